@@ -1,0 +1,93 @@
+"""The two decorators that every compiled function of pmviewer uses, and where compiled code is kept.
+
+Numba decides whether a cached function is stale by looking at that function's own file alone, so an edit in a module
+that a cached function *calls* would go unnoticed. The cache folder is therefore named after a hash of all sources of
+the package: an edit anywhere starts a fresh folder, and old folders are swept.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba import njit
+
+FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
+"""Never `nnan`/`ninf`: they delete the checks for non-finite numbers."""
+
+KEPT_CACHES = 3
+
+
+def source_hash() -> str:
+    """Hash of every Python source of the package (16 hex digits)."""
+    digest = hashlib.sha256(f"{sys.version_info[:2]}{numba.__version__}".encode())
+    for path in sorted(Path(__file__).resolve().parent.parent.rglob("*.py")):
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def user_cache_root() -> Path:
+    """The folder for files that can be made again, by the platform's custom."""
+    if override := os.environ.get("PMVIEWER_CACHE"):
+        return Path(override)
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "pmviewer" / "Cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "pmviewer"
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "pmviewer"
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / f".probe{os.getpid()}"
+        probe.touch()
+        probe.unlink()
+    except OSError:
+        return False
+    return True
+
+
+def _choose_cache() -> Path:
+    name = source_hash()
+    root = user_cache_root() / "kernels"
+    if not _writable(root):
+        root = Path(tempfile.gettempdir()) / f"pmviewer-kernels-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
+        if not _writable(root):
+            root = Path(tempfile.mkdtemp(prefix="pmviewer-kernels-"))
+    folder = root / name
+    folder.mkdir(parents=True, exist_ok=True)
+    others = [p for p in root.iterdir() if p.is_dir() and p != folder]
+    for stale in sorted(others, key=lambda p: p.stat().st_mtime, reverse=True)[KEPT_CACHES - 1 :]:
+        shutil.rmtree(stale, ignore_errors=True)
+    os.utime(folder)
+    return folder
+
+
+CACHE_FOLDER = _choose_cache()
+numba.config.CACHE_DIR = str(CACHE_FOLDER)
+
+_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": FASTMATH}
+
+
+def device(function: Callable[..., Any]) -> Any:
+    """A function that kernels call; LLVM may inline it."""
+    return njit(**_OPTIONS)(function)
+
+
+def device_call(function: Callable[..., Any]) -> Any:
+    """A large function that kernels call and that is never copied into them (keeps compile time down)."""
+    return njit(inline="never", **_OPTIONS)(function)
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """An entry point that Python calls: serial, without the GIL, on one tile or batch."""
+    return njit(**_OPTIONS)(function)

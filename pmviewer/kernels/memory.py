@@ -1,0 +1,109 @@
+"""Intrinsics below numba's arrays: stack scratch, loads from raw addresses, bit casts.
+
+A kernel sees the scene as one record of addresses (DESIGN: kernels). `load_f4(address, i)` reads element i of a float32
+array that starts at `address`; Python keeps the array alive.
+"""
+
+from __future__ import annotations
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+I8, I32, I64, F32 = ir.IntType(8), ir.IntType(32), ir.IntType(64), ir.FloatType()
+
+
+@intrinsic
+def bits_of_float(typingctx, x):
+    """The bits of a float32 as uint32."""
+    signature = types.uint32(types.float32)
+
+    def codegen(context, builder, sig, args):
+        return builder.bitcast(args[0], I32)
+
+    return signature, codegen
+
+
+@intrinsic
+def float_of_bits(typingctx, x):
+    """The float32 whose bits are the given uint32."""
+    signature = types.float32(types.uint32)
+
+    def codegen(context, builder, sig, args):
+        return builder.bitcast(args[0], F32)
+
+    return signature, codegen
+
+
+@intrinsic
+def count_trailing_zeros(typingctx, mask):
+    """Index of the lowest set bit of a non-zero int32."""
+    signature = types.int32(types.int32)
+
+    def codegen(context, builder, sig, args):
+        return builder.cttz(args[0], ir.Constant(ir.IntType(1), 1))
+
+    return signature, codegen
+
+
+def _loader(numba_type, llvm_type):
+    @intrinsic
+    def load(typingctx, address, index):
+        signature = numba_type(types.int64, types.int64)
+
+        def codegen(context, builder, sig, args):
+            base = builder.inttoptr(args[0], llvm_type.as_pointer())
+            return builder.load(builder.gep(base, [args[1]]))
+
+        return signature, codegen
+
+    return load
+
+
+load_f4 = _loader(types.float32, F32)
+load_i4 = _loader(types.int32, I32)
+load_u4 = _loader(types.uint32, I32)
+
+
+@intrinsic
+def stack_i4(typingctx, count):
+    """Pointer to `count` (a literal) uninitialised int32 on the stack, 64-byte aligned: scratch without a heap."""
+    length = count.literal_value
+    signature = types.CPointer(types.int32)(count)
+
+    def codegen(context, builder, sig, args):
+        with builder.goto_entry_block():
+            pointer = builder.alloca(ir.ArrayType(I32, length))
+            pointer.align = 64
+        return builder.bitcast(pointer, I32.as_pointer())
+
+    return signature, codegen
+
+
+def _stack_access(numba_type, llvm_type):
+    @intrinsic
+    def get(typingctx, pointer, index):
+        signature = numba_type(pointer, types.int64)
+
+        def codegen(context, builder, sig, args):
+            return builder.load(builder.gep(builder.bitcast(args[0], llvm_type.as_pointer()), [args[1]]))
+
+        return signature, codegen
+
+    @intrinsic
+    def put(typingctx, pointer, index, value):
+        signature = types.void(pointer, types.int64, numba_type)
+
+        def codegen(context, builder, sig, args):
+            base = builder.bitcast(args[0], llvm_type.as_pointer())
+            builder.store(args[2], builder.gep(base, [args[1]]))
+            return context.get_dummy_value()
+
+        return signature, codegen
+
+    return get, put
+
+
+stack_get_i4, stack_put_i4 = _stack_access(types.int32, I32)
+stack_get_f4, stack_put_f4 = _stack_access(types.float32, F32)
+stack_get_i8, stack_put_i8 = _stack_access(types.int64, I64)

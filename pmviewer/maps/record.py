@@ -1,0 +1,108 @@
+"""The photon as it is stored: 24 bytes (T4).
+
+A map is a C-contiguous (n, 6) float32 array of which only the first three columns are floats; the rest is read
+through its uint32 view:
+
+====  =========================================================================================
+0–2   position x, y, z (float32, scene units)
+3     incident direction `wi`, octahedral, 12 + 12 bits, in the high 24 bits; flags in the low 8
+4     power red in the low, green in the high 16 bits
+5     power blue in the low 16 bits, light id in the high 16 bits
+====  =========================================================================================
+
+`wi` points from the surface to where the photon came from. Powers are unsigned 16-bit floats (6 bits of exponent, 10
+of mantissa: relative error 2⁻¹¹) in units of the map's `power_unit`; 1.0 is the power with which photons leave the
+lights, so that the range 2⁻⁴⁷ … 2¹⁶ fits any scene's scale.
+
+Flags: bit 7 the last scattering was specular; bit 6 there was a non-specular scattering before; bits 0–5 the number of
+scatterings so far (63 means 63 or more). They spell the path class: direct `LD` (neither bit), caustic `LS+D`
+(bit 7 alone), indirect (bit 6 alone), indirect caustic (both).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.jit import device
+from pmviewer.kernels.memory import bits_of_float, float_of_bits
+
+BYTES_PER_PHOTON = 24
+
+LAST_SPECULAR = 0x80
+HAD_DIFFUSE = 0x40
+BOUNCES = 0x3F
+
+DIRECT, CAUSTIC, INDIRECT, INDIRECT_CAUSTIC = 0, 2, 1, 3
+"""Path classes as `flags >> 6`."""
+
+_EXPONENT_BASE = np.uint32((127 - 47) << 23)
+_f4 = np.float32
+_u4 = np.uint32
+
+
+@device
+def encode_power(x):
+    """Non-negative float32 in units of the map's power → 16-bit code (round to nearest, 0 below 2⁻⁴⁷)."""
+    bits = _u4(bits_of_float(_f4(x)))
+    if bits < _u4(_EXPONENT_BASE + _u4(0x2000)):
+        return _u4(0)
+    code = _u4(_u4(bits + _u4(0x1000) - _EXPONENT_BASE) >> _u4(13))
+    return min(code, _u4(0xFFFF))
+
+
+@device
+def decode_power(code):
+    """16-bit code → float32 in units of the map's power."""
+    if _u4(code) == _u4(0):
+        return _f4(0.0)
+    return float_of_bits(_u4(_u4(_u4(code) << _u4(13)) + _EXPONENT_BASE))
+
+
+@device
+def encode_direction(x, y, z):
+    """Unit vector → 24-bit octahedral code in the high bits of a uint32 (worst error 0.05°)."""
+    s = _f4(1.0) / (abs(x) + abs(y) + abs(z))
+    u, v = x * s, y * s
+    if z < _f4(0.0):
+        a = (_f4(1.0) - abs(v)) * (_f4(1.0) if u >= _f4(0.0) else _f4(-1.0))
+        v = (_f4(1.0) - abs(u)) * (_f4(1.0) if v >= _f4(0.0) else _f4(-1.0))
+        u = a
+    iu = _u4(min(max(u * _f4(2047.0) + _f4(2047.5), _f4(0.0)), _f4(4094.0)))
+    iv = _u4(min(max(v * _f4(2047.0) + _f4(2047.5), _f4(0.0)), _f4(4094.0)))
+    return _u4((iu << _u4(20)) | (iv << _u4(8)))
+
+
+@device
+def decode_direction(code):
+    """24-bit octahedral code → vector of the right direction, not normalised (length in [0.57, 1])."""
+    scale = _f4(1.0 / 2047.0)
+    u = _f4(np.int32(_u4(code) >> _u4(20)) - np.int32(2047)) * scale
+    v = _f4(np.int32((_u4(code) >> _u4(8)) & _u4(0xFFF)) - np.int32(2047)) * scale
+    z = _f4(1.0) - abs(u) - abs(v)
+    t = max(-z, _f4(0.0))
+    x = u - t if u >= _f4(0.0) else u + t
+    y = v - t if v >= _f4(0.0) else v + t
+    return x, y, z
+
+
+def unpack(photons, power_unit: float) -> dict[str, np.ndarray]:
+    """Photons (n, 6) as named arrays: `position` (n, 3) float32, `wi` (n, 3) float32 unit, `Phi` (n, 3) float32 watts,
+    `bounces` (n,) int, `path_class` (n,) int, `light` (n,) int."""
+    words = photons.view(np.uint32)
+    u = ((words[:, 3] >> 20).astype(np.float32) - 2047) / 2047
+    v = (((words[:, 3] >> 8) & 0xFFF).astype(np.float32) - 2047) / 2047
+    z = 1 - np.abs(u) - np.abs(v)
+    t = np.maximum(-z, 0)
+    wi = np.stack([u - np.where(u >= 0, t, -t), v - np.where(v >= 0, t, -t), z], axis=1)
+    wi /= np.linalg.norm(wi, axis=1, keepdims=True)
+    codes = np.stack([words[:, 4] & 0xFFFF, words[:, 4] >> 16, words[:, 5] & 0xFFFF], axis=1).astype(np.uint32)
+    power = np.where(codes == 0, np.float32(0), ((codes << 13) + _EXPONENT_BASE).view(np.float32))
+    flags = (words[:, 3] & 0xFF).astype(np.int32)
+    return {
+        "position": photons[:, :3],
+        "wi": wi.astype(np.float32),
+        "Phi": (power * np.float32(power_unit)).astype(np.float32),
+        "bounces": flags & BOUNCES,
+        "path_class": flags >> 6,
+        "light": (words[:, 5] >> 16).astype(np.int32),
+    }

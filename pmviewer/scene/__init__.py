@@ -1,0 +1,1 @@
+"""What is in the world: descriptions, loaders, analysis and flattening into arrays."""
