@@ -1,0 +1,493 @@
+"""The single schema of everything a user can change.
+
+Sliders, tooltips, `--set`, session files, EXR metadata and the table in the documentation are all made from this tree.
+A setting's `stage` is the earliest stage of the pipeline that reads it: changing the setting recomputes that stage and
+what follows, nothing before it (see `docs/architecture.md`).
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+
+from pmviewer.errors import SettingError
+
+Scale = Literal["linear", "log", "integer", "choice", "switch", "vector"]
+Stage = Literal["photons", "maps", "image", "display", "stop"]
+Auto = Literal["auto"]
+Vec3 = tuple[float, float, float]
+
+
+def setting(
+    default: Any,
+    description: str,
+    *,
+    stage: Stage,
+    scale: Scale,
+    title: str = "",
+    unit: str = "",
+    ge: float | None = None,
+    le: float | None = None,
+) -> Any:
+    """A field of the schema. `ge` and `le` bound numbers, `unit` is shown behind the value."""
+    extra = {"stage": stage, "scale": scale, "unit": unit, "ge": ge, "le": le}
+    return Field(default, description=description, title=title or None, json_schema_extra=extra)
+
+
+class Group(BaseModel):
+    """A frozen group of settings; unknown names are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _in_bounds(cls, value: Any, field: ValidationInfo) -> Any:
+        """Bounds live in the schema's extras, not in pydantic's own constraints, which "auto" would not pass."""
+        extra: Any = cls.model_fields[field.field_name or ""].json_schema_extra
+        if extra and isinstance(value, int | float) and not isinstance(value, bool):
+            if (extra["ge"] is not None and value < extra["ge"]) or (extra["le"] is not None and value > extra["le"]):
+                raise ValueError("out of bounds")
+        return value
+
+
+class Photons(Group):
+    """Light pass"""
+
+    N: int = setting(
+        200_000,
+        "Photon trajectories emitted in each pass.",
+        stage="photons",
+        scale="log",
+        unit="photons",
+        ge=100,
+        le=50_000_000,
+    )
+    q: float = setting(
+        0.5,
+        "Share of the trajectories that fill the global map; the caustic map gets all of them (Keller and Wald §2.4).",
+        stage="photons",
+        scale="log",
+        ge=0.001,
+        le=1.0,
+    )
+    q_rule: Literal["trajectories", "photons"] = setting(
+        "trajectories",
+        "How q thins the global map: only the first q·N trajectories fill it, or every trajectory's photon is stored "
+        "with probability q and power divided by q.",
+        stage="photons",
+        scale="choice",
+        title="q rule",
+    )
+    indirect_caustics: bool = setting(
+        True,
+        "Photons last scattered by a specular surface go to the caustic map even after a diffuse bounce "
+        "(Keller and Wald §2.3). Off: they belong to the global map alone.",
+        stage="photons",
+        scale="switch",
+    )
+    sequence: Literal["sobol", "independent"] = setting(
+        "sobol",
+        "Random numbers of the photons: Owen-scrambled Sobol points, or independent ones.",
+        stage="photons",
+        scale="choice",
+    )
+    max_bounces: int = setting(
+        64,
+        "Scatterings after which a photon is dropped; Russian roulette ends nearly all of them earlier.",
+        stage="photons",
+        scale="integer",
+        ge=1,
+        le=1000,
+    )
+
+
+class Estimate(Group):
+    """Density estimate"""
+
+    radius: float | Auto = setting(
+        "auto",
+        "Look-up radius of the first pass, relative to the scene's bounding-sphere radius. Automatic: a few pixel "
+        "footprints at the typical distance of what the camera sees.",
+        stage="maps",
+        scale="log",
+        unit="× scene",
+        ge=1e-5,
+        le=1.0,
+    )
+    caustic_radius: float = setting(
+        0.5,
+        "Radius of caustic look-ups relative to that of global ones: caustics are sharper and their map is denser.",
+        stage="maps",
+        scale="log",
+        unit="× radius",
+        ge=0.05,
+        le=2.0,
+    )
+    alpha: float = setting(
+        2.0 / 3.0,
+        "How fast the radius shrinks from pass to pass, r²ᵢ₊₁ = r²ᵢ·(i+α)/(i+1). 1 keeps it (and its bias).",
+        stage="maps",
+        scale="linear",
+        ge=0.0,
+        le=1.0,
+    )
+    floor: float = setting(
+        1e-5,
+        "No pass uses a smaller radius than this, relative to the scene's bounding-sphere radius.",
+        stage="maps",
+        scale="log",
+        unit="× scene",
+        ge=1e-7,
+        le=0.1,
+    )
+    lookup: Literal["radius", "nearest"] = setting(
+        "radius",
+        "Photons within the radius of the pass, or the k nearest ones (up to the maximum radius).",
+        stage="maps",
+        scale="choice",
+    )
+    k: int = setting(50, "Photons in a k-nearest estimate.", stage="maps", scale="log", unit="photons", ge=2, le=1000)
+    rim: Literal["left out", "half", "whole"] = setting(
+        "left out",
+        "How the k-th photon, which sets the radius, counts: leaving it out is exact for independently scattered "
+        "photons, half suits stratified ones, whole is too bright.",
+        stage="image",
+        scale="choice",
+    )
+    max_radius: float | Auto = setting(
+        "auto",
+        "Largest radius of a k-nearest search, relative to the scene. Automatic: where k of the brightest photons would "
+        "still be darker than the black level (course guide §5.2).",
+        stage="maps",
+        scale="log",
+        unit="× scene",
+        ge=1e-5,
+        le=2.0,
+    )
+    black_level: float = setting(
+        0.05,
+        "Radiance below which the automatic maximum radius may lose detail.",
+        stage="maps",
+        scale="log",
+        unit="W/(m² sr)",
+        ge=1e-6,
+        le=10.0,
+    )
+    filter: Literal["constant", "cone", "gaussian", "simpson", "epanechnikov"] = setting(
+        "constant", "Kernel that weighs photons by their distance.", stage="image", scale="choice"
+    )
+    cone_k: float = setting(
+        1.1, "Slope of the cone filter: its weight is 1 − d/(k·r).", stage="image", scale="linear", ge=1.0, le=10.0
+    )
+    flatness: float = setting(
+        0.2,
+        "Half-thickness of the search disc relative to the radius: photons further off the tangent plane are another "
+        "surface's. 1 searches a sphere.",
+        stage="image",
+        scale="linear",
+        unit="× radius",
+        ge=0.01,
+        le=1.0,
+    )
+
+
+class Direct(Group):
+    """Direct light"""
+
+    samples: int = setting(
+        1, "Light samples per pixel and pass.", stage="image", scale="integer", unit="samples", ge=1, le=64
+    )
+    mis: bool = setting(
+        True,
+        "Combine light sampling with BSDF sampling by multiple importance sampling (power heuristic). Off: light "
+        "sampling alone.",
+        stage="image",
+        scale="switch",
+        title="MIS",
+    )
+
+
+class Gather(Group):
+    """Final gather"""
+
+    rays: int = setting(
+        4, "Final-gather rays per pixel and pass.", stage="image", scale="integer", unit="rays", ge=1, le=256
+    )
+
+
+class Render(Group):
+    """Method"""
+
+    method: Literal["progressive", "gather", "path", "global map", "caustic map"] = setting(
+        "progressive",
+        "progressive: direct light by sampling, both maps shown directly with a shrinking radius. gather: indirect "
+        "light by a final gather into the global map. path: path tracing, the yardstick without photons. "
+        "global/caustic map: that map alone, as it is.",
+        stage="image",
+        scale="choice",
+    )
+    max_depth: int = setting(
+        32,
+        "Longest chain of mirrors and glass followed from the camera, and longest path of the path tracer.",
+        stage="image",
+        scale="integer",
+        ge=1,
+        le=1000,
+    )
+    seed: int = setting(1, "Seed of every random stream.", stage="photons", scale="integer", ge=0, le=2**31 - 1)
+    passes: int = setting(
+        1024, "Refinement stops after this many passes.", stage="stop", scale="log", unit="passes", ge=1, le=1_000_000
+    )
+    time_limit: float = setting(
+        0.0, "Refinement stops after this time; 0 is no limit.", stage="stop", scale="linear", unit="s", ge=0, le=1e6
+    )
+
+
+class CameraSettings(Group):
+    """Camera"""
+
+    origin: Vec3 | Auto = setting("auto", "Eye point; auto is the scene file's.", stage="image", scale="vector")
+    target: Vec3 | Auto = setting("auto", "Point in the image's centre.", stage="image", scale="vector")
+    up: Vec3 | Auto = setting("auto", "Direction that is upright in the image.", stage="image", scale="vector")
+    fov: float | Auto = setting(
+        "auto", "Horizontal field of view.", stage="image", scale="linear", unit="°", ge=1.0, le=170.0, title="FOV"
+    )
+    width: int | Auto = setting(
+        "auto", "Image width; auto is the scene file's.", stage="image", scale="integer", unit="px", ge=1, le=16384
+    )
+    height: int | Auto = setting("auto", "Image height.", stage="image", scale="integer", unit="px", ge=1, le=16384)
+
+
+class Display(Group):
+    """Display"""
+
+    view: Literal[
+        "beauty", "emission", "direct", "specular", "caustic", "indirect", "albedo", "normal", "depth", "geometry"
+    ] = setting(
+        "beauty",
+        "What the viewport shows: the image, one of its terms, a property of the first hit, or the shaded geometry.",
+        stage="display",
+        scale="choice",
+    )
+    exposure: float = setting(
+        0.0, "Exposure before the tone curve.", stage="display", scale="linear", unit="EV", ge=-20, le=20
+    )
+    tone: Literal["sRGB", "Reinhard", "filmic", "linear"] = setting(
+        "sRGB", "Tone curve from radiance to the screen.", stage="display", scale="choice", title="tone curve"
+    )
+
+
+Colour = Literal["power", "bounce", "light"]
+
+
+class PointOverlay(Group):
+    """A photon map drawn as points"""
+
+    show: bool = setting(False, "Draw the photons of this map.", stage="display", scale="switch")
+    size: float = setting(2.0, "Point size.", stage="display", scale="linear", unit="px", ge=1, le=12)
+    colour: Colour = setting(
+        "power", "Colour by power, by number of bounces or by light.", stage="display", scale="choice"
+    )
+    depth: bool = setting(True, "Hide points behind surfaces.", stage="display", scale="switch", title="depth test")
+    limit: int = setting(
+        100_000,
+        "At most this many points are drawn, evenly thinned.",
+        stage="display",
+        scale="log",
+        unit="points",
+        ge=1_000,
+        le=5_000_000,
+    )
+
+
+class Overlays(Group):
+    """Overlays"""
+
+    caustic: PointOverlay = Field(default_factory=PointOverlay, title="caustic photons")
+    global_: PointOverlay = Field(default_factory=PointOverlay, alias="global", title="global photons")
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
+
+
+class Settings(Group):
+    """All settings of a session."""
+
+    photons: Photons = Field(default_factory=Photons)
+    estimate: Estimate = Field(default_factory=Estimate)
+    direct: Direct = Field(default_factory=Direct)
+    gather: Gather = Field(default_factory=Gather)
+    render: Render = Field(default_factory=Render)
+    camera: CameraSettings = Field(default_factory=CameraSettings)
+    display: Display = Field(default_factory=Display)
+    overlays: Overlays = Field(default_factory=Overlays)
+
+
+@dataclass(frozen=True)
+class SettingInfo:
+    """What an interface needs to know about one setting. `path` is its full name ("photons.N"), `group` the group's
+    heading, `kind` its Python type, `auto` whether "auto" is a value, `choices` the values of a choice."""
+
+    path: str
+    group: str
+    title: str
+    description: str
+    unit: str
+    scale: Scale
+    stage: Stage
+    kind: type
+    lower: float | None
+    upper: float | None
+    choices: tuple[str, ...]
+    auto: bool
+    default: Any
+
+
+def _kind_of(annotation: Any) -> tuple[type, tuple[str, ...], bool]:
+    """Plain type, choices and whether "auto" is allowed, of a field's annotation."""
+    origin = get_origin(annotation)
+    if origin is Literal:
+        return str, tuple(get_args(annotation)), False
+    if origin in (Union, types.UnionType):
+        plain = next(arm for arm in get_args(annotation) if get_origin(arm) is not Literal)
+        kind, choices, _ = _kind_of(plain)
+        return kind, choices, True
+    if origin is tuple:
+        return tuple, (), False
+    return annotation, (), False
+
+
+def _infos(model: type[BaseModel], prefix: str, heading: str) -> Iterator[SettingInfo]:
+    for name, field in model.model_fields.items():
+        public = field.alias or name
+        path = f"{prefix}{public}"
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            inner = field.title or (field.annotation.__doc__ or public).strip()
+            yield from _infos(field.annotation, f"{path}.", inner)
+            continue
+        extra: Any = field.json_schema_extra
+        kind, choices, auto = _kind_of(field.annotation)
+        yield SettingInfo(
+            path=path,
+            group=heading,
+            title=field.title or public.replace("_", " "),
+            description=field.description or "",
+            unit=extra["unit"],
+            scale=extra["scale"],
+            stage=extra["stage"],
+            kind=kind,
+            lower=extra["ge"],
+            upper=extra["le"],
+            choices=choices,
+            auto=auto,
+            default=field.default,
+        )
+
+
+SETTINGS: dict[str, SettingInfo] = {info.path: info for info in _infos(Settings, "", "")}
+"""Every setting by its full name, in the order of the schema."""
+
+
+def info_of(path: str) -> SettingInfo:
+    """Raises SettingError, naming near misses, when there is no such setting."""
+    if path in SETTINGS:
+        return SETTINGS[path]
+    import difflib
+
+    near = difflib.get_close_matches(path, SETTINGS, n=3, cutoff=0.4)
+    hint = f" Did you mean {' or '.join(near)}?" if near else ""
+    raise SettingError(f"There is no setting '{path}'.{hint}")
+
+
+def get(settings: Settings, path: str) -> Any:
+    """The value of the setting with that full name."""
+    info_of(path)
+    value: Any = settings
+    for part in path.split("."):
+        value = getattr(value, "global_" if part == "global" else part)
+    return value
+
+
+def with_values(settings: Settings, values: dict[str, Any]) -> Settings:
+    """A copy with some settings changed. Raises SettingError that names setting, value and what is allowed."""
+    tree = settings.model_dump(by_alias=True)
+    for path, value in values.items():
+        info_of(path)
+        *groups, name = path.split(".")
+        branch = tree
+        for part in groups:
+            branch = branch[part]
+        branch[name] = value
+    return from_tree(tree)
+
+
+def from_tree(tree: dict[str, Any]) -> Settings:
+    """Settings from nested dictionaries; whatever is missing has its default. Raises SettingError."""
+    try:
+        return Settings.model_validate(tree)
+    except ValidationError as error:
+        raise SettingError(_explain(error)) from None
+
+
+def _explain(error: ValidationError) -> str:
+    first = error.errors()[0]
+    parts = [str(p) for p in first["loc"]]
+    while parts and ".".join(parts) not in SETTINGS and len(parts) > 1:
+        parts.pop()
+    path = ".".join(parts)
+    if path not in SETTINGS:
+        return f"There is no setting '{'.'.join(str(p) for p in first['loc'])}'."
+    info = SETTINGS[path]
+    allowed = "one of " + ", ".join(info.choices) if info.choices else _range_text(info)
+    return f"{path} = {first['input']!r} is not allowed: expected {allowed}."
+
+
+def _range_text(info: SettingInfo) -> str:
+    if info.scale == "vector":
+        text = "three numbers (x, y, z)"
+    elif info.kind is bool:
+        text = "true or false"
+    else:
+        text = f"{'a whole number' if info.kind is int else 'a number'}"
+        if info.lower is not None and info.upper is not None:
+            text += f" from {info.lower:g} to {info.upper:g}"
+    return text + (" or auto" if info.auto else "")
+
+
+def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
+    """`key=value` texts of the command line as values for `with_values`. Raises SettingError."""
+    values: dict[str, Any] = {}
+    for text in assignments:
+        path, separator, raw = (part.strip() for part in text.partition("="))
+        if not separator:
+            raise SettingError(f"'{text}' is not a setting: write name=value, for example photons.N=200000.")
+        info = info_of(path)
+        if info.scale == "vector" and raw != "auto":
+            values[path] = tuple(part for part in raw.replace(",", " ").split())
+        elif info.kind is int and raw != "auto":
+            values[path] = _whole_number(raw)
+        else:
+            values[path] = raw
+    return values
+
+
+def _whole_number(raw: str) -> Any:
+    """2e5 and 200_000 are whole numbers too; anything else is left for the schema to refuse."""
+    try:
+        number = float(raw.replace("_", ""))
+    except ValueError:
+        return raw
+    return int(number) if number.is_integer() else number
+
+
+def flat(settings: Settings) -> dict[str, Any]:
+    """Every setting's value by full name."""
+    return {path: get(settings, path) for path in SETTINGS}
+
+
+def changed_stages(before: Settings, after: Settings) -> set[Stage]:
+    """Stages of the settings that differ."""
+    return {info.stage for path, info in SETTINGS.items() if get(before, path) != get(after, path)}
