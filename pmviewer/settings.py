@@ -160,8 +160,8 @@ class Estimate(Group):
     )
     max_radius: float | Auto = setting(
         "auto",
-        "Largest radius of a k-nearest search, relative to the scene. Automatic: where k of the brightest photons would "
-        "still be darker than the black level (course guide §5.2).",
+        "Largest radius of a k-nearest search, relative to the scene. Automatic: where k of the brightest photons "
+        "would still be darker than the black level (course guide §5.2).",
         stage="maps",
         scale="log",
         unit="× scene",

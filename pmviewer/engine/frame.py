@@ -1,0 +1,96 @@
+"""What a session publishes: frames with their statistics, its state, and its messages. All immutable."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.render.camera import CameraPose
+from pmviewer.render.planes import view_of
+from pmviewer.settings import Settings
+
+State = Literal["empty", "loading", "preparing", "rendering", "paused", "finished", "failed"]
+Level = Literal["info", "warning", "error"]
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Counts since the last restart, unless a field says otherwise. Lengths in scene units."""
+
+    passes: int = 0
+    emitted: int = 0
+    stored: Mapping[str, int] = field(default_factory=dict)
+    """Photons stored, all passes together, by map ("caustic", "global")."""
+    stored_in_pass: Mapping[str, int] = field(default_factory=dict)
+    radius: Mapping[str, float] = field(default_factory=dict)
+    """Look-up radius of the latest pass by map."""
+    rays: int = 0
+    seconds: float = 0.0
+    """Rendering time without pauses."""
+    cpu_seconds: float = 0.0
+    stage_seconds: Mapping[str, float] = field(default_factory=dict)
+    """CPU time by stage, summed over threads."""
+    map_bytes: int = 0
+    bytes_per_photon: float = 0.0
+    dropped: Mapping[str, int] = field(default_factory=dict)
+    """Samples left out because they were not finite or negative, by place; all zero in a healthy scene."""
+    skipped: tuple[tuple[str, str], ...] = ()
+    """Stages that did not run and why."""
+
+    @property
+    def rays_per_second(self) -> float:
+        return self.rays / self.seconds if self.seconds > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class PhotonCloud:
+    """One map's photons of the latest pass, as `pmviewer.maps.record` describes them: (n, 6) float32."""
+
+    photons: NDArray[np.float32]
+    power_unit: float
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One published picture. `planes` is (height, width, 22) float32, see `pmviewer.render.planes`."""
+
+    serial: int
+    """Grows by one with each frame of a session."""
+    version: int
+    """Version of the settings it was made with."""
+    coarse: bool
+    """True for the quick first picture of a new state: few pixels, few photons."""
+    planes: NDArray[np.float32]
+    settings: Settings
+    camera: CameraPose
+    statistics: Statistics
+    clouds: Mapping[str, PhotonCloud] = field(default_factory=dict)
+    scene_name: str = ""
+
+    def image(self, view: str = "beauty") -> NDArray[np.float32]:
+        """(height, width, 3), or 1 channel for depth; view is `beauty`, a term or a first-hit property."""
+        return view_of(self.planes, view)
+
+
+@dataclass(frozen=True)
+class Status:
+    """What the session is doing now. `progress` is 0–1 of the current activity, None when unknown."""
+
+    state: State = "empty"
+    text: str = ""
+    passes: int = 0
+    progress: float | None = None
+
+
+@dataclass(frozen=True)
+class Message:
+    """A line for the log."""
+
+    level: Level
+    text: str
+    when: float = field(default_factory=time.time)

@@ -1,0 +1,1 @@
+"""The eye pass: camera, direct light, gathering, path tracer, film."""

@@ -1,0 +1,123 @@
+"""The perspective camera: from scene and settings to rays, and to the matrices with which OpenGL draws the same view."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.errors import SettingError
+from pmviewer.scene.description import Camera, Scene, Vec3
+from pmviewer.settings import CameraSettings
+
+Matrix = NDArray[np.float64]
+
+
+def _fov_x(camera: Camera, width: int, height: int) -> float:
+    """Horizontal field of view in degrees of a camera whose `fov_axis` may be another."""
+    half = math.tan(math.radians(camera.fov) / 2)
+    aspect = width / height
+    axis = camera.fov_axis
+    if axis == "smaller":
+        axis = "x" if width <= height else "y"
+    elif axis == "larger":
+        axis = "x" if width >= height else "y"
+    if axis == "y":
+        half *= aspect
+    elif axis == "diagonal":
+        half *= aspect / math.hypot(aspect, 1)
+    return math.degrees(2 * math.atan(half))
+
+
+@dataclass(frozen=True)
+class CameraPose:
+    """A camera with nothing left open. `fov` is horizontal, in degrees; `width` and `height` in pixels."""
+
+    origin: Vec3
+    target: Vec3
+    up: Vec3
+    fov: float
+    width: int
+    height: int
+    near: float = 0.0
+    far: float = math.inf
+    mirrored: bool = False
+
+    def axes(self) -> tuple[Matrix, Matrix, Matrix]:
+        """Unit vectors to the right of the image, to its top, and into the view.
+
+        Raises SettingError when eye and target coincide. An `up` along the view direction is replaced.
+        """
+        forward = np.subtract(self.target, self.origin)
+        length = float(np.linalg.norm(forward))
+        if not math.isfinite(length) or length == 0:
+            raise SettingError("The camera's origin and target coincide: move one of them.")
+        forward /= length
+        up = np.asarray(self.up, float)
+        right = np.cross(forward, up)
+        if np.linalg.norm(right) < 1e-9 * max(1e-300, float(np.linalg.norm(up))) or not np.all(np.isfinite(right)):
+            right = np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))])
+        right /= np.linalg.norm(right)
+        top = np.cross(right, forward)
+        return (-right if self.mirrored else right), top, forward
+
+    def ray_frame(self) -> NDArray[np.float64]:
+        """(4, 3): eye, direction through the image's top left corner, and its change per pixel to the right and down."""
+        right, top, forward = self.axes()
+        half = math.tan(math.radians(self.fov) / 2)
+        step = 2 * half / self.width
+        corner = forward - right * half + top * (step * self.height / 2)
+        return np.array([self.origin, corner, right * step, -top * step], dtype=np.float64)
+
+    def pixel_angle(self) -> float:
+        """Width of a pixel in the image's centre divided by its distance."""
+        return 2 * math.tan(math.radians(self.fov) / 2) / self.width
+
+    def view_matrix(self) -> Matrix:
+        """World to eye space (OpenGL: the camera looks along −z), row-major (4, 4)."""
+        right, top, forward = self.axes()
+        rotation = np.eye(4)
+        rotation[0, :3], rotation[1, :3], rotation[2, :3] = right, top, -forward
+        translation = np.eye(4)
+        translation[:3, 3] = -np.asarray(self.origin, float)
+        return rotation @ translation
+
+    def projection_matrix(self, near: float, far: float) -> Matrix:
+        """Eye to clip space (OpenGL), row-major (4, 4)."""
+        half_x = math.tan(math.radians(self.fov) / 2)
+        half_y = half_x * self.height / self.width
+        projection = np.zeros((4, 4))
+        projection[0, 0], projection[1, 1] = 1 / half_x, 1 / half_y
+        projection[2, 2], projection[2, 3] = -(far + near) / (far - near), -2 * far * near / (far - near)
+        projection[3, 2] = -1
+        return projection
+
+    def project(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """World points (n, 3) to (n, 3): pixel x, pixel y (origin in the top left corner) and distance along the view."""
+        right, top, forward = self.axes()
+        offset = np.asarray(points, float) - np.asarray(self.origin, float)
+        depth = offset @ forward
+        scale = self.width / (2 * math.tan(math.radians(self.fov) / 2))
+        x = self.width / 2 + scale * (offset @ right) / depth
+        y = self.height / 2 - scale * (offset @ top) / depth
+        return np.stack([x, y, depth], axis=1)
+
+
+def resolve_camera(scene: Scene, settings: CameraSettings) -> CameraPose:
+    """The scene's camera with the settings' overrides."""
+    width = scene.width if settings.width == "auto" else int(settings.width)
+    height = scene.height if settings.height == "auto" else int(settings.height)
+    camera = scene.camera
+    return CameraPose(
+        origin=camera.origin if settings.origin == "auto" else settings.origin,
+        target=camera.target if settings.target == "auto" else settings.target,
+        up=camera.up if settings.up == "auto" else settings.up,
+        fov=_fov_x(camera, width, height) if settings.fov == "auto" else float(settings.fov),
+        width=width,
+        height=height,
+        near=camera.near,
+        far=camera.far,
+        mirrored=camera.mirrored,
+    )
