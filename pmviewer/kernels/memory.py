@@ -65,7 +65,7 @@ load_i4 = _loader(types.int32, I32)
 load_u4 = _loader(types.uint32, I32)
 
 
-@intrinsic
+@intrinsic(prefer_literal=True)
 def stack_i4(typingctx, count):
     """Pointer to `count` (a literal) uninitialised int32 on the stack, 64-byte aligned: scratch without a heap."""
     length = count.literal_value
