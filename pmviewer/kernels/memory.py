@@ -6,11 +6,26 @@ array that starts at `address`; Python keeps the array alive.
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core import errors
 from numba.extending import intrinsic
 
 I8, I32, I64, F32 = ir.IntType(8), ir.IntType(32), ir.IntType(64), ir.FloatType()
+
+
+CACHE_LINE = 64
+
+
+def aligned_empty(shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
+    """An uninitialised C-contiguous array that starts at a cache line, as aligned vector loads need."""
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    raw = np.empty(size + CACHE_LINE, np.uint8)
+    start = -raw.ctypes.data % CACHE_LINE
+    return raw[start : start + size].view(dtype).reshape(shape)
 
 
 @intrinsic
@@ -68,6 +83,8 @@ load_u4 = _loader(types.uint32, I32)
 @intrinsic(prefer_literal=True)
 def stack_i4(typingctx, count):
     """Pointer to `count` (a literal) uninitialised int32 on the stack, 64-byte aligned: scratch without a heap."""
+    if not isinstance(count, types.IntegerLiteral):
+        raise errors.RequireLiteralValue("the length must be a literal")
     length = count.literal_value
     signature = types.CPointer(types.int32)(count)
 

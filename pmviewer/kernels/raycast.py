@@ -1,0 +1,217 @@
+"""Casting rays: the nearest hit, and whether anything is in between.
+
+`scene` is a record with the fields of `bvh.BVH_FIELDS`. A ray is the points o + t d with tmin < t < tmax; d need not be
+of unit length, t is in units of its length. Lengths of any scale do: there is no absolute epsilon here, callers offset
+the origin or choose tmin.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.jit import device, device_call, kernel
+from pmviewer.kernels.memory import (
+    bits_of_float,
+    count_trailing_zeros,
+    load_i4,
+    stack_get_f4,
+    stack_get_i4,
+    stack_get_i8,
+    stack_i4,
+    stack_put_i4,
+    stack_put_i8,
+)
+from pmviewer.kernels.quadric import QUADRIC_FLOATS, intersect_quadric
+from pmviewer.kernels.simd import (
+    BLOCK_BYTES,
+    CHILD_OFFSET,
+    ID_OFFSET,
+    LANES,
+    NODE_BYTES,
+    ROW_BYTES,
+    hit_boxes,
+    hit_triangles,
+)
+
+QUADRIC_BYTES = 4 * QUADRIC_FLOATS
+STACK_INTS = 1024  # 512 keys; a level pushes at most 7, and the build keeps trees below 70 levels
+SCRATCH_INTS = 4 * LANES
+SMALLEST_COMPONENT = np.float32(1e-18)  # of a direction: its reciprocal stays finite, so that 0 · inf never arises
+PLANE_SLACK = np.float32(2.0**-22)  # relative rounding error of origin · reciprocal, with room
+
+
+@device
+def _reciprocal(x):
+    if abs(x) >= SMALLEST_COMPONENT:
+        return np.float32(1) / x
+    return np.float32(-1e18) if x < np.float32(0) else np.float32(1e18)
+
+
+@device
+def _is_finite(ox, oy, oz, dx, dy, dz):
+    return abs(ox) + abs(oy) + abs(oz) + abs(dx) + abs(dy) + abs(dz) < np.float32(np.inf)
+
+
+@device
+def _key(distances, base, lane):
+    """Entry distance in the high half, child in the low half: non-negative floats sort like their bits."""
+    distance = np.int64(stack_get_i4(distances, lane))
+    return (distance << 32) | (np.int64(load_i4(base, lane)) & 0xFFFFFFFF)
+
+
+@device_call
+def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    """(t, primitive, u, v) of the nearest hit; (tmax, -1, 0, 0) without one.
+
+    u and v are the barycentrics of a triangle's second and third vertex, 0 for quadrics. Negative tmin counts as 0. A
+    ray with a non-finite number hits nothing.
+    """
+    hit, u, v = np.int32(-1), np.float32(0), np.float32(0)
+    if not _is_finite(ox, oy, oz, dx, dy, dz):
+        return tmax, hit, u, v
+    if not tmin > np.float32(0):
+        tmin = np.float32(0)
+    nodes, blocks, n_blocks = scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks
+    stack = stack_i4(STACK_INTS)
+    scratch = stack_i4(SCRATCH_INTS)
+    ix, iy, iz = _reciprocal(dx), _reciprocal(dy), _reciprocal(dz)
+    near_x = np.int64(0 if ix > 0 else ROW_BYTES)
+    near_y = np.int64(2 * ROW_BYTES if iy > 0 else 3 * ROW_BYTES)
+    near_z = np.int64(4 * ROW_BYTES if iz > 0 else 5 * ROW_BYTES)
+    rx, ry, rz = ox * ix, oy * iy, oz * iz
+    sx, sy, sz = abs(rx) * PLANE_SLACK, abs(ry) * PLANE_SLACK, abs(rz) * PLANE_SLACK
+    size = 0
+    child = np.int32(0)
+    while True:
+        if child >= 0:
+            node = nodes + np.int64(child) * NODE_BYTES
+            mask = hit_boxes(
+                node, near_x, near_y, near_z, ix, iy, iz, rx + sx, ry + sy, rz + sz, rx - sx, ry - sy, rz - sz,
+                tmin, tmax, scratch,
+            )  # fmt: skip
+            if mask != 0:
+                base = node + CHILD_OFFSET
+                lane = count_trailing_zeros(mask)
+                mask &= mask - 1
+                if mask == 0:
+                    child = load_i4(base, lane)
+                    continue
+                nearest = _key(scratch, base, lane)
+                bottom = size
+                while mask != 0:
+                    key = _key(scratch, base, count_trailing_zeros(mask))
+                    mask &= mask - 1
+                    if key < nearest:
+                        nearest, key = key, nearest
+                    slot = size
+                    while slot > bottom:
+                        above = stack_get_i8(stack, slot - 1)
+                        if above >= key:
+                            break
+                        stack_put_i8(stack, slot, above)
+                        slot -= 1
+                    stack_put_i8(stack, slot, key)
+                    size += 1
+                child = np.int32(nearest & 0xFFFFFFFF)
+                continue
+        else:
+            leaf = np.int64(~child)
+            if leaf < n_blocks:
+                block = blocks + leaf * BLOCK_BYTES
+                mask = hit_triangles(block, ox, oy, oz, dx, dy, dz, tmin, tmax, scratch)
+                while mask != 0:
+                    lane = count_trailing_zeros(mask)
+                    mask &= mask - 1
+                    scale = np.float32(1) / stack_get_f4(scratch, 3 * LANES + lane)
+                    t = stack_get_f4(scratch, lane) * scale
+                    if t < tmax and t > tmin:
+                        tmax, hit = t, load_i4(block + ID_OFFSET, lane)
+                        u = stack_get_f4(scratch, LANES + lane) * scale
+                        v = stack_get_f4(scratch, 2 * LANES + lane) * scale
+            else:
+                quadric = leaf - n_blocks
+                address = scene.bvh_quadrics + quadric * QUADRIC_BYTES
+                t = intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax)
+                if t < tmax:
+                    tmax, hit = t, np.int32(scene.n_triangles + quadric)
+                    u = v = np.float32(0)
+        limit = np.int64(bits_of_float(tmax))
+        found = False
+        while size > 0:
+            size -= 1
+            key = stack_get_i8(stack, size)
+            if (key >> 32) < limit:
+                child, found = np.int32(key & 0xFFFFFFFF), True
+                break
+        if not found:
+            return tmax, hit, u, v
+
+
+@device_call
+def occluded(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    """Whether the ray meets anything; False for a ray with a non-finite number."""
+    if not _is_finite(ox, oy, oz, dx, dy, dz):
+        return False
+    if not tmin > np.float32(0):
+        tmin = np.float32(0)
+    nodes, blocks, n_blocks = scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks
+    stack = stack_i4(STACK_INTS)
+    scratch = stack_i4(SCRATCH_INTS)
+    ix, iy, iz = _reciprocal(dx), _reciprocal(dy), _reciprocal(dz)
+    near_x = np.int64(0 if ix > 0 else ROW_BYTES)
+    near_y = np.int64(2 * ROW_BYTES if iy > 0 else 3 * ROW_BYTES)
+    near_z = np.int64(4 * ROW_BYTES if iz > 0 else 5 * ROW_BYTES)
+    rx, ry, rz = ox * ix, oy * iy, oz * iz
+    sx, sy, sz = abs(rx) * PLANE_SLACK, abs(ry) * PLANE_SLACK, abs(rz) * PLANE_SLACK
+    size = 0
+    child = np.int32(0)
+    while True:
+        if child >= 0:
+            node = nodes + np.int64(child) * NODE_BYTES
+            mask = hit_boxes(
+                node, near_x, near_y, near_z, ix, iy, iz, rx + sx, ry + sy, rz + sz, rx - sx, ry - sy, rz - sz,
+                tmin, tmax, scratch,
+            )  # fmt: skip
+            if mask != 0:
+                base = node + CHILD_OFFSET
+                child = load_i4(base, count_trailing_zeros(mask))
+                mask &= mask - 1
+                while mask != 0:
+                    stack_put_i4(stack, size, load_i4(base, count_trailing_zeros(mask)))
+                    mask &= mask - 1
+                    size += 1
+                continue
+        else:
+            leaf = np.int64(~child)
+            if leaf < n_blocks:
+                if hit_triangles(blocks + leaf * BLOCK_BYTES, ox, oy, oz, dx, dy, dz, tmin, tmax, scratch) != 0:
+                    return True
+            else:
+                address = scene.bvh_quadrics + (leaf - n_blocks) * QUADRIC_BYTES
+                if intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax) < tmax:
+                    return True
+        if size == 0:
+            return False
+        size -= 1
+        child = stack_get_i4(stack, size)
+
+
+@kernel
+def cast_closest(scene, origins, directions, tmin, tmax, t, primitive, uv):
+    """`closest_hit` of n rays: origins, directions (n, 3), tmin, tmax (n,) float32 in; t (n,), primitive (n,) int32,
+    uv (n, 2) out."""
+    for i in range(len(origins)):
+        t[i], primitive[i], uv[i, 0], uv[i, 1] = closest_hit(
+            scene, origins[i, 0], origins[i, 1], origins[i, 2],
+            directions[i, 0], directions[i, 1], directions[i, 2], tmin[i], tmax[i],
+        )  # fmt: skip
+
+
+@kernel
+def cast_occluded(scene, origins, directions, tmin, tmax, hit):
+    """`occluded` of n rays into hit (n,) bool; the rest as in `cast_closest`."""
+    for i in range(len(origins)):
+        hit[i] = occluded(
+            scene, origins[i, 0], origins[i, 1], origins[i, 2],
+            directions[i, 0], directions[i, 1], directions[i, 2], tmin[i], tmax[i],
+        )  # fmt: skip

@@ -1,0 +1,146 @@
+"""Eight-lane vector operations of the ray caster: one ray against eight boxes, one ray against eight triangles.
+
+LLVM has portable vectors, so `<8 x float>` becomes one AVX register, two SSE or NEON registers, or whatever the machine
+has. Each intrinsic returns an 8-bit mask of lanes as int32; lanes are then visited with `count_trailing_zeros`.
+
+Memory layouts (float32 unless noted, each row is eight lanes = 32 bytes, addresses 32-byte aligned):
+
+- node, 256 bytes: rows lo x, hi x, lo y, hi y, lo z, hi z, child (int32), one unused row;
+- block, 320 bytes: rows v0 x, y, z, e1 x, y, z, e2 x, y, z, primitive id (int32), with e1 = v1 - v0, e2 = v2 - v0.
+"""
+
+from __future__ import annotations
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from pmviewer.kernels.memory import F32, I8, I32, I64
+
+LANES = 8
+ROW_BYTES = 4 * LANES
+NODE_ROWS, NODE_BYTES, CHILD_OFFSET = 8, 8 * ROW_BYTES, 6 * ROW_BYTES
+BLOCK_ROWS, BLOCK_BYTES, ID_OFFSET = 10, 10 * ROW_BYTES, 9 * ROW_BYTES
+
+EDGE_TOLERANCE = 1e-5
+"""A triangle reaches this far over its edges, in barycentrics, so that rays don't slip between neighbours."""
+
+FAR_FACTOR = 1.0 + 2.0**-21
+"""Widens a slab interval by more than its relative rounding error."""
+
+V8 = ir.VectorType(F32, LANES)
+V8I = ir.VectorType(I32, LANES)
+FLAGS = ("contract",)
+SIGN = -(2**31)
+
+
+def _constant(value: float) -> ir.Constant:
+    return ir.Constant(V8, [value] * LANES)
+
+
+def _splat(builder, scalar):
+    vector = builder.insert_element(ir.Constant(V8, ir.Undefined), scalar, ir.Constant(I32, 0))
+    return builder.shuffle_vector(vector, ir.Constant(V8, ir.Undefined), ir.Constant(V8I, [0] * LANES))
+
+
+def _load(builder, address):
+    value = builder.load(builder.inttoptr(address, V8.as_pointer()))
+    value.align = ROW_BYTES
+    return value
+
+
+def _store(builder, value, pointer, row):
+    slot = builder.gep(builder.bitcast(pointer, V8.as_pointer()), [ir.Constant(I32, row)])
+    builder.store(value, slot).align = ROW_BYTES
+
+
+def _mask(builder, lanes):
+    return builder.zext(builder.bitcast(lanes, I8), I32)
+
+
+@intrinsic
+def hit_boxes(typingctx, node, near_x, near_y, near_z, ix, iy, iz, ax, ay, az, bx, by, bz, tmin, tmax, out):
+    """Lanes of the node at address `node` whose boxes the ray meets in [tmin, tmax]; entry distances go to `out`.
+
+    `near_*` are the byte offsets of the rows of the planes that the ray meets first; `i*` the reciprocals of the
+    direction; `a*` and `b*` are origin · i*, nudged up and down by its rounding error, so that the test never misses a
+    box that the exact ray meets. A NaN of one axis leaves the other axes to decide.
+    """
+    f = types.float32
+    signature = types.int32(*[types.int64] * 4, *[f] * 11, out)
+
+    def codegen(context, builder, sig, args):
+        node, nears, inverses = args[0], args[1:4], args[4:7]
+        upper, lower, tmin, tmax, out = args[7:10], args[10:13], args[13], args[14], args[15]
+        enter, leave = _splat(builder, tmin), _splat(builder, tmax)
+        for near, i, a, b in zip(nears, inverses, upper, lower):
+            first = _load(builder, builder.add(node, near))
+            last = _load(builder, builder.add(node, builder.xor(near, ir.Constant(I64, ROW_BYTES))))
+            i = _splat(builder, i)
+            t0 = builder.fsub(builder.fmul(first, i, flags=FLAGS), _splat(builder, a), flags=FLAGS)
+            t1 = builder.fsub(builder.fmul(last, i, flags=FLAGS), _splat(builder, b), flags=FLAGS)
+            enter = builder.select(builder.fcmp_ordered(">", t0, enter), t0, enter)
+            leave = builder.select(builder.fcmp_ordered("<", t1, leave), t1, leave)
+        leave = builder.fmul(leave, _constant(FAR_FACTOR))
+        _store(builder, enter, out, 0)
+        return _mask(builder, builder.fcmp_ordered("<=", enter, leave))
+
+    return signature, codegen
+
+
+@intrinsic
+def hit_triangles(typingctx, block, ox, oy, oz, dx, dy, dz, tmin, tmax, out):
+    """Lanes of the block at address `block` whose triangles the ray meets with tmin < t < tmax.
+
+    Only if there are any, four rows go to `out`: t, u, v, each times |det|, and |det|. The test is that of Möller and
+    Trumbore ("Fast, minimum storage ray/triangle intersection", 1997), multiplied by the determinant instead of divided
+    by it. A triangle without area is never met, whatever the ray.
+    """
+    f = types.float32
+    signature = types.int32(types.int64, *[f] * 8, out)
+
+    def codegen(context, builder, sig, args):
+        block, tmin, tmax, out = args[0], args[7], args[8], args[9]
+
+        def mul(x, y):
+            return builder.fmul(x, y, flags=FLAGS)
+
+        def sub(x, y):
+            return builder.fsub(x, y, flags=FLAGS)
+
+        def add(x, y):
+            return builder.fadd(x, y, flags=FLAGS)
+
+        def cross(x, y):
+            return [sub(mul(x[i], y[j]), mul(x[j], y[i])) for i, j in ((1, 2), (2, 0), (0, 1))]
+
+        def dot(x, y):
+            return add(add(mul(x[0], y[0]), mul(x[1], y[1])), mul(x[2], y[2]))
+
+        def flip(x, sign):
+            return builder.bitcast(builder.xor(builder.bitcast(x, V8I), sign), V8)
+
+        rows = [_load(builder, builder.add(block, ir.Constant(I64, ROW_BYTES * k))) for k in range(9)]
+        v0, e1, e2 = rows[0:3], rows[3:6], rows[6:9]
+        origin, direction = ([_splat(builder, x) for x in args[k : k + 3]] for k in (1, 4))
+        p = cross(direction, e2)
+        det = dot(e1, p)
+        sign = builder.and_(builder.bitcast(det, V8I), ir.Constant(V8I, [SIGN] * LANES))
+        size = flip(det, sign)
+        s = [sub(o, v) for o, v in zip(origin, v0)]
+        u = flip(dot(s, p), sign)
+        q = cross(s, e1)
+        v = flip(dot(direction, q), sign)
+        t = flip(dot(e2, q), sign)
+        slack = mul(size, _constant(-EDGE_TOLERANCE))
+        lanes = builder.and_(builder.fcmp_ordered(">=", u, slack), builder.fcmp_ordered(">=", v, slack))
+        lanes = builder.and_(lanes, builder.fcmp_ordered("<=", add(u, v), mul(size, _constant(1.0 + EDGE_TOLERANCE))))
+        lanes = builder.and_(lanes, builder.fcmp_ordered(">", t, mul(size, _splat(builder, tmin))))
+        lanes = builder.and_(lanes, builder.fcmp_ordered("<", t, mul(size, _splat(builder, tmax))))
+        mask = _mask(builder, lanes)
+        with builder.if_then(builder.icmp_unsigned("!=", mask, ir.Constant(I32, 0)), likely=False):
+            for row, value in enumerate((t, u, v, size)):
+                _store(builder, value, out, row)
+        return mask
+
+    return signature, codegen
