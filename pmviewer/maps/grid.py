@@ -10,7 +10,8 @@ large scene) cells are hashed (Teschner et al. 2003) into about n/2 buckets; fou
 they mostly stay contiguous. Two cells may fall into one bucket; a look-up visits each bucket once, and the distance
 test removes strangers.
 
-A grid stores 24 bytes a photon (positions as three arrays, the rest as (n, 3) words) and at most 6 bytes of cell starts.
+A grid stores 24 bytes a photon (positions as three arrays, the rest as (n, 3) words) and at most 6 bytes a photon of
+cell starts.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Distance tests on eight photons at once.
 
 Positions are stored as three separate arrays (structure of arrays), so that eight of them load as one LLVM vector
-`<8 x float>` each; machines without AVX split it into two halves by themselves. Arrays are padded by `WIDTH` elements so
-that the last load stays inside them.
+`<8 x float>` each; machines without AVX split it into two halves by themselves. Arrays are padded by `WIDTH` elements
+so that the last load stays inside them.
 """
 
 from __future__ import annotations

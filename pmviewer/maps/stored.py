@@ -1,0 +1,44 @@
+"""Reading the photons of a grid or a tree inside kernels.
+
+Both keep positions in three arrays and words 3–5 of the photon record in `payload`, under the same names in their
+kernel records, so that these functions take either.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.jit import device
+from pmviewer.kernels.memory import load_f4, load_u4
+from pmviewer.maps.record import decode_direction, decode_power
+
+ALL_CLASSES = 0b1111
+"""Class mask that takes photons of every path class."""
+
+_f4 = np.float32
+_i4 = np.int32
+_u4 = np.uint32
+
+
+@device
+def arrives(photons, i, nx, ny, nz, class_mask):
+    """Whether photon i comes from the side that the normal points to, on a path whose class has its bit set."""
+    word = load_u4(photons.payload, 3 * i)
+    if (class_mask >> _i4((word >> _u4(6)) & _u4(3))) & 1 == 0:
+        return False
+    wx, wy, wz = decode_direction(word)
+    return nx * wx + ny * wy + nz * wz > _f4(0.0)
+
+
+@device
+def height_above(photons, i, px, py, pz, nx, ny, nz):
+    """Signed distance of photon i from the plane through p with normal n."""
+    dx, dy, dz = load_f4(photons.x, i) - px, load_f4(photons.y, i) - py, load_f4(photons.z, i) - pz
+    return nx * dx + ny * dy + nz * dz
+
+
+@device
+def stored_power(photons, i):
+    """Red, green, blue power of photon i in units of the map's power."""
+    rg, b = load_u4(photons.payload, 3 * i + 1), load_u4(photons.payload, 3 * i + 2)
+    return decode_power(rg & _u4(0xFFFF)), decode_power(rg >> _u4(16)), decode_power(b & _u4(0xFFFF))
