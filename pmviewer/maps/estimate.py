@@ -6,8 +6,12 @@ over photons closer than r that arrive from the front (n·wi > 0), lie inside th
 the full sphere) and belong to a path class whose bit `1 << class` is set in `class_mask`. Photons that fail are left
 out before they count.
 
-With a fixed radius the sum is unbiased but for the blur. Sums run in float64: a pass may put millions of photons into
-one disc.
+With a fixed radius the sum is unbiased but for the blur. With the k nearest photons, r is the distance of the k-th, and
+the disc is known to end exactly at a photon: given r, the k−1 inner photons are independent and uniform in the disc, so
+that their sum alone is unbiased; stratified photons fill their disc more evenly and the rim photon counts half. Where
+fewer than k lie within the largest radius, that is the radius and nothing is corrected.
+
+Sums run in float64: a pass may put millions of photons into one disc.
 """
 
 from __future__ import annotations
@@ -15,42 +19,31 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.jit import device, kernel
-from pmviewer.kernels.memory import count_trailing_zeros, load_f4, load_u4, stack_get_f4, stack_get_i4, stack_i4
+from pmviewer.kernels.memory import (
+    count_trailing_zeros,
+    float_of_bits,
+    stack_get_f4,
+    stack_get_i4,
+    stack_get_i8,
+    stack_i4,
+)
 from pmviewer.maps.filters import CONSTANT, filter_disc_mean, filter_weight
 from pmviewer.maps.grid import grid_ranges
-from pmviewer.maps.record import decode_direction, decode_power
+from pmviewer.maps.kdtree import KEYS, nearest
 from pmviewer.maps.simd import WIDTH, within8
+from pmviewer.maps.stored import arrives, height_above, stored_power
 
-ALL_CLASSES = 0b1111
-"""Class mask that takes photons of every path class."""
+RIM_LEFT_OUT, RIM_HALF, RIM_WHOLE = 0, 1, 2
+"""What the farthest of k nearest photons counts: nothing (exact for independently scattered photons), half
+(Christensen's rule; for stratified first hits), whole."""
 
+_FLATTEST = np.float32(1e-3)
 _f4 = np.float32
 _f8 = np.float64
 _i4 = np.int32
 _i8 = np.int64
 _u4 = np.uint32
 _PI = _f8(np.pi)
-
-
-@device
-def accepts(photons, i, px, py, pz, nx, ny, nz, height, class_mask):
-    """Whether photon i of a grid's or tree's record arrives from the front of the point (p, n), within `height` of its
-    tangent plane, on a path of a wanted class."""
-    word = load_u4(photons.payload, 3 * i)
-    if (class_mask >> _i4((word >> _u4(6)) & _u4(3))) & 1 == 0:
-        return False
-    wx, wy, wz = decode_direction(word)
-    if not nx * wx + ny * wy + nz * wz > _f4(0.0):
-        return False
-    dx, dy, dz = load_f4(photons.x, i) - px, load_f4(photons.y, i) - py, load_f4(photons.z, i) - pz
-    return abs(nx * dx + ny * dy + nz * dz) <= height
-
-
-@device
-def stored_power(photons, i):
-    """Red, green, blue power of photon i in units of the map's power."""
-    rg, b = load_u4(photons.payload, 3 * i + 1), load_u4(photons.payload, 3 * i + 2)
-    return decode_power(rg & _u4(0xFFFF)), decode_power(rg >> _u4(16)), decode_power(b & _u4(0xFFFF))
 
 
 @device
@@ -87,7 +80,9 @@ def irradiance_radius(grid, px, py, pz, nx, ny, nz, radius, flatness, class_mask
                 lane = count_trailing_zeros(mask)
                 mask &= mask - _i4(1)
                 i = j + lane
-                if accepts(grid, i, px, py, pz, nx, ny, nz, height, class_mask):
+                if arrives(grid, i, nx, ny, nz, class_mask) and (
+                    abs(height_above(grid, i, px, py, pz, nx, ny, nz)) <= height
+                ):
                     r, g, b = stored_power(grid, i)
                     if filter_kind != CONSTANT:
                         w = filter_weight(filter_kind, cone_k, stack_get_f4(squared, lane) * inverse_r2)
@@ -99,6 +94,50 @@ def irradiance_radius(grid, px, py, pz, nx, ny, nz, radius, flatness, class_mask
             j += WIDTH
     scale = _f8(grid.power_unit) / (_f8(filter_disc_mean(filter_kind, cone_k)) * _PI * _f8(radius) * _f8(radius))
     return _f4(red * scale), _f4(green * scale), _f4(blue * scale), count
+
+
+@device
+def irradiance_knn(tree, px, py, pz, nx, ny, nz, k, max_radius, flatness, class_mask, filter_kind, cone_k, rim):
+    """Irradiance from the k nearest photons, at most `max_radius` away.
+
+    Parameters
+    ----------
+    tree: record of a PhotonKdTree.
+    k: int32, 2 … MAX_K.
+    max_radius: float32, finite.
+    rim: int32, RIM_LEFT_OUT, RIM_HALF or RIM_WHOLE.
+    others: as for `irradiance_radius`. In a flattened disc the distance is max(d, |h|/flatness), which on the tangent
+        plane is d.
+
+    Returns
+    -------
+    (E red, E green, E blue) float32, number of photons int32, radius float32.
+    """
+    keys = stack_i4(KEYS)
+    flatness = max(flatness, _FLATTEST)
+    steepness = _f4(1.0) / (flatness * flatness)
+    largest = max_radius * max_radius
+    count, r2 = nearest(tree, px, py, pz, k, largest, keys, True, nx, ny, nz, steepness, class_mask)
+    farthest = _i8(-1)
+    rim_factor = _f4(1.0)
+    if count == k:
+        for j in range(count):
+            farthest = max(farthest, stack_get_i8(keys, j))
+        rim_factor = _f4(rim) * _f4(0.5)
+    r2 = max(r2, tree.smallest_radius * tree.smallest_radius)
+    inverse_r2 = _f4(1.0) / r2
+    red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
+    for j in range(count):
+        key = stack_get_i8(keys, j)
+        r, g, b = stored_power(tree, key & _i8(0xFFFFFFFF))
+        w = filter_weight(filter_kind, cone_k, float_of_bits(_u4(key >> 32)) * inverse_r2)
+        if key == farthest:
+            w *= rim_factor
+        red += w * r
+        green += w * g
+        blue += w * b
+    scale = _f8(tree.power_unit) / (_f8(filter_disc_mean(filter_kind, cone_k)) * _PI * _f8(r2))
+    return _f4(red * scale), _f4(green * scale), _f4(blue * scale), _i4(count), np.sqrt(r2)
 
 
 @kernel
@@ -127,3 +166,49 @@ def irradiance_at_radius(
         )
         irradiance[i, 0], irradiance[i, 1], irradiance[i, 2] = red, green, blue
         counts[i] = count
+
+
+@kernel
+def irradiance_at_knn(
+    trees,
+    points,
+    normals,
+    k,
+    max_radius,
+    flatness,
+    class_mask,
+    filter_kind,
+    cone_k,
+    rim,
+    i0,
+    i1,
+    irradiance,
+    counts,
+    radii,
+):
+    """`irradiance_knn` at points[i0:i1].
+
+    points, normals, irradiance: (m, 3) float32; counts: (m,) int32; radii: (m,) float32; trees: the record array of a
+    PhotonKdTree.
+    """
+    tree = trees[0]
+    for i in range(i0, i1):
+        red, green, blue, count, radius = irradiance_knn(
+            tree,
+            points[i, 0],
+            points[i, 1],
+            points[i, 2],
+            normals[i, 0],
+            normals[i, 1],
+            normals[i, 2],
+            k,
+            max_radius,
+            flatness,
+            class_mask,
+            filter_kind,
+            cone_k,
+            rim,
+        )
+        irradiance[i, 0], irradiance[i, 1], irradiance[i, 2] = red, green, blue
+        counts[i] = count
+        radii[i] = radius

@@ -1,8 +1,8 @@
 """Balanced kd-tree with leaves of 16 photons for k-nearest look-ups (M1).
 
-The tree is complete and implicit: node i has children 2i and 2i+1, inner nodes store a splitting plane alone, and leaf i
-of 2^depth holds photons n·i/2^depth … n·(i+1)/2^depth − 1, nine to sixteen of them in three arrays of coordinates that
-are tested eight at a time.
+The tree is complete and implicit: node i has children 2i and 2i+1, inner nodes store a splitting plane alone, and leaf
+i of 2^depth holds photons n·i/2^depth … n·(i+1)/2^depth − 1, at most sixteen, in three arrays of coordinates that are
+tested eight at a time.
 
 A search keeps an exact lower bound of the distance to each subtree by the offsets along the axes (Arya & Mount 1993).
 Neighbours are collected without order until there are 2k; then a selection keeps the nearest k and the search radius
@@ -60,7 +60,7 @@ RECORD = np.dtype(
     ],
     align=True,
 )
-"""What kernels see of a tree."""
+"""What kernels see of a tree; `smallest_radius` is the resolution of its float32 positions."""
 
 _f4 = np.float32
 _i4 = np.int32
@@ -120,8 +120,8 @@ def _partition(keys, low, high, pivot):
 def _select(keys, count, k, smallest, largest):
     """Brings the k smallest of `count` > k distinct keys to the front.
 
-    All keys lie in [smallest, largest]. The first pivots are interpolated: squared distances of photons on a surface are
-    nearly uniform. If that doesn't help, pivots are medians of three.
+    All keys lie in [smallest, largest]. The first pivots are interpolated: squared distances of photons on a surface
+    are nearly uniform. If that doesn't help, pivots are medians of three.
     """
     low, high = _i8(0), _i8(count)
     tries = 0
@@ -173,9 +173,9 @@ def nearest(tree, px, py, pz, k, r2, keys, facing, nx, ny, nz, steepness, class_
     r2: float32 squared largest distance.
     keys: pointer to `KEYS` int32 of scratch that receives the neighbours, unordered, as int64: bits of the squared
         distance in the high, place in the tree in the low half.
-    facing: whether only photons count that arrive on the side of the normal n on a path of a class in `class_mask`, with
-        the distance max(d², steepness·h²), h being the height above the tangent plane: the k nearest then fill the
-        smallest flattened disc |h| ≤ r/sqrt(steepness).
+    facing: whether only photons count that arrive on the side of the normal n on a path of a class in `class_mask`,
+        with the distance max(d², steepness·h²), h being the height above the tangent plane: the k nearest then fill
+        the smallest flattened disc |h| ≤ r/sqrt(steepness).
 
     Returns
     -------
@@ -267,8 +267,8 @@ def _order(keys, count):
 def nearest_at(trees, points, k, max_radius, ordered, i0, i1, indices, squared):
     """The k nearest photons of points[i0:i1], see `knn`; `ordered`: whether by ascending distance.
 
-    The distance of the k-th neighbour of the point before, plus the way from there, bounds the search: points in
-    screen or Morton order are faster than shuffled ones.
+    The distance of the k-th neighbour of the point before, plus the way from there, bounds the search, and a little
+    more than that distance alone is tried first: points in screen or Morton order are faster than shuffled ones.
     """
     tree = trees[0]
     keys = stack_i4(KEYS)
@@ -278,7 +278,10 @@ def nearest_at(trees, points, k, max_radius, ordered, i0, i1, indices, squared):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         step = np.sqrt((x - qx) * (x - qx) + (y - qy) * (y - qy) + (z - qz) * (z - qz))
         radius = min(max_radius, (reach + step) * _f4(1.00001))
-        count, r2 = nearest(tree, x, y, z, k, radius * radius, keys, False, zero, zero, zero, zero, _i4(0))
+        guess = min(radius, reach * _f4(1.15))
+        count, r2 = nearest(tree, x, y, z, k, guess * guess, keys, False, zero, zero, zero, zero, _i4(0))
+        if count < k and guess < radius:
+            count, r2 = nearest(tree, x, y, z, k, radius * radius, keys, False, zero, zero, zero, zero, _i4(0))
         qx, qy, qz = x, y, z
         reach = np.sqrt(r2) if count == k else _f4(np.inf)
         if ordered:
@@ -417,7 +420,7 @@ def build_kdtree(photons: np.ndarray, power_unit: float = 1.0, pool: Executor | 
         places, pairs, axes = nodes.view(np.int32), nodes.view(np.int64), planes.view(np.int32)
         _collect(photons, nodes, places)
         extent = nodes[:, :3].max(axis=0).astype(np.float64) - nodes[:, :3].min(axis=0)
-        smallest_radius = 1e-7 * max(float(extent.max()), float(np.abs(nodes[0, :3]).max()))
+        smallest_radius = 1e-7 * (max(float(extent.max()), float(np.abs(nodes[0, :3]).max())) or 1.0)
         top = min(depth, 4) if pool is not None and depth > 8 else depth
         _split(nodes, pairs, planes, axes, depth, 0, 0, top)
         if pool is not None and top < depth:

@@ -1,0 +1,51 @@
+"""How far a look-up reaches: the automatic largest radius (M3) and the shrinking radius of progressive passes (E6)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pmviewer.kernels.jit import kernel
+from pmviewer.maps.record import decode_power
+
+_f4 = np.float32
+_u4 = np.uint32
+
+
+@kernel
+def _largest_luminance(words):
+    """Largest luminance (Rec. 709) of the power of photons (n, 6), seen as uint32, in units of the map's power."""
+    largest = _f4(0.0)
+    for i in range(len(words)):
+        red, green = decode_power(words[i, 4] & _u4(0xFFFF)), decode_power(words[i, 4] >> _u4(16))
+        blue = decode_power(words[i, 5] & _u4(0xFFFF))
+        largest = max(largest, _f4(0.2126) * red + _f4(0.7152) * green + _f4(0.0722) * blue)
+    return largest
+
+
+def largest_power(photons: np.ndarray, power_unit: float) -> float:
+    """Φ_max, the largest luminance of a power among photons (n, 6), in watts; 0 for an empty map."""
+    photons = np.require(photons, np.float32, ["C", "W"])
+    return float(_largest_luminance(photons.view(np.uint32))) * power_unit
+
+
+def automatic_radius(k: int, phi_max: float, threshold: float) -> float:
+    """Largest radius that a look-up of k photons needs: r_m = (1/π)·sqrt(k·Φ_max / L_t).
+
+    Where k photons of the largest power Φ_max fill a disc of this radius, a white diffuse surface reflects the radiance
+    L = k·Φ_max / (π·π·r²) = L_t; whatever needs a wider disc is darker than the threshold L_t (about 0.05 of display
+    white after exposure), and looking no further changes nothing that can be seen (Jensen et al. 2004, course notes).
+    0 for an empty map or a map without power.
+    """
+    return math.sqrt(k * phi_max / threshold) / math.pi
+
+
+def progressive_radius(r1: float, i: int, alpha: float = 2.0 / 3.0, floor: float = 0.0) -> float:
+    """Radius of pass i = 1, 2, …, without those before it (Knaus & Zwicker 2011, eq. 20).
+
+    From r²_{i+1} = r²_i·(i+α)/(i+1) follows r²_i = r1²·Π_{m=1}^{i−1} (m+α)/(m+1) = r1²·Γ(i+α) / (Γ(1+α)·Γ(i+1)).
+    Never less than `floor`.
+    """
+    log_ratio = math.lgamma(i + alpha) - math.lgamma(1.0 + alpha) - math.lgamma(i + 1.0)
+    return max(r1 * math.exp(0.5 * log_ratio), floor)
