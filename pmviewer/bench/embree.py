@@ -19,7 +19,7 @@ from pmviewer.kernels.jit import kernel
 
 _I8, _I32, _F32 = ir.IntType(8), ir.IntType(32), ir.FloatType()
 _POINTER = _I8.as_pointer()
-# Byte offsets in RTCRay (org, tnear, dir, time, tfar, mask, id, flags) and RTCHit behind it (Ng, u, v, prim, geom, inst).
+# Byte offsets in RTCRay and, from 48 on, in the RTCHit that follows it in an RTCRayHit.
 _ORIGIN, _TNEAR, _DIRECTION, _TIME, _TFAR, _MASK, _ID, _FLAGS = 0, 12, 16, 28, 32, 36, 40, 44
 _U, _V, _PRIMITIVE, _GEOMETRY, _INSTANCE = 60, 64, 68, 72, 76
 _INVALID = 0xFFFFFFFF
