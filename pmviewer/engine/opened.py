@@ -1,0 +1,33 @@
+"""An open scene: the description together with everything that is derived from it once."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pmviewer.scene.analysis import SceneTraits, analyse
+from pmviewer.scene.description import Scene
+from pmviewer.scene.flatten import FlatScene, flatten
+from pmviewer.scene.load import load_scene
+
+_uids = itertools.count(1)
+
+
+@dataclass(frozen=True)
+class OpenScene:
+    """`source` is what the user named; `uid` tells scenes apart in caches."""
+
+    scene: Scene
+    flat: FlatScene
+    traits: SceneTraits
+    source: str
+    uid: int = field(default_factory=lambda: next(_uids))
+
+
+def open_scene(source: str | Path | Scene, parameters: Mapping[str, str] | None = None) -> OpenScene:
+    """Load, check and flatten. Raises SceneError."""
+    scene = source if isinstance(source, Scene) else load_scene(source, parameters or {})
+    name = scene.name if isinstance(source, Scene) else str(source)
+    return OpenScene(scene, flatten(scene), analyse(scene), name)

@@ -1,0 +1,83 @@
+"""Compiling, or loading from the cache, the kernels that a scene and its settings need, one visible step at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pmviewer.engine.method import plan_of
+from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.kernels.raycast import cast_closest
+from pmviewer.maps.grid import build_grid
+from pmviewer.maps.kdtree import build_kdtree
+from pmviewer.photons.trace import LIGHT_PASS_DTYPE, N_COUNTS, N_LEDGER, trace_photons
+from pmviewer.render.eye import eye_pass
+from pmviewer.render.film import Film
+from pmviewer.render.path import path_pass
+from pmviewer.render.record import EYE_DTYPE
+from pmviewer.settings import Settings
+
+Step = tuple[str, Callable[[], object]]
+Tell = Callable[[str, float | None], None]
+
+_done: set[tuple[str, bool]] = set()
+
+
+def prepare(scene: OpenScene, settings: Settings, pool: WorkPool, tell: Tell) -> None:
+    """Call each kernel that the next passes need once, on nothing. `tell(text, share)` hears of each step.
+
+    The first start compiles (some 20 s in all), later ones load compiled code from disk.
+    """
+    nearest = settings.estimate.lookup == "nearest"
+    steps = [(name, step) for name, step in _steps(scene, settings, nearest) if (name, nearest) not in _done]
+    for i, (name, step) in enumerate(steps):
+        tell(f"preparing kernels, {i + 1} of {len(steps)}: {name}", i / len(steps))
+        pool.run([step])
+        _done.add((name, nearest))
+
+
+def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
+    plan = plan_of(settings, scene.traits)
+    flat = scene.flat
+    empty = np.zeros((1, 6), np.float32)
+    photon_map = build_kdtree if nearest else lambda photons: build_grid(photons, 1.0, 1.0)
+    steps: list[Step] = [("film", lambda: Film(1, 1).planes())]
+    if plan.photons:
+        nothing = np.empty((0, 3), np.float32)
+        light_pass = np.zeros(1, LIGHT_PASS_DTYPE)
+        counts, ledger = np.zeros(N_COUNTS, np.int64), np.zeros(N_LEDGER)
+        none = np.empty(0, np.float32)
+        steps += [
+            (
+                "ray casting",
+                lambda: cast_closest(
+                    flat.record[0],
+                    nothing,
+                    nothing,
+                    none,
+                    none,
+                    none,
+                    np.empty(0, np.int32),
+                    np.empty((0, 2), np.float32),
+                ),
+            ),
+            (
+                "light pass",
+                lambda: trace_photons(flat.record, light_pass, 0, 0, empty, empty, counts, ledger),
+            ),
+            ("kd-tree" if nearest else "photon grid", lambda: photon_map(empty)),
+        ]
+    eye, film = np.zeros(1, EYE_DTYPE), np.zeros((1, 1))
+    eye_counts = np.zeros(2, np.int64)
+    if plan.path:
+        steps.append(("path tracer", lambda: path_pass(flat.record, eye, film, eye_counts, 0, 0)))
+    else:
+
+        def compile_eye() -> None:
+            record = photon_map(empty).record
+            eye_pass(flat.record, eye, record, record, film, eye_counts, 0, 0)
+
+        steps.append(("eye pass", compile_eye))
+    return steps

@@ -1,0 +1,53 @@
+"""The radius of the first pass when the user gives none, and the radius of every pass from it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pmviewer.kernels.raycast import cast_closest
+from pmviewer.maps.radius import progressive_radius
+from pmviewer.render.camera import CameraPose
+from pmviewer.scene.flatten import FlatScene
+from pmviewer.settings import Estimate
+
+FOOTPRINTS = {"gather": 5.0}
+"""Radius in pixel footprints by method: a gather blurs what its rays find anyway, so it can use a wider, calmer one."""
+DEFAULT_FOOTPRINTS = 2.5
+PROBES = 24
+
+
+def typical_distance(scene: FlatScene, camera: CameraPose) -> float:
+    """Median distance from the eye to what it sees; the scene's radius where it sees nothing."""
+    frame = camera.ray_frame()
+    u = (np.arange(PROBES) + 0.5) / PROBES
+    x, y = (g.reshape(-1, 1) for g in np.meshgrid(u * camera.width, u * camera.height))
+    directions = frame[1] + x * frame[2] + y * frame[3]
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    directions = np.ascontiguousarray(directions, np.float32)
+    n = len(directions)
+    origins = np.broadcast_to(frame[0].astype(np.float32), (n, 3)).copy()
+    tmin, tmax = np.zeros(n, np.float32), np.full(n, np.inf, np.float32)
+    t, prim, uv = np.empty(n, np.float32), np.empty(n, np.int32), np.empty((n, 2), np.float32)
+    cast_closest(scene.record[0], origins, directions, tmin, tmax, t, prim, uv)
+    hits = t[prim >= 0]
+    return float(np.median(hits)) if len(hits) else scene.radius
+
+
+def first_radius(scene: FlatScene, camera: CameraPose, estimate: Estimate, method: str) -> float:
+    """Radius of pass 0 in scene units.
+
+    The automatic one is rounded to steps of 2^¼, so that a small camera move keeps the maps of the previous view.
+    """
+    if estimate.radius != "auto":
+        return float(estimate.radius) * scene.radius
+    footprint = typical_distance(scene, camera) * camera.pixel_angle()
+    wanted = FOOTPRINTS.get(method, DEFAULT_FOOTPRINTS) * footprint / scene.radius
+    wanted = min(max(wanted, 1e-4), 0.1)
+    return 2.0 ** (round(4 * math.log2(wanted)) / 4) * scene.radius
+
+
+def pass_radius(first: float, index: int, estimate: Estimate, scene_radius: float) -> float:
+    """Radius of pass `index` (E6), never below the floor."""
+    return progressive_radius(first, index + 1, estimate.alpha, estimate.floor * scene_radius)

@@ -1,0 +1,312 @@
+"""The session: a worker thread that keeps the picture of the newest scene and settings up to date.
+
+Requests (`open`, `set`, `pause` …) return at once. The worker drops what is out of date between slices of some 30 ms,
+shows a coarse frame of the new state first, then refines it pass by pass until a stop rule holds.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from pmviewer.engine.cache import StageCache
+from pmviewer.engine.frame import Frame, Level, Message, State, Status
+from pmviewer.engine.opened import OpenScene, open_scene
+from pmviewer.engine.pool import Cancelled, WorkPool, lower_priority
+from pmviewer.engine.prepare import prepare
+from pmviewer.engine.renderer import Renderer
+from pmviewer.errors import PmviewerError
+from pmviewer.scene.analysis import SceneTraits
+from pmviewer.scene.description import Scene
+from pmviewer.scene.tessellate import DrawGeometry, tessellate
+from pmviewer.settings import Settings, changed_stages
+
+Source = str | Path | Scene
+
+
+class Session:
+    """See the module. All public attributes may be read from any thread; frames and statuses are immutable."""
+
+    def __init__(self, threads: int | None = None, settings: Settings | None = None) -> None:
+        self.on_update: Callable[[], None] | None = None
+        self.frame: Frame | None = None
+        self.status = Status()
+        self.geometry: DrawGeometry | None = None
+        self._opened: OpenScene | None = None
+        self._settings = settings or Settings()
+        self._version = 0
+        self._loading = 0
+        self._loaded: tuple[OpenScene, DrawGeometry, Settings | None] | None = None
+        self._restart = False
+        self._paused = False
+        self._closed = False
+        self._loading_done = 0
+        self._failed_version = -1
+        self._serial = 0
+        self._messages: list[Message] = []
+        self._changed = threading.Condition()
+        self._pool = WorkPool(threads)
+        self._cache = StageCache()
+        self._renderer: Renderer | None = None
+        self._worker = threading.Thread(target=self._work, name="pmviewer session", daemon=True)
+        self._worker.start()
+
+    # requests ---------------------------------------------------------------------------------------------------
+
+    def open(
+        self, source: Source, settings: Settings | None = None, parameters: Mapping[str, str] | None = None
+    ) -> None:
+        """Open a scene, with other settings if given. Until it is loaded the old one goes on; a failure becomes an error
+        message and changes nothing."""
+        with self._changed:
+            self._loading += 1
+            ticket = self._loading
+        arguments = (ticket, source, settings, parameters or {})
+        threading.Thread(target=self._load, args=arguments, name="pmviewer loader", daemon=True).start()
+
+    def set(self, settings: Settings) -> int:
+        """Use these settings from now on; returns the version that frames made with them will carry."""
+        with self._changed:
+            before, self._settings = self._settings, settings
+            if changed_stages(before, settings) - {"display", "stop"}:
+                self._version += 1
+                self._interrupt()
+            else:
+                self._changed.notify_all()
+            return self._version
+
+    def restart(self) -> None:
+        """Forget the film and begin with pass 0."""
+        with self._changed:
+            self._version += 1
+            self._restart = True
+            self._interrupt()
+
+    def pause(self) -> None:
+        """Stop after the current pass; a changed setting still shows its first pass."""
+        with self._changed:
+            self._paused = True
+            self._changed.notify_all()
+
+    def resume(self) -> None:
+        with self._changed:
+            self._paused = False
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """Stop the worker and its threads; returns when they are gone."""
+        with self._changed:
+            self._closed = True
+            self._interrupt()
+        self._worker.join()
+        self._pool.close()
+
+    def _interrupt(self) -> None:
+        self._pool.cancel.set()
+        self._changed.notify_all()
+
+    # state ------------------------------------------------------------------------------------------------------
+
+    @property
+    def settings(self) -> Settings:
+        return self._settings
+
+    @property
+    def paused(self) -> bool:
+        return self._paused
+
+    @property
+    def scene(self) -> Scene | None:
+        return self._opened.scene if self._opened else None
+
+    @property
+    def scene_path(self) -> str:
+        """What the open scene was opened by: a file or a bundled scene's name."""
+        return self._opened.source if self._opened else ""
+
+    @property
+    def traits(self) -> SceneTraits | None:
+        return self._opened.traits if self._opened else None
+
+    def take_messages(self) -> list[Message]:
+        """Messages since the last call."""
+        with self._changed:
+            taken, self._messages = self._messages, []
+        return taken
+
+    def wait(self, passes: int | None = None, timeout: float | None = None) -> bool:
+        """Wait for that many passes of the newest settings, or for the stop rule. False after `timeout` seconds or when
+        the session failed or was closed."""
+
+        def reached() -> bool:
+            if self._closed or self.status.state in ("failed",):
+                return True
+            if self._pending_loads or self._loaded or self.frame is None or self.frame.version != self._version:
+                return False
+            done = self.frame.statistics.passes if not self.frame.coarse else 0
+            return self.status.state == "finished" or (passes is not None and done >= passes)
+
+        with self._changed:
+            return self._changed.wait_for(reached, timeout) and not self._closed and self.status.state != "failed"
+
+    # worker -----------------------------------------------------------------------------------------------------
+
+    def _load(self, ticket: int, source: Source, settings: Settings | None, parameters: Mapping[str, str]) -> None:
+        """In a thread of its own: load, then hand over to the worker, unless another scene was asked for meanwhile."""
+        name = source.name if isinstance(source, Scene) else str(source)
+        if self._opened is None:
+            self._tell("loading", f"loading {name}")
+        try:
+            opened = open_scene(source, parameters)
+            geometry = tessellate(opened.scene)
+        except PmviewerError as error:
+            self._load_failed(ticket, str(error))
+            return
+        except MemoryError:
+            self._load_failed(ticket, f"{name}: not enough memory for this scene.")
+            return
+        except Exception as error:
+            self._load_failed(ticket, f"{name}: {unexpected(error)}")
+            return
+        with self._changed:
+            if ticket != self._loading or self._closed:
+                return
+            self._loaded = (opened, geometry, settings)
+            self._loading_done = ticket
+            self._interrupt()
+
+    def _load_failed(self, ticket: int, text: str) -> None:
+        self._say("error", text)
+        with self._changed:
+            self._loading_done = max(self._loading_done, ticket)
+            if self._opened is None:
+                self.status = Status("failed", text)
+            self._changed.notify_all()
+        self._notify()
+
+    @property
+    def _pending_loads(self) -> bool:
+        return self._loading_done < self._loading
+
+    def _work(self) -> None:
+        lower_priority()
+        while True:
+            with self._changed:
+                self._changed.wait_for(self._has_work)
+                if self._closed:
+                    return
+                self._pool.cancel.clear()
+                loaded, self._loaded = self._loaded, None
+            try:
+                if loaded:
+                    self._adopt(*loaded)
+                else:
+                    self._advance()
+            except Cancelled:
+                self._renderer = None
+            except PmviewerError as error:
+                self._fail(str(error))
+            except MemoryError:
+                self._cache.clear()
+                self._fail("Not enough memory for these settings: lower N or the image size.")
+            except Exception as error:
+                self._fail(unexpected(error))
+
+    def _has_work(self) -> bool:
+        if self._closed or self._loaded:
+            return True
+        if self._opened is None:
+            return False
+        if self._is_stale():
+            return self._failed_version != self._version
+        return not self._paused and not self._is_finished()
+
+    def _is_stale(self) -> bool:
+        return self._renderer is None or self._renderer.version != self._version or self._restart
+
+    def _is_finished(self) -> bool:
+        renderer = self._renderer
+        if renderer is None:
+            return True
+        render = self._settings.render
+        return renderer.passes >= render.passes or 0 < render.time_limit <= renderer.seconds
+
+    def _adopt(self, opened: OpenScene, geometry: DrawGeometry, settings: Settings | None) -> None:
+        """Make a loaded scene the open one."""
+        for warning in opened.scene.warnings:
+            self._say("warning", warning)
+        for reason, count in opened.scene.dropped.items():
+            self._say("warning", f"{count} × {reason} left out")
+        with self._changed:
+            self._cache.clear()
+            self._opened, self.geometry, self._renderer = opened, geometry, None
+            if settings is not None:
+                self._settings = settings
+            self._version += 1
+        flat = opened.flat
+        self._say("info", f"opened {opened.source}: {flat.n_triangles:,} triangles, {flat.n_quadrics:,} round shapes")
+
+    def _advance(self) -> None:
+        """A coarse frame for a new state, one pass for a known one."""
+        assert self._opened is not None
+        if not self._is_stale():
+            assert self._renderer is not None
+            self._step(self._renderer)
+            return
+        with self._changed:
+            version, settings, self._restart = self._version, self._settings, False
+        prepare(self._opened, settings, self._pool, lambda text, share: self._tell("preparing", text, share))
+        renderer = Renderer(self._opened, settings, self._pool, self._cache, version)
+        self._tell("rendering", "first picture")
+        self._publish(renderer.coarse_frame(self._serial + 1))
+        self._renderer = renderer
+        if self._paused:
+            self._step(renderer)
+
+    def _step(self, renderer: Renderer) -> None:
+        renderer.step()
+        self._publish(renderer.frame(self._serial + 1))
+        state: State = "finished" if self._is_finished() else "paused" if self._paused else "rendering"
+        limit = self._settings.render.passes
+        self._tell(state, state, renderer.passes / limit)
+
+    def _publish(self, frame: Frame) -> None:
+        with self._changed:
+            self._serial = frame.serial
+            if frame.version == self._version:
+                self.frame = frame
+            self._changed.notify_all()
+        self._notify()
+
+    def _tell(self, state: State, text: str, progress: float | None = None) -> None:
+        with self._changed:
+            passes = self._renderer.passes if self._renderer else 0
+            self.status = Status(state, text, passes, progress)
+            self._changed.notify_all()
+        self._notify()
+
+    def _fail(self, text: str) -> None:
+        """Report that the newest settings can't be rendered; the last frame stays, other settings may follow."""
+        self._say("error", text)
+        with self._changed:
+            self._renderer = None
+            self._failed_version = self._version
+            self.status = Status("failed", text)
+            self._changed.notify_all()
+        self._notify()
+
+    def _say(self, level: Level, text: str) -> None:
+        with self._changed:
+            self._messages.append(Message(level, text, time.time()))
+        self._notify()
+
+    def _notify(self) -> None:
+        if self.on_update:
+            self.on_update()
+
+
+def unexpected(error: Exception) -> str:
+    """Text for an error that is pmviewer's own fault."""
+    return f"Unexpected {type(error).__name__}: {error}. Please report it together with the scene and the settings."

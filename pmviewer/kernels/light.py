@@ -1,0 +1,246 @@
+"""Lights (T1): emission of photons, sampling towards a point, and the densities that multiple importance sampling needs.
+
+All lights are one-sided: they emit where their normal points. Lights are picked with probability proportional to their
+power's luminance.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pmviewer.kernels.jit import device, device_call
+from pmviewer.kernels.memory import load_f4, load_i4
+from pmviewer.kernels.scene import (
+    CYLINDER,
+    DISK,
+    ENVIRONMENT,
+    L_A,
+    L_AREA,
+    L_B,
+    L_C,
+    L_COUNT,
+    L_FIRST,
+    L_FLIP,
+    L_KIND,
+    L_LENGTH,
+    L_RADIANCE,
+    L_RADIUS,
+    PARALLELOGRAM,
+    POINT,
+    SPHERE,
+    light_number,
+    light_vector,
+    load3,
+)
+from pmviewer.kernels.surface import leave
+from pmviewer.kernels.vector import along, basis, cross, dot, from_basis, luminance, normalize, scale, sub
+from pmviewer.kernels.warp import (
+    square_to_cone,
+    square_to_cosine_hemisphere,
+    square_to_disk,
+    square_to_sphere,
+    square_to_triangle,
+)
+
+_f4 = np.float32
+_PI = _f4(math.pi)
+
+
+@device
+def find_interval(address, count, first, u):
+    """Index i of the cumulative array at `address` (entries first … first+count−1, the last one is 1) with u below it."""
+    low, high = np.int64(0), np.int64(count) - 1
+    while low < high:
+        middle = (low + high) >> 1
+        if u < load_f4(address, first + middle):
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+@device
+def pick_light(scene, u):
+    """A light, its probability, and u stretched to [0, 1) for another use."""
+    if scene.n_lights == 1:
+        return np.int64(0), _f4(1.0), u
+    light = find_interval(scene.light_cdf, scene.n_lights, np.int64(1), u)
+    low = load_f4(scene.light_cdf, light)
+    probability = load_f4(scene.light_cdf, light + 1) - low
+    return light, probability, min((u - low) / probability, _f4(0.99999994))
+
+
+@device
+def light_probability(scene, light):
+    return load_f4(scene.light_cdf, light + 1) - load_f4(scene.light_cdf, light)
+
+
+@device_call
+def light_point(scene, light, u, v):
+    """A point uniform on the area light and its unit normal (the emitting side)."""
+    kind = np.int32(light_number(scene, light, L_KIND))
+    a = light_vector(scene, light, L_A)
+    b = light_vector(scene, light, L_B)
+    if kind == PARALLELOGRAM:
+        c = light_vector(scene, light, L_C)
+        p = (a[0] + u * b[0] + v * c[0], a[1] + u * b[1] + v * c[1], a[2] + u * b[2] + v * c[2])
+        return p, normalize(cross(b, c))
+    flip = light_number(scene, light, L_FLIP)
+    radius = light_number(scene, light, L_RADIUS)
+    if kind == DISK:
+        x, y = square_to_disk(u, v)
+        s, t = basis(b)
+        return along(along(a, s, x * radius), t, y * radius), b
+    if kind == SPHERE:
+        n = square_to_sphere(u, v)
+        return along(a, n, radius), scale(n, flip)
+    if kind == CYLINDER:
+        phi = _f4(2.0) * _PI * u
+        s, t = basis(b)
+        x, y = _f4(math.cos(phi)), _f4(math.sin(phi))
+        n = (s[0] * x + t[0] * y, s[1] * x + t[1] * y, s[2] * x + t[2] * y)
+        return along(along(a, b, v * light_number(scene, light, L_LENGTH)), n, radius), scale(n, flip)
+    first = np.int64(light_number(scene, light, L_FIRST))
+    count = np.int64(light_number(scene, light, L_COUNT))
+    k = find_interval(scene.light_triangle_cdf, count, first, u)
+    low = _f4(0.0) if k == 0 else load_f4(scene.light_triangle_cdf, first + k - 1)
+    width = load_f4(scene.light_triangle_cdf, first + k) - low
+    if width > _f4(0.0):
+        u = min((u - low) / width, _f4(0.99999994))
+    base = np.int64(load_i4(scene.light_triangles, first + k)) * 9
+    p0 = load3(scene.vertices, base)
+    e1 = sub(load3(scene.vertices, base + 3), p0)
+    e2 = sub(load3(scene.vertices, base + 6), p0)
+    b1, b2 = square_to_triangle(u, v)
+    return along(along(p0, e1, b1), e2, b2), normalize(cross(e1, e2))
+
+
+@device
+def _sphere_cone(scene, light, x):
+    """1 − cos of the half angle under which x sees a sphere light from outside; 0 when the cone can't be used."""
+    center = light_vector(scene, light, L_A)
+    radius = light_number(scene, light, L_RADIUS)
+    offset = sub(center, x)
+    distance2 = dot(offset, offset)
+    sin2 = radius * radius / distance2
+    if light_number(scene, light, L_FLIP) < _f4(0.0) or sin2 >= _f4(0.9999):
+        return _f4(0.0)
+    return sin2 / (_f4(1.0) + _f4(math.sqrt(_f4(1.0) - sin2)))
+
+
+@device_call
+def sample_light(scene, x, u_pick, u, v):
+    """A direction from the point x towards a light.
+
+    Returns unit `wi`, the end point of the shadow ray, the radiance L arriving if nothing is in between, its pdf per
+    solid angle (0: no contribution; for point lights L/pdf is intensity/distance² over the pick probability) and whether
+    a BSDF sample could have found it (False for point lights).
+    """
+    light, probability, u_pick = pick_light(scene, u_pick)
+    kind = np.int32(light_number(scene, light, L_KIND))
+    L = light_vector(scene, light, L_RADIANCE)
+    if kind == ENVIRONMENT:
+        wi = square_to_sphere(u, v)
+        end = along(x, wi, _f4(2.0) * (scene.radius + distance_to_center(scene, x)))
+        return wi, end, L, probability * _f4(1.0 / (4.0 * math.pi)), True
+    if kind == POINT:
+        p = light_vector(scene, light, L_A)
+        offset = sub(p, x)
+        distance2 = dot(offset, offset)
+        if not distance2 > _f4(0.0):
+            return (_f4(0.0), _f4(0.0), _f4(1.0)), p, L, _f4(0.0), False
+        inv = _f4(1.0) / _f4(math.sqrt(distance2))
+        return scale(offset, inv), p, scale(L, inv * inv), probability, False
+    if kind == SPHERE:
+        cone = _sphere_cone(scene, light, x)
+        if cone > _f4(0.0):
+            center = light_vector(scene, light, L_A)
+            radius = light_number(scene, light, L_RADIUS)
+            axis = normalize(sub(center, x))
+            local = square_to_cone(u, v, cone)
+            wi = from_basis(axis, local[0], local[1], local[2])
+            # Nearest intersection with the sphere, from the closest approach to its centre.
+            offset = sub(center, x)
+            reach = dot(offset, wi)
+            miss = sub(offset, scale(wi, reach))
+            half = _f4(math.sqrt(max(_f4(0.0), radius * radius - dot(miss, miss))))
+            p = along(x, wi, reach - half)
+            n = normalize(sub(p, center))
+            end = leave(p, n, -wi[0], -wi[1], -wi[2])
+            return wi, end, L, probability / (_f4(2.0) * _PI * cone), True
+    p, n = light_point(scene, light, u, v)
+    offset = sub(p, x)
+    distance2 = dot(offset, offset)
+    if not distance2 > _f4(0.0):
+        return n, p, L, _f4(0.0), True
+    inv = _f4(1.0) / _f4(math.sqrt(distance2))
+    wi = scale(offset, inv)
+    cos_light = -dot(wi, n)
+    if cos_light <= _f4(0.0):
+        return wi, p, L, _f4(0.0), True
+    pdf = probability * distance2 / (cos_light * light_number(scene, light, L_AREA))
+    return wi, leave(p, n, -wi[0], -wi[1], -wi[2]), L, pdf, True
+
+
+@device
+def distance_to_center(scene, x):
+    d = (x[0] - scene.center_x, x[1] - scene.center_y, x[2] - scene.center_z)
+    return _f4(math.sqrt(dot(d, d)))
+
+
+@device
+def emitted(scene, light, ng, d):
+    """Radiance that leaves an area light's surface (geometric normal ng) against the travelling direction d."""
+    if dot(ng, d) < _f4(0.0):
+        return light_vector(scene, light, L_RADIANCE)
+    return _f4(0.0), _f4(0.0), _f4(0.0)
+
+
+@device
+def light_pdf(scene, light, x, p, ng, wi):
+    """Density per solid angle with which `sample_light` at x would have chosen direction wi to the light's point p."""
+    if light == scene.environment:
+        return light_probability(scene, light) * _f4(1.0 / (4.0 * math.pi))
+    if np.int32(light_number(scene, light, L_KIND)) == SPHERE:
+        cone = _sphere_cone(scene, light, x)
+        if cone > _f4(0.0):
+            return light_probability(scene, light) / (_f4(2.0) * _PI * cone)
+    offset = sub(p, x)
+    cos_light = abs(dot(ng, wi))
+    return (
+        light_probability(scene, light)
+        * dot(offset, offset)
+        / (max(cos_light, _f4(1e-9)) * light_number(scene, light, L_AREA))
+    )
+
+
+@device_call
+def emit_photon(scene, u_pick, position, direction):
+    """A photon leaving a light: origin, unit direction, power in units of the total power's luminance, light.
+
+    `position` and `direction` are pairs of numbers in [0, 1). Environment photons start on a disc outside the scene's
+    bounding sphere (T1).
+    """
+    light, probability, u_pick = pick_light(scene, u_pick)
+    kind = np.int32(light_number(scene, light, L_KIND))
+    L = light_vector(scene, light, L_RADIANCE)
+    beta = scale(L, _f4(1.0) / luminance(L))  # the pick probability is the light's share of the power
+    if kind == POINT:
+        return light_vector(scene, light, L_A), square_to_sphere(direction[0], direction[1]), beta, light
+    if kind == ENVIRONMENT:
+        d = square_to_sphere(direction[0], direction[1])
+        x, y = square_to_disk(position[0], position[1])
+        r = scene.radius
+        s, t = basis(d)
+        p = (
+            scene.center_x + r * (x * s[0] + y * t[0] - d[0]),
+            scene.center_y + r * (x * s[1] + y * t[1] - d[1]),
+            scene.center_z + r * (x * s[2] + y * t[2] - d[2]),
+        )
+        return p, d, beta, light
+    p, n = light_point(scene, light, position[0], position[1])
+    local = square_to_cosine_hemisphere(direction[0], direction[1])
+    d = from_basis(n, local[0], local[1], local[2])
+    return leave(p, n, d[0], d[1], d[2]), d, beta, light

@@ -1,0 +1,136 @@
+"""Counter-based random streams (T2): a number depends on (seed, index, dimension) and on nothing else.
+
+Two sequences: independent numbers by hashing, and Owen-scrambled Sobol points, four dimensions a set, the sets padded by
+shuffling the index (Laine–Karras hashing as an Owen scramble).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.jit import device
+
+INDEPENDENT, SOBOL = 0, 1
+
+_u4 = np.uint32
+_f4 = np.float32
+
+
+def _direction_numbers() -> np.ndarray:
+    """(4, 32) uint32 direction numbers of the first four Sobol dimensions (Joe and Kuo 2008)."""
+    numbers = np.zeros((4, 32), np.uint64)
+    numbers[0] = [1 << (31 - k) for k in range(32)]
+    for dimension, (a, m) in enumerate([(0, [1]), (1, [1, 3]), (1, [1, 3, 1])], start=1):
+        s = len(m)
+        v = [m[k] << (31 - k) for k in range(s)]
+        for k in range(s, 32):
+            value = v[k - s] ^ (v[k - s] >> s)
+            for j in range(1, s):
+                if (a >> (s - 1 - j)) & 1:
+                    value ^= v[k - j]
+            v.append(value)
+        numbers[dimension] = v
+    return numbers.astype(np.uint32)
+
+
+def _byte_tables(numbers: np.ndarray) -> np.ndarray:
+    """(4 dimensions · 4 bytes · 256,) uint32: the point of an index is the xor of four look-ups."""
+    tables = np.zeros((4, 4, 256), np.uint32)
+    for byte in range(4):
+        for value in range(256):
+            for bit in range(8):
+                if value >> bit & 1:
+                    tables[:, byte, value] ^= numbers[:, 8 * byte + bit]
+    return tables.reshape(-1)
+
+
+SOBOL_TABLE = _byte_tables(_direction_numbers())
+
+
+@device
+def hash3(a, b, c):
+    """xxHash32 of three uint32."""
+    h = _u4(_u4(_u4(a) * _u4(3266489917)) + _u4(374761393))
+    h = _u4(_u4(_u4(h << _u4(17)) | _u4(h >> _u4(15))) * _u4(668265263))
+    h = _u4(h + _u4(_u4(b) * _u4(3266489917)))
+    h = _u4(_u4(_u4(h << _u4(17)) | _u4(h >> _u4(15))) * _u4(668265263))
+    h = _u4(h + _u4(_u4(c) * _u4(3266489917)))
+    h = _u4(_u4(_u4(h << _u4(17)) | _u4(h >> _u4(15))) * _u4(668265263))
+    h = _u4(_u4(h ^ (h >> _u4(15))) * _u4(2246822519))
+    h = _u4(_u4(h ^ (h >> _u4(13))) * _u4(3266489917))
+    return _u4(h ^ (h >> _u4(16)))
+
+
+@device
+def unit_float(bits):
+    """uint32 to a float32 in [0, 1)."""
+    return _f4(_u4(bits) >> _u4(8)) * _f4(5.9604645e-08)
+
+
+@device
+def reverse_bits(x):
+    x = _u4(_u4(x >> _u4(16)) | _u4(x << _u4(16)))
+    x = _u4(_u4(_u4(x & _u4(0x00FF00FF)) << _u4(8)) | _u4(_u4(x & _u4(0xFF00FF00)) >> _u4(8)))
+    x = _u4(_u4(_u4(x & _u4(0x0F0F0F0F)) << _u4(4)) | _u4(_u4(x & _u4(0xF0F0F0F0)) >> _u4(4)))
+    x = _u4(_u4(_u4(x & _u4(0x33333333)) << _u4(2)) | _u4(_u4(x & _u4(0xCCCCCCCC)) >> _u4(2)))
+    return _u4(_u4(_u4(x & _u4(0x55555555)) << _u4(1)) | _u4(_u4(x & _u4(0xAAAAAAAA)) >> _u4(1)))
+
+
+@device
+def owen_reversed(x, seed):
+    """Owen scramble of bit-reversed x (Laine and Karras 2011, constants by Vegdahl)."""
+    x = _u4(x + _u4(seed))
+    x = _u4(x ^ _u4(x * _u4(0x6C50B47C)))
+    x = _u4(x ^ _u4(x * _u4(0xB82F1E52)))
+    x = _u4(x ^ _u4(x * _u4(0xC7AFE638)))
+    return _u4(x ^ _u4(x * _u4(0x8D22F6E6)))
+
+
+@device
+def owen(x, seed):
+    return reverse_bits(owen_reversed(reverse_bits(_u4(x)), _u4(seed)))
+
+
+@device
+def sobol(index, dimension):
+    """uint32 coordinate of the Sobol point with that index."""
+    base = np.int64(dimension) * np.int64(1024)
+    i = _u4(index)
+    return _u4(
+        SOBOL_TABLE[base + np.int64(i & _u4(255))]
+        ^ SOBOL_TABLE[base + np.int64(256) + np.int64((i >> _u4(8)) & _u4(255))]
+        ^ SOBOL_TABLE[base + np.int64(512) + np.int64((i >> _u4(16)) & _u4(255))]
+        ^ SOBOL_TABLE[base + np.int64(768) + np.int64(i >> _u4(24))]
+    )
+
+
+@device
+def draw4(sequence, seed, index, dimension_set):
+    """Four numbers in [0, 1) for that (seed, index) and set of dimensions.
+
+    Over `index`, a set is a scrambled Sobol point set or independent; different sets and seeds are independent.
+    """
+    key = hash3(seed, _u4(dimension_set), _u4(0x9E3779B9))
+    if sequence == SOBOL:
+        i = owen(_u4(index), key)
+        return (
+            unit_float(owen(sobol(i, 0), hash3(key, _u4(1), _u4(0)))),
+            unit_float(owen(sobol(i, 1), hash3(key, _u4(2), _u4(0)))),
+            unit_float(owen(sobol(i, 2), hash3(key, _u4(3), _u4(0)))),
+            unit_float(owen(sobol(i, 3), hash3(key, _u4(4), _u4(0)))),
+        )
+    return (
+        unit_float(hash3(key, _u4(index), _u4(0))),
+        unit_float(hash3(key, _u4(index), _u4(1))),
+        unit_float(hash3(key, _u4(index), _u4(2))),
+        unit_float(hash3(key, _u4(index), _u4(3))),
+    )
+
+
+@device
+def draw1(sequence, seed, index, dimension_set):
+    """One number in [0, 1) for that (seed, index) and set: cheaper than `draw4` where one is enough."""
+    key = hash3(seed, _u4(dimension_set), _u4(0x51ED270B))
+    if sequence == SOBOL:
+        return unit_float(owen(reverse_bits(owen(_u4(index), key)), hash3(key, _u4(1), _u4(0))))
+    return unit_float(hash3(key, _u4(index), _u4(0)))

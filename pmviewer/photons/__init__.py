@@ -1,0 +1,1 @@
+"""The light pass: photons leave the lights, scatter, and are stored."""

@@ -1,0 +1,76 @@
+"""Direct light on a diffuse surface: light samples, and the other half of multiple importance sampling (R2, plain)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pmviewer.kernels.jit import device, device_call
+from pmviewer.kernels.light import emitted, light_pdf, sample_light
+from pmviewer.kernels.random import draw4
+from pmviewer.kernels.raycast import occluded
+from pmviewer.kernels.scene import L_RADIANCE, light_of, light_vector
+from pmviewer.kernels.surface import leave
+from pmviewer.kernels.vector import add, dot, scale, sub
+
+_f4 = np.float32
+_u4 = np.uint32
+INV_PI = _f4(1.0 / math.pi)
+BEFORE_LIGHT = _f4(1.0 - 2.0**-13)
+"""Shadow rays end a little before the light's own surface."""
+BLACK = (_f4(0.0), _f4(0.0), _f4(0.0))
+
+
+@device
+def power_heuristic(n_this, pdf_this, n_other, pdf_other):
+    """Weight of a sample of one technique among two, β = 2 (Veach 1997)."""
+    a, b = n_this * pdf_this, n_other * pdf_other
+    return a * a / (a * a + b * b)
+
+
+@device_call
+def visible(scene, p, ng, wi, end):
+    """Whether nothing stands between the surface point p and the point `end`, seen from p in direction wi."""
+    o = leave(p, ng, wi[0], wi[1], wi[2])
+    d = sub(end, o)
+    return not occluded(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), BEFORE_LIGHT)
+
+
+@device_call
+def light_samples(scene, p, ng, ns, n, n_bsdf, sequence, seed, index, u_pick, u, v):
+    """Mean of n light samples of the irradiance at p, each weighted against n_bsdf cosine-distributed BSDF samples.
+
+    (u_pick, u, v) are the first sample's numbers; further ones are drawn. Returns E (W/m²) and the shadow rays cast.
+    """
+    total = BLACK
+    rays = 0
+    for s in range(n):
+        if s > 0:
+            u_pick, u, v, _ = draw4(sequence, seed, index, 1000 + s)
+        wi, end, L, pdf, findable = sample_light(scene, p, u_pick, u, v)
+        cos = dot(wi, ns)
+        if pdf > _f4(0.0) and cos > _f4(0.0) and dot(wi, ng) > _f4(0.0):
+            rays += 1
+            if visible(scene, p, ng, wi, end):
+                weight = cos / (pdf * _f4(n))
+                if findable and n_bsdf > 0:
+                    weight *= power_heuristic(_f4(n), pdf, _f4(n_bsdf), cos * INV_PI)
+                total = add(total, scale(L, weight))
+    return total, rays
+
+
+@device
+def found_light(scene, p, wi, cos, n_bsdf, n_light, prim, q, nq):
+    """A BSDF sample from p in direction wi found primitive `prim` at q with geometric normal nq (prim < 0: nothing).
+
+    Its emission (radiance), weighted against `n_light` light samples.
+    """
+    light = scene.environment if prim < 0 else light_of(scene, prim)
+    if light < 0:
+        return BLACK
+    L = light_vector(scene, light, L_RADIANCE) if prim < 0 else emitted(scene, light, nq, wi)
+    if not L[0] + L[1] + L[2] > _f4(0.0):
+        return BLACK
+    pdf = light_pdf(scene, light, p, q, nq, wi)
+    return scale(L, power_heuristic(_f4(n_bsdf), cos * INV_PI, _f4(n_light), pdf))

@@ -1,0 +1,64 @@
+"""What the eye pass's kernels know besides the scene and the maps: camera, pass and settings, as one record."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.kernels.random import SOBOL
+from pmviewer.maps.filters import FILTERS
+from pmviewer.render.camera import CameraPose
+from pmviewer.settings import Settings
+
+EYE_DTYPE = np.dtype(
+    [
+        *[(f"{axis}_{part}", "f4") for part in ("eye", "corner", "right", "down", "forward") for axis in "xyz"],
+        ("near", "f4"),
+        ("far", "f4"),
+        ("width", "i4"),
+        ("height", "i4"),
+        ("sequence", "i4"),
+        ("seed", "u4"),
+        ("index", "u4"),  # the pass: the sample index of every pixel's sequences
+        ("max_depth", "i4"),
+        ("direct", "i4"),  # whether direct light is sampled
+        ("light_samples", "i4"),
+        ("mis", "i4"),
+        ("caustic_mask", "i4"),  # path classes shown from the caustic map, 0 for none
+        ("global_mask", "i4"),  # path classes shown directly from the global map
+        ("gather_rays", "i4"),  # final-gather rays, 0 for none
+        ("gather_specular", "i4"),  # whether gather rays follow mirrors and glass
+        ("filter", "i4"),
+        ("rim", "i4"),
+        ("k", "i4"),
+        ("cone_k", "f4"),
+        ("flatness", "f4"),
+        ("caustic_radius", "f4"),
+        ("global_radius", "f4"),
+    ],
+    align=True,
+)
+
+RIMS = ("left out", "half", "whole")
+
+N_COUNTS = 2
+C_RAYS, C_DROPPED = range(N_COUNTS)
+
+
+def eye_record(camera: CameraPose, settings: Settings, index: int) -> NDArray[np.void]:
+    """The part of the record that camera and settings give; the engine fills in masks and radii for the method."""
+    record = np.zeros(1, EYE_DTYPE)
+    r = record[0]
+    frame = np.concatenate([camera.ray_frame(), camera.axes()[2][None]])
+    for part, vector in zip(("eye", "corner", "right", "down", "forward"), frame, strict=True):
+        for axis, value in zip("xyz", vector, strict=True):
+            r[f"{axis}_{part}"] = value
+    r["near"], r["far"] = camera.near, camera.far
+    r["width"], r["height"] = camera.width, camera.height
+    r["sequence"], r["seed"], r["index"] = SOBOL, settings.render.seed & 0xFFFFFFFF, index & 0xFFFFFFFF
+    r["max_depth"] = settings.render.max_depth
+    r["light_samples"], r["mis"] = settings.direct.samples, settings.direct.mis
+    estimate = settings.estimate
+    r["filter"], r["rim"], r["k"] = FILTERS.index(estimate.filter), RIMS.index(estimate.rim), estimate.k
+    r["cone_k"], r["flatness"] = estimate.cone_k, estimate.flatness
+    return record

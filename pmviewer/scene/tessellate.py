@@ -1,0 +1,110 @@
+"""Triangles for the window: every shape as flat arrays of corners, analytic shapes finely cut."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.scene.description import Cylinder, Disk, Mesh, Parallelogram, Scene, Sphere
+from pmviewer.scene.flatten import bounding_sphere
+
+Float = NDArray[np.float64]
+SEGMENTS = 96
+
+
+@dataclass(frozen=True)
+class DrawGeometry:
+    """Corners of all triangles, three a triangle: `vertices`, `normals`, `albedo` (n, 3) float32. Lights carry their
+    hue at full brightness as albedo. `center` (3,) and `radius` bound the scene."""
+
+    vertices: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    albedo: NDArray[np.float32]
+    center: Float
+    radius: float
+
+
+def tessellate(scene: Scene) -> DrawGeometry:
+    """All shapes of the scene as triangles."""
+    vertices, normals, albedos = [], [], []
+    for shape in scene.shapes:
+        corners, corner_normals = _triangles(shape.geometry)
+        material = scene.materials[shape.material]
+        colour = np.array(material.reflectance)
+        if shape.radiance is not None and max(shape.radiance) > 0:
+            colour = np.array(shape.radiance) / max(shape.radiance)
+        elif material.kind == "dielectric":
+            colour = 0.5 + 0.5 * np.array(material.transmittance) * np.array([0.8, 0.9, 1.0])
+        vertices.append(corners.reshape(-1, 3))
+        normals.append(corner_normals.reshape(-1, 3))
+        albedos.append(np.broadcast_to(colour, (corners.shape[0] * 3, 3)))
+    center, radius = bounding_sphere(scene)
+    return DrawGeometry(
+        vertices=np.ascontiguousarray(np.concatenate(vertices), np.float32),
+        normals=np.ascontiguousarray(np.concatenate(normals), np.float32),
+        albedo=np.ascontiguousarray(np.concatenate(albedos), np.float32),
+        center=center,
+        radius=radius,
+    )
+
+
+def _flat(corners: Float) -> tuple[Float, Float]:
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    return corners, np.repeat(normal[:, None], 3, axis=1)
+
+
+def _triangles(g: object) -> tuple[Float, Float]:
+    """Corners and normals (n, 3, 3)."""
+    if isinstance(g, Mesh):
+        corners = g.vertices[g.faces]
+        return _flat(corners) if g.normals is None else (corners, g.normals[g.faces])
+    if isinstance(g, Parallelogram):
+        a, u, v = np.array(g.corner), np.array(g.edge_u), np.array(g.edge_v)
+        return _flat(np.array([[a, a + u, a + u + v], [a, a + u + v, a + v]]))
+    if isinstance(g, Sphere):
+        theta = np.linspace(0, math.pi, SEGMENTS // 2 + 1)
+        phi = np.linspace(0, 2 * math.pi, SEGMENTS + 1)
+        unit = np.stack(
+            [
+                np.sin(theta)[:, None] * np.cos(phi),
+                np.sin(theta)[:, None] * np.sin(phi),
+                np.cos(theta)[:, None] * np.ones_like(phi),
+            ],
+            axis=-1,
+        )
+        corners, normals = _sheet(np.array(g.center) + g.radius * unit, unit)
+        return corners, -normals if g.flip_normals else normals
+    if isinstance(g, Cylinder):
+        axis = np.subtract(g.p1, g.p0)
+        ring = _ring(axis)
+        rows = np.stack([np.array(g.p0) + g.radius * ring, np.array(g.p1) + g.radius * ring])
+        corners, normals = _sheet(rows, np.stack([ring, ring]))
+        return corners, -normals if g.flip_normals else normals
+    assert isinstance(g, Disk)
+    ring = np.array(g.center) + g.radius * _ring(np.array(g.normal))
+    center = np.broadcast_to(np.array(g.center), ring[:-1].shape)
+    return _flat(np.stack([center, ring[:-1], ring[1:]], axis=1))
+
+
+def _ring(axis: Float) -> Float:
+    """Unit circle around the axis, (SEGMENTS + 1, 3), counter-clockwise seen from where the axis points."""
+    w = axis / np.linalg.norm(axis)
+    u = np.cross(w, np.eye(3)[np.argmin(np.abs(w))])
+    u /= np.linalg.norm(u)
+    v = np.cross(w, u)
+    phi = np.linspace(0, 2 * math.pi, SEGMENTS + 1)[:, None]
+    return np.cos(phi) * u + np.sin(phi) * v
+
+
+def _sheet(points: Float, normals: Float) -> tuple[Float, Float]:
+    """Triangles of a grid of points (rows, columns, 3)."""
+
+    def cut(x: Float) -> Float:
+        a, b, c, d = x[:-1, :-1], x[1:, :-1], x[1:, 1:], x[:-1, 1:]
+        return np.concatenate([np.stack([a, b, c], 2).reshape(-1, 3, 3), np.stack([a, c, d], 2).reshape(-1, 3, 3)])
+
+    return cut(points), cut(normals)
