@@ -1,0 +1,1 @@
+"""Measuring: error against time, throughput, the papers' ratios, and how results are reported."""
