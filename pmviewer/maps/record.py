@@ -12,7 +12,7 @@ through its uint32 view:
 
 `wi` points from the surface to where the photon came from. Powers are unsigned 16-bit floats (6 bits of exponent, 10
 of mantissa: relative error 2⁻¹¹) in units of the map's `power_unit`; 1.0 is the power with which photons leave the
-lights, so that the range 2⁻⁴⁷ … 2¹⁶ fits any scene's scale.
+lights, so that the range 2⁻⁴⁷ … 2¹⁷ fits any scene's scale.
 
 Flags: bit 7 the last scattering was specular; bit 6 there was a non-specular scattering before; bits 0–5 the number of
 scatterings so far (63 means 63 or more). They spell the path class: direct `LD` (neither bit), caustic `LS+D`
@@ -60,7 +60,7 @@ def decode_power(code):
 
 @device
 def encode_direction(x, y, z):
-    """Unit vector → 24-bit octahedral code in the high bits of a uint32 (worst error 0.05°)."""
+    """Unit vector → 24-bit octahedral code in the high bits of a uint32 (worst error 0.06°)."""
     s = _f4(1.0) / (abs(x) + abs(y) + abs(z))
     u, v = x * s, y * s
     if z < _f4(0.0):

@@ -1,0 +1,74 @@
+"""The 24-byte photon record."""
+
+import numpy as np
+import pytest
+
+from pmviewer.maps import record
+from tests import naive_maps as naive
+
+f4 = np.float32
+WORST_ANGLE = 0.06  # degrees
+
+
+@pytest.fixture(scope="module")
+def directions():
+    rng = np.random.default_rng(1)
+    wi = rng.normal(size=(3000, 3))
+    axes = np.vstack([np.eye(3), -np.eye(3), np.array([[1, 1, 0], [1, -1, 0], [-1, 0, -1], [0, -1, -1], [1, 1, -1]])])
+    wi = np.vstack([wi, axes])
+    return (wi / np.linalg.norm(wi, axis=1, keepdims=True)).astype(f4)
+
+
+def test_direction_round_trip(directions):
+    for wi in directions:
+        decoded = np.array(record.decode_direction(record.encode_direction(*wi)), np.float64)
+        length = np.linalg.norm(decoded)
+        assert 0.57 < length < 1.0001
+        sine = np.linalg.norm(np.cross(decoded / length, wi.astype(np.float64)))
+        assert sine < np.radians(WORST_ANGLE)
+        assert decoded @ wi > 0
+
+
+def test_axes_are_exact(directions):
+    for wi in np.vstack([np.eye(3), -np.eye(3)]).astype(f4):
+        np.testing.assert_array_equal(record.decode_direction(record.encode_direction(*wi)), wi)
+
+
+def test_power_round_trip():
+    rng = np.random.default_rng(2)
+    for x in np.exp2(rng.uniform(-46.9, 15.9, 3000)).astype(f4):
+        assert abs(record.decode_power(record.encode_power(x)) / x - 1) <= 2.0**-11
+
+
+@pytest.mark.parametrize(
+    ("x", "decoded"), [(0.0, 0.0), (1.0, 1.0), (0.5, 0.5), (2.0**-60, 0.0), (2.0**15, 2.0**15), (1e9, 131008.0)]
+)
+def test_power_special_values(x, decoded):
+    assert record.decode_power(record.encode_power(f4(x))) == f4(decoded)
+
+
+def test_kernels_agree_with_the_obvious_encoding(directions):
+    rng = np.random.default_rng(3)
+    # Powers on code boundaries are a matter of rounding; these are not.
+    power = np.exp2(rng.uniform(-40, 15, len(directions))).astype(f4)
+    np.testing.assert_array_equal([record.encode_power(x) for x in power], naive.encode_power(power))
+    kernel = np.array([int(record.encode_direction(*wi)) for wi in directions])
+    obvious = naive.encode_direction(directions).astype(np.int64)
+    for shift in (20, 8):
+        assert np.abs((kernel >> shift & 0xFFF) - (obvious >> shift & 0xFFF)).max() <= 1
+    assert np.mean(kernel == obvious) > 0.99
+
+
+def test_unpack_names_everything(directions):
+    n = len(directions)
+    rng = np.random.default_rng(4)
+    position, power = rng.normal(size=(n, 3)).astype(f4), rng.uniform(0.01, 2, (n, 3))
+    flags = rng.integers(0, 256, n)
+    light = rng.integers(0, 1 << 16, n)
+    unpacked = record.unpack(naive.pack(position, directions, power, flags, light), 3.0)
+    np.testing.assert_array_equal(unpacked["position"], position)
+    np.testing.assert_allclose(unpacked["Phi"], 3 * power, rtol=2.0**-11 * 1.001)
+    assert np.linalg.norm(np.cross(unpacked["wi"], directions), axis=1).max() < np.radians(WORST_ANGLE)
+    np.testing.assert_array_equal(unpacked["bounces"], flags & 0x3F)
+    np.testing.assert_array_equal(unpacked["path_class"], flags >> 6)
+    np.testing.assert_array_equal(unpacked["light"], light)
