@@ -75,13 +75,13 @@ def format_number(value: float, digits: int = 3) -> str:
 
 
 def _distinct(value: float, bound: float) -> tuple[str, str]:
-    """Both formatted; with more digits where rounding would show a miss as a hit."""
-    for digits in range(3, 17):
-        texts = format_number(value, digits), format_number(bound, digits)
-        if texts[0] != texts[1] or value == bound:
+    """The bound in full and the value rounded, with more digits where rounding would show a miss as a hit."""
+    text = format_number(value)
+    for digits in range(4, 18):
+        if float(text) != bound or value == bound:
             break
-    shortest = format_number(bound)
-    return texts[0], shortest if float(shortest) == bound else texts[1]
+        text = format_number(value, digits)
+    return text, str(int(bound)) if bound.is_integer() and abs(bound) < 1e15 else f"{bound:.15g}"
 
 
 def format_cell(cell: Cell) -> str:
