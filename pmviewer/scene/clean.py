@@ -1,0 +1,203 @@
+"""What no scene may contain: unusable triangles, shapes and lights are dropped and counted, the rest is an error."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.errors import SceneError
+from pmviewer.scene.description import (
+    Camera,
+    ConstantEnvironment,
+    Cylinder,
+    Disk,
+    Geometry,
+    Mesh,
+    Parallelogram,
+    PointLight,
+    Shape,
+    Sphere,
+)
+from pmviewer.scene.diagnostics import Diagnostics
+
+LARGEST_SIDE = 16384
+"""Pixels; the camera's settings have the same bound."""
+LARGEST_COORDINATE = 1e15
+"""Beyond this, squares of distances leave float32."""
+_FLATTEST = 1e-9
+"""A triangle's height over its longest edge below which it has no normal."""
+_ON_SURFACE = 1e-6
+
+
+def check_faces(mesh: Mesh, path: Path | None) -> None:
+    """Raises SceneError for an index that has no vertex."""
+    if len(mesh.faces) and (mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices)):
+        bad = int(np.flatnonzero(((mesh.faces < 0) | (mesh.faces >= len(mesh.vertices))).any(axis=1))[0])
+        what = f"Triangle {bad} uses a vertex that does not exist (there are {len(mesh.vertices)})."
+        raise SceneError(what, path, hint="The mesh file is damaged: export it again.")
+
+
+def clean_shapes(shapes: list[Shape], diagnostics: Diagnostics) -> tuple[Shape, ...]:
+    """The usable shapes. What is left out is counted in `diagnostics.dropped`."""
+    kept = []
+    for shape in shapes:
+        geometry = _clean(shape.geometry, diagnostics.dropped)
+        if geometry is None:
+            reason = "zero-area light" if shape.radiance is not None else f"empty {_kind(shape.geometry)}"
+            diagnostics.dropped[reason] += 1
+            continue
+        radiance = shape.radiance
+        if radiance is not None and not max(radiance) > 0:
+            diagnostics.dropped["light of no power"] += 1
+            radiance = None
+        kept.append(replace(shape, geometry=geometry, radiance=radiance))
+    return tuple(kept)
+
+
+def _kind(geometry: Geometry) -> str:
+    return type(geometry).__name__.lower()
+
+
+def clean_lights(
+    lights: list[PointLight | ConstantEnvironment], diagnostics: Diagnostics
+) -> tuple[PointLight | ConstantEnvironment, ...]:
+    """Lights that emit something."""
+    kept = []
+    for light in lights:
+        power = light.intensity if isinstance(light, PointLight) else light.radiance
+        if max(power) > 0:
+            kept.append(light)
+        else:
+            diagnostics.dropped["light of no power"] += 1
+    return tuple(kept)
+
+
+def _clean(geometry: Geometry, dropped: Counter[str]) -> Geometry | None:
+    if isinstance(geometry, Mesh):
+        return clean_mesh(geometry, dropped)
+    if isinstance(geometry, Parallelogram):
+        numbers = (*geometry.corner, *geometry.edge_u, *geometry.edge_v)
+        corner, u, v = (np.array(x, np.float32) for x in (geometry.corner, geometry.edge_u, geometry.edge_v))
+        corners = np.array([[corner, corner + u, corner + v]], np.float64)
+        return geometry if _usable(numbers) and not _flat(corners)[0] else None
+    if isinstance(geometry, Sphere):
+        return geometry if _usable((*geometry.center, geometry.radius)) and _visible(geometry.radius) else None
+    if isinstance(geometry, Disk):
+        visible = _visible(geometry.radius) and any(geometry.normal)
+        return geometry if _usable((*geometry.center, geometry.radius)) and visible else None
+    assert isinstance(geometry, Cylinder)
+    length = math.dist(geometry.p0, geometry.p1)
+    visible = _visible(geometry.radius) and _visible(length)
+    return geometry if _usable((*geometry.p0, *geometry.p1, geometry.radius)) and visible else None
+
+
+def _usable(numbers: tuple[float, ...]) -> bool:
+    return all(math.isfinite(x) and abs(x) <= LARGEST_COORDINATE for x in numbers)
+
+
+def _visible(length: float) -> bool:
+    return length > 1e-15
+
+
+def clean_mesh(mesh: Mesh, dropped: Counter[str]) -> Mesh | None:
+    """The mesh without triangles that have unusable vertices or no area; None when nothing is left.
+
+    Triangles are judged as float32 sees them, since that is how they are traced. Broken vertex normals are replaced by
+    those of the neighbouring faces.
+    """
+    with np.errstate(invalid="ignore"):
+        usable = (np.abs(mesh.vertices) <= LARGEST_COORDINATE).all(axis=1)
+    whole = usable[mesh.faces].all(axis=1)
+    dropped["triangle with a NaN, infinite or huge vertex"] += int((~whole).sum())
+    faces = mesh.faces[whole]
+    vertices = np.where(usable[:, None], mesh.vertices, 0.0)
+    degenerate = _flat(vertices.astype(np.float32).astype(np.float64)[faces])
+    dropped["degenerate triangle"] += int(degenerate.sum())
+    faces = faces[~degenerate]
+    for reason in ("triangle with a NaN, infinite or huge vertex", "degenerate triangle"):
+        if not dropped[reason]:
+            del dropped[reason]
+    if not len(faces):
+        return None
+    used, index = np.unique(faces, return_inverse=True)
+    normals = mesh.normals
+    if normals is not None:
+        normals = _mended(Mesh(vertices, faces, normals))[used]
+    return Mesh(np.ascontiguousarray(vertices[used]), index.reshape(-1, 3).astype(np.int32), normals)
+
+
+def _flat(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which of the triangles (n, 3, 3) have no area."""
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    longest = np.maximum.reduce([(e * e).sum(axis=1) for e in (a, b, b - a)])
+    area = np.linalg.norm(np.cross(a, b), axis=1)
+    return ~((area > _FLATTEST * longest) & (longest > 0))
+
+
+def _mended(mesh: Mesh) -> NDArray[np.float64]:
+    """Unit vertex normals; those that are NaN or zero are computed anew."""
+    from pmviewer.scene.primitives import unit, with_smooth_normals
+
+    assert mesh.normals is not None
+    normals = unit(np.where(np.isfinite(mesh.normals), mesh.normals, 0.0))
+    broken = ~np.isfinite(mesh.normals).all(axis=1) | ~normals.any(axis=1)
+    if broken.any():
+        smooth = with_smooth_normals(Mesh(mesh.vertices, mesh.faces)).normals
+        assert smooth is not None
+        normals = np.where(broken[:, None], smooth, normals)
+    return normals
+
+
+def check_camera(camera: Camera, path: Path | None, line: int | None = None) -> None:
+    """Raises SceneError for a camera that can't look at anything."""
+    numbers = (*camera.origin, *camera.target, *camera.up)
+    if not _usable(numbers) or camera.origin == camera.target:
+        hint = "Check its to_world transformation."
+        raise SceneError("The camera's position or direction is not usable (NaN, infinite or zero).", path, line, hint)
+    if not 0 < camera.fov < 180:
+        what = f"The camera's field of view must lie between 0 and 180 degrees, found {camera.fov:g}."
+        raise SceneError(what, path, line)
+
+
+def check_size(width: int, height: int, path: Path | None, line: int | None = None) -> None:
+    """Raises SceneError for an image without pixels or with absurdly many."""
+    if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
+        what = f"The image must be 1 to {LARGEST_SIDE} pixels wide and high, found {width} × {height}."
+        raise SceneError(what, path, line, "Correct the film's width and height.")
+
+
+def on_a_surface(origin: tuple[float, float, float], shapes: tuple[Shape, ...], scale: float) -> str | None:
+    """Name of a shape that the point lies on, within a millionth of the scene's size."""
+    near = _ON_SURFACE * scale
+    eye = np.array(origin)
+    for shape in shapes:
+        g = shape.geometry
+        if isinstance(g, Sphere) and abs(math.dist(g.center, origin) - g.radius) <= near:
+            return shape.name
+        if isinstance(g, Parallelogram):
+            corner, u, v = np.array(g.corner), np.array(g.edge_u), np.array(g.edge_v)
+            if _touches(
+                np.array([[corner, corner + u, corner + u + v], [corner, corner + u + v, corner + v]]), eye, near
+            ):
+                return shape.name
+        if isinstance(g, Mesh) and _touches(g.vertices[g.faces], eye, near):
+            return shape.name
+    return None
+
+
+def _touches(corners: NDArray[np.float64], eye: NDArray[np.float64], near: float) -> bool:
+    """Is the point within `near` of one of the triangles (in their plane and between their edges)?"""
+    a, b, c = corners[:, 0] - eye, corners[:, 1] - eye, corners[:, 2] - eye
+    normal = np.cross(b - a, c - a)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    inside = np.abs((normal * a).sum(axis=1)) <= near
+    for p, q in ((a, b), (b, c), (c, a)):
+        inward = np.cross(normal, q - p)
+        inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+        inside &= (inward * -p).sum(axis=1) >= -near
+    return bool(inside.any())

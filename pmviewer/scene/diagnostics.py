@@ -1,0 +1,46 @@
+"""What a loader has to say: warnings gathered by kind, unusable things counted, errors with file and line."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+from pmviewer.errors import SceneError
+
+_SHOWN_LINES = 5
+
+
+class Diagnostics:
+    """Collects the warnings and counts of one scene. `path` is the file that errors name."""
+
+    def __init__(self, path: Path | None = None) -> None:
+        self.path = path
+        self.dropped: Counter[str] = Counter()
+        self._sentences: dict[str, str] = {}
+        self._lines: dict[str, list[int]] = {}
+
+    def error(self, what: str, line: int | None = None, hint: str = "") -> SceneError:
+        """The error to raise."""
+        return SceneError(what, self.path, line, hint)
+
+    def warn(self, sentence: str, line: int | None = None, kind: str | None = None) -> None:
+        """Keep one warning per kind (the sentence itself if no kind is given), with all lines where it applies."""
+        key = kind or sentence
+        self._sentences.setdefault(key, sentence)
+        lines = self._lines.setdefault(key, [])
+        if line is not None and line not in lines:
+            lines.append(line)
+
+    def warnings(self) -> tuple[str, ...]:
+        """One sentence a kind, in the order of their first appearance."""
+        return tuple(_located(sentence, self._lines[key]) for key, sentence in self._sentences.items())
+
+
+def _located(sentence: str, lines: list[int]) -> str:
+    if not lines:
+        return sentence
+    if len(lines) == 1:
+        return f"line {lines[0]}: {sentence}"
+    shown = ", ".join(map(str, lines[:_SHOWN_LINES]))
+    more = f" and {len(lines) - _SHOWN_LINES} more" if len(lines) > _SHOWN_LINES else ""
+    return f"lines {shown}{more}: {sentence}"

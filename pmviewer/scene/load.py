@@ -1,0 +1,88 @@
+"""Opening a scene, whatever it is: a bundled name, a folder, a Mitsuba file, a mesh."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pmviewer.errors import SceneError
+from pmviewer.resources import data_folder
+from pmviewer.scene.description import Scene
+from pmviewer.scene.mitsuba import load_mitsuba
+
+MESH_ENDINGS = (".glb", ".gltf", ".obj", ".ply", ".stl")
+ENDINGS = (".xml", *MESH_ENDINGS)
+
+
+@dataclass(frozen=True)
+class BundledScene:
+    """A scene that ships with the program. `path` is its folder; `shows` says what it is good for."""
+
+    name: str
+    path: Path
+    title: str
+    description: str = ""
+    shows: str = ""
+
+
+def bundled_scenes() -> list[BundledScene]:
+    """All scenes in the program's scene folder, by name."""
+    found = []
+    for folder in sorted(data_folder("scenes").iterdir()):
+        if (folder / "scene.xml").is_file():
+            about = folder / "scene.toml"
+            texts = tomllib.loads(about.read_text("utf-8")) if about.is_file() else {}
+            text = {key: str(texts.get(key, "")) for key in ("title", "description", "shows")}
+            found.append(BundledScene(folder.name, folder, text.pop("title") or folder.name, **text))
+    return found
+
+
+def load_scene(path_or_name: str | Path, parameters: Mapping[str, str] | None = None) -> Scene:
+    """Open a bundled scene by name, a folder with scene.xml, or a file by its ending.
+
+    Parameters
+    ----------
+    path_or_name: "cornell_caustic", "my/folder", "my/scene.xml", "chair.glb" …
+    parameters: values for the `<default>` names of a Mitsuba file; other formats have none.
+
+    Raises SceneError for anything wrong with the input, and nothing else.
+    """
+    path = _find(path_or_name)
+    ending = path.suffix.lower()
+    if ending == ".xml":
+        return load_mitsuba(path, parameters or {})
+    if ending not in MESH_ENDINGS:
+        what = (
+            f"Files ending in '{path.suffix}' can't be opened."
+            if ending
+            else "A file without an ending can't be opened."
+        )
+        raise SceneError(what, path, hint=f"Known endings: {', '.join(ENDINGS)}.")
+    from pmviewer.scene.meshes import load_mesh_scene
+
+    scene = load_mesh_scene(path)
+    ignored = tuple(f"Parameter '{name}' was given, but {ending} files have none." for name in parameters or {})
+    return replace(scene, warnings=scene.warnings + ignored)
+
+
+def _find(path_or_name: str | Path) -> Path:
+    path = Path(path_or_name).expanduser()
+    try:
+        if path.is_file():
+            return path
+        if (path / "scene.xml").is_file():
+            return path / "scene.xml"
+        is_folder, exists = path.is_dir(), path.exists()
+    except (OSError, ValueError):
+        raise SceneError(f"{str(path_or_name)[:200]!r} is not a file name.") from None
+    for scene in bundled_scenes():
+        if scene.name == str(path_or_name):
+            return scene.path / "scene.xml"
+    if is_folder:
+        raise SceneError("The folder has no scene.xml.", path, hint="Name the scene file itself.")
+    if exists:
+        raise SceneError("This is not a regular file.", path)
+    names = ", ".join(scene.name for scene in bundled_scenes())
+    raise SceneError("There is no such file or bundled scene.", path, hint=f"Bundled scenes: {names}.")

@@ -1,0 +1,123 @@
+"""Shape elements as geometry in world space."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pmviewer.errors import SceneError
+from pmviewer.scene import primitives
+from pmviewer.scene.clean import check_faces
+from pmviewer.scene.description import Cylinder, Disk, Geometry, Mesh, Parallelogram, Sphere, Vec3
+from pmviewer.scene.mitsuba_document import Properties
+from pmviewer.scene.mitsuba_transform import Matrix, apply, mirrors, similar_columns
+from pmviewer.scene.ply import read_ply
+
+SUPPORTED = ("obj", "ply", "rectangle", "cube", "sphere", "disk", "cylinder")
+
+
+def _vec3(v: np.ndarray) -> Vec3:
+    x, y, z = (float(c) for c in v)
+    return (x, y, z)
+
+
+def geometry(p: Properties) -> Geometry:
+    """Geometry of a supported <shape>. Raises SceneError."""
+    to_world = p.transform()
+    flip = p.boolean("flip_normals", False)
+    if p.type in ("obj", "ply"):
+        return _mesh_file(p, to_world, flip)
+    if p.type == "cube":
+        return primitives.transformed(primitives.cube(), to_world, flip)
+    if p.type == "rectangle":
+        return _rectangle(to_world, flip)
+    if p.type == "sphere":
+        return _sphere(p, to_world, flip)
+    if p.type == "disk":
+        return _disk(p, to_world, flip)
+    return _cylinder(p, to_world, flip)
+
+
+def _rectangle(m: Matrix, flip: bool) -> Parallelogram:
+    edge_u, edge_v = _vec3(2 * m[:3, 0]), _vec3(2 * m[:3, 1])
+    if mirrors(m) != flip:
+        edge_u, edge_v = edge_v, edge_u
+    return Parallelogram(_vec3(apply(m, (-1, -1, 0))), edge_u, edge_v)
+
+
+def _uneven(p: Properties) -> None:
+    p.document.warn(f"{p.element} is scaled unevenly: it is cut into triangles.", p.element)
+
+
+def _sphere(p: Properties, to_world: Matrix, flip: bool) -> Geometry:
+    center, radius = p.point("center", (0.0, 0.0, 0.0)), p.number("radius", 1.0)
+    # Mitsuba turns a mirrored sphere (or one of negative radius) inside out.
+    flip = flip != (mirrors(to_world) != (radius < 0))
+    scale = similar_columns(to_world)
+    if scale is not None:
+        return Sphere(_vec3(apply(to_world, center)), abs(radius) * scale, flip)
+    _uneven(p)
+    local = np.eye(4)
+    local[:3, :3] *= abs(radius)
+    local[:3, 3] = center
+    return primitives.transformed(primitives.sphere(), to_world @ local, flip)
+
+
+def _disk(p: Properties, to_world: Matrix, flip: bool) -> Geometry:
+    radius = similar_columns(to_world, 2)
+    if radius is None:
+        _uneven(p)
+        return primitives.transformed(primitives.disk(), to_world, flip)
+    normal = primitives.unit(np.cross(to_world[:3, 0], to_world[:3, 1])[None])[0]
+    return Disk(_vec3(to_world[:3, 3]), _vec3(-normal if mirrors(to_world) != flip else normal), radius)
+
+
+def _cylinder(p: Properties, to_world: Matrix, flip: bool) -> Geometry:
+    p0, p1 = p.point("p0", (0.0, 0.0, 0.0)), p.point("p1", (0.0, 0.0, 1.0))
+    radius = abs(p.number("radius", 1.0))
+    axis = np.subtract(p1, p0)
+    length = float(np.linalg.norm(axis))
+    if length == 0:
+        return Cylinder(p0, p0, radius, flip)
+    w = axis / length
+    u = primitives.unit(np.cross(w, np.eye(3)[np.argmin(np.abs(w))])[None])[0]
+    local = np.eye(4)
+    local[:3, 0], local[:3, 1], local[:3, 2], local[:3, 3] = radius * u, radius * np.cross(w, u), axis, p0
+    m = to_world @ local
+    flip = flip != mirrors(to_world)
+    world_radius = similar_columns(m, 2)
+    upright = np.abs(m[:3, 2] @ m[:3, :2]).max() <= 1e-5 * np.linalg.norm(m[:3, 2]) * (world_radius or 0)
+    if world_radius is not None and (upright or math.isclose(radius, 0)):
+        return Cylinder(_vec3(m[:3, 3]), _vec3(m[:3, 3] + m[:3, 2]), world_radius, flip)
+    _uneven(p)
+    return primitives.transformed(primitives.cylinder(), m, flip)
+
+
+def _mesh_file(p: Properties, to_world: Matrix, flip: bool) -> Mesh:
+    name = p.string("filename", "")
+    if not name:
+        raise p.document.error(f"{p.element} needs a 'filename'.", p.element)
+    flat = p.boolean("face_normals", False)
+    p.known("flip_tex_coords")
+    path = p.document.file(name, p.element)
+    try:
+        mesh = read_ply(path) if p.type == "ply" else _read_obj(path)
+        check_faces(mesh, path)
+    except SceneError as error:
+        raise p.document.error(
+            f"The mesh {path.name} named by {p.element}: {error.what}", p.element, error.hint
+        ) from None
+    if flat:
+        mesh = replace(mesh, normals=None)
+    elif mesh.normals is None:
+        mesh = primitives.with_smooth_normals(mesh)
+    return primitives.transformed(mesh, to_world, flip)
+
+
+def _read_obj(path: Path) -> Mesh:
+    from pmviewer.scene.meshes import read_single
+
+    return read_single(path)

@@ -1,0 +1,124 @@
+"""4×4 transformations of a scene file: column vectors, later operations multiply from the left."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.scene.mitsuba_values import parse_float, parse_numbers, parse_vector
+from pmviewer.scene.mitsuba_xml import Element
+
+Matrix = NDArray[np.float64]
+OPERATIONS = ("translate", "rotate", "scale", "matrix", "lookat")
+_SIMILAR = 1e-5
+
+
+def translation(x: float, y: float, z: float) -> Matrix:
+    m = np.eye(4)
+    m[:3, 3] = x, y, z
+    return m
+
+
+def scaling(x: float, y: float, z: float) -> Matrix:
+    return np.diag([x, y, z, 1.0])
+
+
+def rotation(axis: tuple[float, float, float], degrees: float) -> Matrix:
+    """Right-handed rotation about an axis through the origin (Rodrigues). ValueError for a zero axis."""
+    length = math.hypot(*axis)
+    if length == 0:
+        raise ValueError("expected a rotation axis other than zero")
+    x, y, z = (c / length for c in axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    angle = math.radians(degrees)
+    m = np.eye(4)
+    m[:3, :3] += math.sin(angle) * cross + (1 - math.cos(angle)) * (cross @ cross)
+    return m
+
+
+def look_at(origin: tuple[float, ...], target: tuple[float, ...], up: tuple[float, ...]) -> Matrix:
+    """Camera space to world: +x to the left of the image, +y up, +z into the view.
+
+    A zero `up` is replaced; ValueError when origin and target coincide or `up` is along the view.
+    """
+    forward = np.subtract(target, origin)
+    length = float(np.linalg.norm(forward))
+    if length == 0:
+        raise ValueError("expected a lookat whose origin and target differ")
+    forward /= length
+    up_vector = np.asarray(up, float)
+    if not up_vector.any():
+        up_vector = np.eye(3)[np.argmin(np.abs(forward))]
+    left = np.cross(up_vector, forward)
+    if float(np.linalg.norm(left)) <= 1e-12 * float(np.linalg.norm(up_vector)):
+        raise ValueError("expected a lookat whose 'up' is not along the view direction")
+    left /= np.linalg.norm(left)
+    m = np.eye(4)
+    m[:3, 0], m[:3, 1], m[:3, 2], m[:3, 3] = left, np.cross(forward, left), forward, origin
+    return m
+
+
+def _components(attributes: dict[str, str], default: float) -> tuple[float, float, float]:
+    if "value" in attributes:
+        return parse_vector(attributes["value"])
+    x, y, z = (parse_float(attributes[c]) if c in attributes else default for c in "xyz")
+    return (x, y, z)
+
+
+def operation(element: Element) -> Matrix:
+    """The matrix of <translate>, <rotate>, <scale>, <matrix> or <lookat>. ValueError says what was expected."""
+    attributes = element.attributes
+    if element.tag == "translate":
+        return translation(*_components(attributes, 0.0))
+    if element.tag == "scale":
+        return scaling(*_components(attributes, 1.0))
+    if element.tag == "rotate":
+        return rotation(_components(attributes, 0.0), parse_float(_required(attributes, "angle")))
+    if element.tag == "matrix":
+        numbers = parse_numbers(_required(attributes, "value"), (9, 16))
+        if len(numbers) == 16:
+            if numbers[12:] != [0.0, 0.0, 0.0, 1.0]:
+                raise ValueError("expected a matrix whose last row is 0 0 0 1")
+            return np.reshape(numbers, (4, 4))
+        m = np.eye(4)
+        m[:3, :3] = np.reshape(numbers, (3, 3))
+        return m
+    if element.tag == "lookat":
+        up = parse_numbers(attributes["up"], (3,)) if "up" in attributes else [0.0, 0.0, 0.0]
+        origin = parse_numbers(_required(attributes, "origin"), (3,))
+        return look_at(tuple(origin), tuple(parse_numbers(_required(attributes, "target"), (3,))), tuple(up))
+    raise ValueError(f"expected one of {', '.join(OPERATIONS)} in a transformation, found <{element.tag}>")
+
+
+def _required(attributes: dict[str, str], name: str) -> str:
+    if name not in attributes:
+        raise ValueError(f"expected the attribute '{name}'")
+    return attributes[name]
+
+
+def apply(m: Matrix, point: tuple[float, float, float]) -> NDArray[np.float64]:
+    """The transformed point (3,)."""
+    return m[:3, :3] @ np.asarray(point, float) + m[:3, 3]
+
+
+def cofactor(m: Matrix) -> Matrix:
+    """(3, 3) matrix that turns normals (up to length and the determinant's sign); exists for singular matrices too."""
+    a, b, c = m[:3, 0], m[:3, 1], m[:3, 2]
+    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+
+
+def mirrors(m: Matrix) -> bool:
+    """Does the transformation swap left and right?"""
+    return bool(m[:3, 0] @ np.cross(m[:3, 1], m[:3, 2]) < 0)
+
+
+def similar_columns(m: Matrix, count: int = 3) -> float | None:
+    """Common length of the first `count` columns if they are orthogonal and equally long, else None."""
+    columns = m[:3, :count]
+    gram = columns.T @ columns
+    square = float(np.trace(gram)) / count
+    if np.abs(gram - square * np.eye(count)).max() > _SIMILAR * square:
+        return None
+    return math.sqrt(square)
