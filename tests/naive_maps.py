@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pmviewer.bench.lookup import clustered as clustered
 from pmviewer.maps.record import unpack
 
 ALPHA, BETA = 0.918, 1.953
@@ -89,20 +90,3 @@ def pack(position, wi=(0.0, 0.0, 1.0), power=1.0, flags=0, light=0) -> np.ndarra
     words[:, 4] = codes[:, 0] | codes[:, 1] << 16
     words[:, 5] = codes[:, 2] | np.broadcast_to(np.asarray(light, np.uint32), n) << 16
     return photons
-
-
-def clustered(n: int, seed: int) -> np.ndarray:
-    """Positions (n, 3) float32 as a light pass leaves them: four fifths evenly on the walls of a box and two spheres in
-    it, one fifth in a caustic on the floor."""
-    rng = np.random.default_rng(seed)
-    wall = rng.choice(7, n, p=np.array([4, 4, 4, 4, 4, 1.54, 1.13]) / 22.67)
-    position = rng.uniform(-1, 1, (n, 3))
-    for side, (axis, value) in enumerate([(1, -1), (1, 1), (2, -1), (0, -1), (0, 1)]):
-        position[wall == side, axis] = value
-    direction = rng.normal(size=(n, 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    position[wall == 5] = [0.4, -0.6, 0.3] + 0.35 * direction[wall == 5]
-    position[wall == 6] = [-0.4, -0.7, 0.5] + 0.3 * direction[wall == 6]
-    caustic = rng.random(n) < 0.2
-    position[caustic] = np.array([0.2, -1, 0.5]) + rng.normal(size=(n, 3))[caustic] * [0.14, 0, 0.14]
-    return position.astype(np.float32)
