@@ -11,7 +11,7 @@ the disc is known to end exactly at a photon: given r, the k−1 inner photons a
 that their sum alone is unbiased; stratified photons fill their disc more evenly and the rim photon counts half. Where
 fewer than k lie within the largest radius, that is the radius and nothing is corrected.
 
-Sums run in float64: a pass may put millions of photons into one disc.
+A pass may put millions of photons into one disc: float32 sums are short, and their sum is float64.
 """
 
 from __future__ import annotations
@@ -26,16 +26,20 @@ from pmviewer.kernels.memory import (
     stack_get_i4,
     stack_get_i8,
     stack_i4,
+    stack_put_f4,
 )
 from pmviewer.maps.filters import CONSTANT, filter_disc_mean, filter_weight
 from pmviewer.maps.grid import grid_ranges
 from pmviewer.maps.kdtree import KEYS, nearest
-from pmviewer.maps.simd import WIDTH, within8
-from pmviewer.maps.stored import arrives, height_above, stored_power
+from pmviewer.maps.simd import WIDTH, add_power8, count_bits, facing8, within8
+from pmviewer.maps.stored import stored_power
 
 RIM_LEFT_OUT, RIM_HALF, RIM_WHOLE = 0, 1, 2
 """What the farthest of k nearest photons counts: nothing (exact for independently scattered photons), half
 (Christensen's rule; for stratified first hits), whole."""
+
+FLUSH = 64
+"""Float32 sums take at most this many photons before they move to float64."""
 
 _FLATTEST = np.float32(1e-3)
 _f4 = np.float32
@@ -44,6 +48,18 @@ _i4 = np.int32
 _i8 = np.int64
 _u4 = np.uint32
 _PI = _f8(np.pi)
+
+
+@device
+def _flush(sums, red, green, blue):
+    """Moves the eight float32 partial sums of each channel into the float64 sums."""
+    for lane in range(WIDTH):
+        red += _f8(stack_get_f4(sums, lane))
+        green += _f8(stack_get_f4(sums, WIDTH + lane))
+        blue += _f8(stack_get_f4(sums, 2 * WIDTH + lane))
+    for lane in range(3 * WIDTH):
+        stack_put_f4(sums, lane, _f4(0.0))
+    return red, green, blue
 
 
 @device
@@ -66,32 +82,37 @@ def irradiance_radius(grid, px, py, pz, nx, ny, nz, radius, flatness, class_mask
     r2 = radius * radius
     inverse_r2 = _f4(1.0) / r2
     height = flatness * radius
-    ranges = stack_i4(16)
-    squared = stack_i4(8)
+    ranges, squared, weights, sums = stack_i4(16), stack_i4(8), stack_i4(8), stack_i4(24)
+    for lane in range(WIDTH):
+        stack_put_f4(weights, lane, _f4(1.0))
+    for lane in range(3 * WIDTH):
+        stack_put_f4(sums, lane, _f4(0.0))
     red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
-    count = _i4(0)
+    count, pending = _i4(0), _i4(0)
     for k in range(grid_ranges(grid, px, py, pz, radius, ranges)):
         j, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
         while j < end:
             mask = within8(grid.x, grid.y, grid.z, j, px, py, pz, r2, squared)
             if end - j < WIDTH:
                 mask &= _i4((1 << (end - j)) - 1)
-            while mask != 0:
-                lane = count_trailing_zeros(mask)
-                mask &= mask - _i4(1)
-                i = j + lane
-                if arrives(grid, i, nx, ny, nz, class_mask) and (
-                    abs(height_above(grid, i, px, py, pz, nx, ny, nz)) <= height
-                ):
-                    r, g, b = stored_power(grid, i)
-                    if filter_kind != CONSTANT:
-                        w = filter_weight(filter_kind, cone_k, stack_get_f4(squared, lane) * inverse_r2)
-                        r, g, b = w * r, w * g, w * b
-                    red += r
-                    green += g
-                    blue += b
-                    count += _i4(1)
+            if mask != 0:
+                mask &= facing8(grid.x, grid.y, grid.z, grid.direction, j, px, py, pz, nx, ny, nz, height, class_mask)
+            if mask != 0:
+                if filter_kind != CONSTANT:
+                    lanes = mask
+                    while lanes != 0:
+                        lane = count_trailing_zeros(lanes)
+                        lanes &= lanes - _i4(1)
+                        x2 = stack_get_f4(squared, lane) * inverse_r2
+                        stack_put_f4(weights, lane, filter_weight(filter_kind, cone_k, x2))
+                add_power8(grid.power_rg, grid.power_b, j, mask, weights, sums)
+                count += count_bits(mask)
+                pending += _i4(1)
+                if pending == FLUSH:
+                    red, green, blue = _flush(sums, red, green, blue)
+                    pending = _i4(0)
             j += WIDTH
+    red, green, blue = _flush(sums, red, green, blue)
     scale = _f8(grid.power_unit) / (_f8(filter_disc_mean(filter_kind, cone_k)) * _PI * _f8(radius) * _f8(radius))
     return _f4(red * scale), _f4(green * scale), _f4(blue * scale), count
 

@@ -10,7 +10,7 @@ large scene) cells are hashed (Teschner et al. 2003) into about n/2 buckets; fou
 they mostly stay contiguous. Two cells may fall into one bucket; a look-up visits each bucket once, and the distance
 test removes strangers.
 
-A grid stores 24 bytes a photon (positions as three arrays, the rest as (n, 3) words) and at most 6 bytes a photon of
+A grid stores 24 bytes a photon (one array for each of the six words of the record) and at most 6 bytes a photon of
 cell starts.
 """
 
@@ -43,7 +43,9 @@ RECORD = np.dtype(
         ("x", np.int64),
         ("y", np.int64),
         ("z", np.int64),
-        ("payload", np.int64),
+        ("direction", np.int64),
+        ("power_rg", np.int64),
+        ("power_b", np.int64),
         ("starts", np.int64),
         ("n", np.int64),
         ("origin_x", np.float64),
@@ -72,7 +74,7 @@ class PhotonGrid:
     Attributes
     ----------
     x, y, z: (n + 8,) float32 positions, the last 8 padding.
-    payload: (n, 3) uint32, words 3–5 of the photon record.
+    direction, power_rg, power_b: (n + 8,) uint32, words 3, 4 and 5 of the photon record, padded likewise.
     starts: (cells + 1,) int32, first photon of each cell or hash bucket.
     radius: the largest radius of look-ups.
     power_unit: watts of one unit of stored power.
@@ -82,7 +84,9 @@ class PhotonGrid:
     x: np.ndarray
     y: np.ndarray
     z: np.ndarray
-    payload: np.ndarray
+    direction: np.ndarray
+    power_rg: np.ndarray
+    power_b: np.ndarray
     starts: np.ndarray
     radius: float
     power_unit: float
@@ -90,7 +94,7 @@ class PhotonGrid:
 
     @property
     def n(self) -> int:
-        return len(self.payload)
+        return len(self.x) - WIDTH
 
     @property
     def hashed(self) -> bool:
@@ -99,17 +103,19 @@ class PhotonGrid:
     @property
     def bytes(self) -> int:
         """Memory held, in bytes, photons included."""
-        return sum(a.nbytes for a in (self.x, self.y, self.z, self.payload, self.starts, self.record))
+        return sum(a.nbytes for a in (*self._columns, self.starts, self.record))
+
+    @property
+    def _columns(self) -> tuple[np.ndarray, ...]:
+        return self.x, self.y, self.z, self.direction, self.power_rg, self.power_b
 
     @property
     def photons(self) -> np.ndarray:
         """A new (n, 6) float32 array of the photons in cell order."""
-        n = self.n
-        columns = np.empty((n, 6), np.float32)
-        for axis, values in enumerate((self.x, self.y, self.z)):
-            columns[:, axis] = values[:n]
-        columns.view(np.uint32)[:, 3:] = self.payload
-        return columns
+        photons = np.empty((self.n, 6), np.float32)
+        for i, column in enumerate(self._columns):
+            photons.view(column.dtype)[:, i] = column[: self.n]
+        return photons
 
 
 @device
@@ -212,7 +218,9 @@ def _bounds(photons, box):
 
 
 @kernel
-def _sort(photons, words, records, shift, keys, order, bucket_ends, cell_ends, x, y, z, payload, starts):
+def _sort(
+    photons, words, records, shift, keys, order, bucket_ends, cell_ends, x, y, z, direction, power_rg, power_b, starts
+):
     """Two-level counting sort of photons (n, 6), seen as uint32 in `words`, by cell.
 
     keys, order: (2, n) and (n,) int32 scratch; bucket_ends: zeroed int64, one per 2^shift cells, plus one; cell_ends:
@@ -262,7 +270,7 @@ def _sort(photons, words, records, shift, keys, order, bucket_ends, cell_ends, x
             cell_ends[c] = place + 1
             j = order[i]
             x[place], y[place], z[place] = photons[j, 0], photons[j, 1], photons[j, 2]
-            payload[place, 0], payload[place, 1], payload[place, 2] = words[j, 3], words[j, 4], words[j, 5]
+            direction[place], power_rg[place], power_b[place] = words[j, 3], words[j, 4], words[j, 5]
         begin = end
     starts[cells] = n
 
@@ -291,27 +299,16 @@ def build_grid(photons: np.ndarray, radius: float, power_unit: float = 1.0) -> P
     if cells > min(MOST_CELLS, max(DENSE_CELLS_PER_PHOTON * n, FEWEST_DENSE_CELLS)):
         cells = 1 << max(int(n / 2).bit_length(), 3)
         hash_mask = cells - 1
-    grid_x, grid_y, grid_z = (np.zeros(n + WIDTH, np.float32) for _ in range(3))
-    payload = np.empty((n, 3), np.uint32)
+    columns = [np.zeros(n + WIDTH, np.float32 if i < 3 else np.uint32) for i in range(6)]
     starts = np.zeros(cells + 1, np.int32)
     record = np.zeros(1, RECORD)
-    record[0] = (
-        *(a.ctypes.data for a in (grid_x, grid_y, grid_z, payload, starts)),
-        n,
-        *low,
-        1.0 / cell,
-        *shape,
-        hash_mask,
-        radius,
-        power_unit,
-    )
+    addresses = (a.ctypes.data for a in (*columns, starts))
+    record[0] = (*addresses, n, *low, 1.0 / cell, *shape, hash_mask, radius, power_unit)
     if n:
         shift = max(4, math.ceil(math.log2(cells / 1024)))
         keys, order = np.empty((2, n), np.int32), np.empty(n, np.int32)
         bucket_ends = np.zeros((cells - 1 >> shift) + 1, np.int64)
         cell_ends = np.empty(1 << shift, np.int64)
         words = photons.view(np.uint32)
-        _sort(
-            photons, words, record, shift, keys, order, bucket_ends, cell_ends, grid_x, grid_y, grid_z, payload, starts
-        )
-    return PhotonGrid(grid_x, grid_y, grid_z, payload, starts, float(radius), float(power_unit), record)
+        _sort(photons, words, record, shift, keys, order, bucket_ends, cell_ends, *columns, starts)
+    return PhotonGrid(*columns, starts, float(radius), float(power_unit), record)

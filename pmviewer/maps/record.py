@@ -35,7 +35,10 @@ BOUNCES = 0x3F
 DIRECT, CAUSTIC, INDIRECT, INDIRECT_CAUSTIC = 0, 2, 1, 3
 """Path classes as `flags >> 6`."""
 
-_EXPONENT_BASE = np.uint32((127 - 47) << 23)
+EXPONENT_BASE = (127 - 47) << 23
+"""Bits of 2⁻⁴⁷ as float32, the power of code 0 if that did not mean none."""
+
+_EXPONENT_BASE = np.uint32(EXPONENT_BASE)
 _f4 = np.float32
 _u4 = np.uint32
 

@@ -1,27 +1,58 @@
-"""Distance tests on eight photons at once.
+"""Tests and sums over eight photons at once.
 
-Positions are stored as three separate arrays (structure of arrays), so that eight of them load as one LLVM vector
-`<8 x float>` each; machines without AVX split it into two halves by themselves. Arrays are padded by `WIDTH` elements
-so that the last load stays inside them.
+Photons are stored as separate arrays of coordinates and words (structure of arrays), so that eight of them load as one
+LLVM vector `<8 x float>` each; machines without AVX split it into two halves by themselves. Arrays are padded by
+`WIDTH` elements so that the last load stays inside them.
 """
 
 from __future__ import annotations
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 from pmviewer.kernels.memory import F32, I8, I32
+from pmviewer.maps.record import EXPONENT_BASE
 
 WIDTH = 8
 _VECTOR = ir.VectorType(F32, WIDTH)
+_WORDS = ir.VectorType(I32, WIDTH)
+_BITS = ir.VectorType(ir.IntType(1), WIDTH)
 _FAST = ("contract", "reassoc", "nsz")
 
 
-def _splat(builder, scalar):
-    first = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), scalar, ir.Constant(I32, 0))
-    zeros = ir.Constant(ir.VectorType(I32, WIDTH), [0] * WIDTH)
-    return builder.shuffle_vector(first, ir.Constant(_VECTOR, ir.Undefined), zeros)
+def _constant(vector, value):
+    return ir.Constant(vector, [value] * WIDTH)
+
+
+def _splat(builder, scalar, vector=_VECTOR):
+    undefined = ir.Constant(vector, ir.Undefined)
+    first = builder.insert_element(undefined, scalar, ir.Constant(I32, 0))
+    return builder.shuffle_vector(first, undefined, _constant(_WORDS, 0))
+
+
+def _load(builder, array, index, vector=_VECTOR):
+    """Elements index … index+7 of the array at an int64 address."""
+    start = builder.gep(builder.inttoptr(array, vector.element.as_pointer()), [index])
+    values = builder.load(builder.bitcast(start, vector.as_pointer()))
+    values.align = 4
+    return values
+
+
+def _call(builder, name, *vectors):
+    """An LLVM intrinsic on `<8 x float>`, such as fabs."""
+    function_type = ir.FunctionType(_VECTOR, [_VECTOR] * len(vectors))
+    function = cgutils.get_or_insert_function(builder.module, function_type, f"llvm.{name}.v{WIDTH}f32")
+    return builder.call(function, vectors)
+
+
+def _dot(builder, a, b):
+    total = None
+    for p, q in zip(a, b):
+        product = builder.fmul(p, q, flags=_FAST)
+        total = product if total is None else builder.fadd(total, product, flags=_FAST)
+    return total
 
 
 @intrinsic
@@ -44,14 +75,11 @@ def within8(typingctx, x_array, y_array, z_array, i, x, y, z, r2, squared):
 
     def codegen(context, builder, sig, args):
         *arrays, index, x, y, z, limit, out = args
-        total = None
-        for array, coordinate in zip(arrays, (x, y, z)):
-            start = builder.gep(builder.inttoptr(array, F32.as_pointer()), [index])
-            values = builder.load(builder.bitcast(start, _VECTOR.as_pointer()))
-            values.align = 4
-            d = builder.fsub(values, _splat(builder, coordinate), flags=_FAST)
-            square = builder.fmul(d, d, flags=_FAST)
-            total = square if total is None else builder.fadd(total, square, flags=_FAST)
+        d = [
+            builder.fsub(_load(builder, array, index), _splat(builder, coordinate), flags=_FAST)
+            for array, coordinate in zip(arrays, (x, y, z))
+        ]
+        total = _dot(builder, d, d)
         builder.store(total, builder.bitcast(out, _VECTOR.as_pointer())).align = 4
         mask = builder.fcmp_ordered("<", total, _splat(builder, limit))
         return builder.zext(builder.bitcast(mask, I8), I32)
@@ -66,5 +94,82 @@ def count_bits(typingctx, mask):
 
     def codegen(context, builder, sig, args):
         return builder.ctpop(args[0])
+
+    return signature, codegen
+
+
+@intrinsic
+def facing8(typingctx, x_array, y_array, z_array, words, i, x, y, z, nx, ny, nz, height, class_mask):
+    """Which of the photons i … i+7 arrive from the side of the normal, within `height` of the tangent plane, on a path
+    of a class in `class_mask`.
+
+    words: int64 address of word 3 of the photon records; others as for `within8` and `irradiance_radius`. Returns int32
+    with bit j set for photon i+j.
+    """
+    f, i8, i4 = types.float32, types.int64, types.int32
+    signature = i4(i8, i8, i8, i8, i8, f, f, f, f, f, f, f, i4)
+
+    def codegen(context, builder, sig, args):
+        *arrays, words, index, x, y, z, nx, ny, nz, height, class_mask = args
+        normal = [_splat(builder, n) for n in (nx, ny, nz)]
+        d = [
+            builder.fsub(_load(builder, array, index), _splat(builder, coordinate), flags=_FAST)
+            for array, coordinate in zip(arrays, (x, y, z))
+        ]
+        inside = builder.fcmp_ordered("<=", _call(builder, "fabs", _dot(builder, d, normal)), _splat(builder, height))
+
+        word = _load(builder, words, index, _WORDS)
+        path_class = builder.and_(builder.lshr(word, _constant(_WORDS, 6)), _constant(_WORDS, 3))
+        wanted = builder.trunc(builder.lshr(_splat(builder, class_mask, _WORDS), path_class), _BITS)
+
+        # The octahedral direction as in record.decode_direction, 2047 times as long: only the sign of n·wi matters.
+        half = _constant(_VECTOR, 2047.0)
+        u = builder.fsub(builder.sitofp(builder.lshr(word, _constant(_WORDS, 20)), _VECTOR), half)
+        low = builder.and_(builder.lshr(word, _constant(_WORDS, 8)), _constant(_WORDS, 0xFFF))
+        v = builder.fsub(builder.sitofp(low, _VECTOR), half)
+        wz = builder.fsub(builder.fsub(half, _call(builder, "fabs", u)), _call(builder, "fabs", v))
+        fold = _call(builder, "maxnum", builder.fneg(wz), _constant(_VECTOR, 0.0))
+        wx = builder.fsub(u, _call(builder, "copysign", fold, u))
+        wy = builder.fsub(v, _call(builder, "copysign", fold, v))
+        front = builder.fcmp_ordered(">", _dot(builder, (wx, wy, wz), normal), _constant(_VECTOR, 0.0))
+
+        mask = builder.and_(builder.and_(inside, wanted), front)
+        return builder.zext(builder.bitcast(mask, I8), I32)
+
+    return signature, codegen
+
+
+@intrinsic
+def add_power8(typingctx, rg_words, b_words, i, mask, weights, sums):
+    """Adds the weighted powers of those photons i … i+7 whose bit is set in `mask`.
+
+    rg_words, b_words: int64 addresses of words 4 and 5 of the photon records.
+    weights: pointer to 8 float32.
+    sums: pointer to 3 × 8 float32: eight partial sums of red, green and blue, in units of the map's power.
+    """
+    pointer = types.CPointer(types.int32)
+    signature = types.void(types.int64, types.int64, types.int64, types.int32, pointer, pointer)
+
+    def codegen(context, builder, sig, args):
+        rg_words, b_words, index, mask, weights, sums = args
+        chosen = builder.bitcast(builder.trunc(mask, I8), _BITS)
+        weight = builder.load(builder.bitcast(weights, _VECTOR.as_pointer()))
+        weight.align = 4
+        weight = builder.select(chosen, weight, _constant(_VECTOR, 0.0))
+        rg, b = _load(builder, rg_words, index, _WORDS), _load(builder, b_words, index, _WORDS)
+        low = _constant(_WORDS, 0xFFFF)
+        channels = builder.and_(rg, low), builder.lshr(rg, _constant(_WORDS, 16)), builder.and_(b, low)
+        for channel, code in enumerate(channels):
+            # record.decode_power
+            bits = builder.add(builder.shl(code, _constant(_WORDS, 13)), _constant(_WORDS, EXPONENT_BASE))
+            power = builder.bitcast(bits, _VECTOR)
+            zero = builder.icmp_unsigned("==", code, _constant(_WORDS, 0))
+            power = builder.select(zero, _constant(_VECTOR, 0.0), power)
+            place = builder.gep(builder.bitcast(sums, _VECTOR.as_pointer()), [ir.Constant(I32, channel)])
+            total = builder.load(place)
+            total.align = 4
+            total = builder.fadd(total, builder.fmul(power, weight, flags=_FAST), flags=_FAST)
+            builder.store(total, place).align = 4
+        return context.get_dummy_value()
 
     return signature, codegen

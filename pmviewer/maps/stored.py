@@ -1,8 +1,4 @@
-"""Reading the photons of a grid or a tree inside kernels.
-
-Both keep positions in three arrays and words 3–5 of the photon record in `payload`, under the same names in their
-kernel records, so that these functions take either.
-"""
+"""Reading single photons of a tree inside kernels; `photons` is the record of a PhotonKdTree."""
 
 from __future__ import annotations
 
