@@ -1,0 +1,3 @@
+"""pmviewer: an interactive previewer for photon-mapping global illumination."""
+
+__version__ = "0.1.0"

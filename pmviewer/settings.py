@@ -441,11 +441,13 @@ def _explain(error: ValidationError) -> str:
     if path not in SETTINGS:
         return f"There is no setting '{'.'.join(str(p) for p in first['loc'])}'."
     info = SETTINGS[path]
-    allowed = "one of " + ", ".join(info.choices) if info.choices else _range_text(info)
-    return f"{path} = {first['input']!r} is not allowed: expected {allowed}."
+    return f"{path} = {first['input']!r} is not allowed: expected {range_text(info)}."
 
 
-def _range_text(info: SettingInfo) -> str:
+def range_text(info: SettingInfo) -> str:
+    """What the schema allows, in words."""
+    if info.choices:
+        return "one of " + ", ".join(info.choices)
     if info.scale == "vector":
         text = "three numbers (x, y, z)"
     elif info.kind is bool:

@@ -12,7 +12,7 @@ from pmviewer.render.camera import CameraPose
 from pmviewer.scene.flatten import FlatScene
 from pmviewer.settings import Estimate
 
-FOOTPRINTS = {"gather": 5.0}
+FOOTPRINTS = {"gather": 3.0}
 """Radius in pixel footprints by method: a gather blurs what its rays find anyway, so it can use a wider, calmer one."""
 DEFAULT_FOOTPRINTS = 2.5
 PROBES = 24

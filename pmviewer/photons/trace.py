@@ -15,7 +15,7 @@ from pmviewer.kernels.bsdf import scatter_specular
 from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.light import emit_photon
 from pmviewer.kernels.memory import float_of_bits
-from pmviewer.kernels.random import draw4, hash3, unit_float
+from pmviewer.kernels.random import draw1, draw4
 from pmviewer.kernels.raycast import closest_hit
 from pmviewer.kernels.scene import DIFFUSE, material_kind, material_of, material_two_sided, reflectance
 from pmviewer.kernels.surface import leave, surface_at
@@ -28,6 +28,7 @@ _f4 = np.float32
 _f8 = np.float64
 _u4 = np.uint32
 _INF = _f4(np.inf)
+LIGHT_CHOICE_SET = 0xE817
 
 LIGHT_PASS_DTYPE = np.dtype(
     [
@@ -77,7 +78,7 @@ def trace_photons(scenes, passes, i0, i1, global_out, caustic_out, counts, ledge
         to_global = i < pass_.global_trajectories
         index = _u4(pass_.first_index + _u4(i))
         u0, u1, u2, u3 = draw4(pass_.sequence, pass_.seed, index, 0)
-        u_pick = unit_float(hash3(pass_.seed, index, _u4(0xE817)))
+        u_pick = draw1(pass_.sequence, pass_.seed, index, LIGHT_CHOICE_SET)
         p, d, beta, light = emit_photon(scene, u_pick, (u2, u3), (u0, u1))
         start = luminance(beta)
         ledger[E_EMITTED] += _f8(start)

@@ -42,7 +42,7 @@ from pmviewer.render.record import C_RAYS
 
 _f4 = np.float32
 _INF = _f4(np.inf)
-ROULETTE_DEPTH = 3
+ROULETTE_DEPTH = 8
 
 
 @kernel
@@ -94,7 +94,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 properties(scene, film, eye, pixel, albedo, face(ns, wo), p)
             if depth == eye.max_depth:
                 break
-            u0, u1, u2, u3 = draw4(eye.sequence, seed, index, 2 + 2 * depth)
+            u0, u1, _, u3 = draw4(eye.sequence, seed, index, 2 + 2 * depth)
             if material_kind(scene, material) != DIFFUSE:
                 d, factor, compression = scatter_specular(scene, material, ns, d, u0)
                 beta = scale(mul(beta, factor), compression)

@@ -1,0 +1,141 @@
+"""The command line. Heavy modules are imported by the command that needs them, so that `--help` and the window are quick."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pmviewer import __version__
+from pmviewer.errors import PmviewerError, SettingError, WindowError
+
+DEFAULT_SCENE = "cornell_caustic"
+FALLBACK_PASSES = 64
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=False,
+    rich_markup_mode=None,
+    help="Interactive previewer for photon-mapping global illumination.",
+)
+
+SceneArgument = Annotated[
+    str, typer.Argument(help="A bundled scene's name, a scene file (.xml .glb .gltf .obj .ply .stl) or a session (.toml).")
+]
+SetOption = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Change a setting, for example photons.N=200000.")
+]
+ThreadsOption = Annotated[int | None, typer.Option(min=1, max=1024, help="Threads; all processors if not given.")]
+ParameterOption = Annotated[
+    list[str] | None, typer.Option("--define", "-D", metavar="NAME=VALUE", help="A scene file's <default> parameter.")
+]
+
+
+@app.command()
+def view(
+    scene: SceneArgument = DEFAULT_SCENE,
+    set_: SetOption = None,
+    threads: ThreadsOption = None,
+    define: ParameterOption = None,
+) -> None:
+    """Open the window (the default command)."""
+    from pmviewer.jobs import load_job
+
+    job = load_job(scene, set_ or [], define or [])
+    try:
+        from pmviewer.viewer.app import run_viewer
+
+        code = run_viewer(job.scene, job.settings, threads=threads, parameters=job.parameters)
+    except WindowError as error:
+        typer.echo(f"{error}", err=True)
+        target = Path(f"{Path(job.scene).stem}.png")
+        typer.echo(f"Rendering {FALLBACK_PASSES} passes to {target} instead.", err=True)
+        render(scene, [target, target.with_suffix(".exr")], FALLBACK_PASSES, set_=set_, threads=threads, define=define)
+        code = 0
+    raise typer.Exit(code)
+
+
+@app.command()
+def render(
+    scene: SceneArgument,
+    output: Annotated[list[Path], typer.Option("-o", "--output", help="File to write, .exr or .png; may be repeated.")],
+    passes: Annotated[int | None, typer.Option(min=1, help="Passes to render.")] = None,
+    time: Annotated[float | None, typer.Option(min=0.001, metavar="S", help="Seconds to render.")] = None,
+    size: Annotated[str | None, typer.Option(metavar="WxH", help="Image size, for example 1280x720.")] = None,
+    threads: ThreadsOption = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the random streams.")] = None,
+    set_: SetOption = None,
+    half: Annotated[bool, typer.Option(help="Half-precision EXR.")] = False,
+    define: ParameterOption = None,
+) -> None:
+    """Render to a file without a window; the result is what the window shows after the same passes."""
+    from pmviewer.jobs import load_job, render_job
+
+    if passes is not None and time is not None:
+        raise SettingError("--passes and --time exclude each other: give one of them.")
+    job = load_job(scene, set_ or [], define or [])
+    render_job(job, output, passes=passes, seconds=time, size=size, threads=threads, seed=seed, half=half)
+
+
+@app.command()
+def scenes() -> None:
+    """List the bundled scenes."""
+    from pmviewer.scene.load import bundled_scenes
+
+    for bundled in bundled_scenes():
+        typer.echo(f"{bundled.name:18s} {bundled.title}")
+
+
+@app.command()
+def info(scene: SceneArgument, define: ParameterOption = None) -> None:
+    """Say what is in a scene, what was ignored, and which stages it needs or skips."""
+    from pmviewer.jobs import load_job, scene_report
+
+    typer.echo(scene_report(load_job(scene, [], define or [])))
+
+
+@app.command()
+def bench(
+    name: Annotated[str, typer.Argument(help="A bench's name, or list.")] = "list",
+    quick: Annotated[bool, typer.Option(help="Fewer rounds and smaller inputs.")] = False,
+    csv: Annotated[Path | None, typer.Option(help="Also write the table as CSV.")] = None,
+    markdown: Annotated[Path | None, typer.Option(help="Also write the table as Markdown.")] = None,
+) -> None:
+    """Measure: a table, then a line for each target."""
+    from pmviewer.bench.registry import BENCHES, run_bench
+
+    if name == "list":
+        for key, (description, _) in BENCHES.items():
+            typer.echo(f"{key:10s} {description}")
+        return
+    run_bench(name, quick, csv, markdown)
+
+
+@app.command()
+def settings() -> None:
+    """List every setting with its default and range."""
+    from pmviewer.settings import SETTINGS, range_text
+
+    for path, entry in SETTINGS.items():
+        typer.echo(f"{path} = {entry.default}   [{range_text(entry)}]\n    {entry.description}")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point: `pmviewer SCENE` means `pmviewer view SCENE`. Errors are one line and exit code 2."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if words[:1] == ["--version"]:
+        print(f"pmviewer {__version__}")
+        return
+    commands = {command.name or command.callback.__name__ for command in app.registered_commands if command.callback}
+    if not words or (words[0] not in commands and words[0] not in ("--help", "-h")):
+        words.insert(0, "view")
+    try:
+        app(words, prog_name="pmviewer")
+    except PmviewerError as error:
+        print(f"pmviewer: error: {error}", file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        print("pmviewer: stopped", file=sys.stderr)
+        sys.exit(130)

@@ -1,0 +1,162 @@
+"""What the command line does without a window: jobs from scenes and session files, rendering to files, scene reports."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pmviewer.engine.cache import StageCache
+from pmviewer.engine.frame import Frame
+from pmviewer.engine.method import plan_of
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.prepare import prepare
+from pmviewer.engine.renderer import Renderer
+from pmviewer.errors import OutputError, SettingError
+from pmviewer.output.frame_export import write_frame_exr, write_frame_png
+from pmviewer.output.session_file import read_session
+from pmviewer.scene.analysis import analyse
+from pmviewer.scene.describe import describe
+from pmviewer.scene.load import load_scene
+from pmviewer.settings import Settings, parse_assignments, with_values
+
+DEFAULT_PASSES = 64
+FORMATS = (".exr", ".png")
+
+
+@dataclass(frozen=True)
+class Job:
+    """A scene to open, with settings. `passes` is what a session file had rendered, None for a plain scene."""
+
+    scene: str
+    settings: Settings
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    passes: int | None = None
+
+
+def load_job(source: str, assignments: Iterable[str], defines: Iterable[str]) -> Job:
+    """A job from a scene or a session file (.toml). Raises SettingError and SceneError."""
+    parameters = dict(_definition(text) for text in defines)
+    values = parse_assignments(assignments)
+    if source.lower().endswith(".toml"):
+        session = read_session(Path(source))
+        settings = with_values(session.settings, values)
+        return Job(str(session.scene), settings, {**session.parameters, **parameters}, session.passes)
+    return Job(source, with_values(Settings(), values), parameters)
+
+
+def _definition(text: str) -> tuple[str, str]:
+    name, separator, value = text.partition("=")
+    if not separator or not name:
+        raise SettingError(f"'{text}' defines nothing: write name=value, for example -D res=512.")
+    return name, value
+
+
+def render_job(
+    job: Job,
+    outputs: list[Path],
+    *,
+    passes: int | None = None,
+    seconds: float | None = None,
+    size: str | None = None,
+    threads: int | None = None,
+    seed: int | None = None,
+    half: bool = False,
+) -> Frame:
+    """Render with a progress bar and write the files. Raises PmviewerError; refuses bad file names before rendering."""
+    for path in outputs:
+        if path.suffix.lower() not in FORMATS:
+            raise OutputError(f"{path}: unknown format '{path.suffix}'. Use .exr or .png.")
+        if not path.absolute().parent.is_dir():
+            raise OutputError(f"{path}: the folder {path.absolute().parent} does not exist. Create it first.")
+    settings = with_values(job.settings, _overrides(passes, seconds, size, seed, job.passes))
+    opened = open_scene(job.scene, job.parameters)
+    _print_warnings(opened.scene.warnings, opened.scene.dropped)
+    pool = WorkPool(threads)
+    try:
+        renderer = Renderer(opened, settings, pool, StageCache(0))
+        _run(renderer, pool)
+        frame = renderer.frame(1)
+    finally:
+        pool.close()
+    for path in outputs:
+        if path.suffix.lower() == ".exr":
+            write_frame_exr(path, frame, half=half)
+        else:
+            write_frame_png(path, frame)
+        print(f"wrote {path}")
+    return frame
+
+
+def _overrides(
+    passes: int | None, seconds: float | None, size: str | None, seed: int | None, session_passes: int | None
+) -> dict[str, object]:
+    values: dict[str, object] = {}
+    if seconds is not None:
+        values["render.time_limit"] = seconds
+        values["render.passes"] = 1_000_000
+    else:
+        values["render.passes"] = passes or session_passes or DEFAULT_PASSES
+        values["render.time_limit"] = 0.0
+    if size is not None:
+        match = re.fullmatch(r"\s*(\d{1,6})\s*[xX×]\s*(\d{1,6})\s*", size)
+        if not match:
+            raise SettingError(f"--size {size} is not a size: write WIDTHxHEIGHT, for example 1280x720.")
+        values["camera.width"], values["camera.height"] = int(match[1]), int(match[2])
+    if seed is not None:
+        values["render.seed"] = seed
+    return values
+
+
+def _run(renderer: Renderer, pool: WorkPool) -> None:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    render = renderer.settings.render
+    by_time = render.time_limit > 0
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=not console.is_terminal) as progress:
+        bar = progress.add_task("preparing", total=1.0)
+        prepare(
+            renderer.scene, renderer.settings, pool, lambda text, share: progress.update(bar, description=text, completed=share)
+        )
+        progress.reset(bar, total=1.0, description="rendering")
+        while not renderer.finished:
+            renderer.step()
+            share = renderer.seconds / render.time_limit if by_time else renderer.passes / render.passes
+            progress.update(bar, completed=min(share, 1.0), description=f"pass {renderer.passes}")
+
+
+def _print_warnings(warnings: Iterable[str], dropped: Mapping[str, int]) -> None:
+    import sys
+
+    for warning in warnings:
+        print(f"pmviewer: warning: {warning}", file=sys.stderr)
+    for reason, count in dropped.items():
+        print(f"pmviewer: warning: {count} × {reason} left out", file=sys.stderr)
+
+
+def scene_report(job: Job) -> str:
+    """Text of `pmviewer info`: what is in the scene, what was ignored, which stages run."""
+    scene = load_scene(job.scene, job.parameters)
+    plan = plan_of(job.settings, analyse(scene))
+    rows = describe(scene)
+    needed = [
+        name
+        for name, runs in (
+            ("light pass", plan.photons),
+            ("caustic map", plan.caustic_mask),
+            ("global map", plan.global_classes),
+            ("direct light", plan.direct),
+            ("final gather", plan.gather),
+            ("path tracer", plan.path),
+        )
+        if runs
+    ]
+    rows.append((f"stages ({job.settings.render.method})", ", ".join(needed) or "none"))
+    rows += [(f"skips {stage}", reason) for stage, reason in plan.skipped]
+    width = max(len(label) for label, _ in rows)
+    return "\n".join(f"{label:{width}s}  {text}" for label, text in rows)

@@ -1,0 +1,115 @@
+"""Set up and start from a bare checkout: `python3 -m pmviewer.launch` opens the window, `… launch test` runs the tests.
+
+Uses the standard library alone. Makes a virtual environment in `.venv`, installs pmviewer into it, and sees to the
+system's OpenGL packages: as root on Debian or Ubuntu it installs what is missing, otherwise it says what to install.
+"""
+
+from __future__ import annotations
+
+import ctypes.util
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+ENVIRONMENT = Path(os.environ.get("PMVIEWER_VENV", ROOT / ".venv"))
+SCENE = "cornell_caustic"
+
+LIBRARIES = {
+    "GL": "libgl1",
+    "EGL": "libegl1",
+    "gomp": "libgomp1",
+    "X11": "libx11-6",
+    "Xext": "libxext6",
+    "Xcursor": "libxcursor1",
+    "Xi": "libxi6",
+    "Xrandr": "libxrandr2",
+    "Xinerama": "libxinerama1",
+}
+"""Shared libraries that the window needs, and their Debian packages."""
+
+DRIVER = "libgl1-mesa-dri"
+TEST_PROGRAMS = {"Xvfb": "xvfb", "xauth": "xauth", "xdotool": "xdotool"}
+
+
+def missing_packages(testing: bool) -> list[str]:
+    """Debian packages that are not there yet."""
+    missing = [package for library, package in LIBRARIES.items() if ctypes.util.find_library(library) is None]
+    if missing or (testing and shutil.which("dpkg") and not _installed(DRIVER)):
+        missing.append(DRIVER)
+    if testing:
+        missing += [package for program, package in TEST_PROGRAMS.items() if shutil.which(program) is None]
+    return missing
+
+
+def _installed(package: str) -> bool:
+    return subprocess.run(["dpkg", "-s", package], capture_output=True, check=False).returncode == 0
+
+
+def install_system_packages(packages: list[str]) -> None:
+    """Install with apt-get when that is possible; otherwise say what to do and go on."""
+    if not packages:
+        return
+    command = "apt-get install -y --no-install-recommends " + " ".join(packages)
+    if shutil.which("apt-get") and getattr(os, "geteuid", lambda: 1)() == 0:
+        print(f"installing system packages: {' '.join(packages)}", flush=True)
+        quiet = {"DEBIAN_FRONTEND": "noninteractive", **os.environ}
+        subprocess.run(["apt-get", "update", "-qq"], check=False, env=quiet, stdout=subprocess.DEVNULL)
+        if subprocess.run([*command.split(), "-qq"], check=False, env=quiet, stdout=subprocess.DEVNULL).returncode == 0:
+            return
+    if sys.platform.startswith("linux"):
+        print(f"Missing system libraries. On Debian or Ubuntu:  sudo {command}", file=sys.stderr)
+
+
+def environment_python() -> Path:
+    """The environment's interpreter; makes the environment when it is not there."""
+    python = ENVIRONMENT / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    if python.exists():
+        return python
+    print(f"making a virtual environment in {ENVIRONMENT}", flush=True)
+    made = subprocess.run([sys.executable, "-m", "venv", str(ENVIRONMENT)], check=False, capture_output=True, text=True)
+    if made.returncode != 0:
+        shutil.rmtree(ENVIRONMENT, ignore_errors=True)
+        version = f"{sys.version_info.major}.{sys.version_info.minor}"
+        install_system_packages([f"python{version}-venv"])
+        if subprocess.run([sys.executable, "-m", "venv", str(ENVIRONMENT)], check=False).returncode != 0:
+            sys.exit("Python can't make a virtual environment: install its venv module and run this again.")
+    return python
+
+
+def install(python: Path, extras: str) -> None:
+    """Install the checkout in editable form, once for each state of `pyproject.toml`."""
+    wanted = hashlib.sha256((ROOT / "pyproject.toml").read_bytes() + extras.encode()).hexdigest()
+    stamp = ENVIRONMENT / f"pmviewer-{extras or 'base'}.stamp"
+    if stamp.exists() and stamp.read_text() == wanted:
+        return
+    print("installing pmviewer and what it needs (about a minute the first time)", flush=True)
+    target = f"{ROOT}[{extras}]" if extras else str(ROOT)
+    command = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-e", target]
+    if subprocess.run(command, check=False, cwd=ROOT).returncode != 0:
+        sys.exit("pip could not install pmviewer: see its message above.")
+    stamp.write_text(wanted)
+
+
+def main(arguments: list[str]) -> int:
+    """`[SCENE and options]`, `test [pytest options]` or `setup` (install everything, run nothing)."""
+    if sys.version_info < (3, 11):
+        sys.exit(f"pmviewer needs Python 3.11 or newer; this is {sys.version.split()[0]}.")
+    testing = arguments[:1] in (["test"], ["setup"])
+    install_system_packages(missing_packages(testing))
+    python = environment_python()
+    install(python, "test" if testing else "")
+    if arguments[:1] == ["setup"]:
+        return 0
+    if testing:
+        command = [str(python), "-m", "pytest", *arguments[1:]]
+    else:
+        command = [str(python), "-m", "pmviewer", *(arguments or [SCENE])]
+    return subprocess.run(command, check=False, cwd=ROOT).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
