@@ -136,7 +136,7 @@ def _flat(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     longest = np.maximum.reduce([(e * e).sum(axis=1) for e in (a, b, b - a)])
     area = np.linalg.norm(np.cross(a, b), axis=1)
-    return ~((area > _FLATTEST * longest) & (longest > 0))
+    return np.logical_not((area > _FLATTEST * longest) & (longest > 0))
 
 
 def _mended(mesh: Mesh) -> NDArray[np.float64]:

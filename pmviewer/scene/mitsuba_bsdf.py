@@ -1,4 +1,4 @@
-"""BSDF elements as materials: the supported ones exactly, common others by the nearest supported one, with a warning."""
+"""BSDF elements as materials: the supported ones exactly, common others by the nearest one, with a warning."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 from xml.parsers import expat
 
 from pmviewer.errors import SceneError
@@ -69,7 +70,7 @@ def parse_xml(data: bytes, path: Path | None = None) -> Element:
     def end(_tag: str) -> None:
         stack.pop()
 
-    def refuse(*_args: object) -> None:
+    def refuse(*_args: object) -> NoReturn:
         raise SceneError(
             "Document types and entities (<!DOCTYPE …>, <!ENTITY …>) are refused.",
             path,
@@ -112,11 +113,11 @@ def _substitute(element: Element, values: dict[str, str], used: set[str], path: 
     for child in element.children:
         _substitute(child, values, used, path)
         if child.tag == "default":
-            name, value = child.attributes.get("name"), child.attributes.get("value")
-            if not name or value is None:
+            key, value = child.attributes.get("name"), child.attributes.get("value")
+            if not key or value is None:
                 raise SceneError("<default> needs a name and a value.", path, child.line)
-            used.add(name)
-            values.setdefault(name, value)
+            used.add(key)
+            values.setdefault(key, value)
     element.children = [c for c in element.children if c.tag != "default"]
 
 

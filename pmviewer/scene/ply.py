@@ -1,4 +1,4 @@
-"""PLY meshes, ASCII and binary. Own reader, because every bundled scene needs it at start and must not wait for more."""
+"""PLY meshes, ASCII and binary. Own reader: every bundled scene needs it at start and must not wait for imports."""
 
 from __future__ import annotations
 

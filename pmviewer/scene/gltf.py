@@ -1,0 +1,205 @@
+"""glTF 2.0: nodes, cameras, lights and materials from its JSON; trimesh decodes the buffers.
+
+The JSON is read here because trimesh keeps colours in 8 bits and knows neither lights nor material extensions.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pmviewer.scene.description import Camera, Mesh, PointLight, Shape
+from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.gltf_material import GltfMaterials
+from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
+from pmviewer.scene.mitsuba_transform import Matrix, mirrors, scaling, translation
+from pmviewer.scene.primitives import transformed
+
+Json = dict[str, Any]
+_LUMENS_PER_WATT = 683.0
+_MOST_NODES = 1_000_000
+_MOST_ITEMS = 1 << 28
+_HARMLESS = ("KHR_materials_", "KHR_lights_punctual", "KHR_texture_", "EXT_texture_")
+_GLB_JSON, _GLB_BIN = 0x4E4F534A, 0x004E4942
+
+
+def read_gltf(path: Path, diagnostics: Diagnostics) -> MeshFile:
+    """The default scene of a .gltf or .glb file. Damaged files raise SceneError or whatever their damage causes."""
+    header, binary = _container(path.read_bytes(), diagnostics)
+    for extension in header.get("extensionsRequired", []):
+        if not str(extension).startswith(_HARMLESS):
+            hint = "Export it without compression or quantization."
+            raise diagnostics.error(
+                f"The file needs the glTF extension {extension}, which is not supported.", hint=hint
+            )
+    for index, accessor in enumerate(header.get("accessors", [])):
+        if not 0 <= int(accessor["count"]) <= _MOST_ITEMS:
+            raise diagnostics.error(f"Accessor {index} claims {accessor['count']} items.", hint="The file is damaged.")
+    for kind in ("skins", "animations"):
+        if header.get(kind):
+            diagnostics.warn(f"The file's {kind} are ignored.")
+    meshes = _decode(header, binary, path)
+    result = MeshFile()
+    materials = GltfMaterials(header, binary, path, diagnostics)
+    for node, matrix in _nodes(header, diagnostics):
+        if "mesh" in node:
+            source = header["meshes"][node["mesh"]]
+            for j, primitive in enumerate(source.get("primitives", [])):
+                mesh = meshes.get(f"{node['mesh']}.{j}")
+                if mesh is None:
+                    diagnostics.warn("Points, lines and other primitives without triangles are ignored.")
+                    continue
+                index = primitive.get("material")
+                material, radiance = (DEFAULT_MATERIAL, None) if index is None else materials.of(index)
+                name = str(node.get("name") or source.get("name") or f"mesh {node['mesh']}")
+                result.shapes.append(Shape(name, transformed(mesh, matrix), result.material(material), radiance))
+        if "camera" in node and result.camera is None:
+            _camera(header["cameras"][node["camera"]], matrix, result, diagnostics)
+        light = node.get("extensions", {}).get("KHR_lights_punctual")
+        if light is not None:
+            lights = header["extensions"]["KHR_lights_punctual"]["lights"]
+            _light(lights[light["light"]], matrix, result, diagnostics)
+    return result
+
+
+def _container(data: bytes, diagnostics: Diagnostics) -> tuple[Json, bytes]:
+    """JSON header and binary chunk of either kind of file."""
+    binary = b""
+    text = data
+    if data[:4] == b"glTF":
+        if len(data) < 20:
+            raise diagnostics.error("The GLB file is cut off.", hint="Export it again.")
+        version, length = struct.unpack_from("<II", data, 4)
+        if version != 2:
+            raise diagnostics.error(f"This is glTF version {version}, expected 2.", hint="Convert it to glTF 2.0.")
+        if length > len(data):
+            what = f"The GLB file is cut off: {len(data)} of {length} bytes are there."
+            raise diagnostics.error(what, hint="Copy or export it again.")
+        offset = 12
+        text = b""
+        while offset + 8 <= length:
+            size, kind = struct.unpack_from("<II", data, offset)
+            chunk = data[offset + 8 : offset + 8 + size]
+            if kind == _GLB_JSON:
+                text = chunk
+            elif kind == _GLB_BIN and not binary:
+                binary = chunk
+            offset += 8 + size
+    try:
+        header = json.loads(text)
+    except (ValueError, RecursionError):
+        raise diagnostics.error("This is not a glTF file (no readable JSON in it).", hint="Export it again.") from None
+    if not isinstance(header, dict) or not str(header.get("asset", {}).get("version", "")).startswith("2"):
+        raise diagnostics.error("This is not a glTF 2.0 file.", hint="Convert it to glTF 2.0.")
+    return header, binary
+
+
+def _decode(header: Json, binary: bytes, path: Path) -> dict[str, Mesh]:
+    """Meshes by "mesh.primitive", in their own coordinates."""
+    from trimesh.exchange.gltf import load_glb, load_gltf
+    from trimesh.resolvers import FilePathResolver
+
+    # Each primitive becomes a mesh of a known name, and the rest of the file is kept from trimesh.
+    alone: Json = {key: header[key] for key in ("asset", "accessors", "bufferViews", "buffers") if key in header}
+    alone["meshes"] = [
+        {"name": f"{i}.{j}", "primitives": [{k: v for k, v in primitive.items() if k != "material"}]}
+        for i, mesh in enumerate(header.get("meshes", []))
+        for j, primitive in enumerate(mesh.get("primitives", []))
+    ]
+    alone["nodes"], alone["scenes"], alone["scene"] = [], [{"nodes": []}], 0
+    text = json.dumps(alone).encode()
+    resolver = FilePathResolver(str(path))
+    if binary:
+        text += b" " * (-len(text) % 4)
+        total = 12 + 8 + len(text) + 8 + len(binary)
+        chunks = struct.pack("<4sIIII", b"glTF", 2, total, len(text), _GLB_JSON) + text
+        chunks += struct.pack("<II", len(binary), _GLB_BIN) + binary
+        loaded = load_glb(BytesIO(chunks), resolver=resolver, skip_materials=True)
+    else:
+        loaded = load_gltf(BytesIO(text), resolver=resolver, skip_materials=True)
+    meshes = {}
+    for name, kwargs in loaded["geometry"].items():
+        if kwargs.get("faces") is None:
+            continue
+        vertices = np.asarray(kwargs["vertices"], np.float64)
+        faces = np.asarray(kwargs["faces"]).reshape(-1, 3).astype(np.int32)
+        normals = kwargs.get("vertex_normals")
+        if normals is not None and np.shape(normals) == vertices.shape:
+            meshes[name] = Mesh(vertices, faces, np.asarray(normals, np.float64))
+        else:
+            meshes[name] = Mesh(vertices, faces)
+    return meshes
+
+
+def _nodes(header: Json, diagnostics: Diagnostics) -> Iterator[tuple[Json, Matrix]]:
+    """Every node of the default scene with its world matrix."""
+    nodes = header.get("nodes", [])
+    scenes = header.get("scenes")
+    roots = scenes[header.get("scene", 0)].get("nodes", []) if scenes else range(len(nodes))
+    stack: list[tuple[int, Matrix, frozenset[int]]] = [(i, np.eye(4), frozenset()) for i in reversed(roots)]
+    count = 0
+    while stack:
+        index, parent, above = stack.pop()
+        count += 1
+        if index in above or count > _MOST_NODES:
+            raise diagnostics.error("The file's nodes contain each other in a circle.", hint="The file is damaged.")
+        node = nodes[index]
+        matrix = parent @ _local(node)
+        yield node, matrix
+        inside = above | {index}
+        stack += [(child, matrix, inside) for child in reversed(node.get("children", []))]
+
+
+def _local(node: Json) -> Matrix:
+    if "matrix" in node:
+        return np.reshape(np.array(node["matrix"], np.float64), (4, 4)).T
+    x, y, z, w = node.get("rotation", (0, 0, 0, 1))
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    x, y, z, w = (c / length for c in (x, y, z, w))
+    turn = np.eye(4)
+    turn[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return translation(*node.get("translation", (0, 0, 0))) @ turn @ scaling(*node.get("scale", (1, 1, 1)))
+
+
+def _camera(camera: Json, matrix: Matrix, result: MeshFile, diagnostics: Diagnostics) -> None:
+    """A glTF camera looks along its −z axis; the field of view is vertical."""
+    if camera.get("type") != "perspective":
+        diagnostics.warn(f"A camera of type '{camera.get('type')}' is ignored.")
+        return
+    lens = camera["perspective"]
+    eye, up, forward = matrix[:3, 3], matrix[:3, 1], -matrix[:3, 2]
+    target = eye + forward / np.linalg.norm(forward)
+    result.aspect = float(lens.get("aspectRatio", 1.0))
+    result.camera = Camera(
+        origin=(float(eye[0]), float(eye[1]), float(eye[2])),
+        target=(float(target[0]), float(target[1]), float(target[2])),
+        up=(float(up[0]), float(up[1]), float(up[2])),
+        fov=math.degrees(float(lens["yfov"])),
+        fov_axis="y",
+        near=float(lens.get("znear", 1e-2)),
+        far=float(lens.get("zfar", 1e4)),
+        mirrored=mirrors(matrix),
+    )
+
+
+def _light(light: Json, matrix: Matrix, result: MeshFile, diagnostics: Diagnostics) -> None:
+    """KHR_lights_punctual: candela become W/sr at the luminous efficacy that exporters use."""
+    kind = light.get("type")
+    if kind != "point":
+        diagnostics.warn(f"A light of type '{kind}' is not supported and was ignored.")
+        return
+    intensity = float(light.get("intensity", 1.0)) / _LUMENS_PER_WATT
+    r, g, b = (float(c) * intensity for c in light.get("color", (1, 1, 1)))
+    x, y, z = (float(c) for c in matrix[:3, 3])
+    result.lights.append(PointLight(str(light.get("name") or "point light"), (x, y, z), (r, g, b)))

@@ -1,0 +1,150 @@
+"""Scenes from mesh files: glTF, OBJ, PLY, STL. A camera and a light are added where the file has none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal, TypeVar
+
+import numpy as np
+
+from pmviewer.errors import SceneError
+from pmviewer.scene.clean import check_camera, check_faces, check_size, clean_lights, clean_shapes
+from pmviewer.scene.description import (
+    BLACK,
+    Camera,
+    ConstantEnvironment,
+    Material,
+    Mesh,
+    Parallelogram,
+    Scene,
+    Shape,
+)
+from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.framing import bounds, framed
+from pmviewer.scene.gltf import read_gltf
+from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
+from pmviewer.scene.obj import joined, obj_parts, read_obj
+from pmviewer.scene.ply import read_ply
+
+T = TypeVar("T")
+SIDE = 512
+# Chosen so that a white surface facing the light comes out a little below 1.
+_LIGHT_RADIANCE, _SKY_RADIANCE = 5.0, 0.3
+_LIGHT_HEIGHT, _LIGHT_SIDE = 2.5, 1.5
+
+
+def load_mesh_scene(path: Path) -> Scene:
+    """The file as a scene. Raises SceneError."""
+    ending = path.suffix.lower()
+    diagnostics = Diagnostics(path)
+    content = _guarded(lambda: _read(path, ending, diagnostics), path)
+    for shape in content.shapes:
+        if isinstance(shape.geometry, Mesh):
+            check_faces(shape.geometry, path)
+    shapes = clean_shapes(content.shapes, diagnostics)
+    if not shapes:
+        raise SceneError("The file has no triangle that can be shown.", path, hint=_dropped(diagnostics))
+    lights = clean_lights(content.lights, diagnostics)
+    materials = list(content.materials)
+    up: Literal["y", "z"] = "z" if ending == ".stl" else "y"
+    camera = content.camera or framed(shapes, up)
+    if content.camera is not None:
+        camera = _aimed(camera, shapes)
+    if not lights and not any(s.radiance for s in shapes):
+        diagnostics.warn("The file has no light: a soft light above it and a dim sky were added.")
+        lights = (ConstantEnvironment("sky", (_SKY_RADIANCE,) * 3),)
+        materials.append(Material("light", "diffuse", BLACK))
+        shapes = (*shapes, _light_above(shapes, up, len(materials) - 1))
+    width, height = SIDE, SIDE
+    if content.camera is not None:
+        width = round(SIDE * content.aspect) if math.isfinite(content.aspect) else 0
+    check_camera(camera, path)
+    check_size(width, height, path)
+    return Scene(
+        name=path.stem,
+        path=path,
+        shapes=shapes,
+        materials=tuple(materials),
+        lights=lights,
+        camera=camera,
+        width=width,
+        height=height,
+        warnings=diagnostics.warnings(),
+        dropped=dict(diagnostics.dropped),
+    )
+
+
+def read_single(path: Path) -> Mesh:
+    """All of an OBJ file as one mesh, without materials. Raises SceneError."""
+    parts = _guarded(lambda: obj_parts(path, skip_materials=True), path)
+    if not parts:
+        raise SceneError("The OBJ file has no faces.", path, hint="Is it an OBJ file? Export it with triangles.")
+    return joined([mesh for _, mesh, _ in parts])
+
+
+def _guarded(read: Callable[[], T], path: Path) -> T:
+    """Run a reader of untrusted data: whatever it stumbles over becomes one SceneError."""
+    try:
+        if path.stat().st_size == 0:
+            raise SceneError("The file is empty (0 bytes).", path, hint="Export it again.")
+        return read()
+    except SceneError:
+        raise
+    except OSError as error:
+        raise SceneError(f"The file can't be read: {error.strerror or error}.", path) from None
+    except Exception as error:  # the decoders raise anything from KeyError to AssertionError on damaged files
+        reason = f"{type(error).__name__}: {error}".splitlines()[0].rstrip(": ")[:120]
+        kind = path.suffix.lstrip(".").upper()
+        hint = "It may be damaged, or not be what its ending says."
+        raise SceneError(f"The {kind} file can't be decoded ({reason}).", path, hint=hint) from None
+
+
+def _read(path: Path, ending: str, diagnostics: Diagnostics) -> MeshFile:
+    if ending in (".glb", ".gltf"):
+        return read_gltf(path, diagnostics)
+    if ending == ".obj":
+        return read_obj(path, diagnostics)
+    meshes = [read_ply(path)] if ending == ".ply" else _stl_meshes(path)
+    return MeshFile([Shape(path.stem, mesh, 0) for mesh in meshes], [DEFAULT_MATERIAL])
+
+
+def _stl_meshes(path: Path) -> list[Mesh]:
+    """All solids of an STL file, flat-shaded as the format is."""
+    from trimesh.exchange.stl import load_stl
+
+    with path.open("rb") as file:
+        loaded = load_stl(file)
+    solids = loaded["geometry"].values() if "geometry" in loaded else [loaded]
+    return [
+        Mesh(np.asarray(s["vertices"], np.float64), np.asarray(s["faces"]).reshape(-1, 3).astype(np.int32))
+        for s in solids
+    ]
+
+
+def _dropped(diagnostics: Diagnostics) -> str:
+    counts = ", ".join(f"{n} × {reason}" for reason, n in diagnostics.dropped.items())
+    return f"Left out: {counts}." if counts else "Is it empty, or a point cloud?"
+
+
+def _aimed(camera: Camera, shapes: tuple[Shape, ...]) -> Camera:
+    """The file's camera with its orbit point as far away as the scene's middle."""
+    low, high = bounds(shapes)
+    eye, target = np.array(camera.origin), np.array(camera.target)
+    distance = float(((low + high) / 2 - eye) @ (target - eye))
+    x, y, z = (float(c) for c in eye + (target - eye) * (distance if distance > 1e-6 else 1.0))
+    return replace(camera, target=(x, y, z))
+
+
+def _light_above(shapes: tuple[Shape, ...], up: Literal["y", "z"], material: int) -> Shape:
+    """A square light that faces down, high enough to stay out of the picture of the framed camera."""
+    low, high = bounds(shapes)
+    radius = float(np.linalg.norm(high - low)) / 2
+    center = (low + high) / 2
+    u, v, top = (np.eye(3)[i] for i in ((0, 2, 1) if up == "y" else (1, 0, 2)))
+    side = _LIGHT_SIDE * radius
+    corner = center + _LIGHT_HEIGHT * radius * top - side / 2 * (u + v)
+    rectangle = Parallelogram(tuple(corner.tolist()), tuple((side * u).tolist()), tuple((side * v).tolist()))
+    return Shape("light above", rectangle, material, (_LIGHT_RADIANCE,) * 3)

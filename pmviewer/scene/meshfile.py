@@ -1,0 +1,27 @@
+"""What the readers of mesh formats hand over, before a camera and a light are added where the file has none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from pmviewer.scene.description import Camera, ConstantEnvironment, Material, PointLight, Shape
+
+DEFAULT_MATERIAL = Material("default", "diffuse", (0.7, 0.7, 0.7), two_sided=True)
+"""For triangles whose file says nothing about their material."""
+
+
+@dataclass
+class MeshFile:
+    """Shapes index into `materials`. `aspect` is the camera's width over height."""
+
+    shapes: list[Shape] = field(default_factory=list)
+    materials: list[Material] = field(default_factory=list)
+    lights: list[PointLight | ConstantEnvironment] = field(default_factory=list)
+    camera: Camera | None = None
+    aspect: float = 1.0
+
+    def material(self, material: Material) -> int:
+        """Index of the material, added if it is new."""
+        if material not in self.materials:
+            self.materials.append(material)
+        return self.materials.index(material)

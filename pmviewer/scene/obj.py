@@ -1,0 +1,112 @@
+"""Wavefront OBJ with its MTL materials; trimesh decodes the geometry."""
+
+from __future__ import annotations
+
+import re
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pmviewer.scene.description import RGB, Material, Mesh, Shape
+from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
+from pmviewer.scene.texture import mean_of_image
+
+_MIRROR_MODELS, _GLASS_MODELS = (3, 5, 8), (4, 6, 7, 9)
+
+
+def obj_parts(path: Path, skip_materials: bool) -> list[tuple[str, Mesh, str | None]]:
+    """Name, mesh and material name of every part of the file."""
+    from trimesh.exchange.obj import load_obj
+    from trimesh.resolvers import FilePathResolver
+
+    loaded = load_obj(BytesIO(path.read_bytes()), resolver=FilePathResolver(str(path)), skip_materials=skip_materials)
+    parts = []
+    for name, kwargs in loaded.get("geometry", {}).items():
+        vertices = np.asarray(kwargs["vertices"], np.float64)
+        faces = np.asarray(kwargs["faces"]).reshape(-1, 3).astype(np.int32)
+        normals = kwargs.get("vertex_normals")
+        mesh = Mesh(vertices, faces, None if normals is None else np.asarray(normals, np.float64))
+        visual = kwargs.get("visual")
+        parts.append((str(name), mesh, str(visual.material.name) if visual is not None else None))
+    return parts
+
+
+def joined(meshes: list[Mesh]) -> Mesh:
+    """All parts as one mesh; normals survive only if every part has them."""
+    offsets = np.cumsum([0] + [len(m.vertices) for m in meshes[:-1]])
+    vertices = np.concatenate([m.vertices for m in meshes])
+    faces = np.concatenate([m.faces + o for m, o in zip(meshes, offsets)]).astype(np.int32)
+    normals = [m.normals for m in meshes if m.normals is not None]
+    return Mesh(vertices, faces, np.concatenate(normals) if len(normals) == len(meshes) else None)
+
+
+def read_obj(path: Path, diagnostics: Diagnostics) -> MeshFile:
+    """The file's parts with their materials."""
+    materials = _libraries(path, diagnostics)
+    result = MeshFile()
+    for name, mesh, material_name in obj_parts(path, skip_materials=not materials):
+        material, radiance = DEFAULT_MATERIAL, None
+        if material_name in materials:
+            material, radiance = _material(material_name, materials[material_name], diagnostics)
+        # trimesh names nameless parts after the file it was given.
+        shape_name = path.stem if name in ("geometry", path.name) else name
+        result.shapes.append(Shape(shape_name, mesh, result.material(material), radiance))
+    return result
+
+
+def _libraries(path: Path, diagnostics: Diagnostics) -> dict[str, dict[str, Any]]:
+    """Materials of all MTL files that the OBJ names."""
+    from trimesh.exchange.obj import parse_mtl
+    from trimesh.resolvers import FilePathResolver
+
+    materials: dict[str, dict[str, Any]] = {}
+    text = path.read_bytes().decode("utf-8", "replace")
+    for match in re.finditer(r"^[ \t]*mtllib[ \t]+(.+?)[ \t\r]*$", text, re.MULTILINE):
+        library = path.parent / match[1]
+        line = text.count("\n", 0, match.start()) + 1
+        if not library.is_file():
+            diagnostics.warn(f"The material file {match[1]!r} does not exist: grey replaces its materials.", line)
+            continue
+        materials |= parse_mtl(library.read_bytes(), resolver=FilePathResolver(str(library)))
+    return materials
+
+
+def _numbers(m: dict[str, Any], key: str, default: float) -> RGB:
+    """Three numbers of an MTL statement; one number counts for all channels."""
+    value = m.get(key)
+    if value is None:
+        return (default, default, default)
+    numbers = [float(x) for x in (value if isinstance(value, list) else [value])]
+    r, g, b = numbers[:3] if len(numbers) >= 3 else numbers[:1] * 3
+    return (max(0.0, r), max(0.0, g), max(0.0, b))
+
+
+def _material(name: str, m: dict[str, Any], diagnostics: Diagnostics) -> tuple[Material, RGB | None]:
+    """Kd, Ks, Ke, Ni and the illumination model as a material and the radiance it emits."""
+    kd, ks, ke = _numbers(m, "kd", 0.7), _numbers(m, "ks", 0.0), _numbers(m, "ke", 0.0)
+    model = int(_numbers(m, "illum", 2)[0])
+    if "image" in m:
+        diagnostics.warn("Textures are not supported: their mean colours are used.")
+        mean = mean_of_image(m["image"])
+        kd = mean if not any(kd) else (kd[0] * mean[0], kd[1] * mean[1], kd[2] * mean[2])
+    ignored = sorted(key for key in m if key.startswith(("map_", "bump", "disp", "refl", "norm")))
+    if ignored:
+        diagnostics.warn(f"The textures {', '.join(ignored)} are ignored.")
+    if model in _GLASS_MODELS:
+        tint = _numbers(m, "tf", 1.0)
+        material = Material(name, "dielectric", (1.0, 1.0, 1.0), _capped(tint), eta=max(1.0, _numbers(m, "ni", 1.5)[0]))
+    elif model in _MIRROR_MODELS and max(ks) >= 0.5 and max(ks) > max(kd):
+        material = Material(name, "conductor", _capped(ks), two_sided=True)
+    else:
+        if _numbers(m, "d", 1.0)[0] < 1:
+            diagnostics.warn("Transparency (d) is ignored except in the glass models (illum 4, 6, 7, 9).")
+        material = Material(name, "diffuse", _capped(kd), two_sided=True)
+    return material, ke if max(ke) > 0 else None
+
+
+def _capped(colour: RGB) -> RGB:
+    r, g, b = (min(1.0, c) for c in colour)
+    return (r, g, b)
