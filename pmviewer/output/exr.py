@@ -129,8 +129,8 @@ def read_reference(path: str | Path) -> NDArray[np.float32]:
     """The beauty image (h, w, 3) of an EXR file; grey is repeated. Raises SceneError."""
     layers, _ = read_exr(path)
     image = layers.get("beauty")
-    if image is None:
-        raise SceneError(f"The file has no channels R, G, B, only the layers {', '.join(layers)}.", path)
+    if image is None or image.shape[2] == 2:
+        raise SceneError(f"The file has no channels R, G, B, only {', '.join(layers)}.", path)
     return np.ascontiguousarray(np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[..., :3])
 
 

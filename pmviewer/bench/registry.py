@@ -1,0 +1,44 @@
+"""The benches by name. A bench is a function `run(quick: bool) -> BenchResult`, imported when it is called."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+
+from pmviewer.bench.report import BenchResult, print_result, to_csv, to_markdown
+from pmviewer.errors import SettingError
+from pmviewer.output.files import check_target, write_file
+
+BENCHES: dict[str, tuple[str, str]] = {
+    "rays": ("Rays per second against Embree (P6)", "pmviewer.bench.rays:run"),
+    "lookup": ("Photon look-ups against scipy's cKDTree (P7)", "pmviewer.bench.lookup:run"),
+    "photons": ("Photons per second and bytes per photon (P8, P13)", "pmviewer.bench.photons:run"),
+    "error": ("Error against CPU time on the bundled scenes (P1–P5)", "pmviewer.bench.error:run"),
+    "latency": ("Slider to first new frame (P9)", "pmviewer.bench.latency:run"),
+    "start": ("Start to first image, cold and warm (P10)", "pmviewer.bench.start:run"),
+    "window": ("Frames per second while computing (P11)", "pmviewer.bench.window:run"),
+}
+"""Name: what it measures, and where its function is."""
+
+
+def run_bench(
+    name: str, quick: bool = False, csv_path: Path | None = None, markdown_path: Path | None = None
+) -> BenchResult:
+    """Run a bench, print its table and targets, and write the table to the files asked for.
+
+    Raises SettingError for an unknown name and OutputError for a file that can't be written; a wrong file name is
+    found before the bench runs.
+    """
+    if name not in BENCHES:
+        raise SettingError(f"There is no bench '{name}'. There are {', '.join(BENCHES)}.")
+    outputs = [(csv_path, to_csv, (".csv",)), (markdown_path, to_markdown, (".md",))]
+    for path, _, suffixes in outputs:
+        if path is not None:
+            check_target(path, suffixes)
+    module, _, function = BENCHES[name][1].partition(":")
+    result: BenchResult = getattr(importlib.import_module(module), function)(quick=quick)
+    print_result(result)
+    for path, text_of, suffixes in outputs:
+        if path is not None:
+            write_file(path, text_of(result).encode("utf-8"), suffixes)
+    return result

@@ -1,0 +1,140 @@
+"""False colours for views of one number per pixel: a colour table, its scale, and the ticks of its legend."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.output.tone import MAGENTA, srgb_encode
+
+_OKLAB_TO_LMS = np.array(
+    [
+        [1.0, 0.3963377774, 0.2158037573],
+        [1.0, -0.1055613458, -0.0638541728],
+        [1.0, -0.0894841775, -1.2914855480],
+    ]
+)
+_LMS_TO_RGB = np.array(
+    [
+        [4.0767416621, -3.3077115913, 0.2309699292],
+        [-1.2684380046, 2.6097574011, -0.3413193965],
+        [-0.0041960863, -0.7034186147, 1.7076147010],
+    ]
+)
+
+
+def _oklab_to_rgb(lab: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Oklab (n, 3) to linear sRGB (B. Ottosson, "A perceptual color space for image processing", 2020)."""
+    return (lab @ _OKLAB_TO_LMS.T) ** 3 @ _LMS_TO_RGB.T
+
+
+def _table(size: int) -> NDArray[np.float32]:
+    """Lightness rises evenly while the hue turns from violet over blue and green to yellow; chroma swells in between
+    and is reduced where the screen couldn't show it."""
+    t = np.linspace(0.0, 1.0, size)
+    lightness = 0.22 + 0.72 * t
+    hue = np.radians(305.0 - 200.0 * t)
+    chroma = 0.10 + 0.07 * np.sin(math.pi * (0.15 + 0.8 * t))
+    # The largest share of the chroma that stays in gamut, by bisection; a share of 0 is grey and always does.
+    low, high = np.zeros(size), np.ones(size)
+    for _ in range(24):
+        share = (low + high) / 2
+        c = chroma * share
+        rgb = _oklab_to_rgb(np.stack([lightness, c * np.cos(hue), c * np.sin(hue)], 1))
+        fits = np.all((rgb >= 0) & (rgb <= 1), axis=1)
+        low, high = np.where(fits, share, low), np.where(fits, high, share)
+    inside = chroma * low
+    rgb = _oklab_to_rgb(np.stack([lightness, inside * np.cos(hue), inside * np.sin(hue)], 1))
+    return srgb_encode(np.clip(rgb, 0.0, 1.0).astype(np.float32))
+
+
+COLOURS: NDArray[np.float32] = _table(256)
+"""(256, 3), display-encoded, dark violet to light yellow. Its lightness alone tells the order, also in grey print."""
+
+
+@dataclass(frozen=True)
+class Tick:
+    """`position` in [0, 1] along the legend."""
+
+    position: float
+    label: str
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Maps values from `lower` … `upper` to 0 … 1, evenly or by their logarithm (then 0 < lower)."""
+
+    lower: float
+    upper: float
+    log: bool = False
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        if not (self.lower < self.upper and math.isfinite(self.upper - self.lower)) or (self.log and self.lower <= 0):
+            raise ValueError(f"no scale from {self.lower} to {self.upper}" + (" by logarithm" if self.log else ""))
+
+    def normalise(self, values: NDArray[Any]) -> NDArray[np.float64]:
+        """Position of each value, cut to [0, 1]; NaN stays NaN. On a logarithmic scale what isn't positive is 0."""
+        values = np.asarray(values, np.float64)
+        low, high = self.lower, self.upper
+        if self.log:
+            with np.errstate(divide="ignore"):
+                values = np.log(np.maximum(values, 0.0))
+            low, high = math.log(low), math.log(high)
+        return np.clip((values - low) / (high - low), 0.0, 1.0)
+
+    def ticks(self, count: int = 5) -> list[Tick]:
+        """Round values within the scale, about `count`, with the unit."""
+        values = _log_values(self.lower, self.upper, count) if self.log else _even_values(self.lower, self.upper, count)
+        unit = f" {self.unit}" if self.unit else ""
+        return [Tick(float(self.normalise(np.array(v))), f"{v:.6g}{unit}") for v in values]
+
+
+def scale_of(values: NDArray[Any], log: bool = False, unit: str = "") -> Scale:
+    """A scale from the 1st to the 99th percentile of the finite (by logarithm: positive) values, widened when they
+    are all alike; 0–1 (0.1–1 by logarithm) when there are none."""
+    values = np.asarray(values, np.float64)
+    good = values[np.isfinite(values) & (values > 0 if log else True)]
+    if not good.size:
+        return Scale(0.1 if log else 0.0, 1.0, log, unit)
+    low, high = (float(v) for v in np.percentile(good, (1, 99)))
+    if high - low <= 1e-9 * max(abs(low), abs(high)):
+        margin = abs(high) / 2 or 0.5
+        low, high = low - margin, high + margin
+    return Scale(low, high, log, unit)
+
+
+def false_colour(values: NDArray[Any], scale: Scale) -> NDArray[np.float32]:
+    """(h, w) or (h, w, 1) to display-encoded (h, w, 3) in [0, 1]; what is not finite is magenta."""
+    values = np.asarray(values)
+    if values.ndim == 3 and values.shape[2] == 1:
+        values = values[..., 0]
+    good = np.isfinite(values)
+    position = scale.normalise(np.where(good, values, scale.lower))
+    pixels = COLOURS[np.rint(position * (len(COLOURS) - 1)).astype(np.intp)]
+    pixels[~good] = MAGENTA
+    return pixels
+
+
+def _even_values(low: float, high: float, count: int) -> list[float]:
+    """Multiples of 1, 2 or 5 times a power of ten."""
+    rough = (high - low) / max(count - 1, 1)
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(m * power for m in (1, 2, 5, 10) if m * power >= rough * (1 - 1e-9))
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [float(f"{i * step:.12g}") for i in range(first, last + 1)]
+
+
+def _log_values(low: float, high: float, count: int) -> list[float]:
+    """Powers of ten, every n-th when there are many; with 2 and 5 between when there are few."""
+    first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
+    decades = math.log10(high / low)
+    digits = (1,) if decades >= 3 else (1, 2, 5) if decades >= 1 else tuple(range(1, 10))
+    skip = max(1, math.ceil((last - first) / max(count, 1)))
+    values = [float(f"{d}e{e}") for e in range(first, last + 1, skip) for d in digits]
+    inside = [v for v in values if low * (1 - 1e-9) <= v <= high * (1 + 1e-9)]
+    return inside or _even_values(low, high, count)

@@ -1,0 +1,139 @@
+"""A frame as EXR (every layer, every setting) or PNG (one view as it is shown)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer import __version__
+from pmviewer.errors import OutputError
+from pmviewer.output.exr import PREFIX, Value, write_exr
+from pmviewer.output.png import write_png
+from pmviewer.output.tone import display_image
+from pmviewer.settings import Display, Settings, flat
+
+LAYERS = ("beauty", "emission", "direct", "specular", "caustic", "indirect", "albedo", "normal", "depth")
+"""The beauty image, its terms in the order in which their sum gives it bit for bit, and the first hit's properties."""
+RADIANCE_UNIT = "W/(m^2 sr)"
+
+
+class Counts(Protocol):
+    """What an exporter reads of `pmviewer.engine.frame.Statistics`."""
+
+    @property
+    def passes(self) -> int: ...
+    @property
+    def emitted(self) -> int: ...
+    @property
+    def stored(self) -> Mapping[str, int]: ...
+    @property
+    def radius(self) -> Mapping[str, float]: ...
+    @property
+    def rays(self) -> int: ...
+    @property
+    def seconds(self) -> float: ...
+    @property
+    def cpu_seconds(self) -> float: ...
+    @property
+    def dropped(self) -> Mapping[str, int]: ...
+
+
+class Pose(Protocol):
+    """What an exporter reads of `pmviewer.render.camera.CameraPose`."""
+
+    @property
+    def origin(self) -> tuple[float, float, float]: ...
+    @property
+    def target(self) -> tuple[float, float, float]: ...
+    @property
+    def up(self) -> tuple[float, float, float]: ...
+    @property
+    def fov(self) -> float: ...
+
+
+class Exportable(Protocol):
+    """What an exporter reads of `pmviewer.engine.frame.Frame`."""
+
+    @property
+    def settings(self) -> Settings: ...
+    @property
+    def statistics(self) -> Counts: ...
+    @property
+    def camera(self) -> Pose: ...
+    @property
+    def scene_name(self) -> str: ...
+    def image(self, view: str = ...) -> NDArray[np.float32]: ...
+
+
+def frame_layers(frame: Exportable) -> dict[str, NDArray[np.float32]]:
+    """Every layer of `LAYERS`, (h, w, 3) float32, depth (h, w, 1)."""
+    return {name: frame.image(name) for name in LAYERS}
+
+
+def frame_metadata(frame: Exportable) -> dict[str, Value]:
+    """What made the picture: every setting by its full name, the camera as it was resolved, and the counts.
+
+    Vectors are texts of three numbers, switches "true" or "false", lengths in scene units, times in seconds.
+    """
+    counts, camera = frame.statistics, frame.camera
+    about: dict[str, Value] = {
+        "program": f"pmviewer {__version__}",
+        "scene": frame.scene_name,
+        "units": RADIANCE_UNIT,
+        "seed": frame.settings.render.seed,
+        "passes": counts.passes,
+        "photons_emitted": counts.emitted,
+        "rays": counts.rays,
+        "seconds": float(counts.seconds),
+        "cpu_seconds": float(counts.cpu_seconds),
+        "view.origin": _text(camera.origin),
+        "view.target": _text(camera.target),
+        "view.up": _text(camera.up),
+        "view.fov": float(camera.fov),
+    }
+    about |= {f"photons_stored.{name}": count for name, count in counts.stored.items()}
+    about |= {f"radius.{name}": float(radius) for name, radius in counts.radius.items()}
+    about |= {f"dropped.{place}": count for place, count in counts.dropped.items()}
+    return about | {path: _plain(value) for path, value in flat(frame.settings).items()}
+
+
+def write_frame_exr(path: str | Path, frame: Exportable, half: bool = False) -> None:
+    """Write all layers and the metadata. Raises OutputError."""
+    write_exr(path, frame_layers(frame), frame_metadata(frame), half)
+
+
+def write_frame_png(
+    path: str | Path, frame: Exportable, view: str | None = None, display: Display | None = None
+) -> None:
+    """Write one view as it is shown.
+
+    Parameters
+    ----------
+    view: what to show; the display settings' view if None.
+    display: view, exposure and tone curve; the frame's own if None. They change without a new frame.
+
+    Raises OutputError, also for the view `geometry`, which only the window draws.
+    """
+    display = display or frame.settings.display
+    view = view or display.view
+    if view not in LAYERS:
+        raise OutputError(f"{path}: the view '{view}' is drawn by the window alone. Choose one of {', '.join(LAYERS)}.")
+    shown = display_image(view, frame.image(view), display.exposure, display.tone)
+    texts = {PREFIX + name: _text(value) for name, value in frame_metadata(frame).items()}
+    write_png(path, shown.pixels, {"Software": f"pmviewer {__version__}", "Title": frame.scene_name, **texts})
+
+
+def _plain(value: Any) -> Value:
+    return value if isinstance(value, str | int | float) and not isinstance(value, bool) else _text(value)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, tuple):
+        return " ".join(repr(float(part)) for part in value)
+    return str(value)
