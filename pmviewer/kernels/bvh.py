@@ -1,8 +1,9 @@
 """Building the 8-wide bounding volume hierarchy that `raycast` traverses.
 
 First a binary tree by binned surface-area heuristic (Wald, "On fast construction of SAH-based bounding volume
-hierarchies", 2007), then a collapse that pulls up to eight descendants of largest area into one node (Wald, Benthin,
-Boulos, "Getting rid of packets", 2008). Triangles sit in blocks of up to eight; quadrics are leaves of their own.
+hierarchies", 2007), then a collapse of up to eight descendants into one node, planned by dynamic programming (Ylitie,
+Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", 2017, section 3.3). Triangles
+sit in blocks of up to eight; quadrics are leaves of their own.
 
 A child index c of a wide node is a node if c >= 0; otherwise ~c is a block, or, from `n_blocks` on, quadric
 ~c - n_blocks. Memory layouts are in `simd`.
@@ -23,6 +24,9 @@ from pmviewer.kernels.simd import BLOCK_ROWS, LANES, NODE_ROWS
 BINS = 16
 MAX_SAH_DEPTH = 40
 """Below this depth nodes are halved by count, which bounds the depth and with it the traversal's stack."""
+
+LEAF_COST = np.float32(1.2)
+"""Of testing a block, relative to a wide node; it steers the collapse."""
 
 MIN_SINE = 1e-7
 """A triangle whose edges span a smaller sine has no usable float32 normal: it is left out, like one without area."""
@@ -99,13 +103,15 @@ def build(triangles: F4, quadrics: F4) -> Bvh:
     boxes.view(np.int32)[n_kept:, 3] = kept
 
     binary = aligned_empty((2 * len(boxes) + 2, 8), np.float32)
-    n_leaves, n_blocks = _build_binary(boxes, boxes.view(np.int32), n_kept, binary, binary.view(np.int32))
-    nodes = aligned_empty((max(n_leaves, 1), NODE_ROWS, LANES), np.float32)
+    n_binary, n_blocks = _build_binary(boxes, boxes.view(np.int32), n_kept, binary, binary.view(np.int32))
+    plan = np.empty((n_binary, LANES), np.int8)
+    _plan_collapse(binary, binary.view(np.int32), np.empty((n_binary, LANES), np.float32), plan)
+    nodes = aligned_empty((n_binary // 2 + 1, NODE_ROWS, LANES), np.float32)
     # An unused lane refers to block 0, which therefore always exists.
     blocks = aligned_empty((max(n_blocks, 1), BLOCK_ROWS, LANES), np.float32)
     blocks[0] = 0.0
     n_nodes = _collapse(
-        triangles, boxes.view(np.int32), n_kept, binary, binary.view(np.int32),
+        triangles, boxes.view(np.int32), n_kept, binary, binary.view(np.int32), plan,
         nodes, nodes.view(np.int32), blocks, blocks.view(np.int32),
     )  # fmt: skip
     own_nodes = aligned_empty((n_nodes, NODE_ROWS, LANES), np.float32)
@@ -245,17 +251,17 @@ def _split(boxes, box_ints, begin, end, lanes, bin_boxes, bin_counts, costs):
 
 @kernel
 def _build_binary(boxes, box_ints, n_triangles, nodes, node_ints):
-    """Fill nodes (2n + 2, 8) with the tree over boxes (n, 8), reordering them; root 0.
+    """Fill nodes (2n + 2, 8) with the tree over boxes (n, 8), reordering them; root 0, children behind their parents.
 
     Boxes from `n_triangles` on are quadrics. A leaf keeps (first box, count); an inner node (index of the first of two
-    adjacent children, 0). A split at box m owns nodes 2m and 2m + 1. Returns the numbers of leaves and of blocks.
+    adjacent children, 0). Returns the numbers of nodes and of blocks.
     """
     n = len(boxes)
     bin_boxes = np.empty((3, BINS, 8), np.float32)
     bin_counts = np.empty((3, BINS), np.int32)
     costs = np.empty(BINS + 1, np.float32)
     stack = np.empty((256, 2), np.int64)
-    n_leaves = n_blocks = 0
+    n_nodes, n_blocks = 1, 0
     _make_node(nodes, node_ints, 0, boxes, 0, n)
     stack[0, 0], stack[0, 1] = 0, 0
     size = 1 if n > 0 else 0
@@ -267,7 +273,6 @@ def _build_binary(boxes, box_ints, n_triangles, nodes, node_ints):
         mixed = begin < n_triangles < end
         lanes = LANES if begin < n_triangles else 1
         if end - begin <= lanes and not mixed:
-            n_leaves += 1
             n_blocks += 1 if begin < n_triangles else 0
             continue
         if mixed:
@@ -276,13 +281,14 @@ def _build_binary(boxes, box_ints, n_triangles, nodes, node_ints):
             middle = _split(boxes, box_ints, begin, end, lanes, bin_boxes, bin_counts, costs)
         else:
             middle = (begin + end) // 2
-        _make_node(nodes, node_ints, 2 * middle, boxes, begin, middle)
-        _make_node(nodes, node_ints, 2 * middle + 1, boxes, middle, end)
-        node_ints[index, 3], node_ints[index, 7] = 2 * middle, 0
+        _make_node(nodes, node_ints, n_nodes, boxes, begin, middle)
+        _make_node(nodes, node_ints, n_nodes + 1, boxes, middle, end)
+        node_ints[index, 3], node_ints[index, 7] = n_nodes, 0
         for child in range(2):
-            stack[size, 0], stack[size, 1] = 2 * middle + child, depth + 1
+            stack[size, 0], stack[size, 1] = n_nodes + child, depth + 1
             size += 1
-    return n_leaves, n_blocks
+        n_nodes += 2
+    return n_nodes, n_blocks
 
 
 @device
@@ -300,49 +306,67 @@ def _fill_block(triangles, box_ints, begin, count, block, block_ints):
         block_ints[9, lane] = i
 
 
+@device
+def _node_area(nodes, i):
+    return _half_area(nodes[i, 0], nodes[i, 1], nodes[i, 2], nodes[i, 4], nodes[i, 5], nodes[i, 6])
+
+
 @kernel
-def _collapse(triangles, box_ints, n_triangles, binary, binary_ints, nodes, node_ints, blocks, block_ints):
+def _plan_collapse(binary, binary_ints, costs, plan):
+    """Which descendants of each binary node become children of a wide node, at least expected cost.
+
+    costs[c, k - 1] is the cost of the subtree c as at most k children of a wide node above it, plan[c, k - 1] how many
+    of the k its left half gets; 0: c stays whole, as one child. plan[c, 0] is the left half's share of the eight when c
+    is a wide node itself.
+    """
+    for c in range(len(costs) - 1, -1, -1):
+        area = _node_area(binary, c)
+        if binary_ints[c, 7] > 0:
+            costs[c], plan[c] = area * LEAF_COST, 0
+            continue
+        left = np.int64(binary_ints[c, 3])
+        for k in range(LANES, 0, -1):
+            wanted = k if k > 1 else LANES
+            best, share = np.float32(np.inf), 1
+            for i in range(1, wanted):
+                cost = costs[left, i - 1] + costs[left + 1, wanted - i - 1]
+                if cost < best:
+                    best, share = cost, i
+            costs[c, k - 1], plan[c, k - 1] = best, share
+        costs[c, 0] += area
+        for k in range(1, LANES):
+            if costs[c, 0] <= costs[c, k]:
+                costs[c, k], plan[c, k] = costs[c, 0], 0
+
+
+@kernel
+def _collapse(triangles, box_ints, n_triangles, binary, binary_ints, plan, nodes, node_ints, blocks, block_ints):
     """Turn the binary tree into wide nodes and blocks; returns the number of wide nodes."""
-    n = len(box_ints)
     n_blocks_total = len(blocks)
     n_nodes, n_blocks = 1, 0
     stack = np.empty((1024, 2), np.int64)
     stack[0, 0], stack[0, 1] = 0, 0
     size = 1
-    children = np.empty(LANES, np.int64)
+    pending = np.empty((LANES, 2), np.int64)
     while size > 0:
         size -= 1
         source, target = stack[size, 0], stack[size, 1]
-        children[0] = source
-        count = 1 if n > 0 else 0
-        while 0 < count < LANES:
-            widest, area = -1, np.float32(-1)
-            for k in range(count):
-                c = children[k]
-                if binary_ints[c, 7] == 0:
-                    a = _half_area(binary[c, 0], binary[c, 1], binary[c, 2], binary[c, 4], binary[c, 5], binary[c, 6])
-                    if widest < 0 or a > area:
-                        widest, area = k, a
-            if widest < 0:
-                break
-            first = np.int64(binary_ints[children[widest], 3])
-            children[widest] = first
-            children[count] = first + 1
-            count += 1
-        for lane in range(LANES):
-            if lane >= count:
-                for k in range(3):
-                    nodes[target, 2 * k, lane] = np.float32(np.inf)
-                    nodes[target, 2 * k + 1, lane] = np.float32(-np.inf)
-                node_ints[target, 6, lane] = ~0
-                node_ints[target, 7, lane] = 0
-                continue
-            c = children[lane]
-            for k in range(3):
-                nodes[target, 2 * k, lane] = binary[c, k]
-                nodes[target, 2 * k + 1, lane] = binary[c, 4 + k]
-            node_ints[target, 7, lane] = 0
+        lane = 0
+        pending[0, 0], pending[0, 1] = source, 1
+        waiting = 1 if len(box_ints) > 0 else 0
+        while waiting > 0:
+            waiting -= 1
+            c, k = pending[waiting, 0], pending[waiting, 1]
             begin, held = np.int64(binary_ints[c, 3]), np.int64(binary_ints[c, 7])
+            share = np.int64(plan[c, k - 1])
+            if held == 0 and (c == source or (k > 1 and share > 0)):
+                k = LANES if c == source else k
+                pending[waiting, 0], pending[waiting, 1] = begin + 1, k - share
+                pending[waiting + 1, 0], pending[waiting + 1, 1] = begin, share
+                waiting += 2
+                continue
+            for i in range(3):
+                nodes[target, 2 * i, lane], nodes[target, 2 * i + 1, lane] = binary[c, i], binary[c, 4 + i]
             if held == 0:
                 node_ints[target, 6, lane] = n_nodes
                 stack[size, 0], stack[size, 1] = c, n_nodes
@@ -354,4 +378,10 @@ def _collapse(triangles, box_ints, n_triangles, binary, binary_ints, nodes, node
                 n_blocks += 1
             else:
                 node_ints[target, 6, lane] = ~(n_blocks_total + box_ints[begin, 3])
+            lane += 1
+        node_ints[target, 7] = 0
+        for i in range(lane, LANES):
+            for k in range(3):
+                nodes[target, 2 * k, i], nodes[target, 2 * k + 1, i] = np.float32(np.inf), np.float32(-np.inf)
+            node_ints[target, 6, i] = ~0
     return n_nodes

@@ -34,17 +34,8 @@ from pmviewer.kernels.simd import (
 )
 
 QUADRIC_BYTES = 4 * QUADRIC_FLOATS
-STACK_INTS = 1024  # 512 keys; a level pushes at most 7, and the build keeps trees below 70 levels
-SCRATCH_INTS = 4 * LANES
-SMALLEST_COMPONENT = np.float32(1e-18)  # of a direction: its reciprocal stays finite, so that 0 · inf never arises
-PLANE_SLACK = np.float32(2.0**-22)  # relative rounding error of origin · reciprocal, with room
-
-
-@device
-def _reciprocal(x):
-    if abs(x) >= SMALLEST_COMPONENT:
-        return np.float32(1) / x
-    return np.float32(-1e18) if x < np.float32(0) else np.float32(1e18)
+STACK_INTS = 1024  # 512 keys; a level pushes at most 7, and the build keeps trees below 72 levels
+SCRATCH_INTS = 3 * LANES
 
 
 @device
@@ -74,32 +65,36 @@ def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     nodes, blocks, n_blocks = scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks
     stack = stack_i4(STACK_INTS)
     scratch = stack_i4(SCRATCH_INTS)
-    ix, iy, iz = _reciprocal(dx), _reciprocal(dy), _reciprocal(dz)
+    ix, iy, iz = np.float32(1) / dx, np.float32(1) / dy, np.float32(1) / dz
     near_x = np.int64(0 if ix > 0 else ROW_BYTES)
     near_y = np.int64(2 * ROW_BYTES if iy > 0 else 3 * ROW_BYTES)
     near_z = np.int64(4 * ROW_BYTES if iz > 0 else 5 * ROW_BYTES)
-    rx, ry, rz = ox * ix, oy * iy, oz * iz
-    sx, sy, sz = abs(rx) * PLANE_SLACK, abs(ry) * PLANE_SLACK, abs(rz) * PLANE_SLACK
-    size = 0
-    child = np.int32(0)
+    stack_put_i8(stack, 0, np.int64(0))
+    size = 1
     while True:
-        if child >= 0:
-            node = nodes + np.int64(child) * NODE_BYTES
-            mask = hit_boxes(
-                node, near_x, near_y, near_z, ix, iy, iz, rx + sx, ry + sy, rz + sz, rx - sx, ry - sy, rz - sz,
-                tmin, tmax, scratch,
-            )  # fmt: skip
-            if mask != 0:
-                base = node + CHILD_OFFSET
+        # Quadrics are left to this outer loop: a call inside the inner one would cost all rays their vector registers.
+        quadric = np.int64(-1)
+        while size > 0:
+            size -= 1
+            key = stack_get_i8(stack, size)
+            if (key >> 32) >= np.int64(bits_of_float(tmax)):
+                continue
+            child = np.int32(key & 0xFFFFFFFF)
+            while child >= 0:
+                node = nodes + np.int64(child) * NODE_BYTES
+                mask = hit_boxes(node, near_x, near_y, near_z, ox, oy, oz, ix, iy, iz, tmin, tmax, scratch)
+                if mask == 0:
+                    break
+                children = node + CHILD_OFFSET
                 lane = count_trailing_zeros(mask)
                 mask &= mask - 1
                 if mask == 0:
-                    child = load_i4(base, lane)
+                    child = load_i4(children, lane)
                     continue
-                nearest = _key(scratch, base, lane)
+                nearest = _key(scratch, children, lane)
                 bottom = size
                 while mask != 0:
-                    key = _key(scratch, base, count_trailing_zeros(mask))
+                    key = _key(scratch, children, count_trailing_zeros(mask))
                     mask &= mask - 1
                     if key < nearest:
                         nearest, key = key, nearest
@@ -113,38 +108,28 @@ def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
                     stack_put_i8(stack, slot, key)
                     size += 1
                 child = np.int32(nearest & 0xFFFFFFFF)
+            if child >= 0:
                 continue
-        else:
             leaf = np.int64(~child)
-            if leaf < n_blocks:
-                block = blocks + leaf * BLOCK_BYTES
-                mask = hit_triangles(block, ox, oy, oz, dx, dy, dz, tmin, tmax, scratch)
-                while mask != 0:
-                    lane = count_trailing_zeros(mask)
-                    mask &= mask - 1
-                    scale = np.float32(1) / stack_get_f4(scratch, 3 * LANES + lane)
-                    t = stack_get_f4(scratch, lane) * scale
-                    if t < tmax and t > tmin:
-                        tmax, hit = t, load_i4(block + ID_OFFSET, lane)
-                        u = stack_get_f4(scratch, LANES + lane) * scale
-                        v = stack_get_f4(scratch, 2 * LANES + lane) * scale
-            else:
+            if leaf >= n_blocks:
                 quadric = leaf - n_blocks
-                address = scene.bvh_quadrics + quadric * QUADRIC_BYTES
-                t = intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax)
-                if t < tmax:
-                    tmax, hit = t, np.int32(scene.n_triangles + quadric)
-                    u = v = np.float32(0)
-        limit = np.int64(bits_of_float(tmax))
-        found = False
-        while size > 0:
-            size -= 1
-            key = stack_get_i8(stack, size)
-            if (key >> 32) < limit:
-                child, found = np.int32(key & 0xFFFFFFFF), True
                 break
-        if not found:
+            block = blocks + leaf * BLOCK_BYTES
+            mask = hit_triangles(block, ox, oy, oz, dx, dy, dz, tmin, tmax, scratch)
+            while mask != 0:
+                lane = count_trailing_zeros(mask)
+                mask &= mask - 1
+                t = stack_get_f4(scratch, lane)
+                if t < tmax:
+                    tmax, hit = t, load_i4(block + ID_OFFSET, lane)
+                    u, v = stack_get_f4(scratch, LANES + lane), stack_get_f4(scratch, 2 * LANES + lane)
+        if quadric < 0:
             return tmax, hit, u, v
+        address = scene.bvh_quadrics + quadric * QUADRIC_BYTES
+        t = intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax)
+        if t < tmax:
+            tmax, hit = t, np.int32(scene.n_triangles + quadric)
+            u = v = np.float32(0)
 
 
 @device_call
@@ -157,43 +142,42 @@ def occluded(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     nodes, blocks, n_blocks = scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks
     stack = stack_i4(STACK_INTS)
     scratch = stack_i4(SCRATCH_INTS)
-    ix, iy, iz = _reciprocal(dx), _reciprocal(dy), _reciprocal(dz)
+    ix, iy, iz = np.float32(1) / dx, np.float32(1) / dy, np.float32(1) / dz
     near_x = np.int64(0 if ix > 0 else ROW_BYTES)
     near_y = np.int64(2 * ROW_BYTES if iy > 0 else 3 * ROW_BYTES)
     near_z = np.int64(4 * ROW_BYTES if iz > 0 else 5 * ROW_BYTES)
-    rx, ry, rz = ox * ix, oy * iy, oz * iz
-    sx, sy, sz = abs(rx) * PLANE_SLACK, abs(ry) * PLANE_SLACK, abs(rz) * PLANE_SLACK
-    size = 0
-    child = np.int32(0)
+    stack_put_i4(stack, 0, np.int32(0))
+    size = 1
     while True:
-        if child >= 0:
-            node = nodes + np.int64(child) * NODE_BYTES
-            mask = hit_boxes(
-                node, near_x, near_y, near_z, ix, iy, iz, rx + sx, ry + sy, rz + sz, rx - sx, ry - sy, rz - sz,
-                tmin, tmax, scratch,
-            )  # fmt: skip
-            if mask != 0:
-                base = node + CHILD_OFFSET
-                child = load_i4(base, count_trailing_zeros(mask))
+        quadric = np.int64(-1)
+        while size > 0:
+            size -= 1
+            child = stack_get_i4(stack, size)
+            while child >= 0:
+                node = nodes + np.int64(child) * NODE_BYTES
+                mask = hit_boxes(node, near_x, near_y, near_z, ox, oy, oz, ix, iy, iz, tmin, tmax, scratch)
+                if mask == 0:
+                    break
+                children = node + CHILD_OFFSET
+                child = load_i4(children, count_trailing_zeros(mask))
                 mask &= mask - 1
                 while mask != 0:
-                    stack_put_i4(stack, size, load_i4(base, count_trailing_zeros(mask)))
+                    stack_put_i4(stack, size, load_i4(children, count_trailing_zeros(mask)))
                     mask &= mask - 1
                     size += 1
+            if child >= 0:
                 continue
-        else:
             leaf = np.int64(~child)
-            if leaf < n_blocks:
-                if hit_triangles(blocks + leaf * BLOCK_BYTES, ox, oy, oz, dx, dy, dz, tmin, tmax, scratch) != 0:
-                    return True
-            else:
-                address = scene.bvh_quadrics + (leaf - n_blocks) * QUADRIC_BYTES
-                if intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax) < tmax:
-                    return True
-        if size == 0:
+            if leaf >= n_blocks:
+                quadric = leaf - n_blocks
+                break
+            if hit_triangles(blocks + leaf * BLOCK_BYTES, ox, oy, oz, dx, dy, dz, tmin, tmax, scratch) != 0:
+                return True
+        if quadric < 0:
             return False
-        size -= 1
-        child = stack_get_i4(stack, size)
+        address = scene.bvh_quadrics + quadric * QUADRIC_BYTES
+        if intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax) < tmax:
+            return True
 
 
 @kernel

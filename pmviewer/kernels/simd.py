@@ -31,7 +31,6 @@ FAR_FACTOR = 1.0 + 2.0**-21
 V8 = ir.VectorType(F32, LANES)
 V8I = ir.VectorType(I32, LANES)
 FLAGS = ("contract",)
-SIGN = -(2**31)
 
 
 def _constant(value: float) -> ir.Constant:
@@ -59,26 +58,26 @@ def _mask(builder, lanes):
 
 
 @intrinsic
-def hit_boxes(typingctx, node, near_x, near_y, near_z, ix, iy, iz, ax, ay, az, bx, by, bz, tmin, tmax, out):
+def hit_boxes(typingctx, node, near_x, near_y, near_z, ox, oy, oz, ix, iy, iz, tmin, tmax, out):
     """Lanes of the node at address `node` whose boxes the ray meets in [tmin, tmax]; entry distances go to `out`.
 
-    `near_*` are the byte offsets of the rows of the planes that the ray meets first; `i*` the reciprocals of the
-    direction; `a*` and `b*` are origin · i*, nudged up and down by its rounding error, so that the test never misses a
-    box that the exact ray meets. A NaN of one axis leaves the other axes to decide.
+    `near_*` are the byte offsets of the rows of the planes that the ray meets first, `i*` the reciprocals of the
+    direction. Differences come before products, so all rounding errors are relative to t and `FAR_FACTOR` covers them.
+    A ray in a plane of the box gives 0 · inf there: comparisons with the NaN fail and the other planes decide.
     """
     f = types.float32
-    signature = types.int32(*[types.int64] * 4, *[f] * 11, out)
+    signature = types.int32(*[types.int64] * 4, *[f] * 8, out)
 
     def codegen(context, builder, sig, args):
-        node, nears, inverses = args[0], args[1:4], args[4:7]
-        upper, lower, tmin, tmax, out = args[7:10], args[10:13], args[13], args[14], args[15]
+        node, nears, origin, inverses = args[0], args[1:4], args[4:7], args[7:10]
+        tmin, tmax, out = args[10:13]
         enter, leave = _splat(builder, tmin), _splat(builder, tmax)
-        for near, i, a, b in zip(nears, inverses, upper, lower):
+        for near, o, i in zip(nears, origin, inverses):
             first = _load(builder, builder.add(node, near))
             last = _load(builder, builder.add(node, builder.xor(near, ir.Constant(I64, ROW_BYTES))))
-            i = _splat(builder, i)
-            t0 = builder.fsub(builder.fmul(first, i, flags=FLAGS), _splat(builder, a), flags=FLAGS)
-            t1 = builder.fsub(builder.fmul(last, i, flags=FLAGS), _splat(builder, b), flags=FLAGS)
+            o, i = _splat(builder, o), _splat(builder, i)
+            t0 = builder.fmul(builder.fsub(first, o), i)
+            t1 = builder.fmul(builder.fsub(last, o), i)
             enter = builder.select(builder.fcmp_ordered(">", t0, enter), t0, enter)
             leave = builder.select(builder.fcmp_ordered("<", t1, leave), t1, leave)
         leave = builder.fmul(leave, _constant(FAR_FACTOR))
@@ -92,9 +91,8 @@ def hit_boxes(typingctx, node, near_x, near_y, near_z, ix, iy, iz, ax, ay, az, b
 def hit_triangles(typingctx, block, ox, oy, oz, dx, dy, dz, tmin, tmax, out):
     """Lanes of the block at address `block` whose triangles the ray meets with tmin < t < tmax.
 
-    Only if there are any, four rows go to `out`: t, u, v, each times |det|, and |det|. The test is that of Möller and
-    Trumbore ("Fast, minimum storage ray/triangle intersection", 1997), multiplied by the determinant instead of divided
-    by it. A triangle without area is never met, whatever the ray.
+    Three rows go to `out`: t, u, v of all lanes. The test is that of Möller and Trumbore ("Fast, minimum storage
+    ray/triangle intersection", 1997). A triangle without area is never met: its reciprocal determinant is infinite.
     """
     f = types.float32
     signature = types.int32(types.int64, *[f] * 8, out)
@@ -117,30 +115,23 @@ def hit_triangles(typingctx, block, ox, oy, oz, dx, dy, dz, tmin, tmax, out):
         def dot(x, y):
             return add(add(mul(x[0], y[0]), mul(x[1], y[1])), mul(x[2], y[2]))
 
-        def flip(x, sign):
-            return builder.bitcast(builder.xor(builder.bitcast(x, V8I), sign), V8)
-
         rows = [_load(builder, builder.add(block, ir.Constant(I64, ROW_BYTES * k))) for k in range(9)]
         v0, e1, e2 = rows[0:3], rows[3:6], rows[6:9]
         origin, direction = ([_splat(builder, x) for x in args[k : k + 3]] for k in (1, 4))
         p = cross(direction, e2)
-        det = dot(e1, p)
-        sign = builder.and_(builder.bitcast(det, V8I), ir.Constant(V8I, [SIGN] * LANES))
-        size = flip(det, sign)
+        inverse = builder.fdiv(_constant(1.0), dot(e1, p))
         s = [sub(o, v) for o, v in zip(origin, v0)]
-        u = flip(dot(s, p), sign)
+        u = mul(dot(s, p), inverse)
         q = cross(s, e1)
-        v = flip(dot(direction, q), sign)
-        t = flip(dot(e2, q), sign)
-        slack = mul(size, _constant(-EDGE_TOLERANCE))
-        lanes = builder.and_(builder.fcmp_ordered(">=", u, slack), builder.fcmp_ordered(">=", v, slack))
-        lanes = builder.and_(lanes, builder.fcmp_ordered("<=", add(u, v), mul(size, _constant(1.0 + EDGE_TOLERANCE))))
-        lanes = builder.and_(lanes, builder.fcmp_ordered(">", t, mul(size, _splat(builder, tmin))))
-        lanes = builder.and_(lanes, builder.fcmp_ordered("<", t, mul(size, _splat(builder, tmax))))
-        mask = _mask(builder, lanes)
-        with builder.if_then(builder.icmp_unsigned("!=", mask, ir.Constant(I32, 0)), likely=False):
-            for row, value in enumerate((t, u, v, size)):
-                _store(builder, value, out, row)
-        return mask
+        v = mul(dot(direction, q), inverse)
+        t = mul(dot(e2, q), inverse)
+        low = _constant(-EDGE_TOLERANCE)
+        lanes = builder.and_(builder.fcmp_ordered(">=", u, low), builder.fcmp_ordered(">=", v, low))
+        lanes = builder.and_(lanes, builder.fcmp_ordered("<=", add(u, v), _constant(1.0 + EDGE_TOLERANCE)))
+        lanes = builder.and_(lanes, builder.fcmp_ordered(">", t, _splat(builder, tmin)))
+        lanes = builder.and_(lanes, builder.fcmp_ordered("<", t, _splat(builder, tmax)))
+        for row, value in enumerate((t, u, v)):
+            _store(builder, value, out, row)
+        return _mask(builder, lanes)
 
     return signature, codegen

@@ -134,18 +134,19 @@ def test_no_ray_leaves_through_vertices_and_edges():
 
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_axis_parallel_rays_in_slab_planes(axis, sign):
+@pytest.mark.parametrize("start", [0, -5, -12])
+def test_axis_parallel_rays_in_slab_planes(axis, sign, start):
     """Along the faces of boxes 0/0 and 0·inf lurk: a grid of squares with integer corners, rays at integer places."""
     n = 12
     other = [k for k in range(3) if k != axis]
     i, j = (x.ravel() for x in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
     corners = np.zeros((n * n, 4, 3), np.float32)
     for k, (a, b) in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)]):
-        corners[:, k, other[0]], corners[:, k, other[1]] = i + a, j + b
+        corners[:, k, other[0]], corners[:, k, other[1]] = start + i + a, start + j + b
     tracer = Tracer(np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]))
     x, y = (x.ravel() for x in np.meshgrid(np.arange(n + 1), np.arange(n + 1) / 2, indexing="ij"))
     origins, directions = np.zeros((len(x), 3)), np.zeros((len(x), 3))
-    origins[:, other[0]], origins[:, other[1]], origins[:, axis] = x, y, -3.0 * sign
+    origins[:, other[0]], origins[:, other[1]], origins[:, axis] = start + x, start + y, -3.0 * sign
     directions[:, axis] = sign
     for zero in (0.0, -0.0):
         directions[:, other] = zero
