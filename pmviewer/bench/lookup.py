@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -79,7 +80,7 @@ class _Queries:
     def __init__(self, m: int, pool: ThreadPoolExecutor) -> None:
         points = clustered(m, 2)
         self.points = np.ascontiguousarray(points[morton_order(points)])
-        self.normals = np.tile(_f4([0.0, 1.0, 0.0]), (m, 1))
+        self.normals = np.tile(np.array([0, 1, 0], _f4), (m, 1))
         self.counts, self.irradiance, self.radii = np.empty(m, _i4), np.empty((m, 3), _f4), np.empty(m, _f4)
         self.indices, self.squared = np.empty((m, K), _i4), np.empty((m, K), _f4)
         self.pool = pool
@@ -134,7 +135,6 @@ def _against_ckdtree(queries: _Queries, n: int, repeats: int) -> tuple[list[list
         "grid, count in radius": lambda: queries.count(grid),
         "grid, irradiance in radius": lambda: queries.estimate(grid),
     }
-    queries.count(grid), queries.estimate(grid), queries.nearest(tree, False), queries.estimate_nearest(tree, radius)
     seconds = _best(tasks, repeats)
     reference = {
         name: seconds["cKDTree, k nearest" if "nearest" in name else "cKDTree, count in radius"] for name in tasks
@@ -163,9 +163,9 @@ def _over_n(queries: _Queries, sizes: list[int], repeats: int) -> tuple[list[lis
             structure = build_grid(photons, radius) if name == "grid" else build_kdtree(photons)
             build = time.perf_counter() - start
             if isinstance(structure, PhotonGrid):
-                seconds = _best({name: lambda grid=structure: queries.estimate(grid)}, repeats)[name]
+                seconds = _best({name: partial(queries.estimate, structure)}, repeats)[name]
             else:
-                seconds = _best({name: lambda tree=structure: queries.nearest(tree, False)}, repeats)[name]
+                seconds = _best({name: partial(queries.nearest, structure, False)}, repeats)[name]
             look_up[name].append(seconds)
             bytes_per_photon = max(bytes_per_photon, structure.bytes / n)
             rows.append([f"{name}, building, ns a photon", n, 1e9 * build / n, "", structure.bytes / n])

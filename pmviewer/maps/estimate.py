@@ -29,7 +29,7 @@ from pmviewer.kernels.memory import (
     stack_put_f4,
 )
 from pmviewer.maps.filters import CONSTANT, filter_disc_mean, filter_weight
-from pmviewer.maps.grid import grid_ranges
+from pmviewer.maps.grid import BLOCK_BYTES, ROW_BYTES, grid_ranges, lanes_between
 from pmviewer.maps.kdtree import KEYS, nearest
 from pmviewer.maps.simd import WIDTH, add_power8, count_bits, facing8, within8
 from pmviewer.maps.stored import stored_power
@@ -90,13 +90,19 @@ def irradiance_radius(grid, px, py, pz, nx, ny, nz, radius, flatness, class_mask
     red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
     count, pending = _i4(0), _i4(0)
     for k in range(grid_ranges(grid, px, py, pz, radius, ranges)):
-        j, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
-        while j < end:
-            mask = within8(grid.x, grid.y, grid.z, j, px, py, pz, r2, squared)
-            if end - j < WIDTH:
-                mask &= _i4((1 << (end - j)) - 1)
+        first, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
+        for block in range(first // WIDTH, (end - 1) // WIDTH + 1):
+            x = grid.blocks + block * BLOCK_BYTES
+            y, z, words, rg, b = (
+                x + ROW_BYTES,
+                x + 2 * ROW_BYTES,
+                x + 3 * ROW_BYTES,
+                x + 4 * ROW_BYTES,
+                x + 5 * ROW_BYTES,
+            )
+            mask = _i4(within8(x, y, z, px, py, pz, r2, squared) & lanes_between(first, end, block))
             if mask != 0:
-                mask &= facing8(grid.x, grid.y, grid.z, grid.direction, j, px, py, pz, nx, ny, nz, height, class_mask)
+                mask &= facing8(x, y, z, words, px, py, pz, nx, ny, nz, height, class_mask)
             if mask != 0:
                 if filter_kind != CONSTANT:
                     lanes = mask
@@ -105,13 +111,12 @@ def irradiance_radius(grid, px, py, pz, nx, ny, nz, radius, flatness, class_mask
                         lanes &= lanes - _i4(1)
                         x2 = stack_get_f4(squared, lane) * inverse_r2
                         stack_put_f4(weights, lane, filter_weight(filter_kind, cone_k, x2))
-                add_power8(grid.power_rg, grid.power_b, j, mask, weights, sums)
+                add_power8(rg, b, mask, weights, sums)
                 count += count_bits(mask)
                 pending += _i4(1)
                 if pending == FLUSH:
                     red, green, blue = _flush(sums, red, green, blue)
                     pending = _i4(0)
-            j += WIDTH
     red, green, blue = _flush(sums, red, green, blue)
     scale = _f8(grid.power_unit) / (_f8(filter_disc_mean(filter_kind, cone_k)) * _PI * _f8(radius) * _f8(radius))
     return _f4(red * scale), _f4(green * scale), _f4(blue * scale), count

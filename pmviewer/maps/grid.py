@@ -2,16 +2,16 @@
 
 Cells are 2r wide, so a look-up touches at most 2×2×2 of them. Cells that follow each other in x follow each other in
 memory: the photons of a row of two cells are one contiguous run, and a look-up is at most four runs that are tested
-eight photons at a time. Photons are brought into cell order by a stable counting sort in two levels (coarse buckets of
-cells first, then cells within a bucket), whose scattered writes stay within the caches.
+eight photons at a time. Photons are stored in blocks of eight, each the six words of the record in turn: a run is one
+stretch of memory. A stable counting sort in two levels (coarse buckets of cells first, then cells within a bucket)
+brings photons into cell order; its scattered writes stay within the caches.
 
 While the cells of the bounding box are not many more than the photons, the grid is dense. Otherwise (small radius in a
 large scene) cells are hashed (Teschner et al. 2003) into about n/2 buckets; four neighbours in x share one hash so that
 they mostly stay contiguous. Two cells may fall into one bucket; a look-up visits each bucket once, and the distance
 test removes strangers.
 
-A grid stores 24 bytes a photon (one array for each of the six words of the record) and at most 6 bytes a photon of
-cell starts.
+A grid stores 24 bytes a photon and at most 6 of cell starts.
 """
 
 from __future__ import annotations
@@ -35,17 +35,15 @@ MOST_CELLS_ALONG_AXIS = 1 << 22
 MARGIN = 1.0 + 1e-6
 """Photons whose float32 distance rounds to inside may lie this much farther out."""
 
+ROW_BYTES = 4 * WIDTH
+BLOCK_BYTES = 6 * ROW_BYTES
+
 RANGES = 8
 """Most runs of photons that one look-up visits."""
 
 RECORD = np.dtype(
     [
-        ("x", np.int64),
-        ("y", np.int64),
-        ("z", np.int64),
-        ("direction", np.int64),
-        ("power_rg", np.int64),
-        ("power_b", np.int64),
+        ("blocks", np.int64),
         ("starts", np.int64),
         ("n", np.int64),
         ("origin_x", np.float64),
@@ -64,6 +62,7 @@ RECORD = np.dtype(
 """What kernels see of a grid: addresses of its arrays, its geometry; `hash_mask` is 0 for a dense grid."""
 
 _u4 = np.uint32
+_i4 = np.int32
 _i8 = np.int64
 
 
@@ -73,28 +72,19 @@ class PhotonGrid:
 
     Attributes
     ----------
-    x, y, z: (n + 8,) float32 positions, the last 8 padding.
-    direction, power_rg, power_b: (n + 8,) uint32, words 3, 4 and 5 of the photon record, padded likewise.
+    blocks: (⌈n/8⌉, 6, 8) uint32, word w of photon i at [i // 8, w, i % 8].
     starts: (cells + 1,) int32, first photon of each cell or hash bucket.
     radius: the largest radius of look-ups.
     power_unit: watts of one unit of stored power.
     record: one-element array of dtype `RECORD` for kernels; valid while this object lives.
     """
 
-    x: np.ndarray
-    y: np.ndarray
-    z: np.ndarray
-    direction: np.ndarray
-    power_rg: np.ndarray
-    power_b: np.ndarray
+    n: int
+    blocks: np.ndarray
     starts: np.ndarray
     radius: float
     power_unit: float
     record: np.ndarray
-
-    @property
-    def n(self) -> int:
-        return len(self.x) - WIDTH
 
     @property
     def hashed(self) -> bool:
@@ -103,19 +93,12 @@ class PhotonGrid:
     @property
     def bytes(self) -> int:
         """Memory held, in bytes, photons included."""
-        return sum(a.nbytes for a in (*self._columns, self.starts, self.record))
-
-    @property
-    def _columns(self) -> tuple[np.ndarray, ...]:
-        return self.x, self.y, self.z, self.direction, self.power_rg, self.power_b
+        return self.blocks.nbytes + self.starts.nbytes + self.record.nbytes
 
     @property
     def photons(self) -> np.ndarray:
         """A new (n, 6) float32 array of the photons in cell order."""
-        photons = np.empty((self.n, 6), np.float32)
-        for i, column in enumerate(self._columns):
-            photons.view(column.dtype)[:, i] = column[: self.n]
-        return photons
+        return self.blocks.transpose(0, 2, 1).reshape(-1, 6)[: self.n].view(np.float32)
 
 
 @device
@@ -180,6 +163,18 @@ def grid_ranges(grid, px, py, pz, radius, ranges):
     return count
 
 
+@device
+def lanes_between(first, end, block):
+    """Mask of those of the eight photons of a block that lie in first … end−1."""
+    mask = _i4(0xFF)
+    start = block * WIDTH
+    if first > start:
+        mask &= _i4(0xFF << (first - start))
+    if end - start < WIDTH:
+        mask &= _i4((1 << (end - start)) - 1)
+    return mask
+
+
 @kernel
 def count_in_radius(grids, points, radius, i0, i1, counts):
     """Number of photons closer than `radius` to points[i0:i1]; points (m, 3) float32, counts (m,) int32."""
@@ -190,15 +185,13 @@ def count_in_radius(grids, points, radius, i0, i1, counts):
     r2 = radius * radius
     for i in range(i0, i1):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        total = 0
+        total = _i4(0)
         for k in range(grid_ranges(grid, x, y, z, radius, ranges)):
-            j, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
-            while j < end:
-                mask = within8(grid.x, grid.y, grid.z, j, x, y, z, r2, squared)
-                if end - j < WIDTH:
-                    mask &= np.int32((1 << (end - j)) - 1)
-                total += count_bits(mask)
-                j += WIDTH
+            first, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
+            for block in range(first // WIDTH, (end - 1) // WIDTH + 1):
+                at = grid.blocks + block * BLOCK_BYTES
+                inside = within8(at, at + ROW_BYTES, at + 2 * ROW_BYTES, x, y, z, r2, squared)
+                total += count_bits(_i4(inside & lanes_between(first, end, block)))
         counts[i] = total
 
 
@@ -218,9 +211,7 @@ def _bounds(photons, box):
 
 
 @kernel
-def _sort(
-    photons, words, records, shift, keys, order, bucket_ends, cell_ends, x, y, z, direction, power_rg, power_b, starts
-):
+def _sort(photons, words, records, shift, keys, order, bucket_ends, cell_ends, blocks, starts):
     """Two-level counting sort of photons (n, 6), seen as uint32 in `words`, by cell.
 
     keys, order: (2, n) and (n,) int32 scratch; bucket_ends: zeroed int64, one per 2^shift cells, plus one; cell_ends:
@@ -269,8 +260,8 @@ def _sort(
             place = cell_ends[c]
             cell_ends[c] = place + 1
             j = order[i]
-            x[place], y[place], z[place] = photons[j, 0], photons[j, 1], photons[j, 2]
-            direction[place], power_rg[place], power_b[place] = words[j, 3], words[j, 4], words[j, 5]
+            for w in range(6):
+                blocks[place // WIDTH, w, place % WIDTH] = words[j, w]
         begin = end
     starts[cells] = n
 
@@ -299,10 +290,10 @@ def build_grid(photons: np.ndarray, radius: float, power_unit: float = 1.0) -> P
     if cells > min(MOST_CELLS, max(DENSE_CELLS_PER_PHOTON * n, FEWEST_DENSE_CELLS)):
         cells = 1 << max(int(n / 2).bit_length(), 3)
         hash_mask = cells - 1
-    columns = [np.zeros(n + WIDTH, np.float32 if i < 3 else np.uint32) for i in range(6)]
+    blocks = np.zeros((-(-n // WIDTH), 6, WIDTH), np.uint32)
     starts = np.zeros(cells + 1, np.int32)
     record = np.zeros(1, RECORD)
-    addresses = (a.ctypes.data for a in (*columns, starts))
+    addresses = blocks.ctypes.data, starts.ctypes.data
     record[0] = (*addresses, n, *low, 1.0 / cell, *shape, hash_mask, radius, power_unit)
     if n:
         shift = max(4, math.ceil(math.log2(cells / 1024)))
@@ -310,5 +301,5 @@ def build_grid(photons: np.ndarray, radius: float, power_unit: float = 1.0) -> P
         bucket_ends = np.zeros((cells - 1 >> shift) + 1, np.int64)
         cell_ends = np.empty(1 << shift, np.int64)
         words = photons.view(np.uint32)
-        _sort(photons, words, record, shift, keys, order, bucket_ends, cell_ends, *columns, starts)
-    return PhotonGrid(*columns, starts, float(radius), float(power_unit), record)
+        _sort(photons, words, record, shift, keys, order, bucket_ends, cell_ends, blocks, starts)
+    return PhotonGrid(n, blocks, starts, float(radius), float(power_unit), record)

@@ -74,7 +74,7 @@ class PhotonKdTree:
 
     Attributes
     ----------
-    x, y, z: (n + 8,) float32 positions, the last 8 padding.
+    x, y, z: (n + 8,) float32 positions, the last 8 padding: photons are loaded eight at a time.
     payload: (n, 3) uint32, words 3–5 of the photon record.
     index: (n,) int32, each photon's place in the input.
     planes: (2^depth, 2) float32 position and (as int32) axis of the splitting planes, from element 1.
@@ -214,7 +214,7 @@ def nearest(tree, px, py, pz, k, r2, keys, facing, nx, ny, nz, steepness, class_
         leaf = node - leaves
         j, end = (tree.n * leaf) >> tree.depth, (tree.n * (leaf + 1)) >> tree.depth
         while j < end:
-            mask = within8(tree.x, tree.y, tree.z, j, px, py, pz, r2, squared)
+            mask = within8(tree.x + 4 * j, tree.y + 4 * j, tree.z + 4 * j, px, py, pz, r2, squared)
             if end - j < WIDTH:
                 mask &= _i4((1 << (end - j)) - 1)
             while mask != 0:

@@ -1,8 +1,7 @@
 """Tests and sums over eight photons at once.
 
-Photons are stored as separate arrays of coordinates and words (structure of arrays), so that eight of them load as one
-LLVM vector `<8 x float>` each; machines without AVX split it into two halves by themselves. Arrays are padded by
-`WIDTH` elements so that the last load stays inside them.
+Each coordinate or word of eight photons lies in eight successive elements, so that it loads as one LLVM vector
+`<8 x float>`; machines without AVX split it into two halves by themselves. Addresses are of the first of the eight.
 """
 
 from __future__ import annotations
@@ -32,10 +31,8 @@ def _splat(builder, scalar, vector=_VECTOR):
     return builder.shuffle_vector(first, undefined, _constant(_WORDS, 0))
 
 
-def _load(builder, array, index, vector=_VECTOR):
-    """Elements index … index+7 of the array at an int64 address."""
-    start = builder.gep(builder.inttoptr(array, vector.element.as_pointer()), [index])
-    values = builder.load(builder.bitcast(start, vector.as_pointer()))
+def _load(builder, address, vector=_VECTOR):
+    values = builder.load(builder.inttoptr(address, vector.as_pointer()))
     values.align = 4
     return values
 
@@ -56,28 +53,27 @@ def _dot(builder, a, b):
 
 
 @intrinsic
-def within8(typingctx, x_array, y_array, z_array, i, x, y, z, r2, squared):
-    """Which of the photons i … i+7 lie closer than sqrt(r2) to (x, y, z).
+def within8(typingctx, x_address, y_address, z_address, x, y, z, r2, squared):
+    """Which of eight photons lie closer than sqrt(r2) to (x, y, z).
 
     Parameters
     ----------
-    x_array, y_array, z_array: int64 addresses of the float32 coordinates.
-    i: int64 index of the first of the eight.
+    x_address, y_address, z_address: int64 addresses of the float32 coordinates.
     r2: float32 squared radius; the comparison is strict.
     squared: pointer to 8 float32 of scratch that receive the squared distances.
 
     Returns
     -------
-    int32 with bit j set when photon i+j is inside.
+    int32 with bit j set when photon j is inside.
     """
     f, i8 = types.float32, types.int64
-    signature = types.int32(i8, i8, i8, i8, f, f, f, f, types.CPointer(types.int32))
+    signature = types.int32(i8, i8, i8, f, f, f, f, types.CPointer(types.int32))
 
     def codegen(context, builder, sig, args):
-        *arrays, index, x, y, z, limit, out = args
+        *addresses, x, y, z, limit, out = args
         d = [
-            builder.fsub(_load(builder, array, index), _splat(builder, coordinate), flags=_FAST)
-            for array, coordinate in zip(arrays, (x, y, z))
+            builder.fsub(_load(builder, address), _splat(builder, coordinate), flags=_FAST)
+            for address, coordinate in zip(addresses, (x, y, z))
         ]
         total = _dot(builder, d, d)
         builder.store(total, builder.bitcast(out, _VECTOR.as_pointer())).align = 4
@@ -99,26 +95,26 @@ def count_bits(typingctx, mask):
 
 
 @intrinsic
-def facing8(typingctx, x_array, y_array, z_array, words, i, x, y, z, nx, ny, nz, height, class_mask):
-    """Which of the photons i … i+7 arrive from the side of the normal, within `height` of the tangent plane, on a path
-    of a class in `class_mask`.
+def facing8(typingctx, x_address, y_address, z_address, words, x, y, z, nx, ny, nz, height, class_mask):
+    """Which of eight photons arrive from the side of the normal, within `height` of the tangent plane, on a path of a
+    class in `class_mask`.
 
-    words: int64 address of word 3 of the photon records; others as for `within8` and `irradiance_radius`. Returns int32
-    with bit j set for photon i+j.
+    words: int64 address of words 3 of the photon records; others as for `within8` and `irradiance_radius`. Returns
+    int32 with bit j set for photon j.
     """
     f, i8, i4 = types.float32, types.int64, types.int32
-    signature = i4(i8, i8, i8, i8, i8, f, f, f, f, f, f, f, i4)
+    signature = i4(i8, i8, i8, i8, f, f, f, f, f, f, f, i4)
 
     def codegen(context, builder, sig, args):
-        *arrays, words, index, x, y, z, nx, ny, nz, height, class_mask = args
+        *addresses, words, x, y, z, nx, ny, nz, height, class_mask = args
         normal = [_splat(builder, n) for n in (nx, ny, nz)]
         d = [
-            builder.fsub(_load(builder, array, index), _splat(builder, coordinate), flags=_FAST)
-            for array, coordinate in zip(arrays, (x, y, z))
+            builder.fsub(_load(builder, address), _splat(builder, coordinate), flags=_FAST)
+            for address, coordinate in zip(addresses, (x, y, z))
         ]
         inside = builder.fcmp_ordered("<=", _call(builder, "fabs", _dot(builder, d, normal)), _splat(builder, height))
 
-        word = _load(builder, words, index, _WORDS)
+        word = _load(builder, words, _WORDS)
         path_class = builder.and_(builder.lshr(word, _constant(_WORDS, 6)), _constant(_WORDS, 3))
         wanted = builder.trunc(builder.lshr(_splat(builder, class_mask, _WORDS), path_class), _BITS)
 
@@ -140,23 +136,23 @@ def facing8(typingctx, x_array, y_array, z_array, words, i, x, y, z, nx, ny, nz,
 
 
 @intrinsic
-def add_power8(typingctx, rg_words, b_words, i, mask, weights, sums):
-    """Adds the weighted powers of those photons i … i+7 whose bit is set in `mask`.
+def add_power8(typingctx, rg_words, b_words, mask, weights, sums):
+    """Adds the weighted powers of those of eight photons whose bit is set in `mask`.
 
-    rg_words, b_words: int64 addresses of words 4 and 5 of the photon records.
+    rg_words, b_words: int64 addresses of words 4 and of words 5 of the photon records.
     weights: pointer to 8 float32.
     sums: pointer to 3 × 8 float32: eight partial sums of red, green and blue, in units of the map's power.
     """
     pointer = types.CPointer(types.int32)
-    signature = types.void(types.int64, types.int64, types.int64, types.int32, pointer, pointer)
+    signature = types.void(types.int64, types.int64, types.int32, pointer, pointer)
 
     def codegen(context, builder, sig, args):
-        rg_words, b_words, index, mask, weights, sums = args
+        rg_words, b_words, mask, weights, sums = args
         chosen = builder.bitcast(builder.trunc(mask, I8), _BITS)
         weight = builder.load(builder.bitcast(weights, _VECTOR.as_pointer()))
         weight.align = 4
         weight = builder.select(chosen, weight, _constant(_VECTOR, 0.0))
-        rg, b = _load(builder, rg_words, index, _WORDS), _load(builder, b_words, index, _WORDS)
+        rg, b = _load(builder, rg_words, _WORDS), _load(builder, b_words, _WORDS)
         low = _constant(_WORDS, 0xFFFF)
         channels = builder.and_(rg, low), builder.lshr(rg, _constant(_WORDS, 16)), builder.and_(b, low)
         for channel, code in enumerate(channels):
