@@ -69,7 +69,27 @@ def block_error(image: NDArray[Any], reference: NDArray[Any], size: int = BLOCK)
     return relmse(block_means(image, size), block_means(reference, size))
 
 
-def log_log_slope(x: ArrayLike, y: ArrayLike) -> float:
+@dataclass(frozen=True)
+class Metrics:
+    """The errors of an image by the functions of the same names."""
+
+    relmse_all: float
+    relmse_drop: float
+    mean_ratio: float
+    block_error: float
+
+
+def metrics(image: NDArray[Any], reference: NDArray[Any]) -> Metrics:
+    """All errors at once."""
+    return Metrics(
+        relmse(image, reference),
+        relmse_drop(image, reference),
+        mean_ratio(image, reference),
+        block_error(image, reference),
+    )
+
+
+def loglog_slope(x: ArrayLike, y: ArrayLike) -> float:
     """Exponent p of the least-squares fit y ∝ xᵖ: −1 is relMSE of independent samples against their number.
 
     Raises ValueError with fewer than two different x or values that aren't positive.
@@ -84,29 +104,14 @@ def log_log_slope(x: ArrayLike, y: ArrayLike) -> float:
     return float((u * (v - v.mean())).sum() / (u * u).sum())
 
 
-def crossing(cost: ArrayLike, error: ArrayLike, level: float) -> float:
-    """The cost at which the error first falls to `level`, interpolated in logarithms; inf if it never does, the first
-    cost if it starts below. `cost` rises."""
-    cost, error = np.asarray(cost, np.float64), np.asarray(error, np.float64)
-    below = np.flatnonzero(error <= level)
-    if not below.size:
-        return math.inf
-    j = int(below[0])
-    if j == 0:
-        return float(cost[0])
-    drop = math.log(error[j - 1]) - math.log(max(error[j], 1e-300))
-    share = (math.log(error[j - 1]) - math.log(level)) / drop
-    return float(math.exp(math.log(cost[j - 1]) + share * (math.log(cost[j]) - math.log(cost[j - 1]))))
-
-
 @dataclass(frozen=True)
 class ZTest:
     """Outcome of `z_test`: are two images of equal expectation?
 
     max_z: largest |z| of all blocks and channels.
     beyond_2, beyond_3: shares of |z| above 2 and 3; 0.0455 and 0.0027 are expected.
-    chi2: sum of z² over the blocks of the worst channel; `blocks` is expected.
-    blocks: blocks of one channel that took part.
+    chi2: sum of z² over the noisy blocks of the worst channel; `blocks` is expected.
+    blocks: noisy blocks of one channel.
     p_value: probability of an outcome at least that bad by chance, corrected for the number of tests.
     """
 
@@ -146,19 +151,18 @@ def z_test(
     difference = block_means(m - r, block)
     # A light seen directly has no variance, yet two programs round it differently: one part in a million is no error.
     rounding = 1e-6 * (block_means(np.abs(m), block) + block_means(np.abs(r), block))
-    sigma = np.sqrt(block_means(variance, block) / block**2 + rounding**2)
-    if not np.all(np.isfinite(difference)) or not np.all(np.isfinite(sigma)):
-        return ZTest(math.inf, 1.0, 1.0, math.inf, difference.shape[0] * difference.shape[1], 0.0)
-    channels = difference.shape[2]
-    known = (sigma > 0).any(axis=2)
-    z = np.abs(difference[known] / np.where(sigma[known] > 0, sigma[known], 1.0))
-    blocks = len(z)
-    if not blocks:
-        return ZTest(0.0, 0.0, 0.0, 0.0, 0, 1.0)
+    noise = np.sqrt(block_means(variance, block)) / block
+    noisy = (noise > rounding).any(axis=2)
+    blocks = int(noisy.sum())
+    if not np.all(np.isfinite(difference)) or not np.all(np.isfinite(noise)):
+        return ZTest(math.inf, 1.0, 1.0, math.inf, blocks, 0.0)
+    # Where both images are black, 0/tiny: no difference.
+    z = np.abs(difference) / np.maximum(np.hypot(noise, rounding), np.finfo(np.float64).tiny)
     largest = float(z.max())
-    chi2 = float((z**2).sum(axis=0).max())
+    squares = (z[noisy] ** 2).sum(axis=0)
+    chi2 = float(squares.max())
     by_largest = _sidak(float(erfc(largest / math.sqrt(2))), z.size)
-    by_sum = _sidak(float(chdtrc(blocks, chi2)), channels)
+    by_sum = _sidak(float(chdtrc(blocks, chi2)), squares.size) if blocks else 1.0
     p_value = min(1.0, 2 * min(by_largest, by_sum))
     return ZTest(largest, float((z > 2).mean()), float((z > 3).mean()), chi2, blocks, p_value)
 

@@ -20,10 +20,12 @@ Layers = dict[str, NDArray[np.float32]]
 
 PREFIX = "pmviewer."
 """Begins the name of every attribute of ours, so that it never collides with a standard one."""
-ALWAYS_FLOAT = ("normal", "depth")
+BEAUTY = ""
+"""Name of the layer whose channels have no layer name: what every program shows first."""
+ALWAYS_FLOAT = ("N", "depth")
 """Layers that half precision would spoil: 11 bits of depth show as steps."""
-_CHANNELS = {"beauty": ("R", "G", "B"), "normal": ("N.X", "N.Y", "N.Z"), "depth": ("depth.Z",)}
 _COMPONENTS = {1: "Y", 3: "RGB", 4: "RGBA"}
+_OWN_COMPONENTS = {"N": "XYZ", "depth": "Z"}
 _COMPRESSION = {
     "none": OpenEXR.NO_COMPRESSION,
     "rle": OpenEXR.RLE_COMPRESSION,
@@ -34,12 +36,12 @@ _COMPRESSION = {
 
 
 def channel_names(layer: str, count: int) -> tuple[str, ...]:
-    """Channels of a layer: `R, G, B` of the beauty image stand alone, `N.X …` is the normal, `depth.Z` the depth, and
-    any other layer has `name.R …` (3), `name.R … name.A` (4) or `name.Y` (1)."""
-    names = _CHANNELS.get(layer) or tuple(f"{layer}.{c}" for c in _COMPONENTS.get(count, ""))
-    if len(names) != count:
-        raise ValueError(f"layer {layer} can't have {count} channels")
-    return names
+    """Channels of a layer: the normal has `N.X …`, the depth `depth.Z`, any other layer `name.R …` (3), also with
+    `name.A` (4), or `name.Y` (1), and those of `BEAUTY` stand without a layer name."""
+    components = _OWN_COMPONENTS.get(layer) or _COMPONENTS.get(count, "")
+    if len(components) != count:
+        raise ValueError(f"layer '{layer}' can't have {count} channels")
+    return tuple(f"{layer}.{c}" if layer else c for c in components)
 
 
 def write_exr(
@@ -128,7 +130,7 @@ def read_exr(path: str | Path) -> tuple[Layers, dict[str, Value]]:
 def read_reference(path: str | Path) -> NDArray[np.float32]:
     """The beauty image (h, w, 3) of an EXR file; grey is repeated. Raises SceneError."""
     layers, _ = read_exr(path)
-    image = layers.get("beauty")
+    image = layers.get(BEAUTY)
     if image is None or image.shape[2] == 2:
         raise SceneError(f"The file has no channels R, G, B, only {', '.join(layers)}.", path)
     return np.ascontiguousarray(np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[..., :3])
@@ -149,12 +151,11 @@ def _layers(pixels: Mapping[str, NDArray[Any]]) -> Layers:
         if not prefix and component not in (("R", "G", "B", "A") if "R" in pixels else ("Y",)):
             prefix = component
         groups.setdefault(prefix, {})[component] = name
-    public = {"": "beauty", "N": "normal"}
     layers = {}
     for prefix, components in groups.items():
         # Alphabetical order suits X, Y, Z; colours have their own.
         order = "RGBA" if "R" in components else ""
         chosen = sorted(components, key=lambda c: (order.find(c) if c in order else len(order), c))
         stack = np.stack([pixels[components[c]] for c in chosen], axis=-1)
-        layers[public.get(prefix, prefix)] = np.ascontiguousarray(stack, np.float32)
+        layers[prefix] = np.ascontiguousarray(stack, np.float32)
     return layers

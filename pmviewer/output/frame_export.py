@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from pmviewer import __version__
 from pmviewer.errors import OutputError
-from pmviewer.output.exr import PREFIX, Value, write_exr
+from pmviewer.output.exr import BEAUTY, PREFIX, Value, write_exr
 from pmviewer.output.png import write_png
 from pmviewer.output.tone import display_image
 from pmviewer.settings import Display, Settings, flat
 
 LAYERS = ("beauty", "emission", "direct", "specular", "caustic", "indirect", "albedo", "normal", "depth")
 """The beauty image, its terms in the order in which their sum gives it bit for bit, and the first hit's properties."""
+_EXR_NAMES = {"beauty": BEAUTY, "normal": "N"}
 RADIANCE_UNIT = "W/(m^2 sr)"
 
 
@@ -70,8 +71,8 @@ class Exportable(Protocol):
 
 
 def frame_layers(frame: Exportable) -> dict[str, NDArray[np.float32]]:
-    """Every layer of `LAYERS`, (h, w, 3) float32, depth (h, w, 1)."""
-    return {name: frame.image(name) for name in LAYERS}
+    """Every one of `LAYERS` by its name in an EXR file, (h, w, 3) float32, depth (h, w, 1)."""
+    return {_EXR_NAMES.get(name, name): frame.image(name) for name in LAYERS}
 
 
 def frame_metadata(frame: Exportable) -> dict[str, Value]:
