@@ -22,10 +22,12 @@ app = typer.Typer(
 )
 
 SceneArgument = Annotated[
-    str, typer.Argument(help="A bundled scene's name, a scene file (.xml .glb .gltf .obj .ply .stl) or a session (.toml).")
+    str,
+    typer.Argument(help="A bundled scene's name, a scene file (.xml .glb .gltf .obj .ply .stl) or a session (.toml)."),
 ]
 SetOption = Annotated[
-    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Change a setting, for example photons.N=200000.")
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Change a setting, for example photons.N=200000."),
 ]
 ThreadsOption = Annotated[int | None, typer.Option(min=1, max=1024, help="Threads; all processors if not given.")]
 ParameterOption = Annotated[

@@ -121,7 +121,10 @@ def _run(renderer: Renderer, pool: WorkPool) -> None:
     with Progress(*columns, console=console, transient=not console.is_terminal) as progress:
         bar = progress.add_task("preparing", total=1.0)
         prepare(
-            renderer.scene, renderer.settings, pool, lambda text, share: progress.update(bar, description=text, completed=share)
+            renderer.scene,
+            renderer.settings,
+            pool,
+            lambda text, share: progress.update(bar, description=text, completed=share),
         )
         progress.reset(bar, total=1.0, description="rendering")
         while not renderer.finished:

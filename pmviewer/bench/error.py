@@ -136,7 +136,9 @@ def plot(curves: list[Curve], path: Path) -> str:
     for axis, scene in zip(axes.flat, SCENES, strict=True):
         for curve in curves:
             if curve.scene == scene:
-                axis.loglog(curve.cpu, curve.error, marker="o", markersize=3, label=f"{curve.method} ({curve.slope:.2f})")
+                axis.loglog(
+                    curve.cpu, curve.error, marker="o", markersize=3, label=f"{curve.method} ({curve.slope:.2f})"
+                )
         for target, of_scene, error, bound in TARGETS:
             if of_scene == scene:
                 axis.plot(bound, error, "x", color="black")

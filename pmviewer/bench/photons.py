@@ -47,4 +47,6 @@ def run(quick: bool = False) -> BenchResult:
             targets.append(Target("P13", tree.bytes / tree.n, 31, "bytes/photon", False, "kd-tree"))
     pool.close()
     columns = ["scene", "M trajectories/s", "M stored/s", "M rays/s", "stored per trajectory", "wall s"]
-    return BenchResult("Photon tracing, one core, q = 1", columns, rows, targets, [f"numpy {np.__version__}, {N} a pass"])
+    return BenchResult(
+        "Photon tracing, one core, q = 1", columns, rows, targets, [f"numpy {np.__version__}, {N} a pass"]
+    )

@@ -33,15 +33,22 @@ def _direction_numbers() -> np.ndarray:
     return numbers.astype(np.uint32)
 
 
+def _reverse(bits: np.ndarray) -> np.ndarray:
+    """Bit-reversed uint32 array."""
+    return np.packbits(np.unpackbits(bits.astype(">u4").view(np.uint8).reshape(-1, 4), axis=1)[:, ::-1], axis=1).view(
+        ">u4"
+    )
+
+
 def _byte_tables(numbers: np.ndarray) -> np.ndarray:
-    """(4 dimensions · 4 bytes · 256,) uint32: the point of an index is the xor of four look-ups."""
+    """(4 dimensions · 4 bytes · 256,) uint32: the bit-reversed point of an index is the xor of four look-ups."""
     tables = np.zeros((4, 4, 256), np.uint32)
     for byte in range(4):
         for value in range(256):
             for bit in range(8):
                 if value >> bit & 1:
                     tables[:, byte, value] ^= numbers[:, 8 * byte + bit]
-    return tables.reshape(-1)
+    return _reverse(tables.reshape(-1)).astype(np.uint32).reshape(-1)
 
 
 SOBOL_TABLE = _byte_tables(_direction_numbers())
@@ -69,6 +76,7 @@ def unit_float(bits):
 
 @device
 def reverse_bits(x):
+    """A uint32 with its bits in the opposite order."""
     x = _u4(_u4(x >> _u4(16)) | _u4(x << _u4(16)))
     x = _u4(_u4(_u4(x & _u4(0x00FF00FF)) << _u4(8)) | _u4(_u4(x & _u4(0xFF00FF00)) >> _u4(8)))
     x = _u4(_u4(_u4(x & _u4(0x0F0F0F0F)) << _u4(4)) | _u4(_u4(x & _u4(0xF0F0F0F0)) >> _u4(4)))
@@ -78,7 +86,7 @@ def reverse_bits(x):
 
 @device
 def owen_reversed(x, seed):
-    """Owen scramble of bit-reversed x (Laine and Karras 2011, constants by Vegdahl)."""
+    """Owen scramble of bit-reversed x (Laine and Karras 2011, constants by Vegdahl); the result is bit-reversed too."""
     x = _u4(x + _u4(seed))
     x = _u4(x ^ _u4(x * _u4(0x6C50B47C)))
     x = _u4(x ^ _u4(x * _u4(0xB82F1E52)))
@@ -88,12 +96,13 @@ def owen_reversed(x, seed):
 
 @device
 def owen(x, seed):
+    """Nested uniform (Owen) scramble of a uint32."""
     return reverse_bits(owen_reversed(reverse_bits(_u4(x)), _u4(seed)))
 
 
 @device
-def sobol(index, dimension):
-    """uint32 coordinate of the Sobol point with that index."""
+def sobol_reversed(index, dimension):
+    """Bit-reversed uint32 coordinate 1–3 of the Sobol point with that index (coordinate 0 is the index itself)."""
     base = np.int64(dimension) * np.int64(1024)
     i = _u4(index)
     return _u4(
@@ -102,6 +111,11 @@ def sobol(index, dimension):
         ^ SOBOL_TABLE[base + np.int64(512) + np.int64((i >> _u4(16)) & _u4(255))]
         ^ SOBOL_TABLE[base + np.int64(768) + np.int64(i >> _u4(24))]
     )
+
+
+@device
+def _scrambled(reversed_bits, seed):
+    return unit_float(reverse_bits(owen_reversed(reversed_bits, seed)))
 
 
 @device
@@ -114,10 +128,10 @@ def draw4(sequence, seed, index, dimension_set):
     if sequence == SOBOL:
         i = owen(_u4(index), key)
         return (
-            unit_float(owen(sobol(i, 0), hash3(key, _u4(1), _u4(0)))),
-            unit_float(owen(sobol(i, 1), hash3(key, _u4(2), _u4(0)))),
-            unit_float(owen(sobol(i, 2), hash3(key, _u4(3), _u4(0)))),
-            unit_float(owen(sobol(i, 3), hash3(key, _u4(4), _u4(0)))),
+            _scrambled(i, _u4(key ^ _u4(0xA511E9B3))),
+            _scrambled(sobol_reversed(i, 1), _u4(_u4(key * _u4(0x9E3779B1)) ^ _u4(0x63D83595))),
+            _scrambled(sobol_reversed(i, 2), _u4(_u4(key * _u4(0x85EBCA77)) ^ _u4(0xC2B2AE3D))),
+            _scrambled(sobol_reversed(i, 3), _u4(_u4(key * _u4(0x27D4EB2F)) ^ _u4(0x165667B1))),
         )
     return (
         unit_float(hash3(key, _u4(index), _u4(0))),
@@ -132,5 +146,5 @@ def draw1(sequence, seed, index, dimension_set):
     """One number in [0, 1) for that (seed, index) and set: cheaper than `draw4` where one is enough."""
     key = hash3(seed, _u4(dimension_set), _u4(0x51ED270B))
     if sequence == SOBOL:
-        return unit_float(owen(reverse_bits(owen(_u4(index), key)), hash3(key, _u4(1), _u4(0))))
+        return _scrambled(owen(_u4(index), key), _u4(key ^ _u4(0xA511E9B3)))
     return unit_float(hash3(key, _u4(index), _u4(0)))
