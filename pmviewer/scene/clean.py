@@ -111,8 +111,8 @@ def clean_mesh(mesh: Mesh, dropped: Counter[str]) -> Mesh | None:
     those of the neighbouring faces.
     """
     with np.errstate(invalid="ignore"):
-        usable = (np.abs(mesh.vertices) <= LARGEST_COORDINATE).all(axis=1)
-    whole = usable[mesh.faces].all(axis=1)
+        usable = np.all(np.abs(mesh.vertices) <= LARGEST_COORDINATE, axis=1)
+    whole = np.all(usable[mesh.faces], axis=1)
     dropped["triangle with a NaN, infinite or huge vertex"] += int((~whole).sum())
     faces = mesh.faces[whole]
     vertices = np.where(usable[:, None], mesh.vertices, 0.0)
@@ -145,7 +145,7 @@ def _mended(mesh: Mesh) -> NDArray[np.float64]:
 
     assert mesh.normals is not None
     normals = unit(np.where(np.isfinite(mesh.normals), mesh.normals, 0.0))
-    broken = ~np.isfinite(mesh.normals).all(axis=1) | ~normals.any(axis=1)
+    broken = np.logical_not(np.all(np.isfinite(mesh.normals), axis=1) & np.any(normals, axis=1))
     if broken.any():
         smooth = with_smooth_normals(Mesh(mesh.vertices, mesh.faces)).normals
         assert smooth is not None
@@ -193,11 +193,12 @@ def on_a_surface(origin: tuple[float, float, float], shapes: tuple[Shape, ...], 
 def _touches(corners: NDArray[np.float64], eye: NDArray[np.float64], near: float) -> bool:
     """Is the point within `near` of one of the triangles (in their plane and between their edges)?"""
     a, b, c = corners[:, 0] - eye, corners[:, 1] - eye, corners[:, 2] - eye
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    inside = np.abs((normal * a).sum(axis=1)) <= near
-    for p, q in ((a, b), (b, c), (c, a)):
-        inward = np.cross(normal, q - p)
-        inward /= np.linalg.norm(inward, axis=1, keepdims=True)
-        inside &= (inward * -p).sum(axis=1) >= -near
+    with np.errstate(invalid="ignore"):  # a sliver may have no normal: the comparisons are then false
+        normal = np.cross(b - a, c - a)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        inside = np.abs((normal * a).sum(axis=1)) <= near
+        for p, q in ((a, b), (b, c), (c, a)):
+            inward = np.cross(normal, q - p)
+            inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+            inside &= (inward * -p).sum(axis=1) >= -near
     return bool(inside.any())

@@ -31,6 +31,12 @@ class Diagnostics:
         if line is not None and line not in lines:
             lines.append(line)
 
+    def left_out(self) -> str:
+        """What was ignored or dropped, as a hint for an error about what is missing; empty if nothing was."""
+        counts = ", ".join(f"{count} × {reason}" for reason, count in self.dropped.items())
+        sentences = [*self.warnings(), *([f"{counts}."] if counts else [])]
+        return f"Left out: {' '.join(sentences)}" if sentences else ""
+
     def warnings(self) -> tuple[str, ...]:
         """One sentence a kind, in the order of their first appearance."""
         return tuple(_located(sentence, self._lines[key]) for key, sentence in self._sentences.items())

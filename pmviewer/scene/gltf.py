@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 
@@ -42,6 +43,11 @@ def read_gltf(path: Path, diagnostics: Diagnostics) -> MeshFile:
     for index, accessor in enumerate(header.get("accessors", [])):
         if not 0 <= int(accessor["count"]) <= _MOST_ITEMS:
             raise diagnostics.error(f"Accessor {index} claims {accessor['count']} items.", hint="The file is damaged.")
+    for buffer in header.get("buffers", []):
+        uri = str(buffer.get("uri", "data:"))
+        if not uri.startswith("data:") and not (path.parent / unquote(uri)).is_file():
+            hint = "Copy it beside the .gltf file, or export a .glb, which holds everything."
+            raise diagnostics.error(f"The file's buffer {uri[:200]!r} does not exist.", hint=hint)
     for kind in ("skins", "animations"):
         if header.get(kind):
             diagnostics.warn(f"The file's {kind} are ignored.")

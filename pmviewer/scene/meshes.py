@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import Literal, TypeVar
 
@@ -26,7 +27,7 @@ from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.framing import bounds, framed
 from pmviewer.scene.gltf import read_gltf
 from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
-from pmviewer.scene.obj import joined, obj_parts, read_obj
+from pmviewer.scene.obj import as_utf8, joined, obj_parts, read_obj
 from pmviewer.scene.ply import read_ply
 
 T = TypeVar("T")
@@ -46,7 +47,9 @@ def load_mesh_scene(path: Path) -> Scene:
             check_faces(shape.geometry, path)
     shapes = clean_shapes(content.shapes, diagnostics)
     if not shapes:
-        raise SceneError("The file has no triangle that can be shown.", path, hint=_dropped(diagnostics))
+        raise SceneError(
+            "The file has no triangle that can be shown.", path, hint=diagnostics.left_out() or "Is it empty?"
+        )
     lights = clean_lights(content.lights, diagnostics)
     materials = list(content.materials)
     up: Literal["y", "z"] = "z" if ending == ".stl" else "y"
@@ -115,18 +118,17 @@ def _stl_meshes(path: Path) -> list[Mesh]:
     """All solids of an STL file, flat-shaded as the format is."""
     from trimesh.exchange.stl import load_stl
 
-    with path.open("rb") as file:
-        loaded = load_stl(file)
+    data = path.read_bytes()
+    is_binary = len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
+    if not is_binary and not data.lstrip()[:5].lower() == b"solid":
+        hint = "Is the file complete? Export it again."
+        raise SceneError("This is neither a binary nor a text STL file.", path, hint=hint)
+    loaded = load_stl(BytesIO(data if is_binary else as_utf8(data)))
     solids = loaded["geometry"].values() if "geometry" in loaded else [loaded]
     return [
         Mesh(np.asarray(s["vertices"], np.float64), np.asarray(s["faces"]).reshape(-1, 3).astype(np.int32))
         for s in solids
     ]
-
-
-def _dropped(diagnostics: Diagnostics) -> str:
-    counts = ", ".join(f"{n} × {reason}" for reason, n in diagnostics.dropped.items())
-    return f"Left out: {counts}." if counts else "Is it empty, or a point cloud?"
 
 
 def _aimed(camera: Camera, shapes: tuple[Shape, ...]) -> Camera:

@@ -20,7 +20,8 @@ from pmviewer.scene.mitsuba_document import SILENT_TAGS, Document, Properties
 from pmviewer.scene.mitsuba_shape import SUPPORTED, geometry
 from pmviewer.scene.mitsuba_xml import Element, read_xml, substitute
 
-_KNOWN_TAGS = frozenset(("shape", "bsdf", "emitter", "sensor", "ref", "alias"))
+# Definitions that other objects refer to change nothing where they stand.
+_SILENT = SILENT_TAGS | {"bsdf", "texture", "spectrum", "alias"}
 _PERSPECTIVE = ("perspective", "thinlens")
 
 
@@ -38,10 +39,10 @@ def load_mitsuba(path: Path, parameters: Mapping[str, str]) -> Scene:
     shapes = clean_shapes(scene.shapes, diagnostics)
     lights = clean_lights(scene.lights, diagnostics)
     if not shapes:
-        raise diagnostics.error("The scene has no surface.", hint=f"Add a <shape> of type {', '.join(SUPPORTED)}.")
+        hint = diagnostics.left_out() or f"Add a <shape> of type {', '.join(SUPPORTED)}."
+        raise diagnostics.error("The scene has no surface.", hint=hint)
     if not lights and not any(s.radiance for s in shapes):
-        ignored = "; ".join(w for w in diagnostics.warnings() if "<emitter" in w)
-        hint = f"Ignored: {ignored}" if ignored else 'Add an <emitter> of type "area", "point" or "constant".'
+        hint = diagnostics.left_out() or 'Add an <emitter> of type "area", "point" or "constant".'
         raise diagnostics.error("The scene has no light.", hint=hint)
     low, high = bounds(shapes)
     seen = scene.view((low + high) / 2, shapes)
@@ -83,7 +84,7 @@ class _Reader:
                 raise document.error(
                     "<include> is refused.", element, "Copy the included file's contents in its place."
                 )
-            elif element.tag not in _KNOWN_TAGS and element.tag not in SILENT_TAGS and "id" not in element.attributes:
+            elif element.tag not in _SILENT:
                 document.ignore(element)
 
     def _shape(self, element: Element) -> None:

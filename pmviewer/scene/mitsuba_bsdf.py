@@ -7,7 +7,6 @@ from pmviewer.scene.mitsuba_document import Document, Properties
 from pmviewer.scene.mitsuba_xml import Element
 from pmviewer.scene.optics import IOR, METALS, normal_reflectance
 
-_MOST_NESTED = 32
 _WRAPPERS = frozenset(("mask", "bumpmap", "normalmap"))
 
 
@@ -38,10 +37,7 @@ class Materials:
         return self._index[key]
 
     def _build(self, element: Element, name: str, depth: int) -> Material:
-        if depth > _MOST_NESTED:
-            what = f"{element} contains itself, or BSDFs are nested deeper than {_MOST_NESTED}."
-            raise self.document.error(what, element, "Remove the circular <ref>.")
-        p = Properties(element, self.document)
+        p = Properties(element, self.document, depth)
         if p.type in ("twosided", *_WRAPPERS):
             return self._wrapped(p, name, depth)
         if p.type == "diffuse":

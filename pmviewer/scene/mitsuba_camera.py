@@ -92,7 +92,7 @@ def view(element: Element, document: Document, center: np.ndarray) -> View:
 def _lookat_target(p: Properties) -> Vec3 | None:
     """The point that the file says it looks at, when nothing else moves the camera."""
     transform = p.values.get("to_world")
-    if transform is None or [c.tag for c in transform.children] != ["lookat"]:
+    if transform is None or [c.tag.lower() for c in transform.children] != ["lookat"]:
         return None
     x, y, z = parse_numbers(transform.children[0].attributes["target"], (3,))
     return (x, y, z)

@@ -15,6 +15,7 @@ from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.mitsuba_spectrum import spectrum_object
 from pmviewer.scene.mitsuba_transform import Matrix, operation
 from pmviewer.scene.mitsuba_values import (
+    LARGEST,
     is_sampled,
     parse_boolean,
     parse_float,
@@ -27,6 +28,7 @@ from pmviewer.scene.mitsuba_values import (
 from pmviewer.scene.mitsuba_xml import Element
 
 T = TypeVar("T")
+MOST_NESTED = 32
 VALUE_TAGS = frozenset(
     ("boolean", "integer", "float", "string", "point", "vector", "rgb", "srgb", "spectrum", "transform")
 )
@@ -107,9 +109,13 @@ class Document:
 class Properties:
     """Typed access to the values inside one object element. What nobody asks for ends up in a warning."""
 
-    def __init__(self, element: Element, document: Document) -> None:
+    def __init__(self, element: Element, document: Document, depth: int = 0) -> None:
+        if depth > MOST_NESTED:
+            what = f"{element} contains itself, or objects are nested deeper than {MOST_NESTED}."
+            raise document.error(what, element, "Remove the circular <ref>.")
         self.element = element
         self.document = document
+        self._depth = depth
         self.type = element.attributes.get("type", "")
         self.values: dict[str, Element] = {}
         self._objects: list[tuple[Element, Element]] = []
@@ -204,7 +210,8 @@ class Properties:
             return (default, default, default)
         text = element.attributes.get("value")
         if element.tag == "texture" or "type" in element.attributes:
-            return spectrum_object(Properties(element, self.document), (default, default, default))
+            nested = Properties(element, self.document, self._depth + 1)
+            return spectrum_object(nested, (default, default, default))
         if element.tag == "rgb":
             return self._parsed(element, name, parse_rgb, text)
         if element.tag == "srgb":
@@ -248,11 +255,13 @@ class Properties:
             raise self.document.error(f"'{name}' of {self.element} must be a <transform>, not {element}.", element)
         for child in element.children:
             try:
-                matrix = operation(child) @ matrix
+                with np.errstate(over="ignore", invalid="ignore"):
+                    matrix = operation(child) @ matrix
             except ValueError as error:
                 raise self.document.error(f"<{child.tag}> of {self.element}: {error}.", child) from None
-        if not np.isfinite(matrix).all():
-            raise self.document.error(f"'{name}' of {self.element} is not finite.", element, "Use smaller numbers.")
+            if not np.abs(matrix).max() <= LARGEST:
+                what = f"'{name}' of {self.element} grows beyond {LARGEST:g}."
+                raise self.document.error(what, child, "Use smaller numbers.")
         return matrix
 
 

@@ -69,14 +69,14 @@ def _components(attributes: dict[str, str], default: float) -> tuple[float, floa
 
 def operation(element: Element) -> Matrix:
     """The matrix of <translate>, <rotate>, <scale>, <matrix> or <lookat>. ValueError says what was expected."""
-    attributes = element.attributes
-    if element.tag == "translate":
+    attributes, tag = element.attributes, element.tag.lower()
+    if tag == "translate":
         return translation(*_components(attributes, 0.0))
-    if element.tag == "scale":
+    if tag == "scale":
         return scaling(*_components(attributes, 1.0))
-    if element.tag == "rotate":
+    if tag == "rotate":
         return rotation(_components(attributes, 0.0), parse_float(_required(attributes, "angle")))
-    if element.tag == "matrix":
+    if tag == "matrix":
         numbers = parse_numbers(_required(attributes, "value"), (9, 16))
         if len(numbers) == 16:
             if numbers[12:] != [0.0, 0.0, 0.0, 1.0]:
@@ -85,7 +85,7 @@ def operation(element: Element) -> Matrix:
         m = np.eye(4)
         m[:3, :3] = np.reshape(numbers, (3, 3))
         return m
-    if element.tag == "lookat":
+    if tag == "lookat":
         up = parse_numbers(attributes["up"], (3,)) if "up" in attributes else [0.0, 0.0, 0.0]
         origin = parse_numbers(_required(attributes, "origin"), (3,))
         return look_at(tuple(origin), tuple(parse_numbers(_required(attributes, "target"), (3,))), tuple(up))

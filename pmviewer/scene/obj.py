@@ -22,7 +22,8 @@ def obj_parts(path: Path, skip_materials: bool) -> list[tuple[str, Mesh, str | N
     from trimesh.exchange.obj import load_obj
     from trimesh.resolvers import FilePathResolver
 
-    loaded = load_obj(BytesIO(path.read_bytes()), resolver=FilePathResolver(str(path)), skip_materials=skip_materials)
+    resolver = FilePathResolver(str(path))
+    loaded = load_obj(BytesIO(as_utf8(path.read_bytes())), resolver=resolver, skip_materials=skip_materials)
     parts = []
     for name, kwargs in loaded.get("geometry", {}).items():
         vertices = np.asarray(kwargs["vertices"], np.float64)
@@ -32,6 +33,15 @@ def obj_parts(path: Path, skip_materials: bool) -> list[tuple[str, Mesh, str | N
         visual = kwargs.get("visual")
         parts.append((str(name), mesh, str(visual.material.name) if visual is not None else None))
     return parts
+
+
+def as_utf8(data: bytes) -> bytes:
+    """Text of an older encoding as UTF-8, which is all that trimesh reads without a further package."""
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1").encode("utf-8")
+    return data
 
 
 def joined(meshes: list[Mesh]) -> Mesh:
@@ -70,7 +80,7 @@ def _libraries(path: Path, diagnostics: Diagnostics) -> dict[str, dict[str, Any]
         if not library.is_file():
             diagnostics.warn(f"The material file {match[1]!r} does not exist: grey replaces its materials.", line)
             continue
-        materials |= parse_mtl(library.read_bytes(), resolver=FilePathResolver(str(library)))
+        materials |= parse_mtl(as_utf8(library.read_bytes()), resolver=FilePathResolver(str(library)))
     return materials
 
 

@@ -57,11 +57,12 @@ def disk(columns: int = 128) -> Mesh:
 
 def transformed(mesh: Mesh, m: Matrix, flip: bool = False) -> Mesh:
     """The mesh in world space. What was outside stays outside under a mirroring transformation, unless `flip`."""
-    vertices = mesh.vertices @ m[:3, :3].T + m[:3, 3]
     mirrored = mirrors(m)
     normals = mesh.normals
-    if normals is not None:
-        normals = unit(normals @ cofactor(m).T) * (-1.0 if mirrored != flip else 1.0)
+    with np.errstate(invalid="ignore", over="ignore"):  # broken vertices are `clean`'s business
+        vertices = mesh.vertices @ m[:3, :3].T + m[:3, 3]
+        if normals is not None:
+            normals = unit(normals @ cofactor(m).T) * (-1.0 if mirrored != flip else 1.0)
     faces = mesh.faces[:, ::-1] if mirrored != flip else mesh.faces
     return Mesh(vertices, np.ascontiguousarray(faces), normals)
 
