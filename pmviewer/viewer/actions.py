@@ -1,0 +1,138 @@
+"""What menus, toolbar and keys can trigger, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from imgui_bundle import hello_imgui
+
+from pmviewer.settings import SETTINGS, get
+from pmviewer.viewer import controls
+from pmviewer.viewer.dialogs import FileDialogs
+from pmviewer.viewer.exports import Exports, default_path, fresh_path
+from pmviewer.viewer.layout import VIEWPORT
+from pmviewer.viewer.state import ViewerState
+from pmviewer.viewer.viewport import Fit, Viewport
+
+SCENE_PATTERNS = ["*.xml", "*.toml", "*.glb", "*.gltf", "*.obj", "*.ply", "*.stl"]
+EXPOSURE_STEP = 0.5
+
+
+class Commands:
+    """`table` maps each action's name to what it does."""
+
+    def __init__(self, state: ViewerState, viewport: Viewport, dialogs: FileDialogs) -> None:
+        self.state = state
+        self.viewport = viewport
+        self.dialogs = dialogs
+        self.exports = Exports(state, viewport)
+        self.window_shot: Path | None = None
+        """Where the next frame of the whole window goes."""
+        self._hidden: list[str] = []
+        self.table: dict[str, Callable[[], None]] = {
+            "open": self._open,
+            "save_session": lambda: self._save(".toml", self.exports.session),
+            "export_exr": lambda: self._save(".exr", self.exports.exr),
+            "export_exr_half": lambda: self._save(".exr", lambda path: self.exports.exr(path, half=True)),
+            "export_png": lambda: self._save(".png", lambda path: self.exports.png(path, overlays=False)),
+            "export_png_overlays": lambda: self._save(".png", lambda path: self.exports.png(path, overlays=True)),
+            "screenshot": self._screenshot,
+            "screenshot_picture": lambda: self.exports.png(self._fresh(".png"), overlays=True),
+            "quit": self._quit,
+            "toggle_pause": self._toggle_pause,
+            "restart": self.state.session.restart,
+            "exposure_up": lambda: self._expose(EXPOSURE_STEP),
+            "exposure_down": lambda: self._expose(-EXPOSURE_STEP),
+            "next_tone": self._next_tone,
+            "toggle_caustic": lambda: self._toggle("overlays.caustic.show"),
+            "toggle_global": lambda: self._toggle("overlays.global.show"),
+            "fit_picture": self._fit,
+            "toggle_fly": self._toggle_fly,
+            "frame_all": self._frame_all,
+            "reset_camera": lambda: state.change(
+                {f"camera.{name}": "auto" for name in ("origin", "target", "up", "fov")}
+            ),
+            "toggle_panels": self._toggle_panels,
+            "toggle_help": self._toggle_help,
+            "escape": self._escape,
+        }
+
+    def choose_view(self, number: int) -> None:
+        """The view of that number in the schema's order."""
+        choices = SETTINGS["display.view"].choices
+        if number < len(choices):
+            self.state.change({"display.view": choices[number]})
+
+    # files ------------------------------------------------------------------------------------------------------
+
+    def _open(self) -> None:
+        self.dialogs.open("Open a scene or session", "Scenes and sessions", SCENE_PATTERNS, self.state.open)
+
+    def _save(self, suffix: str, write: Callable[[Path], None]) -> None:
+        view = "" if suffix == ".toml" else self.state.settings.display.view if suffix == ".png" else "layers"
+        self.dialogs.save("Save as", default_path(self.state, suffix, view), write)
+
+    def _fresh(self, suffix: str) -> Path:
+        return fresh_path(default_path(self.state, suffix, self.state.settings.display.view))
+
+    def _screenshot(self) -> None:
+        self.window_shot = fresh_path(default_path(self.state, ".png", "window"))
+
+    def _quit(self) -> None:
+        hello_imgui.get_runner_params().app_shall_exit = True
+
+    # rendering and display --------------------------------------------------------------------------------------
+
+    def _toggle_pause(self) -> None:
+        session = self.state.session
+        if session.paused:
+            session.resume()
+        else:
+            session.pause()
+
+    def _toggle(self, path: str) -> None:
+        self.state.change({path: not get(self.state.settings, path)})
+
+    def _expose(self, step: float) -> None:
+        info = SETTINGS["display.exposure"]
+        value = self.state.settings.display.exposure + step
+        self.state.change({info.path: min(max(value, info.lower or 0.0), info.upper or 0.0)})
+
+    def _next_tone(self) -> None:
+        choices = SETTINGS["display.tone"].choices
+        now = choices.index(self.state.settings.display.tone)
+        self.state.change({"display.tone": choices[(now + 1) % len(choices)]})
+
+    # camera -----------------------------------------------------------------------------------------------------
+
+    def _frame_all(self) -> None:
+        pose, geometry = self.state.live_camera(), self.state.session.geometry
+        if pose is not None and geometry is not None:
+            self.state.move_camera(controls.frame_all(pose, geometry.center, float(geometry.radius)))
+
+    def _toggle_fly(self) -> None:
+        self.state.flying = not self.state.flying
+
+    def _fit(self) -> None:
+        self.viewport.fit = Fit()
+
+    # window -----------------------------------------------------------------------------------------------------
+
+    def _toggle_panels(self) -> None:
+        """Hide every panel but the picture, or bring back those that were there."""
+        windows = hello_imgui.get_runner_params().docking_params.dockable_windows
+        if self.state.panels_hidden:
+            for window in windows:
+                window.is_visible = window.is_visible or window.label in self._hidden
+        else:
+            self._hidden = [w.label for w in windows if w.is_visible and w.label != VIEWPORT]
+            for window in windows:
+                window.is_visible = window.label == VIEWPORT
+        self.state.panels_hidden = not self.state.panels_hidden
+
+    def _toggle_help(self) -> None:
+        self.state.help_open = not self.state.help_open
+
+    def _escape(self) -> None:
+        self.state.flying = self.state.help_open = False

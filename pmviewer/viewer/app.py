@@ -1,0 +1,183 @@
+"""The window: puts the parts together and runs them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+# imgui_bundle comes first: it makes glfw use the library that it brings along.
+from imgui_bundle import hello_imgui, immapp  # isort: skip
+import glfw
+import moderngl
+import numpy as np
+from imgui_bundle.glfw_utils import glfw_window_hello_imgui
+
+from pmviewer.errors import PmviewerError
+from pmviewer.settings import Settings
+from pmviewer.viewer import layout
+from pmviewer.viewer.actions import Commands
+from pmviewer.viewer.dialogs import FileDialogs
+from pmviewer.viewer.help_overlay import draw_help
+from pmviewer.viewer.log_panel import LogPanel, draw_toasts
+from pmviewer.viewer.menus import Menus
+from pmviewer.viewer.overlay_panel import OverlayPanel
+from pmviewer.viewer.picture import Picture
+from pmviewer.viewer.recent import RecentFiles
+from pmviewer.viewer.session_link import SessionLike
+from pmviewer.viewer.settings_panel import SettingsPanel
+from pmviewer.viewer.shortcuts import run_shortcuts
+from pmviewer.viewer.state import InactiveReason, ViewerState
+from pmviewer.viewer.statistics_panel import StatisticsPanel
+from pmviewer.viewer.status_bar import draw_status_bar
+from pmviewer.viewer.toolbar import Toolbar
+from pmviewer.viewer.viewport import Viewport
+
+
+def _always_active(path: str, settings: Settings, traits: Any) -> str | None:
+    return None
+
+
+class ViewerApp:
+    """A window on a session.
+
+    Parameters
+    ----------
+    session: anything with the interface of `pmviewer.engine.session.Session`. The window doesn't close it.
+    inactive_reason: why a setting has no effect now, or None.
+    recent: the list of recent files; the user's own by default.
+    remember: keep the window's layout between runs.
+    """
+
+    def __init__(
+        self,
+        session: SessionLike,
+        *,
+        inactive_reason: InactiveReason = _always_active,
+        recent: RecentFiles | None = None,
+        remember: bool = True,
+    ) -> None:
+        self.state = ViewerState(session, inactive_reason, recent or RecentFiles())
+        self.viewport = Viewport(self.state)
+        self.dialogs = FileDialogs()
+        self.commands = Commands(self.state, self.viewport, self.dialogs)
+        self.settings_panel = SettingsPanel(self.state)
+        self.context: moderngl.Context | None = None
+        self._title = ""
+        self._running = False
+        self.viewport.draw_toasts = lambda: draw_toasts(self.state, *self.viewport.origin, self.viewport.size[0])
+        self.params = layout.runner_params(self._callbacks(), remember=remember)
+        self.add_ons = immapp.AddOnsParams()
+
+    def _callbacks(self) -> layout.Callbacks:
+        actions = self.commands.table
+        panels = {
+            "Settings": self.settings_panel.gui,
+            "Overlays": OverlayPanel(self.viewport, self.settings_panel).gui,
+            "Statistics": StatisticsPanel(self.state).gui,
+            "Log": LogPanel(self.state).gui,
+        }
+        return layout.Callbacks(
+            panels=panels,
+            viewport=self.viewport.gui,
+            menus=Menus(self.state, actions, layout.PANELS).gui,
+            toolbar=Toolbar(self.state, actions).gui,
+            status=lambda: draw_status_bar(self.state),
+            over_everything=self._over_everything,
+            post_init=self._post_init,
+            add_platform_callbacks=self._add_platform_callbacks,
+            pre_new_frame=self._pre_new_frame,
+            before_swap=self._before_swap,
+            before_exit=self._before_exit,
+        )
+
+    def run(self) -> None:
+        """Open the window; returns when it was closed and every export is written."""
+        immapp.run(self.params, self.add_ons)
+
+    def drop(self, paths: list[str]) -> None:
+        """Files dropped onto the window: the first is opened."""
+        if len(paths) > 1:
+            self.state.say("warning", f"{len(paths)} files were dropped; only {paths[0]} is opened.")
+        if paths:
+            self.state.open(paths[0])
+
+    def wake(self) -> None:
+        """Draw soon. From any thread."""
+        if self._running:
+            hello_imgui.request_refresh()
+
+    # callbacks --------------------------------------------------------------------------------------------------
+
+    def _add_platform_callbacks(self) -> None:
+        def on_drop(window: Any, paths: list[str]) -> None:
+            try:
+                self.drop(paths)
+            except Exception as error:  # glfw would raise it much later, somewhere else
+                self.state.say("error", f"The dropped file could not be opened: {error}")
+
+        glfw.set_drop_callback(glfw_window_hello_imgui(), on_drop)
+
+    def _post_init(self) -> None:
+        self.context = moderngl.create_context()
+        self.viewport.picture = Picture(self.context)
+        self.state.say("info", f"OpenGL {self.context.info['GL_VERSION']} on {self.context.info['GL_RENDERER']}")
+        self._running = True
+        self.state.session.on_update = self.wake
+        self.state.jobs.on_done = self.wake
+
+    def _pre_new_frame(self) -> None:
+        assert self.context is not None
+        self.state.poll()
+        try:
+            self.viewport.render()
+        except PmviewerError as error:
+            self.state.say("error", str(error))
+        self.context.screen.use()  # or the interface would be drawn into the picture
+        self._show_title()
+        if self.state.flying or self.state.navigating:
+            self.wake()
+
+    def _show_title(self) -> None:
+        scene = self.state.session.scene
+        title = f"{scene.name} · pmviewer" if scene is not None else "pmviewer"
+        if title != self._title:
+            glfw.set_window_title(glfw_window_hello_imgui(), title)
+            self._title = title
+
+    def _over_everything(self) -> None:
+        run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying)
+        self.dialogs.poll()
+        draw_help(self.state)
+
+    def _before_swap(self) -> None:
+        path, self.commands.window_shot = self.commands.window_shot, None
+        if path is not None:
+            self.commands.exports.pixels(path, self._window_pixels())
+
+    def _window_pixels(self) -> np.ndarray:
+        """(height, width, 3) uint8 of the whole window."""
+        assert self.context is not None
+        width, height = glfw.get_framebuffer_size(glfw_window_hello_imgui())
+        copy = self.context.simple_framebuffer((width, height), 4)
+        screen = self.context.detect_framebuffer(0)
+        self.context.copy_framebuffer(copy, screen)
+        pixels = np.frombuffer(copy.read(components=3, alignment=1), np.uint8).reshape(height, width, 3)
+        copy.release()
+        screen.use()
+        return np.ascontiguousarray(pixels[::-1])
+
+    def _before_exit(self) -> None:
+        self._running = False
+        self.state.session.on_update = None
+        self.state.jobs.on_done = None
+        self.state.jobs.finish()
+
+
+def run_viewer(source: str | Path | None, settings: Settings | None, threads: int | None = None) -> int:
+    """Open the window on a scene or session file (None: the Cornell box with a mirror and a glass sphere).
+
+    Returns 0 when the window was closed. Raises WindowError when there is no display or no OpenGL.
+    """
+    from pmviewer.viewer.start import start_viewer
+
+    return start_viewer(ViewerApp, source, settings, threads)

@@ -1,0 +1,129 @@
+"""Moving the camera: pure functions from one pose to the next, in units of what is on the screen.
+
+Mouse distances come as fractions of the picture's height, so the feel doesn't depend on its size; speeds follow the
+distance to the target or the scene's size, so neither does it depend on the scene's.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.render.camera import CameraPose
+from pmviewer.scene.description import Vec3
+
+Vector = NDArray[np.float64]
+
+ORBIT_SPEED = math.pi
+"""Radians a drag over the picture's whole height turns."""
+LOOK_SPEED = math.pi / 2
+"""The same for turning about the eye."""
+POLE = math.radians(2)
+"""The orbit stops this short of looking along the up vector."""
+
+
+def _vec3(v: Vector) -> Vec3:
+    return float(v[0]), float(v[1]), float(v[2])
+
+
+def _unit(v: Vector) -> Vector:
+    return v / max(float(np.linalg.norm(v)), 1e-300)
+
+
+def _rotate(v: Vector, axis: Vector, angle: float) -> Vector:
+    """Rodrigues' rotation about a unit axis."""
+    c, s = math.cos(angle), math.sin(angle)
+    return v * c + np.cross(axis, v) * s + axis * float(axis @ v) * (1 - c)
+
+
+def _upright(pose: CameraPose) -> Vector:
+    """The unit up vector; the image's own when the pose's is along the view."""
+    up = _unit(np.asarray(pose.up, float))
+    _, top, forward = pose.axes()
+    return top if abs(float(up @ forward)) > math.cos(POLE / 2) else up
+
+
+def with_pivot(pose: CameraPose, center: Vector, radius: float) -> CameraPose:
+    """A camera straight from a file may have its target anywhere along the view ray (a matrix has none): put it at the
+    depth of the scene's centre, where a drag expects to hold the scene."""
+    _, _, forward = pose.axes()
+    origin = np.asarray(pose.origin, float)
+    depth = float((center - origin) @ forward)
+    if depth < 0.05 * radius:
+        depth = max(0.5 * radius, float(np.linalg.norm(np.subtract(pose.target, pose.origin))))
+    return replace(pose, target=_vec3(origin + forward * depth))
+
+
+def _turn(pose: CameraPose, offset: Vector, sideways: float, away_from_up: float) -> Vector:
+    """`offset` turned clockwise about the up axis, then away from it but never past the poles. Angles in radians."""
+    up = _upright(pose)
+    turned = _rotate(offset, up, sideways if pose.mirrored else -sideways)
+    axis = np.cross(up, turned)
+    polar = math.acos(float(np.clip(_unit(turned) @ up, -1, 1)))
+    wanted = min(max(polar + away_from_up, POLE), math.pi - POLE)
+    return _rotate(turned, _unit(axis), wanted - polar)
+
+
+def orbit(pose: CameraPose, dx: float, dy: float) -> CameraPose:
+    """Turn the eye around the target, as if dragging the scene."""
+    target = np.asarray(pose.target, float)
+    offset = _turn(pose, np.asarray(pose.origin, float) - target, dx * ORBIT_SPEED, -dy * ORBIT_SPEED)
+    return replace(pose, origin=_vec3(target + offset), up=_vec3(_upright(pose)))
+
+
+def look(pose: CameraPose, dx: float, dy: float) -> CameraPose:
+    """Turn the view about the eye."""
+    origin = np.asarray(pose.origin, float)
+    offset = _turn(pose, np.asarray(pose.target, float) - origin, dx * LOOK_SPEED, dy * LOOK_SPEED)
+    return replace(pose, target=_vec3(origin + offset), up=_vec3(_upright(pose)))
+
+
+def _height_at_target(pose: CameraPose) -> float:
+    """What the picture's height spans at the target's distance."""
+    distance = float(np.linalg.norm(np.subtract(pose.target, pose.origin)))
+    return 2 * distance * math.tan(math.radians(pose.fov) / 2) * pose.height / pose.width
+
+
+def pan(pose: CameraPose, dx: float, dy: float) -> CameraPose:
+    """Move eye and target so that the target's plane follows the mouse."""
+    right, top, _ = pose.axes()
+    shift = (-right * dx + top * dy) * _height_at_target(pose)
+    return replace(pose, origin=_vec3(pose.origin + shift), target=_vec3(pose.target + shift))
+
+
+def zoom(pose: CameraPose, steps: float, radius: float) -> CameraPose:
+    """Move the eye towards the target; one step (a notch of the wheel) is a tenth of the way. The target is pushed
+    ahead rather than reached, so zooming never gets stuck."""
+    origin, target = np.asarray(pose.origin, float), np.asarray(pose.target, float)
+    forward = _unit(target - origin)
+    distance = float(np.linalg.norm(target - origin))
+    wanted = distance * 0.9**steps
+    closest = 1e-3 * radius
+    moved = target - forward * max(wanted, closest)
+    if wanted < closest:
+        target = target + forward * 0.02 * radius * abs(steps)
+    return replace(pose, origin=_vec3(moved), target=_vec3(target))
+
+
+def fly(pose: CameraPose, right: float, up: float, forward: float, step: float) -> CameraPose:
+    """Move eye and target along the camera's axes; each argument is −1, 0 or 1, `step` a distance."""
+    x, y, z = pose.axes()
+    shift = (x * right + y * up + z * forward) * step
+    return replace(pose, origin=_vec3(pose.origin + shift), target=_vec3(pose.target + shift))
+
+
+def frame_all(pose: CameraPose, center: Vector, radius: float) -> CameraPose:
+    """Back off along the view direction until the bounding sphere fits."""
+    _, _, forward = pose.axes()
+    half_x = math.tan(math.radians(pose.fov) / 2)
+    half = math.atan(min(half_x, half_x * pose.height / pose.width))
+    distance = radius / max(math.sin(half), 1e-3) * 1.02
+    return replace(pose, origin=_vec3(center - forward * distance), target=_vec3(np.asarray(center, float)))
+
+
+def camera_values(pose: CameraPose) -> dict[str, Vec3]:
+    """The pose as settings."""
+    return {"camera.origin": pose.origin, "camera.target": pose.target, "camera.up": pose.up}

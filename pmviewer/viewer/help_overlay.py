@@ -1,0 +1,56 @@
+"""The overview of keys and mouse buttons, made from the table of bindings."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+from imgui_bundle import imgui
+
+from pmviewer.viewer import theme
+from pmviewer.viewer.shortcuts import BINDINGS
+from pmviewer.viewer.state import ViewerState
+
+
+def draw_help(state: ViewerState) -> None:
+    """A window in the middle of the screen, in two columns."""
+    if not state.help_open:
+        return
+    center = imgui.get_main_viewport().get_center()
+    imgui.set_next_window_pos(center, imgui.Cond_.appearing, (0.5, 0.5))
+    flags = imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
+    flags |= imgui.WindowFlags_.no_collapse
+    shown, still_open = imgui.begin("Keys and mouse", True, flags)
+    state.help_open = bool(still_open)
+    if shown:
+        groups = [(name, list(bindings)) for name, bindings in groupby(BINDINGS, key=lambda b: b.group)]
+        left = {"File", "Render", "Window"}
+        if imgui.begin_table("##help", 2, imgui.TableFlags_.sizing_fixed_fit):
+            imgui.table_next_column()
+            for name, bindings in groups:
+                if name in left:
+                    _group(name, bindings)
+            imgui.table_next_column()
+            for name, bindings in groups:
+                if name not in left:
+                    _group(name, bindings)
+            imgui.end_table()
+    imgui.end()
+
+
+def _group(name: str, bindings: list) -> None:
+    em = imgui.get_font_size()
+    imgui.text_colored(imgui.ImVec4(*theme.ACCENT), name)
+    if not imgui.begin_table(f"##{name}", 2, imgui.TableFlags_.sizing_fixed_fit):
+        return
+    imgui.table_setup_column("keys", imgui.TableColumnFlags_.width_fixed, 11 * em)
+    imgui.table_setup_column("what", imgui.TableColumnFlags_.width_fixed, 19 * em)
+    for binding in bindings:
+        imgui.table_next_row()
+        imgui.table_next_column()
+        imgui.text_unformatted(theme.drawable(binding.keys))
+        imgui.table_next_column()
+        imgui.push_text_wrap_pos(0)
+        imgui.text_colored(imgui.ImVec4(*theme.DIM), theme.drawable(binding.text))
+        imgui.pop_text_wrap_pos()
+    imgui.end_table()
+    imgui.spacing()

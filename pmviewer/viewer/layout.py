@@ -1,0 +1,108 @@
+"""The window's frame: docked panels, bars and pace, as hello_imgui wants them described."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from imgui_bundle import hello_imgui, imgui
+
+from pmviewer.viewer import theme
+
+Draw = Callable[[], None]
+VIEWPORT = "Viewport"
+PANELS = ("Settings", "Overlays", "Statistics", "Log")
+_PLACE = {"Settings": "Left", "Overlays": "Right", "Statistics": "Bottom", "Log": "Bottom"}
+WINDOW_SIZE = (1440, 900)
+FPS_MAX = 60
+FPS_IDLE = 3
+
+
+@dataclass(frozen=True)
+class Callbacks:
+    """What the window calls: `panels` by label, and the bars."""
+
+    panels: Mapping[str, Draw]
+    viewport: Draw
+    menus: Draw
+    toolbar: Draw
+    status: Draw
+    over_everything: Draw
+    post_init: Draw
+    add_platform_callbacks: Draw
+    pre_new_frame: Draw
+    before_swap: Draw
+    before_exit: Draw
+
+
+def runner_params(callbacks: Callbacks, *, remember: bool) -> hello_imgui.RunnerParams:
+    """`remember` keeps window and panel positions in the user's configuration folder."""
+    params = hello_imgui.RunnerParams()
+    window = params.app_window_params
+    window.window_title = "pmviewer"
+    window.window_geometry.size = WINDOW_SIZE
+    window.restore_previous_geometry = remember
+    params.ini_disable = not remember
+    params.ini_folder_type = hello_imgui.IniFolderType.app_user_config_folder
+    params.ini_filename = "pmviewer/window.ini"
+    params.renderer_backend_options.open_gl_options = _opengl()
+    _pace(params.fps_idling)
+    _bars(params, callbacks)
+    _dock(params.docking_params, callbacks)
+    c = params.callbacks
+    c.load_additional_fonts = theme.load_fonts
+    c.setup_imgui_style = theme.apply
+    c.show_menus = callbacks.menus
+    c.show_status = callbacks.status
+    c.show_gui = callbacks.over_everything
+    c.post_init = callbacks.post_init
+    c.post_init_add_platform_backend_callbacks = callbacks.add_platform_callbacks
+    c.pre_new_frame = callbacks.pre_new_frame
+    c.before_swap = callbacks.before_swap
+    c.before_exit = callbacks.before_exit
+    return params
+
+
+def _opengl() -> hello_imgui.OpenGlOptions:
+    """The interface is drawn without multisampling: it costs much on a software driver and shows little elsewhere."""
+    options = hello_imgui.OpenGlOptions()
+    options.anti_aliasing_samples = 0
+    return options
+
+
+def _pace(idling: hello_imgui.FpsIdling) -> None:
+    """Fast while the user acts, nearly still otherwise; each new frame of the session wakes the window."""
+    idling.fps_max = FPS_MAX
+    idling.fps_idle = FPS_IDLE
+    idling.time_active_after_last_event = 0.5
+    idling.vsync_to_monitor = True
+
+
+def _bars(params: hello_imgui.RunnerParams, callbacks: Callbacks) -> None:
+    frame = params.imgui_window_params
+    frame.default_imgui_window_type = hello_imgui.DefaultImGuiWindowType.provide_full_screen_dock_space
+    frame.show_menu_bar = True
+    frame.show_menu_app = False
+    frame.show_menu_view = False
+    frame.show_status_bar = True
+    frame.show_status_fps = False
+    frame.remember_theme = False
+    frame.remember_status_bar_settings = False
+    frame.background_color = theme.grey(0.105)
+    options = hello_imgui.EdgeToolbarOptions()
+    options.size_em = 2.4
+    options.window_padding_em = imgui.ImVec2(0.5, 0.3)
+    options.window_bg = theme.grey(0.15)
+    params.callbacks.add_edge_toolbar(hello_imgui.EdgeToolbarType.top, callbacks.toolbar, options)
+
+
+def _dock(docking: hello_imgui.DockingParams, callbacks: Callbacks) -> None:
+    docking.docking_splits = [
+        hello_imgui.DockingSplit("MainDockSpace", "Left", imgui.Dir.left, 0.235),
+        hello_imgui.DockingSplit("MainDockSpace", "Right", imgui.Dir.right, 0.235),
+        hello_imgui.DockingSplit("MainDockSpace", "Bottom", imgui.Dir.down, 0.24),
+    ]
+    picture = hello_imgui.DockableWindow(VIEWPORT, "MainDockSpace", callbacks.viewport, True, False)
+    picture.imgui_window_flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
+    panels = [hello_imgui.DockableWindow(label, _PLACE[label], callbacks.panels[label]) for label in PANELS]
+    docking.dockable_windows = [picture, *panels]

@@ -1,0 +1,103 @@
+"""The menu bar."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from imgui_bundle import hello_imgui, imgui
+
+from pmviewer.settings import SETTINGS, get
+from pmviewer.viewer.shortcuts import keys_of
+from pmviewer.viewer.state import ViewerState
+from pmviewer.viewer.toolbar import Actions
+
+
+class Menus:
+    def __init__(self, state: ViewerState, actions: Actions, panels: tuple[str, ...]) -> None:
+        self._state = state
+        self._actions = actions
+        self._panels = panels
+
+    def gui(self) -> None:
+        if imgui.begin_menu("File"):
+            self._file()
+            imgui.end_menu()
+        if imgui.begin_menu("View"):
+            self._view()
+            imgui.end_menu()
+        if imgui.begin_menu("Render"):
+            self._render()
+            imgui.end_menu()
+        if imgui.begin_menu("Overlays"):
+            for name, action in (("caustic", "toggle_caustic"), ("global", "toggle_global")):
+                shown = get(self._state.settings, f"overlays.{name}.show")
+                self._item(SETTINGS[f"overlays.{name}.show"].group.capitalize(), action, shown)
+            imgui.end_menu()
+        if imgui.begin_menu("Help"):
+            self._item("Keys and mouse", "toggle_help", self._state.help_open)
+            imgui.end_menu()
+
+    def _item(self, text: str, action: str, selected: bool = False) -> None:
+        if imgui.menu_item(text, keys_of(action), selected)[0]:
+            self._actions[action]()
+
+    def _file(self) -> None:
+        self._item("Open …", "open")
+        if imgui.begin_menu("Open recent", bool(self._state.recent.entries)):
+            for entry in list(self._state.recent.entries):
+                self._recent(entry)
+            imgui.separator()
+            if imgui.menu_item_simple("Clear the list"):
+                self._state.recent.clear()
+            imgui.end_menu()
+        imgui.separator()
+        self._item("Save session …", "save_session")
+        imgui.separator()
+        self._item("Export PNG …", "export_png")
+        self._item("Export PNG with overlays …", "export_png_overlays")
+        self._item("Export EXR, 32-bit float …", "export_exr")
+        self._item("Export EXR, 16-bit half …", "export_exr_half")
+        self._item("Screenshot of the picture", "screenshot_picture")
+        self._item("Screenshot of the window", "screenshot")
+        imgui.separator()
+        self._item("Quit", "quit")
+
+    def _recent(self, entry: str) -> None:
+        missing = self._state.recent.is_missing(entry)
+        name = f"{Path(entry).parent.name}/{Path(entry).name}" if Path(entry).is_absolute() else entry
+        if imgui.menu_item(f"{name}{'  (missing)' if missing else ''}##{entry}", "", False)[0]:
+            if missing:
+                self._state.recent.remove(entry)
+                self._state.say("error", f"{entry}: the file is gone; it was taken off the list.")
+            else:
+                self._state.open(entry)
+        imgui.set_item_tooltip(entry)
+
+    def _view(self) -> None:
+        view = self._state.settings.display.view
+        for number, name in enumerate(SETTINGS["display.view"].choices):
+            if imgui.menu_item(name.capitalize(), str((number + 1) % 10), name == view)[0]:
+                self._state.change({"display.view": name})
+        imgui.separator()
+        self._item("Frame the whole scene", "frame_all")
+        self._item("Reset the camera", "reset_camera")
+        self._item("Fly", "toggle_fly", self._state.flying)
+        self._item("Fit the picture", "fit_picture")
+        imgui.separator()
+        params = hello_imgui.get_runner_params()
+        for label in self._panels:
+            window = params.docking_params.dockable_window_of_name(label)
+            _, window.is_visible = imgui.menu_item(label, "", window.is_visible)
+        self._item("Hide the panels", "toggle_panels", self._state.panels_hidden)
+        if imgui.menu_item_simple("Reset the layout"):
+            params.docking_params.layout_reset = True
+
+    def _render(self) -> None:
+        self._item("Resume" if self._state.session.paused else "Pause", "toggle_pause")
+        self._item("Restart", "restart")
+        imgui.separator()
+        info = SETTINGS["render.method"]
+        method = get(self._state.settings, info.path)
+        for choice in info.choices:
+            if imgui.menu_item(choice.capitalize(), "", choice == method)[0]:
+                self._state.change({info.path: choice})

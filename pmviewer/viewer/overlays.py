@@ -1,0 +1,149 @@
+"""Photon maps as point clouds on the GPU.
+
+Photons are uploaded as they are stored, 24 bytes each, and decoded in the vertex shader; thinning is a stride in the
+vertex format, so a map of millions costs no work on the CPU.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.engine.frame import PhotonCloud
+from pmviewer.render.camera import Matrix
+from pmviewer.settings import PointOverlay
+from pmviewer.viewer.gl_program import load_program, set_uniforms
+
+RGB = tuple[float, float, float]
+
+BOUNCE_PALETTE: tuple[RGB, ...] = (
+    (0.99, 0.91, 0.15),
+    (0.62, 0.85, 0.22),
+    (0.29, 0.76, 0.43),
+    (0.13, 0.63, 0.53),
+    (0.20, 0.53, 0.70),
+    (0.35, 0.44, 0.82),
+    (0.53, 0.36, 0.80),
+    (0.66, 0.30, 0.62),
+)
+"""One to eight and more scatterings."""
+LIGHT_PALETTE: tuple[RGB, ...] = (
+    (0.95, 0.69, 0.15),
+    (0.35, 0.71, 0.91),
+    (0.10, 0.70, 0.50),
+    (0.94, 0.89, 0.36),
+    (0.25, 0.52, 0.85),
+    (0.88, 0.45, 0.20),
+    (0.84, 0.55, 0.72),
+    (0.75, 0.75, 0.75),
+)
+"""Distinct with colour-blind eyes too (after Okabe and Ito); lights beyond the eighth start again."""
+
+_COLOUR_BY = {"power": 0, "bounce": 1, "light": 2}
+_EXPONENT_BASE = np.uint32(80 << 23)
+
+
+def even_thinning(count: int, limit: int) -> int:
+    """Stride that leaves at most `limit` of `count` photons."""
+    return max(1, -(-count // max(limit, 1)))
+
+
+def brightest_channel(photons: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(n,) brightest of the three channels of photons (n, 6), in units of the map's power."""
+    words = photons.view(np.uint32)
+    codes = np.maximum(np.maximum(words[:, 4] & 0xFFFF, words[:, 4] >> 16), words[:, 5] & 0xFFFF).astype(np.uint32)
+    return np.where(codes == 0, np.float32(0), ((codes << np.uint32(13)) + _EXPONENT_BASE).view(np.float32))
+
+
+@dataclass(frozen=True)
+class CloudSummary:
+    """For the legend: photons in the map, photons drawn, and the 1st and 99th percentile of their power in watts."""
+
+    total: int
+    drawn: int
+    power_low: float
+    power_high: float
+    lights: tuple[int, ...]
+    """Ids of the lights they came from, of a sample."""
+
+
+class PointCloud:
+    """One map's photons."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._context = context
+        self._program = load_program(context, "points")
+        set_uniforms(
+            self._program,
+            bounce_palette=np.array(BOUNCE_PALETTE, np.float32),
+            light_palette=np.array(LIGHT_PALETTE, np.float32),
+        )
+        self._buffer: moderngl.Buffer | None = None
+        self._arrays: dict[int, moderngl.VertexArray] = {}
+        self._count = 0
+        self._log_range = (0.0, 1.0)
+        self._uploaded: PhotonCloud | None = None
+        self._sample: tuple[float, float, tuple[int, ...]] = (0.0, 0.0, ())
+
+    def upload(self, cloud: PhotonCloud | None) -> bool:
+        """Take this cloud; False when it is the one that is there already."""
+        if cloud is self._uploaded:
+            return False
+        self.release()
+        self._uploaded = cloud
+        self._count = 0 if cloud is None else len(cloud.photons)
+        if cloud is None or self._count == 0:
+            return True
+        photons = np.ascontiguousarray(cloud.photons, np.float32)
+        self._buffer = self._context.buffer(photons)
+        sample = photons[:: even_thinning(self._count, 20_000)]
+        power = brightest_channel(sample)
+        low, high = np.percentile(power[power > 0], [1, 99]) if np.any(power > 0) else (1.0, 1.0)
+        if high < low * 1.2:
+            low = high / 4  # equal powers: all bright
+        self._log_range = (float(np.log2(low)), float(np.log2(high)))
+        lights = tuple(int(i) for i in np.unique(sample.view(np.uint32)[:, 5] >> 16)[:64])
+        self._sample = (float(low) * cloud.power_unit, float(high) * cloud.power_unit, lights)
+        return True
+
+    def release(self) -> None:
+        """Free what lies on the GPU."""
+        for array in self._arrays.values():
+            array.release()
+        self._arrays.clear()
+        if self._buffer is not None:
+            self._buffer.release()
+        self._buffer, self._uploaded, self._count = None, None, 0
+
+    def summary(self, limit: int) -> CloudSummary:
+        drawn = -(-self._count // even_thinning(self._count, limit)) if self._count else 0
+        return CloudSummary(self._count, drawn, *self._sample)
+
+    def draw(self, style: PointOverlay, view: Matrix, projection: Matrix, limit: int, pixel_ratio: float) -> None:
+        """Draw at most `limit` photons into the bound framebuffer. Depth test and viewport are the caller's."""
+        if self._buffer is None:
+            return
+        stride = even_thinning(self._count, limit)
+        size = style.size * pixel_ratio
+        set_uniforms(
+            self._program,
+            view=view,
+            projection=projection,
+            size=size,
+            colour_by=_COLOUR_BY[style.colour],
+            power_range=self._log_range,
+            round_points=int(size >= 3),
+        )
+        self._array(stride).render(moderngl.POINTS, vertices=-(-self._count // stride))
+
+    def _array(self, stride: int) -> moderngl.VertexArray:
+        if stride not in self._arrays:
+            assert self._buffer is not None
+            rest = f" {24 * (stride - 1)}x1" if stride > 1 else ""
+            names = [n for n in ("position", "direction_and_flags", "power_and_light") if n in self._program]
+            layout = f"3f4 1u4 2u4{rest}"
+            self._arrays[stride] = self._context.vertex_array(self._program, [(self._buffer, layout, *names)])
+        return self._arrays[stride]

@@ -1,0 +1,259 @@
+"""What the viewport shows, drawn into a framebuffer of its own: a plane of the frame or the shaded geometry, and the
+photon maps over it, with the same camera to the pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.engine.frame import Frame
+from pmviewer.output.tone import depth_bounds
+from pmviewer.render.camera import CameraPose, Matrix
+from pmviewer.settings import Display, Overlays
+from pmviewer.viewer.gl_program import load_program, set_uniforms
+from pmviewer.viewer.overlays import PointCloud
+
+CLOUDS = ("caustic", "global")
+SURROUND = (0.105, 0.105, 0.105)
+_CONTENT = {"albedo": 1, "normal": 2, "depth": 3}
+_CURVE = {"sRGB": 0, "Reinhard": 1, "filmic": 2, "linear": 3}
+NEAREST_FROM = 3.0
+"""Magnification from which pixels are shown as squares."""
+NAVIGATION_LIMIT = 30_000
+"""Points drawn while the camera moves, on a driver without a GPU."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where to draw: framebuffer `size` in pixels and the picture's rectangle in it (left, top, width, height), which
+    may reach beyond when the user zooms in. `pixel_ratio` scales point sizes (HiDPI)."""
+
+    size: tuple[int, int]
+    picture: tuple[int, int, int, int]
+    pixel_ratio: float = 1.0
+
+
+def clip_planes(camera: CameraPose, center: NDArray[np.floating], radius: float) -> tuple[float, float]:
+    """Near and far distance that enclose a bounding sphere as tightly as the depth buffer needs."""
+    distance = float(np.linalg.norm(np.asarray(camera.origin, float) - center))
+    far = (distance + radius) * 1.01
+    return max((distance - radius) * 0.99, far * 1e-3), far
+
+
+class Picture:
+    """Textures and buffers of the viewport. Every method needs the window's OpenGL context."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self.context = context
+        context.gc_mode = "auto"
+        self.software = any(name in context.info["GL_RENDERER"].lower() for name in ("llvmpipe", "softpipe", "swrast"))
+        self.clouds = {name: PointCloud(context) for name in CLOUDS}
+        self.depth_range = (0.0, 1.0)
+        self._picture_program = load_program(context, "picture")
+        self._geometry_program = load_program(context, "geometry")
+        self._triangle = context.vertex_array(self._picture_program, [])
+        self._plane: moderngl.Texture | None = None
+        self._shown: tuple[int, str] | None = None
+        self._coarse = False
+        self._geometry: Any = None
+        self._geometry_array: moderngl.VertexArray | None = None
+        self._center, self._radius = np.zeros(3), 1.0
+        self._framebuffers: dict[str, moderngl.Framebuffer] = {}
+
+    # data -------------------------------------------------------------------------------------------------------
+
+    def upload_frame(self, frame: Frame, view: str, shown_clouds: Mapping[str, bool]) -> bool:
+        """Bring the plane of that view and the clouds that are switched on to the GPU. True when anything changed."""
+        changed = False
+        if view != "geometry" and self._shown != (frame.serial, view):
+            self._upload_plane(frame.image(view), view)
+            self._shown, self._coarse = (frame.serial, view), frame.coarse
+            changed = True
+        for name, cloud in self.clouds.items():
+            if shown_clouds[name]:
+                changed |= cloud.upload(frame.clouds.get(name))
+        return changed
+
+    def _upload_plane(self, image: NDArray[np.float32], view: str) -> None:
+        height, width, channels = image.shape
+        if view == "depth":
+            self.depth_range = depth_bounds(image)
+        plane = self._plane
+        if plane is None or plane.size != (width, height) or plane.components != channels:
+            if plane is not None:
+                plane.release()
+            plane = self._plane = self.context.texture((width, height), channels, dtype="f4", alignment=4)
+            plane.repeat_x = plane.repeat_y = False
+        plane.write(np.ascontiguousarray(image, np.float32))
+
+    def upload_geometry(self, geometry: Any) -> bool:
+        """Take a `DrawGeometry` (or None). True when it is another one than before."""
+        if geometry is self._geometry:
+            return False
+        self._geometry = geometry
+        if self._geometry_array is not None:
+            self._geometry_array.release()
+        self._geometry_array = None
+        if geometry is not None and len(geometry.vertices):
+            data = np.hstack([geometry.vertices, geometry.normals, geometry.albedo]).astype(np.float32)
+            buffer = self.context.buffer(np.ascontiguousarray(data))
+            names = [(n, n in self._geometry_program) for n in ("position", "normal", "albedo")]
+            layout = " ".join("3f4" if used else "12x1" for _, used in names)
+            attributes = [n for n, used in names if used]
+            self._geometry_array = self.context.vertex_array(self._geometry_program, [(buffer, layout, *attributes)])
+            self._center, self._radius = np.asarray(geometry.center, float), float(geometry.radius)
+        return True
+
+    def forget_frame(self) -> None:
+        """Another scene: what was uploaded of the last one is stale."""
+        self._shown = None
+        for cloud in self.clouds.values():
+            cloud.release()
+
+    @property
+    def has_plane(self) -> bool:
+        return self._shown is not None
+
+    @property
+    def has_geometry(self) -> bool:
+        return self._geometry_array is not None
+
+    @property
+    def plane_size(self) -> tuple[int, int]:
+        """Pixels of the uploaded plane; fewer than the image's when the frame is coarse."""
+        return self._plane.size if self._plane is not None else (1, 1)
+
+    # drawing ----------------------------------------------------------------------------------------------------
+
+    def draw(
+        self,
+        name: str,
+        target: Target,
+        camera: CameraPose | None,
+        display: Display,
+        overlays: Overlays | None,
+        *,
+        navigating: bool = False,
+    ) -> moderngl.Texture:
+        """Draw into the framebuffer of that name and return its colour texture (rows bottom to top).
+
+        `camera` is the frame's; None draws the surround alone. `overlays` None leaves the points out.
+        """
+        framebuffer = self._framebuffer(name, target.size)
+        framebuffer.scissor = None
+        framebuffer.viewport = (0, 0, *framebuffer.size)
+        framebuffer.use()
+        framebuffer.clear(*SURROUND, 1.0)
+        colour: moderngl.Texture = framebuffer.color_attachments[0]
+        if camera is None:
+            return colour
+        left, top, width, height = target.picture
+        clip = _clip(target)
+        if clip is None:
+            return colour
+        framebuffer.viewport = (left, target.size[1] - top - height, width, height)
+        framebuffer.scissor = clip
+        near, far = clip_planes(camera, self._center, self._radius)
+        view, projection = camera.view_matrix(), camera.projection_matrix(near, far)
+        as_geometry = display.view == "geometry" or not self.has_plane
+        if as_geometry:
+            self._draw_geometry(view, projection)
+        else:
+            self._draw_plane(display, width)
+        if overlays is not None:
+            self._draw_points(framebuffer, overlays, view, projection, target.pixel_ratio, navigating)
+        self.context.disable(moderngl.DEPTH_TEST)
+        return colour
+
+    def _draw_plane(self, display: Display, width: int) -> None:
+        assert self._plane is not None
+        squares = width / self._plane.width >= NEAREST_FROM and not self._coarse
+        sampling = moderngl.NEAREST if squares else moderngl.LINEAR
+        self._plane.filter = (sampling, sampling)
+        self._plane.use(0)
+        set_uniforms(
+            self._picture_program,
+            plane=0,
+            content=_CONTENT.get(display.view, 0),
+            curve=_CURVE[display.tone],
+            scale=2.0**display.exposure,
+            depth_range=self.depth_range,
+        )
+        self.context.disable(moderngl.DEPTH_TEST)
+        self._triangle.render(moderngl.TRIANGLES, vertices=3)
+
+    def _draw_geometry(self, view: Matrix, projection: Matrix) -> None:
+        """Surfaces, pushed back a little in depth so that they don't fight with the points that lie on them."""
+        if self._geometry_array is None:
+            return
+        self.context.enable_only(moderngl.DEPTH_TEST)
+        self.context.polygon_offset = (1.0, 1.0)
+        set_uniforms(self._geometry_program, view=view, projection=projection)
+        self._geometry_array.render(moderngl.TRIANGLES)
+        self.context.polygon_offset = (0.0, 0.0)
+
+    def _draw_points(
+        self,
+        framebuffer: moderngl.Framebuffer,
+        overlays: Overlays,
+        view: Matrix,
+        projection: Matrix,
+        pixel_ratio: float,
+        navigating: bool,
+    ) -> None:
+        styles = {"caustic": overlays.caustic, "global": overlays.global_}
+        if not any(style.show for style in styles.values()):
+            return
+        context = self.context
+        if any(style.show and style.depth for style in styles.values()):
+            self._draw_depth(framebuffer, view, projection)
+        for name, style in styles.items():
+            if not style.show:
+                continue
+            context.enable_only(moderngl.PROGRAM_POINT_SIZE | (moderngl.DEPTH_TEST if style.depth else 0))
+            limit = min(style.limit, NAVIGATION_LIMIT) if navigating and self.software else style.limit
+            self.clouds[name].draw(style, view, projection, limit, pixel_ratio)
+
+    def _draw_depth(self, framebuffer: moderngl.Framebuffer, view: Matrix, projection: Matrix) -> None:
+        """Surfaces into the depth buffer alone. moderngl hands a framebuffer's mask to OpenGL when it is bound."""
+        framebuffer.color_mask = (False, False, False, False)
+        framebuffer.use()
+        self._draw_geometry(view, projection)
+        framebuffer.color_mask = (True, True, True, True)
+        framebuffer.use()
+
+    def read(self, name: str) -> NDArray[np.uint8]:
+        """(height, width, 3) of what was drawn into that framebuffer, top row first."""
+        framebuffer = self._framebuffers[name]
+        width, height = framebuffer.size
+        pixels = np.frombuffer(framebuffer.read(components=3, alignment=1), np.uint8).reshape(height, width, 3)
+        return np.ascontiguousarray(pixels[::-1])
+
+    def _framebuffer(self, name: str, size: tuple[int, int]) -> moderngl.Framebuffer:
+        """A colour and depth buffer of that size; another size replaces it."""
+        size = (max(size[0], 1), max(size[1], 1))
+        old = self._framebuffers.get(name)
+        if old is not None and old.size == size:
+            return old
+        if old is not None:
+            old.color_attachments[0].release()
+            old.depth_attachment.release()
+            old.release()
+        new = self.context.framebuffer([self.context.texture(size, 4)], self.context.depth_renderbuffer(size))
+        self._framebuffers[name] = new
+        return new
+
+
+def _clip(target: Target) -> tuple[int, int, int, int] | None:
+    """The part of the picture inside the framebuffer, as OpenGL's scissor wants it; None when nothing is."""
+    left, top, width, height = target.picture
+    x0, x1 = max(left, 0), min(left + width, target.size[0])
+    y0, y1 = max(top, 0), min(top + height, target.size[1])
+    if x1 <= x0 or y1 <= y0:
+        return None
+    return x0, target.size[1] - y1, x1 - x0, y1 - y0

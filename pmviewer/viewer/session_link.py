@@ -1,0 +1,176 @@
+"""The window's handle on a session that is still being imported.
+
+Importing the engine takes longer than opening the window, so the window starts with this: it keeps what the user asks
+for and hands everything to the real session once that exists.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+from pmviewer.engine.frame import Frame, Message, Status
+from pmviewer.scene.description import Scene
+from pmviewer.settings import Settings
+
+
+class SessionLike(Protocol):
+    """What the window uses of `pmviewer.engine.session.Session`."""
+
+    on_update: Callable[[], None] | None
+
+    @property
+    def settings(self) -> Settings: ...
+    @property
+    def frame(self) -> Frame | None: ...
+    @property
+    def status(self) -> Status: ...
+    @property
+    def scene(self) -> Scene | None: ...
+    @property
+    def scene_path(self) -> str: ...
+    @property
+    def traits(self) -> Any: ...
+    @property
+    def geometry(self) -> Any: ...
+    @property
+    def paused(self) -> bool: ...
+    def open(self, source: Any, settings: Settings | None = None) -> None: ...
+    def set(self, settings: Settings) -> Any: ...
+    def pause(self) -> None: ...
+    def resume(self) -> None: ...
+    def restart(self) -> None: ...
+    def take_messages(self) -> list[Message]: ...
+    def close(self) -> None: ...
+
+
+class SessionLink:
+    """A session that exists once `make` has returned; `make` runs on a thread of its own."""
+
+    def __init__(self, make: Callable[[], SessionLike], settings: Settings | None = None) -> None:
+        self.on_update: Callable[[], None] | None = None
+        self._make = make
+        self._session: SessionLike | None = None
+        self._settings = settings or Settings()
+        self._source: tuple[str | Path | Scene, Settings | None] | None = None
+        self._paused = False
+        self._closed = False
+        self._messages: list[Message] = []
+        self._status = Status("preparing", "starting the engine")
+        self._lock = threading.Lock()
+
+    def connect(self) -> None:
+        """Start making the session."""
+        threading.Thread(target=self._connect, name="pmviewer start", daemon=True).start()
+
+    def _connect(self) -> None:
+        try:
+            session = self._make()
+        except Exception as error:  # whatever it is, the window has to show it
+            with self._lock:
+                self._messages.append(Message("error", f"The engine did not start: {error}"))
+                self._status = Status("failed", "the engine did not start")
+            self._notify()
+            return
+        with self._lock:
+            session.on_update = self._notify
+            self._session = session
+            if self._closed:
+                session.close()
+                return
+            session.set(self._settings)
+            if self._paused:
+                session.pause()
+            if self._source is not None:
+                session.open(*self._source)
+        self._notify()
+
+    def _notify(self) -> None:
+        if self.on_update:
+            self.on_update()
+
+    # requests ---------------------------------------------------------------------------------------------------
+
+    def open(self, source: str | Path | Scene, settings: Settings | None = None) -> None:
+        with self._lock:
+            if self._session is not None:
+                self._session.open(source, settings)
+                return
+            self._source = (source, settings)
+
+    def set(self, settings: Settings) -> None:
+        with self._lock:
+            self._settings = settings
+            if self._session is not None:
+                self._session.set(settings)
+            elif self._source is not None and self._source[1] is not None:
+                self._source = (self._source[0], settings)
+
+    def pause(self) -> None:
+        with self._lock:
+            self._paused = True
+            if self._session is not None:
+                self._session.pause()
+
+    def resume(self) -> None:
+        with self._lock:
+            self._paused = False
+            if self._session is not None:
+                self._session.resume()
+
+    def restart(self) -> None:
+        with self._lock:
+            if self._session is not None:
+                self._session.restart()
+
+    def close(self) -> None:
+        with self._lock:
+            self._closed = True
+            session = self._session
+        if session is not None:
+            session.close()
+
+    # state ------------------------------------------------------------------------------------------------------
+
+    @property
+    def settings(self) -> Settings:
+        if self._session is not None:
+            return self._session.settings
+        if self._source is not None and self._source[1] is not None:
+            return self._source[1]
+        return self._settings
+
+    @property
+    def frame(self) -> Frame | None:
+        return self._session.frame if self._session else None
+
+    @property
+    def status(self) -> Status:
+        return self._session.status if self._session else self._status
+
+    @property
+    def scene(self) -> Scene | None:
+        return self._session.scene if self._session else None
+
+    @property
+    def scene_path(self) -> str:
+        return self._session.scene_path if self._session else ""
+
+    @property
+    def traits(self) -> Any:
+        return self._session.traits if self._session else None
+
+    @property
+    def geometry(self) -> Any:
+        return self._session.geometry if self._session else None
+
+    @property
+    def paused(self) -> bool:
+        return self._session.paused if self._session else self._paused
+
+    def take_messages(self) -> list[Message]:
+        with self._lock:
+            taken, self._messages = self._messages, []
+        return taken + (self._session.take_messages() if self._session else [])

@@ -1,0 +1,154 @@
+"""The settings, made from the schema: N, q and the radius on top, the rest by group."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import Any
+
+from imgui_bundle import icons_fontawesome_6 as fa
+from imgui_bundle import imgui
+
+from pmviewer.settings import SETTINGS, SettingInfo, get
+from pmviewer.viewer import theme
+from pmviewer.viewer.state import ViewerState
+from pmviewer.viewer.widgets import SettingWidgets, icon_button, range_text, reset_button, tooltip_text, value_text
+
+PINNED = ("photons.N", "photons.q", "estimate.radius")
+_ELSEWHERE = ("overlays.",)
+_OPEN = ("Light pass", "Density estimate", "Method")
+
+
+class SettingsPanel:
+    def __init__(self, state: ViewerState) -> None:
+        self.state = state
+        self.widgets = SettingWidgets()
+        self._filter = ""
+        listed = [i for i in SETTINGS.values() if i.path not in PINNED and not i.path.startswith(_ELSEWHERE)]
+        self._groups = [(heading, list(infos)) for heading, infos in groupby(listed, key=lambda info: info.group)]
+
+    def gui(self) -> None:
+        if self.begin_rows("pinned"):
+            for path in PINNED:
+                self.row(SETTINGS[path])
+            imgui.end_table()
+        imgui.spacing()
+        self._filter_row()
+        if imgui.begin_child("##groups", (0, 0)):
+            for heading, infos in self._groups:
+                self._group(heading, infos)
+        imgui.end_child()
+
+    def _filter_row(self) -> None:
+        everything = [
+            p for p, info in SETTINGS.items() if not p.startswith(_ELSEWHERE) and self._value(p) != info.default
+        ]
+        size = imgui.get_frame_height() * 1.15 + imgui.get_style().item_spacing.x
+        imgui.set_next_item_width(-size)
+        _, self._filter = imgui.input_text_with_hint(
+            "##filter", f"{fa.ICON_FA_MAGNIFYING_GLASS}  find a setting", self._filter
+        )
+        imgui.same_line()
+        tip = "Reset every setting to its default" if everything else "Every setting has its default"
+        if icon_button(fa.ICON_FA_ARROW_ROTATE_LEFT, "reset.all", tip, enabled=bool(everything)):
+            self.state.change({path: SETTINGS[path].default for path in everything})
+
+    def _group(self, heading: str, infos: list[SettingInfo]) -> None:
+        wanted = self._filter.strip().lower()
+        if wanted:
+            infos = [i for i in infos if wanted in f"{i.path} {i.title} {i.description} {heading}".lower()]
+            if not infos:
+                return
+            imgui.set_next_item_open(True)
+        else:
+            imgui.set_next_item_open(heading in _OPEN, imgui.Cond_.once)
+        changed = sum(self._value(i.path) != i.default for i in infos)
+        note = f"   {changed} changed" if changed else ""
+        if imgui.collapsing_header(f"{heading}{note}###{heading}") and self.begin_rows(heading):
+            for info in infos:
+                self.row(info)
+            imgui.end_table()
+
+    def _value(self, path: str) -> Any:
+        return get(self.state.settings, path)
+
+    @staticmethod
+    def begin_rows(name: str, name_em: float = 8.2) -> bool:
+        """Open the table that `row` fills; end it with `imgui.end_table()` when True."""
+        if not imgui.begin_table(f"##{name}", 3):
+            return False
+        em = imgui.get_font_size()
+        imgui.table_setup_column("name", imgui.TableColumnFlags_.width_fixed, name_em * em)
+        imgui.table_setup_column("value", imgui.TableColumnFlags_.width_stretch)
+        imgui.table_setup_column("reset", imgui.TableColumnFlags_.width_fixed, 1.9 * em)
+        return True
+
+    def row(self, info: SettingInfo) -> None:
+        """Label, widget and reset of one setting, inside a table of three columns."""
+        state, value = self.state, self._value(info.path)
+        reason = state.inactive_reason(info.path, state.settings, state.session.traits)
+        resolved = state.resolved(info.path) if value == "auto" else value
+        imgui.table_next_row()
+        imgui.table_next_column()
+        if reason:
+            imgui.push_style_var(imgui.StyleVar_.alpha, 0.45)
+        imgui.align_text_to_frame_padding()
+        differs = value != info.default
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*(theme.TEXT if differs else (0.76, 0.76, 0.76, 1.0))))
+        imgui.text_unformatted(theme.drawable(info.title))
+        imgui.pop_style_color()
+        described = self._is_hovered()
+        self._context_menu(info, value, resolved)
+        imgui.table_next_column()
+        new = self.widgets.edit(info, value, resolved)
+        described = described or (self._is_hovered() and not imgui.is_item_active())
+        self._context_menu(info, value, resolved)
+        imgui.table_next_column()
+        if info.auto:
+            new = self._auto_button(info, value, resolved, new)
+        elif reset_button(info, value):
+            new = info.default
+        if reason:
+            imgui.pop_style_var()
+        if described:
+            self._tooltip(info, value, reason)
+        if new is not None:
+            state.change({info.path: new})
+
+    @staticmethod
+    def _is_hovered() -> bool:
+        return imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip)
+
+    def _auto_button(self, info: SettingInfo, value: Any, resolved: Any, new: Any) -> Any:
+        automatic = value == "auto"
+        if automatic:
+            tip = "Automatic. Click to fix the present value." if resolved is not None else "Automatic"
+        else:
+            tip = "Back to automatic"
+        if icon_button(fa.ICON_FA_WAND_MAGIC_SPARKLES, f"auto.{info.path}", tip, on=automatic):
+            return resolved if automatic else "auto"
+        return new
+
+    def _context_menu(self, info: SettingInfo, value: Any, resolved: Any) -> None:
+        if not imgui.begin_popup_context_item(f"menu.{info.path}"):
+            return
+        imgui.text_disabled(info.path)
+        imgui.separator()
+        if imgui.menu_item(f"Reset to {value_text(info, info.default)}", "", False, value != info.default)[0]:
+            self.state.change({info.path: info.default})
+        typed = info.scale not in ("switch", "choice", "vector") and resolved is not None
+        if typed and imgui.menu_item_simple("Type a value"):
+            self.widgets.start_typing(info, resolved)
+        if imgui.menu_item_simple("Copy as command-line option"):
+            text = " ".join(f"{v:g}" for v in value) if isinstance(value, tuple) else str(value)
+            quote = '"' if " " in text else ""
+            imgui.set_clipboard_text(f"--set {quote}{info.path}={text}{quote}")
+        imgui.end_popup()
+
+    def _tooltip(self, info: SettingInfo, value: Any, reason: str | None) -> None:
+        lines = [(info.path, theme.ACCENT), (info.description, theme.TEXT)]
+        if reason:
+            lines.append((f"No effect now: {reason}", theme.WARNING))
+        allowed = range_text(info)
+        default = f"Default {value_text(info, info.default)}"
+        lines.append((f"{allowed}. {default}." if allowed else f"{default}.", theme.DIM))
+        tooltip_text(lines)

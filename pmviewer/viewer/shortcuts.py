@@ -1,0 +1,83 @@
+"""Keys and mouse buttons in one table: what runs on a key press, and what the overview (`H`) lists."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from imgui_bundle import imgui
+
+K = imgui.Key
+
+
+@dataclass(frozen=True)
+class Binding:
+    """`action` names what happens; `key` is None for what the mouse does and the viewport handles itself."""
+
+    group: str
+    keys: str
+    text: str
+    action: str = ""
+    key: imgui.Key | None = None
+    ctrl: bool = False
+    shift: bool = False
+    repeat: bool = False
+    alternative: imgui.Key | None = None
+
+
+BINDINGS: tuple[Binding, ...] = (
+    Binding("File", "Ctrl+O", "Open a scene or session", "open", K.o, ctrl=True),
+    Binding("File", "Ctrl+S", "Save the session", "save_session", K.s, ctrl=True),
+    Binding("File", "Ctrl+E", "Export the layers as EXR", "export_exr", K.e, ctrl=True),
+    Binding("File", "Ctrl+P", "Export the picture as PNG", "export_png", K.p, ctrl=True),
+    Binding("File", "F12", "Screenshot of the window", "screenshot", K.f12),
+    Binding("File", "Ctrl+F12", "Screenshot of the picture with overlays", "screenshot_picture", K.f12, ctrl=True),
+    Binding("File", "Ctrl+Q", "Quit", "quit", K.q, ctrl=True),
+    Binding("Render", "Space", "Pause or resume", "toggle_pause", K.space),
+    Binding("Render", "R", "Restart", "restart", K.r),
+    Binding("Picture", "1 … 9, 0", "View: beauty, one of its terms, a property, geometry"),
+    Binding("Picture", "E", "Exposure up by half a stop", "exposure_up", K.e, repeat=True),
+    Binding("Picture", "Shift+E", "Exposure down by half a stop", "exposure_down", K.e, shift=True, repeat=True),
+    Binding("Picture", "T", "Next tone curve", "next_tone", K.t),
+    Binding("Picture", "C", "Caustic photons on or off", "toggle_caustic", K.c),
+    Binding("Picture", "G", "Global photons on or off", "toggle_global", K.g),
+    Binding("Picture", "Ctrl+wheel", "Magnify pixels; Z fits the picture again", "fit_picture", K.z),
+    Binding("Camera", "Left drag", "Orbit around the target"),
+    Binding("Camera", "Middle or Shift+left drag", "Pan"),
+    Binding("Camera", "Wheel or right drag", "Zoom"),
+    Binding("Camera", "F", "Fly: W A S D, Q down, E up, drag to look; Shift is faster", "toggle_fly", K.f),
+    Binding("Camera", "Right button + W A S D Q E", "Fly while the button is held"),
+    Binding("Camera", "Home or A", "Frame the whole scene", "frame_all", K.home, alternative=K.a),
+    Binding("Camera", "Backspace", "The scene file's camera", "reset_camera", K.backspace),
+    Binding("Window", "Tab", "Hide or show the panels", "toggle_panels", K.tab),
+    Binding("Window", "H or F1", "This overview", "toggle_help", K.h, alternative=K.f1),
+    Binding("Settings", "Double click or Ctrl+click", "Type an exact value"),
+    Binding("Settings", "Right click", "Reset to the default, copy the setting's name"),
+    Binding("Settings", "Esc", "Leave fly mode, close this overview", "escape", K.escape),
+)
+
+_DIGITS = (K._1, K._2, K._3, K._4, K._5, K._6, K._7, K._8, K._9, K._0)
+FLY_KEYS = (K.w, K.a, K.s, K.d, K.q, K.e)
+
+
+def keys_of(action: str) -> str:
+    """What to show beside a menu entry."""
+    return next((b.keys for b in BINDINGS if b.action == action), "")
+
+
+def run_shortcuts(actions: Mapping[str, Callable[[], None]], choose_view: Callable[[int], None], flying: bool) -> None:
+    """Run the actions of the keys pressed in this frame. Typing into a field and flying keep their letters."""
+    io = imgui.get_io()
+    if io.want_text_input:
+        return
+    for binding in BINDINGS:
+        for key in (binding.key, binding.alternative):
+            if key is None or (flying and key in FLY_KEYS and not io.key_ctrl):
+                continue
+            if io.key_ctrl == binding.ctrl and io.key_shift == binding.shift and not io.key_alt:
+                if imgui.is_key_pressed(key, binding.repeat):
+                    actions[binding.action]()
+    if not (io.key_ctrl or io.key_shift or io.key_alt):
+        for number, key in enumerate(_DIGITS):
+            if imgui.is_key_pressed(key, False):
+                choose_view(number)

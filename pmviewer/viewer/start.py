@@ -1,0 +1,85 @@
+"""From the command line to an open window: check the screen, open the window, start the engine behind it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import glfw
+
+from pmviewer.errors import WindowError
+from pmviewer.settings import Settings
+from pmviewer.viewer.session_link import SessionLike, SessionLink
+
+if TYPE_CHECKING:
+    from pmviewer.viewer.app import ViewerApp
+
+DEFAULT_SCENE = "cornell_caustic"
+
+
+def check_screen() -> None:
+    """Raises WindowError, saying what to do, when no window with OpenGL 3.3 can be opened."""
+    failures: list[str] = []
+    glfw.ERROR_REPORTING = lambda code, text: failures.append(text.decode(errors="replace"))
+    try:
+        if not glfw.init():
+            raise WindowError(
+                "No window can be opened: there is no display"
+                + (" (DISPLAY is not set)" if sys.platform.startswith("linux") else "")
+                + ". Render to a file instead: pmviewer render SCENE -o picture.exr."
+            )
+        glfw.default_window_hints()
+        glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
+        glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
+        glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
+        glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
+        glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, glfw.TRUE)
+        window = glfw.create_window(64, 64, "pmviewer", None, None)
+        if not window:
+            reason = f" ({failures[-1]})" if failures else ""
+            raise WindowError(
+                f"This screen has no OpenGL 3.3{reason}. On Debian or Ubuntu install it with: apt-get install libgl1 "
+                "libegl1. Without it, render to a file: pmviewer render SCENE -o picture.exr."
+            )
+        glfw.destroy_window(window)
+    finally:
+        glfw.default_window_hints()
+        glfw.ERROR_REPORTING = "warn"
+
+
+def _make_session(threads: int | None, settings: Settings | None) -> Callable[[], SessionLike]:
+    def make() -> SessionLike:
+        from pmviewer.engine.session import Session
+
+        return Session(threads, settings)
+
+    return make
+
+
+def _inactive_reason(path: str, settings: Settings, traits: Any) -> str | None:
+    """Asked of the engine once it is there; before, every setting looks active."""
+    effects = sys.modules.get("pmviewer.engine.effects")
+    if effects is None:
+        if traits is None:
+            return None
+        from pmviewer.engine import effects
+    reason: str | None = effects.inactive_reason(path, settings, traits)
+    return reason
+
+
+def start_viewer(
+    make_app: Callable[..., ViewerApp], source: str | Path | None, settings: Settings | None, threads: int | None
+) -> int:
+    """See `pmviewer.viewer.app.run_viewer`."""
+    check_screen()
+    link = SessionLink(_make_session(threads, settings), settings)
+    app = make_app(link, inactive_reason=_inactive_reason)
+    app.state.open(source if source is not None else DEFAULT_SCENE, keep_camera=True)
+    app.params.callbacks.enqueue_post_init(link.connect)
+    try:
+        app.run()
+    finally:
+        link.close()
+    return 0

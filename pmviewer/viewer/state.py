@@ -1,0 +1,156 @@
+"""What the window's parts share: the session, the log, and the one way to change a setting."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pmviewer.engine.frame import Frame, Level, Message
+from pmviewer.errors import PmviewerError
+from pmviewer.render.camera import CameraPose, resolve_camera
+from pmviewer.settings import CameraSettings, Settings, get, parse_assignments, with_values
+from pmviewer.viewer.controls import camera_values
+from pmviewer.viewer.jobs import Jobs
+from pmviewer.viewer.recent import RecentFiles
+from pmviewer.viewer.session_link import SessionLike
+
+InactiveReason = Callable[[str, Settings, Any], str | None]
+LOG_LINES = 2000
+TOAST_SECONDS = 8.0
+
+
+@dataclass
+class Toast:
+    """A message that floats over the picture until it is dismissed or, unless it is an error, grows old."""
+
+    message: Message
+    born: float = field(default_factory=time.monotonic)
+
+    def is_over(self) -> bool:
+        return self.message.level != "error" and time.monotonic() - self.born > TOAST_SECONDS
+
+
+class ViewerState:
+    """Lives as long as the window."""
+
+    def __init__(self, session: SessionLike, inactive_reason: InactiveReason, recent: RecentFiles) -> None:
+        self.session = session
+        self.inactive_reason = inactive_reason
+        self.recent = recent
+        self.jobs = Jobs(self.say)
+        self.log: deque[Message] = deque(maxlen=LOG_LINES)
+        self.toasts: list[Toast] = []
+        self.flying = False
+        self.panels_hidden = False
+        self.help_open = False
+        self.last_camera_move = -1e9
+        self._scene: Any = None
+        self._stale_serial = -1
+        self._opening = ""
+
+    # settings ---------------------------------------------------------------------------------------------------
+
+    @property
+    def settings(self) -> Settings:
+        return self.session.settings
+
+    def change(self, values: dict[str, Any]) -> None:
+        """Change settings; text is parsed as on the command line. What the schema refuses goes to the log."""
+        try:
+            parsed: dict[str, Any] = {}
+            for path, value in values.items():
+                if isinstance(value, str) and not isinstance(get(self.settings, path), str):
+                    value = value.replace(",", "") if get(self.settings, path) is not None else value
+                    parsed |= parse_assignments([f"{path}={value}"])
+                else:
+                    parsed[path] = value
+            settings = with_values(self.settings, parsed)
+        except PmviewerError as error:
+            self.say("error", str(error))
+            return
+        if settings != self.settings:
+            self.session.set(settings)
+
+    def resolved(self, path: str) -> Any:
+        """What "auto" means now for that setting, or None when it isn't known yet."""
+        pose = self.live_camera()
+        if path.startswith("camera."):
+            return getattr(pose, path.removeprefix("camera.")) if pose else None
+        frame, geometry = self.frame, self.session.geometry
+        if path == "estimate.radius" and frame is not None and geometry is not None:
+            radius = frame.statistics.radius.get("global") or next(iter(frame.statistics.radius.values()), None)
+            return radius / geometry.radius if radius else None
+        return None
+
+    # what is shown ----------------------------------------------------------------------------------------------
+
+    @property
+    def frame(self) -> Frame | None:
+        """The newest frame of the scene that is open now."""
+        frame = self.session.frame
+        return frame if frame is not None and frame.serial > self._stale_serial else None
+
+    def live_camera(self) -> CameraPose | None:
+        """The camera of the newest settings, ahead of the frame's while the user moves it."""
+        scene = self.session.scene
+        return resolve_camera(scene, self.settings.camera) if scene is not None else None
+
+    def scene_changed(self) -> bool:
+        """True once after another scene was opened; frames of the one before are not shown any more."""
+        scene = self.session.scene
+        if scene is self._scene:
+            return False
+        self._scene = scene
+        if self._opening:
+            self.recent.add(self._opening)
+            self._opening = ""
+        frame = self.session.frame
+        if frame is not None and scene is not None and frame.scene_name != scene.name:
+            self._stale_serial = frame.serial
+        return True
+
+    def move_camera(self, pose: CameraPose) -> None:
+        self.last_camera_move = time.monotonic()
+        self.change(dict(camera_values(pose)))
+
+    @property
+    def navigating(self) -> bool:
+        return time.monotonic() - self.last_camera_move < 0.3
+
+    # files and messages -----------------------------------------------------------------------------------------
+
+    def open(self, path: str | Path, *, keep_camera: bool = False) -> None:
+        """Open a scene or a session file. Settings stay when it is a scene, but for the camera's: that was another
+        scene's unless `keep_camera` says otherwise."""
+        settings = self.settings if keep_camera else self.settings.model_copy(update={"camera": CameraSettings()})
+        source: str | Path = path
+        if str(path).lower().endswith(".toml"):
+            from pmviewer.output.session_file import read_session
+
+            try:
+                saved = read_session(Path(path))
+            except (PmviewerError, OSError) as error:
+                self.say("error", str(error))
+                return
+            source, settings = saved.scene, saved.settings
+        self._opening = str(path)
+        self.session.open(source, settings)
+
+    def say(self, level: Level, text: str) -> None:
+        """A line for the log, from any thread."""
+        self._take(Message(level, text))
+
+    def _take(self, message: Message) -> None:
+        self.log.append(message)
+        if message.level == "error":
+            self.toasts.append(Toast(message))
+
+    def poll(self) -> None:
+        """Once per window frame: collect the session's messages."""
+        for message in self.session.take_messages():
+            self._take(message)
+        self.toasts = [toast for toast in self.toasts if not toast.is_over()][-4:]

@@ -1,0 +1,63 @@
+"""One line at the bottom: what the session does and how far it is."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from pmviewer.viewer import theme
+from pmviewer.viewer.format import duration, grouped, si
+from pmviewer.viewer.state import ViewerState
+
+_COLOURS = {"rendering": theme.ACCENT, "finished": theme.GOOD, "failed": theme.ERROR, "paused": theme.WARNING}
+
+
+def status_parts(state: ViewerState) -> list[str]:
+    """The pieces of the line after the state, in order of importance."""
+    frame = state.frame
+    if frame is None:
+        return []
+    s = frame.statistics
+    parts = [f"pass {grouped(s.passes)}" if not frame.coarse else "coarse"]
+    parts.append(f"{si(s.emitted)} emitted")
+    parts += [f"{name} {si(count)}" for name, count in s.stored.items()]
+    radius = s.radius.get("global") or next(iter(s.radius.values()), 0.0)
+    if radius:
+        parts.append(f"r {si(radius, 'm')}")
+    if s.rays:
+        parts.append(f"{si(s.rays_per_second, 'rays/s')}")
+    parts.append(duration(s.seconds))
+    dropped = sum(s.dropped.values())
+    if dropped:
+        parts.append(f"{grouped(dropped)} samples dropped")
+    return parts
+
+
+def draw_status_bar(state: ViewerState) -> None:
+    status = state.session.status
+    colour = _COLOURS.get(status.state, theme.TEXT)
+    imgui.text_colored(imgui.ImVec4(*colour), status.state)
+    if status.text and status.text != status.state:
+        imgui.same_line()
+        imgui.text_unformatted(theme.drawable(status.text))
+    busy = status.state in ("loading", "preparing")
+    em = imgui.get_font_size()
+    if busy or (status.state == "rendering" and status.progress is not None):
+        imgui.same_line()
+        fraction = status.progress if status.progress is not None else -0.4 * imgui.get_time()
+        text = f"{status.progress:.0%}" if status.progress is not None else ""
+        imgui.push_style_color(imgui.Col_.plot_histogram, theme.with_alpha(theme.ACCENT, 0.55))
+        imgui.progress_bar(fraction, (7 * em, 1.1 * em), text)
+        imgui.pop_style_color()
+        if not busy:
+            imgui.set_item_tooltip(f"{grouped(status.passes)} of {grouped(state.settings.render.passes)} passes")
+    for part in status_parts(state):
+        imgui.same_line()
+        imgui.text_disabled("·")
+        imgui.same_line()
+        imgui.text_unformatted(theme.drawable(part))
+    for job in state.jobs.running:
+        imgui.same_line()
+        imgui.text_disabled("·")
+        imgui.same_line()
+        waited = f" {duration(job.seconds)}" if job.seconds > 0.5 else ""
+        imgui.text_colored(imgui.ImVec4(*theme.ACCENT), f"{job.title} …{waited}")

@@ -1,0 +1,210 @@
+"""The picture's panel: fits it into the panel, redraws it when something changed, and turns mouse and keys into camera
+moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import moderngl
+import numpy as np
+from imgui_bundle import imgui
+
+from pmviewer.render.camera import CameraPose
+from pmviewer.settings import Display
+from pmviewer.viewer import controls
+from pmviewer.viewer.picture import Picture, Target
+from pmviewer.viewer.shortcuts import K
+from pmviewer.viewer.state import ViewerState
+from pmviewer.viewer.viewport_hud import draw_hud
+
+MOST_ZOOM = 64.0
+_FLY_AXES = {K.d: (1, 0, 0), K.a: (-1, 0, 0), K.e: (0, 1, 0), K.q: (0, -1, 0), K.w: (0, 0, 1), K.s: (0, 0, -1)}
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How the picture lies in the panel: `zoom` 1 shows all of it, `center` is the picture's point (0 to 1) in the
+    panel's middle."""
+
+    zoom: float = 1.0
+    center: tuple[float, float] = (0.5, 0.5)
+
+    def rectangle(self, panel: tuple[float, float], aspect: float) -> tuple[float, float, float, float]:
+        """Left, top, width and height of a picture of that width/height ratio."""
+        width = min(panel[0], panel[1] * aspect) * self.zoom
+        height = width / aspect
+        return panel[0] / 2 - self.center[0] * width, panel[1] / 2 - self.center[1] * height, width, height
+
+
+class Viewport:
+    """`gui` lays out and handles the mouse; `render` runs before the next frame and draws when something changed."""
+
+    def __init__(self, state: ViewerState) -> None:
+        self.state = state
+        self.picture: Picture | None = None
+        self.fit = Fit()
+        self.redraws = 0
+        """How often the picture was drawn: an idle window draws nothing."""
+        self.origin = (0.0, 0.0)
+        self.size = (0.0, 0.0)
+        self._ratio = 1.0
+        self._texture: moderngl.Texture | None = None
+        self._drawn_key: Any = None
+        self._flew_with_right = False
+        self.draw_toasts: Callable[[], None] = lambda: None
+
+    # drawing ----------------------------------------------------------------------------------------------------
+
+    def shown_camera(self) -> CameraPose | None:
+        """The frame's camera, so that points lie on the picture; the newest one when only geometry is shown."""
+        frame = self.state.frame
+        if frame is None or self.state.settings.display.view == "geometry":
+            return self.state.live_camera() if self.state.session.geometry is not None else None
+        return frame.camera
+
+    def rectangle(self) -> tuple[float, float, float, float]:
+        """The picture's left, top, width and height in the panel, in points."""
+        camera = self.shown_camera()
+        aspect = camera.width / camera.height if camera else 1.0
+        return self.fit.rectangle(self.size, aspect)
+
+    def target(self) -> Target:
+        """The panel in pixels."""
+        left, top, width, height = (round(v * self._ratio) for v in self.rectangle())
+        size = round(self.size[0] * self._ratio), round(self.size[1] * self._ratio)
+        return Target(size, (left, top, max(width, 1), max(height, 1)), self._ratio)
+
+    def render(self) -> None:
+        """Bring the picture's texture up to date, if anything it shows has changed."""
+        picture = self.picture
+        if picture is None or min(self.size) < 1:
+            return
+        if self.state.scene_changed():
+            picture.forget_frame()
+            self.fit = Fit()
+        settings, frame = self.state.settings, self.state.frame
+        changed = picture.upload_geometry(self.state.session.geometry)
+        overlays = settings.overlays
+        if frame is not None:
+            shown = {"caustic": overlays.caustic.show, "global": overlays.global_.show}
+            changed |= picture.upload_frame(frame, settings.display.view, shown)
+        camera, target = self.shown_camera(), self.target()
+        navigating = self.state.navigating and picture.software
+        key = (camera, target, settings.display, overlays, navigating)
+        if changed or key != self._drawn_key:
+            self._texture = picture.draw("window", target, camera, settings.display, overlays, navigating=navigating)
+            self._drawn_key = key
+            self.redraws += 1
+
+    def capture(self, *, overlays: bool) -> np.ndarray | None:
+        """(height, width, 3) uint8: the picture at its own resolution, with or without the points."""
+        picture, camera = self.picture, self.shown_camera()
+        if picture is None or camera is None:
+            return None
+        settings = self.state.settings
+        size = camera.width, camera.height
+        target = Target(size, (0, 0, *size))
+        picture.draw("capture", target, camera, settings.display, settings.overlays if overlays else None)
+        return picture.read("capture")
+
+    # interface --------------------------------------------------------------------------------------------------
+
+    def gui(self) -> None:
+        available, corner = imgui.get_content_region_avail(), imgui.get_cursor_screen_pos()
+        self.size = max(available.x, 1.0), max(available.y, 1.0)
+        self.origin = corner.x, corner.y
+        self._ratio = imgui.get_io().display_framebuffer_scale.x or 1.0
+        if self._texture is not None:
+            imgui.image(imgui.ImTextureRef(self._texture.glo), self.size, (0, 1), (1, 0))
+        imgui.set_cursor_screen_pos(corner)
+        buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_middle
+        imgui.invisible_button("##picture", self.size, buttons | imgui.ButtonFlags_.mouse_button_right)
+        hovered, active = imgui.is_item_hovered(), imgui.is_item_active()
+        if hovered:
+            imgui.set_item_key_owner(imgui.Key.mouse_wheel_y)
+        pose = self.state.live_camera()
+        if pose is not None:
+            self._handle(pose, hovered, active)
+        draw_hud(self, hovered)
+        self.draw_toasts()
+
+    def _handle(self, pose: CameraPose, hovered: bool, active: bool) -> None:
+        io = imgui.get_io()
+        before = pose
+        geometry = self.state.session.geometry
+        radius = float(geometry.radius) if geometry is not None else 1.0
+        if geometry is not None and self.state.settings.camera.target == "auto":
+            pose = controls.with_pivot(pose, geometry.center, radius)
+            before = pose
+        height = max(self.rectangle()[3], 1.0)
+        dx, dy = io.mouse_delta.x / height, io.mouse_delta.y / height
+        right = active and imgui.is_mouse_down(imgui.MouseButton_.right)
+        if hovered and io.mouse_wheel and io.key_ctrl:
+            self._magnify(io.mouse_wheel)
+        elif hovered and io.mouse_wheel:
+            pose = controls.zoom(pose, io.mouse_wheel, radius)
+        if active and io.key_ctrl:
+            self._shift(io.mouse_delta.x, io.mouse_delta.y)
+        elif active and (dx or dy):
+            pose = self._drag(pose, dx, dy, right, radius)
+        if not right:
+            self._flew_with_right = False
+        if (self.state.flying or right) and not io.want_text_input and not io.key_ctrl:
+            pose = self._fly(pose, radius, right)
+        if pose != before:
+            self.state.move_camera(pose)
+
+    def _drag(self, pose: CameraPose, dx: float, dy: float, right: bool, radius: float) -> CameraPose:
+        if imgui.is_mouse_down(imgui.MouseButton_.middle) or (imgui.get_io().key_shift and not self.state.flying):
+            return controls.pan(pose, dx, dy)
+        if self.state.flying or self._flew_with_right:
+            return controls.look(pose, dx, dy)
+        if right:
+            return controls.zoom(pose, (dx - dy) * 12, radius)
+        return controls.orbit(pose, dx, dy)
+
+    def _fly(self, pose: CameraPose, radius: float, right: bool) -> CameraPose:
+        axes = np.sum([axis for key, axis in _FLY_AXES.items() if imgui.is_key_down(key)] or [(0, 0, 0)], axis=0)
+        if not np.any(axes):
+            return pose
+        self._flew_with_right = self._flew_with_right or right
+        io = imgui.get_io()
+        step = 0.5 * radius * min(io.delta_time, 0.1) * (4 if io.key_shift else 1)
+        return controls.fly(pose, *(float(a) for a in axes), step)
+
+    def _magnify(self, notches: float) -> None:
+        """Zoom into the pixels, keeping the point under the mouse where it is."""
+        mouse = imgui.get_mouse_pos()
+        x, y = mouse.x - self.origin[0], mouse.y - self.origin[1]
+        left, top, width, height = self.rectangle()
+        u, v = (x - left) / width, (y - top) / height
+        zoom = min(max(self.fit.zoom * 1.25**notches, 1.0), MOST_ZOOM)
+        grown = zoom / self.fit.zoom
+        center = u + (self.fit.center[0] - u) / grown, v + (self.fit.center[1] - v) / grown
+        self.fit = Fit() if zoom == 1.0 else Fit(zoom, center)
+
+    def _shift(self, dx: float, dy: float) -> None:
+        if self.fit.zoom > 1:
+            _, _, width, height = self.rectangle()
+            u, v = self.fit.center
+            self.fit = replace(self.fit, center=(min(max(u - dx / width, 0), 1), min(max(v - dy / height, 0), 1)))
+
+    def pixel_under_mouse(self) -> tuple[int, int] | None:
+        """Pixel (x, y) of the image, or None when the mouse is elsewhere."""
+        frame = self.state.frame
+        if frame is None:
+            return None
+        mouse = imgui.get_mouse_pos()
+        left, top, width, height = self.rectangle()
+        u = (mouse.x - self.origin[0] - left) / width
+        v = (mouse.y - self.origin[1] - top) / height
+        if not (0 <= u < 1 and 0 <= v < 1):
+            return None
+        return int(u * frame.camera.width), int(v * frame.camera.height)
+
+
+def is_data_view(display: Display) -> bool:
+    """True for views that exposure and tone curve leave alone."""
+    return display.view in ("albedo", "normal", "depth", "geometry")

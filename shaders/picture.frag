@@ -1,0 +1,45 @@
+#version 330 core
+// A plane of the frame on the screen. The tone curves are those of pmviewer/output/tone.py.
+uniform sampler2D plane;
+uniform int content;      // 0 radiance, 1 reflectance, 2 unit vector, 3 depth
+uniform int curve;        // 0 sRGB, 1 Reinhard, 2 filmic, 3 linear
+uniform float scale;      // 2^exposure
+uniform vec2 depth_range; // nearest and farthest finite depth
+
+in vec2 uv;
+out vec4 colour;
+
+vec3 srgb_oetf(vec3 x) {
+    x = clamp(x, 0.0, 1.0);
+    return mix(12.92 * x, 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, vec3(greaterThan(x, vec3(0.0031308))));
+}
+
+vec3 tone(vec3 x) {
+    x = clamp(x * scale, 0.0, 1e15); // beyond, squares overflow
+    if (curve == 1) return srgb_oetf(x / (1.0 + x));
+    // Narkowicz' fit of the ACES film curve.
+    if (curve == 2) return srgb_oetf(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14));
+    if (curve == 3) return clamp(x, 0.0, 1.0);
+    return srgb_oetf(x);
+}
+
+void main() {
+    vec4 value = texture(plane, uv);
+    if (any(isnan(value)) || any(isinf(value))) {
+        colour = vec4(1.0, 0.0, 1.0, 1.0); // not a number: magenta, which nobody overlooks
+        return;
+    }
+    vec3 shown;
+    if (content == 0) {
+        shown = tone(value.rgb);
+    } else if (content == 1) {
+        shown = srgb_oetf(value.rgb);
+    } else if (content == 2) {
+        shown = value.rgb != vec3(0.0) ? value.rgb * 0.5 + 0.5 : vec3(0.0);
+    } else {
+        // Near is bright; pixels that see nothing are black.
+        float span = max(depth_range.y - depth_range.x, 1e-30);
+        shown = vec3(value.r > 0.0 ? 1.0 - 0.9 * clamp((value.r - depth_range.x) / span, 0.0, 1.0) : 0.0);
+    }
+    colour = vec4(shown, 1.0);
+}
