@@ -11,9 +11,8 @@ from pmviewer.settings import SETTINGS, get
 from pmviewer.viewer import controls
 from pmviewer.viewer.dialogs import FileDialogs
 from pmviewer.viewer.exports import Exports, default_path, fresh_path
-from pmviewer.viewer.layout import VIEWPORT
 from pmviewer.viewer.state import ViewerState
-from pmviewer.viewer.viewport import Fit, Viewport
+from pmviewer.viewer.viewport import VIEWPORT, Fit, Viewport
 
 SCENE_PATTERNS = ["*.xml", "*.toml", "*.glb", "*.gltf", "*.obj", "*.ply", "*.stl"]
 EXPOSURE_STEP = 0.5

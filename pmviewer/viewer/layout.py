@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from imgui_bundle import hello_imgui, imgui
 
 from pmviewer.viewer import theme
+from pmviewer.viewer.viewport import VIEWPORT
 
 Draw = Callable[[], None]
-VIEWPORT = "Viewport"
 PANELS = ("Settings", "Overlays", "Statistics", "Log")
 _PLACE = {"Settings": "Left", "Overlays": "Right", "Statistics": "Bottom", "Log": "Bottom"}
 WINDOW_SIZE = (1440, 900)
@@ -103,6 +103,6 @@ def _dock(docking: hello_imgui.DockingParams, callbacks: Callbacks) -> None:
         hello_imgui.DockingSplit("MainDockSpace", "Bottom", imgui.Dir.down, 0.24),
     ]
     picture = hello_imgui.DockableWindow(VIEWPORT, "MainDockSpace", callbacks.viewport, True, False)
-    picture.imgui_window_flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
+    picture.call_begin_end = False  # the viewport opens its window itself, without padding
     panels = [hello_imgui.DockableWindow(label, _PLACE[label], callbacks.panels[label]) for label in PANELS]
     docking.dockable_windows = [picture, *panels]

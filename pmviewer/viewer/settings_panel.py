@@ -27,13 +27,15 @@ class SettingsPanel:
         self._groups = [(heading, list(infos)) for heading, infos in groupby(listed, key=lambda info: info.group)]
 
     def gui(self) -> None:
-        if self.begin_rows("pinned"):
+        # The groups below scroll: leave the same room beside these rows as the scroll bar takes there.
+        if self.begin_rows("pinned", room=imgui.get_style().scrollbar_size):
             for path in PINNED:
                 self.row(SETTINGS[path])
             imgui.end_table()
         imgui.spacing()
         self._filter_row()
-        if imgui.begin_child("##groups", (0, 0)):
+        flags = imgui.WindowFlags_.always_vertical_scrollbar
+        if imgui.begin_child("##groups", (0, 0), imgui.ChildFlags_.none, flags):
             for heading, infos in self._groups:
                 self._group(heading, infos)
         imgui.end_child()
@@ -72,9 +74,10 @@ class SettingsPanel:
         return get(self.state.settings, path)
 
     @staticmethod
-    def begin_rows(name: str, name_em: float = 8.2) -> bool:
+    def begin_rows(name: str, name_em: float = 7.2, room: float = 0) -> bool:
         """Open the table that `row` fills; end it with `imgui.end_table()` when True."""
-        if not imgui.begin_table(f"##{name}", 3):
+        width = imgui.get_content_region_avail().x - room
+        if not imgui.begin_table(f"##{name}", 3, imgui.TableFlags_.none, (width, 0)):
             return False
         em = imgui.get_font_size()
         imgui.table_setup_column("name", imgui.TableColumnFlags_.width_fixed, name_em * em)

@@ -13,10 +13,7 @@ Rows = list[tuple[str, str]]
 
 
 def photon_rows(s: Statistics) -> Rows:
-    rows = [("Photons emitted", grouped(s.emitted))]
-    rows += [(f"Stored, {name} map", grouped(count)) for name, count in s.stored.items()]
-    rows += [(f"Stored in the last pass, {name}", grouped(count)) for name, count in s.stored_in_pass.items()]
-    rows += [(f"Radius, {name} map", si(radius, "m")) for name, radius in s.radius.items()]
+    rows = [("Emitted", grouped(s.emitted))]
     if s.bytes_per_photon:
         rows.append(("Memory of a photon", f"{s.bytes_per_photon:.1f} bytes"))
     rows.append(("Memory of the maps", data_size(s.map_bytes)))
@@ -52,6 +49,7 @@ class StatisticsPanel:
             return
         imgui.table_next_column()
         _table("Photons", photon_rows(s))
+        _maps(s)
         imgui.table_next_column()
         _table("Time", time_rows(s))
         imgui.table_next_column()
@@ -77,6 +75,34 @@ class StatisticsPanel:
             imgui.text_disabled("No sample was dropped.")
 
 
+def _maps(s: Statistics) -> None:
+    """A row for each photon map."""
+    if not s.stored or not imgui.begin_table("##maps", 4):
+        return
+    imgui.table_setup_column("map", imgui.TableColumnFlags_.width_stretch, 0.8)
+    for name in ("stored", "in last pass", "radius"):
+        imgui.table_setup_column(name, imgui.TableColumnFlags_.width_stretch, 1.0)
+    imgui.table_next_row()
+    for name in ("map", "stored", "in last pass", "radius"):
+        imgui.table_next_column()
+        _right(name, dim=True) if name != "map" else imgui.text_colored(imgui.ImVec4(*theme.DIM), name)
+    for name, count in s.stored.items():
+        imgui.table_next_row()
+        imgui.table_next_column()
+        imgui.text_unformatted(name)
+        radius = s.radius.get(name, 0.0)
+        for text in (grouped(count), grouped(s.stored_in_pass.get(name, 0)), si(radius, "m") if radius else "–"):
+            imgui.table_next_column()
+            _right(text)
+    imgui.end_table()
+
+
+def _right(text: str, *, dim: bool = False) -> None:
+    offset = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(offset, 0))
+    imgui.text_colored(imgui.ImVec4(*(theme.DIM if dim else theme.TEXT)), text)
+
+
 def _table(title: str, rows: Rows) -> None:
     """Names on the left, right-aligned values."""
     imgui.text_colored(imgui.ImVec4(*theme.DIM), title)
@@ -89,7 +115,5 @@ def _table(title: str, rows: Rows) -> None:
         imgui.table_next_column()
         imgui.text_unformatted(theme.drawable(name))
         imgui.table_next_column()
-        offset = imgui.get_content_region_avail().x - imgui.calc_text_size(value).x
-        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(offset, 0))
-        imgui.text_unformatted(value)
+        _right(value)
     imgui.end_table()

@@ -34,6 +34,7 @@ def status_parts(state: ViewerState) -> list[str]:
 
 def draw_status_bar(state: ViewerState) -> None:
     status = state.session.status
+    imgui.align_text_to_frame_padding()
     colour = _COLOURS.get(status.state, theme.TEXT)
     imgui.text_colored(imgui.ImVec4(*colour), status.state)
     if status.text and status.text != status.state:
@@ -46,7 +47,7 @@ def draw_status_bar(state: ViewerState) -> None:
         fraction = status.progress if status.progress is not None else -0.4 * imgui.get_time()
         text = f"{status.progress:.0%}" if status.progress is not None else ""
         imgui.push_style_color(imgui.Col_.plot_histogram, theme.with_alpha(theme.ACCENT, 0.55))
-        imgui.progress_bar(fraction, (7 * em, 1.1 * em), text)
+        imgui.progress_bar(fraction, (7 * em, imgui.get_frame_height() * 0.9), text)
         imgui.pop_style_color()
         if not busy:
             imgui.set_item_tooltip(f"{grouped(status.passes)} of {grouped(state.settings.render.passes)} passes")

@@ -77,14 +77,16 @@ def apply() -> None:
         c.table_border_strong: 0.25,
         c.table_border_light: 0.22,
         c.table_row_bg_alt: 0.18,
-        c.slider_grab: 0.52,
+        c.checkbox_selected_bg: 0.235,
     }.items():
         k(item, grey(level))
     k(c.text, imgui.ImVec4(*TEXT))
     k(c.text_disabled, imgui.ImVec4(*FAINT))
     k(c.resize_grip, grey(0.3, 0.4))
+    # Sliders are filled bars (see `widgets.filled_bar`): a grab would cover the number in their middle.
+    k(c.slider_grab, grey(0, 0))
+    k(c.slider_grab_active, grey(0, 0))
     for item, alpha in {
-        c.slider_grab_active: 1.0,
         c.check_mark: 1.0,
         c.separator_hovered: 0.6,
         c.separator_active: 0.9,
@@ -121,5 +123,8 @@ def _spacing(style: imgui.Style) -> None:
     style.frame_border_size = 0
     style.popup_border_size = 1
     style.tab_bar_overline_size = 2
+    style.window_menu_button_position = imgui.Dir.none
+    style.docking_node_has_close_button = False
+    style.tab_close_button_min_width_selected = 0
     style.separator_text_padding = (0, 4)
     style.hover_stationary_delay = 0.25

@@ -19,6 +19,7 @@ from pmviewer.viewer.shortcuts import K
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport_hud import draw_hud
 
+VIEWPORT = "Viewport"
 MOST_ZOOM = 64.0
 _FLY_AXES = {K.d: (1, 0, 0), K.a: (-1, 0, 0), K.e: (0, 1, 0), K.q: (0, -1, 0), K.w: (0, 0, 1), K.s: (0, 0, -1)}
 
@@ -112,6 +113,16 @@ class Viewport:
     # interface --------------------------------------------------------------------------------------------------
 
     def gui(self) -> None:
+        """The window with the picture in it."""
+        flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
+        imgui.push_style_var(imgui.StyleVar_.window_padding, (0, 0))
+        shown, _ = imgui.begin(VIEWPORT, None, flags | imgui.WindowFlags_.no_collapse)
+        imgui.pop_style_var()
+        if shown:
+            self._contents()
+        imgui.end()
+
+    def _contents(self) -> None:
         available, corner = imgui.get_content_region_avail(), imgui.get_cursor_screen_pos()
         self.size = max(available.x, 1.0), max(available.y, 1.0)
         self.origin = corner.x, corner.y

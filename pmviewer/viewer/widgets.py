@@ -78,7 +78,7 @@ class SettingWidgets:
             return self._vector(info, value, resolved)
         if self.typing is not None and self.typing.path == info.path:
             return self._typed(info)
-        return self._number(info, value, resolved)
+        return self._number(info, value, resolved, width)
 
     def start_typing(self, info: SettingInfo, value: Any) -> None:
         text = f"{value}" if info.kind is int or isinstance(value, str) else f"{value:.6g}"
@@ -121,7 +121,7 @@ class SettingWidgets:
             typing.fresh = False
         return None
 
-    def _number(self, info: SettingInfo, value: Any, resolved: Any) -> Any:
+    def _number(self, info: SettingInfo, value: Any, resolved: Any, width: float) -> Any:
         automatic = isinstance(value, str)
         current = resolved if automatic else value
         if current is None:
@@ -129,7 +129,7 @@ class SettingWidgets:
             text = "auto"
         else:
             text = ("auto · " if automatic else "") + value_text(info, current)
-        new = self._slide(info, current, theme.drawable(text).replace("%", "%%"))
+        new = self._slide(info, current, theme.drawable(text).replace("%", "%%"), width)
         if imgui.is_item_activated() and not imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
             self._before[info.path] = value
         clicked = imgui.is_item_hovered() and imgui.is_mouse_clicked(imgui.MouseButton_.left)
@@ -139,23 +139,34 @@ class SettingWidgets:
             return before
         return new
 
-    def _slide(self, info: SettingInfo, current: Any, text: str) -> Any:
+    def _slide(self, info: SettingInfo, current: Any, text: str, width: float) -> Any:
         """The slider or drag field; None when it didn't move."""
         name = f"##{info.path}"
+        imgui.push_style_color(imgui.Col_.frame_bg, theme.grey(0, 0))
+        imgui.push_style_color(imgui.Col_.frame_bg_hovered, theme.grey(1, 0.06))
+        imgui.push_style_color(imgui.Col_.frame_bg_active, theme.grey(1, 0.10))
+        try:
+            return self._slide_over_bar(info, name, current, text, width)
+        finally:
+            imgui.pop_style_color(3)
+
+    def _slide_over_bar(self, info: SettingInfo, name: str, current: Any, text: str, width: float) -> Any:
         low, high = info.lower, info.upper
         assert low is not None
         assert high is not None
+        relative = high - low > WIDE_RANGE and info.scale != "log"
+        filled_bar(width, 0.0 if relative else slider_share(info, current))
         if info.scale == "log":
             exponent = math.log10(min(max(current, low), high))
             changed, new = imgui.slider_float(name, exponent, math.log10(low), math.log10(high), text, _FLAGS)
             if not changed:
                 return None
             number = min(max(rounded(10.0**new), low), high)
-        elif info.kind is int and high - low > WIDE_RANGE:
+        elif info.kind is int and relative:
             changed, number = imgui.drag_int(name, int(current), 1.0, int(low), int(high), text, _FLAGS)
         elif info.kind is int:
             changed, number = imgui.slider_int(name, int(current), int(low), int(high), text, _FLAGS)
-        elif high - low > WIDE_RANGE:
+        elif relative:
             changed, number = imgui.drag_float(name, current, 0.1, low, high, text, _FLAGS)
         else:
             changed, number = imgui.slider_float(name, current, low, high, text, _FLAGS)
@@ -164,6 +175,33 @@ class SettingWidgets:
             return None
         number = info.kind(round(number)) if info.kind is int else float(number)
         return number if number != current else None
+
+
+def slider_share(info: SettingInfo, value: float) -> float:
+    """Where the value lies between the setting's bounds, 0 to 1, on the setting's scale."""
+    assert info.lower is not None
+    assert info.upper is not None
+    low, high = info.lower, info.upper
+    if info.scale == "log":
+        low, high, value = math.log10(low), math.log10(high), math.log10(max(value, low))
+    return min(max((value - low) / (high - low), 0.0), 1.0)
+
+
+def filled_bar(width: float, share: float) -> None:
+    """The ground of the slider that is drawn next, filled from the left up to its value."""
+    size = imgui.get_content_region_avail().x if width < 0 else width
+    x, y = imgui.get_cursor_screen_pos()
+    bottom = y + imgui.get_frame_height()
+    rounding = imgui.get_style().frame_rounding
+    draw = imgui.get_window_draw_list()
+    alpha = imgui.get_style().alpha
+    draw.add_rect_filled((x, y), (x + size, bottom), imgui.get_color_u32(theme.grey(0.235, alpha)), rounding)
+    if share > 0:
+        end = x + max(size * share, 2)
+        fill = imgui.get_color_u32(theme.with_alpha(theme.ACCENT, 0.30 * alpha))
+        edge = imgui.get_color_u32(theme.with_alpha(theme.ACCENT, 0.85 * alpha))
+        draw.add_rect_filled((x, y), (end, bottom), fill, rounding)
+        draw.add_rect_filled((end - 2, y), (end, bottom), edge)
 
 
 def icon_button(icon: str, name: str, tooltip: str, *, on: bool = False, enabled: bool = True) -> bool:
