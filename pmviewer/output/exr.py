@@ -132,7 +132,8 @@ def read_reference(path: str | Path) -> NDArray[np.float32]:
     layers, _ = read_exr(path)
     image = layers.get(BEAUTY)
     if image is None or image.shape[2] == 2:
-        raise SceneError(f"The file has no channels R, G, B, only {', '.join(layers)}.", path)
+        others = ", ".join(name for name in layers if name)
+        raise SceneError(f"The file has no channels R, G, B{f', only the layers {others}' if others else ''}.", path)
     return np.ascontiguousarray(np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[..., :3])
 
 

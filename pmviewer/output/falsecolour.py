@@ -33,23 +33,15 @@ def _oklab_to_rgb(lab: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _table(size: int) -> NDArray[np.float32]:
-    """Lightness rises evenly while the hue turns from violet over blue and green to yellow; chroma swells in between
-    and is reduced where the screen couldn't show it."""
+    """Lightness rises evenly while the hue turns from violet over blue and green to yellow. Chroma is lowest in the
+    middle, where the screen's gamut is narrowest, and never leaves the gamut."""
     t = np.linspace(0.0, 1.0, size)
     lightness = 0.22 + 0.72 * t
     hue = np.radians(305.0 - 200.0 * t)
-    chroma = 0.10 + 0.07 * np.sin(math.pi * (0.15 + 0.8 * t))
-    # The largest share of the chroma that stays in gamut, by bisection; a share of 0 is grey and always does.
-    low, high = np.zeros(size), np.ones(size)
-    for _ in range(24):
-        share = (low + high) / 2
-        c = chroma * share
-        rgb = _oklab_to_rgb(np.stack([lightness, c * np.cos(hue), c * np.sin(hue)], 1))
-        fits = np.all((rgb >= 0) & (rgb <= 1), axis=1)
-        low, high = np.where(fits, share, low), np.where(fits, high, share)
-    inside = chroma * low
-    rgb = _oklab_to_rgb(np.stack([lightness, inside * np.cos(hue), inside * np.sin(hue)], 1))
-    return srgb_encode(np.clip(rgb, 0.0, 1.0).astype(np.float32))
+    d = t - 0.45
+    chroma = 0.085 + np.where(d < 0, 0.1, 0.28) * d**2
+    rgb = _oklab_to_rgb(np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], 1))
+    return srgb_encode(rgb.astype(np.float32))
 
 
 COLOURS: NDArray[np.float32] = _table(256)
