@@ -197,9 +197,9 @@ def nearest(tree, px, py, pz, k, r2, keys, facing, nx, ny, nz, steepness, class_
     node, bound = _i8(1), _f4(0.0)
     while True:
         while node < leaves:
-            axis = _i8(load_i4(tree.planes, 2 * node + 1))
-            side = stack_get_f4(point, axis) - load_f4(tree.planes, 2 * node)
-            offset = stack_get_f4(offsets, axis)
+            along = _i8(load_i4(tree.planes, 2 * node + 1))
+            side = stack_get_f4(point, along) - load_f4(tree.planes, 2 * node)
+            offset = stack_get_f4(offsets, along)
             near = 2 * node + _i8(side >= _f4(0.0))
             far_bound = bound - offset * offset + side * side
             if far_bound < r2:
@@ -208,7 +208,7 @@ def nearest(tree, px, py, pz, k, r2, keys, facing, nx, ny, nz, steepness, class_
                 stack_put_f4(stack, base + 1, far_bound)
                 for other in range(3):
                     stack_put_f4(stack, base + 2 + other, stack_get_f4(offsets, other))
-                stack_put_f4(stack, base + 2 + axis, side)
+                stack_put_f4(stack, base + 2 + along, side)
                 waiting += 1
             node = near
         leaf = node - leaves
