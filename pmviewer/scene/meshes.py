@@ -120,7 +120,7 @@ def _stl_meshes(path: Path) -> list[Mesh]:
 
     data = path.read_bytes()
     is_binary = len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
-    if not is_binary and not data.lstrip()[:5].lower() == b"solid":
+    if not is_binary and data.lstrip()[:5].lower() != b"solid":
         hint = "Is the file complete? Export it again."
         raise SceneError("This is neither a binary nor a text STL file.", path, hint=hint)
     loaded = load_stl(BytesIO(data if is_binary else as_utf8(data)))

@@ -78,7 +78,7 @@ def _disk(p: Properties, to_world: Matrix, flip: bool) -> Geometry:
 def _cylinder(p: Properties, to_world: Matrix, flip: bool) -> Geometry:
     p0, p1 = p.point("p0", (0.0, 0.0, 0.0)), p.point("p1", (0.0, 0.0, 1.0))
     radius = abs(p.number("radius", 1.0))
-    axis = np.subtract(p1, p0)
+    axis = np.subtract(p1, p0, dtype=np.float64)
     length = float(np.linalg.norm(axis))
     if length == 0:
         return Cylinder(p0, p0, radius, flip)

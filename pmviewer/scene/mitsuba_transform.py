@@ -43,7 +43,7 @@ def look_at(origin: tuple[float, ...], target: tuple[float, ...], up: tuple[floa
 
     A zero `up` is replaced; ValueError when origin and target coincide or `up` is along the view.
     """
-    forward = np.subtract(target, origin)
+    forward = np.subtract(target, origin, dtype=np.float64)
     length = float(np.linalg.norm(forward))
     if length == 0:
         raise ValueError("expected a lookat whose origin and target differ")

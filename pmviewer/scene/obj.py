@@ -12,6 +12,7 @@ import numpy as np
 from pmviewer.scene.description import RGB, Material, Mesh, Shape
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
+from pmviewer.scene.primitives import fans
 from pmviewer.scene.texture import mean_of_image
 
 _MIRROR_MODELS, _GLASS_MODELS = (3, 5, 8), (4, 6, 7, 9)
@@ -27,7 +28,7 @@ def obj_parts(path: Path, skip_materials: bool) -> list[tuple[str, Mesh, str | N
     parts = []
     for name, kwargs in loaded.get("geometry", {}).items():
         vertices = np.asarray(kwargs["vertices"], np.float64)
-        faces = np.asarray(kwargs["faces"]).reshape(-1, 3).astype(np.int32)
+        faces = fans(np.asarray(kwargs["faces"])).astype(np.int32)  # quads come as quads
         normals = kwargs.get("vertex_normals")
         mesh = Mesh(vertices, faces, None if normals is None else np.asarray(normals, np.float64))
         visual = kwargs.get("visual")

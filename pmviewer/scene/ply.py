@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.description import Mesh
+from pmviewer.scene.primitives import fans
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
@@ -148,18 +149,8 @@ def _columns_of(rows: NDArray, element: _Element) -> dict[str, NDArray]:
         if p.count_type is None:
             columns[p.name] = rows[f"p{i}"]
         else:
-            columns[p.name] = _fans(rows[f"p{i}"])
+            columns[p.name] = fans(rows[f"p{i}"])
     return columns
-
-
-def _fans(polygons: NDArray) -> NDArray[np.int64]:
-    """(m, n) polygons of n corners as triangles (m·(n-2), 3)."""
-    n = polygons.shape[1]
-    if n < 3:
-        return np.zeros((0, 3), np.int64)
-    index = np.array([[0, i, i + 1] for i in range(1, n - 1)])
-    with np.errstate(invalid="ignore"):  # NaN as an index becomes one that is out of range
-        return polygons[:, index].reshape(-1, 3).astype(np.int64)
 
 
 def _read_records(data: bytes, offset: int, order: str, element: _Element) -> tuple[dict[str, NDArray], int]:
@@ -188,7 +179,7 @@ def _join(rows: list[NDArray], p: _Property) -> NDArray:
     sizes = np.array([len(r) for r in rows])
     for n in np.unique(sizes):
         if n >= 3:
-            triangles.append(_fans(np.stack([r for r in rows if len(r) == n])))
+            triangles.append(fans(np.stack([r for r in rows if len(r) == n])))
     return np.concatenate(triangles)
 
 

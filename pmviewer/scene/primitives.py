@@ -55,6 +55,16 @@ def disk(columns: int = 128) -> Mesh:
     )
 
 
+def fans(polygons: NDArray[np.number]) -> NDArray[np.int64]:
+    """(m, n) polygons of n corners as triangles (m·(n-2), 3)."""
+    n = polygons.shape[1]
+    if n < 3:
+        return np.zeros((0, 3), np.int64)
+    index = np.array([[0, i, i + 1] for i in range(1, n - 1)])
+    with np.errstate(invalid="ignore"):  # NaN as an index becomes one that is out of range
+        return polygons[:, index].reshape(-1, 3).astype(np.int64)
+
+
 def transformed(mesh: Mesh, m: Matrix, flip: bool = False) -> Mesh:
     """The mesh in world space. What was outside stays outside under a mirroring transformation, unless `flip`."""
     mirrored = mirrors(m)

@@ -1,0 +1,136 @@
+"""Every file in tests/broken gives its one clear error or warning, and none hangs."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from pmviewer.errors import SceneError
+from pmviewer.scene.load import load_scene
+from tests.scene.helpers import CAMERA, SKY, xml_file
+
+BROKEN = Path(__file__).resolve().parent.parent / "broken"
+
+# What the error says: the line (None where the format has none), then words that must be in it.
+ERRORS: dict[str, tuple[int | None, tuple[str, ...]]] = {
+    "broken_number.xml": (4, ("'radius'", "sphere", "expected a number", "1.2.3")),
+    "compressed.gltf": (None, ("KHR_draco_mesh_compression", "without compression")),
+    "cyclic_default.xml": (2, ("$b", "not defined", "before this line")),
+    "deep_nesting.xml": (1, ("nested deeper than 64",)),
+    "duplicate_id.xml": (5, ("'wall'", "already taken in line 4")),
+    "empty.xml": (1, ("The file is empty",)),
+    "entity_bomb.xml": (2, ("entities", "refused")),
+    "external_entity.xml": (2, ("entities", "refused")),
+    "garbage.glb": (None, ("not a glTF file",)),
+    "garbage.gltf": (None, ("not a glTF file",)),
+    "garbage.obj": (None, ("no triangle",)),
+    "garbage.ply": (None, ("not a PLY file",)),
+    "garbage.stl": (None, ("neither a binary nor a text STL",)),
+    "garbage.xml": (1, ("not well-formed XML",)),
+    "huge_accessor.gltf": (None, ("Accessor 0", "1000000000000000")),
+    "huge_number.xml": (4, ("'radius'", "between -1e+30 and 1e+30", "1e300")),
+    "huge_size.xml": (2, ("1 to 16384 pixels", "2000000000", "width and height")),
+    "include.xml": (4, ("<include> is refused", "Copy")),
+    "index_out_of_range.obj": (None, ("can't be decoded", "out of bounds")),
+    "index_out_of_range.ply": (None, ("Triangle 0", "does not exist", "there are 5")),
+    "index_out_of_range.xml": (4, ("index_out_of_range.ply", "Triangle 0", "does not exist")),
+    "lookat_up_along_view.xml": (2, ("lookat", "'up' is not along the view")),
+    "missing_buffer.gltf": (None, ("gone.bin", "does not exist", "Copy it")),
+    "missing_mesh.xml": (4, ("meshes/gone.ply", "does not exist", "Put it there")),
+    "model.fbx": (None, ("'.fbx' can't be opened", ".glb")),
+    "nan_number.xml": (4, ("'center'", "expected a number", "nan")),
+    "negative_light.xml": (4, ("'radiance'", "must not be negative")),
+    "no_light.xml": (None, ("no light", "Add an <emitter>")),
+    "no_surface.xml": (None, ("no surface", "Add a <shape>")),
+    "no_triangles.stl": (None, ("no triangle",)),
+    "node_circle.gltf": (None, ("nodes contain each other",)),
+    "not_a_scene.xml": (1, ("<html>", "expected <scene>")),
+    "only_nan_vertices.ply": (None, ("no triangle", "3 × triangle with a NaN")),
+    "only_unknown_shapes.xml": (None, ("no surface", "line 4", "sdfgrid")),
+    "parameter_bomb.xml": (17, ("grows beyond 65536 characters",)),
+    "recursive_ref.xml": (4, ("contains itself", "circular")),
+    "singular_camera.xml": (2, ("sensor", "singular", "lookat")),
+    "truncated.glb": (None, ("cut off", "46 of 5000 bytes")),
+    "truncated.ply": (None, ("fewer than 3 rows of 'face'", "complete")),
+    "truncated.xml": (3, ("not well-formed XML", "complete")),
+    "unknown_encoding.xml": (1, ("encoding", "UTF-8")),
+    "unknown_ref.xml": (4, ("'velvet'", "not defined")),
+    "unsupported_light.xml": (None, ("no light", "line 4", "envmap")),
+    "zero_area_light.xml": (None, ("no light", "zero-area light")),
+    "zero_bytes.obj": (None, ("empty (0 bytes)",)),
+    "zero_bytes.ply": (None, ("empty (0 bytes)",)),
+    "zero_size.xml": (2, ("1 to 16384 pixels", "0 × 32")),
+}
+
+# Files that open all the same: words of a warning, and what was dropped.
+OPENS: dict[str, tuple[str, dict[str, int]]] = {
+    "camera_in_wall.xml": ("camera stands on the surface of 'rectangle", {}),
+    "nan_vertices.ply": ("no light", {"triangle with a NaN, infinite or huge vertex": 2}),
+    "nan_vertices.xml": ("", {"triangle with a NaN, infinite or huge vertex": 2}),
+    "unknown_bsdf.xml": ('line 4: <bsdf type="hair"> is not supported', {}),
+    "unknown_shape.xml": ('line 5: <shape type="bsplinecurve"> is not supported', {}),
+    "zero_radius.xml": ("", {"empty sphere": 1}),
+}
+
+
+def test_every_broken_file_has_its_expectation() -> None:
+    assert {p.name for p in BROKEN.iterdir()} == ERRORS.keys() | OPENS.keys()
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", ERRORS)
+def test_broken_file_gives_one_clear_error(name: str) -> None:
+    line, words = ERRORS[name]
+    with pytest.raises(SceneError) as caught:
+        load_scene(BROKEN / name)
+    assert caught.value.line == line
+    for word in (name, *words):
+        assert word in str(caught.value)
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", OPENS)
+def test_odd_file_opens_and_says_so(name: str) -> None:
+    words, dropped = OPENS[name]
+    scene = load_scene(BROKEN / name)
+    assert scene.dropped == dropped
+    assert any(words in w for w in scene.warnings) if words else scene.warnings == ()
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("name", ["nothing_here", "nothing.xml", "", "a\0b", "x" * 5000])
+def test_names_that_lead_nowhere(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SceneError):
+        load_scene(name)
+
+
+def test_unknown_name_lists_the_bundled_scenes() -> None:
+    with pytest.raises(SceneError, match="cornell_caustic, cornell_diffuse"):
+        load_scene("cornel_caustic")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+@pytest.mark.timeout(20)
+def test_pipes_and_devices_are_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.ply")
+    with pytest.raises(SceneError, match="not a regular file"):
+        load_scene(tmp_path / "pipe.ply")
+    mesh = '<shape type="ply"><string name="filename" value="{}"/></shape>'
+    for name in ("pipe.ply", "/dev/zero"):
+        with pytest.raises(SceneError, match="does not exist"):
+            load_scene(xml_file(tmp_path, mesh.format(name), CAMERA, SKY))
+
+
+@pytest.mark.timeout(60)
+def test_every_cut_of_a_binary_mesh_opens_or_raises(tmp_path: Path) -> None:
+    whole = (BROKEN.parent.parent / "scenes/cornell_caustic/meshes/red.ply").read_bytes()
+    path = tmp_path / "cut.ply"
+    for length in range(len(whole)):
+        path.write_bytes(whole[:length])
+        with pytest.raises(SceneError):
+            load_scene(path)
+    path.write_bytes(whole)
+    assert len(load_scene(path).shapes) == 2

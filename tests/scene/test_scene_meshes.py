@@ -1,0 +1,290 @@
+"""glTF, OBJ, PLY and STL, from files made here."""
+
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pmviewer.errors import SceneError
+from pmviewer.render.camera import resolve_camera
+from pmviewer.scene.description import BLACK, Mesh, Parallelogram, PointLight, Scene
+from pmviewer.scene.framing import bounds
+from pmviewer.scene.load import load_scene
+from pmviewer.scene.ply import read_ply
+from pmviewer.settings import CameraSettings
+from tests.scene.helpers import load
+
+TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+
+
+def gltf(folder: Path, binary: bool = True, **parts) -> Path:
+    """A glTF file with one triangle (positions, normals along +z) and whatever else is given."""
+    data = TRIANGLE.tobytes() + np.tile(np.array([0, 0, 1], np.float32), 3).tobytes()
+    header = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"byteLength": len(data)}],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 36},
+            {"buffer": 0, "byteOffset": 36, "byteLength": 36},
+        ],
+        "accessors": [{"bufferView": i, "componentType": 5126, "count": 3, "type": "VEC3"} for i in (0, 1)],
+        "meshes": [{"name": "tri", "primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1}, "material": 0}]}],
+        "materials": [{}],
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        **parts,
+    }
+    if not binary:
+        header["buffers"][0]["uri"] = "tri.bin"
+        (folder / "tri.bin").write_bytes(data)
+        path = folder / "tri.gltf"
+        path.write_text(json.dumps(header))
+        return path
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
+    path = folder / "tri.glb"
+    path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks)
+    return path
+
+
+def only_mesh(scene: Scene) -> Mesh:
+    (mesh,) = (s.geometry for s in scene.shapes if isinstance(s.geometry, Mesh))
+    return mesh
+
+
+def corners(mesh: Mesh) -> list[list[float]]:
+    return sorted(np.round(mesh.vertices[mesh.faces].reshape(-1, 3), 6).tolist())
+
+
+@pytest.mark.parametrize("binary", [True, False])
+def test_gltf_geometry_with_its_node_transformations(tmp_path: Path, binary: bool) -> None:
+    half = 0.5**0.5
+    nodes = [
+        {"children": [1], "translation": [0, 0, 5]},
+        {"mesh": 0, "rotation": [0, 0, half, half], "scale": [2, 2, 2]},
+    ]
+    mesh = only_mesh(load_scene(gltf(tmp_path, binary, nodes=nodes)))
+    # Scaled by two, turned by 90° about z, moved along z.
+    assert corners(mesh) == [[-2, 0, 5], [0, 0, 5], [0, 2, 5]]
+    assert mesh.normals == pytest.approx(np.tile([0, 0, 1], (3, 1)))
+
+
+def test_gltf_mesh_used_twice_and_matrix(tmp_path: Path) -> None:
+    matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 7, 8, 9, 1]
+    scene = load_scene(gltf(tmp_path, scenes=[{"nodes": [0, 1]}], nodes=[{"mesh": 0}, {"mesh": 0, "matrix": matrix}]))
+    meshes = [s.geometry for s in scene.shapes if isinstance(s.geometry, Mesh)]
+    assert np.ptp([m.vertices.min(axis=0) for m in meshes], axis=0) == pytest.approx([7, 8, 9])
+
+
+@pytest.mark.parametrize(
+    ("source", "kind", "reflectance", "transmittance"),
+    [
+        ({"pbrMetallicRoughness": {"baseColorFactor": [0.123, 0.2, 0.3, 1]}}, "diffuse", (0.123, 0.2, 0.3), (1,) * 3),
+        (
+            {"pbrMetallicRoughness": {"baseColorFactor": [0.9, 0.8, 0.7, 1], "roughnessFactor": 0.05}},
+            "conductor",
+            (0.9, 0.8, 0.7),
+            (1,) * 3,
+        ),
+        (
+            {
+                "pbrMetallicRoughness": {"baseColorFactor": [0.9, 1, 1, 1]},
+                "extensions": {
+                    "KHR_materials_transmission": {"transmissionFactor": 1},
+                    "KHR_materials_ior": {"ior": 1.33},
+                },
+            },
+            "dielectric",
+            (1,) * 3,
+            (0.9, 1, 1),
+        ),
+    ],
+)
+def test_gltf_materials(tmp_path: Path, source, kind, reflectance, transmittance) -> None:
+    scene = load_scene(gltf(tmp_path, materials=[source]))
+    material = scene.materials[scene.shapes[0].material]
+    assert material.kind == kind
+    assert material.reflectance == reflectance
+    assert material.transmittance == transmittance
+    if kind == "dielectric":
+        assert material.eta == 1.33
+
+
+def test_gltf_texture_gives_its_mean(tmp_path: Path) -> None:
+    from PIL import Image
+
+    Image.new("RGB", (4, 4), (255, 0, 0)).save(tmp_path / "red.png")
+    pbr = {"baseColorFactor": [0.5, 1, 1, 1], "baseColorTexture": {"index": 0}}
+    path = gltf(
+        tmp_path,
+        materials=[{"pbrMetallicRoughness": pbr}],
+        textures=[{"source": 0}],
+        images=[{"uri": "red.png"}],
+    )
+    scene = load_scene(path)
+    assert scene.materials[0].reflectance == pytest.approx((0.5, 0, 0))
+    assert any("mean colours" in w for w in scene.warnings)
+
+
+def test_gltf_camera_light_and_emission(tmp_path: Path) -> None:
+    lights = {"lights": [{"type": "point", "intensity": 683, "color": [1, 0.5, 0]}, {"type": "spot"}]}
+    nodes = [
+        {"mesh": 0},
+        {"camera": 0, "translation": [0, 0, 3]},
+        {"extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": [0, 4, 0]},
+        {"extensions": {"KHR_lights_punctual": {"light": 1}}},
+    ]
+    scene = load_scene(
+        gltf(
+            tmp_path,
+            nodes=nodes,
+            scenes=[{"nodes": [0, 1, 2, 3]}],
+            cameras=[{"type": "perspective", "perspective": {"yfov": np.pi / 2, "aspectRatio": 2, "znear": 0.1}}],
+            materials=[{"emissiveFactor": [1, 0.5, 0.25],
+                        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}}}],
+            extensions={"KHR_lights_punctual": lights},
+        )
+    )  # fmt: skip
+    assert scene.shapes[0].radiance == (4, 2, 1)
+    (light,) = scene.lights
+    assert isinstance(light, PointLight)
+    assert light.position == (0, 4, 0)
+    assert light.intensity == pytest.approx((1, 0.5, 0))
+    assert (scene.width, scene.height) == (1024, 512)
+    # 90° vertically from z = 3: the point (0, 3, 0) is on the upper edge, +x to the right.
+    projected = resolve_camera(scene, CameraSettings()).project(np.array([[0, 3, 0], [3, 0, 0]], float))
+    assert projected[:, :2] == pytest.approx(np.array([[512, 0], [768, 256]]), abs=1e-6)
+    assert any("'spot'" in w for w in scene.warnings)
+
+
+def test_obj_with_materials_polygons_and_old_encoding(tmp_path: Path) -> None:
+    (tmp_path / "a.mtl").write_text(
+        "newmtl wall\nKd 0.1 0.2 0.3\nnewmtl lamp\nKd 0 0 0\nKe 5 4 3\n"
+        "newmtl glass\nillum 7\nNi 1.4\nnewmtl mirror\nillum 3\nKd 0 0 0\nKs 0.9 0.9 0.9\n"
+    )
+    text = "# größe\nmtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+    for name in ("wall", "lamp", "glass", "mirror"):
+        text += f"usemtl {name}\nf 1 2 3 4\n"
+    (tmp_path / "a.obj").write_bytes(text.encode("latin-1"))
+    scene = load_scene(tmp_path / "a.obj")
+    by_name = {scene.materials[s.material].name: (scene.materials[s.material], s) for s in scene.shapes}
+    assert by_name["wall"][0].reflectance == (0.1, 0.2, 0.3)
+    assert by_name["lamp"][1].radiance == (5, 4, 3)
+    assert (by_name["glass"][0].kind, by_name["glass"][0].eta) == ("dielectric", 1.4)
+    assert (by_name["mirror"][0].kind, by_name["mirror"][0].reflectance) == ("conductor", (0.9, 0.9, 0.9))
+    assert all(len(s.geometry.faces) == 2 for s in scene.shapes)
+    assert scene.lights == ()
+
+
+def test_obj_without_its_material_file(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nmtllib gone.mtl\nusemtl x\nf 1 2 3\n")
+    scene = load_scene(tmp_path / "a.obj")
+    assert "line 4: The material file 'gone.mtl' does not exist" in scene.warnings[0]
+    assert scene.shapes[0].name == "a"
+
+
+STL = (
+    "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n"
+)
+
+
+def test_stl_text_and_binary(tmp_path: Path) -> None:
+    (tmp_path / "text.stl").write_text(STL)
+    record = struct.pack("<3f", 0, 0, 1) + TRIANGLE.tobytes() + b"\0\0"
+    (tmp_path / "binary.stl").write_bytes(b"solid but binary".ljust(80) + struct.pack("<I", 1) + record)
+    for name in ("text.stl", "binary.stl"):
+        scene = load_scene(tmp_path / name)
+        assert corners(only_mesh(scene)) == sorted(TRIANGLE.tolist())
+        assert scene.camera.up == (0, 0, 1)
+
+
+PLY_HEADER = (
+    "ply\nformat {} 1.0\ncomment made here\nelement vertex 4\nproperty {f} x\nproperty {f} y\nproperty {f} z\n"
+    "property float nx\nproperty float ny\nproperty float nz\nelement face 2\n"
+    "property list uchar {i} vertex_indices\nend_header\n"
+)
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
+@pytest.mark.parametrize("mixed", [False, True])
+def test_ply_in_all_its_formats(tmp_path: Path, kind: str, mixed: bool) -> None:
+    points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+    polygons = [(0, 1, 2), (0, 1, 2, 3)] if mixed else [(0, 1, 2), (0, 2, 3)]
+    header = PLY_HEADER.format(kind, f="double", i="uint")
+    if kind == "ascii":
+        rows = [" ".join(map(str, (*p, 0, 0, 1))) for p in points]
+        rows += [" ".join(map(str, (len(p), *p))) for p in polygons]
+        body = "\n".join(rows).encode()
+    else:
+        order = "<" if kind == "binary_little_endian" else ">"
+        body = b"".join(struct.pack(order + "3d3f", *p, 0, 0, 1) for p in points)
+        body += b"".join(struct.pack(f"{order}B{len(p)}I", len(p), *p) for p in polygons)
+    path = tmp_path / "a.ply"
+    path.write_bytes(header.encode() + body)
+    mesh = read_ply(path)
+    assert mesh.vertices.tolist() == [list(p) for p in points]
+    assert mesh.normals is not None
+    assert mesh.normals.tolist() == [[0, 0, 1]] * 4
+    expected = [[0, 1, 2], [0, 1, 2], [0, 2, 3]] if mixed else [[0, 1, 2], [0, 2, 3]]
+    assert sorted(mesh.faces.tolist()) == expected
+
+
+def test_scene_without_light_gets_one_out_of_sight(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_text(STL)
+    scene = load_scene(tmp_path / "a.stl")
+    light = scene.shapes[-1]
+    assert isinstance(light.geometry, Parallelogram)
+    assert np.cross(light.geometry.edge_u, light.geometry.edge_v)[2] < 0
+    assert scene.materials[light.material].reflectance == BLACK
+    assert any("soft light above" in w for w in scene.warnings)
+    pose = resolve_camera(scene, CameraSettings())
+    corner, u, v = (np.array(x) for x in (light.geometry.corner, light.geometry.edge_u, light.geometry.edge_v))
+    s, t = (x.reshape(-1, 1) for x in np.meshgrid(np.linspace(0, 1, 20), np.linspace(0, 1, 20)))
+    x, y, depth = pose.project(corner + s * u + t * v).T
+    assert not ((x >= 0) & (x < 512) & (y >= 0) & (y < 512) & (depth > 0)).any()
+
+
+def test_framed_camera_sees_everything(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1000 0 0\nv 0 1 0\nv 0 0 30\nf 1 2 3\nf 1 3 4\n")
+    scene = load_scene(tmp_path / "a.obj")
+    low, high = bounds(scene.shapes[:1])
+    box = np.array(
+        [[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+    )
+    x, y, depth = resolve_camera(scene, CameraSettings()).project(box).T
+    assert ((x > 0) & (x < 512) & (y > 0) & (y < 512) & (depth > 0)).all()
+
+
+OBJ_ROOF = "v -1 0 0\nv 0 1 0\nv 1 0 0\nv -1 0 1\nv 0 1 1\nv 1 0 1\nf 1 4 5\nf 1 5 2\nf 2 5 6\nf 2 6 3\n"
+
+
+def test_mitsuba_smooths_meshes_without_normals_unless_told_not_to(tmp_path: Path) -> None:
+    (tmp_path / "roof.obj").write_text(OBJ_ROOF)
+    shape = '<shape type="obj"><string name="filename" value="roof.obj"/>{}</shape>'
+    smooth = load(tmp_path, shape.format("")).shapes[0].geometry
+    ridge = smooth.normals[smooth.vertices[:, 1] == 1]
+    assert ridge == pytest.approx(np.tile([0, 1, 0], (2, 1)), abs=1e-9)
+    flat = load(tmp_path, shape.format('<boolean name="face_normals" value="true"/>')).shapes[0].geometry
+    assert flat.normals is None
+
+
+def test_transformed_mesh_keeps_outside_outside(tmp_path: Path) -> None:
+    (tmp_path / "roof.obj").write_text(OBJ_ROOF)
+    mirror = '<transform name="to_world"><scale x="-1"/></transform>'
+    shape = f'<shape type="obj"><string name="filename" value="roof.obj"/>{mirror}{{}}</shape>'
+    for more, sign in (("", 1), ('<boolean name="flip_normals" value="true"/>', -1)):
+        mesh = load(tmp_path, shape.format(more)).shapes[0].geometry
+        c = mesh.vertices[mesh.faces]
+        geometric = np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0])
+        assert (sign * geometric[:, 1] > 0).all()
+        assert (sign * mesh.normals[:, 1] > 0).all()
+
+
+def test_folder_and_parameters_of_other_formats(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_text(STL)
+    assert "'res' was given" in load_scene(tmp_path / "a.stl", {"res": "1"}).warnings[-1]
+    with pytest.raises(SceneError, match=r"no scene\.xml"):
+        load_scene(tmp_path)
