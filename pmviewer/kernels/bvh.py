@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.jit import device, kernel
+from pmviewer.kernels.jit import device, device_call, kernel
 from pmviewer.kernels.memory import aligned_empty
 from pmviewer.kernels.quadric import QUADRIC_FLOATS, quadric_bounds
 from pmviewer.kernels.simd import BLOCK_ROWS, LANES, NODE_ROWS
@@ -125,7 +125,6 @@ def _triangle_boxes(triangles, boxes, box_ids):
     count = 0
     for i in range(len(triangles)):
         total = np.float64(0.0)
-        longest = np.float64(0.0)
         for k in range(3):
             a, b, c = triangles[i, 0, k], triangles[i, 1, k], triangles[i, 2, k]
             boxes[count, k] = min(a, min(b, c))
@@ -147,22 +146,32 @@ def _triangle_boxes(triangles, boxes, box_ids):
     return count
 
 
+@device_call
+def _empty(box):
+    box[0] = box[1] = box[2] = np.float32(np.inf)
+    box[4] = box[5] = box[6] = np.float32(-np.inf)
+
+
 @device
+def _grow(box, other):
+    for k in range(3):
+        box[k] = min(box[k], other[k])
+        box[4 + k] = max(box[4 + k], other[4 + k])
+
+
+@device_call
 def _make_node(nodes, node_ints, index, boxes, begin, end):
     """Node `index` as a leaf over boxes [begin, end): lower corner, begin, upper corner, count."""
-    x0 = y0 = z0 = np.float32(np.inf)
-    x1 = y1 = z1 = np.float32(-np.inf)
+    node = nodes[index]
+    _empty(node)
     for i in range(begin, end):
-        x0, y0, z0 = min(x0, boxes[i, 0]), min(y0, boxes[i, 1]), min(z0, boxes[i, 2])
-        x1, y1, z1 = max(x1, boxes[i, 4]), max(y1, boxes[i, 5]), max(z1, boxes[i, 6])
-    nodes[index, 0], nodes[index, 1], nodes[index, 2] = x0, y0, z0
-    nodes[index, 4], nodes[index, 5], nodes[index, 6] = x1, y1, z1
+        _grow(node, boxes[i])
     node_ints[index, 3], node_ints[index, 7] = begin, end - begin
 
 
 @device
-def _half_area(x0, y0, z0, x1, y1, z1):
-    dx, dy, dz = x1 - x0, y1 - y0, z1 - z0
+def _half_area(box):
+    dx, dy, dz = box[4] - box[0], box[5] - box[1], box[6] - box[2]
     return dx * dy + dy * dz + dz * dx
 
 
@@ -194,43 +203,34 @@ def _split(boxes, box_ints, begin, end, lanes, bin_boxes, bin_counts, costs):
     bin_counts[:] = 0
     for k in range(3):
         for b in range(BINS):
-            for c in range(3):
-                bin_boxes[k, b, c], bin_boxes[k, b, 4 + c] = np.float32(np.inf), np.float32(-np.inf)
+            _empty(bin_boxes[k, b])
     for i in range(begin, end):
-        x0, y0, z0, x1, y1, z1 = boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 4], boxes[i, 5], boxes[i, 6]
         for k in range(3):
             b = _bin(boxes[i, k] + boxes[i, 4 + k], low[k], scale[k])
             bin_counts[k, b] += 1
-            box = bin_boxes[k, b]
-            box[0], box[1], box[2] = min(box[0], x0), min(box[1], y0), min(box[2], z0)
-            box[4], box[5], box[6] = max(box[4], x1), max(box[5], y1), max(box[6], z1)
+            _grow(bin_boxes[k, b], boxes[i])
 
     best, best_axis, best_bin = np.float32(np.inf), -1, -1
+    side = np.empty(8, np.float32)
     for k in range(3):
         if scale[k] == np.float32(0):
             continue
         count = 0
-        x0 = y0 = z0 = np.float32(np.inf)
-        x1 = y1 = z1 = np.float32(-np.inf)
+        _empty(side)
         for b in range(BINS - 1, 0, -1):
-            box = bin_boxes[k, b]
-            x0, y0, z0 = min(x0, box[0]), min(y0, box[1]), min(z0, box[2])
-            x1, y1, z1 = max(x1, box[4]), max(y1, box[5]), max(z1, box[6])
+            _grow(side, bin_boxes[k, b])
             count += bin_counts[k, b]
             full = np.float32((count + lanes - 1) // lanes)
-            costs[b] = _half_area(x0, y0, z0, x1, y1, z1) * full if count > 0 else np.float32(np.inf)
+            costs[b] = _half_area(side) * full if count > 0 else np.float32(np.inf)
         count = 0
-        x0 = y0 = z0 = np.float32(np.inf)
-        x1 = y1 = z1 = np.float32(-np.inf)
+        _empty(side)
         for b in range(BINS - 1):
-            box = bin_boxes[k, b]
-            x0, y0, z0 = min(x0, box[0]), min(y0, box[1]), min(z0, box[2])
-            x1, y1, z1 = max(x1, box[4]), max(y1, box[5]), max(z1, box[6])
+            _grow(side, bin_boxes[k, b])
             count += bin_counts[k, b]
             if count == 0:
                 continue
             full = np.float32((count + lanes - 1) // lanes)
-            cost = _half_area(x0, y0, z0, x1, y1, z1) * full + costs[b + 1]
+            cost = _half_area(side) * full + costs[b + 1]
             if cost < best:
                 best, best_axis, best_bin = cost, k, b
     if best_axis < 0:
@@ -306,11 +306,6 @@ def _fill_block(triangles, box_ints, begin, count, block, block_ints):
         block_ints[9, lane] = i
 
 
-@device
-def _node_area(nodes, i):
-    return _half_area(nodes[i, 0], nodes[i, 1], nodes[i, 2], nodes[i, 4], nodes[i, 5], nodes[i, 6])
-
-
 @kernel
 def _plan_collapse(binary, binary_ints, costs, plan):
     """Which descendants of each binary node become children of a wide node, at least expected cost.
@@ -320,7 +315,7 @@ def _plan_collapse(binary, binary_ints, costs, plan):
     is a wide node itself.
     """
     for c in range(len(costs) - 1, -1, -1):
-        area = _node_area(binary, c)
+        area = _half_area(binary[c])
         if binary_ints[c, 7] > 0:
             costs[c], plan[c] = area * LEAF_COST, 0
             continue
