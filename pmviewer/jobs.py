@@ -74,6 +74,7 @@ def render_job(
     settings = with_values(job.settings, _overrides(passes, seconds, size, seed, job.passes))
     opened = open_scene(job.scene, job.parameters)
     _print_warnings(opened.scene.warnings, opened.scene.dropped)
+    view = "beauty" if settings.display.view == "geometry" else settings.display.view
     pool = WorkPool(threads)
     try:
         renderer = Renderer(opened, settings, pool, StageCache(0))
@@ -85,7 +86,7 @@ def render_job(
         if path.suffix.lower() == ".exr":
             write_frame_exr(path, frame, half=half)
         else:
-            write_frame_png(path, frame)
+            write_frame_png(path, frame, view=view)
         print(f"wrote {path}")
     return frame
 

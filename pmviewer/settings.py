@@ -34,7 +34,7 @@ def setting(
     le: float | None = None,
 ) -> Any:
     """A field of the schema. `ge` and `le` bound numbers, `unit` is shown behind the value."""
-    extra = {"stage": stage, "scale": scale, "unit": unit, "ge": ge, "le": le}
+    extra: dict[str, Any] = {"stage": stage, "scale": scale, "unit": unit, "ge": ge, "le": le}
     return Field(default, description=description, title=title or None, json_schema_extra=extra)
 
 
@@ -58,7 +58,7 @@ class Photons(Group):
     """Light pass"""
 
     N: int = setting(
-        200_000,
+        150_000,
         "Photon trajectories emitted in each pass.",
         stage="photons",
         scale="log",
@@ -67,7 +67,7 @@ class Photons(Group):
         le=50_000_000,
     )
     q: float = setting(
-        0.5,
+        1.0,
         "Share of the trajectories that fill the global map; the caustic map gets all of them (Keller and Wald §2.4).",
         stage="photons",
         scale="log",
