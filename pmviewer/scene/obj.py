@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pmviewer.errors import SceneError
 from pmviewer.scene.description import RGB, Material, Mesh, Shape
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
@@ -28,6 +29,8 @@ def obj_parts(path: Path, skip_materials: bool) -> list[tuple[str, Mesh, str | N
     parts = []
     for name, kwargs in loaded.get("geometry", {}).items():
         vertices = np.asarray(kwargs["vertices"], np.float64)
+        if vertices.shape[1:] != (3,):
+            raise SceneError("The OBJ file's vertices do not have three coordinates each.", path)
         faces = fans(np.asarray(kwargs["faces"])).astype(np.int32)  # quads come as quads
         normals = kwargs.get("vertex_normals")
         mesh = Mesh(vertices, faces, None if normals is None else np.asarray(normals, np.float64))

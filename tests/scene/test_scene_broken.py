@@ -53,6 +53,7 @@ ERRORS: dict[str, tuple[int | None, tuple[str, ...]]] = {
     "truncated.glb": (None, ("cut off", "46 of 5000 bytes")),
     "truncated.ply": (None, ("fewer than 3 rows of 'face'", "complete")),
     "truncated.xml": (3, ("not well-formed XML", "complete")),
+    "two_coordinates.obj": (None, ("three coordinates",)),
     "unknown_encoding.xml": (1, ("encoding", "UTF-8")),
     "unknown_ref.xml": (4, ("'velvet'", "not defined")),
     "unsupported_light.xml": (None, ("no light", "line 4", "envmap")),
