@@ -16,6 +16,7 @@ FALLBACK_PASSES = 64
 
 app = typer.Typer(
     add_completion=False,
+    pretty_exceptions_enable=False,
     no_args_is_help=False,
     rich_markup_mode=None,
     help="Interactive previewer for photon-mapping global illumination.",
@@ -43,13 +44,13 @@ def view(
     define: ParameterOption = None,
 ) -> None:
     """Open the window (the default command)."""
-    from pmviewer.jobs import load_job
+    from pmviewer.job import load_job
 
     job = load_job(scene, set_ or [], define or [])
     try:
         from pmviewer.viewer.app import run_viewer
 
-        code = run_viewer(job.scene, job.settings, threads=threads, parameters=job.parameters)
+        code = run_viewer(job.scene, job.settings, threads=threads)
     except WindowError as error:
         typer.echo(f"{error}", err=True)
         target = Path(f"{Path(job.scene).stem}.png")
@@ -73,7 +74,8 @@ def render(
     define: ParameterOption = None,
 ) -> None:
     """Render to a file without a window; the result is what the window shows after the same passes."""
-    from pmviewer.jobs import load_job, render_job
+    from pmviewer.job import load_job
+    from pmviewer.jobs import render_job
 
     if passes is not None and time is not None:
         raise SettingError("--passes and --time exclude each other: give one of them.")
@@ -93,7 +95,8 @@ def scenes() -> None:
 @app.command()
 def info(scene: SceneArgument, define: ParameterOption = None) -> None:
     """Say what is in a scene, what was ignored, and which stages it needs or skips."""
-    from pmviewer.jobs import load_job, scene_report
+    from pmviewer.job import load_job
+    from pmviewer.jobs import scene_report
 
     typer.echo(scene_report(load_job(scene, [], define or [])))
 

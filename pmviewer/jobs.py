@@ -1,10 +1,9 @@
-"""What the command line does without a window: jobs from scenes and session files, rendering to files, scene reports."""
+"""What the command line does without a window: rendering to files, scene reports."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from pmviewer.engine.cache import StageCache
@@ -15,43 +14,15 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.errors import OutputError, SettingError
+from pmviewer.job import Job
 from pmviewer.output.frame_export import write_frame_exr, write_frame_png
-from pmviewer.output.session_file import read_session
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.describe import describe
 from pmviewer.scene.load import load_scene
-from pmviewer.settings import Settings, parse_assignments, with_values
+from pmviewer.settings import with_values
 
 DEFAULT_PASSES = 64
 FORMATS = (".exr", ".png")
-
-
-@dataclass(frozen=True)
-class Job:
-    """A scene to open, with settings. `passes` is what a session file had rendered, None for a plain scene."""
-
-    scene: str
-    settings: Settings
-    parameters: Mapping[str, str] = field(default_factory=dict)
-    passes: int | None = None
-
-
-def load_job(source: str, assignments: Iterable[str], defines: Iterable[str]) -> Job:
-    """A job from a scene or a session file (.toml). Raises SettingError and SceneError."""
-    parameters = dict(_definition(text) for text in defines)
-    values = parse_assignments(assignments)
-    if source.lower().endswith(".toml"):
-        session = read_session(Path(source))
-        settings = with_values(session.settings, values)
-        return Job(str(session.scene), settings, {**session.parameters, **parameters}, session.passes)
-    return Job(source, with_values(Settings(), values), parameters)
-
-
-def _definition(text: str) -> tuple[str, str]:
-    name, separator, value = text.partition("=")
-    if not separator or not name:
-        raise SettingError(f"'{text}' defines nothing: write name=value, for example -D res=512.")
-    return name, value
 
 
 def render_job(
