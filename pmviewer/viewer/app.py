@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -115,7 +116,8 @@ class ViewerApp:
             except Exception as error:  # glfw would raise it much later, somewhere else
                 self.state.say("error", f"The dropped file could not be opened: {error}")
 
-        glfw.set_drop_callback(glfw_window_hello_imgui(), on_drop)
+        register: Any = glfw.set_drop_callback  # its annotation lacks the list that glfw makes of the paths
+        register(glfw_window_hello_imgui(), on_drop)
 
     def _post_init(self) -> None:
         self.context = moderngl.create_context()
@@ -173,11 +175,17 @@ class ViewerApp:
         self.state.jobs.finish()
 
 
-def run_viewer(source: str | Path | None, settings: Settings | None, threads: int | None = None) -> int:
+def run_viewer(
+    source: str | Path | None,
+    settings: Settings | None,
+    threads: int | None = None,
+    parameters: Mapping[str, str] | None = None,
+) -> int:
     """Open the window on a scene or session file (None: the Cornell box with a mirror and a glass sphere).
 
+    `parameters` are values for the scene file's `<default>` names, `threads` the session's (None: all cores).
     Returns 0 when the window was closed. Raises WindowError when there is no display or no OpenGL.
     """
     from pmviewer.viewer.start import start_viewer
 
-    return start_viewer(ViewerApp, source, settings, threads)
+    return start_viewer(ViewerApp, source, settings, threads, parameters)

@@ -89,12 +89,13 @@ class Exports:
             state.say("error", "There is no session to save yet: open a scene first.")
             return
         settings, scene = state.settings, state.session.scene_path
+        parameters = dict(state.parameters)
         passes = state.frame.statistics.passes if state.frame is not None else 0
 
         def work() -> str:
             from pmviewer.output.session_file import write_session
 
-            write_session(path, settings, scene, passes)
+            write_session(path, settings, scene, passes, parameters)
             return f"wrote {path.absolute()}"
 
         state.jobs.start("saving the session", work)

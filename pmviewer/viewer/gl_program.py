@@ -28,14 +28,15 @@ def set_uniforms(program: moderngl.Program, **values: Any) -> None:
     """Set uniforms by name; row-major (4, 4) arrays become column-major ones. Uniforms that the driver removed because
     they are unused are skipped."""
     for name, value in values.items():
-        if name not in program:
+        uniform = program.get(name, None)
+        if not isinstance(uniform, moderngl.Uniform):
             continue
         if isinstance(value, np.ndarray) and value.shape == (4, 4):
-            program[name].write(column_major(value))
+            uniform.write(column_major(value))
         elif isinstance(value, np.ndarray):
-            program[name].write(np.ascontiguousarray(value, np.float32).tobytes())
+            uniform.write(np.ascontiguousarray(value, np.float32).tobytes())
         else:
-            program[name].value = value
+            uniform.value = value
 
 
 def column_major(matrix: NDArray[np.floating]) -> bytes:

@@ -7,8 +7,13 @@ from itertools import groupby
 from imgui_bundle import imgui
 
 from pmviewer.viewer import theme
-from pmviewer.viewer.shortcuts import BINDINGS
+from pmviewer.viewer.shortcuts import BINDINGS, Binding
 from pmviewer.viewer.state import ViewerState
+
+_LEFT = ("File", "Render", "Window", "Settings")
+_KEYS, _TEXT = 12.0, 18.0
+_WIDTH = _KEYS + _TEXT + 1.5
+"""Widths in multiples of the font size."""
 
 
 def draw_help(state: ViewerState) -> None:
@@ -23,27 +28,27 @@ def draw_help(state: ViewerState) -> None:
     state.help_open = bool(still_open)
     if shown:
         groups = [(name, list(bindings)) for name, bindings in groupby(BINDINGS, key=lambda b: b.group)]
-        left = {"File", "Render", "Window"}
         if imgui.begin_table("##help", 2, imgui.TableFlags_.sizing_fixed_fit):
-            imgui.table_next_column()
-            for name, bindings in groups:
-                if name in left:
-                    _group(name, bindings)
-            imgui.table_next_column()
-            for name, bindings in groups:
-                if name not in left:
-                    _group(name, bindings)
+            for side in (0, 1):
+                imgui.table_setup_column(
+                    f"side{side}", imgui.TableColumnFlags_.width_fixed, _WIDTH * imgui.get_font_size()
+                )
+            for side in (0, 1):
+                imgui.table_next_column()
+                for name, bindings in groups:
+                    if (name in _LEFT) == (side == 0):
+                        _group(name, bindings)
             imgui.end_table()
     imgui.end()
 
 
-def _group(name: str, bindings: list) -> None:
+def _group(name: str, bindings: list[Binding]) -> None:
     em = imgui.get_font_size()
     imgui.text_colored(imgui.ImVec4(*theme.ACCENT), name)
     if not imgui.begin_table(f"##{name}", 2, imgui.TableFlags_.sizing_fixed_fit):
         return
-    imgui.table_setup_column("keys", imgui.TableColumnFlags_.width_fixed, 11 * em)
-    imgui.table_setup_column("what", imgui.TableColumnFlags_.width_fixed, 19 * em)
+    imgui.table_setup_column("keys", imgui.TableColumnFlags_.width_fixed, _KEYS * em)
+    imgui.table_setup_column("what", imgui.TableColumnFlags_.width_fixed, _TEXT * em)
     for binding in bindings:
         imgui.table_next_row()
         imgui.table_next_column()

@@ -98,7 +98,7 @@ def _bars(params: hello_imgui.RunnerParams, callbacks: Callbacks) -> None:
 
 def _dock(docking: hello_imgui.DockingParams, callbacks: Callbacks) -> None:
     docking.docking_splits = [
-        hello_imgui.DockingSplit("MainDockSpace", "Left", imgui.Dir.left, 0.235),
+        hello_imgui.DockingSplit("MainDockSpace", "Left", imgui.Dir.left, 0.24),
         hello_imgui.DockingSplit("MainDockSpace", "Right", imgui.Dir.right, 0.235),
         hello_imgui.DockingSplit("MainDockSpace", "Bottom", imgui.Dir.down, 0.24),
     ]

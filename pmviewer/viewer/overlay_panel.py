@@ -73,8 +73,11 @@ class OverlayPanel:
             imgui.text_disabled(f"Hue of the power; {amount}")
             imgui.pop_text_wrap_pos()
         elif style.colour == "bounce":
-            labels = [*(str(i) for i in range(1, len(BOUNCE_PALETTE))), f"{len(BOUNCE_PALETTE)}+"]
-            _swatches("Scatterings", list(zip(labels, BOUNCE_PALETTE, strict=True)))
+            last = len(BOUNCE_PALETTE) - 1
+            labels = [*(str(i) for i in range(last)), f"{last}+"]
+            _swatches(
+                "Scatterings before; 0 is straight from the light", list(zip(labels, BOUNCE_PALETTE, strict=True))
+            )
         else:
             shown = [(f"light {i + 1}", LIGHT_PALETTE[i % len(LIGHT_PALETTE)]) for i in cloud.lights]
             _swatches("", shown[:12])
@@ -87,7 +90,9 @@ class OverlayPanel:
 def _swatches(title: str, entries: list[tuple[str, RGB]]) -> None:
     """Coloured squares with labels, as many in a line as fit."""
     if title:
+        imgui.push_text_wrap_pos(0)
         imgui.text_disabled(title)
+        imgui.pop_text_wrap_pos()
     size = imgui.get_font_size() * 0.8
     right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
     flags = imgui.ColorEditFlags_.no_tooltip | imgui.ColorEditFlags_.no_drag_drop | imgui.ColorEditFlags_.no_picker

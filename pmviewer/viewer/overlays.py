@@ -29,7 +29,7 @@ BOUNCE_PALETTE: tuple[RGB, ...] = (
     (0.53, 0.36, 0.80),
     (0.66, 0.30, 0.62),
 )
-"""One to eight and more scatterings."""
+"""None (straight from the light) to seven and more scatterings."""
 LIGHT_PALETTE: tuple[RGB, ...] = (
     (0.95, 0.69, 0.15),
     (0.35, 0.71, 0.91),

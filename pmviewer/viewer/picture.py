@@ -145,11 +145,12 @@ class Picture:
         `camera` is the frame's; None draws the surround alone. `overlays` None leaves the points out.
         """
         framebuffer = self._framebuffer(name, target.size)
-        framebuffer.scissor = None
+        framebuffer.scissor = (0, 0, *framebuffer.size)
         framebuffer.viewport = (0, 0, *framebuffer.size)
         framebuffer.use()
         framebuffer.clear(*SURROUND, 1.0)
-        colour: moderngl.Texture = framebuffer.color_attachments[0]
+        colour = framebuffer.color_attachments[0]
+        assert isinstance(colour, moderngl.Texture)
         if camera is None:
             return colour
         left, top, width, height = target.picture

@@ -7,7 +7,7 @@ for and hands everything to the real session once that exists.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -37,7 +37,9 @@ class SessionLike(Protocol):
     def geometry(self) -> Any: ...
     @property
     def paused(self) -> bool: ...
-    def open(self, source: Any, settings: Settings | None = None) -> None: ...
+    def open(
+        self, source: Any, settings: Settings | None = None, parameters: Mapping[str, str] | None = None
+    ) -> None: ...
     def set(self, settings: Settings) -> Any: ...
     def pause(self) -> None: ...
     def resume(self) -> None: ...
@@ -54,7 +56,7 @@ class SessionLink:
         self._make = make
         self._session: SessionLike | None = None
         self._settings = settings or Settings()
-        self._source: tuple[str | Path | Scene, Settings | None] | None = None
+        self._source: tuple[str | Path | Scene, Settings | None, Mapping[str, str] | None] | None = None
         self._paused = False
         self._closed = False
         self._messages: list[Message] = []
@@ -93,12 +95,17 @@ class SessionLink:
 
     # requests ---------------------------------------------------------------------------------------------------
 
-    def open(self, source: str | Path | Scene, settings: Settings | None = None) -> None:
+    def open(
+        self,
+        source: str | Path | Scene,
+        settings: Settings | None = None,
+        parameters: Mapping[str, str] | None = None,
+    ) -> None:
         with self._lock:
             if self._session is not None:
-                self._session.open(source, settings)
+                self._session.open(source, settings, parameters)
                 return
-            self._source = (source, settings)
+            self._source = (source, settings, parameters)
 
     def set(self, settings: Settings) -> None:
         with self._lock:
@@ -106,7 +113,7 @@ class SessionLink:
             if self._session is not None:
                 self._session.set(settings)
             elif self._source is not None and self._source[1] is not None:
-                self._source = (self._source[0], settings)
+                self._source = (self._source[0], settings, self._source[2])
 
     def pause(self) -> None:
         with self._lock:

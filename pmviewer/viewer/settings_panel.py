@@ -22,7 +22,8 @@ class SettingsPanel:
     def __init__(self, state: ViewerState) -> None:
         self.state = state
         self.widgets = SettingWidgets()
-        self._filter = ""
+        self.find = ""
+        """Only settings that contain this are listed."""
         listed = [i for i in SETTINGS.values() if i.path not in PINNED and not i.path.startswith(_ELSEWHERE)]
         self._groups = [(heading, list(infos)) for heading, infos in groupby(listed, key=lambda info: info.group)]
 
@@ -46,8 +47,8 @@ class SettingsPanel:
         ]
         size = imgui.get_frame_height() * 1.15 + imgui.get_style().item_spacing.x
         imgui.set_next_item_width(-size)
-        _, self._filter = imgui.input_text_with_hint(
-            "##filter", f"{fa.ICON_FA_MAGNIFYING_GLASS}  find a setting", self._filter
+        _, self.find = imgui.input_text_with_hint(
+            "##filter", f"{fa.ICON_FA_MAGNIFYING_GLASS}  find a setting", self.find
         )
         imgui.same_line()
         tip = "Reset every setting to its default" if everything else "Every setting has its default"
@@ -55,7 +56,7 @@ class SettingsPanel:
             self.state.change({path: SETTINGS[path].default for path in everything})
 
     def _group(self, heading: str, infos: list[SettingInfo]) -> None:
-        wanted = self._filter.strip().lower()
+        wanted = self.find.strip().lower()
         if wanted:
             infos = [i for i in infos if wanted in f"{i.path} {i.title} {i.description} {heading}".lower()]
             if not infos:
@@ -74,7 +75,7 @@ class SettingsPanel:
         return get(self.state.settings, path)
 
     @staticmethod
-    def begin_rows(name: str, name_em: float = 7.2, room: float = 0) -> bool:
+    def begin_rows(name: str, name_em: float = 6.8, room: float = 0) -> bool:
         """Open the table that `row` fills; end it with `imgui.end_table()` when True."""
         width = imgui.get_content_region_avail().x - room
         if not imgui.begin_table(f"##{name}", 3, imgui.TableFlags_.none, (width, 0)):

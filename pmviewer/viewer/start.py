@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,11 @@ DEFAULT_SCENE = "cornell_caustic"
 def check_screen() -> None:
     """Raises WindowError, saying what to do, when no window with OpenGL 3.3 can be opened."""
     failures: list[str] = []
-    glfw.ERROR_REPORTING = lambda code, text: failures.append(text.decode(errors="replace"))
+
+    def note(code: int, text: str | bytes) -> None:
+        failures.append(text if isinstance(text, str) else text.decode(errors="replace"))
+
+    reporting: Any = glfw.set_error_callback(note)
     try:
         if not glfw.init():
             raise WindowError(
@@ -46,7 +50,7 @@ def check_screen() -> None:
         glfw.destroy_window(window)
     finally:
         glfw.default_window_hints()
-        glfw.ERROR_REPORTING = "warn"
+        glfw.set_error_callback(reporting)
 
 
 def _make_session(threads: int | None, settings: Settings | None) -> Callable[[], SessionLike]:
@@ -60,23 +64,25 @@ def _make_session(threads: int | None, settings: Settings | None) -> Callable[[]
 
 def _inactive_reason(path: str, settings: Settings, traits: Any) -> str | None:
     """Asked of the engine once it is there; before, every setting looks active."""
-    effects = sys.modules.get("pmviewer.engine.effects")
-    if effects is None:
-        if traits is None:
-            return None
-        from pmviewer.engine import effects
-    reason: str | None = effects.inactive_reason(path, settings, traits)
-    return reason
+    if traits is None:
+        return None
+    from pmviewer.engine.effects import inactive_reason
+
+    return inactive_reason(path, settings, traits)
 
 
 def start_viewer(
-    make_app: Callable[..., ViewerApp], source: str | Path | None, settings: Settings | None, threads: int | None
+    make_app: Callable[..., ViewerApp],
+    source: str | Path | None,
+    settings: Settings | None,
+    threads: int | None,
+    parameters: Mapping[str, str] | None,
 ) -> int:
     """See `pmviewer.viewer.app.run_viewer`."""
     check_screen()
     link = SessionLink(_make_session(threads, settings), settings)
     app = make_app(link, inactive_reason=_inactive_reason)
-    app.state.open(source if source is not None else DEFAULT_SCENE, keep_camera=True)
+    app.state.open(source if source is not None else DEFAULT_SCENE, keep_camera=True, parameters=parameters)
     app.params.callbacks.enqueue_post_init(link.connect)
     try:
         app.run()

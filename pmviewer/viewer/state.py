@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,21 @@ class Toast:
         return self.message.level != "error" and time.monotonic() - self.born > TOAST_SECONDS
 
 
+def _first_radius(frame: Frame, scene_radius: float) -> float | None:
+    """Look-up radius of the first pass relative to the scene, from the one of the latest pass."""
+    from pmviewer.maps.radius import progressive_radius  # numba; there by the time of the first frame
+
+    estimate, radius = frame.settings.estimate, frame.statistics.radius
+    if "global" in radius:
+        latest = radius["global"]
+    elif "caustic" in radius:
+        latest = radius["caustic"] / estimate.caustic_radius
+    else:
+        return None
+    shrunk = progressive_radius(1.0, max(frame.statistics.passes, 1), estimate.alpha, 0.0)
+    return latest / shrunk / scene_radius
+
+
 class ViewerState:
     """Lives as long as the window."""
 
@@ -50,7 +65,9 @@ class ViewerState:
         self.last_camera_move = -1e9
         self._scene: Any = None
         self._stale_serial = -1
-        self._opening = ""
+        self.parameters: dict[str, str] = {}
+        """Values for the open scene file's `<default>` names."""
+        self._opening: tuple[str, dict[str, str]] | None = None
 
     # settings ---------------------------------------------------------------------------------------------------
 
@@ -82,8 +99,7 @@ class ViewerState:
             return getattr(pose, path.removeprefix("camera.")) if pose else None
         frame, geometry = self.frame, self.session.geometry
         if path == "estimate.radius" and frame is not None and geometry is not None:
-            radius = frame.statistics.radius.get("global") or next(iter(frame.statistics.radius.values()), None)
-            return radius / geometry.radius if radius else None
+            return _first_radius(frame, float(geometry.radius))
         return None
 
     # what is shown ----------------------------------------------------------------------------------------------
@@ -105,9 +121,10 @@ class ViewerState:
         if scene is self._scene:
             return False
         self._scene = scene
-        if self._opening:
-            self.recent.add(self._opening)
-            self._opening = ""
+        if self._opening is not None:
+            path, self.parameters = self._opening
+            self.recent.add(path)
+            self._opening = None
         frame = self.session.frame
         if frame is not None and scene is not None and frame.scene_name != scene.name:
             self._stale_serial = frame.serial
@@ -123,9 +140,12 @@ class ViewerState:
 
     # files and messages -----------------------------------------------------------------------------------------
 
-    def open(self, path: str | Path, *, keep_camera: bool = False) -> None:
-        """Open a scene or a session file. Settings stay when it is a scene, but for the camera's: that was another
-        scene's unless `keep_camera` says otherwise."""
+    def open(self, path: str | Path, *, keep_camera: bool = False, parameters: Mapping[str, str] | None = None) -> None:
+        """Open a scene or a session file.
+
+        Settings stay when it is a scene, but for the camera's: that was another scene's unless `keep_camera` says
+        otherwise. `parameters` are values for the scene file's `<default>` names.
+        """
         settings = self.settings if keep_camera else self.settings.model_copy(update={"camera": CameraSettings()})
         source: str | Path = path
         if str(path).lower().endswith(".toml"):
@@ -136,9 +156,9 @@ class ViewerState:
             except (PmviewerError, OSError) as error:
                 self.say("error", str(error))
                 return
-            source, settings = saved.scene, saved.settings
-        self._opening = str(path)
-        self.session.open(source, settings)
+            source, settings, parameters = saved.scene, saved.settings, saved.parameters
+        self._opening = str(path), dict(parameters or {})
+        self.session.open(source, settings, parameters)
 
     def say(self, level: Level, text: str) -> None:
         """A line for the log, from any thread."""

@@ -80,10 +80,10 @@ def _maps(s: Statistics) -> None:
     if not s.stored or not imgui.begin_table("##maps", 4):
         return
     imgui.table_setup_column("map", imgui.TableColumnFlags_.width_stretch, 0.8)
-    for name in ("stored", "in last pass", "radius"):
+    for name in ("stored", "last pass", "radius"):
         imgui.table_setup_column(name, imgui.TableColumnFlags_.width_stretch, 1.0)
     imgui.table_next_row()
-    for name in ("map", "stored", "in last pass", "radius"):
+    for name in ("map", "stored", "last pass", "radius"):
         imgui.table_next_column()
         _right(name, dim=True) if name != "map" else imgui.text_colored(imgui.ImVec4(*theme.DIM), name)
     for name, count in s.stored.items():

@@ -36,10 +36,14 @@ def draw_status_bar(state: ViewerState) -> None:
     status = state.session.status
     imgui.align_text_to_frame_padding()
     colour = _COLOURS.get(status.state, theme.TEXT)
-    imgui.text_colored(imgui.ImVec4(*colour), status.state)
-    if status.text and status.text != status.state:
+    head: str = status.state
+    text = status.text
+    if text.startswith(head):
+        head, text = text, ""
+    imgui.text_colored(imgui.ImVec4(*colour), theme.drawable(head))
+    if text:
         imgui.same_line()
-        imgui.text_unformatted(theme.drawable(status.text))
+        imgui.text_unformatted(theme.drawable(text))
     busy = status.state in ("loading", "preparing")
     em = imgui.get_font_size()
     if busy or (status.state == "rendering" and status.progress is not None):

@@ -105,11 +105,11 @@ def apply() -> None:
 
 
 def _spacing(style: imgui.Style) -> None:
-    style.window_padding = (8, 8)
-    style.frame_padding = (7, 4)
-    style.cell_padding = (5, 3)
-    style.item_spacing = (7, 5)
-    style.item_inner_spacing = (6, 4)
+    style.window_padding = imgui.ImVec2(8, 8)
+    style.frame_padding = imgui.ImVec2(7, 4)
+    style.cell_padding = imgui.ImVec2(5, 3)
+    style.item_spacing = imgui.ImVec2(7, 5)
+    style.item_inner_spacing = imgui.ImVec2(6, 4)
     style.scrollbar_size = 12
     style.grab_min_size = 9
     style.window_rounding = 4
@@ -126,5 +126,5 @@ def _spacing(style: imgui.Style) -> None:
     style.window_menu_button_position = imgui.Dir.none
     style.docking_node_has_close_button = False
     style.tab_close_button_min_width_selected = 0
-    style.separator_text_padding = (0, 4)
+    style.separator_text_padding = imgui.ImVec2(0, 4)
     style.hover_stationary_delay = 0.25

@@ -183,7 +183,8 @@ class Viewport:
         self._flew_with_right = self._flew_with_right or right
         io = imgui.get_io()
         step = 0.5 * radius * min(io.delta_time, 0.1) * (4 if io.key_shift else 1)
-        return controls.fly(pose, *(float(a) for a in axes), step)
+        across, up, ahead = (float(a) for a in axes)
+        return controls.fly(pose, across, up, ahead, step)
 
     def _magnify(self, notches: float) -> None:
         """Zoom into the pixels, keeping the point under the mouse where it is."""

@@ -128,7 +128,7 @@ class SettingWidgets:
             current = math.sqrt(info.lower * info.upper) if info.scale == "log" else info.lower  # type: ignore[operator]
             text = "auto"
         else:
-            text = ("auto · " if automatic else "") + value_text(info, current)
+            text = f"auto · {current:.3g}" if automatic else value_text(info, current)
         new = self._slide(info, current, theme.drawable(text).replace("%", "%%"), width)
         if imgui.is_item_activated() and not imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
             self._before[info.path] = value

@@ -99,7 +99,7 @@ class FakeSession:
         self.closed = False
         self._messages: list[Message] = []
 
-    def open(self, source: str | Path, settings: Settings | None = None) -> None:
+    def open(self, source: str | Path, settings: Settings | None = None, parameters=None) -> None:
         self.opened.append(str(source))
         if "broken" in str(source):
             self._messages.append(Message("error", f"{source}:3: unknown shape 'blob'. Use sphere, cube or obj."))

@@ -1,0 +1,106 @@
+"""Runs a window on a session and drives it with the Dear ImGui test engine: real clicks, drags and keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from imgui_bundle import ImVec2
+from imgui_bundle.immapp import testing
+
+from pmviewer.viewer.app import ViewerApp
+from pmviewer.viewer.recent import RecentFiles
+
+Context = Any
+Pixels = np.ndarray
+
+
+def make_app(session: Any, folder: Path, **options: Any) -> ViewerApp:
+    """A window that leaves the user's configuration alone."""
+    app = ViewerApp(session, recent=RecentFiles(folder / "recent.txt"), remember=False, **options)
+    app.params.app_window_params.window_geometry.size = (1280, 800)
+    before = app.params.callbacks.pre_new_frame
+
+    def pre_new_frame() -> None:
+        before()
+        while _work:
+            _work.pop(0)()
+        if app.context is not None:
+            app.context.screen.use()
+
+    app.params.callbacks.pre_new_frame = pre_new_frame
+    return app
+
+
+_work: list[Callable[[], None]] = []
+
+
+def on_window_thread(context: Context, function: Callable[[], Any]) -> Any:
+    """The script runs on a thread of its own, without the OpenGL context: call this on the window's."""
+    results: list[Any] = []
+    _work.append(lambda: results.append(function()))
+    while not results:
+        context.yield_(1)
+    return results[0]
+
+
+def drive(app: ViewerApp, script: Callable[[Context], None]) -> None:
+    """Open the window, run the script in it, close it. Errors of the script and of the test engine are raised."""
+
+    def settled(context: Context) -> None:
+        context.yield_(4)
+        script(context)
+
+    testing.run(test_function=settled, runner_params=app.params, add_ons_params=app.add_ons)
+
+
+def item(path: str) -> str:
+    """The widget of a setting in the settings panel."""
+    return f"//Settings/**/##{path}"
+
+
+def overlay_item(name: str) -> str:
+    return f"//Overlays/**/{name}"
+
+
+def drag(context: Context, ref: str, start: float, end: float) -> None:
+    """Press at a share of the item's width, move, release."""
+    context.scroll_to_item_y(ref)
+    box = context.item_info(ref).rect_full
+    y = (box.min.y + box.max.y) / 2
+    width = box.max.x - box.min.x
+    context.mouse_move_to_pos(ImVec2(box.min.x + start * width, y))
+    context.mouse_down(0)
+    context.mouse_move_to_pos(ImVec2(box.min.x + end * width, y))
+    context.mouse_up(0)
+    context.yield_(2)
+
+
+def drag_picture(context: Context, app: ViewerApp, dx: float, dy: float, button: int = 0) -> None:
+    """Drag from the picture's middle by that many points."""
+    x, y = app.viewport.origin
+    w, h = app.viewport.size
+    context.mouse_move_to_pos(ImVec2(x + w / 2, y + h / 2))
+    context.mouse_down(button)
+    context.mouse_move_to_pos(ImVec2(x + w / 2 + dx, y + h / 2 + dy))
+    context.mouse_up(button)
+    context.yield_(2)
+
+
+def viewport_pixels(context: Context, app: ViewerApp) -> Pixels:
+    """(h, w, 3) uint8 of what the viewport shows now, inside the picture's rectangle."""
+    picture = app.viewport.picture
+    assert picture is not None
+    pixels = on_window_thread(context, lambda: picture.read("window"))
+    left, top, width, height = app.viewport.target().picture
+    return pixels[max(top, 0) : top + height, max(left, 0) : left + width]
+
+
+def window_pixels(app: ViewerApp, context: Context, path: Path) -> Pixels:
+    """(h, w, 3) uint8 of the whole window, through the test engine's screenshot."""
+    from PIL import Image
+
+    testing.capture(context, str(path))
+    return np.asarray(Image.open(path).convert("RGB"))
