@@ -1,4 +1,4 @@
-"""Lights (T1): emission of photons, sampling towards a point, and the densities that multiple importance sampling needs.
+"""Lights (T1): emission of photons, sampling towards a point, and the densities for multiple importance sampling.
 
 All lights are one-sided: they emit where their normal points. Lights are picked with probability proportional to their
 power's luminance.
@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from pmviewer.kernels.jit import device, device_call
+from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4, load_i4
 from pmviewer.kernels.scene import (
     CYLINDER,
@@ -34,7 +34,7 @@ from pmviewer.kernels.scene import (
     light_vector,
     load3,
 )
-from pmviewer.kernels.surface import leave
+from pmviewer.kernels.surface import gap_of, leave
 from pmviewer.kernels.vector import along, basis, cross, dot, from_basis, luminance, normalize, scale, sub
 from pmviewer.kernels.warp import (
     square_to_cone,
@@ -50,7 +50,7 @@ _PI = _f4(math.pi)
 
 @device
 def find_interval(address, count, first, u):
-    """Index i of the cumulative array at `address` (entries first … first+count−1, the last one is 1) with u below it."""
+    """Index of the first of the cumulative numbers `first` … first+count−1 at `address` (the last one is 1) above u."""
     low, high = np.int64(0), np.int64(count) - 1
     while low < high:
         middle = (low + high) >> 1
@@ -77,31 +77,43 @@ def light_probability(scene, light):
     return load_f4(scene.light_cdf, light + 1) - load_f4(scene.light_cdf, light)
 
 
-@device_call
+@device
+def _round_gap(n, center, reach):
+    return gap_of(n, abs(center[0]) + reach, abs(center[1]) + reach, abs(center[2]) + reach)
+
+
+@device
 def light_point(scene, light, u, v):
-    """A point uniform on the area light and its unit normal (the emitting side)."""
+    """A point uniform on the area light, its unit normal (the emitting side), and the gap for `leave`."""
     kind = np.int32(light_number(scene, light, L_KIND))
     a = light_vector(scene, light, L_A)
     b = light_vector(scene, light, L_B)
     if kind == PARALLELOGRAM:
         c = light_vector(scene, light, L_C)
         p = (a[0] + u * b[0] + v * c[0], a[1] + u * b[1] + v * c[1], a[2] + u * b[2] + v * c[2])
-        return p, normalize(cross(b, c))
+        n = normalize(cross(b, c))
+        sizes = (
+            abs(a[0]) + abs(b[0]) + abs(c[0]),
+            abs(a[1]) + abs(b[1]) + abs(c[1]),
+            abs(a[2]) + abs(b[2]) + abs(c[2]),
+        )
+        return p, n, gap_of(n, sizes[0], sizes[1], sizes[2])
     flip = light_number(scene, light, L_FLIP)
     radius = light_number(scene, light, L_RADIUS)
     if kind == DISK:
         x, y = square_to_disk(u, v)
         s, t = basis(b)
-        return along(along(a, s, x * radius), t, y * radius), b
+        return along(along(a, s, x * radius), t, y * radius), b, _round_gap(b, a, radius)
     if kind == SPHERE:
         n = square_to_sphere(u, v)
-        return along(a, n, radius), scale(n, flip)
+        return along(a, n, radius), scale(n, flip), _round_gap(n, a, radius)
     if kind == CYLINDER:
         phi = _f4(2.0) * _PI * u
         s, t = basis(b)
         x, y = _f4(math.cos(phi)), _f4(math.sin(phi))
         n = (s[0] * x + t[0] * y, s[1] * x + t[1] * y, s[2] * x + t[2] * y)
-        return along(along(a, b, v * light_number(scene, light, L_LENGTH)), n, radius), scale(n, flip)
+        length = light_number(scene, light, L_LENGTH)
+        return along(along(a, b, v * length), n, radius), scale(n, flip), _round_gap(n, a, radius + length)
     first = np.int64(light_number(scene, light, L_FIRST))
     count = np.int64(light_number(scene, light, L_COUNT))
     k = find_interval(scene.light_triangle_cdf, count, first, u)
@@ -114,7 +126,14 @@ def light_point(scene, light, u, v):
     e1 = sub(load3(scene.vertices, base + 3), p0)
     e2 = sub(load3(scene.vertices, base + 6), p0)
     b1, b2 = square_to_triangle(u, v)
-    return along(along(p0, e1, b1), e2, b2), normalize(cross(e1, e2))
+    n = normalize(cross(e1, e2))
+    gap = gap_of(
+        n,
+        abs(p0[0]) + abs(e1[0]) + abs(e2[0]),
+        abs(p0[1]) + abs(e1[1]) + abs(e2[1]),
+        abs(p0[2]) + abs(e1[2]) + abs(e2[2]),
+    )
+    return along(along(p0, e1, b1), e2, b2), n, gap
 
 
 @device
@@ -130,13 +149,13 @@ def _sphere_cone(scene, light, x):
     return sin2 / (_f4(1.0) + _f4(math.sqrt(_f4(1.0) - sin2)))
 
 
-@device_call
+@device
 def sample_light(scene, x, u_pick, u, v):
     """A direction from the point x towards a light.
 
     Returns unit `wi`, the end point of the shadow ray, the radiance L arriving if nothing is in between, its pdf per
-    solid angle (0: no contribution; for point lights L/pdf is intensity/distance² over the pick probability) and whether
-    a BSDF sample could have found it (False for point lights).
+    solid angle (0: no contribution; for point lights L/pdf is intensity/distance² over the pick probability) and
+    whether a BSDF sample could have found it (False for point lights).
     """
     light, probability, u_pick = pick_light(scene, u_pick)
     kind = np.int32(light_number(scene, light, L_KIND))
@@ -168,9 +187,9 @@ def sample_light(scene, x, u_pick, u, v):
             half = _f4(math.sqrt(max(_f4(0.0), radius * radius - dot(miss, miss))))
             p = along(x, wi, reach - half)
             n = normalize(sub(p, center))
-            end = leave(p, n, -wi[0], -wi[1], -wi[2])
+            end = leave(p, n, _round_gap(n, center, radius), -wi[0], -wi[1], -wi[2])
             return wi, end, L, probability / (_f4(2.0) * _PI * cone), True
-    p, n = light_point(scene, light, u, v)
+    p, n, gap = light_point(scene, light, u, v)
     offset = sub(p, x)
     distance2 = dot(offset, offset)
     if not distance2 > _f4(0.0):
@@ -181,7 +200,7 @@ def sample_light(scene, x, u_pick, u, v):
     if cos_light <= _f4(0.0):
         return wi, p, L, _f4(0.0), True
     pdf = probability * distance2 / (cos_light * light_number(scene, light, L_AREA))
-    return wi, leave(p, n, -wi[0], -wi[1], -wi[2]), L, pdf, True
+    return wi, leave(p, n, gap, -wi[0], -wi[1], -wi[2]), L, pdf, True
 
 
 @device
@@ -216,14 +235,14 @@ def light_pdf(scene, light, x, p, ng, wi):
     )
 
 
-@device_call
+@device
 def emit_photon(scene, u_pick, position, direction):
     """A photon leaving a light: origin, unit direction, power in units of the total power's luminance, light.
 
     `position` and `direction` are pairs of numbers in [0, 1). Environment photons start on a disc outside the scene's
     bounding sphere (T1).
     """
-    light, probability, u_pick = pick_light(scene, u_pick)
+    light, _, u_pick = pick_light(scene, u_pick)
     kind = np.int32(light_number(scene, light, L_KIND))
     L = light_vector(scene, light, L_RADIANCE)
     beta = scale(L, _f4(1.0) / luminance(L))  # the pick probability is the light's share of the power
@@ -240,7 +259,7 @@ def emit_photon(scene, u_pick, position, direction):
             scene.center_z + r * (x * s[2] + y * t[2] - d[2]),
         )
         return p, d, beta, light
-    p, n = light_point(scene, light, position[0], position[1])
+    p, n, gap = light_point(scene, light, position[0], position[1])
     local = square_to_cosine_hemisphere(direction[0], direction[1])
     d = from_basis(n, local[0], local[1], local[2])
-    return leave(p, n, d[0], d[1], d[2]), d, beta, light
+    return leave(p, n, gap, d[0], d[1], d[2]), d, beta, light

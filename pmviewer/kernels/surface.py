@@ -1,16 +1,16 @@
-"""From a ray's hit to a point on the surface with a small, known error, and rays that leave it without hitting it again.
+"""From a ray's hit to a point on the surface with a known error, and rays that leave it without hitting it again.
 
 Hit points are interpolated from the vertices (or projected onto the quadric), so their error does not grow with the
-distance of the ray's origin. Rays start off the surface by a multiple of that error, never by a constant: scenes of any
-size give the same picture.
+distance of the ray's origin, but it does with the coordinates of the whole triangle. Along the normal n it is at most a
+few roundings of Σ|nᵢ|·max|vᵢ| over the vertices v; rays start off the surface by a multiple of that, the `gap`, never
+by a constant: scenes of any size give the same picture, and a wide floor parallel to the axes needs no wide gap.
 """
 
 from __future__ import annotations
 
-
 import numpy as np
 
-from pmviewer.kernels.jit import device, device_call
+from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.quadric import quadric_normal, quadric_project
 from pmviewer.kernels.scene import load3
@@ -25,9 +25,15 @@ OFFSET = _f4(2.0**-17)
 """Distance off the surface in units of the coordinates' size: 64 rounding errors of float32."""
 
 
-@device_call
+@device
+def gap_of(n, size_x, size_y, size_z):
+    """How far rays start off a surface with unit normal n whose coordinates have these magnitudes."""
+    return OFFSET * (abs(n[0]) * size_x + abs(n[1]) * size_y + abs(n[2]) * size_z)
+
+
+@device
 def surface_at(scene, prim, u, v, ox, oy, oz, dx, dy, dz, t):
-    """The point hit, its geometric unit normal and its shading unit normal (same side), as three vectors."""
+    """The point hit, its geometric unit normal, its shading unit normal (same side), and the gap for `leave`."""
     if prim < scene.n_triangles:
         base = np.int64(prim) * 9
         a = load3(scene.vertices, base)
@@ -40,6 +46,12 @@ def surface_at(scene, prim, u, v, ox, oy, oz, dx, dy, dz, t):
             w * a[2] + u * b[2] + v * c[2],
         )
         ng = normalize(cross(sub(b, a), sub(c, a)))
+        gap = gap_of(
+            ng,
+            max(abs(a[0]), max(abs(b[0]), abs(c[0]))),
+            max(abs(a[1]), max(abs(b[1]), abs(c[1]))),
+            max(abs(a[2]), max(abs(b[2]), abs(c[2]))),
+        )
         ns = ng
         if scene.normals != 0:
             na = load3(scene.normals, base)
@@ -54,23 +66,21 @@ def surface_at(scene, prim, u, v, ox, oy, oz, dx, dy, dz, t):
                 ns = normalize(m)
                 if dot(ns, ng) < _f4(0.0):
                     ns = (-ns[0], -ns[1], -ns[2])
-        return p, ng, ns
+        return p, ng, ns, gap
     j = np.int64(prim) - np.int64(scene.n_triangles)
     p = quadric_project(scene, j, ox + t * dx, oy + t * dy, oz + t * dz)
     side = load_f4(scene.bvh_quadrics, j * 12 + QUADRIC_SIDE)
     ng = quadric_normal(scene, j, p[0], p[1], p[2])
     ng = (side * ng[0], side * ng[1], side * ng[2])
-    return p, ng, ng
+    return p, ng, ng, gap_of(ng, abs(p[0]), abs(p[1]), abs(p[2]))
 
 
 @device
-def leave(p, ng, dx, dy, dz):
-    """Origin of a ray that leaves the surface point p in direction (dx, dy, dz), on that direction's side."""
-    size = abs(p[0]) + abs(p[1]) + abs(p[2])
-    delta = OFFSET * size
+def leave(p, ng, gap, dx, dy, dz):
+    """Where a ray leaves the surface point p in direction (dx, dy, dz): `gap` off it on that direction's side."""
     if dx * ng[0] + dy * ng[1] + dz * ng[2] < _f4(0.0):
-        delta = -delta
-    return p[0] + delta * ng[0], p[1] + delta * ng[1], p[2] + delta * ng[2]
+        gap = -gap
+    return p[0] + gap * ng[0], p[1] + gap * ng[1], p[2] + gap * ng[2]
 
 
 @device

@@ -73,11 +73,12 @@ def trace_pass(
     record = np.zeros(1, LIGHT_PASS_DTYPE)
     record[0] = (
         seed & 0xFFFFFFFF,
-        first_index & 0xFFFFFFFF,
+        first_index,
         SOBOL if settings.sequence == "sobol" else INDEPENDENT,
         settings.max_bounces,
         filling,
         probability,
+        has_specular,
         settings.indirect_caustics,
     )
 

@@ -15,30 +15,39 @@ from pmviewer.kernels.bsdf import scatter_specular
 from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.light import emit_photon
 from pmviewer.kernels.memory import float_of_bits
-from pmviewer.kernels.random import draw1, draw4
+from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.raycast import closest_hit
 from pmviewer.kernels.scene import DIFFUSE, material_kind, material_of, material_two_sided, reflectance
 from pmviewer.kernels.surface import leave, surface_at
 from pmviewer.kernels.vector import dot, from_basis, is_good, luminance, mul, scale
 from pmviewer.kernels.warp import square_to_cosine_hemisphere
-from pmviewer.maps.record import BOUNCES, CAUSTIC, HAD_DIFFUSE, INDIRECT_CAUSTIC, LAST_SPECULAR
-from pmviewer.maps.record import encode_direction, encode_power
+from pmviewer.maps.record import (
+    BOUNCES,
+    CAUSTIC,
+    HAD_DIFFUSE,
+    INDIRECT_CAUSTIC,
+    LAST_SPECULAR,
+    encode_direction,
+    encode_power,
+)
 
 _f4 = np.float32
 _f8 = np.float64
 _u4 = np.uint32
+_i8 = np.int64
 _INF = _f4(np.inf)
-LIGHT_CHOICE_SET = 0xE817
+LIGHT_CHOICE_SET = _i8(0xE817)
 
 LIGHT_PASS_DTYPE = np.dtype(
     [
         ("seed", "u4"),
-        ("first_index", "u4"),  # index over all passes of this pass's photon 0
+        ("first_index", "i8"),  # index over all passes of this pass's photon 0
         ("sequence", "i4"),
         ("max_bounces", "i4"),
         ("global_trajectories", "i8"),  # photons 0 … this−1 of the pass fill the global map
         ("store_probability", "f4"),  # of a global photon (q rule "photons"); 1 otherwise
-        ("indirect_caustics", "i4"),
+        ("caustics", "i4"),  # whether the caustic map is filled
+        ("indirect_caustics", "i4"),  # whether with photons that met a diffuse surface before, too
     ],
     align=True,
 )
@@ -76,9 +85,12 @@ def trace_photons(scenes, passes, i0, i1, global_out, caustic_out, counts, ledge
         if counts[C_GLOBAL] + max_bounces > len(global_out) or counts[C_CAUSTIC] + max_bounces > len(caustic_out):
             return i
         to_global = i < pass_.global_trajectories
-        index = _u4(pass_.first_index + _u4(i))
-        u0, u1, u2, u3 = draw4(pass_.sequence, pass_.seed, index, 0)
-        u_pick = draw1(pass_.sequence, pass_.seed, index, LIGHT_CHOICE_SET)
+        place = np.int64(pass_.first_index) + np.int64(i)
+        index, seed = _u4(place), pass_.seed
+        if place >> 32 != 0:  # a Sobol set has 2³² points; the next photons use other sets
+            seed = hash3(seed, _u4(place >> 32), _u4(LIGHT_CHOICE_SET))
+        u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, _i8(0))
+        u_pick = draw1(pass_.sequence, seed, index, LIGHT_CHOICE_SET)
         p, d, beta, light = emit_photon(scene, u_pick, (u2, u3), (u0, u1))
         start = luminance(beta)
         ledger[E_EMITTED] += _f8(start)
@@ -91,9 +103,9 @@ def trace_photons(scenes, passes, i0, i1, global_out, caustic_out, counts, ledge
             if prim < 0:
                 ledger[E_ESCAPED] += _f8(luminance(beta))
                 break
-            p, ng, ns = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
+            p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
-            u0, u1, u2, u3 = draw4(pass_.sequence, pass_.seed, index, 1 + bounces)
+            u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
             if material_kind(scene, material) != DIFFUSE:
                 d, weight, _ = scatter_specular(scene, material, ns, d, u0)
                 flags = _u4(flags | _u4(LAST_SPECULAR))
@@ -114,7 +126,7 @@ def trace_photons(scenes, passes, i0, i1, global_out, caustic_out, counts, ledge
                 path_class = np.int32(flags >> _u4(6))
                 word = _u4(flags | _u4(min(bounces, BOUNCES)))
                 is_caustic = path_class == CAUSTIC or (path_class == INDIRECT_CAUSTIC and pass_.indirect_caustics != 0)
-                if is_caustic:
+                if is_caustic and pass_.caustics != 0:
                     _store(caustic_out, counts[C_CAUSTIC], p, wi, beta, word, light)
                     counts[C_CAUSTIC] += 1
                 if to_global and (pass_.store_probability >= _f4(1.0) or u3 < pass_.store_probability):
@@ -141,5 +153,5 @@ def trace_photons(scenes, passes, i0, i1, global_out, caustic_out, counts, ledge
             if bounces >= max_bounces:
                 ledger[E_TERMINATED] += _f8(luminance(beta))
                 break
-            o = leave(p, ng, d[0], d[1], d[2])
+            o = leave(p, ng, gap, d[0], d[1], d[2])
     return i1

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pmviewer.kernels.jit import device, device_call
+from pmviewer.kernels.jit import device
 from pmviewer.kernels.light import emitted, light_pdf, sample_light
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.raycast import occluded
@@ -17,6 +17,8 @@ from pmviewer.kernels.vector import add, dot, scale, sub
 _f4 = np.float32
 _u4 = np.uint32
 INV_PI = _f4(1.0 / math.pi)
+EXTRA_SET = np.int64(1000)
+"""Dimension set of the second light sample; further ones follow."""
 BEFORE_LIGHT = _f4(1.0 - 2.0**-13)
 """Shadow rays end a little before the light's own surface."""
 BLACK = (_f4(0.0), _f4(0.0), _f4(0.0))
@@ -29,16 +31,16 @@ def power_heuristic(n_this, pdf_this, n_other, pdf_other):
     return a * a / (a * a + b * b)
 
 
-@device_call
-def visible(scene, p, ng, wi, end):
+@device
+def visible(scene, p, ng, gap, wi, end):
     """Whether nothing stands between the surface point p and the point `end`, seen from p in direction wi."""
-    o = leave(p, ng, wi[0], wi[1], wi[2])
+    o = leave(p, ng, gap, wi[0], wi[1], wi[2])
     d = sub(end, o)
     return not occluded(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), BEFORE_LIGHT)
 
 
-@device_call
-def light_samples(scene, p, ng, ns, n, n_bsdf, sequence, seed, index, u_pick, u, v):
+@device
+def light_samples(scene, p, ng, ns, gap, n, n_bsdf, sequence, seed, index, u_pick, u, v):
     """Mean of n light samples of the irradiance at p, each weighted against n_bsdf cosine-distributed BSDF samples.
 
     (u_pick, u, v) are the first sample's numbers; further ones are drawn. Returns E (W/m²) and the shadow rays cast.
@@ -47,12 +49,12 @@ def light_samples(scene, p, ng, ns, n, n_bsdf, sequence, seed, index, u_pick, u,
     rays = 0
     for s in range(n):
         if s > 0:
-            u_pick, u, v, _ = draw4(sequence, seed, index, 1000 + s)
+            u_pick, u, v, _ = draw4(sequence, seed, index, EXTRA_SET + s)
         wi, end, L, pdf, findable = sample_light(scene, p, u_pick, u, v)
         cos = dot(wi, ns)
         if pdf > _f4(0.0) and cos > _f4(0.0) and dot(wi, ng) > _f4(0.0):
             rays += 1
-            if visible(scene, p, ng, wi, end):
+            if visible(scene, p, ng, gap, wi, end):
                 weight = cos / (pdf * _f4(n))
                 if findable and n_bsdf > 0:
                     weight *= power_heuristic(_f4(n), pdf, _f4(n_bsdf), cos * INV_PI)

@@ -4,8 +4,9 @@ From the camera, mirrors and glass are followed to the first diffuse surface. Th
 come from the caustic map, and indirect light from the global map: shown directly (`progressive`) or by a final gather,
 BSDF-sampled rays that look the map up where they land (`gather`).
 
-Random numbers of a pixel are Owen-scrambled Sobol points over the passes, keyed by (seed, pixel): dimension set 0 is the
-place in the pixel and on the light, 1 the choice of light and the BSDF sample, 2 + d the specular choice at depth d.
+Random numbers of a pixel are Owen-scrambled Sobol points over the passes, keyed by (seed, pixel): dimension set 0 is
+the place in the pixel and on the light, 1 the choice of light and the BSDF sample, 2 + d the specular choice at depth
+d.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.bsdf import scatter_specular
-from pmviewer.kernels.jit import device, device_call, kernel
+from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.light import emitted
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.raycast import closest_hit
@@ -42,7 +43,7 @@ _INF = _f4(np.inf)
 
 EMISSION, DIRECT, SPECULAR, CAUSTIC, INDIRECT = 0, 3, 6, 9, 12
 ALBEDO, NORMAL, DEPTH = 15, 18, 21
-GATHER_SET, GATHER_CHAIN_SET = 2000, 3000
+PIXEL_SET, BSDF_SET, CHAIN_SET, GATHER_SET, GATHER_CHAIN_SET = np.array([0, 1, 2, 2000, 3000], np.int64)
 
 
 @device
@@ -87,19 +88,19 @@ def properties(scene, film, eye, pixel, albedo, n, p):
     film[pixel, DEPTH] += _f8(depth)
 
 
-@device_call
-def bsdf_ray(scene, p, ng, wi):
-    """What a ray from the surface point p in direction wi meets: primitive (−1: nothing), point, normals."""
-    o = leave(p, ng, wi[0], wi[1], wi[2])
+@device
+def bsdf_ray(scene, p, ng, gap, wi):
+    """What a ray from the surface point p in direction wi meets: primitive (−1: nothing), point, normals, gap."""
+    o = leave(p, ng, gap, wi[0], wi[1], wi[2])
     t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], wi[0], wi[1], wi[2], _f4(0.0), _INF)
     if prim < 0:
-        return prim, o, wi, wi
-    q, nq, sq = surface_at(scene, prim, u, v, o[0], o[1], o[2], wi[0], wi[1], wi[2], t)
-    return prim, q, nq, sq
+        return prim, o, wi, wi, gap
+    q, nq, sq, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], wi[0], wi[1], wi[2], t)
+    return prim, q, nq, sq, gap
 
 
-@device_call
-def gather_light(scene, eye, photons, prim, q, nq, sq, d, seed, index):
+@device
+def gather_light(scene, eye, photons, prim, q, nq, sq, gap, d, seed, index):
     """Radiance that a gather ray brings back: the global map's at the first diffuse surface, on the side it hit.
 
     Mirrors and glass end the ray unless the map holds what they reflect (`gather_specular`). Returns L and rays cast.
@@ -127,7 +128,7 @@ def gather_light(scene, eye, photons, prim, q, nq, sq, d, seed, index):
         if not largest(beta) > _f4(0.0):
             return BLACK, rays
         rays += 1
-        prim, q, nq, sq = bsdf_ray(scene, q, nq, d)
+        prim, q, nq, sq, gap = bsdf_ray(scene, q, nq, gap, d)
     return BLACK, rays
 
 
@@ -143,7 +144,7 @@ def eye_pass(scenes, eyes, caustic_maps, global_maps, film, counts, first, last)
     index = eye.index
     for pixel in range(first, last):
         seed = pixel_seed(eye, pixel)
-        ux, uy, lu, lv = draw4(eye.sequence, seed, index, 0)
+        ux, uy, lu, lv = draw4(eye.sequence, seed, index, PIXEL_SET)
         d, near, far = camera_ray(eye, pixel, ux, uy)
         o = (eye.x_eye, eye.y_eye, eye.z_eye)
         beta = (_f4(1.0), _f4(1.0), _f4(1.0))
@@ -156,7 +157,7 @@ def eye_pass(scenes, eyes, caustic_maps, global_maps, film, counts, first, last)
                     L = light_vector(scene, scene.environment, L_RADIANCE)
                     deposit(film, counts, pixel, seen, mul(beta, L))
                 break
-            p, ng, ns = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
+            p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             wo = (-d[0], -d[1], -d[2])
             material = material_of(scene, prim)
             albedo = reflectance(scene, material)
@@ -168,12 +169,12 @@ def eye_pass(scenes, eyes, caustic_maps, global_maps, film, counts, first, last)
             if material_kind(scene, material) != DIFFUSE:
                 if depth == eye.max_depth:
                     break
-                choice = draw1(eye.sequence, seed, index, 2 + depth)
+                choice = draw1(eye.sequence, seed, index, CHAIN_SET + depth)
                 d, weight, compression = scatter_specular(scene, material, ns, d, choice)
                 beta = scale(mul(beta, weight), compression)
                 if not largest(beta) > _f4(0.0):
                     break
-                o = leave(p, ng, d[0], d[1], d[2])
+                o = leave(p, ng, gap, d[0], d[1], d[2])
                 near, far = _f4(0.0), _INF
                 continue
             if dot(ng, d) > _f4(0.0):
@@ -184,13 +185,13 @@ def eye_pass(scenes, eyes, caustic_maps, global_maps, film, counts, first, last)
             if not largest(beta) > _f4(0.0):
                 break
             per_E = scale(beta, INV_PI)
-            u_pick, bu, bv, _ = draw4(eye.sequence, seed, index, 1)
+            u_pick, bu, bv, _ = draw4(eye.sequence, seed, index, BSDF_SET)
             n_bsdf = 0
             if eye.mis != 0:
                 n_bsdf = max(eye.gather_rays, 1)
             if eye.direct != 0:
                 E, rays = light_samples(
-                    scene, p, ng, ns, eye.light_samples, n_bsdf, eye.sequence, seed, index, u_pick, lu, lv
+                    scene, p, ng, ns, gap, eye.light_samples, n_bsdf, eye.sequence, seed, index, u_pick, lu, lv
                 )
                 counts[C_RAYS] += rays
                 deposit(film, counts, pixel, DIRECT if depth == 0 else SPECULAR, mul(per_E, E))
@@ -214,11 +215,11 @@ def eye_pass(scenes, eyes, caustic_maps, global_maps, film, counts, first, last)
                 if dot(wi, ng) <= _f4(0.0):
                     continue
                 counts[C_RAYS] += 1
-                hit, q, nq, sq = bsdf_ray(scene, p, ng, wi)
+                hit, q, nq, sq, far_gap = bsdf_ray(scene, p, ng, gap, wi)
                 if eye.direct != 0 and eye.mis != 0:
                     direct = add(direct, found_light(scene, p, wi, local[2], bsdf_rays, eye.light_samples, hit, q, nq))
                 if eye.gather_rays > 0:
-                    L, rays = gather_light(scene, eye, global_map, hit, q, nq, sq, wi, seed, sample)
+                    L, rays = gather_light(scene, eye, global_map, hit, q, nq, sq, far_gap, wi, seed, sample)
                     counts[C_RAYS] += rays
                     indirect = add(indirect, L)
             if bsdf_rays > 0:

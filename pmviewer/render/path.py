@@ -32,6 +32,7 @@ from pmviewer.render.eye import (
     DIRECT,
     EMISSION,
     INDIRECT,
+    PIXEL_SET,
     SPECULAR,
     camera_ray,
     deposit,
@@ -43,6 +44,7 @@ from pmviewer.render.record import C_RAYS
 _f4 = np.float32
 _INF = _f4(np.inf)
 ROULETTE_DEPTH = 8
+FIRST_SET = np.int64(2)
 
 
 @kernel
@@ -52,7 +54,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
     index = eye.index
     for pixel in range(first, last):
         seed = pixel_seed(eye, pixel)
-        ux, uy, _, _ = draw4(eye.sequence, seed, index, 0)
+        ux, uy, _, _ = draw4(eye.sequence, seed, index, PIXEL_SET)
         d, near, far = camera_ray(eye, pixel, ux, uy)
         o = (eye.x_eye, eye.y_eye, eye.z_eye)
         beta = (_f4(1.0), _f4(1.0), _f4(1.0))
@@ -72,9 +74,9 @@ def path_pass(scenes, eyes, film, counts, first, last):
             elif diffuse == 1:
                 term = DIRECT if since_diffuse == 0 else CAUSTIC
             light = scene.environment if prim < 0 else light_of(scene, prim)
-            p, ng, ns = o, d, d
+            p, ng, ns, gap = o, d, d, near
             if prim >= 0:
-                p, ng, ns = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
+                p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             if light >= 0:
                 L = light_vector(scene, light, L_RADIANCE) if prim < 0 else emitted(scene, light, ng, d)
                 weight = _f4(1.0)
@@ -94,7 +96,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 properties(scene, film, eye, pixel, albedo, face(ns, wo), p)
             if depth == eye.max_depth:
                 break
-            u0, u1, _, u3 = draw4(eye.sequence, seed, index, 2 + 2 * depth)
+            u0, u1, _, u3 = draw4(eye.sequence, seed, index, FIRST_SET + 2 * depth)
             if material_kind(scene, material) != DIFFUSE:
                 d, factor, compression = scatter_specular(scene, material, ns, d, u0)
                 beta = scale(mul(beta, factor), compression)
@@ -110,9 +112,9 @@ def path_pass(scenes, eyes, film, counts, first, last):
                     break
                 diffuse += 1
                 since_diffuse = 0
-                u_pick, lu, lv, _ = draw4(eye.sequence, seed, index, 3 + 2 * depth)
+                u_pick, lu, lv, _ = draw4(eye.sequence, seed, index, FIRST_SET + 1 + 2 * depth)
                 E, rays = light_samples(
-                    scene, p, ng, ns, eye.light_samples, eye.mis, eye.sequence, seed, index, u_pick, lu, lv
+                    scene, p, ng, ns, gap, eye.light_samples, eye.mis, eye.sequence, seed, index, u_pick, lu, lv
                 )
                 counts[C_RAYS] += rays
                 term = INDIRECT
@@ -134,5 +136,5 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 if not u3 < survival:
                     break
                 beta = scale(beta, _f4(1.0) / survival)
-            o = leave(p, ng, d[0], d[1], d[2])
+            o = leave(p, ng, gap, d[0], d[1], d[2])
             near, far = _f4(0.0), _INF
