@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pmviewer.kernels.jit import device, device_call
+from pmviewer.kernels.jit import device
 from pmviewer.kernels.scene import (
     CONDUCTOR,
     material_eta,
@@ -42,7 +42,7 @@ def fresnel_dielectric(cos_i, eta):
     return _f4(0.5) * (parallel * parallel + perpendicular * perpendicular), cos_t
 
 
-@device_call
+@device
 def scatter_specular(scene, material, n, d, u):
     """One specular scattering of the travelling direction d at a surface with outward normal n.
 

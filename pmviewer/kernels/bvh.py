@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.jit import device, device_call, kernel
+from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.memory import aligned_empty
 from pmviewer.kernels.quadric import QUADRIC_FLOATS, quadric_bounds
 from pmviewer.kernels.simd import BLOCK_ROWS, LANES, NODE_ROWS
@@ -146,7 +146,7 @@ def _triangle_boxes(triangles, boxes, box_ids):
     return count
 
 
-@device_call
+@device
 def _empty(box):
     box[0] = box[1] = box[2] = np.float32(np.inf)
     box[4] = box[5] = box[6] = np.float32(-np.inf)
@@ -159,7 +159,7 @@ def _grow(box, other):
         box[4 + k] = max(box[4 + k], other[4 + k])
 
 
-@device_call
+@device
 def _make_node(nodes, node_ints, index, boxes, begin, end):
     """Node `index` as a leaf over boxes [begin, end): lower corner, begin, upper corner, count."""
     node = nodes[index]
@@ -261,8 +261,8 @@ def _build_binary(boxes, box_ints, n_triangles, nodes, node_ints):
     bin_counts = np.empty((3, BINS), np.int32)
     costs = np.empty(BINS + 1, np.float32)
     stack = np.empty((256, 2), np.int64)
-    n_nodes, n_blocks = 1, 0
-    _make_node(nodes, node_ints, 0, boxes, 0, n)
+    n_nodes, n_blocks = np.int64(1), np.int64(0)
+    _make_node(nodes, node_ints, np.int64(0), boxes, np.int64(0), np.int64(n))
     stack[0, 0], stack[0, 1] = 0, 0
     size = 1 if n > 0 else 0
     while size > 0:

@@ -79,13 +79,8 @@ _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"
 
 
 def device(function: Callable[..., Any]) -> Any:
-    """A function that kernels call; LLVM may inline it."""
-    return njit(**_OPTIONS)(function)
-
-
-def device_call(function: Callable[..., Any]) -> Any:
-    """A large function that kernels call and that is never copied into them (keeps compile time down)."""
-    return njit(inline="never", **_OPTIONS)(function)
+    """A function that kernels call. It has no wrapper for Python: that halves the time to compile."""
+    return njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
 
 
 def kernel(function: Callable[..., Any]) -> Any:

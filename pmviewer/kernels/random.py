@@ -129,9 +129,9 @@ def draw4(sequence, seed, index, dimension_set):
         i = owen(_u4(index), key)
         return (
             _scrambled(i, _u4(key ^ _u4(0xA511E9B3))),
-            _scrambled(sobol_reversed(i, 1), _u4(_u4(key * _u4(0x9E3779B1)) ^ _u4(0x63D83595))),
-            _scrambled(sobol_reversed(i, 2), _u4(_u4(key * _u4(0x85EBCA77)) ^ _u4(0xC2B2AE3D))),
-            _scrambled(sobol_reversed(i, 3), _u4(_u4(key * _u4(0x27D4EB2F)) ^ _u4(0x165667B1))),
+            _scrambled(sobol_reversed(i, np.int64(1)), _u4(_u4(key * _u4(0x9E3779B1)) ^ _u4(0x63D83595))),
+            _scrambled(sobol_reversed(i, np.int64(2)), _u4(_u4(key * _u4(0x85EBCA77)) ^ _u4(0xC2B2AE3D))),
+            _scrambled(sobol_reversed(i, np.int64(3)), _u4(_u4(key * _u4(0x27D4EB2F)) ^ _u4(0x165667B1))),
         )
     return (
         unit_float(hash3(key, _u4(index), _u4(0))),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.jit import device, device_call, kernel
+from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.memory import (
     bits_of_float,
     count_trailing_zeros,
@@ -50,7 +50,7 @@ def _key(distances, base, lane):
     return (distance << 32) | (np.int64(load_i4(base, lane)) & 0xFFFFFFFF)
 
 
-@device_call
+@device
 def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     """(t, primitive, u, v) of the nearest hit; (tmax, -1, 0, 0) without one.
 
@@ -132,7 +132,7 @@ def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
             u = v = np.float32(0)
 
 
-@device_call
+@device
 def occluded(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     """Whether the ray meets anything; False for a ray with a non-finite number."""
     if not _is_finite(ox, oy, oz, dx, dy, dz):

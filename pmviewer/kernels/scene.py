@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pmviewer.kernels.bvh import BVH_FIELDS
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4, load_i4
-from pmviewer.kernels.bvh import BVH_FIELDS
 
 _f4 = np.float32
 
@@ -36,25 +36,17 @@ SCENE_DTYPE = np.dtype(
     align=True,
 )
 
+# Columns are numpy integers: numba would compile an accessor anew for each literal one.
+_columns = np.arange(20, dtype=np.int64)
+
 DIFFUSE, CONDUCTOR, DIELECTRIC = 0, 1, 2
 MATERIAL_COLUMNS = 12
-M_KIND, M_TWO_SIDED, M_ETA, M_REFLECTANCE, M_TRANSMITTANCE = 0, 1, 2, 4, 8
+M_KIND, M_TWO_SIDED, M_ETA, M_REFLECTANCE, M_TRANSMITTANCE = _columns[[0, 1, 2, 4, 8]]
 
 PARALLELOGRAM, DISK, SPHERE, CYLINDER, MESH, POINT, ENVIRONMENT = range(7)
 LIGHT_COLUMNS = 20
-L_KIND, L_RADIANCE, L_A, L_B, L_C, L_AREA, L_RADIUS, L_LENGTH, L_FLIP, L_FIRST, L_COUNT = (
-    0,
-    1,
-    4,
-    7,
-    10,
-    13,
-    14,
-    15,
-    16,
-    17,
-    18,
-)
+L_KIND, L_RADIANCE, L_A, L_B, L_C = _columns[[0, 1, 4, 7, 10]]
+L_AREA, L_RADIUS, L_LENGTH, L_FLIP, L_FIRST, L_COUNT = _columns[13:19]
 
 
 @device

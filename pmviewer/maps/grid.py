@@ -156,7 +156,7 @@ def grid_ranges(grid, px, py, pz, radius, ranges):
     x0, x1 = _i8(max(gx - h, 0.0)), min(_i8(gx + h), grid.nx - 1)
     y0, y1 = _i8(max(gy - h, 0.0)), min(_i8(gy + h), grid.ny - 1)
     z0, z1 = _i8(max(gz - h, 0.0)), min(_i8(gz + h), grid.nz - 1)
-    count = 0
+    count = _i8(0)
     for cz in range(z0, z1 + 1):
         for cy in range(y0, y1 + 1):
             count = _row(grid, x0, x1, cy, cz, ranges, count)

@@ -11,10 +11,22 @@ import numpy as np
 
 PROGRAM = """
 import json, warnings
+from types import SimpleNamespace
+import numba
 import numpy as np
-from pmviewer.kernels import vector, warp
-from pmviewer.kernels.bsdf import fresnel_dielectric, reflect
-from pmviewer.kernels.random import INDEPENDENT, SOBOL, draw1, draw4, hash3
+from pmviewer.kernels import bsdf, random, vector, warp
+from pmviewer.kernels.random import INDEPENDENT, SOBOL
+
+def callable_from_python(module, names):  # device functions have no wrapper of their own
+    def wrap(g):
+        return numba.njit(lambda *a: g(*a))
+    return SimpleNamespace(**{name: wrap(getattr(module, name)) for name in names.split()})
+
+vector = callable_from_python(vector, "normalize from_basis luminance dot cross")
+names = "square_to_sphere square_to_disk square_to_cosine_hemisphere square_to_cone square_to_triangle"
+warp = callable_from_python(warp, names)
+fresnel_dielectric, reflect = vars(callable_from_python(bsdf, "fresnel_dielectric reflect")).values()
+draw1, draw4, hash3 = vars(callable_from_python(random, "draw1 draw4 hash3")).values()
 
 warnings.simplefilter("ignore", RuntimeWarning)  # uint32 products are meant to overflow
 f, u4 = np.float32, np.uint32
