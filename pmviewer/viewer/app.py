@@ -147,7 +147,8 @@ class ViewerApp:
             self._title = title
 
     def _over_everything(self) -> None:
-        run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying)
+        if not self.dialogs.is_open:
+            run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying)
         self.dialogs.poll()
         draw_help(self.state)
 

@@ -95,17 +95,17 @@ def pan(pose: CameraPose, dx: float, dy: float) -> CameraPose:
 
 
 def zoom(pose: CameraPose, steps: float, radius: float) -> CameraPose:
-    """Move the eye towards the target; one step (a notch of the wheel) is a tenth of the way. The target is pushed
-    ahead rather than reached, so zooming never gets stuck."""
+    """Move the eye towards the target; one step (a notch of the wheel) is a tenth of the way. Close to the target the
+    eye goes on at a steady pace and pushes the target ahead, so that zooming never gets stuck."""
     origin, target = np.asarray(pose.origin, float), np.asarray(pose.target, float)
     forward = _unit(target - origin)
     distance = float(np.linalg.norm(target - origin))
-    wanted = distance * 0.9**steps
-    closest = 1e-3 * radius
-    moved = target - forward * max(wanted, closest)
-    if wanted < closest:
-        target = target + forward * 0.02 * radius * abs(steps)
-    return replace(pose, origin=_vec3(moved), target=_vec3(target))
+    advance = distance * (1 - 0.9**steps)
+    if steps > 0:
+        advance = max(advance, 0.005 * radius * steps)
+    moved = origin + forward * advance
+    left = max(distance - advance, 0.02 * radius)
+    return replace(pose, origin=_vec3(moved), target=_vec3(moved + forward * left))
 
 
 def fly(pose: CameraPose, right: float, up: float, forward: float, step: float) -> CameraPose:

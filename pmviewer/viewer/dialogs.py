@@ -9,8 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from imgui_bundle import im_file_dialog
 from imgui_bundle import portable_file_dialogs as native
+
+from pmviewer.viewer.file_browser import FileBrowser
 
 Chosen = Callable[[Path], None]
 _HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
@@ -28,7 +29,7 @@ class FileDialogs:
 
     def __init__(self) -> None:
         self._native: Any = None
-        self._drawn = ""
+        self._browser: FileBrowser | None = None
         self._chosen: Chosen | None = None
         self._suffix = ""
 
@@ -44,44 +45,31 @@ class FileDialogs:
         if has_native_dialogs():
             self._native = native.open_file(title, str(Path.cwd()), [name, " ".join(patterns), "All files", "*"])
         else:
-            self._drawn = "open"
-            extensions = ",".join(p.removeprefix("*") for p in patterns)
-            im_file_dialog.FileDialog.instance().open(
-                self._drawn, title, f"{name} ({' '.join(patterns)}){{{extensions}}},.*", False, str(Path.cwd())
-            )
+            self._browser = FileBrowser(title, Path.cwd(), patterns, self._answer)
 
     def save(self, title: str, default: Path, chosen: Chosen) -> None:
         """Ask where to write; `default` gives folder, name and suffix."""
         if self.is_open:
             return
         self._chosen, self._suffix = chosen, default.suffix
-        pattern = f"*{default.suffix}"
+        patterns = [f"*{default.suffix}"]
         if has_native_dialogs():
-            self._native = native.save_file(title, str(default), [default.suffix[1:].upper(), pattern])
+            self._native = native.save_file(title, str(default), [default.suffix[1:].upper(), *patterns])
         else:
-            self._drawn = "save"
-            im_file_dialog.FileDialog.instance().save(
-                self._drawn, title, f"{default.suffix[1:].upper()} ({pattern}){{{default.suffix}}}", str(default.parent)
-            )
+            self._browser = FileBrowser(title, default.parent, patterns, self._answer, saving=True, name=default.name)
 
     def poll(self) -> None:
         """Draw the dialog when it is ours, and hand over the answer once there is one."""
         if self._native is not None and self._native.ready(0):
             result = self._native.result()
             self._native = None
-            self._answer(result[0] if isinstance(result, list) and result else result or "")
-        elif self._drawn and im_file_dialog.FileDialog.instance().is_done(self._drawn):
-            dialog = im_file_dialog.FileDialog.instance()
-            result = dialog.get_result().path() if dialog.has_result() else ""
-            dialog.close()
-            self._drawn = ""
-            self._answer(result)
+            text = (result[0] if result else "") if isinstance(result, list) else result
+            self._answer(Path(text) if text else None)
+        elif self._browser is not None and not self._browser.draw():
+            self._browser = None
 
-    def _answer(self, result: Any) -> None:
+    def _answer(self, path: Path | None) -> None:
         chosen, self._chosen = self._chosen, None
-        if not result or chosen is None:
+        if path is None or chosen is None:
             return
-        path = Path(str(result))
-        if self._suffix and not path.suffix:
-            path = path.with_suffix(self._suffix)
-        chosen(path)
+        chosen(path if path.suffix or not self._suffix else path.with_suffix(self._suffix))

@@ -21,7 +21,7 @@ def draw_help(state: ViewerState) -> None:
     if not state.help_open:
         return
     center = imgui.get_main_viewport().get_center()
-    imgui.set_next_window_pos(center, imgui.Cond_.appearing, (0.5, 0.5))
+    imgui.set_next_window_pos(center, imgui.Cond_.always, (0.5, 0.5))
     flags = imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
     flags |= imgui.WindowFlags_.no_collapse
     shown, still_open = imgui.begin("Keys and mouse", True, flags)

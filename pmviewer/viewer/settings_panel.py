@@ -101,11 +101,11 @@ class SettingsPanel:
         imgui.text_unformatted(theme.drawable(info.title))
         imgui.pop_style_color()
         described = self._is_hovered()
-        self._context_menu(info, value, resolved)
+        self._context_menu("label", info, value, resolved)
         imgui.table_next_column()
         new = self.widgets.edit(info, value, resolved)
         described = described or (self._is_hovered() and not imgui.is_item_active())
-        self._context_menu(info, value, resolved)
+        self._context_menu("value", info, value, resolved)
         imgui.table_next_column()
         if info.auto:
             new = self._auto_button(info, value, resolved, new)
@@ -132,8 +132,8 @@ class SettingsPanel:
             return resolved if automatic else "auto"
         return new
 
-    def _context_menu(self, info: SettingInfo, value: Any, resolved: Any) -> None:
-        if not imgui.begin_popup_context_item(f"menu.{info.path}"):
+    def _context_menu(self, part: str, info: SettingInfo, value: Any, resolved: Any) -> None:
+        if not imgui.begin_popup_context_item(f"menu.{part}.{info.path}"):
             return
         imgui.text_disabled(info.path)
         imgui.separator()

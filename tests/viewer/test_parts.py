@@ -1,0 +1,146 @@
+"""Parts of the window that need none: numbers, jobs, recent files, the link to a session that is still starting."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+from fake_session import FakeSession, photons_at, wall_photons
+
+from pmviewer.errors import OutputError
+from pmviewer.maps.record import unpack
+from pmviewer.settings import Settings, with_values
+from pmviewer.viewer import format as fmt
+from pmviewer.viewer.jobs import Jobs
+from pmviewer.viewer.overlays import brightest_channel, even_thinning
+from pmviewer.viewer.recent import LENGTH, RecentFiles
+from pmviewer.viewer.session_link import SessionLink
+from pmviewer.viewer.theme import drawable
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0, "", "0"),
+        (7_432_000, "", "7.43 M"),
+        (412_000, "", "412 k"),
+        (200_000, "", "200 k"),
+        (0.0081, "m", "8.10 mm"),
+        (14.2e6, "rays/s", "14.2 Mrays/s"),
+        (999_999, "", "1.00 M"),
+        (15, "", "15"),
+        (2.5e-7, "W", "250 nW"),
+        (float("inf"), "m", "inf m"),
+    ],
+)
+def test_si(value, unit, text):
+    assert fmt.si(value, unit) == text
+
+
+def test_other_numbers():
+    assert fmt.grouped(1234567) == "1,234,567"
+    assert fmt.duration(0.0042) == "4 ms"
+    assert fmt.duration(12.34) == "12.3 s"
+    assert fmt.duration(125) == "2 min 05 s"
+    assert fmt.duration(7380) == "2 h 03 min"
+    assert fmt.data_size(24) == "24 B"
+    assert fmt.data_size(3 * 1024**2) == "3.0 MiB"
+    assert fmt.short(50_000_000.0) == "50,000,000"
+
+
+def test_text_has_only_characters_of_the_font():
+    assert drawable("r²ᵢ₊₁ = r²ᵢ·(i+α)/(i+1)") == "r²_(i+1) = r²_i·(i+α)/(i+1)"
+
+
+@pytest.mark.parametrize("count", [0, 1, 999, 1000, 1001, 250_000])
+def test_thinning_keeps_to_the_limit_and_wastes_little_of_it(count):
+    stride = even_thinning(count, 1000)
+    drawn = -(-count // stride)
+    assert drawn <= 1000
+    assert drawn >= min(count, 500)
+
+
+def test_powers_are_decoded_as_the_record_says():
+    photons = photons_at(wall_photons()[:3], (0.5, 0.125, 0.03125))
+    np.testing.assert_array_equal(brightest_channel(photons), unpack(photons, 1.0)["Phi"].max(axis=1))
+    np.testing.assert_allclose(unpack(photons, 2.0)["Phi"][0], (1.0, 0.25, 0.0625))
+    assert np.all(brightest_channel(photons_at(wall_photons()[:1], (0, 0, 0))) == 0)
+
+
+def test_recent_files_are_capped_unique_and_kept(tmp_path):
+    store = tmp_path / "config" / "recent.txt"
+    recent = RecentFiles(store)
+    for number in range(LENGTH + 5):
+        recent.add(f"scene{number}")
+    recent.add("scene12")
+    assert len(recent.entries) == LENGTH
+    assert recent.entries[0] == "scene12"
+    assert RecentFiles(store).entries == recent.entries
+    store.parent.chmod(0o500)
+    recent.add("another")  # a folder that can't be written is no reason to fail
+    store.parent.chmod(0o700)
+
+
+def test_jobs_report_results_and_errors():
+    said = []
+    jobs = Jobs(lambda level, text: said.append((level, text)))
+
+    def fail():
+        raise OutputError("picture.exr: the disk is full. Free some space.")
+
+    def crash():
+        raise ValueError("odd")
+
+    jobs.start("writing EXR", lambda: "wrote picture.exr")
+    jobs.start("writing EXR", fail)
+    jobs.start("writing EXR", crash)
+    jobs.finish()
+    assert said == [
+        ("info", "wrote picture.exr"),
+        ("error", "picture.exr: the disk is full. Free some space."),
+        ("error", "writing EXR: unexpected ValueError: odd"),
+    ]
+    assert jobs.running == []
+
+
+def test_the_link_hands_everything_over_once_the_session_is_there():
+    fake, ready = FakeSession(), threading.Event()
+
+    def make():
+        ready.wait(10)
+        return fake
+
+    woken = threading.Event()
+    link = SessionLink(make, Settings())
+    link.on_update = woken.set
+    changed = with_values(Settings(), {"photons.N": 5000})
+    link.open("box", Settings())
+    link.set(changed)
+    link.pause()
+    link.connect()
+    assert link.status.state == "preparing"
+    assert link.settings == changed
+    assert link.frame is None
+    ready.set()
+    assert woken.wait(10)
+    assert fake.opened == ["box"]
+    assert link.settings == changed
+    assert link.paused
+    assert link.frame is fake.frame
+    link.close()
+    assert fake.closed
+
+
+def test_a_session_that_does_not_start_is_an_error_in_the_log():
+    failed = threading.Event()
+
+    def make():
+        raise OSError("no room for the cache")
+
+    link = SessionLink(make)
+    link.on_update = failed.set
+    link.connect()
+    assert failed.wait(10)
+    assert link.status.state == "failed"
+    assert [m.text for m in link.take_messages()] == ["The engine did not start: no room for the cache"]
