@@ -50,7 +50,7 @@ class CameraPose:
 
         Raises SettingError when eye and target coincide. An `up` along the view direction is replaced.
         """
-        forward = np.subtract(self.target, self.origin)
+        forward = np.subtract(self.target, self.origin, dtype=np.float64)
         length = float(np.linalg.norm(forward))
         if not math.isfinite(length) or length == 0:
             raise SettingError("The camera's origin and target coincide: move one of them.")
