@@ -78,7 +78,7 @@ def diffuse_box(s=1.0, albedo=GREY, size=48):
     return Scene("diffuse box", None, shapes, (diffuse(albedo=(albedo,) * 3),), (), box_camera(s), size, size)
 
 
-def cornell_box(s=1.0, size=48):
+def cornell_box(s=1.0, size=48, light=0.4):
     """Coloured walls, a glass ball, a mirror ball, a light of some size; nothing leaves it."""
     materials = (
         diffuse("white", (0.7, 0.7, 0.7)),
@@ -91,7 +91,7 @@ def cornell_box(s=1.0, size=48):
         Shape("mirror ball", Sphere((-0.45 * s, -0.6 * s, -0.4 * s), 0.38 * s), 3),
         Shape("glass ball", Sphere((0.45 * s, -0.6 * s, 0.1 * s), 0.38 * s), 4),
     )
-    shapes = (*box_walls(s, (1, 2, 0, 0, 0, 0)), panel(s), *balls)
+    shapes = (*box_walls(s, (1, 2, 0, 0, 0, 0)), panel(s, light), *balls)
     return Scene("cornell box", None, shapes, materials, (), box_camera(s), size, size)
 
 

@@ -108,9 +108,7 @@ def test_every_photon_came_from_where_its_class_says(traced, indirect):
         }
         for kind, fit in fits.items():
             chosen = fit[kinds == kind]
-            print(
-                f"{name} map ({indirect=}), class {kind}: {len(chosen)} photons, {share(chosen):.4f} fit"
-            )
+            print(f"{name} map ({indirect=}), class {kind}: {len(chosen)} photons, {share(chosen):.4f} fit")
             assert share(chosen) >= 1 - TOLERATED
 
 
