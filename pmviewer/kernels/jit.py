@@ -18,6 +18,7 @@ from typing import Any
 
 import numba
 from numba import njit
+from numba.core.registry import CPUDispatcher
 
 FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
 """Never `nnan`/`ninf`: they delete the checks for non-finite numbers."""
@@ -78,9 +79,20 @@ numba.config.CACHE_DIR = str(CACHE_FOLDER)
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": FASTMATH}
 
 
+class _DeviceDispatcher(CPUDispatcher):
+    """Without a wrapper numba would jump to address 0."""
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        raise TypeError(f"{self.py_func.__name__} is a device function: call it from a kernel.")
+
+
 def device(function: Callable[..., Any]) -> Any:
-    """A function that kernels call. It has no wrapper for Python: that halves the time to compile."""
-    return njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
+    """A function that kernels call. It has no wrapper for Python, which halves the time to compile; a call from Python
+    raises TypeError."""
+    dispatcher = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
+    if not numba.config.DISABLE_JIT:
+        dispatcher.__class__ = _DeviceDispatcher
+    return dispatcher
 
 
 def kernel(function: Callable[..., Any]) -> Any:

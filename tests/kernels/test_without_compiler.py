@@ -12,15 +12,14 @@ import numpy as np
 PROGRAM = """
 import json, warnings
 from types import SimpleNamespace
-import numba
 import numpy as np
 from pmviewer.kernels import bsdf, random, vector, warp
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
 
-def callable_from_python(module, names):  # device functions have no wrapper of their own
-    def wrap(g):
-        return numba.njit(lambda *a: g(*a))
-    return SimpleNamespace(**{name: wrap(getattr(module, name)) for name in names.split()})
+from tests.device import from_python
+
+def callable_from_python(module, names):
+    return SimpleNamespace(**{name: from_python(getattr(module, name)) for name in names.split()})
 
 vector = callable_from_python(vector, "normalize from_basis luminance dot cross")
 names = "square_to_sphere square_to_disk square_to_cosine_hemisphere square_to_cone square_to_triangle"

@@ -9,6 +9,7 @@ from pmviewer.maps.grid import build_grid
 from pmviewer.maps.kdtree import build_kdtree
 from pmviewer.maps.stored import ALL_CLASSES
 from tests import naive_maps as naive
+from tests.device import from_python
 
 f4, i4 = np.float32, np.int32
 
@@ -81,9 +82,10 @@ def test_nearest_equal_the_obvious_version(mixture, kind, flatness, classes, k, 
 def test_filters(kind, cone_k):
     kernel = i4(FILTERS.index(kind))
     x = np.linspace(0, 1, 21)
-    found = [filter_weight(kernel, f4(cone_k), f4(v * v)) for v in x]
+    weight, disc_mean = from_python(filter_weight), from_python(filter_disc_mean)
+    found = [weight(kernel, f4(cone_k), f4(v * v)) for v in x]
     np.testing.assert_allclose(found, naive.WEIGHTS[kind](x, cone_k), atol=1e-6)
-    assert filter_disc_mean(kernel, f4(cone_k)) == pytest.approx(naive.disc_mean(kind, cone_k), rel=1e-5)
+    assert disc_mean(kernel, f4(cone_k)) == pytest.approx(naive.disc_mean(kind, cone_k), rel=1e-5)
 
 
 # --- Christensen's lit square: 40 000 photons of 1 W in all on a unit square ------------------------------------------

@@ -5,6 +5,10 @@ import pytest
 
 from pmviewer.maps import record
 from tests import naive_maps as naive
+from tests.device import from_python
+
+encode_direction, decode_direction = from_python(record.encode_direction), from_python(record.decode_direction)
+encode_power, decode_power = from_python(record.encode_power), from_python(record.decode_power)
 
 f4 = np.float32
 WORST_ANGLE = 0.06  # degrees
@@ -21,7 +25,7 @@ def directions():
 
 def test_direction_round_trip(directions):
     for wi in directions:
-        decoded = np.array(record.decode_direction(record.encode_direction(*wi)), np.float64)
+        decoded = np.array(decode_direction(encode_direction(*wi)), np.float64)
         length = np.linalg.norm(decoded)
         assert 0.57 < length < 1.0001
         sine = np.linalg.norm(np.cross(decoded / length, wi.astype(np.float64)))
@@ -31,28 +35,28 @@ def test_direction_round_trip(directions):
 
 def test_axes_are_exact(directions):
     for wi in np.vstack([np.eye(3), -np.eye(3)]).astype(f4):
-        np.testing.assert_array_equal(record.decode_direction(record.encode_direction(*wi)), wi)
+        np.testing.assert_array_equal(decode_direction(encode_direction(*wi)), wi)
 
 
 def test_power_round_trip():
     rng = np.random.default_rng(2)
     for x in np.exp2(rng.uniform(-46.9, 15.9, 3000)).astype(f4):
-        assert abs(record.decode_power(record.encode_power(x)) / x - 1) <= 2.0**-11
+        assert abs(decode_power(encode_power(x)) / x - 1) <= 2.0**-11
 
 
 @pytest.mark.parametrize(
     ("x", "decoded"), [(0.0, 0.0), (1.0, 1.0), (0.5, 0.5), (2.0**-60, 0.0), (2.0**15, 2.0**15), (1e9, 131008.0)]
 )
 def test_power_special_values(x, decoded):
-    assert record.decode_power(record.encode_power(f4(x))) == f4(decoded)
+    assert decode_power(encode_power(f4(x))) == f4(decoded)
 
 
 def test_kernels_agree_with_the_obvious_encoding(directions):
     rng = np.random.default_rng(3)
     # Powers on code boundaries are a matter of rounding; these are not.
     power = np.exp2(rng.uniform(-40, 15, len(directions))).astype(f4)
-    np.testing.assert_array_equal([record.encode_power(x) for x in power], naive.encode_power(power))
-    kernel = np.array([int(record.encode_direction(*wi)) for wi in directions])
+    np.testing.assert_array_equal([encode_power(x) for x in power], naive.encode_power(power))
+    kernel = np.array([int(encode_direction(*wi)) for wi in directions])
     obvious = naive.encode_direction(directions).astype(np.int64)
     for shift in (20, 8):
         assert np.abs((kernel >> shift & 0xFFF) - (obvious >> shift & 0xFFF)).max() <= 1

@@ -1,0 +1,13 @@
+"""Calling device functions from Python, where tests need it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import njit
+
+
+def from_python(function: Any) -> Callable[..., Any]:
+    """A function that calls the device function; it compiles for the types of its arguments."""
+    return njit(lambda *arguments: function(*arguments))
