@@ -15,7 +15,7 @@ PANELS = ("Settings", "Overlays", "Statistics", "Log")
 _PLACE = {"Settings": "Left", "Overlays": "Right", "Statistics": "Bottom", "Log": "Bottom"}
 WINDOW_SIZE = (1440, 900)
 FPS_MAX = 60
-FPS_IDLE = 3
+FPS_IDLE = 2
 
 
 @dataclass(frozen=True)

@@ -245,7 +245,9 @@ class Picture:
             old.color_attachments[0].release()
             old.depth_attachment.release()
             old.release()
-        new = self.context.framebuffer([self.context.texture(size, 4)], self.context.depth_renderbuffer(size))
+        colour = self.context.texture(size, 4)
+        colour.filter = (moderngl.NEAREST, moderngl.NEAREST)  # shown pixel for pixel
+        new = self.context.framebuffer([colour], self.context.depth_renderbuffer(size))
         self._framebuffers[name] = new
         return new
 

@@ -8,7 +8,7 @@ from typing import Any
 from imgui_bundle import icons_fontawesome_6 as fa
 from imgui_bundle import imgui
 
-from pmviewer.settings import SETTINGS, SettingInfo, get
+from pmviewer.settings import SETTINGS, SettingInfo, Settings, flat
 from pmviewer.viewer import theme
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.widgets import SettingWidgets, icon_button, range_text, reset_button, tooltip_text, value_text
@@ -24,6 +24,7 @@ class SettingsPanel:
         self.widgets = SettingWidgets()
         self.find = ""
         """Only settings that contain this are listed."""
+        self._known: tuple[Settings, Any, dict[str, Any], dict[str, str | None]] | None = None
         listed = [i for i in SETTINGS.values() if i.path not in PINNED and not i.path.startswith(_ELSEWHERE)]
         self._groups = [(heading, list(infos)) for heading, infos in groupby(listed, key=lambda info: info.group)]
 
@@ -72,7 +73,15 @@ class SettingsPanel:
             imgui.end_table()
 
     def _value(self, path: str) -> Any:
-        return get(self.state.settings, path)
+        return self._facts()[0][path]
+
+    def _facts(self) -> tuple[dict[str, Any], dict[str, str | None]]:
+        """Every setting's value and why it has no effect, worked out once for each change."""
+        settings, traits = self.state.settings, self.state.session.traits
+        if self._known is None or self._known[0] is not settings or self._known[1] is not traits:
+            reasons = {path: self.state.inactive_reason(path, settings, traits) for path in SETTINGS}
+            self._known = settings, traits, flat(settings), reasons
+        return self._known[2], self._known[3]
 
     @staticmethod
     def begin_rows(name: str, name_em: float = 6.8, room: float = 0) -> bool:
@@ -89,7 +98,7 @@ class SettingsPanel:
     def row(self, info: SettingInfo) -> None:
         """Label, widget and reset of one setting, inside a table of three columns."""
         state, value = self.state, self._value(info.path)
-        reason = state.inactive_reason(info.path, state.settings, state.session.traits)
+        reason = self._facts()[1][info.path]
         resolved = state.resolved(info.path) if value == "auto" else value
         imgui.table_next_row()
         imgui.table_next_column()

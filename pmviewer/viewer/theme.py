@@ -46,7 +46,6 @@ def apply() -> None:
     c, k = imgui.Col_, style.set_color_
     for item, level in {
         c.window_bg: 0.165,
-        c.child_bg: 0.165,
         c.popup_bg: 0.19,
         c.menu_bar_bg: 0.135,
         c.title_bg: 0.135,
@@ -83,6 +82,7 @@ def apply() -> None:
     k(c.text, imgui.ImVec4(*TEXT))
     k(c.text_disabled, imgui.ImVec4(*FAINT))
     k(c.resize_grip, grey(0.3, 0.4))
+    k(c.child_bg, grey(0, 0))  # the window's own ground shows: each layer costs time on a software driver
     # Sliders are filled bars (see `widgets.filled_bar`): a grab would cover the number in their middle.
     k(c.slider_grab, grey(0, 0))
     k(c.slider_grab_active, grey(0, 0))

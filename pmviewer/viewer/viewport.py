@@ -115,6 +115,8 @@ class Viewport:
     def gui(self) -> None:
         """The window with the picture in it."""
         flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
+        if self._texture is not None:
+            flags |= imgui.WindowFlags_.no_background  # the picture covers it
         imgui.push_style_var(imgui.StyleVar_.window_padding, (0, 0))
         shown, _ = imgui.begin(VIEWPORT, None, flags | imgui.WindowFlags_.no_collapse)
         imgui.pop_style_var()
@@ -135,7 +137,7 @@ class Viewport:
         hovered, active = imgui.is_item_hovered(), imgui.is_item_active()
         if hovered:
             imgui.set_item_key_owner(imgui.Key.mouse_wheel_y)
-        pose = self.state.live_camera()
+        pose = self.state.live_camera() if hovered or active or self.state.flying else None
         if pose is not None:
             self._handle(pose, hovered, active)
         draw_hud(self, hovered)
