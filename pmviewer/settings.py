@@ -455,8 +455,13 @@ def range_text(info: SettingInfo) -> str:
     else:
         text = f"{'a whole number' if info.kind is int else 'a number'}"
         if info.lower is not None and info.upper is not None:
-            text += f" from {info.lower:g} to {info.upper:g}"
+            text += f" from {_number_text(info.lower)} to {_number_text(info.upper)}"
     return text + (" or auto" if info.auto else "")
+
+
+def _number_text(value: float) -> str:
+    """1e-05, 0.5, 64, 50,000,000"""
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:g}"
 
 
 def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:

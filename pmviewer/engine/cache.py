@@ -1,4 +1,4 @@
-"""Results of stages, kept by what they were made from, so that a changed setting recomputes only what follows from it."""
+"""Results of stages, kept by what they were made from, so that a changed setting recomputes only what follows."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@ from pmviewer.scene.flatten import FlatScene
 from pmviewer.settings import Estimate
 
 FOOTPRINTS = {"gather": 3.0}
-"""Radius in pixel footprints by method: maps shown directly need a calm estimate; gather rays average it anyway, so that
-theirs can be sharper and darken corners less."""
+"""Radius in pixel footprints by method: maps shown directly need a calm estimate; gather rays average it anyway, so
+that theirs can be sharper and darken corners less."""
 DEFAULT_FOOTPRINTS = 4.0
 PROBES = 24
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -215,8 +216,8 @@ class Renderer:
 
     def _build_both(self, cached: Callable[[str], Any], index: int) -> list[Any]:
         if index < CACHED_PASSES:  # the cache belongs to one thread
-            return [self.pool.run([lambda n=name: cached(n)])[0] for name in ("caustic", "global")]
-        return self.pool.run([lambda: cached("caustic"), lambda: cached("global")])
+            return [self.pool.run([partial(cached, name)])[0] for name in ("caustic", "global")]
+        return self.pool.run([partial(cached, name) for name in ("caustic", "global")])
 
     def _no_map(self) -> Any:
         """An empty map: kernels take two maps, whether or not they look them up."""
@@ -263,7 +264,7 @@ class Renderer:
 
 
 def tile_size(pixels: int, eye: np.void, threads: int) -> int:
-    """Pixels a task, so that a task takes at most some 30 ms. It does not change the picture: pixels are independent."""
+    """Pixels a task, so that a task takes at most some 30 ms. The picture does not depend on it."""
     work = 1 + int(eye["gather_rays"]) + int(eye["light_samples"]) // 4
     return max(64, min(4096 * 2 // work, -(-pixels // (4 * threads))))
 

@@ -1,7 +1,9 @@
 """The session: a worker thread that keeps the picture of the newest scene and settings up to date.
 
 Requests (`open`, `set`, `pause` …) return at once. The worker drops what is out of date between slices of some 30 ms,
-shows a coarse frame of the new state first, then refines it pass by pass until a stop rule holds.
+shows a coarse frame of the new state first, then refines it pass by pass until a stop rule holds. A coarse frame is
+finished and shown even when newer settings have arrived meanwhile: a slider that moves all the time would otherwise
+never show one.
 """
 
 from __future__ import annotations
@@ -43,6 +45,8 @@ class Session:
         self._paused = False
         self._closed = False
         self._loading_done = 0
+        self._first_picture = False
+        self._attempt = 0
         self._failed_version = -1
         self._serial = 0
         self._messages: list[Message] = []
@@ -58,8 +62,8 @@ class Session:
     def open(
         self, source: Source, settings: Settings | None = None, parameters: Mapping[str, str] | None = None
     ) -> None:
-        """Open a scene, with other settings if given. Until it is loaded the old one goes on; a failure becomes an error
-        message and changes nothing."""
+        """Open a scene, with other settings if given. Until it is loaded the old one goes on; a failure becomes an
+        error message and changes nothing."""
         with self._changed:
             self._loading += 1
             ticket = self._loading
@@ -71,29 +75,27 @@ class Session:
         with self._changed:
             before, self._settings = self._settings, settings
             if changed_stages(before, settings) - {"display", "stop"}:
-                self._version += 1
-                self._interrupt()
+                self._outdate()
             else:
-                self._changed.notify_all()
+                self._settle()
             return self._version
 
     def restart(self) -> None:
         """Forget the film and begin with pass 0."""
         with self._changed:
-            self._version += 1
             self._restart = True
-            self._interrupt()
+            self._outdate()
 
     def pause(self) -> None:
         """Stop after the current pass; a changed setting still shows its first pass."""
         with self._changed:
             self._paused = True
-            self._changed.notify_all()
+            self._settle()
 
     def resume(self) -> None:
         with self._changed:
             self._paused = False
-            self._changed.notify_all()
+            self._settle()
 
     def close(self) -> None:
         """Stop the worker and its threads; returns when they are gone."""
@@ -102,6 +104,23 @@ class Session:
             self._interrupt()
         self._worker.join()
         self._pool.close()
+
+    def _outdate(self) -> None:
+        """What was rendered so far is of an older version."""
+        self._version += 1
+        if self._first_picture:
+            self._changed.notify_all()
+        else:
+            self._interrupt()
+
+    def _settle(self) -> None:
+        """Say whether the picture of the newest version is finished, paused or going on."""
+        renderer = self._renderer
+        if renderer is not None and not self._is_stale():
+            state: State = "finished" if self._is_finished() else "paused" if self._paused else "rendering"
+            progress = min(1.0, renderer.passes / self._settings.render.passes)
+            self.status = Status(state, state, renderer.passes, progress)
+        self._changed.notify_all()
 
     def _interrupt(self) -> None:
         self._pool.cancel.set()
@@ -141,7 +160,7 @@ class Session:
         the session failed or was closed."""
 
         def reached() -> bool:
-            if self._closed or self.status.state in ("failed",):
+            if self._closed or self._has_failed():
                 return True
             if self._pending_loads or self._loaded or self.frame is None or self.frame.version != self._version:
                 return False
@@ -149,7 +168,15 @@ class Session:
             return self.status.state == "finished" or (passes is not None and done >= passes)
 
         with self._changed:
-            return self._changed.wait_for(reached, timeout) and not self._closed and self.status.state != "failed"
+            return self._changed.wait_for(reached, timeout) and not self._closed and not self._has_failed()
+
+    def _has_failed(self) -> bool:
+        """Whether nothing more will come of the last request."""
+        if self._pending_loads or self._loaded:
+            return False
+        if self._opened is None:
+            return self.status.state == "failed"
+        return self._failed_version == self._version
 
     # worker -----------------------------------------------------------------------------------------------------
 
@@ -199,9 +226,11 @@ class Session:
                     return
                 self._pool.cancel.clear()
                 loaded, self._loaded = self._loaded, None
-            try:
                 if loaded:
                     self._adopt(*loaded)
+            try:
+                if loaded:
+                    self._welcome(loaded[0])
                 else:
                     self._advance()
             except Cancelled:
@@ -235,16 +264,18 @@ class Session:
 
     def _adopt(self, opened: OpenScene, geometry: DrawGeometry, settings: Settings | None) -> None:
         """Make a loaded scene the open one."""
+        self._cache.clear()
+        self._opened, self.geometry, self._renderer = opened, geometry, None
+        if settings is not None:
+            self._settings = settings
+        self._version += 1
+
+    def _welcome(self, opened: OpenScene) -> None:
+        """What the log says of a newly opened scene."""
         for warning in opened.scene.warnings:
             self._say("warning", warning)
         for reason, count in opened.scene.dropped.items():
             self._say("warning", f"{count} × {reason} left out")
-        with self._changed:
-            self._cache.clear()
-            self._opened, self.geometry, self._renderer = opened, geometry, None
-            if settings is not None:
-                self._settings = settings
-            self._version += 1
         flat = opened.flat
         self._say("info", f"opened {opened.source}: {flat.n_triangles:,} triangles, {flat.n_quadrics:,} round shapes")
 
@@ -257,25 +288,30 @@ class Session:
             return
         with self._changed:
             version, settings, self._restart = self._version, self._settings, False
-        prepare(self._opened, settings, self._pool, lambda text, share: self._tell("preparing", text, share))
-        renderer = Renderer(self._opened, settings, self._pool, self._cache, version)
-        self._tell("rendering", "first picture")
-        self._publish(renderer.coarse_frame(self._serial + 1))
+            self._first_picture, self._attempt = True, version
+        try:
+            prepare(self._opened, settings, self._pool, lambda text, share: self._tell("preparing", text, share))
+            renderer = Renderer(self._opened, settings, self._pool, self._cache, version)
+            self._tell("rendering", "first picture")
+            self._publish(renderer.coarse_frame(self._serial + 1))
+        finally:
+            with self._changed:
+                self._first_picture = False
         self._renderer = renderer
-        if self._paused:
+        if self._paused and not self._is_stale():
             self._step(renderer)
 
     def _step(self, renderer: Renderer) -> None:
         renderer.step()
         self._publish(renderer.frame(self._serial + 1))
-        state: State = "finished" if self._is_finished() else "paused" if self._paused else "rendering"
-        limit = self._settings.render.passes
-        self._tell(state, state, renderer.passes / limit)
+        with self._changed:
+            self._settle()
+        self._notify()
 
     def _publish(self, frame: Frame) -> None:
         with self._changed:
             self._serial = frame.serial
-            if frame.version == self._version:
+            if frame.version == self._version or frame.coarse:
                 self.frame = frame
             self._changed.notify_all()
         self._notify()
@@ -292,7 +328,7 @@ class Session:
         self._say("error", text)
         with self._changed:
             self._renderer = None
-            self._failed_version = self._version
+            self._failed_version = self._attempt
             self.status = Status("failed", text)
             self._changed.notify_all()
         self._notify()
@@ -303,8 +339,14 @@ class Session:
         self._notify()
 
     def _notify(self) -> None:
-        if self.on_update:
-            self.on_update()
+        """Tell the listener; one that fails is not told again, and rendering goes on."""
+        try:
+            if self.on_update:
+                self.on_update()
+        except Exception as error:
+            self.on_update = None
+            with self._changed:
+                self._messages.append(Message("error", unexpected(error)))
 
 
 def unexpected(error: Exception) -> str:
