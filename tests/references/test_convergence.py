@@ -1,0 +1,70 @@
+"""Both photon methods converge to the references, and the path tracer agrees with them (run with -s for the figures)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pmviewer.bench.error import reference
+from pmviewer.bench.metric import loglog_slope, metrics, z_test
+from pmviewer.engine.cache import StageCache
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.renderer import Renderer
+from pmviewer.settings import Settings, with_values
+
+OWN_ERROR = {"cornell_diffuse": 2.0e-5, "cornell_caustic": 6.5e-5}
+"""relMSE of the references themselves."""
+
+
+@pytest.fixture(scope="module")
+def pool():
+    pool = WorkPool()
+    yield pool
+    pool.close()
+
+
+def renderer_of(scene: str, pool: WorkPool, **settings: object) -> Renderer:
+    values = {name.replace("__", "."): value for name, value in settings.items()}
+    return Renderer(open_scene(scene), with_values(Settings(), values), pool, StageCache(0))
+
+
+@pytest.mark.parametrize("method", ["progressive", "gather"])
+@pytest.mark.parametrize("scene", ["cornell_diffuse", "cornell_caustic"])
+def test_error_falls_below_a_thousandth(scene, method, pool):
+    target = reference(scene)
+    renderer = renderer_of(scene, pool, render__method=method)
+    passes, errors = [], []
+    while not errors or errors[-1] > 1e-3:
+        renderer.step()
+        n = renderer.passes
+        if n & (n - 1) == 0 or n % 16 == 0:
+            measured = metrics(renderer.frame(0).image().astype(float), target)
+            passes.append(n)
+            errors.append(measured.relmse_all)
+        assert n < 160, f"relMSE is still {errors[-1]:.2e} after {n} passes"
+    slope = loglog_slope(passes, errors)
+    print(
+        f"{scene} {method}: relMSE {errors[-1]:.2e} after {passes[-1]} passes, {renderer.cpu_seconds:.1f} CPU s, "
+        f"slope {slope:.2f}, mean ratio {measured.mean_ratio:.4f}"
+    )
+    assert slope < -0.7
+    assert measured.mean_ratio == pytest.approx(1, abs=5e-3)
+    assert renderer.dropped == {"photons": 0, "samples": 0}
+
+
+@pytest.mark.parametrize("scene", ["cornell_diffuse", "cornell_caustic"])
+def test_path_tracer_agrees_with_the_reference(scene, pool):
+    target = reference(scene)
+    images = []
+    for seed in range(1, 13):
+        renderer = renderer_of(scene, pool, render__method="path", render__seed=seed)
+        for _ in range(8):
+            renderer.step()
+        images.append(renderer.frame(0).image().astype(float))
+    mean = np.mean(images, axis=0)
+    variance = np.var(images, axis=0, ddof=1) / len(images)
+    own = OWN_ERROR[scene] * (target**2 + 0.01)
+    result = z_test(mean, variance, target, own)
+    print(f"{scene} path: {result}, mean ratio {mean.mean() / target.mean():.4f}")
+    assert result.passes(0.001)

@@ -1,0 +1,113 @@
+"""The command line as a user meets it: commands, files, one-line errors."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pmviewer.cli import main
+from pmviewer.output.exr import read_exr
+from pmviewer.output.png import read_png
+from pmviewer.output.session_file import write_session
+from pmviewer.settings import SETTINGS, Settings, with_values
+
+QUICK = ["--passes", "2", "--size", "24x16", "--set", "photons.N=2000"]
+
+
+def call(*words: str) -> int:
+    """Exit code of `pmviewer WORDS`."""
+    try:
+        main(list(words))
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    return 0
+
+
+def test_scenes_info_settings_and_bench_list(capsys):
+    assert call("scenes") == 0
+    assert "cornell_caustic" in capsys.readouterr().out
+    assert call("info", "cornell_diffuse") == 0
+    told = capsys.readouterr().out
+    assert "light pass" in told
+    assert "no mirror or glass" in told
+    assert call("settings") == 0
+    told = capsys.readouterr().out
+    assert all(f"{path} = " in told for path in SETTINGS)
+    assert call("bench", "list") == 0
+    assert "latency" in capsys.readouterr().out
+
+
+def test_render_writes_both_formats_and_the_same_for_any_threads(tmp_path, capsys):
+    files = [tmp_path / f"{threads}.exr" for threads in (1, 2)]
+    for threads, path in zip("12", files, strict=True):
+        png = str(path.with_suffix(".png"))
+        assert call("render", "cornell_caustic", "-o", str(path), "-o", png, "--threads", threads, *QUICK) == 0
+    first, metadata = read_exr(files[0])
+    second, _ = read_exr(files[1])
+    assert first[""].shape == (16, 24, 3)
+    for layer in first:
+        np.testing.assert_array_equal(first[layer], second[layer])
+    assert any("photons.N" in key and value == 2000 for key, value in metadata.items())
+    pixels, _ = read_png(files[0].with_suffix(".png"))
+    assert pixels.shape[:2] == (16, 24)
+    assert pixels.max() > 100
+
+
+def test_session_file_renders_what_it_was_saved_from(tmp_path, capsys):
+    settings = with_values(
+        Settings(), {"photons.N": 2000, "camera.width": 24, "camera.height": 16, "render.method": "gather"}
+    )
+    write_session(tmp_path / "s.toml", settings, "cornell_diffuse", 2)
+    assert call("render", str(tmp_path / "s.toml"), "-o", str(tmp_path / "a.exr")) == 0
+    assert call("render", "cornell_diffuse", "-o", str(tmp_path / "b.exr"), *QUICK, "--set", "render.method=gather") == 0
+    np.testing.assert_array_equal(read_exr(tmp_path / "a.exr")[0][""], read_exr(tmp_path / "b.exr")[0][""])
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["render", "nowhere.xml", "-o", "x.exr"], "nowhere.xml"),
+        (["render", "cornell_diffuse", "-o", "x.jpg"], "Use .exr or .png"),
+        (["render", "cornell_diffuse", "-o", "no/such/x.exr"], "does not exist"),
+        (["render", "cornell_diffuse", "-o", "x.exr", "--size", "big"], "WIDTHxHEIGHT"),
+        (["render", "cornell_diffuse", "-o", "x.exr", "--size", "0x10"], "camera.width"),
+        (["render", "cornell_diffuse", "-o", "x.exr", "--set", "photons.M=3"], "photons.M"),
+        (["render", "cornell_diffuse", "-o", "x.exr", "--set", "photons.N=none"], "whole number"),
+        (["render", "cornell_diffuse", "-o", "x.exr", "--passes", "2", "--time", "2"], "exclude"),
+        (["render", "cornell_diffuse", "-o", "x.exr", "-D", "res"], "name=value"),
+        (["bench", "nonsense"], "nonsense"),
+        (["info", "broken.toml"], "broken.toml"),
+    ],
+)
+def test_bad_input_is_one_line(words, told, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert call(*words) == 2
+    shown = capsys.readouterr().err.strip()
+    assert shown.startswith("pmviewer: error: ")
+    assert told in shown
+    assert "\n" not in shown
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_a_screen_the_default_command_renders_to_a_file(tmp_path):
+    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    environment["PYTHONPATH"] = str(Path(__file__).resolve().parent.parent)
+    size = ["--set", "camera.width=16", "--set", "camera.height=16", "--set", "photons.N=500"]
+    run = subprocess.run(
+        [sys.executable, "-m", "pmviewer", "cornell_diffuse", *size],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    assert "no display" in run.stderr
+    assert (tmp_path / "cornell_diffuse.png").stat().st_size > 300
+    assert (tmp_path / "cornell_diffuse.exr").exists()
