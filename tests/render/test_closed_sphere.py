@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pmviewer.render.planes import TERMS
-from tests.scenes_for_tests import closed_sphere, rendered, settings_of
+from pmviewer.scene.description import Mesh
+from tests.scenes_for_tests import ball_mesh, closed_sphere, rendered, settings_of
 
 # About 30 000 stored photons reach the part of the sphere that is seen, and they carry half of the radiance: the
 # standard error of the mean is 0.3 % at most, that of a path-traced image lower still.
@@ -29,6 +32,22 @@ def test_radiance_of_the_closed_sphere_is_one(case):
     renderer = rendered(closed_sphere(), settings, passes=6)
     image = renderer.frame(1).image()
     print(f"{case}: mean {image.mean():.5f}, standard deviation {image.std():.4f}")
+    assert image.mean() == pytest.approx(1.0, abs=0.005)
+    assert renderer.dropped == {"photons": 0, "samples": 0}
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize("method", ["progressive", "gather", "path"])
+def test_radiance_of_a_closed_ball_of_triangles_is_one(method, smooth):
+    """With flat and with interpolated normals; scattering around the latter must not lose light below the surface."""
+    ball = ball_mesh(1.0, 3)
+    normals = -ball.vertices / np.linalg.norm(ball.vertices, axis=1, keepdims=True)
+    inwards = Mesh(ball.vertices, np.ascontiguousarray(ball.faces[:, ::-1]), normals if smooth else None)
+    scene = closed_sphere()
+    scene = replace(scene, shapes=(replace(scene.shapes[0], geometry=inwards),))
+    renderer = rendered(scene, settings_of(render={"method": method}, photons={"N": 60_000, "q": 1.0}), passes=6)
+    image = renderer.frame(1).image()
+    print(f"{method}, {'smooth' if smooth else 'flat'} normals: mean {image.mean():.5f}")
     assert image.mean() == pytest.approx(1.0, abs=0.005)
     assert renderer.dropped == {"photons": 0, "samples": 0}
 
