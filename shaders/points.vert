@@ -24,7 +24,7 @@ void main() {
                           decode(power_and_light.y & 0xFFFFu));
         float peak = max(max(power.r, power.g), power.b);
         float level = clamp((log2(max(peak, 1e-30)) - power_range.x) / max(power_range.y - power_range.x, 1e-3), 0.0, 1.0);
-        hue = peak > 0.0 ? pow(power / peak, vec3(1.0 / 2.2)) * mix(0.35, 1.0, level) : vec3(0.35);
+        hue = peak > 0.0 ? pow(power / peak, vec3(1.0 / 2.2)) * mix(0.55, 1.0, level) : vec3(0.35);
     } else if (colour_by == 1) {
         hue = bounce_palette[min(int(direction_and_flags & 63u), 7)];
     } else {

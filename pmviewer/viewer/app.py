@@ -123,6 +123,9 @@ class ViewerApp:
         self.context = moderngl.create_context()
         self.viewport.picture = Picture(self.context)
         self.state.say("info", f"OpenGL {self.context.info['GL_VERSION']} on {self.context.info['GL_RENDERER']}")
+        scale = hello_imgui.dpi_window_size_factor()
+        width, height = (round(side * scale) for side in layout.SMALLEST_WINDOW)
+        glfw.set_window_size_limits(glfw_window_hello_imgui(), width, height, glfw.DONT_CARE, glfw.DONT_CARE)
         self._running = True
         self.state.session.on_update = self.wake
         self.state.jobs.on_done = self.wake

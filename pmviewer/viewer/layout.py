@@ -14,6 +14,7 @@ Draw = Callable[[], None]
 PANELS = ("Settings", "Overlays", "Statistics", "Log")
 _PLACE = {"Settings": "Left", "Overlays": "Right", "Statistics": "Bottom", "Log": "Bottom"}
 WINDOW_SIZE = (1440, 900)
+SMALLEST_WINDOW = (1000, 640)
 FPS_MAX = 60
 FPS_IDLE = 2
 

@@ -42,10 +42,14 @@ class OverlayPanel:
         if frame is not None:
             count = frame.statistics.stored_in_pass.get(name, 0)
             text = grouped(count) if count else "none"
-            imgui.same_line(imgui.get_content_region_avail().x - imgui.calc_text_size(text).x)
-            imgui.text_disabled(text)
-            if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
-                imgui.set_tooltip("Photons stored in the latest pass")
+            imgui.same_line()
+            room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
+            if room >= 0:
+                imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + room)
+                imgui.text_disabled(text)
+                imgui.set_item_tooltip("Photons stored in the latest pass")
+            else:
+                imgui.new_line()
         if not style.show:
             return
         imgui.indent(imgui.get_font_size() * 0.5)

@@ -22,6 +22,8 @@ CLOUDS = ("caustic", "global")
 SURROUND = (0.105, 0.105, 0.105)
 _CONTENT = {"albedo": 1, "normal": 2, "depth": 3}
 _CURVE = {"sRGB": 0, "Reinhard": 1, "filmic": 2, "linear": 3}
+BEHIND_POINTS = 0.3
+"""Surfaces are this bright under points, which would drown on white walls."""
 NEAREST_FROM = 3.0
 """Magnification from which pixels are shown as squares."""
 NAVIGATION_LIMIT = 30_000
@@ -163,7 +165,8 @@ class Picture:
         view, projection = camera.view_matrix(), camera.projection_matrix(near, far)
         as_geometry = display.view == "geometry" or not self.has_plane
         if as_geometry:
-            self._draw_geometry(view, projection)
+            points = overlays is not None and (overlays.caustic.show or overlays.global_.show)
+            self._draw_geometry(view, projection, BEHIND_POINTS if points else 1.0)
         else:
             self._draw_plane(display, width)
         if overlays is not None:
@@ -188,13 +191,13 @@ class Picture:
         self.context.disable(moderngl.DEPTH_TEST)
         self._triangle.render(moderngl.TRIANGLES, vertices=3)
 
-    def _draw_geometry(self, view: Matrix, projection: Matrix) -> None:
+    def _draw_geometry(self, view: Matrix, projection: Matrix, brightness: float = 1.0) -> None:
         """Surfaces, pushed back a little in depth so that they don't fight with the points that lie on them."""
         if self._geometry_array is None:
             return
         self.context.enable_only(moderngl.DEPTH_TEST)
         self.context.polygon_offset = (1.0, 1.0)
-        set_uniforms(self._geometry_program, view=view, projection=projection)
+        set_uniforms(self._geometry_program, view=view, projection=projection, brightness=brightness)
         self._geometry_array.render(moderngl.TRIANGLES)
         self.context.polygon_offset = (0.0, 0.0)
 

@@ -90,9 +90,9 @@ class SettingsPanel:
         if not imgui.begin_table(f"##{name}", 3, imgui.TableFlags_.none, (width, 0)):
             return False
         em = imgui.get_font_size()
-        imgui.table_setup_column("name", imgui.TableColumnFlags_.width_fixed, name_em * em)
+        imgui.table_setup_column("name", imgui.TableColumnFlags_.width_fixed, min(name_em * em, 0.42 * width))
         imgui.table_setup_column("value", imgui.TableColumnFlags_.width_stretch)
-        imgui.table_setup_column("reset", imgui.TableColumnFlags_.width_fixed, 1.9 * em)
+        imgui.table_setup_column("reset", imgui.TableColumnFlags_.width_fixed, 1.75 * em)
         return True
 
     def row(self, info: SettingInfo) -> None:

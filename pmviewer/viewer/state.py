@@ -59,6 +59,8 @@ class ViewerState:
         self.jobs = Jobs(self.say)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
+        self._said: deque[Message] = deque()
+        """What any thread said since the last frame."""
         self.flying = False
         self.panels_hidden = False
         self.help_open = False
@@ -162,7 +164,7 @@ class ViewerState:
 
     def say(self, level: Level, text: str) -> None:
         """A line for the log, from any thread."""
-        self._take(Message(level, text))
+        self._said.append(Message(level, text))
 
     def _take(self, message: Message) -> None:
         self.log.append(message)
@@ -170,7 +172,9 @@ class ViewerState:
             self.toasts.append(Toast(message))
 
     def poll(self) -> None:
-        """Once per window frame: collect the session's messages."""
+        """Once per window frame: collect the messages."""
         for message in self.session.take_messages():
             self._take(message)
+        while self._said:
+            self._take(self._said.popleft())
         self.toasts = [toast for toast in self.toasts if not toast.is_over()][-4:]

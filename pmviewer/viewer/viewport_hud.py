@@ -70,12 +70,13 @@ def _depth_legend(viewport: Viewport, near: float, far: float) -> None:
     x0, y0 = x1 - 0.8 * line, viewport.origin[1] + 1.2 * line
     y1 = y0 + 8 * line
     pad = 0.5 * line
+    labels = [(y0, si(near, "m")), ((y0 + y1) / 2, si((near + far) / 2, "m")), (y1, si(far, "m"))]
+    widest = max(imgui.calc_text_size(text).x for _, text in labels)
     box = imgui.get_color_u32(theme.grey(0.1, 0.75))
-    draw.add_rect_filled((x0 - 5.2 * line, y0 - pad), (x1 + pad, y1 + pad), box, 4)
+    draw.add_rect_filled((x0 - widest - 0.4 * line - pad, y0 - pad), (x1 + pad, y1 + pad), box, 4)
     bright, dark = imgui.get_color_u32(theme.grey(1.0)), imgui.get_color_u32(theme.grey(0.1))
     draw.add_rect_filled_multi_color((x0, y0), (x1, y1), bright, bright, dark, dark)
-    for y, value in ((y0, near), ((y0 + y1) / 2, (near + far) / 2), (y1, far)):
-        text = si(value, "m")
+    for y, text in labels:
         size = imgui.calc_text_size(text)
         top = min(max(y - size.y / 2, y0), y1 - size.y)
         draw.add_text((x0 - size.x - 0.4 * line, top), imgui.get_color_u32(theme.grey(0.9)), text)
