@@ -1,7 +1,7 @@
 """Counter-based random streams (T2): a number depends on (seed, index, dimension) and on nothing else.
 
-Two sequences: independent numbers by hashing, and Owen-scrambled Sobol points, four dimensions a set, the sets padded by
-shuffling the index (Laine–Karras hashing as an Owen scramble).
+Two sequences: independent numbers by hashing, and Owen-scrambled Sobol points, four dimensions a set, the sets padded
+by shuffling the index (Laine–Karras hashing as an Owen scramble).
 """
 
 from __future__ import annotations

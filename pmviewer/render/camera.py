@@ -1,4 +1,4 @@
-"""The perspective camera: from scene and settings to rays, and to the matrices with which OpenGL draws the same view."""
+"""The perspective camera: from scene and settings to rays, and to the matrices by which OpenGL draws the same view."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class CameraPose:
         return (-right if self.mirrored else right), top, forward
 
     def ray_frame(self) -> NDArray[np.float64]:
-        """(4, 3): eye, direction through the image's top left corner, and its change per pixel to the right and down."""
+        """(4, 3): eye, direction through the image's top left corner, and its change per pixel right and down."""
         right, top, forward = self.axes()
         half = math.tan(math.radians(self.fov) / 2)
         step = 2 * half / self.width
@@ -95,7 +95,7 @@ class CameraPose:
         return projection
 
     def project(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
-        """World points (n, 3) to (n, 3): pixel x, pixel y (origin in the top left corner) and distance along the view."""
+        """World points (n, 3) to (n, 3): pixel x, pixel y (from the top left corner) and distance along the view."""
         right, top, forward = self.axes()
         offset = np.asarray(points, float) - np.asarray(self.origin, float)
         depth = offset @ forward
