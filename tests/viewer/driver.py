@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from imgui_bundle import ImVec2
+from imgui_bundle import ImVec2, hello_imgui, imgui
 from imgui_bundle.immapp import testing
 
 from pmviewer.viewer.app import ViewerApp
@@ -20,7 +20,7 @@ Pixels = np.ndarray
 def make_app(session: Any, folder: Path, **options: Any) -> ViewerApp:
     """A window that leaves the user's configuration alone."""
     app = ViewerApp(session, recent=RecentFiles(folder / "recent.txt"), remember=False, **options)
-    app.params.app_window_params.window_geometry.size = (1280, 800)
+    app.params.app_window_params.window_geometry.size = (1120, 700)
     before = app.params.callbacks.pre_new_frame
 
     def pre_new_frame() -> None:
@@ -50,6 +50,8 @@ def drive(app: ViewerApp, script: Callable[[Context], None]) -> None:
     """Open the window, run the script in it, close it. Errors of the script and of the test engine are raised."""
 
     def settled(context: Context) -> None:
+        # Time goes by frames, or a busy machine makes two clicks of a double click.
+        imgui.test_engine.get_io(hello_imgui.get_imgui_test_engine()).config_fixed_delta_time = 1 / 60
         context.yield_(4)
         script(context)
 
@@ -73,7 +75,9 @@ def drag(context: Context, ref: str, start: float, end: float) -> None:
     width = box.max.x - box.min.x
     context.mouse_move_to_pos(ImVec2(box.min.x + start * width, y))
     context.mouse_down(0)
-    context.mouse_move_to_pos(ImVec2(box.min.x + end * width, y))
+    for step in np.linspace(start, end, 5)[1:]:
+        context.mouse_move_to_pos(ImVec2(box.min.x + step * width, y))
+        context.yield_(1)
     context.mouse_up(0)
     context.yield_(2)
 

@@ -296,7 +296,7 @@ def test_exports_png_exr_and_session(app, session, tmp_path):
     assert with_points.shape == (SIZE, SIZE, 3)
     assert np.any(np.all(np.abs(with_points.astype(int) - (255, 89, 89)) <= 3, axis=-1))
     window, _ = read_png(tmp_path / "box-window-2.png")
-    assert window.shape == (800, 1280, 3)
+    assert window.shape == (700, 1120, 3)
     assert len(np.unique(window.reshape(-1, 3), axis=0)) > 200, "not an empty window"
 
 
