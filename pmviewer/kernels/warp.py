@@ -14,16 +14,29 @@ INV_PI = _f4(1.0 / math.pi)
 
 
 @device
+def _sin_cos_eighth(x):
+    """Sine and cosine of |x| ≤ π/4 to float32 rounding (Taylor), several times faster than the library's."""
+    y = x * x
+    sin = x * (
+        _f4(1.0) + y * (_f4(-1.0 / 6) + y * (_f4(1.0 / 120) + y * (_f4(-1.0 / 5040) + y * _f4(1.0 / 362880))))
+    )
+    cos = _f4(1.0) + y * (
+        _f4(-0.5) + y * (_f4(1.0 / 24) + y * (_f4(-1.0 / 720) + y * (_f4(1.0 / 40320) - y * _f4(1.0 / 3628800))))
+    )
+    return sin, cos
+
+
+@device
 def square_to_disk(u, v):
     """Uniform point on the unit disc, concentric map (Shirley and Chiu 1997)."""
     a, b = _f4(2.0) * u - _f4(1.0), _f4(2.0) * v - _f4(1.0)
-    if a == _f4(0.0) and b == _f4(0.0):
-        return _f4(0.0), _f4(0.0)
     if abs(a) > abs(b):
-        r, phi = a, _f4(math.pi / 4) * (b / a)
-    else:
-        r, phi = b, _f4(math.pi / 2) - _f4(math.pi / 4) * (a / b)
-    return r * _f4(math.cos(phi)), r * _f4(math.sin(phi))
+        sin, cos = _sin_cos_eighth(_f4(math.pi / 4) * (b / a))
+        return a * cos, a * sin
+    if b == _f4(0.0):
+        return _f4(0.0), _f4(0.0)
+    sin, cos = _sin_cos_eighth(_f4(math.pi / 4) * (a / b))
+    return b * sin, b * cos
 
 
 @device

@@ -36,7 +36,7 @@ _f8 = np.float64
 _u4 = np.uint32
 _i8 = np.int64
 _INF = _f4(np.inf)
-LIGHT_CHOICE_SET = _i8(0xE817)
+LIGHT_CHOICE_SET, STORE_SET = _i8(0xE817), _i8(0x10000)
 
 LIGHT_PASS_DTYPE = np.dtype(
     [
@@ -105,7 +105,7 @@ def trace_photons(scenes, passes, i0, i1, global_out, caustic_out, counts, ledge
                 break
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
-            u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
+            u0, u1, u2, _ = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
             if material_kind(scene, material) != DIFFUSE:
                 d, weight, _ = scatter_specular(scene, material, ns, d, u0)
                 flags = _u4(flags | _u4(LAST_SPECULAR))
@@ -129,7 +129,10 @@ def trace_photons(scenes, passes, i0, i1, global_out, caustic_out, counts, ledge
                 if is_caustic and pass_.caustics != 0:
                     _store(caustic_out, counts[C_CAUSTIC], p, wi, beta, word, light)
                     counts[C_CAUSTIC] += 1
-                if to_global and (pass_.store_probability >= _f4(1.0) or u3 < pass_.store_probability):
+                if to_global and (
+                    pass_.store_probability >= _f4(1.0)
+                    or draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
+                ):
                     _store(global_out, counts[C_GLOBAL], p, wi, beta, word, light)
                     counts[C_GLOBAL] += 1
                 ledger[E_STORED] += _f8(luminance(beta))

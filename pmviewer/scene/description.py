@@ -7,6 +7,7 @@ geometric normal points to.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -123,8 +124,8 @@ class Camera:
     up: Vec3
     fov: float
     fov_axis: Literal["x", "y", "diagonal", "smaller", "larger"] = "x"
-    near: float = 1e-2
-    far: float = 1e4
+    near: float = 0.0
+    far: float = math.inf
     mirrored: bool = False
     """True when the file's camera frame has the other handedness: the image is then flipped left to right."""
 

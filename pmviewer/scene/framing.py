@@ -58,6 +58,4 @@ def framed(shapes: Sequence[Shape], up: Literal["y", "z"] = "y") -> Camera:
         up=(0.0, 1.0, 0.0) if up == "y" else (0.0, 0.0, 1.0),
         fov=FOV,
         fov_axis="smaller",
-        near=distance * 1e-4,
-        far=distance * 1e3,
     )

@@ -193,8 +193,8 @@ def _camera(camera: Json, matrix: Matrix, result: MeshFile, diagnostics: Diagnos
         up=(float(up[0]), float(up[1]), float(up[2])),
         fov=math.degrees(float(lens["yfov"])),
         fov_axis="y",
-        near=float(lens.get("znear", 1e-2)),
-        far=float(lens.get("zfar", 1e4)),
+        near=float(lens.get("znear", 0.0)),
+        far=float(lens.get("zfar", math.inf)),
         mirrored=mirrors(matrix),
     )
 

@@ -79,8 +79,8 @@ def view(element: Element, document: Document, center: np.ndarray) -> View:
         up=(float(up[0]), float(up[1]), float(up[2])),
         fov=fov,
         fov_axis=axis,
-        near=p.number("near_clip", 1e-2),
-        far=p.number("far_clip", 1e4),
+        near=p.number("near_clip", 0.0),
+        far=p.number("far_clip", math.inf),
         mirrored=mirrors(m),
     )
     p.known("shutter_open", "shutter_close")

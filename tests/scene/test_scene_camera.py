@@ -50,7 +50,7 @@ def test_focal_length_is_of_a_35_mm_film_diagonal(tmp_path: Path) -> None:
 
 def test_defaults_of_film_and_clipping(tmp_path: Path) -> None:
     scene = sensor(tmp_path, "")
-    assert (scene.width, scene.height, scene.camera.near, scene.camera.far) == (768, 576, 1e-2, 1e4)
+    assert (scene.width, scene.height, scene.camera.near, scene.camera.far) == (768, 576, 0.0, float("inf"))
 
 
 def test_mirrored_camera(tmp_path: Path) -> None:
