@@ -102,7 +102,7 @@ class PointCloud:
         sample = photons[:: even_thinning(self._count, 20_000)]
         power = brightest_channel(sample)
         low, high = np.percentile(power[power > 0], [1, 99]) if np.any(power > 0) else (1.0, 1.0)
-        dim = min(low, high / 4)  # powers that hardly differ are all bright
+        dim = min(low, high / 16)  # powers that hardly differ are all bright
         self._log_range = (float(np.log2(dim)), float(np.log2(high)))
         lights = tuple(int(i) for i in np.unique(sample.view(np.uint32)[:, 5] >> 16)[:64])
         self._sample = (float(low) * cloud.power_unit, float(high) * cloud.power_unit, lights)

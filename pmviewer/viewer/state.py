@@ -12,7 +12,7 @@ from typing import Any
 from pmviewer.engine.frame import Frame, Level, Message
 from pmviewer.errors import PmviewerError
 from pmviewer.render.camera import CameraPose, resolve_camera
-from pmviewer.settings import CameraSettings, Settings, get, parse_assignments, with_values
+from pmviewer.settings import CameraSettings, Settings, info_of, parse_assignments, with_values
 from pmviewer.viewer.controls import camera_values
 from pmviewer.viewer.jobs import Jobs
 from pmviewer.viewer.recent import RecentFiles
@@ -82,9 +82,8 @@ class ViewerState:
         try:
             parsed: dict[str, Any] = {}
             for path, value in values.items():
-                if isinstance(value, str) and not isinstance(get(self.settings, path), str):
-                    value = value.replace(",", "") if get(self.settings, path) is not None else value
-                    parsed |= parse_assignments([f"{path}={value}"])
+                if isinstance(value, str) and info_of(path).kind is not str:
+                    parsed |= parse_assignments([f"{path}={value.replace(',', '')}"])
                 else:
                     parsed[path] = value
             settings = with_values(self.settings, parsed)

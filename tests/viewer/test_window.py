@@ -74,6 +74,17 @@ def test_exact_values_are_typed_after_a_double_click(app, session):
         c.yield_(2)
         assert session.settings.photons.N == 300_000
         assert session.settings.photons.q == 0.125
+        c.item_double_click(item("estimate.radius"))
+        c.yield_(3)
+        assert session.settings.estimate.radius == "auto", "clicking to type changes nothing"
+        c.key_chars_replace_enter("0.02")
+        c.yield_(2)
+        assert session.settings.estimate.radius == 0.02
+        c.item_double_click(item("photons.N"))
+        c.yield_(3)
+        c.key_chars_replace_enter("12,345")
+        c.yield_(2)
+        assert session.settings.photons.N == 12_345
 
     drive(app, script)
 
