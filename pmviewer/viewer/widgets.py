@@ -100,8 +100,8 @@ class SettingWidgets:
         if shown is None:
             imgui.text_disabled("auto")
             return None
-        speed = max(1e-4, 0.005 * max(abs(v) for v in shown))
-        changed, new = imgui.drag_float3(f"##{info.path}", list(shown), speed, 0, 0, "%.3f")
+        speed = 0.005 * max(*(abs(v) for v in shown), 1e-30)
+        changed, new = imgui.drag_float3(f"##{info.path}", list(shown), speed, 0, 0, "%.4g")
         return tuple(new) if changed else None
 
     def _typed(self, info: SettingInfo) -> str | None:
