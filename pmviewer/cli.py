@@ -1,4 +1,4 @@
-"""The command line. Heavy modules are imported by the command that needs them, so that `--help` and the window are quick."""
+"""The command line. Each command imports what it needs, so that `--help` and the window are quick."""
 
 from __future__ import annotations
 

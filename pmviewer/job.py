@@ -1,4 +1,4 @@
-"""What to open: a scene with settings, from the command line's words. Light to import, so that the window comes up fast."""
+"""What to open: a scene with settings, from the command line's words. Light to import: the window waits for it."""
 
 from __future__ import annotations
 

@@ -96,7 +96,7 @@ def install(python: Path, extras: str) -> None:
 
 def main(arguments: list[str]) -> int:
     """`[SCENE and options]`, `test [pytest options]` or `setup` (install everything, run nothing)."""
-    if sys.version_info < (3, 11):
+    if tuple(sys.version_info) < (3, 11):
         sys.exit(f"pmviewer needs Python 3.11 or newer; this is {sys.version.split()[0]}.")
     testing = arguments[:1] in (["test"], ["setup"])
     install_system_packages(missing_packages(testing))

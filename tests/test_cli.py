@@ -64,7 +64,8 @@ def test_session_file_renders_what_it_was_saved_from(tmp_path, capsys):
     )
     write_session(tmp_path / "s.toml", settings, "cornell_diffuse", 2)
     assert call("render", str(tmp_path / "s.toml"), "-o", str(tmp_path / "a.exr")) == 0
-    assert call("render", "cornell_diffuse", "-o", str(tmp_path / "b.exr"), *QUICK, "--set", "render.method=gather") == 0
+    same = [*QUICK, "--set", "render.method=gather"]
+    assert call("render", "cornell_diffuse", "-o", str(tmp_path / "b.exr"), *same) == 0
     np.testing.assert_array_equal(read_exr(tmp_path / "a.exr")[0][""], read_exr(tmp_path / "b.exr")[0][""])
 
 

@@ -1,4 +1,4 @@
-"""From a dragged slider to the first new frame (P9), with everything in place as in the window but the window itself."""
+"""From a dragged slider to the first new frame (P9): everything that the window has, but the window itself."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SIZE = 512
 
 
 def run(quick: bool = False) -> BenchResult:
-    """Change one setting at a time while the session is refining; time until a frame of the new version is published."""
+    """Change one setting at a time while the session refines; time until a frame of the new version is published."""
     rounds = 8 if quick else 24
     start = {"camera.width": SIZE, "camera.height": SIZE}
     session = Session(settings=with_values(Settings(), start))

@@ -16,6 +16,8 @@ import numpy as np
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4
 
+_i8 = np.int64
+
 SPHERE, CYLINDER, DISK = 0, 1, 2
 QUADRIC_FLOATS = 12
 
@@ -41,9 +43,9 @@ def _load_f8(address, i):
 def intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax):
     """Distance of the first hit in (tmin, tmax) with the quadric stored at `address`, or tmax; all float32."""
     kind = np.int32(load_f4(address, 0))
-    ax, ay, az = _load_f8(address, np.int64(4)), _load_f8(address, np.int64(5)), _load_f8(address, np.int64(6))
-    radius = _load_f8(address, np.int64(7))
-    sx, sy, sz = ox - _load_f8(address, np.int64(1)), oy - _load_f8(address, np.int64(2)), oz - _load_f8(address, np.int64(3))
+    ax, ay, az = _load_f8(address, _i8(4)), _load_f8(address, _i8(5)), _load_f8(address, _i8(6))
+    radius = _load_f8(address, _i8(7))
+    sx, sy, sz = ox - _load_f8(address, _i8(1)), oy - _load_f8(address, _i8(2)), oz - _load_f8(address, _i8(3))
     vx, vy, vz = np.float64(dx), np.float64(dy), np.float64(dz)
     if kind == DISK:
         t = -(sx * ax + sy * ay + sz * az) / (vx * ax + vy * ay + vz * az)
@@ -52,7 +54,7 @@ def intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax):
         if near > tmin and near < tmax and px * px + py * py + pz * pz <= radius * radius:
             return near
         return tmax
-    length = _load_f8(address, np.int64(8))
+    length = _load_f8(address, _i8(8))
     start = slope = 0.0
     if kind == CYLINDER:
         # Remove what lies along the axis; a float32 axis is not exactly of unit length.
@@ -87,8 +89,8 @@ def _frame(scene, j, px, py, pz):
     """Unit normal at the point, and its signed distance from the surface, in float64."""
     address = scene.bvh_quadrics + np.int64(j) * (4 * QUADRIC_FLOATS)
     kind = np.int32(load_f4(address, 0))
-    ax, ay, az = _load_f8(address, np.int64(4)), _load_f8(address, np.int64(5)), _load_f8(address, np.int64(6))
-    sx, sy, sz = px - _load_f8(address, np.int64(1)), py - _load_f8(address, np.int64(2)), pz - _load_f8(address, np.int64(3))
+    ax, ay, az = _load_f8(address, _i8(4)), _load_f8(address, _i8(5)), _load_f8(address, _i8(6))
+    sx, sy, sz = px - _load_f8(address, _i8(1)), py - _load_f8(address, _i8(2)), pz - _load_f8(address, _i8(3))
     if kind == DISK:
         return ax, ay, az, sx * ax + sy * ay + sz * az
     if kind == CYLINDER:
@@ -96,7 +98,7 @@ def _frame(scene, j, px, py, pz):
         sx, sy, sz = sx - along * ax, sy - along * ay, sz - along * az
     distance = math.sqrt(sx * sx + sy * sy + sz * sz)
     scale = 1.0 / distance if distance > 0.0 else 0.0
-    return sx * scale, sy * scale, sz * scale, distance - _load_f8(address, np.int64(7))
+    return sx * scale, sy * scale, sz * scale, distance - _load_f8(address, _i8(7))
 
 
 @device

@@ -17,9 +17,7 @@ INV_PI = _f4(1.0 / math.pi)
 def _sin_cos_eighth(x):
     """Sine and cosine of |x| ≤ π/4 to float32 rounding (Taylor), several times faster than the library's."""
     y = x * x
-    sin = x * (
-        _f4(1.0) + y * (_f4(-1.0 / 6) + y * (_f4(1.0 / 120) + y * (_f4(-1.0 / 5040) + y * _f4(1.0 / 362880))))
-    )
+    sin = x * (_f4(1.0) + y * (_f4(-1.0 / 6) + y * (_f4(1.0 / 120) + y * (_f4(-1.0 / 5040) + y * _f4(1.0 / 362880)))))
     cos = _f4(1.0) + y * (
         _f4(-0.5) + y * (_f4(1.0 / 24) + y * (_f4(-1.0 / 720) + y * (_f4(1.0 / 40320) - y * _f4(1.0 / 3628800))))
     )

@@ -1,9 +1,9 @@
 """The real window under a stopwatch: `python -m pmviewer.viewer.probe SCENE start|frames SECONDS`.
 
-Prints one JSON object. Times are of the monotonic clock, which all processes of a machine share, so that whoever started
-this one can subtract the moment before.
+Prints one JSON object. Times are of the monotonic clock, which all processes of a machine share, so that whoever
+started this one can subtract the moment before.
 
-start   closes after the first picture: {"window": t, "coarse": t}: the window's first swap, the first swap with a picture
+start   closes after the first picture: {"window": t, "coarse": t}: the first swap, the first one with a picture
 frames  keeps dragging N for SECONDS while the session computes: {"intervals": [seconds between swaps]}
 """
 

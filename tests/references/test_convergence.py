@@ -1,4 +1,4 @@
-"""Both photon methods converge to the references, and the path tracer agrees with them (run with -s for the figures)."""
+"""Both photon methods converge to the references, and the path tracer agrees with them (figures with -s)."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_error_falls_below_a_thousandth(scene, method, pool):
 
 @pytest.mark.parametrize(("scene", "block"), [("cornell_diffuse", 8), ("cornell_caustic", 32)])
 def test_path_tracer_agrees_with_the_reference(scene, block, pool):
-    """Blocks are averaged before testing: a pixel of a caustic is lit by few, very bright paths and far from Gaussian."""
+    """Blocks are averaged before testing: a pixel of a caustic is lit by few, bright paths and far from Gaussian."""
     target = reference(scene)
     opened = open_scene(scene)
     images = []
