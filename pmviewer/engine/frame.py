@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.render.camera import CameraPose
-from pmviewer.render.planes import view_of
+from pmviewer.render.planes import beauty_of, view_of
 from pmviewer.settings import Settings
 
 State = Literal["empty", "loading", "preparing", "rendering", "paused", "finished", "failed"]
@@ -74,7 +75,12 @@ class Frame:
 
     def image(self, view: str = "beauty") -> NDArray[np.float32]:
         """(height, width, 3), or 1 channel for depth; view is `beauty`, a term or a first-hit property."""
-        return view_of(self.planes, view)
+        return self.beauty if view == "beauty" else view_of(self.planes, view)
+
+    @cached_property
+    def beauty(self) -> NDArray[np.float32]:
+        """The image (height, width, 3), the sum of the terms."""
+        return beauty_of(self.planes)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.frame import Frame, PhotonCloud, Statistics
+from pmviewer.engine.memory import check_memory
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
@@ -45,9 +46,10 @@ class Renderer:
     def __init__(
         self, scene: OpenScene, settings: Settings, pool: WorkPool, cache: StageCache, version: int = 0
     ) -> None:
-        """Raises SettingError when the camera is impossible."""
+        """Raises SettingError when the camera is impossible or the image can't fit into memory."""
         self.scene, self.settings, self.pool, self.cache, self.version = scene, settings, pool, cache, version
         self.camera = resolve_camera(scene.scene, settings.camera)
+        check_memory(self.camera.width, self.camera.height, settings.photons.N)
         self.plan: Plan = plan_of(settings, scene.traits)
         self.film = Film(self.camera.width, self.camera.height)
         self.first_radius = (

@@ -309,6 +309,7 @@ class Session:
         self._notify()
 
     def _publish(self, frame: Frame) -> None:
+        _ = frame.beauty  # added up here, so that the window does not wait for it
         with self._changed:
             self._serial = frame.serial
             if frame.version == self._version or frame.coarse:
