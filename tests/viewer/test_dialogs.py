@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from driver import drive, make_app
-from fake_session import FakeSession
 from imgui_bundle import imgui
 
 from pmviewer.viewer import dialogs
 from pmviewer.viewer.file_browser import Entry, list_folder
+from tests.viewer.driver import drive, make_app
+from tests.viewer.fake_session import FakeSession
 
 K = imgui.Key
 

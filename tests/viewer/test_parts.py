@@ -6,7 +6,6 @@ import threading
 
 import numpy as np
 import pytest
-from fake_session import FakeSession, photons_at, wall_photons
 
 from pmviewer.errors import OutputError
 from pmviewer.maps.record import unpack
@@ -17,6 +16,7 @@ from pmviewer.viewer.overlays import brightest_channel, even_thinning
 from pmviewer.viewer.recent import LENGTH, RecentFiles
 from pmviewer.viewer.session_link import SessionLink
 from pmviewer.viewer.theme import drawable
+from tests.viewer.fake_session import FakeSession, photons_at, wall_photons
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import time
 
 import numpy as np
 import pytest
-from driver import drag, drive, item, make_app, on_window_thread, viewport_pixels
 from imgui_bundle import hello_imgui, imgui
 
 from pmviewer.engine.effects import inactive_reason
@@ -14,6 +13,7 @@ from pmviewer.engine.session import Session
 from pmviewer.output.png import read_png
 from pmviewer.output.tone import to_uint8, tone_map
 from pmviewer.settings import Settings, with_values
+from tests.viewer.driver import drag, drive, item, make_app, on_window_thread, viewport_pixels
 
 K = imgui.Key
 

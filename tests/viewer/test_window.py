@@ -6,8 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driver import drag, drag_picture, drive, item, make_app, on_window_thread, overlay_item, viewport_pixels
-from fake_session import SIZE, FakeSession
 from imgui_bundle import ImVec2, imgui
 
 from pmviewer.output.exr import read_exr
@@ -15,6 +13,17 @@ from pmviewer.output.png import read_png
 from pmviewer.output.session_file import read_session
 from pmviewer.output.tone import to_uint8, tone_map
 from pmviewer.settings import SETTINGS, Settings, get, with_values
+from tests.viewer.driver import (
+    drag,
+    drag_picture,
+    drive,
+    item,
+    make_app,
+    on_window_thread,
+    overlay_item,
+    viewport_pixels,
+)
+from tests.viewer.fake_session import SIZE, FakeSession
 
 K = imgui.Key
 
