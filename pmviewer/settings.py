@@ -217,6 +217,34 @@ class Gather(Group):
     rays: int = setting(
         4, "Final-gather rays per pixel and pass.", stage="image", scale="integer", unit="rays", ge=1, le=256
     )
+    radiance_photons: Literal["off", "all", "1/4", "1/8"] = setting(
+        "off",
+        "Share of the global photons that become radiance photons: gather rays take the irradiance of the nearest one, "
+        "computed when first needed, instead of a look-up each (Pharr §0.3). Pays with many gather rays or k nearest.",
+        stage="photons",
+        scale="choice",
+    )
+    cutoff: float | Auto = setting(
+        "auto",
+        "Farthest radiance photon that a gather ray uses, relative to the look-up radius (with k nearest, to its "
+        "median); farther off the ray looks the map up itself. Automatic: 0.5, which is free of bias, or 1 with k "
+        "nearest.",
+        stage="maps",
+        scale="linear",
+        unit="× radius",
+        ge=0.05,
+        le=2.0,
+        title="cut-off",
+    )
+    similarity: float = setting(
+        0.9,
+        "Least cosine between the normals of a radiance photon and of the surface that a gather ray hit.",
+        stage="image",
+        scale="linear",
+        title="normal similarity",
+        ge=0.01,
+        le=1.0,
+    )
 
 
 class Render(Group):

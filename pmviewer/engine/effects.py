@@ -8,6 +8,7 @@ from pmviewer.settings import Settings
 
 _KDTREE_ONLY = ("estimate.k", "estimate.rim", "estimate.max_radius", "estimate.black_level")
 _GRID_ONLY = ("estimate.radius", "estimate.caustic_radius", "estimate.alpha")
+_RADIANCE_ONLY = ("gather.cutoff", "gather.similarity")
 
 
 def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -> str | None:
@@ -25,6 +26,8 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
         return _estimate(path, settings, plan.caustic_mask)
     if group == "gather" and not plan.gather:
         return f"Only the method 'gather' casts gather rays, not '{method}'."
+    if path in _RADIANCE_ONLY and not plan.radiance:
+        return "Only with radiance photons."
     if group == "direct" and not (plan.direct or plan.path):
         return "Direct light is not computed: a map is shown alone, or nothing is diffuse."
     if path == "overlays.caustic.show" and plan.photons and not plan.caustic_mask:

@@ -14,11 +14,13 @@ ALL = 1 << DIRECT | 1 << CAUSTIC | 1 << INDIRECT | 1 << INDIRECT_CAUSTIC
 @dataclass(frozen=True)
 class Plan:
     """Masks are bit sets of path classes (`1 << class`). `caustic_mask` and `global_mask` are shown directly,
-    `global_classes` are what the global map has to hold; 0 means that the map is not built."""
+    `global_classes` are what the global map has to hold; 0 means that the map is not built. `radiance`: whether gather
+    rays use radiance photons."""
 
     path: bool = False
     direct: bool = False
     gather: bool = False
+    radiance: bool = False
     caustic_mask: int = 0
     global_mask: int = 0
     global_classes: int = 0
@@ -53,6 +55,16 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         skipped += [("direct light", "a map is shown alone"), ("global map", "not shown")]
         return Plan(caustic_mask=caustics, skipped=tuple(skipped))
     if method == "gather":
-        return Plan(direct=True, gather=True, caustic_mask=caustics, global_classes=ALL, skipped=tuple(skipped))
+        radiance = settings.gather.radiance_photons != "off"
+        if not radiance:
+            skipped.append(("radiance photons", "off"))
+        return Plan(
+            direct=True,
+            gather=True,
+            radiance=radiance,
+            caustic_mask=caustics,
+            global_classes=ALL,
+            skipped=tuple(skipped),
+        )
     skipped.append(("final gather", "the method shows the maps directly"))
     return Plan(direct=True, caustic_mask=caustics, global_mask=diffuse, global_classes=diffuse, skipped=tuple(skipped))

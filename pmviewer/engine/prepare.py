@@ -12,9 +12,11 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.kernels.raycast import cast_closest
 from pmviewer.maps.grid import build_grid
 from pmviewer.maps.kdtree import build_kdtree
+from pmviewer.maps.radiance import build_sites
 from pmviewer.photons.trace import LIGHT_PASS_DTYPE, N_COUNTS, N_LEDGER, trace_photons
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
+from pmviewer.render.lookup import NO_SITES
 from pmviewer.render.path import path_pass
 from pmviewer.render.record import EYE_DTYPE
 from pmviewer.settings import Settings
@@ -22,7 +24,7 @@ from pmviewer.settings import Settings
 Step = tuple[str, Callable[[], object]]
 Tell = Callable[[str, float | None], None]
 
-_done: set[tuple[str, bool]] = set()
+_done: set[tuple[str, bool, bool]] = set()
 
 
 def prepare(scene: OpenScene, settings: Settings, pool: WorkPool, tell: Tell) -> None:
@@ -31,11 +33,12 @@ def prepare(scene: OpenScene, settings: Settings, pool: WorkPool, tell: Tell) ->
     The first start compiles (some 20 s in all), later ones load compiled code from disk.
     """
     nearest = settings.estimate.lookup == "nearest"
-    steps = [(name, step) for name, step in _steps(scene, settings, nearest) if (name, nearest) not in _done]
+    radiance = plan_of(settings, scene.traits).radiance
+    steps = [(name, step) for name, step in _steps(scene, settings, nearest) if (name, nearest, radiance) not in _done]
     for i, (name, step) in enumerate(steps):
         tell(f"preparing kernels, {i + 1} of {len(steps)}: {name}", i / len(steps))
         pool.run([step])
-        _done.add((name, nearest))
+        _done.add((name, nearest, radiance))
 
 
 def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
@@ -49,6 +52,7 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
         light_pass = np.zeros(1, LIGHT_PASS_DTYPE)
         counts, ledger = np.zeros(N_COUNTS, np.int64), np.zeros(N_LEDGER)
         none = np.empty(0, np.float32)
+        code = np.zeros(1, np.uint32)
         steps += [
             (
                 "ray casting",
@@ -65,7 +69,7 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
             ),
             (
                 "light pass",
-                lambda: trace_photons(flat.record, light_pass, 0, 0, empty, empty, counts, ledger),
+                lambda: trace_photons(flat.record, light_pass, 0, 0, empty, code, empty, counts, ledger),
             ),
             ("kd-tree" if nearest else "photon grid", lambda: photon_map(empty)),
         ]
@@ -77,7 +81,10 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
 
         def compile_eye() -> None:
             record = photon_map(empty).record
-            eye_pass(flat.record, eye, record, record, film, eye_counts, 0, 0)
+            sites = NO_SITES
+            if plan.radiance:
+                sites = build_sites(empty, np.zeros(1, np.uint32), "all", 1.0, 1.0).record
+            eye_pass(flat.record, eye, record, record, sites, film, eye_counts, 0, 0)
 
         steps.append(("eye pass", compile_eye))
     return steps

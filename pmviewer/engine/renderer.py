@@ -21,13 +21,16 @@ from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import first_radius, pass_radius
+from pmviewer.engine.sites import sites_of
 from pmviewer.maps.grid import build_grid
 from pmviewer.maps.kdtree import build_kdtree
+from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import automatic_radius, largest_power
 from pmviewer.photons.lightpass import PhotonMaps, trace_pass, trajectories
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
+from pmviewer.render.lookup import NO_SITES
 from pmviewer.render.path import path_pass
 from pmviewer.render.record import C_DROPPED, C_RAYS, N_COUNTS, eye_record
 from pmviewer.settings import Settings
@@ -66,6 +69,7 @@ class Renderer:
         self.dropped = {"photons": 0, "samples": 0}
         self.map_bytes = self.map_photons = 0
         self._photons: PhotonMaps | None = None
+        self._sites: RadianceMap | None = None
 
     @property
     def passes(self) -> int:
@@ -155,11 +159,12 @@ class Renderer:
         settings, scene = self.settings, self.scene
         caustics = bool(self.plan.caustic_mask)
         traced, _, _ = trajectories(settings.photons, N, caustics)
-        key = ("photons", scene.uid, settings.photons, settings.render.seed, index, N, caustics)
+        normals = self.plan.radiance
+        key = ("photons", scene.uid, settings.photons, settings.render.seed, index, N, caustics, normals)
 
         def make() -> PhotonMaps:
             return trace_pass(
-                scene.flat, settings.photons, settings.render.seed, index * traced, N, caustics, self.pool.run
+                scene.flat, settings.photons, settings.render.seed, index * traced, N, caustics, self.pool.run, normals
             )
 
         if index >= CACHED_PASSES:
@@ -206,6 +211,9 @@ class Renderer:
             self.radius[name] = look_up_radius
             self.map_bytes += structure.bytes
             self.map_photons += structure.n
+        if plan.radiance:
+            self._sites, eye["site_radius"] = self._timed("maps", lambda: self._build_sites(built[1], index, key))
+            self.map_bytes += self._sites.bytes
         eye["caustic_mask"], eye["global_mask"] = plan.caustic_mask, plan.global_mask
         self._keep = built
         self.emitted += photons.emitted
@@ -220,6 +228,19 @@ class Renderer:
         if index < CACHED_PASSES:  # the cache belongs to one thread
             return [self.pool.run([partial(cached, name)])[0] for name in ("caustic", "global")]
         return self.pool.run([partial(cached, name) for name in ("caustic", "global")])
+
+    def _build_sites(self, built: tuple[Any, float], index: int, key: tuple) -> tuple[RadianceMap, float]:
+        """Radiance photons of the pass in the global map `built`, and their cut-off radius."""
+        photons, (structure, radius), settings = self._photons, built, self.settings
+        assert photons is not None
+
+        def make() -> tuple[RadianceMap, float]:
+            return self.pool.run([lambda: sites_of(photons, structure, radius, settings)])[0]
+
+        if index >= CACHED_PASSES:
+            return make()
+        sites_key = ("sites", key, settings.estimate, settings.gather.radiance_photons, settings.gather.cutoff, radius)
+        return self.cache.get(sites_key, make, lambda made: made[0].bytes)
 
     def _no_map(self) -> Any:
         """An empty map: kernels take two maps, whether or not they look them up."""
@@ -244,6 +265,7 @@ class Renderer:
         eye[0]["direct"] = plan.direct
         eye[0]["gather_rays"] = settings.gather.rays if plan.gather else 0
         eye[0]["gather_specular"] = not settings.photons.indirect_caustics
+        sites = self._sites.record if self._sites else NO_SITES
         scene = self.scene.flat.record
         pixels = len(film.sums)
         tile = tile_size(pixels, eye[0], self.pool.threads)
@@ -255,7 +277,7 @@ class Renderer:
                 if plan.path:
                     path_pass(scene, eye, film.sums, counts, first, last)
                 else:
-                    eye_pass(scene, eye, maps[0], maps[1], film.sums, counts, first, last)
+                    eye_pass(scene, eye, maps[0], maps[1], sites, film.sums, counts, first, last)
                 return counts
 
             return run

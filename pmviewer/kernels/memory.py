@@ -80,6 +80,29 @@ load_i4 = _loader(types.int32, I32)
 load_u4 = _loader(types.uint32, I32)
 
 
+@intrinsic
+def load_shared_i8(typingctx, address):
+    """The int64 at a multiple of eight, whole even while another thread stores there (LLVM `monotonic`)."""
+    signature = types.int64(types.int64)
+
+    def codegen(context, builder, sig, args):
+        return builder.load_atomic(builder.inttoptr(args[0], I64.as_pointer()), "monotonic", 8)
+
+    return signature, codegen
+
+
+@intrinsic
+def store_shared_i8(typingctx, address, value):
+    """Stores an int64 at a multiple of eight, whole even while other threads load it (LLVM `monotonic`)."""
+    signature = types.void(types.int64, types.int64)
+
+    def codegen(context, builder, sig, args):
+        builder.store_atomic(args[1], builder.inttoptr(args[0], I64.as_pointer()), "monotonic", 8)
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
 @intrinsic(prefer_literal=True)
 def stack_i4(typingctx, count):
     """Pointer to `count` (a literal) uninitialised int32 on the stack, 64-byte aligned: scratch without a heap."""

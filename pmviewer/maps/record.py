@@ -88,22 +88,26 @@ def decode_direction(code):
     return x, y, z
 
 
+def decode_directions(codes: np.ndarray) -> np.ndarray:
+    """Codes (n,) uint32 → unit vectors (n, 3) float32."""
+    u = ((codes >> 20).astype(np.float32) - 2047) / 2047
+    v = (((codes >> 8) & 0xFFF).astype(np.float32) - 2047) / 2047
+    z = 1 - np.abs(u) - np.abs(v)
+    t = np.maximum(-z, 0)
+    w = np.stack([u - np.where(u >= 0, t, -t), v - np.where(v >= 0, t, -t), z], axis=1)
+    return np.ascontiguousarray(w / np.linalg.norm(w, axis=1, keepdims=True), np.float32)
+
+
 def unpack(photons, power_unit: float) -> dict[str, np.ndarray]:
     """Photons (n, 6) as named arrays: `position` (n, 3) float32, `wi` (n, 3) float32 unit, `Phi` (n, 3) float32 watts,
     `bounces` (n,) int, `path_class` (n,) int, `light` (n,) int."""
     words = photons.view(np.uint32)
-    u = ((words[:, 3] >> 20).astype(np.float32) - 2047) / 2047
-    v = (((words[:, 3] >> 8) & 0xFFF).astype(np.float32) - 2047) / 2047
-    z = 1 - np.abs(u) - np.abs(v)
-    t = np.maximum(-z, 0)
-    wi = np.stack([u - np.where(u >= 0, t, -t), v - np.where(v >= 0, t, -t), z], axis=1)
-    wi /= np.linalg.norm(wi, axis=1, keepdims=True)
     codes = np.stack([words[:, 4] & 0xFFFF, words[:, 4] >> 16, words[:, 5] & 0xFFFF], axis=1).astype(np.uint32)
     power = np.where(codes == 0, np.float32(0), ((codes << 13) + _EXPONENT_BASE).view(np.float32))
     flags = (words[:, 3] & 0xFF).astype(np.int32)
     return {
         "position": photons[:, :3],
-        "wi": wi.astype(np.float32),
+        "wi": decode_directions(words[:, 3]),
         "Phi": (power * np.float32(power_unit)).astype(np.float32),
         "bounces": flags & BOUNCES,
         "path_class": flags >> 6,

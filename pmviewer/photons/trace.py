@@ -69,11 +69,12 @@ def _store(out, row, p, wi, beta, flags, light):
 
 
 @kernel
-def trace_photons(scenes, passes, i0, i1, global_out, caustic_out, counts, ledger):
+def trace_photons(scenes, passes, i0, i1, global_out, normals_out, caustic_out, counts, ledger):
     """Trace photons i0 … i1−1 of a pass.
 
     scenes: SCENE_DTYPE (1,); passes: LIGHT_PASS_DTYPE (1,); global_out, caustic_out: float32 (capacity, 6), see
-    `pmviewer.maps.record`; counts: int64 (N_COUNTS,) and ledger: float64 (N_LEDGER,) are added to, `counts[C_GLOBAL]`
+    `pmviewer.maps.record`; normals_out: uint32 (capacity,), receives each global photon's surface normal, or (0,) when
+    nobody needs them; counts: int64 (N_COUNTS,) and ledger: float64 (N_LEDGER,) are added to, `counts[C_GLOBAL]`
     and `counts[C_CAUSTIC]` being the rows filled so far.
 
     Returns the index of the next photon to trace: less than i1 when a buffer may not hold another photon's path.
@@ -134,6 +135,8 @@ def trace_photons(scenes, passes, i0, i1, global_out, caustic_out, counts, ledge
                     or draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
                 ):
                     _store(global_out, counts[C_GLOBAL], p, wi, beta, word, light)
+                    if len(normals_out) > 0:
+                        normals_out[counts[C_GLOBAL]] = encode_direction(ng[0], ng[1], ng[2])
                     counts[C_GLOBAL] += 1
                 ledger[E_STORED] += _f8(luminance(beta))
                 if not to_global and pass_.indirect_caustics == 0:

@@ -2,7 +2,7 @@
 
 From the camera, mirrors and glass are followed to the first diffuse surface. There, direct light is sampled, caustics
 come from the caustic map, and indirect light from the global map: shown directly (`progressive`) or by a final gather,
-BSDF-sampled rays that look the map up where they land (`gather`).
+BSDF-sampled rays that look the map up where they land (`gather`), or radiance photons near there (R3).
 
 Random numbers of a pixel are Owen-scrambled Sobol points over the passes, keyed by (seed, pixel): dimension set 0 is
 the place in the pixel and on the light, 1 the choice of light and the BSDF sample, 2 + d the specular choice at depth
@@ -31,9 +31,8 @@ from pmviewer.kernels.scene import (
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.kernels.vector import add, dot, from_basis, is_good, largest, mul, normalize, scale
 from pmviewer.kernels.warp import square_to_cosine_hemisphere
-from pmviewer.maps.stored import ALL_CLASSES
 from pmviewer.render.direct import BLACK, INV_PI, found_light, light_samples
-from pmviewer.render.lookup import irradiance
+from pmviewer.render.lookup import gathered_irradiance, irradiance
 from pmviewer.render.record import C_DROPPED, C_RAYS
 
 _f4 = np.float32
@@ -100,7 +99,7 @@ def bsdf_ray(scene, p, ng, gap, wi):
 
 
 @device
-def gather_light(scene, eye, photons, prim, q, nq, sq, gap, d, seed, index):
+def gather_light(scene, eye, photons, sites, prim, q, nq, sq, gap, d, seed, index):
     """Radiance that a gather ray brings back: the global map's at the first diffuse surface, on the side it hit.
 
     Mirrors and glass end the ray unless the map holds what they reflect (`gather_specular`). Returns L and rays cast.
@@ -118,7 +117,7 @@ def gather_light(scene, eye, photons, prim, q, nq, sq, gap, d, seed, index):
             if not albedo[0] + albedo[1] + albedo[2] > _f4(0.0):
                 return BLACK, rays
             n = face(nq, scale(d, _f4(-1.0)))
-            E = irradiance(photons, eye, eye.global_radius, q, n, np.int32(ALL_CLASSES))
+            E = gathered_irradiance(photons, sites, eye, q, n)
             return scale(mul(mul(beta, albedo), E), INV_PI), rays
         if eye.gather_specular == 0:
             return BLACK, rays
@@ -133,14 +132,15 @@ def gather_light(scene, eye, photons, prim, q, nq, sq, gap, d, seed, index):
 
 
 @kernel
-def eye_pass(scenes, eyes, caustic_maps, global_maps, film, counts, first, last):
+def eye_pass(scenes, eyes, caustic_maps, global_maps, site_maps, film, counts, first, last):
     """Add one sample to each of the pixels first … last−1.
 
     scenes: SCENE_DTYPE (1,); eyes: EYE_DTYPE (1,); caustic_maps, global_maps: records (1,) of grids or kd-trees;
+    site_maps: record (1,) of the radiance photons, or NO_SITES;
     film: float64 (pixels, CHANNELS), see `pmviewer.render.planes`; counts: int64 (N_COUNTS,).
     """
     scene, eye = scenes[0], eyes[0]
-    caustic_map, global_map = caustic_maps[0], global_maps[0]
+    caustic_map, global_map, sites = caustic_maps[0], global_maps[0], site_maps[0]
     index = eye.index
     for pixel in range(first, last):
         seed = pixel_seed(eye, pixel)
@@ -219,7 +219,7 @@ def eye_pass(scenes, eyes, caustic_maps, global_maps, film, counts, first, last)
                 if eye.direct != 0 and eye.mis != 0:
                     direct = add(direct, found_light(scene, p, wi, local[2], bsdf_rays, eye.light_samples, hit, q, nq))
                 if eye.gather_rays > 0:
-                    L, rays = gather_light(scene, eye, global_map, hit, q, nq, sq, far_gap, wi, seed, sample)
+                    L, rays = gather_light(scene, eye, global_map, sites, hit, q, nq, sq, far_gap, wi, seed, sample)
                     counts[C_RAYS] += rays
                     indirect = add(indirect, L)
             if bsdf_rays > 0:

@@ -5,9 +5,12 @@ Kernels are compiled for the kind of map they are given, so that nobody compiles
 
 from __future__ import annotations
 
+import numpy as np
 from numba.extending import overload
 
 from pmviewer.maps.estimate import irradiance_knn, irradiance_radius
+from pmviewer.maps.radiance import UNKNOWN, nearest_site, site_irradiance, site_place, site_slot, store_irradiance
+from pmviewer.maps.stored import ALL_CLASSES
 
 
 def irradiance(photons, eye, radius, p, n, class_mask):
@@ -62,3 +65,41 @@ def _irradiance(photons, eye, radius, p, n, class_mask):
         return r, g, b
 
     return within
+
+
+NO_SITES = np.zeros(1, np.dtype([("none", np.int32)]))
+"""Stands for radiance photons where there are none."""
+
+
+def gathered_irradiance(photons, sites, eye, p, n):
+    """Irradiance from photons of all classes where a gather ray ends, at p with normal n.
+
+    `sites` is the record of a RadianceMap: that of the nearest radiance photon, made by the first ray that needs it,
+    and where none is near a look-up of its own. Or that of NO_SITES: always a look-up of its own.
+    """
+    raise NotImplementedError("only for kernels")
+
+
+@overload(gathered_irradiance)
+def _gathered_irradiance(photons, sites, eye, p, n):
+    if "none" in sites.fields:
+
+        def plain(photons, sites, eye, p, n):
+            return irradiance(photons, eye, eye.global_radius, p, n, np.int32(ALL_CLASSES))
+
+        return plain
+
+    def through_sites(photons, sites, eye, p, n):
+        site = nearest_site(sites, p, n, eye.site_radius, eye.flatness, eye.site_similarity)
+        if site >= 0:
+            word = site_slot(sites, site)
+            if word != UNKNOWN:
+                return site_irradiance(sites, word)
+            p, n = site_place(sites, site)
+        E = irradiance(photons, eye, eye.global_radius, p, n, np.int32(ALL_CLASSES))
+        if site < 0:
+            return E
+        # What was stored, not E: it must not matter who comes first.
+        return site_irradiance(sites, store_irradiance(sites, site, E))
+
+    return through_sites

@@ -35,6 +35,8 @@ EYE_DTYPE = np.dtype(
         ("flatness", "f4"),
         ("caustic_radius", "f4"),
         ("global_radius", "f4"),
+        ("site_radius", "f4"),  # radiance photons farther away are not used
+        ("site_similarity", "f4"),  # least cosine between their normals and the surface's
     ],
     align=True,
 )
@@ -61,4 +63,5 @@ def eye_record(camera: CameraPose, settings: Settings, index: int) -> NDArray[np
     estimate = settings.estimate
     r["filter"], r["rim"], r["k"] = FILTERS.index(estimate.filter), RIMS.index(estimate.rim), estimate.k
     r["cone_k"], r["flatness"] = estimate.cone_k, estimate.flatness
+    r["site_similarity"] = settings.gather.similarity
     return record

@@ -53,6 +53,22 @@ def test_error_falls_below_a_thousandth(scene, method, pool):
     assert renderer.dropped == {"photons": 0, "samples": 0}
 
 
+def test_radiance_photons_keep_the_mean(pool):
+    """With shrinking radius and few photons in a disc, against the reference and against the plain gather."""
+    target = reference("cornell_diffuse")
+    images = {}
+    for share in ("off", "all", "1/8"):
+        renderer = renderer_of("cornell_diffuse", pool, render__method="gather", gather__radiance_photons=share)
+        for _ in range(12):
+            renderer.step()
+        images[share] = renderer.frame(0).image().astype(float)
+        measured = metrics(images[share], target)
+        plain = images[share].mean() / images["off"].mean()
+        print(f"{share}: mean ratio {measured.mean_ratio:.4f}, {plain:.4f} of plain, relMSE {measured.relmse_all:.2e}")
+        assert measured.mean_ratio == pytest.approx(1, abs=5e-3)
+        assert plain == pytest.approx(1, abs=5e-4)
+
+
 @pytest.mark.parametrize(("scene", "block"), [("cornell_diffuse", 8), ("cornell_caustic", 32)])
 def test_path_tracer_agrees_with_the_reference(scene, block, pool):
     """Blocks are averaged before testing: a pixel of a caustic is lit by few, bright paths and far from Gaussian."""
