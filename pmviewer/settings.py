@@ -318,7 +318,10 @@ class PointOverlay(Group):
     show: bool = setting(False, "Draw the photons of this map.", stage="display", scale="switch")
     size: float = setting(2.0, "Point size.", stage="display", scale="linear", unit="px", ge=1, le=12)
     colour: Colour = setting(
-        "power", "Colour by power, by number of bounces or by light.", stage="display", scale="choice"
+        "power",
+        "Colour by power (radiance photons: irradiance), by number of bounces or by light.",
+        stage="display",
+        scale="choice",
     )
     depth: bool = setting(True, "Hide points behind surfaces.", stage="display", scale="switch", title="depth test")
     limit: int = setting(
@@ -337,8 +340,13 @@ class Overlays(Group):
 
     caustic: PointOverlay = Field(default_factory=PointOverlay, title="caustic photons")
     global_: PointOverlay = Field(default_factory=PointOverlay, alias="global", title="global photons")
+    radiance: PointOverlay = Field(default_factory=PointOverlay, title="radiance photons")
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
+
+    def by_map(self) -> dict[str, PointOverlay]:
+        """Map's name in a frame's clouds → how it is drawn."""
+        return {"caustic": self.caustic, "global": self.global_, "radiance": self.radiance}
 
 
 class Settings(Group):

@@ -32,6 +32,10 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
         return "Direct light is not computed: a map is shown alone, or nothing is diffuse."
     if path == "overlays.caustic.show" and plan.photons and not plan.caustic_mask:
         return "No caustic photons: the scene has no mirror or glass, or the method does not use them."
+    if path.startswith("overlays.radiance.") and not plan.radiance:
+        return "Only the method 'gather' has radiance photons, where they are on."
+    if path == "overlays.radiance.colour":
+        return "Radiance photons are coloured by irradiance: light of many photons, lights and bounces."
     if path.startswith("overlays.") and not plan.photons:
         return "This method traces no photons."
     if path == "render.max_depth" and not (plan.path or traits.has_specular):

@@ -28,6 +28,7 @@ class Statistics:
     stored: Mapping[str, int] = field(default_factory=dict)
     """Photons stored, all passes together, by map ("caustic", "global")."""
     stored_in_pass: Mapping[str, int] = field(default_factory=dict)
+    """By map; with "radiance" the radiance photons that gather rays have used."""
     radius: Mapping[str, float] = field(default_factory=dict)
     """Look-up radius of the latest pass by map."""
     rays: int = 0
@@ -50,7 +51,10 @@ class Statistics:
 
 @dataclass(frozen=True)
 class PhotonCloud:
-    """One map's photons of the latest pass, as `pmviewer.maps.record` describes them: (n, 6) float32."""
+    """One map's photons of the latest pass, as `pmviewer.maps.record` describes them: (n, 6) float32.
+
+    Radiance photons have their normal as direction and irradiance as power; `power_unit` is then in W per unit area.
+    """
 
     photons: NDArray[np.float32]
     power_unit: float

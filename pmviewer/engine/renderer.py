@@ -115,11 +115,15 @@ class Renderer:
         if self._photons is not None:
             clouds["global"] = PhotonCloud(self._photons.global_, self._photons.global_unit)
             clouds["caustic"] = PhotonCloud(self._photons.caustic, self._photons.caustic_unit)
+        stored_in_pass = dict(self.stored_in_pass)
+        if self._sites is not None:
+            clouds["radiance"] = PhotonCloud(self._sites.known(), self._sites.grid.power_unit)
+            stored_in_pass["radiance"] = len(clouds["radiance"].photons)
         statistics = Statistics(
             passes=film.passes,
             emitted=self.emitted,
             stored=dict(self.stored),
-            stored_in_pass=dict(self.stored_in_pass),
+            stored_in_pass=stored_in_pass,
             radius=dict(self.radius),
             rays=self.rays,
             seconds=self.seconds,

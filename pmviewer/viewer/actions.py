@@ -46,6 +46,7 @@ class Commands:
             "next_tone": self._next_tone,
             "toggle_caustic": lambda: self._toggle("overlays.caustic.show"),
             "toggle_global": lambda: self._toggle("overlays.global.show"),
+            "toggle_radiance": lambda: self._toggle("overlays.radiance.show"),
             "fit_picture": self._fit,
             "toggle_fly": self._toggle_fly,
             "frame_all": self._frame_all,

@@ -37,7 +37,7 @@ class Exports:
     def png(self, path: Path, *, overlays: bool) -> None:
         """The picture at its own resolution as it is shown, with or without the points over it."""
         settings, frame = self._state.settings, self._state.frame
-        points = overlays and (settings.overlays.caustic.show or settings.overlays.global_.show)
+        points = overlays and any(style.show for style in settings.overlays.by_map().values())
         if frame is not None and not points and settings.display.view != "geometry":
             # The same code as `pmviewer render` uses, so that both write the same picture.
             display = settings.display

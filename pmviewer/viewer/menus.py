@@ -29,9 +29,9 @@ class Menus:
             self._render()
             imgui.end_menu()
         if imgui.begin_menu("Overlays"):
-            for name, action in (("caustic", "toggle_caustic"), ("global", "toggle_global")):
+            for name in ("caustic", "global", "radiance"):
                 shown = get(self._state.settings, f"overlays.{name}.show")
-                self._item(SETTINGS[f"overlays.{name}.show"].group.capitalize(), action, shown)
+                self._item(SETTINGS[f"overlays.{name}.show"].group.capitalize(), f"toggle_{name}", shown)
             imgui.end_menu()
         if imgui.begin_menu("Help"):
             self._item("Keys and mouse", "toggle_help", self._state.help_open)

@@ -9,10 +9,12 @@ from pmviewer.viewer import theme
 from pmviewer.viewer.format import grouped, si
 from pmviewer.viewer.overlays import BOUNCE_PALETTE, LIGHT_PALETTE, RGB, CloudSummary
 from pmviewer.viewer.settings_panel import SettingsPanel
+from pmviewer.viewer.shortcuts import keys_of
 from pmviewer.viewer.viewport import Viewport
 from pmviewer.viewer.widgets import tooltip_text
 
-_MAPS = ("caustic", "global")
+_MAPS = {"caustic": "toggle_caustic", "global": "toggle_global", "radiance": "toggle_radiance"}
+_UNIT = {"radiance": "W/m²"}
 
 
 class OverlayPanel:
@@ -34,7 +36,7 @@ class OverlayPanel:
         info = SETTINGS[f"{path}.show"]
         changed, show = imgui.checkbox(f"{info.group}##{path}.show", style.show)
         if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
-            key = "C" if name == "caustic" else "G"
+            key = keys_of(_MAPS[name])
             tooltip_text([(info.path, theme.ACCENT), (f"{info.description} Key {key}.", theme.TEXT)])
         if changed:
             self._state.change({info.path: show})
@@ -59,20 +61,19 @@ class OverlayPanel:
             imgui.end_table()
         picture = self._viewport.picture
         if picture is not None and frame is not None:
-            self._legend(style, picture.clouds[name].summary(style.limit))
+            self._legend(style, picture.clouds[name].summary(style.limit), _UNIT.get(name, "W"))
         imgui.unindent(imgui.get_font_size() * 0.5)
 
     def _style(self, name: str) -> PointOverlay:
-        overlays = self._state.settings.overlays
-        return overlays.caustic if name == "caustic" else overlays.global_
+        return self._state.settings.overlays.by_map()[name]
 
-    def _legend(self, style: PointOverlay, cloud: CloudSummary) -> None:
+    def _legend(self, style: PointOverlay, cloud: CloudSummary, unit: str) -> None:
         if cloud.total == 0:
             imgui.text_disabled("This map is empty.")
             return
         if style.colour == "power":
             imgui.push_text_wrap_pos(0)
-            low, high = si(cloud.power_low, "W"), si(cloud.power_high, "W")
+            low, high = si(cloud.power_low, unit), si(cloud.power_high, unit)
             amount = f"all near {high}" if low == high else f"brightness from {low} to {high}, logarithmic"
             imgui.text_disabled(f"Hue of the power; {amount}")
             imgui.pop_text_wrap_pos()

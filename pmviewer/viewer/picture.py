@@ -18,7 +18,7 @@ from pmviewer.settings import Display, Overlays
 from pmviewer.viewer.gl_program import load_program, set_uniforms
 from pmviewer.viewer.overlays import PointCloud
 
-CLOUDS = ("caustic", "global")
+CLOUDS = ("caustic", "global", "radiance")
 SURROUND = (0.105, 0.105, 0.105)
 _CONTENT = {"albedo": 1, "normal": 2, "depth": 3}
 _CURVE = {"sRGB": 0, "Reinhard": 1, "filmic": 2, "linear": 3}
@@ -165,7 +165,7 @@ class Picture:
         view, projection = camera.view_matrix(), camera.projection_matrix(near, far)
         as_geometry = display.view == "geometry" or not self.has_plane
         if as_geometry:
-            points = overlays is not None and (overlays.caustic.show or overlays.global_.show)
+            points = overlays is not None and any(style.show for style in overlays.by_map().values())
             self._draw_geometry(view, projection, BEHIND_POINTS if points else 1.0)
         else:
             self._draw_plane(display, width)
@@ -210,7 +210,7 @@ class Picture:
         pixel_ratio: float,
         navigating: bool,
     ) -> None:
-        styles = {"caustic": overlays.caustic, "global": overlays.global_}
+        styles = overlays.by_map()
         if not any(style.show for style in styles.values()):
             return
         context = self.context

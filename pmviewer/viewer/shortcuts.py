@@ -41,6 +41,7 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Picture", "T", "Next tone curve", "next_tone", K.t),
     Binding("Picture", "C", "Caustic photons on or off", "toggle_caustic", K.c),
     Binding("Picture", "G", "Global photons on or off", "toggle_global", K.g),
+    Binding("Picture", "Shift+G", "Radiance photons on or off", "toggle_radiance", K.g, shift=True),
     Binding("Picture", "Ctrl+wheel, Ctrl+drag", "Magnify the picture's pixels and move it"),
     Binding("Picture", "Z", "Fit the picture again", "fit_picture", K.z),
     Binding("Camera", "Left drag", "Orbit around the target"),

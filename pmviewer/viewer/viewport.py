@@ -89,7 +89,7 @@ class Viewport:
         changed = picture.upload_geometry(self.state.session.geometry)
         overlays = settings.overlays
         if frame is not None:
-            shown = {"caustic": overlays.caustic.show, "global": overlays.global_.show}
+            shown = {name: style.show for name, style in overlays.by_map().items()}
             changed |= picture.upload_frame(frame, settings.display.view, shown)
         camera, target = self.shown_camera(), self.target()
         navigating = self.state.navigating and picture.software

@@ -213,6 +213,9 @@ def test_threads_change_nothing(lookup):
     scene = cornell_box(size=64)
     one, two = (rendered(scene, settings, 3, threads) for threads in (1, 2))
     assert np.array_equal(one.film.sums, two.film.sums)
+    clouds = [renderer.frame(1).clouds["radiance"] for renderer in (one, two)]
+    assert np.array_equal(clouds[0].photons.view(np.uint32), clouds[1].photons.view(np.uint32))
+    assert 0 < len(clouds[0].photons) == one.frame(1).statistics.stored_in_pass["radiance"]
     plain = settings_of(render={"method": "gather"}, photons={"N": 20_000}, estimate={"lookup": lookup})
     assert not np.array_equal(one.film.sums, rendered(scene, plain, 3).film.sums)
 
