@@ -55,9 +55,9 @@ def test_window_opens_takes_a_screenshot_and_closes_by_keys(tmp_path):
     try:
         wait_for(lambda: xdotool("search", "--name", "cornell_diffuse · pmviewer"), process)
         window = xdotool("search", "--name", "cornell_diffuse · pmviewer").split()[0]
-        xdotool("windowfocus", "--sync", window)
 
         def screenshot() -> list[Path]:
+            xdotool("windowfocus", window)
             xdotool("key", "--window", window, "F12")
             time.sleep(1.0)
             return list(work.glob("*.png"))
