@@ -11,11 +11,7 @@ from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
 from pmviewer.output.exr import read_reference
-from pmviewer.output.falsecolour import Scale
 from pmviewer.output.metric import BLOCK, DROP, Metrics, channel_ratios, metrics, squared_error
-
-ERROR_SCALE = Scale(1e-5, 1.0, log=True)
-"""Of a pixel's relative squared error in false colours. The same for every picture, so that two can be compared."""
 
 
 @dataclass(frozen=True)
