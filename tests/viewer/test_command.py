@@ -66,7 +66,11 @@ def test_window_opens_takes_a_screenshot_and_closes_by_keys(tmp_path):
         pixels, _ = read_png(screenshot()[0])
         assert pixels.shape[0] > 400
         assert len({tuple(p) for p in pixels[::9, ::9].reshape(-1, pixels.shape[-1])}) > 20
-        xdotool("key", "--window", window, "ctrl+q")
+        end = time.monotonic() + 60
+        while process.poll() is None:
+            assert time.monotonic() < end, "Ctrl+Q does not close the window"
+            xdotool("key", "--window", window, "ctrl+q")
+            time.sleep(1.0)
         _, told = process.communicate(timeout=60)
         assert process.returncode == 0, told
         assert "Traceback" not in told
