@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from pmviewer.engine.frame import Frame, Level
 from pmviewer.render.camera import CameraPose, resolve_camera, size_only
 from pmviewer.scene.description import Scene
-from pmviewer.settings import SETTINGS, Settings, flat
+from pmviewer.settings import SETTINGS, flat
 from pmviewer.viewer.format import grouped
 from pmviewer.viewer.jobs import Jobs
 from pmviewer.viewer.session_link import SessionLike
@@ -206,14 +206,6 @@ def _mismatch(reference: Reference, scene: Scene, frame: Frame) -> str | None:
     if not frame.camera.sees_like(resolve_camera(scene, size_only(frame.settings.camera))):
         return "The camera was moved: the reference is seen by the scene's own. Press Backspace to return to it."
     return None
-
-
-def size_to_match(comparison: Comparison, settings: Settings) -> dict[str, Any] | None:
-    """Settings that give the picture the reference's size; None when it has that size."""
-    reference = comparison.reference
-    if reference is None or (settings.camera.width, settings.camera.height) == reference.size:
-        return None
-    return {"camera.width": reference.size[0], "camera.height": reference.size[1]}
 
 
 def _text(value: Any) -> str:

@@ -6,14 +6,17 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from imgui_bundle import icons_fontawesome_6 as fa
 from imgui_bundle import imgui, implot
 
 from pmviewer.output.falsecolour import Scale
 from pmviewer.viewer import theme
-from pmviewer.viewer.comparison import Point, Run, size_to_match
+from pmviewer.viewer.comparison import Point, Run
 from pmviewer.viewer.format import grouped
+from pmviewer.viewer.shortcuts import keys_of
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.statistics_panel import Rows, table
+from pmviewer.viewer.widgets import icon_button
 
 _EARLIER: tuple[theme.Colour, ...] = (
     (0.62, 0.62, 0.62, 0.8),
@@ -28,8 +31,7 @@ def error_rows(point: Point) -> Rows:
     """The figures of one frame."""
     m = point.metrics
     return [
-        ("Pass", grouped(point.passes)),
-        ("relMSE", f"{m.relmse_all:.3e}"),
+        (f"relMSE, pass {grouped(point.passes)}", f"{m.relmse_all:.3e}"),
         ("Without the worst 0.1 %", f"{m.relmse_drop:.3e}"),
         ("Error of 8×8 blocks", "–" if math.isnan(m.block_error) else f"{m.block_error:.3e}"),
         ("Mean ratio", f"{m.mean_ratio:.4f}"),
@@ -37,9 +39,9 @@ def error_rows(point: Point) -> Rows:
 
 
 def log_limits(values: Sequence[float]) -> tuple[float, float]:
-    """Limits of a logarithmic axis that leave some room around the values, and span at least a factor of 4."""
-    low, high = min(values) / 1.25, max(values) * 1.25
-    widen = max(1.0, math.sqrt(4.0 * low / high))
+    """Limits of a logarithmic axis that leave room for markers around the values, and span at least a factor of 4."""
+    low, high = min(values), max(values)
+    widen = max((high / low) ** 0.07, 2.0 * math.sqrt(low / high))
     return low / widen, high * widen
 
 
@@ -51,61 +53,71 @@ class ErrorPanel:
 
     def gui(self) -> None:
         comparison = self._state.comparison
-        em = imgui.get_font_size()
-        if not imgui.begin_table("##error", 2, imgui.TableFlags_.borders_inner_v):
-            return
-        imgui.table_setup_column("figures", imgui.TableColumnFlags_.width_fixed, 17 * em)
-        imgui.table_setup_column("plot", imgui.TableColumnFlags_.width_stretch)
-        imgui.table_next_column()
-        self._figures()
-        imgui.table_next_column()
         runs = [*comparison.earlier, *([comparison.current] if comparison.current else [])]
         runs = [run for run in runs if run.points]
+        if imgui.begin_child("##figures", (17 * imgui.get_font_size(), 0)):
+            self._source()
+            if runs:
+                self._axis_choice()
+            self._figures()
+        imgui.end_child()
+        imgui.same_line()
         if runs:
             self._plot(runs)
         else:
             imgui.text_disabled("The curve of the error begins with the first pass that can be compared.")
-        imgui.end_table()
+
+    def _source(self) -> None:
+        """Where the reference comes from, and a button to load another one."""
+        reference = self._state.comparison.reference
+        if icon_button(fa.ICON_FA_FOLDER_OPEN, "load_reference", f"Load a reference  ({keys_of('load_reference')})"):
+            self._actions["load_reference"]()
+        imgui.same_line()
+        imgui.align_text_to_frame_padding()
+        if reference is None:
+            imgui.text_disabled("no reference")
+            return
+        imgui.text_unformatted(theme.drawable(f"{reference.path.parent.name}/{reference.path.name}"))
+        imgui.set_item_tooltip(f"{reference.path}\n{reference.size[0]}×{reference.size[1]} pixels")
 
     def _figures(self) -> None:
         comparison, frame = self._state.comparison, self._state.frame
         reference = comparison.reference
         problem = comparison.problem(frame)
-        if reference is not None:
-            path = reference.path
-            imgui.text_unformatted(theme.drawable(f"{path.parent.name}/{path.name}"))
-            imgui.set_item_tooltip(f"{path}\n{reference.size[0]}×{reference.size[1]} pixels")
         if problem is not None:
             imgui.push_text_wrap_pos(0)
             colour = theme.WARNING if reference is not None and frame is not None else theme.DIM
             imgui.text_colored(imgui.ImVec4(*colour), theme.drawable(problem))
             imgui.pop_text_wrap_pos()
+        camera = self._state.live_camera()
+        if reference is not None and camera is not None and (camera.width, camera.height) != reference.size:
+            width, height = reference.size
+            if imgui.button(f"Render {width}×{height}"):
+                self._state.change({"camera.width": width, "camera.height": height})
         point = comparison.latest(frame)
         if problem is None and point is not None:
-            table("Error", error_rows(point))
-        if imgui.button("Load reference …" if reference is None else "Load another …"):
-            self._actions["load_reference"]()
-        fitting = size_to_match(comparison, self._state.settings)
-        camera = self._state.live_camera()
-        if reference is not None and fitting and camera and (camera.width, camera.height) != reference.size:
-            if imgui.button(f"Render {reference.size[0]}×{reference.size[1]}"):
-                self._state.change(fitting)
+            table("", error_rows(point))
+
+    def _axis_choice(self) -> None:
+        """What the curves run over, and a button that forgets those of other settings."""
+        comparison = self._state.comparison
+        for text, by_passes in (("seconds", False), ("passes", True)):
+            if imgui.radio_button(text, self.by_passes == by_passes):
+                self.by_passes = by_passes
+            imgui.same_line()
+        imgui.begin_disabled(not comparison.earlier)
+        if imgui.button("Clear"):
+            comparison.clear_earlier()
+        imgui.end_disabled()
+        imgui.set_item_tooltip("Forget the curves of earlier settings")
 
     def _plot(self, runs: list[Run]) -> None:
         comparison = self._state.comparison
-        if imgui.radio_button("seconds", not self.by_passes):
-            self.by_passes = False
-        imgui.same_line()
-        if imgui.radio_button("passes", self.by_passes):
-            self.by_passes = True
-        if comparison.earlier:
-            imgui.same_line(0, imgui.get_font_size())
-            if imgui.small_button("Clear earlier runs"):
-                comparison.clear_earlier()
         curves = [(run, *self._curve(run)) for run in runs]
         x_limits = log_limits([float(x) for _, xs, _ in curves for x in xs])
         y_limits = log_limits([float(y) for _, _, ys in curves for y in ys])
-        implot.push_style_var(implot.StyleVar_.plot_padding, (6, 6))
+        implot.push_style_var(implot.StyleVar_.plot_padding, (4, 4))
+        implot.push_style_var(implot.StyleVar_.label_padding, (4, 2))
         implot.push_style_color(implot.Col_.frame_bg, theme.grey(0, 0))
         implot.push_style_color(implot.Col_.plot_bg, theme.grey(0.12))
         implot.push_style_color(implot.Col_.axis_grid, theme.grey(1, 0.12))
@@ -123,7 +135,7 @@ class ErrorPanel:
                 implot.plot_line(f"{theme.drawable(run.label)}##{run.version}", xs, ys, spec)
             implot.end_plot()
         implot.pop_style_color(3)
-        implot.pop_style_var()
+        implot.pop_style_var(2)
 
     def _curve(self, run: Run) -> tuple[np.ndarray, np.ndarray]:
         """Passes or seconds, and relMSE: positive, since both axes are logarithmic."""
@@ -143,4 +155,4 @@ def _axis(axis: int, title: str, limits: tuple[float, float]) -> None:
     low, high = limits
     ticks = Scale(low, high, log=True).ticks(5)
     values = [low * (high / low) ** tick.position for tick in ticks]
-    implot.setup_axis_ticks(axis, values, [tick.label for tick in ticks])
+    implot.setup_axis_ticks(axis, values, [tick.label.replace("e-0", "e-") for tick in ticks])

@@ -60,20 +60,19 @@ class StatisticsPanel:
         _maps(s)
         imgui.table_next_column()
         table("Time", time_rows(s))
-        point = self._state.comparison.latest(frame)
-        if point is not None:
-            table("Against the reference", reference_rows(point))
         imgui.table_next_column()
-        self._stages(s)
+        self._stages(s, self._state.comparison.latest(frame))
         imgui.end_table()
 
     @staticmethod
-    def _stages(s: Statistics) -> None:
+    def _stages(s: Statistics, error: Point | None) -> None:
         total = sum(s.stage_seconds.values())
         share = {
             name: f"{duration(t)}  {t / total:4.0%}" if total else duration(t) for name, t in s.stage_seconds.items()
         }
         table("CPU time by stage", sorted(share.items(), key=lambda row: -s.stage_seconds[row[0]]))
+        if error is not None:
+            table("Against the reference", reference_rows(error))
         for name, why in s.skipped:
             imgui.push_text_wrap_pos(0)
             imgui.text_disabled(theme.drawable(f"Skipped {name}: {why}"))
@@ -115,8 +114,9 @@ def _right(text: str, *, dim: bool = False) -> None:
 
 
 def table(title: str, rows: Rows) -> None:
-    """Names on the left, right-aligned values."""
-    imgui.text_colored(imgui.ImVec4(*theme.DIM), title)
+    """Names on the left, right-aligned values, under a title if there is one."""
+    if title:
+        imgui.text_colored(imgui.ImVec4(*theme.DIM), title)
     if not imgui.begin_table(f"##{title}", 2):
         return
     imgui.table_setup_column("name", imgui.TableColumnFlags_.width_stretch)

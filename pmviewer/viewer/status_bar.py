@@ -29,7 +29,7 @@ def status_parts(state: ViewerState) -> list[str]:
     point = state.comparison.latest(frame)
     if point is not None:
         parts.append(f"relMSE {point.metrics.relmse_all:.2e}")
-        parts.append(f"mean ×{point.metrics.mean_ratio:.3f}")
+        parts.append(f"mean ratio {point.metrics.mean_ratio:.3f}")
     dropped = sum(s.dropped.values())
     if dropped:
         parts.append(f"{grouped(dropped)} samples dropped")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from pmviewer.output.compare import Reference
     from pmviewer.viewer.viewport import Viewport
 
-_TITLES = {"error": "error: (I-R)²/(R²+0.01) of each pixel, no unit"}
+_TITLES = {"error": "error: (I–R)²/(R²+0.01) of each pixel, no unit"}
 _UNITS = {"albedo": "", "normal": "", "depth": "m"}
 
 
@@ -92,7 +93,9 @@ def _depth_legend(viewport: Viewport, near: float, far: float) -> None:
 
 def _error_legend(viewport: Viewport) -> None:
     """Large errors are on top."""
-    labels = [(1 - tick.position, tick.label.replace("e-0", "e-")) for tick in ERROR_SCALE.ticks(6)]
+    lowest, highest = (round(math.log10(bound)) for bound in (ERROR_SCALE.lower, ERROR_SCALE.upper))
+    powers = range(highest, lowest - 1, -1)
+    labels = [((highest - p) / (highest - lowest), f"1e{p}" if p < -2 else f"{10.0**p:g}") for p in powers]
     _legend(viewport, labels, COLOURS[::-8])
 
 
@@ -103,7 +106,7 @@ def _legend(viewport: Viewport, labels: list[tuple[float, str]], colours: NDArra
     x1 = viewport.origin[0] + viewport.size[0] - 0.8 * line
     x0, y0 = x1 - 0.8 * line, viewport.origin[1] + 1.2 * line
     y1 = y0 + 8 * line
-    pad = 0.5 * line
+    pad = 0.7 * line
     widest = max(imgui.calc_text_size(text).x for _, text in labels)
     box = imgui.get_color_u32(theme.grey(0.1, 0.75))
     draw.add_rect_filled((x0 - widest - 0.4 * line - pad, y0 - pad), (x1 + pad, y1 + pad), box, 4)
@@ -113,7 +116,7 @@ def _legend(viewport: Viewport, labels: list[tuple[float, str]], colours: NDArra
         draw.add_rect_filled_multi_color((x0, float(top)), (x1, float(bottom)), above, above, below, below)
     for position, text in labels:
         size = imgui.calc_text_size(text)
-        top = min(max(y0 + position * (y1 - y0) - size.y / 2, y0), y1 - size.y)
+        top = y0 + position * (y1 - y0) - size.y / 2
         draw.add_text((x0 - size.x - 0.4 * line, top), imgui.get_color_u32(theme.grey(0.9)), text)
 
 
