@@ -16,7 +16,8 @@ ALL = 1 << DIRECT | 1 << CAUSTIC | 1 << INDIRECT | 1 << INDIRECT_CAUSTIC
 @dataclass(frozen=True)
 class Plan:
     """Masks are bit sets of path classes (`1 << class`). `caustic_mask` and `global_mask` are shown directly,
-    `global_classes` are what the global map has to hold; 0 means that the map is not built. `choice` is how direct light chooses lights."""
+    `global_classes` are what the global map has to hold; 0 means that the map is not built. `choice` is how
+    direct light chooses lights."""
 
     path: bool = False
     direct: bool = False
