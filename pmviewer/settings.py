@@ -212,8 +212,8 @@ class Direct(Group):
     choice: Literal["auto", "power", "photons", "Keller-Wald"] = setting(
         "auto",
         "How light samples are spread over the lights. power: by the lights' power. photons: mostly by the photons "
-        "that arrived from each light near the point. Keller-Wald: some samples for the lights with photons near, some for "
-        "all others (§3). auto: photons with many lights, power otherwise.",
+        "that arrived from each light near the point. Keller-Wald: some samples for the lights with photons near, some "
+        "for all others (§3). auto: photons with many lights, power otherwise.",
         stage="image",
         scale="choice",
     )

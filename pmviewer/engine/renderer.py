@@ -255,7 +255,7 @@ class Renderer:
             return self.cache.get(("light choice", key, asked, self.choice_radius), build, lambda grid: grid.bytes)
 
         chooser = self._timed("maps", lambda: self.pool.run([make])[0])
-        self.choice_radius = chooser.radius
+        self.choice_radius = self.radius["light choice"] = chooser.radius
         eye["choice_radius"] = chooser.radius
         return chooser
 
