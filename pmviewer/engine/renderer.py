@@ -242,7 +242,8 @@ class Renderer:
         asked = self.settings.direct.choice_radius
 
         def build() -> PhotonGrid:
-            primary = of_classes(photons.global_, 1 << DIRECT)[:CHOOSING_PHOTONS]
+            some = photons.global_[: 8 * CHOOSING_PHOTONS]  # of all classes
+            primary = of_classes(some, 1 << DIRECT)[:CHOOSING_PHOTONS]
             if self.choice_radius is None:
                 scene_radius = self.scene.flat.radius
                 relative = neighbourhood(primary[:, :3]) / scene_radius if asked == "auto" else float(asked)
