@@ -311,10 +311,22 @@ class Display(Group):
     """Display"""
 
     view: Literal[
-        "beauty", "emission", "direct", "specular", "caustic", "indirect", "albedo", "normal", "depth", "geometry"
+        "beauty",
+        "emission",
+        "direct",
+        "specular",
+        "caustic",
+        "indirect",
+        "albedo",
+        "normal",
+        "depth",
+        "geometry",
+        "reference",
+        "error",
     ] = setting(
         "beauty",
-        "What the viewport shows: the image, one of its terms, a property of the first hit, or the shaded geometry.",
+        "What the viewport shows: the image, one of its terms, a property of the first hit, the shaded geometry, the "
+        "loaded reference, or the error against it.",
         stage="display",
         scale="choice",
     )
