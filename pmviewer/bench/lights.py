@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench.error import reference
-from pmviewer.bench.metric import EPSILON, block_means
 from pmviewer.bench.report import BenchResult, Target
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.output.metric import EPSILON, block_means
 from pmviewer.settings import Settings, with_values
 
 SCENE = "rooms_10x10"

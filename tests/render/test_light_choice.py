@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.bench.metric import z_test
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
@@ -15,6 +14,7 @@ from pmviewer.kernels.jit import kernel
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.maps.grid import build_grid
 from pmviewer.maps.radius import neighbourhood
+from pmviewer.output.metric import z_test
 from pmviewer.render.choice import (
     BY_PHOTONS,
     CHOICES,
