@@ -163,6 +163,7 @@ def scene_report(job: Job) -> str:
             ("caustic map", plan.caustic_mask),
             ("global map", plan.global_classes),
             ("direct light", plan.direct),
+            ("light choice by photons", plan.choice != "power"),
             ("final gather", plan.gather),
             ("path tracer", plan.path),
         )

@@ -105,6 +105,9 @@ class ViewerState:
         frame, geometry = self.frame, self.session.geometry
         if path == "estimate.radius" and frame is not None and geometry is not None:
             return _first_radius(frame, float(geometry.radius))
+        if path == "direct.choice_radius" and frame is not None and geometry is not None:
+            radius = frame.statistics.radius.get("light choice")
+            return radius / float(geometry.radius) if radius else None
         return None
 
     # what is shown ----------------------------------------------------------------------------------------------

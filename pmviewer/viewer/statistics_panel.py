@@ -28,6 +28,7 @@ def time_rows(s: Statistics) -> Rows:
         ("CPU time", duration(s.cpu_seconds)),
         ("Rays", grouped(s.rays)),
         ("Rays per second", si(s.rays_per_second)),
+        ("Shadow rays per pixel and pass", f"{s.shadow_rays_per_pixel:.2f}"),
     ]
     if s.passes and s.seconds:
         rows.append(("Time of a pass", duration(s.seconds / s.passes)))
