@@ -72,6 +72,10 @@ def render(
     set_: SetOption = None,
     half: Annotated[bool, typer.Option(help="Half-precision EXR.")] = False,
     define: ParameterOption = None,
+    reference: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="EXR to print the error against; auto: the bundled scene's own."),
+    ] = None,
 ) -> None:
     """Render to a file without a window; the result is what the window shows after the same passes."""
     from pmviewer.job import load_job
@@ -80,7 +84,28 @@ def render(
     if passes is not None and time is not None:
         raise SettingError("--passes and --time exclude each other: give one of them.")
     job = load_job(scene, set_ or [], define or [])
-    render_job(job, output, passes=passes, seconds=time, size=size, threads=threads, seed=seed, half=half)
+    render_job(
+        job,
+        output,
+        passes=passes,
+        seconds=time,
+        size=size,
+        threads=threads,
+        seed=seed,
+        half=half,
+        reference=reference,
+    )
+
+
+@app.command()
+def compare(
+    image: Annotated[Path, typer.Argument(help="An EXR file.")],
+    reference: Annotated[Path, typer.Argument(help="The EXR file to compare it with, of the same size.")],
+) -> None:
+    """Print the error of a picture against a reference."""
+    from pmviewer.output.compare import compare_files
+
+    typer.echo(compare_files(image, reference))
 
 
 @app.command()

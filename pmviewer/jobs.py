@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 
 from pmviewer.engine.cache import StageCache
@@ -13,13 +15,17 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
-from pmviewer.errors import OutputError, SettingError
+from pmviewer.errors import OutputError, SceneError, SettingError
 from pmviewer.job import Job
-from pmviewer.output.frame_export import write_frame_exr, write_frame_png
+from pmviewer.output.compare import ERROR_COLUMNS, Reference, error_row, load_reference
+from pmviewer.output.frame_export import LAYERS, write_frame_exr, write_frame_png
+from pmviewer.output.metric import metrics
+from pmviewer.render.camera import resolve_camera, size_only
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.describe import describe
-from pmviewer.scene.load import load_scene
-from pmviewer.settings import with_values
+from pmviewer.scene.description import Scene
+from pmviewer.scene.load import load_scene, reference_of
+from pmviewer.settings import Settings, with_values
 
 DEFAULT_PASSES = 64
 FORMATS = (".exr", ".png")
@@ -35,8 +41,13 @@ def render_job(
     threads: int | None = None,
     seed: int | None = None,
     half: bool = False,
+    reference: str | None = None,
 ) -> Frame:
-    """Render with a progress bar and write the files. Raises PmviewerError; refuses bad file names before rendering."""
+    """Render with a progress bar and write the files; with a reference (a file or "auto") also print the error at
+    passes 1, 2, 4, … and at the end.
+
+    Raises PmviewerError; refuses bad file names and references that don't fit before rendering.
+    """
     for path in outputs:
         if path.suffix.lower() not in FORMATS:
             raise OutputError(f"{path}: unknown format '{path.suffix}'. Use .exr or .png.")
@@ -45,11 +56,12 @@ def render_job(
     settings = with_values(job.settings, _overrides(passes, seconds, size, seed, job.passes))
     opened = open_scene(job.scene, job.parameters)
     _print_warnings(opened.scene.warnings, opened.scene.dropped)
-    view = "beauty" if settings.display.view == "geometry" else settings.display.view
+    target = None if reference is None else _reference(reference, opened.scene, settings)
+    view = settings.display.view if settings.display.view in LAYERS else "beauty"
     pool = WorkPool(threads)
     try:
         renderer = Renderer(opened, settings, pool, StageCache(0))
-        _run(renderer, pool)
+        _run(renderer, pool, None if target is None else partial(_print_error, target))
         frame = renderer.frame(1)
     finally:
         pool.close()
@@ -82,7 +94,30 @@ def _overrides(
     return values
 
 
-def _run(renderer: Renderer, pool: WorkPool) -> None:
+def _reference(source: str, scene: Scene, settings: Settings) -> Reference:
+    """Read the reference, checked against the picture that will be rendered. Raises SceneError."""
+    camera = resolve_camera(scene, settings.camera)
+    path = reference_of(scene) if source == "auto" else Path(source)
+    if path is None:
+        raise SceneError(f"The scene '{scene.name}' has no reference of its own.", hint="Name an EXR file.")
+    if source == "auto" and not camera.sees_like(resolve_camera(scene, size_only(settings.camera))):
+        raise SceneError(
+            "The scene's reference is seen by the scene's own camera: leave out the camera settings.", path
+        )
+    reference = load_reference(path)
+    reference.check_size((camera.width, camera.height))
+    return reference
+
+
+def _print_error(reference: Reference, renderer: Renderer) -> None:
+    if renderer.passes == 1:
+        print(ERROR_COLUMNS)
+    measured = metrics(renderer.frame(0).image(), reference.image)
+    print(error_row(renderer.passes, renderer.seconds, measured))
+
+
+def _run(renderer: Renderer, pool: WorkPool, measure: Callable[[Renderer], None] | None) -> None:
+    """Render until a stop rule holds; `measure` is called after passes 1, 2, 4, … and the last one."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
@@ -90,7 +125,9 @@ def _run(renderer: Renderer, pool: WorkPool) -> None:
     by_time = render.time_limit > 0
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=not console.is_terminal) as progress:
+    # rich would turn what is printed meanwhile to its own console: right on a terminal, wrong for a redirected stdout.
+    shown = sys.stdout.isatty()
+    with Progress(*columns, console=console, transient=not console.is_terminal, redirect_stdout=shown) as progress:
         bar = progress.add_task("preparing", total=1.0)
         prepare(
             renderer.scene,
@@ -101,13 +138,13 @@ def _run(renderer: Renderer, pool: WorkPool) -> None:
         progress.reset(bar, total=1.0, description="rendering")
         while not renderer.finished:
             renderer.step()
+            if measure is not None and (renderer.passes & (renderer.passes - 1) == 0 or renderer.finished):
+                measure(renderer)
             share = renderer.seconds / render.time_limit if by_time else renderer.passes / render.passes
             progress.update(bar, completed=min(share, 1.0), description=f"pass {renderer.passes}")
 
 
 def _print_warnings(warnings: Iterable[str], dropped: Mapping[str, int]) -> None:
-    import sys
-
     for warning in warnings:
         print(f"pmviewer: warning: {warning}", file=sys.stderr)
     for reason, count in dropped.items():
@@ -126,6 +163,7 @@ def scene_report(job: Job) -> str:
             ("caustic map", plan.caustic_mask),
             ("global map", plan.global_classes),
             ("direct light", plan.direct),
+            ("light choice by photons", plan.choice != "power"),
             ("final gather", plan.gather),
             ("path tracer", plan.path),
         )

@@ -209,6 +209,51 @@ class Direct(Group):
         scale="switch",
         title="MIS",
     )
+    choice: Literal["auto", "power", "photons", "Keller-Wald"] = setting(
+        "auto",
+        "How light samples are spread over the lights. power: by the lights' power. photons: mostly by the photons "
+        "that arrived from each light near the point. Keller-Wald: some samples for the lights with photons near, some "
+        "for all others (§3). auto: photons with many lights, power otherwise.",
+        stage="image",
+        scale="choice",
+    )
+    choice_radius: float | Auto = setting(
+        "auto",
+        "Radius within which photons tell the lights of a point, relative to the scene. Automatic: some dozens of "
+        "photons. Too small a radius misses lights and leaves single bright pixels.",
+        stage="maps",
+        scale="log",
+        unit="× scene",
+        ge=1e-4,
+        le=1.0,
+    )
+    con_samples: int = setting(
+        2,
+        "Samples of the lights with photons near the point.",
+        stage="image",
+        scale="integer",
+        unit="samples",
+        ge=1,
+        le=64,
+        title="contributing samples",
+    )
+    noncon_samples: int = setting(
+        1,
+        "Samples of all other lights.",
+        stage="image",
+        scale="integer",
+        unit="samples",
+        ge=1,
+        le=64,
+        title="other samples",
+    )
+    biased: bool = setting(
+        False,
+        "Leave lights without photons near the point out: less noise, a little too dark.",
+        stage="image",
+        scale="switch",
+        title="only contributing lights",
+    )
 
 
 class Gather(Group):
@@ -294,10 +339,22 @@ class Display(Group):
     """Display"""
 
     view: Literal[
-        "beauty", "emission", "direct", "specular", "caustic", "indirect", "albedo", "normal", "depth", "geometry"
+        "beauty",
+        "emission",
+        "direct",
+        "specular",
+        "caustic",
+        "indirect",
+        "albedo",
+        "normal",
+        "depth",
+        "geometry",
+        "reference",
+        "error",
     ] = setting(
         "beauty",
-        "What the viewport shows: the image, one of its terms, a property of the first hit, or the shaded geometry.",
+        "What the viewport shows: the image, one of its terms, a property of the first hit, the shaded geometry, the "
+        "loaded reference, or the error against it.",
         stage="display",
         scale="choice",
     )

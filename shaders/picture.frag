@@ -1,10 +1,13 @@
 #version 330 core
 // A plane of the frame on the screen. The tone curves are those of pmviewer/output/tone.py.
 uniform sampler2D plane;
-uniform int content;      // 0 radiance, 1 reflectance, 2 unit vector, 3 depth
+uniform int content;      // 0 radiance, 1 reflectance, 2 unit vector, 3 depth, 4 error against the reference
 uniform int curve;        // 0 sRGB, 1 Reinhard, 2 filmic, 3 linear
 uniform float scale;      // 2^exposure
 uniform vec2 depth_range; // nearest and farthest finite depth
+uniform sampler2D reference;
+uniform sampler2D colours; // of the error, small to large (pmviewer/output/falsecolour.py)
+uniform vec2 error_range;  // logarithms of the errors at the ends of the colours
 
 in vec2 uv;
 out vec4 colour;
@@ -36,6 +39,12 @@ void main() {
         shown = srgb_oetf(value.rgb);
     } else if (content == 2) {
         shown = value.rgb != vec3(0.0) ? value.rgb * 0.5 + 0.5 : vec3(0.0);
+    } else if (content == 4) {
+        // As in pmviewer/output/metric.py.
+        vec3 truth = texture(reference, uv).rgb, off = value.rgb - truth;
+        float error = dot(off * off / (truth * truth + 0.01), vec3(1.0 / 3.0));
+        float share = clamp((log(max(error, 1e-30)) - error_range.x) / (error_range.y - error_range.x), 0.0, 1.0);
+        shown = texelFetch(colours, ivec2(int(share * float(textureSize(colours, 0).x - 1) + 0.5), 0), 0).rgb;
     } else {
         // Near is bright; pixels that see nothing are black.
         float span = max(depth_range.y - depth_range.x, 1e-30);

@@ -58,6 +58,22 @@ def test_render_writes_both_formats_and_the_same_for_any_threads(tmp_path, capsy
     assert pixels.max() > 100
 
 
+def test_errors_against_a_reference_are_printed_while_rendering_and_by_compare(tmp_path, capsys):
+    truth, again = str(tmp_path / "truth.exr"), str(tmp_path / "again.exr")
+    assert call("render", "cornell_diffuse", "-o", truth, *QUICK) == 0
+    capsys.readouterr()
+    longer = ["--passes", "3", *QUICK[2:]]
+    assert call("render", "cornell_diffuse", "-o", again, *longer, "--reference", truth) == 0
+    head, *rows = capsys.readouterr().out.splitlines()[:-1]
+    assert head.split()[:3] == ["pass", "seconds", "relMSE"]
+    assert [int(row.split()[0]) for row in rows] == [1, 2, 3]
+    errors = [float(row.split()[2]) for row in rows]
+    assert errors[1] == 0, "the same two passes"
+    assert errors[2] > 0
+    assert call("compare", again, truth) == 0
+    assert f"relMSE {errors[2]:.4e}" in " ".join(capsys.readouterr().out.split())
+
+
 def test_session_file_renders_what_it_was_saved_from(tmp_path, capsys):
     settings = with_values(
         Settings(), {"photons.N": 2000, "camera.width": 24, "camera.height": 16, "render.method": "gather"}
@@ -81,6 +97,10 @@ def test_session_file_renders_what_it_was_saved_from(tmp_path, capsys):
         (["render", "cornell_diffuse", "-o", "x.exr", "--set", "photons.N=none"], "whole number"),
         (["render", "cornell_diffuse", "-o", "x.exr", "--passes", "2", "--time", "2"], "exclude"),
         (["render", "cornell_diffuse", "-o", "x.exr", "-D", "res"], "name=value"),
+        (["render", "cornell_diffuse", "-o", "x.exr", "--size", "16x16", "--reference", "auto"], "256×256"),
+        (["render", "cornell_diffuse", "-o", "x.exr", "--reference", "no.exr"], "no.exr"),
+        (["render", "cornell_diffuse", "-o", "x.exr", "--set", "camera.fov=50", "--reference", "auto"], "own camera"),
+        (["compare", "no.exr", "other.exr"], "other.exr"),
         (["bench", "nonsense"], "nonsense"),
         (["info", "broken.toml"], "broken.toml"),
     ],

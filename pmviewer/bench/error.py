@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from pmviewer.bench.metric import loglog_slope, metrics
 from pmviewer.bench.report import BenchResult, Target
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
@@ -20,6 +19,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.output.exr import read_exr
+from pmviewer.output.metric import loglog_slope, metrics
 from pmviewer.resources import data_folder
 from pmviewer.settings import Settings, with_values
 

@@ -63,7 +63,7 @@ def _wide(opened: OpenScene, pool: WorkPool, factor: float) -> float:
 
 def run(quick: bool = False) -> BenchResult:
     """Measure every look-up with every share of radiance photons."""
-    passes = 1 if quick else 2
+    passes = 1 if quick else 4
     rows: list[list[str | float | int]] = []
     targets = []
     pool = WorkPool()

@@ -14,6 +14,7 @@ BENCHES: dict[str, tuple[str, str]] = {
     "lookup": ("Photon look-ups against scipy's cKDTree (P7)", "pmviewer.bench.lookup:run"),
     "photons": ("Photons per second and bytes per photon (P8, P13)", "pmviewer.bench.photons:run"),
     "error": ("Error against CPU time on the bundled scenes (P1–P5)", "pmviewer.bench.error:run"),
+    "lights": ("Shadow rays by choice of lights (R2)", "pmviewer.bench.lights:run"),
     "latency": ("Slider to first new frame (P9)", "pmviewer.bench.latency:run"),
     "start": ("Start to first image, cold and warm (P10)", "pmviewer.bench.start:run"),
     "window": ("Frames per second while computing (P11)", "pmviewer.bench.window:run"),

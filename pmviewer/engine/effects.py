@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pmviewer.engine.method import plan_of
+from pmviewer.engine.method import Plan, plan_of
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings import Settings
 
@@ -30,6 +30,8 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
         return "Only with radiance photons."
     if group == "direct" and not (plan.direct or plan.path):
         return "Direct light is not computed: a map is shown alone, or nothing is diffuse."
+    if group == "direct":
+        return _direct(path, settings, plan, traits)
     if path == "overlays.caustic.show" and plan.photons and not plan.caustic_mask:
         return "No caustic photons: the scene has no mirror or glass, or the method does not use them."
     if path.startswith("overlays.radiance.") and not plan.radiance:
@@ -40,6 +42,24 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
         return "This method traces no photons."
     if path == "render.max_depth" and not (plan.path or traits.has_specular):
         return "No mirror or glass in this scene."
+    return None
+
+
+def _direct(path: str, settings: Settings, plan: Plan, traits: SceneTraits) -> str | None:
+    direct = settings.direct
+    if path == "direct.choice":
+        if plan.path:
+            return "The path tracer chooses lights by power."
+        if traits.n_lights <= 1:
+            return "There is one light."
+    if path == "direct.samples" and plan.choice == "Keller-Wald":
+        return "Keller-Wald sets contributing and other samples instead."
+    if path in ("direct.choice_radius", "direct.biased") and plan.choice == "power":
+        return "No photons choose lights: see direct.choice."
+    if path in ("direct.con_samples", "direct.noncon_samples") and plan.choice != "Keller-Wald":
+        return "Only with the light choice Keller-Wald."
+    if path == "direct.noncon_samples" and direct.biased:
+        return "Lights without photons near are left out."
     return None
 
 

@@ -32,6 +32,10 @@ class Statistics:
     radius: Mapping[str, float] = field(default_factory=dict)
     """Look-up radius of the latest pass by map."""
     rays: int = 0
+    shadow_rays: int = 0
+    """Those of the rays that test whether a light is visible."""
+    shadow_rays_per_pixel: float = 0.0
+    """In one pass, on average."""
     seconds: float = 0.0
     """Rendering time without pauses."""
     cpu_seconds: float = 0.0

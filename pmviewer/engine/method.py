@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings import Settings
 
+MANY_LIGHTS = 4
+"""From so many lights on, the automatic choice of lights asks the photons."""
 ALL = 1 << DIRECT | 1 << CAUSTIC | 1 << INDIRECT | 1 << INDIRECT_CAUSTIC
 
 
 @dataclass(frozen=True)
 class Plan:
     """Masks are bit sets of path classes (`1 << class`). `caustic_mask` and `global_mask` are shown directly,
-    `global_classes` are what the global map has to hold; 0 means that the map is not built. `radiance`: whether gather
-    rays use radiance photons."""
+    `global_classes` are what the global map has to hold; 0 means that the map is not built. `choice` is how
+    direct light chooses lights, `radiance` whether gather rays use radiance photons."""
 
     path: bool = False
     direct: bool = False
@@ -24,6 +26,7 @@ class Plan:
     caustic_mask: int = 0
     global_mask: int = 0
     global_classes: int = 0
+    choice: str = "power"
     skipped: tuple[tuple[str, str], ...] = ()
 
     @property
@@ -54,17 +57,28 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     if method == "caustic map":
         skipped += [("direct light", "a map is shown alone"), ("global map", "not shown")]
         return Plan(caustic_mask=caustics, skipped=tuple(skipped))
+    choice, why = _light_choice(settings, traits)
+    if choice == "power":
+        skipped.append(("light choice by photons", why))
     if method == "gather":
         radiance = settings.gather.radiance_photons != "off"
         if not radiance:
             skipped.append(("radiance photons", "off"))
-        return Plan(
-            direct=True,
-            gather=True,
-            radiance=radiance,
-            caustic_mask=caustics,
-            global_classes=ALL,
-            skipped=tuple(skipped),
+        gathered = Plan(
+            direct=True, gather=True, radiance=radiance, caustic_mask=caustics, global_classes=ALL, choice=choice
         )
+        return replace(gathered, skipped=tuple(skipped))
     skipped.append(("final gather", "the method shows the maps directly"))
-    return Plan(direct=True, caustic_mask=caustics, global_mask=diffuse, global_classes=diffuse, skipped=tuple(skipped))
+    shown = Plan(direct=True, caustic_mask=caustics, global_mask=diffuse, global_classes=diffuse, choice=choice)
+    return replace(shown, skipped=tuple(skipped))
+
+
+def _light_choice(settings: Settings, traits: SceneTraits) -> tuple[str, str]:
+    """How lights are chosen, and why photons don't choose where that is by power."""
+    wanted = settings.direct.choice
+    if traits.n_lights <= 1:
+        return "power", "there is one light"
+    if wanted == "auto":
+        few = f"only {traits.n_lights} lights (direct.choice = photons asks for it)"
+        return ("photons", "") if traits.n_lights >= MANY_LIGHTS else ("power", few)
+    return wanted, "direct.choice = power"

@@ -19,6 +19,7 @@ from pmviewer.render.film import Film
 from pmviewer.render.lookup import NO_SITES
 from pmviewer.render.path import path_pass
 from pmviewer.render.record import EYE_DTYPE
+from pmviewer.render.record import N_COUNTS as N_EYE_COUNTS
 from pmviewer.settings import Settings
 
 Step = tuple[str, Callable[[], object]]
@@ -74,7 +75,7 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
             ("kd-tree" if nearest else "photon grid", lambda: photon_map(empty)),
         ]
     eye, film = np.zeros(1, EYE_DTYPE), np.zeros((1, 1))
-    eye_counts = np.zeros(2, np.int64)
+    eye_counts = np.zeros(N_EYE_COUNTS, np.int64)
     if plan.path:
         steps.append(("path tracer", lambda: path_pass(flat.record, eye, film, eye_counts, 0, 0)))
     else:
@@ -84,7 +85,8 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
             sites = NO_SITES
             if plan.radiance:
                 sites = build_sites(empty, np.zeros(1, np.uint32), "all", 1.0, 1.0).record
-            eye_pass(flat.record, eye, record, record, sites, film, eye_counts, 0, 0)
+            choice_map = build_grid(empty, 1.0, 1.0).record
+            eye_pass(flat.record, eye, record, record, choice_map, sites, film, eye_counts, 0, 0)
 
         steps.append(("eye pass", compile_eye))
     return steps

@@ -22,21 +22,26 @@ from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import first_radius, pass_radius
 from pmviewer.engine.sites import sites_of
-from pmviewer.maps.grid import build_grid
+from pmviewer.maps.grid import PhotonGrid, build_grid
 from pmviewer.maps.kdtree import build_kdtree
 from pmviewer.maps.radiance import RadianceMap
-from pmviewer.maps.radius import automatic_radius, largest_power
+from pmviewer.maps.radius import automatic_radius, largest_power, neighbourhood
+from pmviewer.maps.record import DIRECT
 from pmviewer.photons.lightpass import PhotonMaps, trace_pass, trajectories
 from pmviewer.render.camera import CameraPose, resolve_camera
+from pmviewer.render.choice import CHOICES
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
 from pmviewer.render.lookup import NO_SITES
 from pmviewer.render.path import path_pass
-from pmviewer.render.record import C_DROPPED, C_RAYS, N_COUNTS, eye_record
+from pmviewer.render.record import C_DROPPED, C_RAYS, C_SHADOW_RAYS, N_COUNTS, eye_record
 from pmviewer.settings import Settings
 
 CACHED_PASSES = 4
 """Photons and maps of the first passes are kept, so that a new camera or radius starts from them."""
+
+CHOOSING_PHOTONS = 1 << 17
+"""Most photons in the map that chooses lights."""
 
 COARSE_SHRINK = 4
 COARSE_PHOTONS = 40_000
@@ -60,7 +65,8 @@ class Renderer:
             if self.plan.photons
             else 0.0
         )
-        self.emitted = self.rays = 0
+        self.emitted = self.rays = self.shadow_rays = 0
+        self.choice_radius: float | None = None
         self.seconds = self.cpu_seconds = 0.0
         self.stored = {"caustic": 0, "global": 0}
         self.stored_in_pass: dict[str, int] = {}
@@ -126,6 +132,8 @@ class Renderer:
             stored_in_pass=stored_in_pass,
             radius=dict(self.radius),
             rays=self.rays,
+            shadow_rays=self.shadow_rays,
+            shadow_rays_per_pixel=self.shadow_rays / max(len(film.sums) * film.passes, 1),
             seconds=self.seconds,
             cpu_seconds=self.cpu_seconds,
             stage_seconds=dict(self.stage_seconds),
@@ -175,7 +183,7 @@ class Renderer:
             return make(), key
         return self.cache.get(key, make, lambda photons: photons.bytes), key
 
-    def _maps(self, eye: np.void, index: int, N: int) -> tuple[NDArray[np.void], NDArray[np.void]]:
+    def _maps(self, eye: np.void, index: int, N: int) -> tuple[NDArray[np.void], ...]:
         """Trace the pass's photons and build its maps; fills masks and radii into the eye record."""
         photons, key = self._timed("light pass", lambda: self._photons_of(index, N))
         self._photons = photons
@@ -219,14 +227,16 @@ class Renderer:
             self._sites, eye["site_radius"] = self._timed("maps", lambda: self._build_sites(built[1], index, key))
             self.map_bytes += self._sites.bytes
         eye["caustic_mask"], eye["global_mask"] = plan.caustic_mask, plan.global_mask
-        self._keep = built
+        chooser = self._chooser(eye, photons, key, index)
+        records.append(chooser.record)
+        self._keep = built, chooser
         self.emitted += photons.emitted
         self.rays += photons.rays
         self.dropped["photons"] += photons.dropped
         self.stored_in_pass = {"caustic": len(photons.caustic), "global": len(photons.global_)}
         for name, count in self.stored_in_pass.items():
             self.stored[name] += count
-        return records[0], records[1]
+        return tuple(records)
 
     def _build_both(self, cached: Callable[[str], Any], index: int) -> list[Any]:
         if index < CACHED_PASSES:  # the cache belongs to one thread
@@ -246,16 +256,46 @@ class Renderer:
         sites_key = ("sites", key, settings.estimate, settings.gather.radiance_photons, settings.gather.cutoff, radius)
         return self.cache.get(sites_key, make, lambda made: made[0].bytes)
 
-    def _no_map(self) -> Any:
-        """An empty map: kernels take two maps, whether or not they look them up."""
-        nearest = self.settings.estimate.lookup == "nearest"
+    def _chooser(self, eye: np.void, photons: PhotonMaps, key: tuple, index: int) -> PhotonGrid:
+        """The map of this pass's direct photons that choose lights; fills rule and radius into the eye record.
+
+        Its radius is that of the first pass: it blurs nothing, and a small one would miss lights.
+        """
+        if self.plan.choice == "power":
+            return self._no_map(nearest=False)
+        eye["choice"], eye["biased"] = CHOICES.index(self.plan.choice), self.settings.direct.biased
+        asked = self.settings.direct.choice_radius
+
+        def build() -> PhotonGrid:
+            some = photons.global_[: 8 * CHOOSING_PHOTONS]  # of all classes
+            primary = of_classes(some, 1 << DIRECT)[:CHOOSING_PHOTONS]
+            if self.choice_radius is None:
+                scene_radius = self.scene.flat.radius
+                relative = neighbourhood(primary[:, :3]) / scene_radius if asked == "auto" else float(asked)
+                self.choice_radius = min(max(relative, 1e-4), 1.0) * scene_radius
+            return build_grid(primary, self.choice_radius, photons.global_unit)
+
+        def make() -> PhotonGrid:
+            if index >= CACHED_PASSES:
+                return build()
+            return self.cache.get(("light choice", key, asked, self.choice_radius), build, lambda grid: grid.bytes)
+
+        chooser = self._timed("maps", lambda: self.pool.run([make])[0])
+        self.choice_radius = self.radius["light choice"] = chooser.radius
+        eye["choice_radius"] = chooser.radius
+        return chooser
+
+    def _no_map(self, nearest: bool | None = None) -> Any:
+        """An empty map: kernels take all maps, whether or not they look them up."""
+        if nearest is None:
+            nearest = self.settings.estimate.lookup == "nearest"
         empty = np.empty((0, 6), np.float32)
         make = (lambda: build_kdtree(empty, 1.0)) if nearest else (lambda: build_grid(empty, 1.0, 1.0))
         return self.cache.get(("empty", nearest), make, lambda _: 0)
 
-    def _no_maps(self) -> tuple[NDArray[np.void], NDArray[np.void]]:
+    def _no_maps(self) -> tuple[NDArray[np.void], ...]:
         record = self._no_map().record
-        return record, record
+        return record, record, self._no_map(nearest=False).record
 
     def _max_radius(self, photons: NDArray[np.float32], unit: float) -> float:
         estimate, scene_radius = self.settings.estimate, self.scene.flat.radius
@@ -264,7 +304,7 @@ class Renderer:
         automatic = automatic_radius(estimate.k, largest_power(photons, unit), estimate.black_level)
         return min(max(automatic, estimate.floor * scene_radius), 2 * scene_radius)
 
-    def _eye_pass(self, eye: NDArray[np.void], maps: tuple[NDArray[np.void], NDArray[np.void]], film: Film) -> None:
+    def _eye_pass(self, eye: NDArray[np.void], maps: tuple[NDArray[np.void], ...], film: Film) -> None:
         plan, settings = self.plan, self.settings
         eye[0]["direct"] = plan.direct
         eye[0]["gather_rays"] = settings.gather.rays if plan.gather else 0
@@ -281,19 +321,22 @@ class Renderer:
                 if plan.path:
                     path_pass(scene, eye, film.sums, counts, first, last)
                 else:
-                    eye_pass(scene, eye, maps[0], maps[1], sites, film.sums, counts, first, last)
+                    eye_pass(scene, eye, *maps, sites, film.sums, counts, first, last)
                 return counts
 
             return run
 
         counts = sum(self.pool.run([task(first) for first in range(0, pixels, tile)]), np.zeros(N_COUNTS, np.int64))
         self.rays += int(counts[C_RAYS])
+        self.shadow_rays += int(counts[C_SHADOW_RAYS])
         self.dropped["samples"] += int(counts[C_DROPPED])
 
 
 def tile_size(pixels: int, eye: np.void, threads: int) -> int:
     """Pixels a task, so that a task takes at most some 30 ms. The picture does not depend on it."""
-    work = 1 + int(eye["gather_rays"]) + int(eye["light_samples"]) // 4
+    keller_wald = eye["choice"] == CHOICES.index("Keller-Wald")
+    light_samples = int(eye["con_samples"] + eye["noncon_samples"] if keller_wald else eye["light_samples"])
+    work = 1 + int(eye["gather_rays"]) + light_samples // 4
     return max(64, min(4096 * 2 // work, -(-pixels // (4 * threads))))
 
 

@@ -151,19 +151,27 @@ def _sphere_cone(scene, light, x):
 
 @device
 def sample_light(scene, x, u_pick, u, v):
-    """A direction from the point x towards a light.
+    """A direction from the point x towards a light picked by power: as `sample_one_light`, with the density of the
+    light among all."""
+    light, probability, _ = pick_light(scene, u_pick)
+    wi, end, L, pdf, findable = sample_one_light(scene, light, x, u, v)
+    return wi, end, L, probability * pdf, findable
+
+
+@device
+def sample_one_light(scene, light, x, u, v):
+    """A direction from the point x towards the light.
 
     Returns unit `wi`, the end point of the shadow ray, the radiance L arriving if nothing is in between, its pdf per
-    solid angle (0: no contribution; for point lights L/pdf is intensity/distance² over the pick probability) and
-    whether a BSDF sample could have found it (False for point lights).
+    solid angle (0: no contribution; for point lights L/pdf is intensity/distance²) and whether a BSDF sample could have
+    found it (False for point lights).
     """
-    light, probability, u_pick = pick_light(scene, u_pick)
     kind = np.int32(light_number(scene, light, L_KIND))
     L = light_vector(scene, light, L_RADIANCE)
     if kind == ENVIRONMENT:
         wi = square_to_sphere(u, v)
         end = along(x, wi, _f4(2.0) * (scene.radius + distance_to_center(scene, x)))
-        return wi, end, L, probability * _f4(1.0 / (4.0 * math.pi)), True
+        return wi, end, L, _f4(1.0 / (4.0 * math.pi)), True
     if kind == POINT:
         p = light_vector(scene, light, L_A)
         offset = sub(p, x)
@@ -171,7 +179,7 @@ def sample_light(scene, x, u_pick, u, v):
         if not distance2 > _f4(0.0):
             return (_f4(0.0), _f4(0.0), _f4(1.0)), p, L, _f4(0.0), False
         inv = _f4(1.0) / _f4(math.sqrt(distance2))
-        return scale(offset, inv), p, scale(L, inv * inv), probability, False
+        return scale(offset, inv), p, scale(L, inv * inv), _f4(1.0), False
     if kind == SPHERE:
         cone = _sphere_cone(scene, light, x)
         if cone > _f4(0.0):
@@ -188,7 +196,7 @@ def sample_light(scene, x, u_pick, u, v):
             p = along(x, wi, reach - half)
             n = normalize(sub(p, center))
             end = leave(p, n, _round_gap(n, center, radius), -wi[0], -wi[1], -wi[2])
-            return wi, end, L, probability / (_f4(2.0) * _PI * cone), True
+            return wi, end, L, _f4(1.0) / (_f4(2.0) * _PI * cone), True
     p, n, gap = light_point(scene, light, u, v)
     offset = sub(p, x)
     distance2 = dot(offset, offset)
@@ -199,7 +207,7 @@ def sample_light(scene, x, u_pick, u, v):
     cos_light = -dot(wi, n)
     if cos_light <= _f4(0.0):
         return wi, p, L, _f4(0.0), True
-    pdf = probability * distance2 / (cos_light * light_number(scene, light, L_AREA))
+    pdf = distance2 / (cos_light * light_number(scene, light, L_AREA))
     return wi, leave(p, n, gap, -wi[0], -wi[1], -wi[2]), L, pdf, True
 
 
@@ -220,19 +228,21 @@ def emitted(scene, light, ng, d):
 @device
 def light_pdf(scene, light, x, p, ng, wi):
     """Density per solid angle with which `sample_light` at x would have chosen direction wi to the light's point p."""
+    return light_probability(scene, light) * one_light_pdf(scene, light, x, p, ng, wi)
+
+
+@device
+def one_light_pdf(scene, light, x, p, ng, wi):
+    """The same for `sample_one_light`."""
     if light == scene.environment:
-        return light_probability(scene, light) * _f4(1.0 / (4.0 * math.pi))
+        return _f4(1.0 / (4.0 * math.pi))
     if np.int32(light_number(scene, light, L_KIND)) == SPHERE:
         cone = _sphere_cone(scene, light, x)
         if cone > _f4(0.0):
-            return light_probability(scene, light) / (_f4(2.0) * _PI * cone)
+            return _f4(1.0) / (_f4(2.0) * _PI * cone)
     offset = sub(p, x)
     cos_light = abs(dot(ng, wi))
-    return (
-        light_probability(scene, light)
-        * dot(offset, offset)
-        / (max(cos_light, _f4(1e-9)) * light_number(scene, light, L_AREA))
-    )
+    return dot(offset, offset) / (max(cos_light, _f4(1e-9)) * light_number(scene, light, L_AREA))
 
 
 @device

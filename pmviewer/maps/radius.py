@@ -9,6 +9,7 @@ import numpy as np
 from pmviewer.kernels.jit import kernel
 from pmviewer.maps.record import decode_power
 
+_SAMPLE, _PROBES = 16384, 64
 _f4 = np.float32
 _u4 = np.uint32
 
@@ -39,6 +40,22 @@ def automatic_radius(k: int, phi_max: float, threshold: float) -> float:
     0 for an empty map or a map without power.
     """
     return math.sqrt(k * phi_max / threshold) / math.pi
+
+
+def neighbourhood(positions: np.ndarray, neighbours: int = 64) -> float:
+    """A radius within which about that many photons lie, where they are sparse rather than where they crowd: three
+    quarters of them have more. positions: (n, 3). 0 for fewer than two photons.
+
+    Measured at a few photons in a sample of all, both evenly spaced in the order in which they were emitted.
+    """
+    n = len(positions)
+    if n < 2:
+        return 0.0
+    sample = positions[:: -(-n // _SAMPLE)].astype(np.float64)
+    probes = sample[:: -(-len(sample) // _PROBES)]
+    rank = min(max(round(neighbours * len(sample) / n), 1), len(sample) - 1)
+    squared = ((probes**2).sum(axis=1)[:, None] + (sample**2).sum(axis=1)) - 2 * probes @ sample.T
+    return math.sqrt(max(float(np.quantile(np.partition(squared, rank, axis=1)[:, rank], 0.75)), 0.0))
 
 
 def progressive_radius(r1: float, i: int, alpha: float = 2.0 / 3.0, floor: float = 0.0) -> float:

@@ -86,6 +86,10 @@ class Scale:
         return [Tick(float(self.normalise(np.array(v))), f"{v:.6g}{unit}") for v in values]
 
 
+ERROR_SCALE = Scale(1e-5, 1.0, log=True)
+"""Of a pixel's relative squared error. The same for every picture, so that two can be compared."""
+
+
 def scale_of(values: NDArray[Any], log: bool = False, unit: str = "") -> Scale:
     """A scale from the 1st to the 99th percentile of the finite (by logarithm: positive) values, widened when they
     are all alike; 0–1 (0.1–1 by logarithm) when there are none."""

@@ -71,6 +71,15 @@ class CameraPose:
         corner = forward - right * half + top * (step * self.height / 2)
         return np.array([self.origin, corner, right * step, -top * step], dtype=np.float64)
 
+    def sees_like(self, other: CameraPose) -> bool:
+        """Whether every pixel looks at the same point as the other's. A target farther away changes nothing."""
+        if (self.width, self.height) != (other.width, other.height):
+            return False
+        mine, theirs = self.ray_frame(), other.ray_frame()
+        length = float(np.linalg.norm(np.subtract(other.target, other.origin)))
+        near = np.abs(mine - theirs)
+        return bool(near[0].max() <= 1e-6 * length and near[1:].max() <= 1e-6)
+
     def pixel_angle(self) -> float:
         """Width of a pixel in the image's centre divided by its distance."""
         return 2 * math.tan(math.radians(self.fov) / 2) / self.width
@@ -103,6 +112,11 @@ class CameraPose:
         x = self.width / 2 + scale * (offset @ right) / depth
         y = self.height / 2 - scale * (offset @ top) / depth
         return np.stack([x, y, depth], axis=1)
+
+
+def size_only(settings: CameraSettings) -> CameraSettings:
+    """The same picture size with the scene's own camera."""
+    return CameraSettings(width=settings.width, height=settings.height)
 
 
 def resolve_camera(scene: Scene, settings: CameraSettings) -> CameraPose:

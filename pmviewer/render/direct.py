@@ -1,4 +1,7 @@
-"""Direct light on a diffuse surface: light samples, and the other half of multiple importance sampling (R2, plain)."""
+"""Direct light on a diffuse surface: light samples, and the other half of multiple importance sampling (R2).
+
+Which lights are sampled, and how often, is `pmviewer.render.choice`.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,13 @@ import math
 import numpy as np
 
 from pmviewer.kernels.jit import device
-from pmviewer.kernels.light import emitted, light_pdf, sample_light
+from pmviewer.kernels.light import emitted, one_light_pdf, sample_one_light
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.raycast import occluded
 from pmviewer.kernels.scene import L_RADIANCE, light_of, light_vector
 from pmviewer.kernels.surface import leave
 from pmviewer.kernels.vector import add, dot, scale, sub
+from pmviewer.render.choice import chosen_light, expected_samples
 
 _f4 = np.float32
 _u4 = np.uint32
@@ -40,33 +44,35 @@ def visible(scene, p, ng, gap, wi, end):
 
 
 @device
-def light_samples(scene, p, ng, ns, gap, n, n_bsdf, sequence, seed, index, u_pick, u, v):
-    """Mean of n light samples of the irradiance at p, each weighted against n_bsdf cosine-distributed BSDF samples.
+def light_samples(scene, p, ng, ns, gap, choice, n_bsdf, sequence, seed, index, u_pick, u, v):
+    """Irradiance at p by the light samples of the choice, each weighted against n_bsdf cosine-distributed BSDF samples.
 
     (u_pick, u, v) are the first sample's numbers; further ones are drawn. Returns E (W/m²) and the shadow rays cast.
     """
     total = BLACK
     rays = 0
-    for s in range(n):
+    for s in range(choice[4]):
         if s > 0:
             u_pick, u, v, _ = draw4(sequence, seed, index, EXTRA_SET + s)
-        wi, end, L, pdf, findable = sample_light(scene, p, u_pick, u, v)
+        light, m = chosen_light(scene, choice, s, u_pick)
+        wi, end, L, pdf, findable = sample_one_light(scene, light, p, u, v)
         cos = dot(wi, ns)
-        if pdf > _f4(0.0) and cos > _f4(0.0) and dot(wi, ng) > _f4(0.0):
+        if m * pdf > _f4(0.0) and cos > _f4(0.0) and dot(wi, ng) > _f4(0.0):
             rays += 1
             if visible(scene, p, ng, gap, wi, end):
-                weight = cos / (pdf * _f4(n))
+                weight = cos / (m * pdf)
                 if findable and n_bsdf > 0:
-                    weight *= power_heuristic(_f4(n), pdf, _f4(n_bsdf), cos * INV_PI)
+                    weight *= power_heuristic(m, pdf, _f4(n_bsdf), cos * INV_PI)
                 total = add(total, scale(L, weight))
     return total, rays
 
 
 @device
-def found_light(scene, p, wi, cos, n_bsdf, n_light, prim, q, nq):
+def found_light(scene, p, wi, cos, n_bsdf, choice, biased, prim, q, nq):
     """A BSDF sample from p in direction wi found primitive `prim` at q with geometric normal nq (prim < 0: nothing).
 
-    Its emission (radiance), weighted against `n_light` light samples.
+    Its emission (radiance), weighted against the light samples of the choice; a biased choice leaves the lights that it
+    does not sample out of both halves.
     """
     light = scene.environment if prim < 0 else light_of(scene, prim)
     if light < 0:
@@ -74,5 +80,8 @@ def found_light(scene, p, wi, cos, n_bsdf, n_light, prim, q, nq):
     L = light_vector(scene, light, L_RADIANCE) if prim < 0 else emitted(scene, light, nq, wi)
     if not L[0] + L[1] + L[2] > _f4(0.0):
         return BLACK
-    pdf = light_pdf(scene, light, p, q, nq, wi)
-    return scale(L, power_heuristic(_f4(n_bsdf), cos * INV_PI, _f4(n_light), pdf))
+    m = expected_samples(scene, choice, light)
+    if biased != 0 and not m > _f4(0.0):
+        return BLACK
+    pdf = one_light_pdf(scene, light, p, q, nq, wi)
+    return scale(L, power_heuristic(_f4(n_bsdf), cos * INV_PI, m, pdf))

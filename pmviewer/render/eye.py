@@ -16,6 +16,7 @@ import numpy as np
 from pmviewer.kernels.bsdf import scatter_specular
 from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.light import emitted
+from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.raycast import closest_hit
 from pmviewer.kernels.scene import (
@@ -31,9 +32,10 @@ from pmviewer.kernels.scene import (
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.kernels.vector import add, dot, from_basis, is_good, largest, mul, normalize, scale
 from pmviewer.kernels.warp import square_to_cosine_hemisphere
+from pmviewer.render.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near
 from pmviewer.render.direct import BLACK, INV_PI, found_light, light_samples
 from pmviewer.render.lookup import gathered_irradiance, irradiance
-from pmviewer.render.record import C_DROPPED, C_RAYS
+from pmviewer.render.record import C_DROPPED, C_RAYS, C_SHADOW_RAYS
 
 _f4 = np.float32
 _f8 = np.float64
@@ -132,15 +134,18 @@ def gather_light(scene, eye, photons, sites, prim, q, nq, sq, gap, d, seed, inde
 
 
 @kernel
-def eye_pass(scenes, eyes, caustic_maps, global_maps, site_maps, film, counts, first, last):
+def eye_pass(scenes, eyes, caustic_maps, global_maps, choice_maps, site_maps, film, counts, first, last):
     """Add one sample to each of the pixels first … last−1.
 
     scenes: SCENE_DTYPE (1,); eyes: EYE_DTYPE (1,); caustic_maps, global_maps: records (1,) of grids or kd-trees;
+    choice_maps: record (1,) of the grid of photons that choose lights;
     site_maps: record (1,) of the radiance photons, or NO_SITES;
     film: float64 (pixels, CHANNELS), see `pmviewer.render.planes`; counts: int64 (N_COUNTS,).
     """
     scene, eye = scenes[0], eyes[0]
-    caustic_map, global_map, sites = caustic_maps[0], global_maps[0], site_maps[0]
+    caustic_map, global_map = caustic_maps[0], global_maps[0]
+    choice_map, sites = choice_maps[0], site_maps[0]
+    lights = stack_i4(LIST_WORDS)
     index = eye.index
     for pixel in range(first, last):
         seed = pixel_seed(eye, pixel)
@@ -189,11 +194,15 @@ def eye_pass(scenes, eyes, caustic_maps, global_maps, site_maps, film, counts, f
             n_bsdf = 0
             if eye.mis != 0:
                 n_bsdf = max(eye.gather_rays, 1)
+            choice = choose_by_power(lights, eye.light_samples)
             if eye.direct != 0:
+                if eye.choice != BY_POWER:
+                    choice = choose_near(scene, eye, choice_map, p, ng, lights)
                 E, rays = light_samples(
-                    scene, p, ng, ns, gap, eye.light_samples, n_bsdf, eye.sequence, seed, index, u_pick, lu, lv
+                    scene, p, ng, ns, gap, choice, n_bsdf, eye.sequence, seed, index, u_pick, lu, lv
                 )
                 counts[C_RAYS] += rays
+                counts[C_SHADOW_RAYS] += rays
                 deposit(film, counts, pixel, DIRECT if depth == 0 else SPECULAR, mul(per_E, E))
             if eye.caustic_mask != 0:
                 E = irradiance(caustic_map, eye, eye.caustic_radius, p, ng, eye.caustic_mask)
@@ -217,7 +226,8 @@ def eye_pass(scenes, eyes, caustic_maps, global_maps, site_maps, film, counts, f
                 counts[C_RAYS] += 1
                 hit, q, nq, sq, far_gap = bsdf_ray(scene, p, ng, gap, wi)
                 if eye.direct != 0 and eye.mis != 0:
-                    direct = add(direct, found_light(scene, p, wi, local[2], bsdf_rays, eye.light_samples, hit, q, nq))
+                    L = found_light(scene, p, wi, local[2], bsdf_rays, choice, eye.biased, hit, q, nq)
+                    direct = add(direct, L)
                 if eye.gather_rays > 0:
                     L, rays = gather_light(scene, eye, global_map, sites, hit, q, nq, sq, far_gap, wi, seed, sample)
                     counts[C_RAYS] += rays

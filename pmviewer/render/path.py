@@ -11,6 +11,7 @@ import numpy as np
 from pmviewer.kernels.bsdf import scatter_specular
 from pmviewer.kernels.jit import kernel
 from pmviewer.kernels.light import emitted, light_pdf
+from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.raycast import closest_hit
 from pmviewer.kernels.scene import (
@@ -26,6 +27,7 @@ from pmviewer.kernels.scene import (
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.kernels.vector import dot, from_basis, largest, mul, scale
 from pmviewer.kernels.warp import square_to_cosine_hemisphere
+from pmviewer.render.choice import LIST_WORDS, choose_by_power
 from pmviewer.render.direct import INV_PI, light_samples, power_heuristic
 from pmviewer.render.eye import (
     CAUSTIC,
@@ -39,7 +41,7 @@ from pmviewer.render.eye import (
     pixel_seed,
     properties,
 )
-from pmviewer.render.record import C_RAYS
+from pmviewer.render.record import C_RAYS, C_SHADOW_RAYS
 
 _f4 = np.float32
 _INF = _f4(np.inf)
@@ -52,6 +54,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
     """Add one path to each of the pixels first … last−1; arguments as in `pmviewer.render.eye.eye_pass`."""
     scene, eye = scenes[0], eyes[0]
     index = eye.index
+    choice = choose_by_power(stack_i4(LIST_WORDS), eye.light_samples)
     for pixel in range(first, last):
         seed = pixel_seed(eye, pixel)
         ux, uy, _, _ = draw4(eye.sequence, seed, index, PIXEL_SET)
@@ -114,9 +117,10 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 since_diffuse = 0
                 u_pick, lu, lv, _ = draw4(eye.sequence, seed, index, FIRST_SET + 1 + 2 * depth)
                 E, rays = light_samples(
-                    scene, p, ng, ns, gap, eye.light_samples, eye.mis, eye.sequence, seed, index, u_pick, lu, lv
+                    scene, p, ng, ns, gap, choice, eye.mis, eye.sequence, seed, index, u_pick, lu, lv
                 )
                 counts[C_RAYS] += rays
+                counts[C_SHADOW_RAYS] += rays
                 term = INDIRECT
                 if mirrored:
                     term = SPECULAR

@@ -24,6 +24,11 @@ EYE_DTYPE = np.dtype(
         ("direct", "i4"),  # whether direct light is sampled
         ("light_samples", "i4"),
         ("mis", "i4"),
+        ("choice", "i4"),  # of lights: index into `pmviewer.render.choice.CHOICES`
+        ("con_samples", "i4"),
+        ("noncon_samples", "i4"),
+        ("biased", "i4"),  # whether lights without photons near are left out
+        ("choice_radius", "f4"),
         ("caustic_mask", "i4"),  # path classes shown from the caustic map, 0 for none
         ("global_mask", "i4"),  # path classes shown directly from the global map
         ("gather_rays", "i4"),  # final-gather rays, 0 for none
@@ -43,8 +48,9 @@ EYE_DTYPE = np.dtype(
 
 RIMS = ("left out", "half", "whole")
 
-N_COUNTS = 2
-C_RAYS, C_DROPPED = range(N_COUNTS)
+N_COUNTS = 3
+C_RAYS, C_SHADOW_RAYS, C_DROPPED = range(N_COUNTS)
+"""All rays, those of them that test visibility towards a light sample, and samples dropped."""
 
 
 def eye_record(camera: CameraPose, settings: Settings, index: int) -> NDArray[np.void]:
@@ -59,7 +65,9 @@ def eye_record(camera: CameraPose, settings: Settings, index: int) -> NDArray[np
     r["width"], r["height"] = camera.width, camera.height
     r["sequence"], r["seed"], r["index"] = SOBOL, settings.render.seed & 0xFFFFFFFF, index & 0xFFFFFFFF
     r["max_depth"] = settings.render.max_depth
-    r["light_samples"], r["mis"] = settings.direct.samples, settings.direct.mis
+    direct = settings.direct
+    r["light_samples"], r["mis"] = direct.samples, direct.mis
+    r["con_samples"], r["noncon_samples"] = direct.con_samples, direct.noncon_samples
     estimate = settings.estimate
     r["filter"], r["rim"], r["k"] = FILTERS.index(estimate.filter), RIMS.index(estimate.rim), estimate.k
     r["cone_k"], r["flatness"] = estimate.cone_k, estimate.flatness

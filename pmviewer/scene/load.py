@@ -86,3 +86,12 @@ def _find(path_or_name: str | Path) -> Path:
         raise SceneError("This is not a regular file.", path)
     names = ", ".join(scene.name for scene in bundled_scenes())
     raise SceneError("There is no such file or bundled scene.", path, hint=f"Bundled scenes: {names}.")
+
+
+def reference_of(scene: Scene) -> Path | None:
+    """The converged picture from the scene's own camera that lies beside a scene.xml, as it does in every bundled
+    folder; None when there is none."""
+    if scene.path is None or scene.path.name != "scene.xml":
+        return None
+    path = scene.path.with_name("reference.exr")
+    return path if path.is_file() else None

@@ -14,12 +14,8 @@ import numpy as np
 from pmviewer.errors import SceneError
 from pmviewer.scene.clean import check_camera, check_faces, check_size, clean_lights, clean_shapes
 from pmviewer.scene.description import (
-    BLACK,
     Camera,
-    ConstantEnvironment,
-    Material,
     Mesh,
-    Parallelogram,
     Scene,
     Shape,
 )
@@ -29,12 +25,10 @@ from pmviewer.scene.gltf import read_gltf
 from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
 from pmviewer.scene.obj import as_utf8, joined, obj_parts, read_obj
 from pmviewer.scene.ply import read_ply
+from pmviewer.scene.studio import studio_of
 
 T = TypeVar("T")
 SIDE = 512
-# Chosen so that a white surface facing the light comes out a little below 1.
-_LIGHT_RADIANCE, _SKY_RADIANCE = 5.0, 0.3
-_LIGHT_HEIGHT, _LIGHT_SIDE = 2.5, 1.5
 
 
 def load_mesh_scene(path: Path) -> Scene:
@@ -57,10 +51,10 @@ def load_mesh_scene(path: Path) -> Scene:
     if content.camera is not None:
         camera = _aimed(camera, shapes)
     if not lights and not any(s.radiance for s in shapes):
-        diagnostics.warn("The file has no light: a soft light above it and a dim sky were added.")
-        lights = (ConstantEnvironment("sky", (_SKY_RADIANCE,) * 3),)
-        materials.append(Material("light", "diffuse", BLACK))
-        shapes = (*shapes, _light_above(shapes, up, len(materials) - 1))
+        diagnostics.warn("The file has no light: a soft light above it, a dim sky and a floor were added.")
+        studio = studio_of(shapes, up, len(materials))
+        lights, shapes = (studio.sky,), (*shapes, *studio.shapes)
+        materials += studio.materials
     width, height = SIDE, SIDE
     if content.camera is not None:
         width = round(SIDE * content.aspect) if math.isfinite(content.aspect) else 0
@@ -138,15 +132,3 @@ def _aimed(camera: Camera, shapes: tuple[Shape, ...]) -> Camera:
     distance = float(((low + high) / 2 - eye) @ (target - eye))
     x, y, z = (float(c) for c in eye + (target - eye) * (distance if distance > 1e-6 else 1.0))
     return replace(camera, target=(x, y, z))
-
-
-def _light_above(shapes: tuple[Shape, ...], up: Literal["y", "z"], material: int) -> Shape:
-    """A square light that faces down, high enough to stay out of the picture of the framed camera."""
-    low, high = bounds(shapes)
-    radius = float(np.linalg.norm(high - low)) / 2
-    center = (low + high) / 2
-    u, v, top = (np.eye(3)[i] for i in ((0, 2, 1) if up == "y" else (1, 0, 2)))
-    side = _LIGHT_SIDE * radius
-    corner = center + _LIGHT_HEIGHT * radius * top - side / 2 * (u + v)
-    rectangle = Parallelogram(tuple(corner.tolist()), tuple((side * u).tolist()), tuple((side * v).tolist()))
-    return Shape("light above", rectangle, material, (_LIGHT_RADIANCE,) * 3)

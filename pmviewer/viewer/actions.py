@@ -31,6 +31,7 @@ class Commands:
         self._hidden: list[str] = []
         self.table: dict[str, Callable[[], None]] = {
             "open": self._open,
+            "load_reference": self._load_reference,
             "save_session": lambda: self._save(".toml", self.exports.session),
             "export_exr": lambda: self._save(".exr", self.exports.exr),
             "export_exr_half": lambda: self._save(".exr", lambda path: self.exports.exr(path, half=True)),
@@ -61,13 +62,20 @@ class Commands:
     def choose_view(self, number: int) -> None:
         """The view of that number in the schema's order."""
         choices = SETTINGS["display.view"].choices
-        if number < len(choices):
+        if number < len(choices) and self.state.refused_view(choices[number]) is None:
             self.state.change({"display.view": choices[number]})
 
     # files ------------------------------------------------------------------------------------------------------
 
     def _open(self) -> None:
         self.dialogs.open("Open a scene or session", "Scenes and sessions", SCENE_PATTERNS, self.state.open)
+
+    def _load_reference(self) -> None:
+        self.dialogs.open("Load a reference", "OpenEXR pictures", ["*.exr"], self.load_reference)
+
+    def load_reference(self, path: Path) -> None:
+        """Compare with that EXR file from now on."""
+        self.state.comparison.load(path, self.state.live_camera())
 
     def _save(self, suffix: str, write: Callable[[Path], None]) -> None:
         view = "" if suffix == ".toml" else self.state.settings.display.view if suffix == ".png" else "layers"

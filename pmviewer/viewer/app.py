@@ -18,6 +18,7 @@ from pmviewer.settings import Settings
 from pmviewer.viewer import layout
 from pmviewer.viewer.actions import Commands
 from pmviewer.viewer.dialogs import FileDialogs
+from pmviewer.viewer.error_panel import ErrorPanel
 from pmviewer.viewer.help_overlay import draw_help
 from pmviewer.viewer.log_panel import LogPanel, draw_toasts
 from pmviewer.viewer.menus import Menus
@@ -26,7 +27,7 @@ from pmviewer.viewer.picture import Picture
 from pmviewer.viewer.recent import RecentFiles
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.settings_panel import SettingsPanel
-from pmviewer.viewer.shortcuts import run_shortcuts
+from pmviewer.viewer.shortcuts import FLIP_KEY, is_held, run_shortcuts
 from pmviewer.viewer.state import InactiveReason, ViewerState
 from pmviewer.viewer.statistics_panel import StatisticsPanel
 from pmviewer.viewer.status_bar import draw_status_bar
@@ -67,7 +68,7 @@ class ViewerApp:
         self._running = False
         self.viewport.draw_toasts = lambda: draw_toasts(self.state, *self.viewport.origin, self.viewport.size[0])
         self.params = layout.runner_params(self._callbacks(), remember=remember)
-        self.add_ons = immapp.AddOnsParams()
+        self.add_ons = immapp.AddOnsParams(with_implot=True)
 
     def _callbacks(self) -> layout.Callbacks:
         actions = self.commands.table
@@ -75,6 +76,7 @@ class ViewerApp:
             "Settings": self.settings_panel.gui,
             "Overlays": OverlayPanel(self.viewport, self.settings_panel).gui,
             "Statistics": StatisticsPanel(self.state).gui,
+            "Error": ErrorPanel(self.state, actions).gui,
             "Log": LogPanel(self.state).gui,
         }
         return layout.Callbacks(
@@ -96,10 +98,12 @@ class ViewerApp:
         immapp.run(self.params, self.add_ons)
 
     def drop(self, paths: list[str]) -> None:
-        """Files dropped onto the window: the first is opened."""
+        """Files dropped onto the window: the first is opened, an EXR file as the reference."""
         if len(paths) > 1:
             self.state.say("warning", f"{len(paths)} files were dropped; only {paths[0]} is opened.")
-        if paths:
+        if paths and paths[0].lower().endswith(".exr"):
+            self.commands.load_reference(Path(paths[0]))
+        elif paths:
             self.state.open(paths[0])
 
     def wake(self) -> None:
@@ -128,7 +132,7 @@ class ViewerApp:
         glfw.set_window_size_limits(glfw_window_hello_imgui(), width, height, glfw.DONT_CARE, glfw.DONT_CARE)
         self._running = True
         self.state.session.on_update = self.wake
-        self.state.jobs.on_done = self.wake
+        self.state.jobs.on_done = self.state.comparison.measuring.on_done = self.wake
 
     def _pre_new_frame(self) -> None:
         assert self.context is not None
@@ -152,6 +156,7 @@ class ViewerApp:
     def _over_everything(self) -> None:
         if not self.dialogs.is_open:
             run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying)
+        self.state.flipped = not self.dialogs.is_open and is_held(FLIP_KEY)
         self.dialogs.poll()
         draw_help(self.state)
 
@@ -175,8 +180,9 @@ class ViewerApp:
     def _before_exit(self) -> None:
         self._running = False
         self.state.session.on_update = None
-        self.state.jobs.on_done = None
-        self.state.jobs.finish()
+        for jobs in (self.state.jobs, self.state.comparison.measuring):
+            jobs.on_done = None
+            jobs.finish()
 
 
 def run_viewer(

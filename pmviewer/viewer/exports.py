@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.viewer.comparison import COMPARED_VIEWS
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport import Viewport
 
@@ -38,9 +39,9 @@ class Exports:
         """The picture at its own resolution as it is shown, with or without the points over it."""
         settings, frame = self._state.settings, self._state.frame
         points = overlays and any(style.show for style in settings.overlays.by_map().values())
-        if frame is not None and not points and settings.display.view != "geometry":
+        display = self._state.shown_display
+        if frame is not None and not points and display.view not in ("geometry", *COMPARED_VIEWS):
             # The same code as `pmviewer render` uses, so that both write the same picture.
-            display = settings.display
 
             def work() -> str:
                 from pmviewer.output.frame_export import write_frame_png

@@ -38,7 +38,7 @@ class Jobs:
             return list(self._running)
 
     def start(self, title: str, work: Callable[[], str]) -> None:
-        """Run `work`; the text it returns goes to the log, and so does the one sentence of its error."""
+        """Run `work`; the text it returns, unless empty, goes to the log, and so does the one sentence of its error."""
         job = Job(title)
         with self._lock:
             self._running.append(job)
@@ -46,7 +46,9 @@ class Jobs:
 
     def _run(self, job: Job, work: Callable[[], str]) -> None:
         try:
-            self._say("info", work())
+            text = work()
+            if text:
+                self._say("info", text)
         except (PmviewerError, OSError) as error:
             self._say("error", str(error))
         except MemoryError:

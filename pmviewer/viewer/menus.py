@@ -7,6 +7,7 @@ from pathlib import Path
 from imgui_bundle import hello_imgui, imgui
 
 from pmviewer.settings import SETTINGS, get
+from pmviewer.viewer import theme
 from pmviewer.viewer.shortcuts import keys_of
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.toolbar import Actions
@@ -43,6 +44,7 @@ class Menus:
 
     def _file(self) -> None:
         self._item("Open …", "open")
+        self._item("Load reference …", "load_reference")
         if imgui.begin_menu("Open recent", bool(self._state.recent.entries)):
             for entry in list(self._state.recent.entries):
                 self._recent(entry)
@@ -76,8 +78,12 @@ class Menus:
     def _view(self) -> None:
         view = self._state.settings.display.view
         for number, name in enumerate(SETTINGS["display.view"].choices):
-            if imgui.menu_item(name.capitalize(), str((number + 1) % 10), name == view)[0]:
+            refusal = self._state.refused_view(name)
+            key = str((number + 1) % 10) if number < 10 else ""
+            if imgui.menu_item(name.capitalize(), key, name == view, refusal is None)[0]:
                 self._state.change({"display.view": name})
+            if refusal is not None and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+                imgui.set_tooltip(theme.drawable(refusal))
         imgui.separator()
         self._item("Frame the whole scene", "frame_all")
         self._item("Reset the camera", "reset_camera")

@@ -3,6 +3,7 @@ photon maps over it, with the same camera to the pixel."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,15 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.frame import Frame
+from pmviewer.output.falsecolour import ERROR_SCALE
 from pmviewer.output.tone import depth_bounds
 from pmviewer.render.camera import CameraPose, Matrix
 from pmviewer.settings import Display, Overlays
 from pmviewer.viewer.gl_program import load_program, set_uniforms
 from pmviewer.viewer.overlays import PointCloud
+from pmviewer.viewer.reference_plane import COLOUR_UNIT, REFERENCE_UNIT, ReferencePlane
 
 CLOUDS = ("caustic", "global", "radiance")
 SURROUND = (0.105, 0.105, 0.105)
-_CONTENT = {"albedo": 1, "normal": 2, "depth": 3}
+_CONTENT = {"albedo": 1, "normal": 2, "depth": 3, "error": 4}
 _CURVE = {"sRGB": 0, "Reinhard": 1, "filmic": 2, "linear": 3}
 BEHIND_POINTS = 0.3
 """Surfaces are this bright under points, which would drown on white walls."""
@@ -56,6 +59,7 @@ class Picture:
         self.software = any(name in context.info["GL_RENDERER"].lower() for name in ("llvmpipe", "softpipe", "swrast"))
         self.clouds = {name: PointCloud(context) for name in CLOUDS}
         self.depth_range = (0.0, 1.0)
+        self.reference = ReferencePlane(context)
         self._picture_program = load_program(context, "picture")
         self._geometry_program = load_program(context, "geometry")
         self._triangle = context.vertex_array(self._picture_program, [])
@@ -72,6 +76,8 @@ class Picture:
     def upload_frame(self, frame: Frame, view: str, shown_clouds: Mapping[str, bool]) -> bool:
         """Bring the plane of that view and the clouds that are switched on to the GPU. True when anything changed."""
         changed = False
+        if view in ("reference", "error"):
+            view = "beauty"  # the error is that of the image; the reference is there already
         if view != "geometry" and self._shown != (frame.serial, view):
             self._upload_plane(frame.image(view), view)
             self._shown, self._coarse = (frame.serial, view), frame.coarse
@@ -175,11 +181,15 @@ class Picture:
         return colour
 
     def _draw_plane(self, display: Display, width: int) -> None:
-        assert self._plane is not None
-        squares = width / self._plane.width >= NEAREST_FROM and not self._coarse
+        plane = self.reference.texture if display.view == "reference" else self._plane
+        assert plane is not None
+        coarse = self._coarse and display.view != "reference"
+        squares = (width / plane.width >= NEAREST_FROM and not coarse) or display.view == "error"
         sampling = moderngl.NEAREST if squares else moderngl.LINEAR
-        self._plane.filter = (sampling, sampling)
-        self._plane.use(0)
+        plane.filter = (sampling, sampling)
+        plane.use(0)
+        if display.view == "error":
+            self.reference.bind()
         set_uniforms(
             self._picture_program,
             plane=0,
@@ -187,6 +197,9 @@ class Picture:
             curve=_CURVE[display.tone],
             scale=2.0**display.exposure,
             depth_range=self.depth_range,
+            reference=REFERENCE_UNIT,
+            colours=COLOUR_UNIT,
+            error_range=(math.log(ERROR_SCALE.lower), math.log(ERROR_SCALE.upper)),
         )
         self.context.disable(moderngl.DEPTH_TEST)
         self._triangle.render(moderngl.TRIANGLES, vertices=3)

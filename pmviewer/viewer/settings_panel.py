@@ -21,7 +21,7 @@ _OPEN = ("Light pass", "Density estimate", "Method")
 class SettingsPanel:
     def __init__(self, state: ViewerState) -> None:
         self.state = state
-        self.widgets = SettingWidgets()
+        self.widgets = SettingWidgets(state.refused_view)
         self.find = ""
         """Only settings that contain this are listed."""
         self._known: tuple[Settings, Any, dict[str, Any], dict[str, str | None]] | None = None

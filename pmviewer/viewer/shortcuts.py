@@ -27,6 +27,7 @@ class Binding:
 
 BINDINGS: tuple[Binding, ...] = (
     Binding("File", "Ctrl+O", "Open a scene or session", "open", K.o, ctrl=True),
+    Binding("File", "Ctrl+R", "Load a reference to compare with", "load_reference", K.r, ctrl=True),
     Binding("File", "Ctrl+S", "Save the session", "save_session", K.s, ctrl=True),
     Binding("File", "Ctrl+E", "Export the layers as EXR", "export_exr", K.e, ctrl=True),
     Binding("File", "Ctrl+P", "Export the picture as PNG", "export_png", K.p, ctrl=True),
@@ -39,6 +40,7 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Picture", "E", "Exposure up by half a stop", "exposure_up", K.e, repeat=True),
     Binding("Picture", "Shift+E", "Exposure down by half a stop", "exposure_down", K.e, shift=True, repeat=True),
     Binding("Picture", "T", "Next tone curve", "next_tone", K.t),
+    Binding("Picture", "V held", "The reference instead of the picture"),
     Binding("Picture", "C", "Caustic photons on or off", "toggle_caustic", K.c),
     Binding("Picture", "G", "Global photons on or off", "toggle_global", K.g),
     Binding("Picture", "Shift+G", "Radiance photons on or off", "toggle_radiance", K.g, shift=True),
@@ -59,12 +61,19 @@ BINDINGS: tuple[Binding, ...] = (
 )
 
 _DIGITS = (K._1, K._2, K._3, K._4, K._5, K._6, K._7, K._8, K._9, K._0)
+FLIP_KEY = K.v
 FLY_KEYS = (K.w, K.a, K.s, K.d, K.q, K.e)
 
 
 def keys_of(action: str) -> str:
     """What to show beside a menu entry."""
     return next((b.keys for b in BINDINGS if b.action == action), "")
+
+
+def is_held(key: imgui.Key) -> bool:
+    """Whether the key is down by itself, and not for typing."""
+    io = imgui.get_io()
+    return imgui.is_key_down(key) and not (io.want_text_input or io.key_ctrl or io.key_shift or io.key_alt)
 
 
 def run_shortcuts(actions: Mapping[str, Callable[[], None]], choose_view: Callable[[int], None], flying: bool) -> None:

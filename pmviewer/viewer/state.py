@@ -12,7 +12,8 @@ from typing import Any
 from pmviewer.engine.frame import Frame, Level, Message
 from pmviewer.errors import PmviewerError
 from pmviewer.render.camera import CameraPose, resolve_camera
-from pmviewer.settings import CameraSettings, Settings, info_of, parse_assignments, with_values
+from pmviewer.settings import CameraSettings, Display, Settings, info_of, parse_assignments, with_values
+from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.controls import camera_values
 from pmviewer.viewer.jobs import Jobs
 from pmviewer.viewer.recent import RecentFiles
@@ -57,6 +58,7 @@ class ViewerState:
         self.inactive_reason = inactive_reason
         self.recent = recent
         self.jobs = Jobs(self.say)
+        self.comparison = Comparison(session, self.jobs, self.say)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
         self._said: deque[Message] = deque()
@@ -64,6 +66,8 @@ class ViewerState:
         self.flying = False
         self.panels_hidden = False
         self.help_open = False
+        self.flipped = False
+        """While the key that shows the reference is held."""
         self.last_camera_move = -1e9
         self._scene: Any = None
         self._stale_serial = -1
@@ -101,6 +105,9 @@ class ViewerState:
         frame, geometry = self.frame, self.session.geometry
         if path == "estimate.radius" and frame is not None and geometry is not None:
             return _first_radius(frame, float(geometry.radius))
+        if path == "direct.choice_radius" and frame is not None and geometry is not None:
+            radius = frame.statistics.radius.get("light choice")
+            return radius / float(geometry.radius) if radius else None
         return None
 
     # what is shown ----------------------------------------------------------------------------------------------
@@ -110,6 +117,19 @@ class ViewerState:
         """The newest frame of the scene that is open now."""
         frame = self.session.frame
         return frame if frame is not None and frame.serial > self._stale_serial else None
+
+    @property
+    def shown_display(self) -> Display:
+        """The display settings with the view that can be shown now: the reference while its key is held, the image when
+        there is nothing to compare."""
+        display = self.settings.display
+        if self.flipped and self.refused_view("reference") is None:
+            return display.model_copy(update={"view": "reference"})
+        return display if self.refused_view(display.view) is None else display.model_copy(update={"view": "beauty"})
+
+    def refused_view(self, view: str) -> str | None:
+        """Why that view can't be shown now, or None."""
+        return self.comparison.problem(self.frame) if view in COMPARED_VIEWS else None
 
     def live_camera(self) -> CameraPose | None:
         """The camera of the newest settings, ahead of the frame's while the user moves it."""
@@ -176,4 +196,6 @@ class ViewerState:
             self._take(message)
         while self._said:
             self._take(self._said.popleft())
+        parameters = self._opening[1] if self._opening is not None else self.parameters
+        self.comparison.poll(self.frame, with_own=not parameters)
         self.toasts = [toast for toast in self.toasts if not toast.is_over()][-4:]

@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from pmviewer.engine.frame import Statistics
 from pmviewer.viewer import theme
+from pmviewer.viewer.comparison import Point
 from pmviewer.viewer.format import data_size, duration, grouped, si
 from pmviewer.viewer.state import ViewerState
 
@@ -27,10 +28,18 @@ def time_rows(s: Statistics) -> Rows:
         ("CPU time", duration(s.cpu_seconds)),
         ("Rays", grouped(s.rays)),
         ("Rays per second", si(s.rays_per_second)),
+        ("Shadow rays per pixel and pass", f"{s.shadow_rays_per_pixel:.2f}"),
     ]
     if s.passes and s.seconds:
         rows.append(("Time of a pass", duration(s.seconds / s.passes)))
     return rows
+
+
+def reference_rows(point: Point) -> Rows:
+    return [
+        (f"relMSE, pass {grouped(point.passes)}", f"{point.metrics.relmse_all:.3e}"),
+        ("Mean ratio", f"{point.metrics.mean_ratio:.4f}"),
+    ]
 
 
 class StatisticsPanel:
@@ -48,21 +57,23 @@ class StatisticsPanel:
         ):
             return
         imgui.table_next_column()
-        _table("Photons", photon_rows(s))
+        table("Photons", photon_rows(s))
         _maps(s)
         imgui.table_next_column()
-        _table("Time", time_rows(s))
+        table("Time", time_rows(s))
         imgui.table_next_column()
-        self._stages(s)
+        self._stages(s, self._state.comparison.latest(frame))
         imgui.end_table()
 
     @staticmethod
-    def _stages(s: Statistics) -> None:
+    def _stages(s: Statistics, error: Point | None) -> None:
         total = sum(s.stage_seconds.values())
         share = {
             name: f"{duration(t)}  {t / total:4.0%}" if total else duration(t) for name, t in s.stage_seconds.items()
         }
-        _table("CPU time by stage", sorted(share.items(), key=lambda row: -s.stage_seconds[row[0]]))
+        table("CPU time by stage", sorted(share.items(), key=lambda row: -s.stage_seconds[row[0]]))
+        if error is not None:
+            table("Against the reference", reference_rows(error))
         for name, why in s.skipped:
             imgui.push_text_wrap_pos(0)
             imgui.text_disabled(theme.drawable(f"Skipped {name}: {why}"))
@@ -103,9 +114,10 @@ def _right(text: str, *, dim: bool = False) -> None:
     imgui.text_colored(imgui.ImVec4(*(theme.DIM if dim else theme.TEXT)), text)
 
 
-def _table(title: str, rows: Rows) -> None:
-    """Names on the left, right-aligned values."""
-    imgui.text_colored(imgui.ImVec4(*theme.DIM), title)
+def table(title: str, rows: Rows) -> None:
+    """Names on the left, right-aligned values, under a title if there is one."""
+    if title:
+        imgui.text_colored(imgui.ImVec4(*theme.DIM), title)
     if not imgui.begin_table(f"##{title}", 2):
         return
     imgui.table_setup_column("name", imgui.TableColumnFlags_.width_stretch)

@@ -26,6 +26,10 @@ def status_parts(state: ViewerState) -> list[str]:
     if s.rays:
         parts.append(f"{si(s.rays_per_second, 'rays/s')}")
     parts.append(duration(s.seconds))
+    point = state.comparison.latest(frame)
+    if point is not None:
+        parts.append(f"relMSE {point.metrics.relmse_all:.2e}")
+        parts.append(f"mean ratio {point.metrics.mean_ratio:.3f}")
     dropped = sum(s.dropped.values())
     if dropped:
         parts.append(f"{grouped(dropped)} samples dropped")

@@ -21,7 +21,7 @@ class Toolbar:
     def __init__(self, state: ViewerState, actions: Actions) -> None:
         self._state = state
         self._actions = actions
-        self._widgets = SettingWidgets()
+        self._widgets = SettingWidgets(state.refused_view)
 
     def gui(self) -> None:
         paused = self._state.session.paused
@@ -31,7 +31,7 @@ class Toolbar:
         self._gap()
         self._setting("render.method", "method", 8.5)
         self._setting("display.view", "view", 7)
-        data = is_data_view(self._state.settings.display)
+        data = is_data_view(self._state.shown_display)
         self._setting("display.exposure", "exposure", 8, faded=data)
         self._setting("display.tone", "tone", 6.5, faded=data)
         self._gap()

@@ -61,7 +61,7 @@ class Viewport:
     def shown_camera(self) -> CameraPose | None:
         """The frame's camera, so that points lie on the picture; the newest one when only geometry is shown."""
         frame = self.state.frame
-        if frame is None or self.state.settings.display.view == "geometry":
+        if frame is None or self.state.shown_display.view == "geometry":
             return self.state.live_camera() if self.state.session.geometry is not None else None
         return frame.camera
 
@@ -87,15 +87,17 @@ class Viewport:
             self.fit = Fit()
         settings, frame = self.state.settings, self.state.frame
         changed = picture.upload_geometry(self.state.session.geometry)
-        overlays = settings.overlays
+        overlays, display = settings.overlays, self.state.shown_display
+        reference = self.state.comparison.reference
+        changed |= picture.reference.upload(reference.image if reference is not None else None)
         if frame is not None:
             shown = {name: style.show for name, style in overlays.by_map().items()}
-            changed |= picture.upload_frame(frame, settings.display.view, shown)
+            changed |= picture.upload_frame(frame, display.view, shown)
         camera, target = self.shown_camera(), self.target()
         navigating = self.state.navigating and picture.software
-        key = (camera, target, settings.display, overlays, navigating)
+        key = (camera, target, display, overlays, navigating)
         if changed or key != self._drawn_key:
-            self._texture = picture.draw("window", target, camera, settings.display, overlays, navigating=navigating)
+            self._texture = picture.draw("window", target, camera, display, overlays, navigating=navigating)
             self._drawn_key = key
             self.redraws += 1
 
@@ -107,7 +109,7 @@ class Viewport:
         settings = self.state.settings
         size = camera.width, camera.height
         target = Target(size, (0, 0, *size))
-        picture.draw("capture", target, camera, settings.display, settings.overlays if overlays else None)
+        picture.draw("capture", target, camera, self.state.shown_display, settings.overlays if overlays else None)
         return picture.read("capture")
 
     # interface --------------------------------------------------------------------------------------------------
@@ -221,4 +223,4 @@ class Viewport:
 
 def is_data_view(display: Display) -> bool:
     """True for views that exposure and tone curve leave alone."""
-    return display.view in ("albedo", "normal", "depth", "geometry")
+    return display.view in ("albedo", "normal", "depth", "geometry", "error")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -58,6 +59,8 @@ class Typing:
 class SettingWidgets:
     """Draws setting rows and remembers what is being typed."""
 
+    refused_view: Callable[[str], str | None]
+    """Why a choice of `display.view` can't be taken now, or None."""
     typing: Typing | None = None
     _before: dict[str, Any] = field(default_factory=dict)
     """Values at the first click, for a double click to restore."""
@@ -88,8 +91,12 @@ class SettingWidgets:
         chosen = None
         if imgui.begin_combo(f"##{info.path}", value):
             for choice in info.choices:
-                if imgui.selectable(choice, choice == value)[0]:
+                refusal = self.refused_view(choice) if info.path == "display.view" else None
+                flags = imgui.SelectableFlags_.none if refusal is None else imgui.SelectableFlags_.disabled
+                if imgui.selectable(choice, choice == value, flags)[0]:
                     chosen = choice
+                if refusal is not None and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+                    tooltip_text([(refusal, theme.TEXT)])
                 if choice == value:
                     imgui.set_item_default_focus()
             imgui.end_combo()

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pmviewer.engine.cache import StageCache
-from pmviewer.engine.method import ALL, plan_of
+from pmviewer.engine.effects import inactive_reason
+from pmviewer.engine.method import ALL, MANY_LIGHTS, plan_of
 from pmviewer.engine.pool import Cancelled, WorkPool
 from pmviewer.engine.radius import first_radius, pass_radius, typical_distance
 from pmviewer.errors import SettingError
@@ -123,6 +125,41 @@ def test_plan_runs_what_is_needed_alone():
             skipped = plan(method, scene).skipped
             assert all(stage and reason for stage, reason in skipped)
             assert len({stage for stage, _ in skipped}) == len(skipped)
+
+
+@pytest.mark.parametrize("method", ["progressive", "gather"])
+def test_photons_choose_among_many_lights(method):
+    one = analyse(cornell_box())
+    few, many = replace(one, n_lights=MANY_LIGHTS - 1), replace(one, n_lights=MANY_LIGHTS)
+
+    def choice(traits, wanted, method=method):
+        chosen = plan_of(settings_of(render={"method": method}, direct={"choice": wanted}), traits)
+        assert ("light choice by photons" in dict(chosen.skipped)) == (chosen.direct and chosen.choice == "power")
+        return chosen.choice
+
+    assert [choice(traits, "auto") for traits in (one, few, many)] == ["power", "power", "photons"]
+    for rule in ("power", "photons", "Keller-Wald"):
+        assert [choice(traits, rule) for traits in (one, few, many)] == ["power", rule, rule]
+        assert choice(many, rule, "path") == "power"
+        assert choice(many, rule, "global map") == "power"
+
+
+def test_settings_of_the_light_choice_say_when_they_do_nothing():
+    one = analyse(cornell_box())
+    many = replace(one, n_lights=100)
+    names = ("samples", "choice", "choice_radius", "con_samples", "noncon_samples", "biased")
+
+    def active(traits, method="progressive", **direct):
+        settings = settings_of(render={"method": method}, direct=direct)
+        return [name for name in names if inactive_reason(f"direct.{name}", settings, traits) is None]
+
+    assert active(one) == ["samples"]
+    assert active(many, choice="power") == ["samples", "choice"]
+    assert active(many) == ["samples", "choice", "choice_radius", "biased"]
+    assert active(many, choice="Keller-Wald") == list(names[1:])
+    assert active(many, choice="Keller-Wald", biased=True) == ["choice", "choice_radius", "con_samples", "biased"]
+    assert active(many, "path") == ["samples"]
+    assert active(many, "global map") == []
 
 
 def test_radius_follows_the_pixels_footprint():

@@ -158,7 +158,10 @@ GOOD = 'format = 1\nscene = "cornell_caustic"\n'
             GOOD + "[settings.photons.N]\nx = 3\n",
             r"photons\.N = \{'x': 3\} is not allowed: expected a whole number from",
         ),
-        (GOOD + "[settings.photons]\nN = 3\n", r"photons.N = 3 is not allowed: expected a whole number from 100 to 5e"),
+        (
+            GOOD + "[settings.photons]\nN = 3\n",
+            r"photons.N = 3 is not allowed: expected a whole number from 100 to 50,000,000",
+        ),
         (GOOD + "[settings.photons]\nq = nan\n", r"photons.q = nan is not allowed: expected a number from 0.001 to 1"),
         (GOOD + "[settings.photons]\nq = 1979-05-27\n", r"photons\.q = .* is not allowed"),
         (GOOD + f"[settings.estimate]\nradius = {'9' * 400}\n", r"estimate\.radius = 9+ is not allowed"),

@@ -235,7 +235,7 @@ def test_ply_in_all_its_formats(tmp_path: Path, kind: str, mixed: bool) -> None:
 def test_scene_without_light_gets_one_out_of_sight(tmp_path: Path) -> None:
     (tmp_path / "a.stl").write_text(STL)
     scene = load_scene(tmp_path / "a.stl")
-    light = scene.shapes[-1]
+    light = next(shape for shape in scene.shapes if shape.radiance)
     assert isinstance(light.geometry, Parallelogram)
     assert np.cross(light.geometry.edge_u, light.geometry.edge_v)[2] < 0
     assert scene.materials[light.material].reflectance == BLACK

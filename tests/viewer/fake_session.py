@@ -96,6 +96,7 @@ class FakeSession:
         self.status = Status()
         self.paused = False
         self.restarts = 0
+        self.version = 1
         self.closed = False
         self._messages: list[Message] = []
 
@@ -139,7 +140,7 @@ class FakeSession:
         )
         self.frame = Frame(
             serial=serial,
-            version=1,
+            version=self.version,
             coarse=coarse,
             planes=picture_planes(np.random.default_rng(0)) if planes is None else planes,
             settings=self.settings,

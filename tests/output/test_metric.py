@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pmviewer.bench.metric import (
+from pmviewer.output.metric import (
     block_error,
     block_means,
     loglog_slope,

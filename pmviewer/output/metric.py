@@ -48,7 +48,18 @@ def relmse_drop(image: NDArray[Any], reference: NDArray[Any], drop: float = DROP
 def mean_ratio(image: NDArray[Any], reference: NDArray[Any]) -> float:
     """Mean of the image over that of the reference: 1.01 is one percent too bright as a whole."""
     i, r = _pair(image, reference)
-    return float(i.mean() / r.mean())
+    return _ratio(i.mean(), r.mean())
+
+
+def channel_ratios(image: NDArray[Any], reference: NDArray[Any]) -> list[float]:
+    """`mean_ratio` of each channel: a wrong colour shows here and cancels there."""
+    i, r = _pair(image, reference)
+    return [_ratio(i[..., c].mean(), r[..., c].mean()) for c in range(i.shape[-1])]
+
+
+def _ratio(value: float, reference: float) -> float:
+    """NaN where the reference is black: no factor leads from it to the image."""
+    return float(value / reference) if reference else math.nan
 
 
 def block_means(image: NDArray[Any], size: int = BLOCK) -> F8:
@@ -80,12 +91,13 @@ class Metrics:
 
 
 def metrics(image: NDArray[Any], reference: NDArray[Any]) -> Metrics:
-    """All errors at once."""
+    """All errors at once; an image without one whole block has no block error (NaN)."""
+    blocks = min(image.shape[:2]) >= BLOCK
     return Metrics(
         relmse(image, reference),
         relmse_drop(image, reference),
         mean_ratio(image, reference),
-        block_error(image, reference),
+        block_error(image, reference) if blocks else math.nan,
     )
 
 
