@@ -108,3 +108,8 @@ def window_pixels(app: ViewerApp, context: Context, path: Path) -> Pixels:
 
     testing.capture(context, str(path))
     return np.asarray(Image.open(path).convert("RGB"))
+
+
+def chord(key: int, modifier: int) -> int:
+    """A key with a modifier, as a number: Python 3.11.2 (Debian 12) can't combine these enums."""
+    return int(key) | int(modifier)

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 
 from pmviewer.viewer import dialogs
 from pmviewer.viewer.file_browser import Entry, list_folder
-from tests.viewer.driver import drive, make_app
+from tests.viewer.driver import chord, drive, make_app
 from tests.viewer.fake_session import FakeSession
 
 K = imgui.Key
@@ -36,7 +36,7 @@ def test_a_scene_is_chosen_by_clicks(app, tmp_path):
     (folder / "pool.xml").write_text("<scene/>")
 
     def script(c):
-        c.key_press(K.o | K.mod_ctrl)
+        c.key_press(chord(K.o, K.mod_ctrl))
         c.yield_(4)
         c.item_click("//Open a scene or session/**/\uf07b  scenes")
         c.yield_(3)
@@ -55,7 +55,7 @@ def test_saving_suggests_a_name_and_replacing_takes_a_click(app, tmp_path):
     path.write_bytes(b"old")
 
     def script(c):
-        c.key_press(K.p | K.mod_ctrl)
+        c.key_press(chord(K.p, K.mod_ctrl))
         c.yield_(4)
         c.item_click("//Save as/##name")
         c.key_press(K.enter)
@@ -72,7 +72,7 @@ def test_escape_cancels(app):
     opened = list(app.state.session.opened)
 
     def script(c):
-        c.key_press(K.o | K.mod_ctrl)
+        c.key_press(chord(K.o, K.mod_ctrl))
         c.yield_(4)
         c.key_press(K.escape)
         c.yield_(3)

@@ -15,7 +15,7 @@ from pmviewer.output.tone import to_uint8, tone_map
 from pmviewer.settings import with_values
 from pmviewer.viewer.comparison import EARLIER_RUNS, next_mark, run_of
 from pmviewer.viewer.error_panel import log_limits
-from tests.viewer.driver import drive, make_app, on_window_thread, viewport_pixels
+from tests.viewer.driver import chord, drive, make_app, on_window_thread, viewport_pixels
 from tests.viewer.fake_session import SIZE, FakeSession
 
 K = imgui.Key
@@ -66,7 +66,7 @@ def load(context, app, path):
 def test_the_error_of_each_pass_is_measured_and_falls(app, session, truth, tmp_path):
     def script(c):
         app.dialogs.open = lambda title, name, patterns, chosen: chosen(tmp_path / "truth.exr")
-        c.key_press(K.r | K.mod_ctrl)
+        c.key_press(chord(K.r, K.mod_ctrl))
         wait(c, lambda: app.state.comparison.current and app.state.comparison.current.points)
         for amount in (0.1, 0.05, 0.02):
             session.publish(noisy(session, truth, amount))

@@ -13,7 +13,7 @@ from pmviewer.engine.session import Session
 from pmviewer.output.png import read_png
 from pmviewer.output.tone import to_uint8, tone_map
 from pmviewer.settings import Settings, with_values
-from tests.viewer.driver import drag, drive, item, make_app, on_window_thread, viewport_pixels
+from tests.viewer.driver import chord, drag, drive, item, make_app, on_window_thread, viewport_pixels
 
 K = imgui.Key
 
@@ -64,7 +64,7 @@ def test_open_drag_overlay_export_and_a_broken_file(session, tmp_path, monkeypat
         c.key_press(K.g)
         c.yield_(4)
         seen["points"] = (viewport_pixels(c, app) != before).any(axis=-1).mean()
-        c.key_press(K.f12 | K.mod_ctrl)
+        c.key_press(chord(K.f12, K.mod_ctrl))
         app.drop([str(broken)])
         wait_until(c, lambda: any(m.level == "error" for m in app.state.log))
         c.yield_(2)

@@ -14,6 +14,7 @@ from pmviewer.output.session_file import read_session
 from pmviewer.output.tone import to_uint8, tone_map
 from pmviewer.settings import SETTINGS, Settings, get, with_values
 from tests.viewer.driver import (
+    chord,
     drag,
     drag_picture,
     drive,
@@ -229,8 +230,8 @@ def test_tone_curves_on_the_graphics_card_equal_the_exporters(app, session, curv
 def test_exposure_and_toolbar(app, session):
     def script(c):
         c.key_press(K.e)
-        c.key_press(K.e | K.mod_shift)
-        c.key_press(K.e | K.mod_shift)
+        c.key_press(chord(K.e, K.mod_shift))
+        c.key_press(chord(K.e, K.mod_shift))
         c.yield_(2)
         assert session.settings.display.exposure == -0.5
         c.key_press(K.space)
@@ -289,13 +290,13 @@ def test_exports_png_exr_and_session(app, session, tmp_path):
 
     def script(c):
         app.dialogs.save = lambda title, default, chosen: chosen(default)
-        c.key_press(K.p | K.mod_ctrl)
-        c.key_press(K.e | K.mod_ctrl)
-        c.key_press(K.s | K.mod_ctrl)
+        c.key_press(chord(K.p, K.mod_ctrl))
+        c.key_press(chord(K.e, K.mod_ctrl))
+        c.key_press(chord(K.s, K.mod_ctrl))
         c.yield_(2)
         c.key_press(K.c)
         c.yield_(2)
-        c.key_press(K.f12 | K.mod_ctrl)
+        c.key_press(chord(K.f12, K.mod_ctrl))
         c.key_press(K.f12)
         c.yield_(3)
 
