@@ -9,15 +9,17 @@ from functools import partial
 from pathlib import Path
 
 from pmviewer.engine.cache import StageCache
+from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.frame import Frame
 from pmviewer.engine.method import plan_of
-from pmviewer.engine.opened import open_scene
+from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.errors import OutputError, SceneError, SettingError
 from pmviewer.job import Job
 from pmviewer.output.compare import ERROR_COLUMNS, Reference, error_row, load_reference
+from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.output.frame_export import LAYERS, write_frame_exr, write_frame_png
 from pmviewer.output.metric import metrics
 from pmviewer.render.camera import resolve_camera, size_only
@@ -57,7 +59,7 @@ def render_job(
     opened = open_scene(job.scene, job.parameters)
     _print_warnings(opened.scene.warnings, opened.scene.dropped)
     target = None if reference is None else _reference(reference, opened.scene, settings)
-    view = settings.display.view if settings.display.view in LAYERS else "beauty"
+    view = _view(settings, opened)
     pool = WorkPool(threads)
     try:
         renderer = Renderer(opened, settings, pool, StageCache(0))
@@ -65,6 +67,16 @@ def render_job(
         frame = renderer.frame(1)
     finally:
         pool.close()
+    statistics = frame.statistics
+    if statistics.cache_records:
+        print(
+            f"irradiance cache: {statistics.cache_records:,} records in the last pass, "
+            f"{statistics.gathers_per_pixel:.3f} gathers a pixel and pass, {statistics.interpolated:.1%} interpolated"
+        )
+    if statistics.importons:
+        stored = statistics.stored_in_pass["importons"]
+        print(f"importance: {statistics.importons:,} importons, stored at {stored:,} places")
+    _print_warnings(statistics.warnings, {})
     for path in outputs:
         if path.suffix.lower() == ".exr":
             write_frame_exr(path, frame, half=half)
@@ -72,6 +84,18 @@ def render_job(
             write_frame_png(path, frame, view=view)
         print(f"wrote {path}")
     return frame
+
+
+def _view(settings: Settings, opened: OpenScene) -> str:
+    """The view to write as PNG; what the window alone draws gives the image. Raises SettingError for a diagnostic view
+    that has nothing to show."""
+    view = settings.display.view
+    if view in DIAGNOSTICS:
+        reason = inactive_reason(f"display.view={view}", settings, opened.traits)
+        if reason is not None:
+            raise SettingError(f"display.view = {view}: {reason}")
+        return view
+    return view if view in LAYERS else "beauty"
 
 
 def _overrides(
@@ -113,7 +137,7 @@ def _print_error(reference: Reference, renderer: Renderer) -> None:
     if renderer.passes == 1:
         print(ERROR_COLUMNS)
     measured = metrics(renderer.frame(0).image(), reference.image)
-    print(error_row(renderer.passes, renderer.seconds, measured))
+    print(error_row(renderer.passes, renderer.tally.seconds, measured))
 
 
 def _run(renderer: Renderer, pool: WorkPool, measure: Callable[[Renderer], None] | None) -> None:
@@ -140,7 +164,7 @@ def _run(renderer: Renderer, pool: WorkPool, measure: Callable[[Renderer], None]
             renderer.step()
             if measure is not None and (renderer.passes & (renderer.passes - 1) == 0 or renderer.finished):
                 measure(renderer)
-            share = renderer.seconds / render.time_limit if by_time else renderer.passes / render.passes
+            share = renderer.tally.seconds / render.time_limit if by_time else renderer.passes / render.passes
             progress.update(bar, completed=min(share, 1.0), description=f"pass {renderer.passes}")
 
 
@@ -165,6 +189,8 @@ def scene_report(job: Job) -> str:
             ("direct light", plan.direct),
             ("light choice by photons", plan.choice != "power"),
             ("final gather", plan.gather),
+            ("irradiance cache", plan.cache),
+            ("importance", plan.importance),
             ("path tracer", plan.path),
         )
         if runs

@@ -1,7 +1,10 @@
-"""Where the files that ship with the program are: beside the package in a checkout, inside it in a wheel."""
+"""What the program finds around it: the files that ship with it (beside the package in a checkout, inside it in a
+wheel) and free memory."""
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 
 from pmviewer.errors import PmviewerError
@@ -22,3 +25,19 @@ def data_folder(name: str) -> Path:
     if checkout.is_dir() and (PACKAGE.parent / "pyproject.toml").is_file():
         return checkout
     raise PmviewerError(f"The folder '{name}' that belongs to pmviewer is missing from {PACKAGE}: install it again.")
+
+
+def available_memory() -> int | None:
+    """Bytes that can still be used without swapping; None where the system doesn't tell."""
+    if sys.platform.startswith("linux"):
+        try:
+            with open("/proc/meminfo") as lines:
+                for line in lines:
+                    if line.startswith("MemAvailable:"):
+                        return int(line.split()[1]) * 1024
+        except OSError:
+            return None
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return None

@@ -11,27 +11,43 @@ from pydantic import BaseModel, ValidationError
 
 from pmviewer.errors import SettingError
 from pmviewer.schema import (
+    CacheOverlay,
     CameraSettings,
+    Direct,
     Display,
     Estimate,
+    GatherOverlay,
+    Importance,
+    ImportonOverlay,
     Overlays,
+    PathOverlay,
     Photons,
     PointOverlay,
+    ProjectionOverlay,
     Scale,
     Settings,
+    ShadowOverlay,
     Stage,
 )
 
 __all__ = [
     "SETTINGS",
+    "CacheOverlay",
     "CameraSettings",
+    "Direct",
     "Display",
     "Estimate",
+    "GatherOverlay",
+    "Importance",
+    "ImportonOverlay",
     "Overlays",
+    "PathOverlay",
     "Photons",
     "PointOverlay",
+    "ProjectionOverlay",
     "SettingInfo",
     "Settings",
+    "ShadowOverlay",
     "Stage",
     "changed_stages",
     "flat",
@@ -62,6 +78,8 @@ class SettingInfo:
     choices: tuple[str, ...]
     auto: bool
     default: Any
+    section: str
+    """Heading within the group; empty for the settings before the first."""
 
 
 def _kind_of(annotation: Any) -> tuple[type, tuple[str, ...], bool]:
@@ -79,6 +97,7 @@ def _kind_of(annotation: Any) -> tuple[type, tuple[str, ...], bool]:
 
 
 def _infos(model: type[BaseModel], prefix: str, heading: str) -> Iterator[SettingInfo]:
+    section = ""
     for name, field in model.model_fields.items():
         public = field.alias or name
         path = f"{prefix}{public}"
@@ -88,6 +107,7 @@ def _infos(model: type[BaseModel], prefix: str, heading: str) -> Iterator[Settin
             continue
         extra: Any = field.json_schema_extra
         kind, choices, auto = _kind_of(field.annotation)
+        section = extra["section"] or section
         yield SettingInfo(
             path=path,
             group=heading,
@@ -102,6 +122,7 @@ def _infos(model: type[BaseModel], prefix: str, heading: str) -> Iterator[Settin
             choices=choices,
             auto=auto,
             default=field.default,
+            section=section,
         )
 
 

@@ -1,12 +1,17 @@
 #version 330 core
 // A plane of the frame on the screen. The tone curves are those of pmviewer/output/tone.py.
 uniform sampler2D plane;
-uniform int content;      // 0 radiance, 1 reflectance, 2 unit vector, 3 depth, 4 error against the reference
+uniform int content;      // 0 radiance, 1 reflectance, 2 unit vector, 3 depth, 4 error against the reference,
+                          // 5 a quantity in false colours, 6 cells, each with a colour of its own
 uniform int curve;        // 0 sRGB, 1 Reinhard, 2 filmic, 3 linear
 uniform float scale;      // 2^exposure
 uniform vec2 depth_range; // nearest and farthest finite depth
 uniform sampler2D reference;
-uniform sampler2D colours; // of the error, small to large (pmviewer/output/falsecolour.py)
+uniform sampler2D colours; // of errors and quantities, small to large (pmviewer/output/falsecolour.py)
+uniform vec2 value_range;  // quantities at the ends of the colours, or their logarithms
+uniform int value_log;     // whether they are
+uniform vec3 value_weights; // of the channels in the quantity
+uniform vec3 grey;         // where there is nothing to tell: below zero
 uniform vec2 error_range;  // logarithms of the errors at the ends of the colours
 
 in vec2 uv;
@@ -26,6 +31,21 @@ vec3 tone(vec3 x) {
     return srgb_oetf(x);
 }
 
+vec3 false_colour(float share) {
+    share = clamp(share, 0.0, 1.0);
+    return texelFetch(colours, ivec2(int(share * float(textureSize(colours, 0).x - 1) + 0.5), 0), 0).rgb;
+}
+
+// As in pmviewer/output/diagnostic_views.py; a half marks cells that are only the nearest, not near enough.
+vec3 cell_colour(float cell) {
+    uint h = uint(floor(cell));
+    h = (h ^ (h >> 16u)) * 0x7FEB352Du;
+    h = (h ^ (h >> 16u)) * 0x846CA68Bu;
+    h ^= h >> 16u;
+    vec3 hue = 0.25 + 0.75 * vec3(h & 255u, (h >> 8u) & 255u, (h >> 16u) & 255u) / 255.0;
+    return fract(cell) > 0.25 ? 0.4 * hue : hue;
+}
+
 void main() {
     vec4 value = texture(plane, uv);
     if (any(isnan(value)) || any(isinf(value))) {
@@ -43,8 +63,13 @@ void main() {
         // As in pmviewer/output/metric.py.
         vec3 truth = texture(reference, uv).rgb, off = value.rgb - truth;
         float error = dot(off * off / (truth * truth + 0.01), vec3(1.0 / 3.0));
-        float share = clamp((log(max(error, 1e-30)) - error_range.x) / (error_range.y - error_range.x), 0.0, 1.0);
-        shown = texelFetch(colours, ivec2(int(share * float(textureSize(colours, 0).x - 1) + 0.5), 0), 0).rgb;
+        shown = false_colour((log(max(error, 1e-30)) - error_range.x) / (error_range.y - error_range.x));
+    } else if (content == 5) {
+        float quantity = dot(value.rgb, value_weights);
+        float at = value_log == 1 ? log(max(quantity, 1e-30)) : quantity;
+        shown = quantity < 0.0 ? grey : false_colour((at - value_range.x) / (value_range.y - value_range.x));
+    } else if (content == 6) {
+        shown = value.r < 0.0 ? grey : cell_colour(value.r);
     } else {
         // Near is bright; pixels that see nothing are black.
         float span = max(depth_range.y - depth_range.x, 1e-30);

@@ -9,9 +9,11 @@ import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from pmviewer.bench import peer
 from pmviewer.bench.report import BenchResult, Target
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
@@ -33,6 +35,14 @@ TARGETS = (
     ("P5a", "ring_caustic", 5e-3, 1.5),
     ("P5b", "rooms_10x10", 1e-2, 10.0),
 )
+BUDGETS = {"cornell_diffuse": 8.0, "cornell_caustic": 24.0, "ring_caustic": 8.0, "rooms_10x10": 16.0}
+"""CPU seconds a curve: somewhat more than the slowest target of the scene."""
+QUICK_SHARE = 0.1
+PEER_BUDGET = 2.5
+"""Mitsuba's budget over ours: its time to a target must be found where it is twice ours."""
+PEER = "Mitsuba 3 path"
+PEER_SHARE = 0.5
+"""Our time over Mitsuba's to the same error, in the same run."""
 FIRST_STEP = ("progressive", "cornell_caustic", 1e-2, 1.0)
 
 
@@ -71,9 +81,17 @@ def reference(scene: str) -> np.ndarray:
     return layers[""].astype(np.float64)
 
 
-def measure(opened: OpenScene, method: str, budget: float, threads: int | None = None, limit: int = 4096) -> Curve:
-    """Render until `budget` CPU seconds are spent; the error is taken at passes 1, 2, 4, … and at the end."""
-    settings = with_values(Settings(), {"render.method": method, "render.passes": limit})
+def measure(
+    opened: OpenScene,
+    method: str,
+    budget: float,
+    threads: int | None = None,
+    limit: int = 4096,
+    values: dict[str, Any] | None = None,
+) -> Curve:
+    """Render until `budget` CPU seconds are spent; the error is taken at passes 1, 2, 4, … and at the end. `values` are
+    further settings."""
+    settings = with_values(Settings(), {"render.method": method, "render.passes": limit, **(values or {})})
     pool = WorkPool(threads)
     target = reference(opened.scene.name)
     curve = Curve(opened.scene.name, method, [], [], [], [])
@@ -83,7 +101,7 @@ def measure(opened: OpenScene, method: str, budget: float, threads: int | None =
         renderer = Renderer(opened, settings, pool, StageCache(0))
         while not renderer.finished:
             renderer.step()
-            spent = renderer.cpu_seconds
+            spent = renderer.tally.cpu_seconds
             last = spent >= budget or renderer.finished
             if last or renderer.passes & (renderer.passes - 1) == 0:
                 image = renderer.frame(0).image().astype(np.float64)
@@ -99,13 +117,42 @@ def measure(opened: OpenScene, method: str, budget: float, threads: int | None =
     return curve
 
 
+def measure_peer(scene: str, budget: float) -> Curve:
+    """Mitsuba's path integrator on the same file, its samples per pixel in place of passes. Raises PmviewerError."""
+    spp, cpu, images = peer.error_images(scene, budget)
+    found = [metrics(image.astype(np.float64), reference(scene)) for image in images]
+    return Curve(scene, PEER, spp, cpu, [m.relmse_all for m in found], [m.mean_ratio for m in found])
+
+
+def against_peer(curves: list[Curve], peers: list[Curve]) -> list[Target]:
+    """Our best time over Mitsuba's for each target; where its budget ran out first, an upper bound of the ratio."""
+    targets = []
+    for target, scene, error, _ in TARGETS:
+        ours = min(c.time_to(error) for c in curves if c.scene == scene)
+        curve = next(c for c in peers if c.scene == scene)
+        theirs = curve.time_to(error)
+        note = f"of Mitsuba 3's time to relMSE {error:g} on {scene}"
+        if not math.isfinite(theirs):
+            theirs, note = curve.cpu[-1], note + f", which it did not reach within {curve.cpu[-1]:.3g} CPU s"
+        targets.append(Target(f"{target} peer", ours / theirs, PEER_SHARE, "", False, note))
+    return targets
+
+
 def run(quick: bool = False) -> BenchResult:
-    """Measure all curves; also writes a plot when matplotlib is installed."""
-    budget = 2.0 if quick else 24.0
+    """Measure all curves, Mitsuba's too if it is installed; also writes a plot when matplotlib is installed."""
+    share = QUICK_SHARE if quick else 1.0
+    budgets = {scene: share * seconds for scene, seconds in BUDGETS.items()}
     started = time.perf_counter()
-    curves = [measure(open_scene(scene), method, budget) for scene in SCENES for method in METHODS]
+    curves = [measure(open_scene(scene), method, budgets[scene]) for scene in SCENES for method in METHODS]
+    notes = ["CPU s a curve: " + ", ".join(f"{scene} {budgets[scene]:.3g}" for scene in SCENES)]
+    peers: list[Curve] = []
+    if peer.installed():
+        peers = [measure_peer(scene, PEER_BUDGET * budgets[scene]) for scene in SCENES]
+        notes.append(f"{PEER}: {peer.variant()}, samples per pixel as passes, {PEER_BUDGET:g} times the CPU seconds")
+    else:
+        notes.append(peer.MISSING)
     rows: list[list[str | float | int]] = []
-    for curve in curves:
+    for curve in sorted(curves + peers, key=lambda c: SCENES.index(c.scene)):
         for n, cpu, error, ratio in zip(curve.passes, curve.cpu, curve.error, curve.ratio, strict=True):
             slope = curve.slope if n == curve.passes[-1] else ""
             rows.append([curve.scene, curve.method, n, cpu, error, f"{ratio:.4f}", slope])
@@ -117,8 +164,10 @@ def run(quick: bool = False) -> BenchResult:
     method, scene, error, bound = FIRST_STEP
     curve = next(c for c in curves if (c.method, c.scene) == (method, scene))
     targets.append(Target("P1", curve.time_to(error), bound, "CPU s", False, f"first step: {method} on {scene}"))
-    notes = [f"budget {budget:g} CPU s a curve, {time.perf_counter() - started:.0f} s in all"]
-    notes.append(plot(curves, Path("bench-error.png")))
+    if peers:
+        targets += against_peer(curves, peers)
+    notes.append(f"{time.perf_counter() - started:.0f} s in all")
+    notes.append(plot(curves + peers, Path("bench-error.png")))
     columns = ["scene", "method", "passes", "CPU s", "relMSE", "mean ratio", "slope"]
     return BenchResult("Error against time", columns, rows, targets, notes)
 

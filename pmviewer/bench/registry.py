@@ -11,14 +11,24 @@ from pmviewer.output.files import check_target, write_file
 
 BENCHES: dict[str, tuple[str, str]] = {
     "rays": ("Rays per second against Embree (P6)", "pmviewer.bench.rays:run"),
+    "instances": ("Rays through instances against the scene written out (X3)", "pmviewer.bench.instances:run"),
     "lookup": ("Photon look-ups against scipy's cKDTree (P7)", "pmviewer.bench.lookup:run"),
     "photons": ("Photons per second and bytes per photon (P8, P13)", "pmviewer.bench.photons:run"),
     "error": ("Error against CPU time on the bundled scenes (P1–P5)", "pmviewer.bench.error:run"),
+    "mitsuba": ("Agreement with Mitsuba 3 on the same files, block by block", "pmviewer.bench.mitsuba:run"),
+    "coherence": ("Photons kept when one of three glasses moves (T2)", "pmviewer.bench.coherence:run"),
     "lights": ("Shadow rays by choice of lights (R2)", "pmviewer.bench.lights:run"),
+    "shadows": ("Shadow rays saved by shadow photons (T8)", "pmviewer.bench.shadows:run"),
     "latency": ("Slider to first new frame (P9)", "pmviewer.bench.latency:run"),
     "start": ("Start to first image, cold and warm (P10)", "pmviewer.bench.start:run"),
+    "unused": ("Cost of what a scene does not use (P14)", "pmviewer.bench.unused:run"),
     "window": ("Frames per second while computing (P11)", "pmviewer.bench.window:run"),
+    "guide": ("Directions of gather rays: variance at equal rays (R4)", "pmviewer.bench.guide:run"),
+    "corners": ("Secondary gathering: error at edges and elsewhere (R5)", "pmviewer.bench.corners:run"),
+    "cache": ("Irradiance cache against the plain final gather (R6)", "pmviewer.bench.irradiance_cache:run"),
     "gather": ("Radiance photons against the plain final gather (R3)", "pmviewer.bench.gather:run"),
+    "importance": ("Importance against brute force, and its cost (I1)", "pmviewer.bench.importance:run"),
+    "projection": ("Caustic photons by projection maps (T7)", "pmviewer.bench.projection:run"),
 }
 """Name: what it measures, and where its function is."""
 

@@ -2,51 +2,131 @@
 
 from __future__ import annotations
 
+from pmviewer.engine.diagnose import refused_view
 from pmviewer.engine.method import Plan, plan_of
+from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings import Settings
 
 _KDTREE_ONLY = ("estimate.k", "estimate.rim", "estimate.max_radius", "estimate.black_level")
 _GRID_ONLY = ("estimate.radius", "estimate.caustic_radius", "estimate.alpha")
+_DISC_ONLY = ("estimate.filter", "estimate.cone_k", "estimate.rim", "estimate.differential")
 _RADIANCE_ONLY = ("gather.cutoff", "gather.similarity")
+_GUIDED_ONLY = ("gather.guided", "gather.guide_radius")
+_KELLER_WALD_ONLY = ("importance.f", "importance.epsilon", "importance.cut_off")
+_DEPOSITION = ("importance.deposition", "importance.acceptance", "importance.density", *_KELLER_WALD_ONLY)
+_CACHE_ONLY = ("gather.cache_error", "gather.cache_samples", "gather.cache_min", "gather.cache_max")
 
 
 def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -> str | None:
-    """A sentence for a setting that changes nothing with these settings in this scene, None for one that does."""
+    """A sentence for a setting that changes nothing with these settings in this scene, None for one that does.
+
+    `path` may also name one choice of a setting, "display.view=photon count".
+    """
     if traits is None:
         return None
     plan = plan_of(settings, traits)
     method = settings.render.method
     group = path.split(".")[0]
-    if group in ("photons", "estimate") and not plan.photons:
+    if group in ("photons", "estimate", "importance") and not plan.photons:
         return "The path tracer uses no photons." if plan.path else "No surface of this scene stores photons."
+    if group == "importance":
+        if path in _DEPOSITION:
+            return _deposition(path, settings, plan)
+        if path != "importance.map" and not plan.importance:
+            return "Only with importance (importance.map)."
+        if path == "importance.caustic_M_r" and not plan.caustic_mask:
+            return "No caustic map in this scene or with this method."
+        if path == "importance.M_r" and not plan.global_classes:
+            return "The method shows the caustic map alone."
+        return None
+    if group == "display":
+        return _display(path, settings, plan)
+    if group == "overlays":
+        return _overlays(path, settings, plan)
     if group == "photons":
         return _photons(path, settings, traits)
     if group == "estimate":
         return _estimate(path, settings, plan.caustic_mask)
     if group == "gather" and not plan.gather:
         return f"Only the method 'gather' casts gather rays, not '{method}'."
+    if path in ("gather.directions", *_GUIDED_ONLY) and settings.gather.rays < 2:
+        return "A single gather ray follows the BSDF."
+    if path in _GUIDED_ONLY and not plan.guided_rays:
+        return "No photons guide the rays: see gather.directions."
     if path in _RADIANCE_ONLY and not plan.radiance:
         return "Only with radiance photons."
+    if path in _CACHE_ONLY and not plan.cache:
+        return "Only with the irradiance cache."
     if group == "direct" and not (plan.direct or plan.path):
         return "Direct light is not computed: a map is shown alone, or nothing is diffuse."
     if group == "direct":
         return _direct(path, settings, plan, traits)
-    if path == "overlays.caustic.show" and plan.photons and not plan.caustic_mask:
+    if path == "render.outline_rays" and plan.path:
+        return "The path tracer treats all pixels alike."
+    if path == "render.max_depth" and not (plan.path or traits.follows(settings.photons.glossy)):
+        return "No mirror or glass in this scene."
+    return None
+
+
+def _deposition(path: str, settings: Settings, plan: Plan) -> str | None:
+    asked, active = settings.importance.deposition, plan.deposition
+    if path == "importance.deposition":
+        return None if active == asked else f"{asked} needs importance (importance.map)."
+    if path in _KELLER_WALD_ONLY:
+        return None if active == "Keller-Wald" else "Only with the deposition rule 'Keller-Wald'."
+    if path == "importance.density":
+        return None if active == "constant density" else "Only with the deposition rule 'constant density'."
+    return "Only with density control." if active in ("all", "Keller-Wald") else None
+
+
+def _display(path: str, settings: Settings, plan: Plan) -> str | None:
+    view = path.removeprefix("display.view=")
+    if view in DIAGNOSTICS:
+        return refused_view(view, plan)
+    shown = settings.display.view
+    if path == "display.map":
+        if shown not in DIAGNOSTICS or DIAGNOSTICS[shown].family not in ("look-up", "importance"):
+            return "Only with the views 'look-up radius', 'photon count', 'importance' and 'required density'."
+        if not (plan.caustic_mask and plan.global_classes):
+            return "There is one map."
+    return None
+
+
+def _overlays(path: str, settings: Settings, plan: Plan) -> str | None:
+    name = path.split(".")[1]
+    if name == "shadow":
+        return None if plan.shadows else "Only with shadow photons (direct.shadow_photons)."
+    if not plan.photons:
+        return "This method traces no photons."
+    if name == "importons":
+        return None if plan.importance else "Only with importance (importance.map)."
+    if name == "gather":
+        return None if plan.gather else "Only the method 'gather' casts gather rays."
+    if name == "projection" and settings.photons.projection == "off":
+        return "Photons leave the lights in all directions (photons.projection)."
+    if path == "overlays.projection.map" and (settings.photons.q == 1.0 or settings.photons.q_rule == "photons"):
+        return "All trajectories fill the global map, and leave for any surface (photons.q)."
+    if path == "overlays.caustic.show" and not plan.caustic_mask:
         return "No caustic photons: the scene has no mirror or glass, or the method does not use them."
-    if path.startswith("overlays.radiance.") and not plan.radiance:
+    if name == "radiance" and not plan.radiance:
         return "Only the method 'gather' has radiance photons, where they are on."
+    if name == "cache" and not plan.cache:
+        return "Only the method 'gather' has an irradiance cache, where it is on."
+    if path == "overlays.cache.colour":
+        return "Records are coloured by irradiance: light of many photons, lights and bounces."
     if path == "overlays.radiance.colour":
         return "Radiance photons are coloured by irradiance: light of many photons, lights and bounces."
-    if path.startswith("overlays.") and not plan.photons:
-        return "This method traces no photons."
-    if path == "render.max_depth" and not (plan.path or traits.has_specular):
-        return "No mirror or glass in this scene."
     return None
 
 
 def _direct(path: str, settings: Settings, plan: Plan, traits: SceneTraits) -> str | None:
     direct = settings.direct
+    if path.startswith("direct.shadow_"):
+        if plan.path:
+            return "The path tracer casts every shadow ray."
+        if path != "direct.shadow_photons" and not direct.shadow_photons:
+            return "Only with shadow photons."
     if path == "direct.choice":
         if plan.path:
             return "The path tracer chooses lights by power."
@@ -64,7 +144,9 @@ def _direct(path: str, settings: Settings, plan: Plan, traits: SceneTraits) -> s
 
 
 def _photons(path: str, settings: Settings, traits: SceneTraits) -> str | None:
-    if path == "photons.indirect_caustics" and not traits.has_specular:
+    if path == "photons.glossy" and not traits.glossy_roughness:
+        return "No glossy surface in this scene."
+    if path == "photons.indirect_caustics" and not traits.follows(settings.photons.glossy):
         return "No mirror or glass in this scene."
     if settings.render.method == "caustic map" and path == "photons.q_rule":
         return "The method shows the caustic map alone."
@@ -81,8 +163,15 @@ def _estimate(path: str, settings: Settings, caustic_mask: int) -> str | None:
         return "Only with an automatic maximum radius."
     if path == "estimate.caustic_radius" and not caustic_mask:
         return "No caustic map in this scene or with this method."
+    hull = estimate.area == "convex hull"
+    if hull and path in _DISC_ONLY:
+        return "The convex hull weighs all photons alike and has no dark edges to check for."
+    if path == "estimate.boundary" and not hull:
+        return "Only with the area 'convex hull'."
     if path == "estimate.cone_k" and estimate.filter != "cone":
         return "Only with the cone filter."
+    if path in ("estimate.alpha", "estimate.floor") and settings.photons.renew == "once":
+        return "One photon map serves all passes: the radius does not shrink."
     if path == "estimate.floor" and estimate.lookup != "nearest" and estimate.alpha == 1.0:
         return "The radius does not shrink with alpha = 1."
     return None

@@ -6,14 +6,20 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.inspection import Inspection
+from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.planes import beauty_of, view_of
 from pmviewer.settings import Settings
+
+if TYPE_CHECKING:  # numba, which the window doesn't wait for
+    from pmviewer.photons.deposition import Deposited
+    from pmviewer.photons.projection import ProjectionMap
 
 State = Literal["empty", "loading", "preparing", "rendering", "paused", "finished", "failed"]
 Level = Literal["info", "warning", "error"]
@@ -28,7 +34,8 @@ class Statistics:
     stored: Mapping[str, int] = field(default_factory=dict)
     """Photons stored, all passes together, by map ("caustic", "global")."""
     stored_in_pass: Mapping[str, int] = field(default_factory=dict)
-    """By map; with "radiance" the radiance photons that gather rays have used."""
+    """By map; with "radiance" the radiance photons that gather rays have used; with "shadow" the shadow photons,
+    which serve all passes."""
     radius: Mapping[str, float] = field(default_factory=dict)
     """Look-up radius of the latest pass by map."""
     rays: int = 0
@@ -36,6 +43,14 @@ class Statistics:
     """Those of the rays that test whether a light is visible."""
     shadow_rays_per_pixel: float = 0.0
     """In one pass, on average."""
+    cache_records: int = 0
+    """Records of the irradiance cache in the latest pass; 0 without a cache."""
+    gathers_per_pixel: float = 0.0
+    """In one pass, on average, with an irradiance cache: records made and pixels that gathered themselves."""
+    interpolated: float = 0.0
+    """Share of the surface points seen that the irradiance cache served."""
+    saved_rays: int = 0
+    """Shadow rays that were not cast, because shadow photons knew."""
     seconds: float = 0.0
     """Rendering time without pauses."""
     cpu_seconds: float = 0.0
@@ -45,6 +60,13 @@ class Statistics:
     bytes_per_photon: float = 0.0
     dropped: Mapping[str, int] = field(default_factory=dict)
     """Samples left out because they were not finite or negative, by place; all zero in a healthy scene."""
+    deposited: Mapping[str, Deposited] = field(default_factory=dict)
+    """What became of the photons that arrived in the latest pass, by map; empty where all are stored."""
+    importons: int = 0
+    """Importons traced for the importance maps of the latest pass, 0 without; `stored_in_pass` tells how many are
+    stored."""
+    warnings: tuple[str, ...] = ()
+    """Sentences for the log about what can't work with this scene and camera."""
     skipped: tuple[tuple[str, str], ...] = ()
     """Stages that did not run and why."""
 
@@ -57,11 +79,14 @@ class Statistics:
 class PhotonCloud:
     """One map's photons of the latest pass, as `pmviewer.maps.record` describes them: (n, 6) float32.
 
-    Radiance photons have their normal as direction and irradiance as power; `power_unit` is then in W per unit area.
+    Radiance photons and records of the irradiance cache have their normal as direction and irradiance as power;
+    `power_unit` is then in W per unit area.
     """
 
     photons: NDArray[np.float32]
     power_unit: float
+    reach: NDArray[np.float32] | None = None
+    """Of records: (n,) distances up to which they are used, in scene units."""
 
 
 @dataclass(frozen=True)
@@ -80,10 +105,23 @@ class Frame:
     statistics: Statistics
     clouds: Mapping[str, PhotonCloud] = field(default_factory=dict)
     scene_name: str = ""
+    inspection: Inspection = field(default_factory=Inspection)
+    """What it holds only while it is shown."""
+    projections: Mapping[str, tuple[ProjectionMap, ...]] = field(default_factory=dict)
+    """Projection maps of the lights by what they show, "surfaces" and "caustic"; empty where photons start everywhere.
+    """
 
     def image(self, view: str = "beauty") -> NDArray[np.float32]:
-        """(height, width, 3), or 1 channel for depth; view is `beauty`, a term or a first-hit property."""
+        """(height, width, 3), or 1 channel for depth; view is `beauty`, a term or a first-hit property, or one of
+        `diagnostics`."""
+        if view in DIAGNOSTICS:
+            return self.inspection.planes[view]
         return self.beauty if view == "beauty" else view_of(self.planes, view)
+
+    @property
+    def diagnostics(self) -> Mapping[str, NDArray[np.float32]]:
+        """Planes of the diagnostic views that are there (`pmviewer.output.diagnostic_views`)."""
+        return self.inspection.planes
 
     @cached_property
     def beauty(self) -> NDArray[np.float32]:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import sys
-
-from pmviewer.errors import SettingError
+from pmviewer.errors import SceneError, SettingError
 from pmviewer.render.planes import CHANNELS
+from pmviewer.resources import available_memory
+from pmviewer.scene.description import Scene
 
 BYTES_PER_PIXEL = CHANNELS * (8 + 3 * 4)
 """The film's float64 sums and three float32 frames: the one shown, the one being made, the one being exported."""
@@ -14,21 +13,23 @@ BYTES_PER_PIXEL = CHANNELS * (8 + 3 * 4)
 BYTES_PER_TRAJECTORY = 250
 """Some three photons stored, twice while batches are joined, and their map."""
 
+BYTES_PER_TRIANGLE = 600
+"""Vertices and normals in float64 and float32, and the tree with what building it takes."""
 
-def available_memory() -> int | None:
-    """Bytes that can still be used without swapping; None where the system doesn't tell."""
-    if sys.platform.startswith("linux"):
-        try:
-            with open("/proc/meminfo") as lines:
-                for line in lines:
-                    if line.startswith("MemAvailable:"):
-                        return int(line.split()[1]) * 1024
-        except OSError:
-            return None
-    try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return None
+BYTES_PER_INSTANCE = 1200
+
+
+def check_scene_memory(scene: Scene) -> None:
+    """Raises SceneError when the arrays and trees of a scene can't fit; instances cost little, however much they
+    show."""
+    available = available_memory()
+    if available is None:
+        return
+    triangles = sum(len(getattr(s.geometry, "faces", "--")) for s in scene.all_shapes)
+    needed = triangles * BYTES_PER_TRIANGLE + len(scene.instances) * BYTES_PER_INSTANCE
+    if needed > available:
+        what = f"The scene needs about {needed / 1e9:.1f} GB of memory and {available / 1e9:.1f} GB are free."
+        raise SceneError(what, scene.path, hint="Show repeated meshes by instances, or subdivide less.")
 
 
 def check_memory(width: int, height: int, N: int) -> None:

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from pmviewer.engine.memory import check_scene_memory
+from pmviewer.photons.projection import Projection
 from pmviewer.scene.analysis import SceneTraits, analyse
 from pmviewer.scene.description import Scene
 from pmviewer.scene.flatten import FlatScene, flatten
@@ -17,17 +19,20 @@ _uids = itertools.count(1)
 
 @dataclass(frozen=True)
 class OpenScene:
-    """`source` is what the user named; `uid` tells scenes apart in caches."""
+    """`source` is what the user named; `uid` tells scenes apart in caches. `projections` keeps projection maps by how
+    they were asked for (`pmviewer.engine.projection`)."""
 
     scene: Scene
     flat: FlatScene
     traits: SceneTraits
     source: str
     uid: int = field(default_factory=lambda: next(_uids))
+    projections: dict[tuple[str, bool], Projection | None] = field(default_factory=dict, compare=False, repr=False)
 
 
 def open_scene(source: str | Path | Scene, parameters: Mapping[str, str] | None = None) -> OpenScene:
     """Load, check and flatten. Raises SceneError."""
     scene = source if isinstance(source, Scene) else load_scene(source, parameters or {})
+    check_scene_memory(scene)
     name = scene.name if isinstance(source, Scene) else str(source)
     return OpenScene(scene, flatten(scene), analyse(scene), name)

@@ -6,26 +6,39 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pmviewer.engine.method import plan_of
+from pmviewer.engine.cache_stage import prepare_cache, recipe
+from pmviewer.engine.guides import gather_records
+from pmviewer.engine.importance import prepare_importance
+from pmviewer.engine.method import estimator_of, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.projection import projection_for
 from pmviewer.kernels.raycast import cast_closest
 from pmviewer.maps.grid import build_grid
+from pmviewer.maps.irradiance_cache import NO_CACHE
 from pmviewer.maps.kdtree import build_kdtree
 from pmviewer.maps.radiance import build_sites
+from pmviewer.maps.shadow import shadow_record
+from pmviewer.maps.variant import marked
+from pmviewer.photons.deposition import prepare_rules
+from pmviewer.photons.projected import NO_PROJECTION
 from pmviewer.photons.trace import LIGHT_PASS_DTYPE, N_COUNTS, N_LEDGER, trace_photons
+from pmviewer.render.camera import resolve_camera
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
 from pmviewer.render.lookup import NO_SITES
 from pmviewer.render.path import path_pass
 from pmviewer.render.record import EYE_DTYPE
 from pmviewer.render.record import N_COUNTS as N_EYE_COUNTS
+from pmviewer.render.shadow import NO_SHADOWS
 from pmviewer.settings import Settings
 
 Step = tuple[str, Callable[[], object]]
 Tell = Callable[[str, float | None], None]
 
-_done: set[tuple[str, bool, bool]] = set()
+_done: set[tuple[object, ...]] = set()
+"""Kernels compile for the kind of look-up and of estimate, what the gather uses, the type of the scene's record, and
+with projection maps or without."""
 
 
 def prepare(scene: OpenScene, settings: Settings, pool: WorkPool, tell: Tell) -> None:
@@ -34,12 +47,26 @@ def prepare(scene: OpenScene, settings: Settings, pool: WorkPool, tell: Tell) ->
     The first start compiles (some 20 s in all), later ones load compiled code from disk.
     """
     nearest = settings.estimate.lookup == "nearest"
-    radiance = plan_of(settings, scene.traits).radiance
-    steps = [(name, step) for name, step in _steps(scene, settings, nearest) if (name, nearest, radiance) not in _done]
+    plan = plan_of(settings, scene.traits)
+    with_maps = projection_for(scene, settings) is not None
+    kind = (
+        nearest,
+        plan.radiance,
+        plan.directions,
+        plan.corners,
+        plan.shadows,
+        plan.cache,
+        plan.importance,
+        plan.deposition != "all",
+        estimator_of(settings),
+        scene.flat.record.dtype,
+        with_maps,
+    )
+    steps = [(name, step) for name, step in _steps(scene, settings, nearest) if (name, *kind) not in _done]
     for i, (name, step) in enumerate(steps):
         tell(f"preparing kernels, {i + 1} of {len(steps)}: {name}", i / len(steps))
         pool.run([step])
-        _done.add((name, nearest, radiance))
+        _done.add((name, *kind))
 
 
 def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
@@ -51,6 +78,8 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
     if plan.photons:
         nothing = np.empty((0, 3), np.float32)
         light_pass = np.zeros(1, LIGHT_PASS_DTYPE)
+        maps = projection_for(scene, settings)
+        projections = NO_PROJECTION if maps is None else maps.records
         counts, ledger = np.zeros(N_COUNTS, np.int64), np.zeros(N_LEDGER)
         none = np.empty(0, np.float32)
         code = np.zeros(1, np.uint32)
@@ -70,10 +99,17 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
             ),
             (
                 "light pass",
-                lambda: trace_photons(flat.record, light_pass, 0, 0, empty, code, empty, counts, ledger),
+                lambda: trace_photons(
+                    flat.record, light_pass, projections, 0, 0, empty, (code, code), empty, counts, ledger, None
+                ),
             ),
             ("kd-tree" if nearest else "photon grid", lambda: photon_map(empty)),
         ]
+    if plan.deposition != "all":
+        steps.append(("deposition rules", prepare_rules))
+    if plan.importance:
+        camera = resolve_camera(scene.scene, settings.camera)
+        steps.append(("importance", prepare_importance(scene, settings, plan, camera)))
     eye, film = np.zeros(1, EYE_DTYPE), np.zeros((1, 1))
     eye_counts = np.zeros(N_EYE_COUNTS, np.int64)
     if plan.path:
@@ -81,12 +117,21 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
     else:
 
         def compile_eye() -> None:
-            record = photon_map(empty).record
+            built = photon_map(empty)
+            record = marked(built.record, estimator_of(settings))
             sites = NO_SITES
             if plan.radiance:
                 sites = build_sites(empty, np.zeros(1, np.uint32), "all", 1.0, 1.0).record
-            choice_map = build_grid(empty, 1.0, 1.0).record
-            eye_pass(flat.record, eye, record, record, choice_map, sites, film, eye_counts, 0, 0)
+            grid = build_grid(empty, 1.0, 1.0)
+            shadows = shadow_record(build_grid(empty, 1.0), 1) if plan.shadows else NO_SHADOWS
+            extra = gather_records(plan, grid)
+            cache = NO_CACHE
+            if plan.cache:
+                how = recipe(settings.gather, resolve_camera(scene.scene, settings.camera), 0)
+                beyond = extra[1], shadows, record, grid.record
+                cache = prepare_cache(flat.record, eye, record, sites, beyond, how).record
+            maps = record, record, grid.record, sites, cache, shadows, *extra
+            eye_pass(flat.record, eye, *maps, np.zeros(0, np.uint8), film, eye_counts, 0, 0)
 
         steps.append(("eye pass", compile_eye))
     return steps

@@ -8,40 +8,47 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.cache import StageCache
+from pmviewer.engine.cache_stage import cache_cloud, fill_cache, recipe
+from pmviewer.engine.diagnose import Looked, diagnostic_planes, wanted_of
 from pmviewer.engine.frame import Frame, PhotonCloud, Statistics
+from pmviewer.engine.guides import gather_records
+from pmviewer.engine.importance import ImportanceStage
+from pmviewer.engine.inspection import Inspection, Wanted
+from pmviewer.engine.light_stage import LightStage
 from pmviewer.engine.memory import check_memory
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.radius import first_radius, pass_radius
-from pmviewer.engine.sites import sites_of
-from pmviewer.maps.grid import PhotonGrid, build_grid
-from pmviewer.maps.kdtree import build_kdtree
-from pmviewer.maps.radiance import RadianceMap
-from pmviewer.maps.radius import automatic_radius, largest_power, neighbourhood
-from pmviewer.maps.record import DIRECT
-from pmviewer.photons.lightpass import PhotonMaps, trace_pass, trajectories
+from pmviewer.engine.radius import first_radius
+from pmviewer.engine.shadows import ShadowMap, shadows_of
+from pmviewer.engine.tally import Tally
+from pmviewer.maps.irradiance_cache import NO_CACHE, REACH, IrradianceCache
+from pmviewer.photons.lightpass import trace_pass, trajectories
+from pmviewer.photons.paths import PhotonPaths, empty_paths
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.choice import CHOICES
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
+from pmviewer.render.gather_points import POINT_COLUMNS, gather_points
 from pmviewer.render.lookup import NO_SITES
+from pmviewer.render.outline import outline_pixels
 from pmviewer.render.path import path_pass
-from pmviewer.render.record import C_DROPPED, C_RAYS, C_SHADOW_RAYS, N_COUNTS, eye_record
+from pmviewer.render.record import (
+    N_COUNTS,
+    eye_record,
+)
+from pmviewer.render.shadow import NO_SHADOWS
 from pmviewer.settings import Settings
 
-CACHED_PASSES = 4
-"""Photons and maps of the first passes are kept, so that a new camera or radius starts from them."""
-
-CHOOSING_PHOTONS = 1 << 17
-"""Most photons in the map that chooses lights."""
+MOST_POINTS = 1024
+"""Most gather rays of a pixel that are told of."""
 
 COARSE_SHRINK = 4
 COARSE_PHOTONS = 40_000
@@ -65,17 +72,14 @@ class Renderer:
             if self.plan.photons
             else 0.0
         )
-        self.emitted = self.rays = self.shadow_rays = 0
-        self.choice_radius: float | None = None
-        self.seconds = self.cpu_seconds = 0.0
-        self.stored = {"caustic": 0, "global": 0}
-        self.stored_in_pass: dict[str, int] = {}
-        self.radius: dict[str, float] = {}
-        self.stage_seconds: dict[str, float] = {}
-        self.dropped = {"photons": 0, "samples": 0}
-        self.map_bytes = self.map_photons = 0
-        self._photons: PhotonMaps | None = None
-        self._sites: RadianceMap | None = None
+        self.tally = Tally()
+        self.light = LightStage(scene, settings, self.plan, pool, cache, self.tally)
+        self.importance = ImportanceStage(
+            scene, settings, self.plan, self.camera, self.first_radius, pool, cache, self.tally
+        )
+        self._cache: IrradianceCache | None = None
+        self._shadows: ShadowMap | None = None
+        self._last: tuple[NDArray[np.void], tuple[NDArray[np.void], ...]] | None = None
 
     @property
     def passes(self) -> int:
@@ -85,7 +89,7 @@ class Renderer:
     def finished(self) -> bool:
         """Whether a stop rule holds."""
         render = self.settings.render
-        return self.passes >= render.passes or 0 < render.time_limit <= self.seconds
+        return self.passes >= render.passes or 0 < render.time_limit <= self.tally.seconds
 
     def step(self) -> None:
         """Render the next pass into the film.
@@ -95,10 +99,10 @@ class Renderer:
         start = time.perf_counter()
         self._pass(self.film, self.camera, self.passes, self.settings.photons.N)
         self.film.passes += 1
-        self.seconds += time.perf_counter() - start
+        self.tally.seconds += time.perf_counter() - start
 
-    def coarse_frame(self, serial: int) -> Frame:
-        """A quick picture: a fraction of the pixels and photons, not part of the film."""
+    def coarse_frame(self, serial: int, wanted: Wanted | None = None) -> Frame:
+        """A quick picture: a fraction of the pixels and photons, not part of the film. `wanted` as for `frame`."""
         pose = self.camera
         shrink = COARSE_SHRINK
         while pose.width * pose.height > COARSE_PIXELS * shrink * shrink:
@@ -110,37 +114,96 @@ class Renderer:
         quick.first_radius = self.first_radius * min(2.0, (self.settings.photons.N / N) ** 0.25)
         quick._pass(film, small, 0, N)
         film.passes = 1
-        return quick._frame(serial, film, coarse=True)
+        wanted = replace(wanted or wanted_of(self.settings, self.plan), pixel=None)  # its pixels are others
+        return quick._frame(serial, film, True, wanted)
 
-    def frame(self, serial: int) -> Frame:
-        """The film as it stands."""
-        return self._frame(serial, self.film, coarse=False)
+    def frame(self, serial: int, wanted: Wanted | None = None) -> Frame:
+        """The film as it stands, with what the display wants to know of the latest pass (None: by the settings)."""
+        return self._frame(serial, self.film, False, wanted)
 
-    def _frame(self, serial: int, film: Film, coarse: bool) -> Frame:
+    def inspect(self, wanted: Wanted) -> Inspection:
+        """What is wanted of the latest pass. The film stays as it is."""
+        return self._inspect(wanted, self.film)
+
+    def _inspect(self, wanted: Wanted, film: Film) -> Inspection:
+        if self._last is None:
+            return Inspection()
+        eye, (caustic, global_, choice) = self._last
+        sites = self.light.sites.record if self.light.sites else NO_SITES
+        shadows = self._shadows.record if self._shadows else NO_SHADOWS
+        scene = self.scene.flat.record
+        size = film.width, film.height
+        importance = self.importance.latest
+        M_r = self.settings.importance.caustic_M_r, self.settings.importance.M_r
+        looked = Looked(scene, eye, caustic, global_, choice, sites, shadows, self.light.sites, *size, importance, M_r)
+        planes = diagnostic_planes(wanted, looked, self.plan, self.pool)
+        paths = self._paths(wanted.paths) if wanted.paths else None
+        gathered = self.gather_points(*wanted.pixel) if wanted.pixel else None
+        return Inspection(wanted, planes, paths, gathered)
+
+    def _paths(self, count: int) -> PhotonPaths | None:
+        """Where the first photons of the latest pass went."""
+        if self.light.traced is None:
+            return None
+        index, N = self.light.traced
+        settings, caustics = self.settings, bool(self.plan.caustic_mask)
+        traced, _, _ = trajectories(settings.photons, N, caustics)
+        paths = empty_paths(min(count, traced), self.scene.flat.radius)
+        photons = trace_pass(
+            self.scene.flat,
+            settings.photons,
+            settings.render.seed,
+            index * traced,
+            N,
+            caustics,
+            self.pool.run,
+            projection=self.light.projection,
+            paths=paths,
+        )
+        return replace(paths, power_unit=photons.global_unit)
+
+    def _frame(self, serial: int, film: Film, coarse: bool, wanted: Wanted | None) -> Frame:
         clouds = {}
-        if self._photons is not None:
-            clouds["global"] = PhotonCloud(self._photons.global_, self._photons.global_unit)
-            clouds["caustic"] = PhotonCloud(self._photons.caustic, self._photons.caustic_unit)
-        stored_in_pass = dict(self.stored_in_pass)
-        if self._sites is not None:
-            clouds["radiance"] = PhotonCloud(self._sites.known(), self._sites.grid.power_unit)
+        if self.light.photons is not None:
+            clouds["global"] = PhotonCloud(self.light.photons.global_, self.light.photons.global_unit)
+            clouds["caustic"] = PhotonCloud(self.light.photons.caustic, self.light.photons.caustic_unit)
+        stored_in_pass = dict(self.tally.stored_in_pass)
+        if self.light.sites is not None:
+            clouds["radiance"] = PhotonCloud(self.light.sites.known(), self.light.sites.grid.power_unit)
             stored_in_pass["radiance"] = len(clouds["radiance"].photons)
+        if self._shadows is not None:
+            clouds["shadow"] = PhotonCloud(self._shadows.photons, 1.0)
+            stored_in_pass["shadow"] = len(self._shadows.photons)
+        if self.importance.latest is not None:
+            clouds["importons"] = self.importance.latest.cloud
+            stored_in_pass["importons"] = self.importance.latest.n
+        if self._cache is not None:
+            clouds["cache"] = PhotonCloud(*cache_cloud(self._cache), self._cache.rows[:, REACH].copy())
+            stored_in_pass["cache"] = self._cache.n
+        samples = max(len(film.sums) * film.passes, 1)
         statistics = Statistics(
             passes=film.passes,
-            emitted=self.emitted,
-            stored=dict(self.stored),
+            emitted=self.tally.emitted,
+            stored=dict(self.tally.stored),
             stored_in_pass=stored_in_pass,
-            radius=dict(self.radius),
-            rays=self.rays,
-            shadow_rays=self.shadow_rays,
-            shadow_rays_per_pixel=self.shadow_rays / max(len(film.sums) * film.passes, 1),
-            seconds=self.seconds,
-            cpu_seconds=self.cpu_seconds,
-            stage_seconds=dict(self.stage_seconds),
-            map_bytes=self.map_bytes,
-            bytes_per_photon=self.map_bytes / self.map_photons if self.map_photons else 0.0,
-            dropped=dict(self.dropped),
+            radius=dict(self.tally.radius),
+            rays=self.tally.rays,
+            shadow_rays=self.tally.shadow_rays,
+            saved_rays=self.tally.saved_rays,
+            shadow_rays_per_pixel=self.tally.shadow_rays / samples,
+            cache_records=self._cache.n if self._cache else 0,
+            gathers_per_pixel=(self.tally.records + self.tally.gathered) / samples,
+            interpolated=self.tally.cached / max(self.tally.cached + self.tally.gathered, 1),
+            seconds=self.tally.seconds,
+            cpu_seconds=self.tally.cpu_seconds,
+            stage_seconds=dict(self.tally.stage_seconds),
+            map_bytes=self.tally.map_bytes,
+            bytes_per_photon=self.tally.map_bytes / self.tally.map_photons if self.tally.map_photons else 0.0,
+            dropped=dict(self.tally.dropped),
             skipped=self.plan.skipped,
+            importons=self.importance.latest.traced if self.importance.latest else 0,
+            warnings=self._warnings(),
+            deposited=dict(self.tally.deposited),
         )
         return Frame(
             serial=serial,
@@ -151,166 +214,86 @@ class Renderer:
             camera=self.camera,
             statistics=statistics,
             clouds=clouds,
+            projections=self.light.projection.maps if self.light.projection is not None else {},
             scene_name=self.scene.scene.name,
+            inspection=self._inspect(wanted or wanted_of(self.settings, self.plan), film),
         )
 
-    def _timed(self, stage: str, run: Callable[[], Any]) -> Any:
-        before = self.pool.cpu_seconds
-        result = run()
-        spent = self.pool.cpu_seconds - before
-        self.stage_seconds[stage] = self.stage_seconds.get(stage, 0.0) + spent
-        self.cpu_seconds += spent
-        return result
+    def _warnings(self) -> tuple[str, ...]:
+        """Sentences for the log."""
+        latest = self.importance.latest
+        return (*self.plan.warnings, *(latest.warnings if latest else ()), *self.light.rules.notes)
 
     def _pass(self, film: Film, camera: CameraPose, index: int, N: int) -> None:
         eye = eye_record(camera, self.settings, index)
-        maps = self._maps(eye[0], index, N) if self.plan.photons else self._no_maps()
-        self._timed("eye pass", lambda: self._eye_pass(eye, maps, film))
+        self.importance.run(0 if self.settings.photons.renew == "once" else index)
+        maps = self.light.run(eye[0], index, N, self.first_radius, self.importance)
+        self._set_gather(eye[0])
+        if self.plan.shadows:
+            self._shadows = self.tally.timed(self.pool, "shadow photons", self._shadow_map)
+        if self.plan.cache:
+            self.tally.timed(self.pool, "irradiance cache", lambda: self._fill_cache(eye, maps, camera, index))
+        self.tally.timed(self.pool, "eye pass", lambda: self._eye_pass(eye, maps, film))
+        self._last = eye, maps
 
-    def _photons_of(self, index: int, N: int) -> tuple[PhotonMaps, tuple]:
-        settings, scene = self.settings, self.scene
-        caustics = bool(self.plan.caustic_mask)
-        traced, _, _ = trajectories(settings.photons, N, caustics)
-        normals = self.plan.radiance
-        key = ("photons", scene.uid, settings.photons, settings.render.seed, index, N, caustics, normals)
+    def _shadow_map(self) -> ShadowMap:
+        """The shadow photons that serve all passes."""
+        direct, glossy, seed = self.settings.direct, self.settings.photons.glossy, self.settings.render.seed
+        key = ("shadows", self.scene.uid, seed, direct.shadow_N, direct.shadow_fewest, direct.shadow_radius, glossy)
+        if self._shadows is None:
+            make = partial(shadows_of, self.scene.flat, direct, glossy, seed, self.pool.run)
+            made = self.cache.get(key, make, lambda shadows: shadows.bytes)
+            self.tally.rays += made.rays
+            return made
+        return self._shadows
 
-        def make() -> PhotonMaps:
-            return trace_pass(
-                scene.flat, settings.photons, settings.render.seed, index * traced, N, caustics, self.pool.run, normals
-            )
+    def _eye_records(self) -> tuple[NDArray[np.void], ...]:
+        """What the eye pass looks up besides the pass's three maps."""
+        sites = self.light.sites.record if self.light.sites else NO_SITES
+        shadows = self._shadows.record if self._shadows else NO_SHADOWS
+        cache = self._cache.record if self._cache else NO_CACHE
+        return sites, cache, shadows, *gather_records(self.plan, self.light.guides)
 
-        if index >= CACHED_PASSES:
-            return make(), key
-        return self.cache.get(key, make, lambda photons: photons.bytes), key
+    def gather_points(self, x: int, y: int) -> NDArray[np.float32]:
+        """The gather rays of a pixel in the last pass, (n, POINT_COLUMNS), see `pmviewer.render.gather_points`.
 
-    def _maps(self, eye: np.void, index: int, N: int) -> tuple[NDArray[np.void], ...]:
-        """Trace the pass's photons and build its maps; fills masks and radii into the eye record."""
-        photons, key = self._timed("light pass", lambda: self._photons_of(index, N))
-        self._photons = photons
-        plan, estimate = self.plan, self.settings.estimate
-        scene_radius = self.scene.flat.radius
-        radius = pass_radius(self.first_radius, index, estimate, scene_radius)
-        radii = {"caustic": radius * estimate.caustic_radius, "global": radius}
-        units = {"caustic": photons.caustic_unit, "global": photons.global_unit}
-        clouds = {"caustic": photons.caustic, "global": photons.global_}
-        classes = {"caustic": plan.caustic_mask, "global": plan.global_classes}
-        nearest = estimate.lookup == "nearest"
-
-        def build(name: str) -> Any:
-            if not classes[name]:
-                return None
-            chosen = of_classes(clouds[name], classes[name])
-            if nearest:
-                return build_kdtree(chosen, units[name]), self._max_radius(chosen, units[name])
-            return build_grid(chosen, radii[name], units[name]), radii[name]
-
-        def cached(name: str) -> Any:
-            map_key = ("map", key, name, classes[name], nearest, estimate if nearest else radii[name])
-            if index >= CACHED_PASSES:
-                return build(name)
-            return self.cache.get(map_key, lambda: build(name), lambda m: m[0].bytes if m else 0)
-
-        built = self._timed("maps", lambda: self._build_both(cached, index))
-        records = []
-        self.map_bytes = self.map_photons = 0
-        for name, made in zip(("caustic", "global"), built, strict=True):
-            if made is None:
-                records.append(self._no_map().record)
-                continue
-            structure, look_up_radius = made
-            records.append(structure.record)
-            eye[f"{name}_radius"] = look_up_radius
-            self.radius[name] = look_up_radius
-            self.map_bytes += structure.bytes
-            self.map_photons += structure.n
-        if plan.radiance:
-            self._sites, eye["site_radius"] = self._timed("maps", lambda: self._build_sites(built[1], index, key))
-            self.map_bytes += self._sites.bytes
-        eye["caustic_mask"], eye["global_mask"] = plan.caustic_mask, plan.global_mask
-        chooser = self._chooser(eye, photons, key, index)
-        records.append(chooser.record)
-        self._keep = built, chooser
-        self.emitted += photons.emitted
-        self.rays += photons.rays
-        self.dropped["photons"] += photons.dropped
-        self.stored_in_pass = {"caustic": len(photons.caustic), "global": len(photons.global_)}
-        for name, count in self.stored_in_pass.items():
-            self.stored[name] += count
-        return tuple(records)
-
-    def _build_both(self, cached: Callable[[str], Any], index: int) -> list[Any]:
-        if index < CACHED_PASSES:  # the cache belongs to one thread
-            return [self.pool.run([partial(cached, name)])[0] for name in ("caustic", "global")]
-        return self.pool.run([partial(cached, name) for name in ("caustic", "global")])
-
-    def _build_sites(self, built: tuple[Any, float], index: int, key: tuple) -> tuple[RadianceMap, float]:
-        """Radiance photons of the pass in the global map `built`, and their cut-off radius."""
-        photons, (structure, radius), settings = self._photons, built, self.settings
-        assert photons is not None
-
-        def make() -> tuple[RadianceMap, float]:
-            return self.pool.run([lambda: sites_of(photons, structure, radius, settings)])[0]
-
-        if index >= CACHED_PASSES:
-            return make()
-        sites_key = ("sites", key, settings.estimate, settings.gather.radiance_photons, settings.gather.cutoff, radius)
-        return self.cache.get(sites_key, make, lambda made: made[0].bytes)
-
-    def _chooser(self, eye: np.void, photons: PhotonMaps, key: tuple, index: int) -> PhotonGrid:
-        """The map of this pass's direct photons that choose lights; fills rule and radius into the eye record.
-
-        Its radius is that of the first pass: it blurs nothing, and a small one would miss lights.
+        None with methods that don't gather, before the first pass, and for pixels outside the image.
         """
-        if self.plan.choice == "power":
-            return self._no_map(nearest=False)
-        eye["choice"], eye["biased"] = CHOICES.index(self.plan.choice), self.settings.direct.biased
-        asked = self.settings.direct.choice_radius
+        camera = self.camera
+        inside = 0 <= x < camera.width and 0 <= y < camera.height
+        if self._last is None or not self.plan.gather or not inside:
+            return np.empty((0, POINT_COLUMNS), np.float32)
+        eye, maps = self._last
+        rows = np.empty((MOST_POINTS, POINT_COLUMNS), np.float32)
+        pixel, counts = np.int64(y * camera.width + x), np.zeros(N_COUNTS, np.int64)
 
-        def build() -> PhotonGrid:
-            some = photons.global_[: 8 * CHOOSING_PHOTONS]  # of all classes
-            primary = of_classes(some, 1 << DIRECT)[:CHOOSING_PHOTONS]
-            if self.choice_radius is None:
-                scene_radius = self.scene.flat.radius
-                relative = neighbourhood(primary[:, :3]) / scene_radius if asked == "auto" else float(asked)
-                self.choice_radius = min(max(relative, 1e-4), 1.0) * scene_radius
-            return build_grid(primary, self.choice_radius, photons.global_unit)
+        def replay() -> int:
+            return gather_points(self.scene.flat.record, eye, *maps, *self._eye_records(), pixel, counts, rows)
 
-        def make() -> PhotonGrid:
-            if index >= CACHED_PASSES:
-                return build()
-            return self.cache.get(("light choice", key, asked, self.choice_radius), build, lambda grid: grid.bytes)
+        return rows[: self.pool.run([replay])[0]].copy()
 
-        chooser = self._timed("maps", lambda: self.pool.run([make])[0])
-        self.choice_radius = self.radius["light choice"] = chooser.radius
-        eye["choice_radius"] = chooser.radius
-        return chooser
+    def _set_gather(self, eye: np.void) -> None:
+        eye["direct"] = self.plan.direct
+        eye["gather_rays"] = self.settings.gather.rays if self.plan.gather else 0
+        eye["gather_specular"] = not self.settings.photons.indirect_caustics
 
-    def _no_map(self, nearest: bool | None = None) -> Any:
-        """An empty map: kernels take all maps, whether or not they look them up."""
-        if nearest is None:
-            nearest = self.settings.estimate.lookup == "nearest"
-        empty = np.empty((0, 6), np.float32)
-        make = (lambda: build_kdtree(empty, 1.0)) if nearest else (lambda: build_grid(empty, 1.0, 1.0))
-        return self.cache.get(("empty", nearest), make, lambda _: 0)
-
-    def _no_maps(self) -> tuple[NDArray[np.void], ...]:
-        record = self._no_map().record
-        return record, record, self._no_map(nearest=False).record
-
-    def _max_radius(self, photons: NDArray[np.float32], unit: float) -> float:
-        estimate, scene_radius = self.settings.estimate, self.scene.flat.radius
-        if estimate.max_radius != "auto":
-            return float(estimate.max_radius) * scene_radius
-        automatic = automatic_radius(estimate.k, largest_power(photons, unit), estimate.black_level)
-        return min(max(automatic, estimate.floor * scene_radius), 2 * scene_radius)
+    def _fill_cache(
+        self, eye: NDArray[np.void], maps: tuple[NDArray[np.void], ...], camera: CameraPose, index: int
+    ) -> None:
+        how = recipe(self.settings.gather, camera, index)
+        caustic_map, global_map, choice_map = maps
+        sites, _, shadows, _, corners = self._eye_records()
+        beyond = corners, shadows, caustic_map, choice_map
+        self._cache, counts = fill_cache(self.scene.flat.record, eye, global_map, sites, beyond, how, self.pool)
+        self.tally.map_bytes += self._cache.bytes
+        self.tally.records += self._cache.n
+        self.tally.add_counts(counts)
 
     def _eye_pass(self, eye: NDArray[np.void], maps: tuple[NDArray[np.void], ...], film: Film) -> None:
-        plan, settings = self.plan, self.settings
-        eye[0]["direct"] = plan.direct
-        eye[0]["gather_rays"] = settings.gather.rays if plan.gather else 0
-        eye[0]["gather_specular"] = not settings.photons.indirect_caustics
-        sites = self._sites.record if self._sites else NO_SITES
+        plan = self.plan
+        records = (*maps, *self._eye_records())
         scene = self.scene.flat.record
+        outline = self._outline(film.width, film.height)
         pixels = len(film.sums)
         tile = tile_size(pixels, eye[0], self.pool.threads)
 
@@ -321,15 +304,23 @@ class Renderer:
                 if plan.path:
                     path_pass(scene, eye, film.sums, counts, first, last)
                 else:
-                    eye_pass(scene, eye, *maps, sites, film.sums, counts, first, last)
+                    eye_pass(scene, eye, *records, outline, film.sums, counts, first, last)
                 return counts
 
             return run
 
         counts = sum(self.pool.run([task(first) for first in range(0, pixels, tile)]), np.zeros(N_COUNTS, np.int64))
-        self.rays += int(counts[C_RAYS])
-        self.shadow_rays += int(counts[C_SHADOW_RAYS])
-        self.dropped["samples"] += int(counts[C_DROPPED])
+        self.tally.add_counts(counts)
+
+    def _outline(self, width: int, height: int) -> NDArray[np.uint8]:
+        """Pixels on the outline of a light, where the eye pass looks for emission with rays of its own."""
+        if self.settings.render.outline_rays == 0 or self.plan.path:
+            return np.zeros(0, np.uint8)
+        camera = self.camera
+        if (width, height) != (camera.width, camera.height):
+            camera = replace(camera, width=width, height=height)
+        key = ("outline", self.scene.uid, camera)
+        return self.cache.get(key, lambda: outline_pixels(self.scene.scene, camera), lambda pixels: pixels.nbytes)
 
 
 def tile_size(pixels: int, eye: np.void, threads: int) -> int:
@@ -338,12 +329,3 @@ def tile_size(pixels: int, eye: np.void, threads: int) -> int:
     light_samples = int(eye["con_samples"] + eye["noncon_samples"] if keller_wald else eye["light_samples"])
     work = 1 + int(eye["gather_rays"]) + light_samples // 4
     return max(64, min(4096 * 2 // work, -(-pixels // (4 * threads))))
-
-
-def of_classes(photons: NDArray[np.float32], mask: int) -> NDArray[np.float32]:
-    """The photons whose path class has its bit in the mask."""
-    if mask == 0b1111 or not len(photons):
-        return photons
-    classes = (photons.view(np.uint32)[:, 3] >> 6) & 3
-    wanted = np.array([mask >> c & 1 for c in range(4)], bool)[classes]
-    return photons if wanted.all() else np.ascontiguousarray(photons[wanted])

@@ -11,10 +11,13 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from pmviewer.engine.cache import StageCache
+from pmviewer.engine.diagnose import wanted_of
 from pmviewer.engine.frame import Frame, Level, Message, State, Status
+from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import Cancelled, WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
@@ -42,6 +45,7 @@ class Session:
         self._loading = 0
         self._loaded: tuple[OpenScene, DrawGeometry, Settings | None] | None = None
         self._restart = False
+        self._pixel: tuple[int, int] | None = None
         self._paused = False
         self._closed = False
         self._loading_done = 0
@@ -50,6 +54,7 @@ class Session:
         self._failed_version = -1
         self._serial = 0
         self._messages: list[Message] = []
+        self._warned: set[str] = set()
         self._changed = threading.Condition()
         self._pool = WorkPool(threads)
         self._cache = StageCache()
@@ -85,6 +90,12 @@ class Session:
         with self._changed:
             self._restart = True
             self._outdate()
+
+    def inspect(self, pixel: tuple[int, int] | None) -> None:
+        """Frames shall hold the gather rays of this pixel (x, y) of the image, while that overlay is shown."""
+        with self._changed:
+            self._pixel = pixel
+            self._changed.notify_all()
 
     def pause(self) -> None:
         """Stop after the current pass; a changed setting still shows its first pass."""
@@ -250,22 +261,36 @@ class Session:
             return False
         if self._is_stale():
             return self._failed_version != self._version
+        if self._unseen() is not None:
+            return True
         return not self._paused and not self._is_finished()
 
     def _is_stale(self) -> bool:
         return self._renderer is None or self._renderer.version != self._version or self._restart
+
+    def _wanted(self, renderer: Renderer) -> Wanted:
+        """What the display asks for now."""
+        return wanted_of(self._settings, renderer.plan, self._pixel)
+
+    def _unseen(self) -> Wanted | None:
+        """What the display asks for, if the newest frame lacks it. The pass that follows a coarse frame brings it."""
+        renderer, frame = self._renderer, self.frame
+        if renderer is None or frame is None or frame.coarse or frame.version != renderer.version:
+            return None
+        wanted = self._wanted(renderer)
+        return wanted if wanted.lacks(frame.inspection.wanted) else None
 
     def _is_finished(self) -> bool:
         renderer = self._renderer
         if renderer is None:
             return True
         render = self._settings.render
-        return renderer.passes >= render.passes or 0 < render.time_limit <= renderer.seconds
+        return renderer.passes >= render.passes or 0 < render.time_limit <= renderer.tally.seconds
 
     def _adopt(self, opened: OpenScene, geometry: DrawGeometry, settings: Settings | None) -> None:
         """Make a loaded scene the open one."""
         self._cache.clear()
-        self._opened, self.geometry, self._renderer = opened, geometry, None
+        self._opened, self.geometry, self._renderer, self._pixel = opened, geometry, None, None
         if settings is not None:
             self._settings = settings
         self._version += 1
@@ -278,13 +303,21 @@ class Session:
             self._say("warning", f"{count} × {reason} left out")
         flat = opened.flat
         self._say("info", f"opened {opened.source}: {flat.n_triangles:,} triangles, {flat.n_quadrics:,} round shapes")
+        if flat.n_instances:
+            self._say("info", f"{flat.n_instances:,} instances show {flat.n_elements:,} elements")
+        if self.geometry is not None and self.geometry.note:
+            self._say("info", self.geometry.note)
 
     def _advance(self) -> None:
         """A coarse frame for a new state, one pass for a known one."""
         assert self._opened is not None
         if not self._is_stale():
             assert self._renderer is not None
-            self._step(self._renderer)
+            wanted = self._unseen()
+            if wanted is not None:
+                self._look(self._renderer, wanted)
+            else:
+                self._step(self._renderer)
             return
         with self._changed:
             version, settings, self._restart = self._version, self._settings, False
@@ -293,7 +326,11 @@ class Session:
             prepare(self._opened, settings, self._pool, lambda text, share: self._tell("preparing", text, share))
             renderer = Renderer(self._opened, settings, self._pool, self._cache, version)
             self._tell("rendering", "first picture")
-            self._publish(renderer.coarse_frame(self._serial + 1))
+            frame = renderer.coarse_frame(self._serial + 1, self._wanted(renderer))
+            self._publish(frame)
+            for warning in set(frame.statistics.warnings) - self._warned:
+                self._say("warning", warning)
+            self._warned = set(frame.statistics.warnings)
         finally:
             with self._changed:
                 self._first_picture = False
@@ -303,7 +340,17 @@ class Session:
 
     def _step(self, renderer: Renderer) -> None:
         renderer.step()
-        self._publish(renderer.frame(self._serial + 1))
+        self._publish(renderer.frame(self._serial + 1, self._wanted(renderer)))
+        with self._changed:
+            self._settle()
+        self._notify()
+
+    def _look(self, renderer: Renderer, wanted: Wanted) -> None:
+        """Add to the newest frame what the display asks for. The first time its kernels are compiled."""
+        frame = self.frame
+        assert frame is not None
+        self._tell("rendering", "making what is shown")
+        self._publish(replace(frame, serial=self._serial + 1, inspection=renderer.inspect(wanted)))
         with self._changed:
             self._settle()
         self._notify()

@@ -35,7 +35,7 @@ def sites_of(photons: PhotonMaps, structure: Any, radius: float, settings: Setti
     assert share != "off"
     cutoff = AUTOMATIC_CUTOFF
     if isinstance(structure, PhotonKdTree):
-        radius = _median_radius(photons, structure, radius, settings.estimate)
+        radius = median_radius(photons, structure, radius, settings.estimate)
         cutoff = AUTOMATIC_CUTOFF_NEAREST
     if settings.gather.cutoff != "auto":
         cutoff = float(settings.gather.cutoff)
@@ -44,7 +44,7 @@ def sites_of(photons: PhotonMaps, structure: Any, radius: float, settings: Setti
     return build_sites(photons.global_, photons.normals, share, cutoff, unit), cutoff
 
 
-def _median_radius(photons: PhotonMaps, tree: PhotonKdTree, max_radius: float, estimate: Estimate) -> float:
+def median_radius(photons: PhotonMaps, tree: PhotonKdTree, max_radius: float, estimate: Estimate) -> float:
     """Median radius of the k-nearest look-ups at photons spread evenly over the map."""
     n = len(photons.global_)
     if n == 0:

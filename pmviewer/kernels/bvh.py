@@ -6,7 +6,7 @@ Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wi
 sit in blocks of up to eight; quadrics are leaves of their own.
 
 A child index c of a wide node is a node if c >= 0; otherwise ~c is a block, or, from `n_blocks` on, quadric
-~c - n_blocks. Memory layouts are in `simd`.
+~c - n_blocks, or, beyond the quadrics, an instance. Memory layouts are in `simd`.
 """
 
 from __future__ import annotations
@@ -84,8 +84,9 @@ class Bvh:
         record["n_triangles"] = self.n_triangles
 
 
-def build(triangles: F4, quadrics: F4) -> Bvh:
-    """The tree over `triangles` (n, 3, 3), world-space vertices, and `quadrics` (m, 12), see `quadric`.
+def build(triangles: F4, quadrics: F4, boxed: tuple[F4, F4] | None = None) -> Bvh:
+    """The tree over `triangles` (n, 3, 3), world-space vertices, `quadrics` (m, 12), see `quadric`, and instances, of
+    which `boxed` has the lower and upper corners, (k, 3) each.
 
     Triangles without area and primitives with non-finite coordinates are left out of the tree: no ray meets them. Their
     ids stay taken.
@@ -94,9 +95,11 @@ def build(triangles: F4, quadrics: F4) -> Bvh:
     own_quadrics = aligned_empty((max(len(quadrics), 1), QUADRIC_FLOATS), np.float32)
     own_quadrics[:] = 0.0
     own_quadrics[: len(quadrics)] = quadrics
-    boxes = aligned_empty((len(triangles) + len(quadrics), 8), np.float32)
-    n_kept = _triangle_boxes(triangles, boxes, boxes.view(np.int32))
     lower, upper = quadric_bounds(own_quadrics[: len(quadrics)])
+    if boxed is not None:
+        lower, upper = np.concatenate([lower, boxed[0]]), np.concatenate([upper, boxed[1]])
+    boxes = aligned_empty((len(triangles) + len(lower), 8), np.float32)
+    n_kept = _triangle_boxes(triangles, boxes, boxes.view(np.int32))
     kept = np.flatnonzero(np.isfinite(lower).all(1) & np.isfinite(upper).all(1))
     boxes = boxes[: n_kept + len(kept)]
     boxes[n_kept:, 0:3], boxes[n_kept:, 4:7] = lower[kept], upper[kept]

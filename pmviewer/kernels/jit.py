@@ -1,8 +1,8 @@
 """The two decorators that every compiled function of pmviewer uses, and where compiled code is kept.
 
 Numba decides whether a cached function is stale by looking at that function's own file alone, so an edit in a module
-that a cached function *calls* would go unnoticed. The cache folder is therefore named after a hash of all sources of
-the package: an edit anywhere starts a fresh folder, and old folders are swept.
+that a cached function *calls* would go unnoticed. Here it is stale when any source has changed that its module imports,
+directly or not; an edit elsewhere recompiles nothing.
 """
 
 from __future__ import annotations
@@ -18,7 +18,10 @@ from typing import Any
 
 import numba
 from numba import njit
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
+
+from pmviewer.kernels.sources import PACKAGE, stamp
 
 FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
 """Never `nnan`/`ninf`: they delete the checks for non-finite numbers."""
@@ -26,13 +29,10 @@ FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
 KEPT_CACHES = 3
 
 
-def source_hash() -> str:
-    """Hash of every Python source of the package (16 hex digits)."""
-    digest = hashlib.sha256(f"{sys.version_info[:2]}{numba.__version__}".encode())
-    for path in sorted(Path(__file__).resolve().parent.parent.rglob("*.py")):
-        digest.update(path.name.encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+def _versions() -> str:
+    """Names the cache of this copy of the package under this Python and numba."""
+    what = f"{PACKAGE}{sys.version_info[:2]}{numba.__version__}"
+    return hashlib.sha256(what.encode()).hexdigest()[:16]
 
 
 def user_cache_root() -> Path:
@@ -58,7 +58,7 @@ def _writable(folder: Path) -> bool:
 
 
 def _choose_cache() -> Path:
-    name = source_hash()
+    name = _versions()
     root = user_cache_root() / "kernels"
     if not _writable(root):
         root = Path(tempfile.gettempdir()) / f"pmviewer-kernels-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
@@ -76,7 +76,28 @@ def _choose_cache() -> Path:
 CACHE_FOLDER = _choose_cache()
 numba.config.CACHE_DIR = str(CACHE_FOLDER)
 
-_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": FASTMATH}
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": FASTMATH}
+
+
+class _Locator(UserProvidedCacheLocator):
+    """Stale when a source has changed that the function's module depends on."""
+
+    def get_source_stamp(self) -> str:
+        return stamp(Path(self._py_file).resolve())
+
+
+class _KernelCacheImpl(CompileResultCacheImpl):
+    _locator_classes = (_Locator,)
+
+
+class _KernelCache(FunctionCache):
+    _impl_class = _KernelCacheImpl
+
+
+def _cached(dispatcher: Any) -> Any:
+    if not numba.config.DISABLE_JIT:
+        dispatcher._cache = _KernelCache(dispatcher.py_func)
+    return dispatcher
 
 
 class _DeviceDispatcher(CPUDispatcher):
@@ -89,7 +110,7 @@ class _DeviceDispatcher(CPUDispatcher):
 def device(function: Callable[..., Any]) -> Any:
     """A function that kernels call. It has no wrapper for Python, which halves the time to compile; a call from Python
     raises TypeError."""
-    dispatcher = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
+    dispatcher = _cached(njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function))
     if not numba.config.DISABLE_JIT:
         dispatcher.__class__ = _DeviceDispatcher
     return dispatcher
@@ -97,4 +118,4 @@ def device(function: Callable[..., Any]) -> Any:
 
 def kernel(function: Callable[..., Any]) -> Any:
     """An entry point that Python calls: serial, without the GIL, on one tile or batch."""
-    return njit(**_OPTIONS)(function)
+    return _cached(njit(**_OPTIONS)(function))

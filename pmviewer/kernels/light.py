@@ -1,7 +1,8 @@
 """Lights (T1): emission of photons, sampling towards a point, and the densities for multiple importance sampling.
 
-All lights are one-sided: they emit where their normal points. Lights are picked with probability proportional to their
-power's luminance.
+Area lights are one-sided: they emit where their normal points. Lights are picked with probability proportional to their
+power's luminance. Spots, directional lights and image environments have files of their own; scenes without them have
+another type of record (`pmviewer.kernels.scene`) and compile nothing of them.
 """
 
 from __future__ import annotations
@@ -9,13 +10,18 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba.extending import overload
 
+from pmviewer.kernels.distant import behind_scene, emit_directional, outside, sample_directional
+from pmviewer.kernels.environment import emit_image, image_pdf, image_radiance, sample_image
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4, load_i4
 from pmviewer.kernels.scene import (
     CYLINDER,
+    DIRECTIONAL,
     DISK,
     ENVIRONMENT,
+    IMAGE,
     L_A,
     L_AREA,
     L_B,
@@ -30,11 +36,15 @@ from pmviewer.kernels.scene import (
     PARALLELOGRAM,
     POINT,
     SPHERE,
+    SPOT,
     light_number,
     light_vector,
     load3,
 )
+from pmviewer.kernels.spot import emit_spot, sample_spot
 from pmviewer.kernels.surface import gap_of, leave
+from pmviewer.kernels.table import find_interval
+from pmviewer.kernels.textured_light import area_density, emission_at, radiance_from, spread
 from pmviewer.kernels.vector import along, basis, cross, dot, from_basis, luminance, normalize, scale, sub
 from pmviewer.kernels.warp import (
     square_to_cone,
@@ -46,19 +56,6 @@ from pmviewer.kernels.warp import (
 
 _f4 = np.float32
 _PI = _f4(math.pi)
-
-
-@device
-def find_interval(address, count, first, u):
-    """Index of the first of the cumulative numbers `first` … first+count−1 at `address` (the last one is 1) above u."""
-    low, high = np.int64(0), np.int64(count) - 1
-    while low < high:
-        middle = (low + high) >> 1
-        if u < load_f4(address, first + middle):
-            high = middle
-        else:
-            low = middle + 1
-    return low
 
 
 @device
@@ -158,20 +155,45 @@ def sample_light(scene, x, u_pick, u, v):
     return wi, end, L, probability * pdf, findable
 
 
-@device
 def sample_one_light(scene, light, x, u, v):
     """A direction from the point x towards the light.
 
     Returns unit `wi`, the end point of the shadow ray, the radiance L arriving if nothing is in between, its pdf per
-    solid angle (0: no contribution; for point lights L/pdf is intensity/distance²) and whether a BSDF sample could have
-    found it (False for point lights).
+    solid angle (0: no contribution; for point lights and spots L/pdf is intensity/distance², for directional ones
+    irradiance) and whether a BSDF sample could have found it (False for point, spot and directional lights).
     """
+    raise NotImplementedError("only for kernels")
+
+
+@overload(sample_one_light)
+def _sample_one_light(scene, light, x, u, v):
+    if "more_lights" not in scene.fields:
+
+        def plain(scene, light, x, u, v):
+            return _sample_plain(scene, light, x, u, v)
+
+        return plain
+
+    def more(scene, light, x, u, v):
+        kind = np.int32(light_number(scene, light, L_KIND))
+        if kind == SPOT:
+            return sample_spot(scene, light, x)
+        if kind == DIRECTIONAL:
+            return sample_directional(scene, light, x)
+        if kind == IMAGE:
+            return sample_image(scene, light, x, u, v)
+        return _sample_plain(scene, light, x, u, v)
+
+    return more
+
+
+@device
+def _sample_plain(scene, light, x, u, v):
     kind = np.int32(light_number(scene, light, L_KIND))
     L = light_vector(scene, light, L_RADIANCE)
     if kind == ENVIRONMENT:
         wi = square_to_sphere(u, v)
-        end = along(x, wi, _f4(2.0) * (scene.radius + distance_to_center(scene, x)))
-        return wi, end, L, _f4(1.0 / (4.0 * math.pi)), True
+        return wi, outside(scene, x, wi), L, _f4(1.0 / (4.0 * math.pi)), True
     if kind == POINT:
         p = light_vector(scene, light, L_A)
         offset = sub(p, x)
@@ -196,8 +218,11 @@ def sample_one_light(scene, light, x, u, v):
             p = along(x, wi, reach - half)
             n = normalize(sub(p, center))
             end = leave(p, n, _round_gap(n, center, radius), -wi[0], -wi[1], -wi[2])
+            L = radiance_from(scene, light, p, u, v)
             return wi, end, L, _f4(1.0) / (_f4(2.0) * _PI * cone), True
+    u, v, density = spread(scene, light, u, v)
     p, n, gap = light_point(scene, light, u, v)
+    L = radiance_from(scene, light, p, u, v)
     offset = sub(p, x)
     distance2 = dot(offset, offset)
     if not distance2 > _f4(0.0):
@@ -207,22 +232,39 @@ def sample_one_light(scene, light, x, u, v):
     cos_light = -dot(wi, n)
     if cos_light <= _f4(0.0):
         return wi, p, L, _f4(0.0), True
-    pdf = distance2 / (cos_light * light_number(scene, light, L_AREA))
+    pdf = density * (distance2 / (cos_light * light_number(scene, light, L_AREA)))
     return wi, leave(p, n, gap, -wi[0], -wi[1], -wi[2]), L, pdf, True
 
 
 @device
-def distance_to_center(scene, x):
-    d = (x[0] - scene.center_x, x[1] - scene.center_y, x[2] - scene.center_z)
-    return _f4(math.sqrt(dot(d, d)))
-
-
-@device
-def emitted(scene, light, ng, d):
-    """Radiance that leaves an area light's surface (geometric normal ng) against the travelling direction d."""
+def emitted(scene, light, prim, p, ng, d):
+    """Radiance that leaves an area light at the point p of its primitive `prim`, with geometric normal ng, against the
+    travelling direction d."""
     if dot(ng, d) < _f4(0.0):
-        return light_vector(scene, light, L_RADIANCE)
+        return emission_at(scene, light, prim, p)
     return _f4(0.0), _f4(0.0), _f4(0.0)
+
+
+def environment_radiance(scene, d):
+    """Radiance that a ray in direction d brings when it leaves a scene that has an environment."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(environment_radiance)
+def _environment_radiance(scene, d):
+    if "more_lights" not in scene.fields:
+
+        def constant(scene, d):
+            return light_vector(scene, scene.environment, L_RADIANCE)
+
+        return constant
+
+    def image(scene, d):
+        if np.int32(light_number(scene, scene.environment, L_KIND)) == IMAGE:
+            return image_radiance(scene, scene.environment, d)
+        return light_vector(scene, scene.environment, L_RADIANCE)
+
+    return image
 
 
 @device
@@ -231,9 +273,30 @@ def light_pdf(scene, light, x, p, ng, wi):
     return light_probability(scene, light) * one_light_pdf(scene, light, x, p, ng, wi)
 
 
-@device
 def one_light_pdf(scene, light, x, p, ng, wi):
     """The same for `sample_one_light`."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(one_light_pdf)
+def _one_light_pdf(scene, light, x, p, ng, wi):
+    if "more_lights" not in scene.fields:
+
+        def plain(scene, light, x, p, ng, wi):
+            return _plain_pdf(scene, light, x, p, ng, wi)
+
+        return plain
+
+    def more(scene, light, x, p, ng, wi):
+        if np.int32(light_number(scene, light, L_KIND)) == IMAGE:
+            return image_pdf(scene, light, image_radiance(scene, light, wi))
+        return _plain_pdf(scene, light, x, p, ng, wi)
+
+    return more
+
+
+@device
+def _plain_pdf(scene, light, x, p, ng, wi):
     if light == scene.environment:
         return _f4(1.0 / (4.0 * math.pi))
     if np.int32(light_number(scene, light, L_KIND)) == SPHERE:
@@ -242,34 +305,63 @@ def one_light_pdf(scene, light, x, p, ng, wi):
             return _f4(1.0) / (_f4(2.0) * _PI * cone)
     offset = sub(p, x)
     cos_light = abs(dot(ng, wi))
-    return dot(offset, offset) / (max(cos_light, _f4(1e-9)) * light_number(scene, light, L_AREA))
+    uniform = dot(offset, offset) / (max(cos_light, _f4(1e-9)) * light_number(scene, light, L_AREA))
+    return area_density(scene, light, p) * uniform
 
 
 @device
 def emit_photon(scene, u_pick, position, direction):
     """A photon leaving a light: origin, unit direction, power in units of the total power's luminance, light.
 
-    `position` and `direction` are pairs of numbers in [0, 1). Environment photons start on a disc outside the scene's
-    bounding sphere (T1).
+    `position` and `direction` are pairs of numbers in [0, 1). Photons of environments and directional lights start on a
+    disc outside the scene's bounding sphere (T1). The pick probability is the light's share of the power, so that every
+    photon's power has luminance 1, or nearly for a textured light.
     """
-    light, _, u_pick = pick_light(scene, u_pick)
+    light, _, _ = pick_light(scene, u_pick)
+    p, d, beta = emit_from(scene, light, position, direction)
+    return p, d, beta, light
+
+
+def emit_from(scene, light, position, direction):
+    """Origin, unit direction and power of a photon that leaves that light; the power's luminance is 1."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(emit_from)
+def _emit_from(scene, light, position, direction):
+    if "more_lights" not in scene.fields:
+
+        def plain(scene, light, position, direction):
+            return _emit_plain(scene, light, position, direction)
+
+        return plain
+
+    def more(scene, light, position, direction):
+        kind = np.int32(light_number(scene, light, L_KIND))
+        if kind == SPOT:
+            return emit_spot(scene, light, direction[0], direction[1])
+        if kind == DIRECTIONAL:
+            return emit_directional(scene, light, position[0], position[1])
+        if kind == IMAGE:
+            return emit_image(scene, light, position, direction)
+        return _emit_plain(scene, light, position, direction)
+
+    return more
+
+
+@device
+def _emit_plain(scene, light, position, direction):
     kind = np.int32(light_number(scene, light, L_KIND))
     L = light_vector(scene, light, L_RADIANCE)
-    beta = scale(L, _f4(1.0) / luminance(L))  # the pick probability is the light's share of the power
+    beta = scale(L, _f4(1.0) / luminance(L))
     if kind == POINT:
-        return light_vector(scene, light, L_A), square_to_sphere(direction[0], direction[1]), beta, light
+        return light_vector(scene, light, L_A), square_to_sphere(direction[0], direction[1]), beta
     if kind == ENVIRONMENT:
         d = square_to_sphere(direction[0], direction[1])
-        x, y = square_to_disk(position[0], position[1])
-        r = scene.radius
-        s, t = basis(d)
-        p = (
-            scene.center_x + r * (x * s[0] + y * t[0] - d[0]),
-            scene.center_y + r * (x * s[1] + y * t[1] - d[1]),
-            scene.center_z + r * (x * s[2] + y * t[2] - d[2]),
-        )
-        return p, d, beta, light
-    p, n, gap = light_point(scene, light, position[0], position[1])
+        return behind_scene(scene, d, position[0], position[1]), d, beta
+    u, v, density = spread(scene, light, position[0], position[1])
+    p, n, gap = light_point(scene, light, u, v)
+    beta = scale(radiance_from(scene, light, p, u, v), _f4(1.0) / (luminance(L) * density))
     local = square_to_cosine_hemisphere(direction[0], direction[1])
     d = from_basis(n, local[0], local[1], local[2])
-    return leave(p, n, gap, d[0], d[1], d[2]), d, beta, light
+    return leave(p, n, gap, d[0], d[1], d[2]), d, beta

@@ -14,7 +14,7 @@ from numba import types
 from numba.core import errors
 from numba.extending import intrinsic
 
-I8, I32, I64, F32 = ir.IntType(8), ir.IntType(32), ir.IntType(64), ir.FloatType()
+I8, I32, I64, F32, F64 = ir.IntType(8), ir.IntType(32), ir.IntType(64), ir.FloatType(), ir.DoubleType()
 
 
 CACHE_LINE = 64
@@ -78,6 +78,8 @@ def _loader(numba_type, llvm_type):
 load_f4 = _loader(types.float32, F32)
 load_i4 = _loader(types.int32, I32)
 load_u4 = _loader(types.uint32, I32)
+load_i8 = _loader(types.int64, I64)
+load_f8 = _loader(types.float64, F64)
 
 
 @intrinsic

@@ -1,14 +1,30 @@
 """Casting rays: the nearest hit, and whether anything is in between.
 
-`scene` is a record with the fields of `bvh.BVH_FIELDS`. A ray is the points o + t d with tmin < t < tmax; d need not be
-of unit length, t is in units of its length. Lengths of any scale do: there is no absolute epsilon here, callers offset
-the origin or choose tmin.
+`scene` is a record with the fields of `bvh.BVH_FIELDS`, and with those of `instance` if there are instances: their
+leaves start a second traversal, of the group's tree by the ray in the group's coordinates.
+
+A ray is the points o + t d with tmin < t < tmax; d need not be of unit length, t is in units of its length. Lengths of
+any scale do: there is no absolute epsilon here, callers offset the origin or choose tmin.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numba.extending import overload
 
+from pmviewer.kernels.instance import (
+    G_BLOCKS,
+    G_N_BLOCKS,
+    G_N_TRIANGLES,
+    G_NODES,
+    G_QUADRICS,
+    I_BASE,
+    group_number,
+    group_of,
+    has_instances,
+    instance_number,
+    local_ray,
+)
 from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.memory import (
     bits_of_float,
@@ -51,18 +67,100 @@ def _key(distances, base, lane):
 
 
 @device
+def _closest_in_leaf(scene, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    if leaf < scene.n_own_quadrics:
+        t = intersect_quadric(scene.bvh_quadrics + leaf * QUADRIC_BYTES, ox, oy, oz, dx, dy, dz, tmin, tmax)
+        return t, np.int32(scene.n_triangles + leaf), np.float32(0), np.float32(0)
+    i = leaf - scene.n_own_quadrics
+    group = group_of(scene, i)
+    px, py, pz, vx, vy, vz, start = local_ray(scene, i, ox, oy, oz, dx, dy, dz)
+    leaves = (group_number(scene, group, G_QUADRICS), group_number(scene, group, G_N_TRIANGLES))
+    nodes, blocks = group_number(scene, group, G_NODES), group_number(scene, group, G_BLOCKS)
+    n_blocks = group_number(scene, group, G_N_BLOCKS)
+    t, prim, u, v = _closest_in_tree(
+        leaves, nodes, blocks, n_blocks, px, py, pz, vx, vy, vz, tmin - start, tmax - start
+    )
+    if prim < 0:
+        return tmax, prim, u, v
+    return start + t, np.int32(instance_number(scene, i, I_BASE)) + prim, u, v
+
+
+@device
+def _occluded_in_leaf(scene, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    if leaf < scene.n_own_quadrics:
+        address = scene.bvh_quadrics + leaf * QUADRIC_BYTES
+        return intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax) < tmax
+    i = leaf - scene.n_own_quadrics
+    group = group_of(scene, i)
+    px, py, pz, vx, vy, vz, start = local_ray(scene, i, ox, oy, oz, dx, dy, dz)
+    leaves = (group_number(scene, group, G_QUADRICS), group_number(scene, group, G_N_TRIANGLES))
+    nodes, blocks = group_number(scene, group, G_NODES), group_number(scene, group, G_BLOCKS)
+    n_blocks = group_number(scene, group, G_N_BLOCKS)
+    return _occluded_in_tree(leaves, nodes, blocks, n_blocks, px, py, pz, vx, vy, vz, tmin - start, tmax - start)
+
+
+def meet_leaf(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    """(t, primitive, u, v) of the nearest hit with what is no block; t = tmax without one."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(meet_leaf)
+def _meet_leaf(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    if has_instances(leaves):
+        return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: _closest_in_leaf(
+            leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax
+        )
+    return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: (
+        intersect_quadric(leaves[0] + leaf * QUADRIC_BYTES, ox, oy, oz, dx, dy, dz, tmin, tmax),
+        np.int32(leaves[1] + leaf),
+        np.float32(0),
+        np.float32(0),
+    )
+
+
+def leaf_occludes(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    """Whether the ray meets what is no block."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(leaf_occludes)
+def _leaf_occludes(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    if has_instances(leaves):
+        return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: _occluded_in_leaf(
+            leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax
+        )
+    return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: (
+        intersect_quadric(leaves[0] + leaf * QUADRIC_BYTES, ox, oy, oz, dx, dy, dz, tmin, tmax) < tmax
+    )
+
+
 def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     """(t, primitive, u, v) of the nearest hit; (tmax, -1, 0, 0) without one.
 
     u and v are the barycentrics of a triangle's second and third vertex, 0 for quadrics. Negative tmin counts as 0. A
     ray with a non-finite number hits nothing.
     """
+    raise NotImplementedError("only for kernels")
+
+
+@overload(closest_hit)
+def _closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    if has_instances(scene):
+        return lambda scene, ox, oy, oz, dx, dy, dz, tmin, tmax: _closest_in_scene(
+            scene, scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks, ox, oy, oz, dx, dy, dz, tmin, tmax
+        )
+    return lambda scene, ox, oy, oz, dx, dy, dz, tmin, tmax: _closest_in_tree(
+        (scene.bvh_quadrics, scene.n_triangles), scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks,
+        ox, oy, oz, dx, dy, dz, tmin, tmax,
+    )  # fmt: skip
+
+
+def _closest(leaves, nodes, blocks, n_blocks, ox, oy, oz, dx, dy, dz, tmin, tmax):
     hit, u, v = np.int32(-1), np.float32(0), np.float32(0)
     if not _is_finite(ox, oy, oz, dx, dy, dz):
         return tmax, hit, u, v
     if not tmin > np.float32(0):
         tmin = np.float32(0)
-    nodes, blocks, n_blocks = scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks
     stack = stack_i4(STACK_INTS)
     scratch = stack_i4(SCRATCH_INTS)
     ix, iy, iz = np.float32(1) / dx, np.float32(1) / dy, np.float32(1) / dz
@@ -72,8 +170,9 @@ def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     stack_put_i8(stack, 0, np.int64(0))
     size = 1
     while True:
-        # Quadrics are left to this outer loop: a call inside the inner one would cost all rays their vector registers.
-        quadric = np.int64(-1)
+        # What is no block is left to this outer loop: a call inside the inner one would cost all rays their vector
+        # registers.
+        other = np.int64(-1)
         while size > 0:
             size -= 1
             key = stack_get_i8(stack, size)
@@ -112,7 +211,7 @@ def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
                 continue
             leaf = np.int64(~child)
             if leaf >= n_blocks:
-                quadric = leaf - n_blocks
+                other = leaf - n_blocks
                 break
             block = blocks + leaf * BLOCK_BYTES
             mask = hit_triangles(block, ox, oy, oz, dx, dy, dz, tmin, tmax, scratch)
@@ -123,23 +222,39 @@ def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
                 if t < tmax:
                     tmax, hit = t, load_i4(block + ID_OFFSET, lane)
                     u, v = stack_get_f4(scratch, LANES + lane), stack_get_f4(scratch, 2 * LANES + lane)
-        if quadric < 0:
+        if other < 0:
             return tmax, hit, u, v
-        address = scene.bvh_quadrics + quadric * QUADRIC_BYTES
-        t = intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax)
+        t, prim, tu, tv = meet_leaf(leaves, other, ox, oy, oz, dx, dy, dz, tmin, tmax)
         if t < tmax:
-            tmax, hit = t, np.int32(scene.n_triangles + quadric)
-            u = v = np.float32(0)
+            tmax, hit, u, v = t, prim, tu, tv
 
 
-@device
+# A function can't call itself with other types, so that the scene's tree and the groups' have one each.
+_closest_in_tree, _closest_in_scene = device(_closest), device(_closest)
+
+
 def occluded(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     """Whether the ray meets anything; False for a ray with a non-finite number."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(occluded)
+def _any_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    if has_instances(scene):
+        return lambda scene, ox, oy, oz, dx, dy, dz, tmin, tmax: _occluded_in_scene(
+            scene, scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks, ox, oy, oz, dx, dy, dz, tmin, tmax
+        )
+    return lambda scene, ox, oy, oz, dx, dy, dz, tmin, tmax: _occluded_in_tree(
+        (scene.bvh_quadrics, scene.n_triangles), scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks,
+        ox, oy, oz, dx, dy, dz, tmin, tmax,
+    )  # fmt: skip
+
+
+def _occluded(leaves, nodes, blocks, n_blocks, ox, oy, oz, dx, dy, dz, tmin, tmax):
     if not _is_finite(ox, oy, oz, dx, dy, dz):
         return False
     if not tmin > np.float32(0):
         tmin = np.float32(0)
-    nodes, blocks, n_blocks = scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks
     stack = stack_i4(STACK_INTS)
     scratch = stack_i4(SCRATCH_INTS)
     ix, iy, iz = np.float32(1) / dx, np.float32(1) / dy, np.float32(1) / dz
@@ -149,7 +264,7 @@ def occluded(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     stack_put_i4(stack, 0, np.int32(0))
     size = 1
     while True:
-        quadric = np.int64(-1)
+        other = np.int64(-1)
         while size > 0:
             size -= 1
             child = stack_get_i4(stack, size)
@@ -169,15 +284,17 @@ def occluded(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
                 continue
             leaf = np.int64(~child)
             if leaf >= n_blocks:
-                quadric = leaf - n_blocks
+                other = leaf - n_blocks
                 break
             if hit_triangles(blocks + leaf * BLOCK_BYTES, ox, oy, oz, dx, dy, dz, tmin, tmax, scratch) != 0:
                 return True
-        if quadric < 0:
+        if other < 0:
             return False
-        address = scene.bvh_quadrics + quadric * QUADRIC_BYTES
-        if intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax) < tmax:
+        if leaf_occludes(leaves, other, ox, oy, oz, dx, dy, dz, tmin, tmax):
             return True
+
+
+_occluded_in_tree, _occluded_in_scene = device(_occluded), device(_occluded)
 
 
 @kernel

@@ -9,44 +9,108 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.bvh import BVH_FIELDS
+from pmviewer.kernels.instance import INSTANCE_FIELDS, is_own, stored_prim
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4, load_i4
 
 _f4 = np.float32
 
-SCENE_DTYPE = np.dtype(
-    [
-        *BVH_FIELDS,
-        ("vertices", "i8"),  # float32 (n_triangles, 9)
-        ("normals", "i8"),  # float32 (n_triangles, 9), or 0 when every triangle is flat
-        ("prim_material", "i8"),  # int32 per primitive: triangles, then quadrics
-        ("prim_light", "i8"),  # int32 per primitive, -1 for no light
-        ("materials", "i8"),  # float32 (n_materials, MATERIAL_COLUMNS)
-        ("lights", "i8"),  # float32 (n_lights, LIGHT_COLUMNS)
-        ("light_cdf", "i8"),  # float32 (n_lights + 1): distribution over power
-        ("light_triangles", "i8"),  # int32: triangles of mesh lights
-        ("light_triangle_cdf", "i8"),  # float32, per mesh light: cumulative area up to and including the triangle
-        ("n_lights", "i8"),
-        ("environment", "i8"),  # index of the environment light, -1 without one
-        ("center_x", "f4"),
-        ("center_y", "f4"),
-        ("center_z", "f4"),
-        ("radius", "f4"),  # of the bounding sphere
-    ],
-    align=True,
-)
+_FIELDS = [
+    *BVH_FIELDS,
+    ("vertices", "i8"),  # float32 (n_triangles, 9)
+    ("normals", "i8"),  # float32 (n_triangles, 9), or 0 when every triangle is flat
+    ("prim_material", "i8"),  # int32 per primitive: triangles, then quadrics
+    ("prim_light", "i8"),  # int32 per primitive, -1 for no light
+    ("materials", "i8"),  # float32 (n_materials, MATERIAL_COLUMNS)
+    ("lights", "i8"),  # float32 (n_lights, LIGHT_COLUMNS)
+    ("light_cdf", "i8"),  # float32 (n_lights + 1): distribution over power
+    ("light_triangles", "i8"),  # int32: triangles of mesh lights
+    ("light_triangle_cdf", "i8"),  # float32, per mesh light: cumulative area up to and including the triangle
+    ("n_lights", "i8"),
+    ("environment", "i8"),  # index of the environment light, -1 without one
+    ("center_x", "f4"),
+    ("center_y", "f4"),
+    ("center_z", "f4"),
+    ("radius", "f4"),  # of the bounding sphere
+]
+
+BSDF_FIELDS: list[tuple[str, str]] = [
+    ("bsdfs", "i8"),  # 1; its presence says that materials are not all diffuse, mirror or smooth glass
+    ("bsdf_tables", "i8"),  # float32 (n_tables, BSDF_TABLE_SIZE), see `pmviewer.scene.bsdf_tables`
+]
+LIGHT_FIELDS: list[tuple[str, str]] = [
+    ("more_lights", "i8"),  # 1; its presence says that there are spot, directional or image environment lights
+    ("sky_texels", "i8"),  # float32 (sky_height, sky_width, 3): radiance of the image environment
+    ("sky_rows", "i8"),  # float32 (sky_height − 1,): its distribution, see `pmviewer.kernels.environment`
+    ("sky_cells", "i8"),  # float32 (sky_height − 1, sky_width)
+    ("sky_width", "i8"),
+    ("sky_height", "i8"),
+]
+TEXTURE_FIELDS: list[tuple[str, str]] = [
+    ("uvs", "i8"),  # float32 (n_triangles, 6): corners' texture coordinates; NaN for a triangle that has none
+    ("quadric_frames", "i8"),  # float32 (n_quadrics, 9): unit axes that a quadric's texture coordinates refer to
+    ("textures", "i8"),  # float32 (n_textures, TEXTURE_COLUMNS)
+    ("texel_starts", "i8"),  # int64 (n_textures,): a bitmap's first number in `texels`
+    ("texels", "i8"),  # float32, all bitmaps row by row
+    ("light_textures", "i8"),  # int64 (n_lights, LIGHT_TEXTURE_COLUMNS), or 0 when no light is textured
+    ("light_frames", "i8"),  # float32 (n_lights, 9): see `pmviewer.kernels.textured_light`
+    ("light_tables", "i8"),  # float32: distributions over textured lights
+]
+"""Of scenes with textures, or with materials that have a direction."""
+
+
+def scene_dtype(bsdfs: bool = False, lights: bool = False, instances: bool = False, textures: bool = False) -> np.dtype:
+    """The record of a scene with or without these features.
+
+    Kernels are compiled for the record's type, so that simple scenes neither run nor compile what they don't use.
+    """
+    extra = [
+        *(BSDF_FIELDS if bsdfs else []),
+        *(LIGHT_FIELDS if lights else []),
+        *(TEXTURE_FIELDS if textures else []),
+        *(INSTANCE_FIELDS if instances else []),
+    ]
+    # In front: numba takes code compiled for a record as good enough for longer ones that begin with the same fields.
+    return np.dtype([*extra, *_FIELDS], align=True)
+
+
+SCENE_DTYPE = scene_dtype()
+"""Of a scene of diffuse surfaces, mirrors and smooth glass under uniform area, point and environment lights."""
 
 # Columns are numpy integers: numba would compile an accessor anew for each literal one.
-_columns = np.arange(20, dtype=np.int64)
+_columns = np.arange(32, dtype=np.int64)
 
 DIFFUSE, CONDUCTOR, DIELECTRIC = 0, 1, 2
-MATERIAL_COLUMNS = 12
+ROUGH_CONDUCTOR, ROUGH_DIELECTRIC, THIN_DIELECTRIC, PLASTIC, ROUGH_PLASTIC, SCHLICK, WARD = range(3, 10)
+GGX, BECKMANN = 0, 1
+MATERIAL_COLUMNS = 32
 M_KIND, M_TWO_SIDED, M_ETA, M_REFLECTANCE, M_TRANSMITTANCE = _columns[[0, 1, 2, 4, 8]]
+M_ALPHA_X, M_ALPHA_Y, M_ETA_RGB, M_NONLINEAR, M_K_RGB, M_DISTRIBUTION = _columns[[7, 11, 12, 15, 16, 19]]
+M_SPECULAR, M_TABLE, M_INNER = _columns[[20, 23, 31]]
+"""M_ETA_RGB, M_K_RGB: complex index of a conductor. M_SPECULAR: colour of a coat or of the glossy lobe; for a
+dielectric its absorption per unit length. M_TABLE: row of `bsdf_tables`. M_INNER: diffuse reflectance of a coat from
+below."""
+M_REFLECTANCE_MAP, M_SPECULAR_MAP, M_ALPHA_MAP, M_NORMAL_MAP, M_BUMP_MAP, M_BUMP_SCALE = _columns[24:30]
+M_TRANSMITTANCE_MAP = _columns[30]
+"""The maps are texture numbers, -1 for none."""
+BSDF_TABLE_SIZE = 64
 
-PARALLELOGRAM, DISK, SPHERE, CYLINDER, MESH, POINT, ENVIRONMENT = range(7)
+PARALLELOGRAM, DISK, SPHERE, CYLINDER, MESH, POINT, ENVIRONMENT, SPOT, DIRECTIONAL, IMAGE = range(10)
+"""Kinds of lights; those from SPOT on are in scenes whose record has LIGHT_FIELDS alone."""
 LIGHT_COLUMNS = 20
 L_KIND, L_RADIANCE, L_A, L_B, L_C = _columns[[0, 1, 4, 7, 10]]
 L_AREA, L_RADIUS, L_LENGTH, L_FLIP, L_FIRST, L_COUNT = _columns[13:19]
+L_CUTOFF, L_BEAM = _columns[[10, 11]]
+"""Half angles in radians, of a spot."""
+
+BITMAP, CHECKERBOARD = 0, 1
+REPEAT, MIRROR, CLAMP = 0, 1, 2
+TEXTURE_COLUMNS = 20
+T_KIND, T_WIDTH, T_HEIGHT, T_CHANNELS, T_WRAP, T_NEAREST, T_TO_UV = _columns[:7]
+T_COLOR0, T_COLOR1 = _columns[[12, 15]]
+"""`T_TO_UV`: six numbers a … f with u' = a u + b v + c, v' = d u + e v + f. `T_COLOR0`: a bitmap's scale."""
+LIGHT_TEXTURE_COLUMNS = 4
+LT_TEXTURE, LT_FIRST, LT_ROWS, LT_COLUMNS = _columns[:4]
 
 
 @device
@@ -57,11 +121,13 @@ def load3(address, index):
 
 @device
 def material_of(scene, prim):
-    return np.int64(load_i4(scene.prim_material, np.int64(prim)))
+    return np.int64(load_i4(scene.prim_material, stored_prim(scene, prim)))
 
 
 @device
 def light_of(scene, prim):
+    if not is_own(scene, prim):
+        return np.int64(-1)
     return np.int64(load_i4(scene.prim_light, np.int64(prim)))
 
 

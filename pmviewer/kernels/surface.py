@@ -9,7 +9,17 @@ by a constant: scenes of any size give the same picture, and a wide floor parall
 from __future__ import annotations
 
 import numpy as np
+from numba.extending import overload
 
+from pmviewer.kernels.instance import (
+    I_TO_LOCAL,
+    I_TO_WORLD,
+    find_instance,
+    has_instances,
+    normal_to_world,
+    stored_of,
+    transform_point,
+)
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.quadric import quadric_normal, quadric_project
@@ -21,6 +31,11 @@ _f4 = np.float32
 QUADRIC_SIDE = 9
 """Column of a quadric that is 1, or −1 when its normals are flipped."""
 
+STRAIGHT = _f4(0.9999)
+"""Cosine between the normals from which a shading normal is the surface's own."""
+
+_LEAST_COSINES = _f4(1e-3)
+
 OFFSET = _f4(2.0**-17)
 """Distance off the surface in units of the coordinates' size: 64 rounding errors of float32."""
 
@@ -31,9 +46,50 @@ def gap_of(n, size_x, size_y, size_z):
     return OFFSET * (abs(n[0]) * size_x + abs(n[1]) * size_y + abs(n[2]) * size_z)
 
 
-@device
 def surface_at(scene, prim, u, v, ox, oy, oz, dx, dy, dz, t):
     """The point hit, its geometric unit normal, its shading unit normal (same side), and the gap for `leave`."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(surface_at)
+def _surface_at(scene, prim, u, v, ox, oy, oz, dx, dy, dz, t):
+    if has_instances(scene):
+        return lambda scene, prim, u, v, ox, oy, oz, dx, dy, dz, t: _through_instances(
+            scene, prim, u, v, ox, oy, oz, dx, dy, dz, t
+        )
+    return lambda scene, prim, u, v, ox, oy, oz, dx, dy, dz, t: _stored_surface(
+        scene, prim, u, v, ox, oy, oz, dx, dy, dz, t
+    )
+
+
+@device
+def _through_instances(scene, prim, u, v, ox, oy, oz, dx, dy, dz, t):
+    """`surface_at` for a scene with instances.
+
+    A distance h off a plane with unit normal n in the group is h / |Wᵀn| in the world, W being the linear part of the
+    way into the group; so the gap of the group's coordinates counts, and that of the world's comes on top.
+    """
+    if prim < scene.n_stored:
+        return _stored_surface(scene, prim, u, v, ox, oy, oz, dx, dy, dz, t)
+    i = find_instance(scene, prim)
+    stored = stored_of(scene, i, prim)
+    far = np.float64(t)
+    x, y, z = transform_point(scene, i, I_TO_LOCAL, ox + far * dx, oy + far * dy, oz + far * dz)
+    no = _f4(0.0)
+    q, local, shading, local_gap = _stored_surface(scene, stored, u, v, _f4(x), _f4(y), _f4(z), no, no, no, no)
+    x, y, z = transform_point(scene, i, I_TO_WORLD, q[0], q[1], q[2])
+    nx, ny, nz, stretch = normal_to_world(scene, i, local[0], local[1], local[2])
+    ng = (nx, ny, nz)
+    nx, ny, nz, _ = normal_to_world(scene, i, shading[0], shading[1], shading[2])
+    ns = (nx, ny, nz)
+    if dot(ns, ng) < _f4(0.0):
+        ns = (-ns[0], -ns[1], -ns[2])
+    p = (_f4(x), _f4(y), _f4(z))
+    return p, ng, ns, gap_of(ng, abs(p[0]), abs(p[1]), abs(p[2])) + _f4(local_gap / stretch)
+
+
+@device
+def _stored_surface(scene, prim, u, v, ox, oy, oz, dx, dy, dz, t):
     if prim < scene.n_triangles:
         base = np.int64(prim) * 9
         a = load3(scene.vertices, base)
@@ -81,6 +137,16 @@ def leave(p, ng, gap, dx, dy, dz):
     if dx * ng[0] + dy * ng[1] + dz * ng[2] < _f4(0.0):
         gap = -gap
     return p[0] + gap * ng[0], p[1] + gap * ng[1], p[2] + gap * ng[2]
+
+
+@device
+def adjoint_cosines(ns, ng, wi, wo):
+    """What a shading normal ns multiplies a photon's weight by on its way from wi to wo (Veach 1997, §5.3).
+
+    Eye paths use f·|ns·wi| where the surface has |ng·wi|. For photons, which travel the other way, the same scattering
+    is f·|ns·wi|·|ng·wo|/(|ng·wi|·|ns·wo|) per |ns·wo|.
+    """
+    return (abs(dot(ns, wi)) * abs(dot(ng, wo))) / max(abs(dot(ng, wi)) * abs(dot(ns, wo)), _LEAST_COSINES)
 
 
 @device

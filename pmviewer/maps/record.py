@@ -98,6 +98,15 @@ def decode_directions(codes: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(w / np.linalg.norm(w, axis=1, keepdims=True), np.float32)
 
 
+def in_classes(photons: np.ndarray, mask: int) -> np.ndarray | None:
+    """Which of photons (n, 6) are on a path whose class has its bit in the mask, (n,) bool; None where all are."""
+    if mask == 0b1111 or not len(photons):
+        return None
+    classes = (photons.view(np.uint32)[:, 3] >> 6) & 3
+    wanted = np.array([mask >> c & 1 for c in range(4)], bool)[classes]
+    return None if wanted.all() else wanted
+
+
 def unpack(photons, power_unit: float) -> dict[str, np.ndarray]:
     """Photons (n, 6) as named arrays: `position` (n, 3) float32, `wi` (n, 3) float32 unit, `Phi` (n, 3) float32 watts,
     `bounces` (n,) int, `path_class` (n,) int, `light` (n,) int."""

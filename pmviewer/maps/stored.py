@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba.extending import overload
 
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4, load_u4
@@ -16,14 +17,33 @@ _i4 = np.int32
 _u4 = np.uint32
 
 
-@device
 def arrives(photons, i, nx, ny, nz, class_mask):
-    """Whether photon i comes from the side that the normal points to, on a path whose class has its bit set."""
-    word = load_u4(photons.payload, 3 * i)
-    if (class_mask >> _i4((word >> _u4(6)) & _u4(3))) & 1 == 0:
-        return False
-    wx, wy, wz = decode_direction(word)
-    return nx * wx + ny * wy + nz * wz > _f4(0.0)
+    """Whether photon i comes from the side that the normal points to, on a path whose class has its bit set.
+
+    Importons (`pmviewer.maps.importance`) have their surface's normal for a direction: it has to be similar.
+    """
+    raise NotImplementedError("only for kernels")
+
+
+@overload(arrives)
+def _arrives(photons, i, nx, ny, nz, class_mask):
+    if "importons" in photons.fields:
+
+        def similar(photons, i, nx, ny, nz, class_mask):
+            wx, wy, wz = decode_direction(load_u4(photons.payload, 3 * i))
+            cosine = nx * wx + ny * wy + nz * wz
+            return cosine > _f4(0.0) and cosine * cosine > _f4(0.25) * (wx * wx + wy * wy + wz * wz)
+
+        return similar
+
+    def on_side(photons, i, nx, ny, nz, class_mask):
+        word = load_u4(photons.payload, 3 * i)
+        if (class_mask >> _i4((word >> _u4(6)) & _u4(3))) & 1 == 0:
+            return False
+        wx, wy, wz = decode_direction(word)
+        return nx * wx + ny * wy + nz * wz > _f4(0.0)
+
+    return on_side
 
 
 @device

@@ -114,7 +114,11 @@ def read_exr(path: str | Path) -> tuple[Layers, dict[str, Value]]:
     Files of other programs work too: half or float, `R,G,B` with or without `A`, grey, tiles; the first part of a
     multi-part file. Raises SceneError for a file that is missing, broken or not a plain image.
     """
-    data = read_file(path)
+    return decode_exr(read_file(path), path)
+
+
+def decode_exr(data: bytes, path: str | Path | None = None) -> tuple[Layers, dict[str, Value]]:
+    """The same for a file's content; `path` is for error messages alone."""
     try:
         file = OpenEXR.File(io.BytesIO(data), separate_channels=True)
         header, channels = file.header(), file.channels()

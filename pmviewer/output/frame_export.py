@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pmviewer import __version__
 from pmviewer.errors import OutputError
+from pmviewer.output.diagnostic_views import DIAGNOSTICS, coloured
 from pmviewer.output.exr import BEAUTY, PREFIX, Value, write_exr
 from pmviewer.output.png import write_png
 from pmviewer.output.tone import display_image
@@ -67,12 +68,21 @@ class Exportable(Protocol):
     def camera(self) -> Pose: ...
     @property
     def scene_name(self) -> str: ...
+    @property
+    def diagnostics(self) -> Mapping[str, NDArray[np.float32]]: ...
     def image(self, view: str = ...) -> NDArray[np.float32]: ...
 
 
 def frame_layers(frame: Exportable) -> dict[str, NDArray[np.float32]]:
-    """Every one of `LAYERS` by its name in an EXR file, (h, w, 3) float32, depth (h, w, 1)."""
-    return {_EXR_NAMES.get(name, name): frame.image(name) for name in LAYERS}
+    """Every one of `LAYERS` by its name in an EXR file, (h, w, 3) float32, depth (h, w, 1); behind them the planes of
+    diagnostic views that the frame holds, negative where there is nothing to tell."""
+    layers = {_EXR_NAMES.get(name, name): frame.image(name) for name in LAYERS}
+    return layers | {layer_name(view): plane for view, plane in frame.diagnostics.items()}
+
+
+def layer_name(view: str) -> str:
+    """Of a diagnostic view's plane in an EXR file."""
+    return view.replace(" ", "_").replace("-", "_")
 
 
 def frame_metadata(frame: Exportable) -> dict[str, Value]:
@@ -99,6 +109,7 @@ def frame_metadata(frame: Exportable) -> dict[str, Value]:
     about |= {f"photons_stored.{name}": count for name, count in counts.stored.items()}
     about |= {f"radius.{name}": float(radius) for name, radius in counts.radius.items()}
     about |= {f"dropped.{place}": count for place, count in counts.dropped.items()}
+    about |= {f"units.{layer_name(view)}": DIAGNOSTICS[view].unit for view in frame.diagnostics}
     return about | {path: _plain(value) for path, value in flat(frame.settings).items()}
 
 
@@ -121,11 +132,16 @@ def write_frame_png(
     """
     display = display or frame.settings.display
     view = view or display.view
-    if view not in LAYERS:
+    if view in DIAGNOSTICS and view not in frame.diagnostics:
+        raise OutputError(f"{path}: this frame holds nothing for the view '{view}': see when it is available.")
+    if view not in LAYERS and view not in DIAGNOSTICS:
         raise OutputError(f"{path}: the view '{view}' is drawn by the window alone. Choose one of {', '.join(LAYERS)}.")
-    shown = display_image(view, frame.image(view), display.exposure, display.tone)
+    if view in DIAGNOSTICS:
+        pixels = coloured(view, frame.image(view))
+    else:
+        pixels = display_image(view, frame.image(view), display.exposure, display.tone).pixels
     texts = {PREFIX + name: _text(value) for name, value in frame_metadata(frame).items()}
-    write_png(path, shown.pixels, {"Software": f"pmviewer {__version__}", "Title": frame.scene_name, **texts})
+    write_png(path, pixels, {"Software": f"pmviewer {__version__}", "Title": frame.scene_name, **texts})
 
 
 def _plain(value: Any) -> Value:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
+from pmviewer.maps.record import in_classes
+from pmviewer.photons.deposition import Deposited, Deposition, Filling, Prepared, rounds
+from pmviewer.photons.paths import PhotonPaths
+from pmviewer.photons.projected import NO_PROJECTION
+from pmviewer.photons.projection import Projection
+from pmviewer.photons.roulette import EQUAL, MOST_COPIES, RULES
 from pmviewer.photons.trace import (
     C_CAUSTIC,
     C_DROPPED,
@@ -29,6 +35,8 @@ Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 
 BATCH = 8192
 """Photons a task: fixed, so that the result does not depend on the number of threads."""
+SAMPLED = 64 * BATCH
+"""Trajectories whose photons are also kept as they arrive, where a deposition rule asks for a sample."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +44,11 @@ class PhotonMaps:
     """Photons of one pass: `caustic` and `global_` (n, 6) float32 as in `pmviewer.maps.record`, with their units of
     power in watts, `normals` (n,) uint32 of the surfaces that the global photons lie on, on the side that they came
     from, as codes of `encode_direction` (empty unless asked for), `emitted` trajectories, `rays` cast, `dropped`
-    non-finite photons and the energy `ledger`."""
+    non-finite photons and the energy `ledger`.
+
+    With a deposition rule, `caustic_normals` are those of the caustic photons, `sample` (n, 6) are photons of the first
+    trajectories as they arrived, a map by themselves in units of `sample_unit`, for whoever counts photons, and
+    `deposited` says what became of each map's."""
 
     caustic: Float
     global_: Float
@@ -47,10 +59,15 @@ class PhotonMaps:
     dropped: int
     ledger: NDArray[np.float64]
     normals: NDArray[np.uint32]
+    caustic_normals: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, np.uint32))
+    sample: Float = field(default_factory=lambda: np.empty((0, 6), np.float32))
+    sample_unit: float = 0.0
+    deposited: Mapping[str, Deposited] = field(default_factory=dict)
 
     @property
     def bytes(self) -> int:
-        return self.caustic.nbytes + self.global_.nbytes + self.normals.nbytes
+        arrays = self.caustic, self.global_, self.normals, self.caustic_normals, self.sample
+        return sum(array.nbytes for array in arrays)
 
 
 def trajectories(settings: Photons, N: int, has_specular: bool) -> tuple[int, int, float]:
@@ -73,75 +90,190 @@ def trace_pass(
     has_specular: bool,
     run: Runner,
     with_normals: bool = False,
+    projection: Projection | None = None,
+    paths: PhotonPaths | None = None,
+    deposition: Deposition | None = None,
 ) -> PhotonMaps:
-    """Trace one pass of N trajectories.
+    """Trace one pass of N trajectories; with `paths` only the first ones, whose paths are written there.
 
     Photon powers are the same for all trajectories of a map: Φ/N in the caustic map, Φ/⌊qN⌋ in the global one
     (trajectory split) or Φ/(qN) (photon rule), K §2.4.
+
+    With projection maps the first ⌊qN⌋ trajectories start where they can meet surfaces, with power W₁ in all, and
+    the others where they can meet what makes caustics, with W₂. A light's path L S⁺ D is found by a = ⌊qN⌋/W₁
+    trajectories a watt of the first kind and b = (N − ⌊qN⌋)/W₂ of the second, so that each of its photons has the
+    power 1/(a + b). The second kind ends there: caustics after a diffuse bounce may come from anywhere, they are the
+    first kind's, with 1/a.
+
+    With `deposition` its rules decide about storing; the maps then hold the path classes that it names alone.
     """
     traced, filling, probability = trajectories(settings, N, has_specular)
+    unit = scene.total_luminance
+    projections, surface_power, caustic_power = NO_PROJECTION, unit, unit
+    if projection is not None:
+        projections = projection.records
+        surface_power, caustic_power = projection.surface_power, projection.caustic_power
+        if not caustic_power > 0:  # no light reaches what makes caustics
+            traced = filling
+    density = filling / surface_power
+    direct_density = density
+    if traced > filling:
+        direct_density += (traced - filling) / caustic_power
     record = np.zeros(1, LIGHT_PASS_DTYPE)
     record[0] = (
         seed & 0xFFFFFFFF,
         first_index,
         SOBOL if settings.sequence == "sobol" else INDEPENDENT,
         settings.max_bounces,
+        RULES.index(settings.roulette),
+        settings.glossy,
         filling,
         probability,
         has_specular,
         settings.indirect_caustics,
+        projection is not None or not settings.indirect_caustics,
+        direct_density / density if projection is not None else 1.0,
     )
 
-    def batch(i0: int) -> Callable[[], _Batch]:
-        return lambda: _trace_batch(scene, record, i0, min(i0 + BATCH, traced), filling, has_specular, with_normals)
+    last = traced if paths is None else min(traced, paths.n)
+    normals = NORMALS if deposition is not None else GLOBAL_NORMALS if with_normals else NO_NORMALS
 
-    results = run([batch(i0) for i0 in range(0, traced, BATCH)])
+    def batch(i0: int) -> Callable[[], _Batch]:
+        return lambda: _trace_batch(
+            scene, record, projections, i0, min(i0 + BATCH, last), filling, has_specular, normals, paths
+        )
+
+    caustic_unit = unit / traced if projection is None else 1.0 / direct_density
+    global_unit = surface_power / (filling * probability)
+    if deposition is not None:
+        return _deposited(deposition, batch, last, first_index, run, caustic_unit, global_unit, filling)
+    results = run([batch(i0) for i0 in range(0, last, BATCH)])
     counts = sum((r[2] for r in results), np.zeros(N_COUNTS, np.int64))
-    unit = scene.total_luminance
     return PhotonMaps(
         caustic=_join([part for r in results for part in r[0]]),
         global_=_join([part for r in results for part in r[1]]),
-        caustic_unit=unit / traced,
-        global_unit=unit / (filling * probability),
-        emitted=traced,
+        caustic_unit=caustic_unit,
+        global_unit=global_unit,
+        emitted=last,
         rays=int(counts[C_RAYS]),
         dropped=int(counts[C_DROPPED]),
         ledger=sum((r[3] for r in results), np.zeros(N_LEDGER)),
-        normals=np.concatenate([np.empty(0, np.uint32), *(part for r in results for part in r[4])]),
+        normals=_joined([part for r in results for part in r[4]]),
     )
 
 
-_Batch = tuple[list[Float], list[Float], NDArray[np.int64], NDArray[np.float64], list[NDArray[np.uint32]]]
+def _deposited(
+    deposition: Deposition,
+    batch: Callable[[int], Callable[[], _Batch]],
+    last: int,
+    first_index: int,
+    run: Runner,
+    caustic_unit: float,
+    global_unit: float,
+    filling: int,
+) -> PhotonMaps:
+    """The pass's maps by the rules of `deposition`, from its batches, round by round where rounds matter."""
+    caustic, global_ = Filling(deposition.caustic), Filling(deposition.global_)
+    sampled: list[Float] = []
+    counts, ledger = np.zeros(N_COUNTS, np.int64), np.zeros(N_LEDGER)
+
+    def judged(i0: int) -> Callable[[], tuple[Prepared, Prepared, Float, NDArray[np.int64], NDArray[np.float64]]]:
+        def task() -> tuple[Prepared, Prepared, Float, NDArray[np.int64], NDArray[np.float64]]:
+            caustics, globals_, counts, ledger, global_normals, caustic_normals = batch(i0)()
+            photons, normals = _join(globals_), _joined(global_normals)
+            sample = photons[:0]
+            if deposition.sample_classes and i0 < SAMPLED:
+                wanted = in_classes(photons, deposition.sample_classes)
+                sample = photons if wanted is None else photons[wanted]
+            of_caustic = _chosen(_join(caustics), _joined(caustic_normals), deposition.caustic_classes)
+            of_global = _chosen(photons, normals, deposition.global_classes)
+            index = first_index + i0
+            return caustic.judge(*of_caustic, index), global_.judge(*of_global, index), sample, counts, ledger
+
+        return task
+
+    batches = range(0, last, BATCH)
+    for some in rounds(len(batches)) if deposition.in_rounds else [range(len(batches))]:
+        results = run([judged(batches[i]) for i in some])
+        caustic.take([r[0] for r in results], run)
+        global_.take([r[1] for r in results], run)
+        sampled += [r[2] for r in results]
+        counts += sum((r[3] for r in results), np.zeros(N_COUNTS, np.int64))
+        ledger += sum((r[4] for r in results), np.zeros(N_LEDGER))
+    (in_caustic, in_global) = run([lambda: caustic.finish(caustic_unit), lambda: global_.finish(global_unit)])
+    return PhotonMaps(
+        caustic=in_caustic[0],
+        global_=in_global[0],
+        caustic_unit=in_caustic[2],
+        global_unit=in_global[2],
+        emitted=last,
+        rays=int(counts[C_RAYS]),
+        dropped=int(counts[C_DROPPED]),
+        ledger=ledger,
+        normals=in_global[1],
+        caustic_normals=in_caustic[1],
+        sample=_join(sampled),
+        sample_unit=global_unit * max(filling / SAMPLED, 1.0),
+        deposited={"caustic": in_caustic[3], "global": in_global[3]},
+    )
+
+
+def _chosen(photons: Float, normals: Codes, mask: int) -> tuple[Float, Codes]:
+    """Photons of the path classes in the mask, with their normals."""
+    wanted = in_classes(photons, mask)
+    return (photons, normals) if wanted is None else (photons[wanted], normals[wanted])
+
+
+NO_NORMALS, GLOBAL_NORMALS, NORMALS = range(3)
+
+Codes = NDArray[np.uint32]
+_Batch = tuple[list[Float], list[Float], NDArray[np.int64], NDArray[np.float64], list[Codes], list[Codes]]
 
 
 def _trace_batch(
     scene: FlatScene,
     record: NDArray[np.void],
+    projections: NDArray[np.void],
     i0: int,
     i1: int,
     filling: int,
     has_specular: bool,
-    with_normals: bool,
+    with_normals: int,
+    paths: PhotonPaths | None,
 ) -> _Batch:
     """Photons i0 … i1−1, resumed with fresh buffers whenever one is full."""
-    max_bounces = int(record[0]["max_bounces"])
+    where = None if paths is None else paths.arguments
+    most = int(record[0]["max_bounces"])
+    if record[0]["roulette"] == EQUAL:
+        most *= MOST_COPIES
     total, ledger = np.zeros(N_COUNTS, np.int64), np.zeros(N_LEDGER)
     caustic_parts: list[Float] = []
     global_parts: list[Float] = []
-    normal_parts: list[NDArray[np.uint32]] = []
+    normal_parts: list[Codes] = []
+    caustic_normal_parts: list[Codes] = []
     while i0 < i1:
-        rows = 5 * (i1 - i0) + 2 * max_bounces
-        global_out = np.empty((rows if i0 < filling else max_bounces, 6), np.float32)
-        caustic_out = np.empty((rows // 2 + max_bounces if has_specular else max_bounces, 6), np.float32)
-        normals_out = np.empty(len(global_out) if with_normals else 0, np.uint32)
+        rows = 5 * (i1 - i0) + 2 * most
+        global_out = np.empty((rows if i0 < filling else most, 6), np.float32)
+        caustic_out = np.empty((rows // 2 + most if has_specular else most, 6), np.float32)
+        normals_out = (
+            np.empty(len(global_out) if with_normals != NO_NORMALS else 0, np.uint32),
+            np.empty(len(caustic_out) if with_normals == NORMALS else 0, np.uint32),
+        )
         counts = np.zeros(N_COUNTS, np.int64)
-        i0 = trace_photons(scene.record, record, i0, i1, global_out, normals_out, caustic_out, counts, ledger)
+        i0 = trace_photons(
+            scene.record, record, projections, i0, i1, global_out, normals_out, caustic_out, counts, ledger, where
+        )
         global_parts.append(global_out[: counts[C_GLOBAL]].copy())
-        normal_parts.append(normals_out[: counts[C_GLOBAL]].copy())
+        normal_parts.append(normals_out[0][: counts[C_GLOBAL]].copy())
+        caustic_normal_parts.append(normals_out[1][: counts[C_CAUSTIC]].copy())
         caustic_parts.append(caustic_out[: counts[C_CAUSTIC]].copy())
         total += counts
-    return caustic_parts, global_parts, total, ledger, normal_parts
+    return caustic_parts, global_parts, total, ledger, normal_parts, caustic_normal_parts
 
 
 def _join(parts: list[Float]) -> Float:
     return np.ascontiguousarray(np.concatenate(parts)) if parts else np.empty((0, 6), np.float32)
+
+
+def _joined(parts: list[Codes]) -> Codes:
+    return np.concatenate([np.empty(0, np.uint32), *parts])

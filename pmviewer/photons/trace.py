@@ -1,7 +1,7 @@
 """Photon tracing: emission, scattering with Russian roulette, deposition (T1–T6).
 
-Weights stay nearly equal: lights are picked by power, and a photon survives a scattering with the ratio of its power's
-luminance after and before (P §0.2.2), so that survivors keep their power.
+Weights stay nearly equal: lights are picked by power, and roulette decides about scatterings
+(`pmviewer.photons.roulette`).
 
 Random numbers of a photon are keyed by (seed, its index over all passes, dimension): the same photons for any number of
 threads and any batch size (T2). Dimension set 0 is emission, set 1 + b the b-th scattering.
@@ -11,16 +11,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.bsdf import scatter_specular
 from pmviewer.kernels.jit import device, kernel
-from pmviewer.kernels.light import emit_photon
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.raycast import closest_hit
-from pmviewer.kernels.scene import DIFFUSE, material_kind, material_of, material_two_sided, reflectance
-from pmviewer.kernels.surface import leave, surface_at
-from pmviewer.kernels.vector import dot, from_basis, is_good, luminance, mul, scale
-from pmviewer.kernels.warp import square_to_cosine_hemisphere
+from pmviewer.kernels.scattering import (
+    FOLLOWED,
+    NOTHING,
+    STORED,
+    attenuation,
+    bsdf_at,
+    bsdf_sample,
+    pick_group,
+    same_side,
+    shading_normal,
+)
+from pmviewer.kernels.scene import material_of
+from pmviewer.kernels.surface import STRAIGHT, adjoint_cosines, face, leave, surface_at
+from pmviewer.kernels.vector import dot, is_good, luminance, mul, scale
 from pmviewer.maps.record import (
     BOUNCES,
     CAUSTIC,
@@ -30,13 +38,16 @@ from pmviewer.maps.record import (
     encode_direction,
     encode_power,
 )
+from pmviewer.photons.paths import begin_path, extend_path
+from pmviewer.photons.projected import emission
+from pmviewer.photons.roulette import BY_LUMINANCE, EQUAL, MOST_COPIES, copies, survival_probability
 
 _f4 = np.float32
 _f8 = np.float64
 _u4 = np.uint32
 _i8 = np.int64
 _INF = _f4(np.inf)
-LIGHT_CHOICE_SET, STORE_SET = _i8(0xE817), _i8(0x10000)
+LIGHT_CHOICE_SET, STORE_SET, COPIES_SET = _i8(0xE817), _i8(0x10000), _i8(0x20000)
 
 LIGHT_PASS_DTYPE = np.dtype(
     [
@@ -44,10 +55,14 @@ LIGHT_PASS_DTYPE = np.dtype(
         ("first_index", "i8"),  # index over all passes of this pass's photon 0
         ("sequence", "i4"),
         ("max_bounces", "i4"),
+        ("roulette", "i4"),  # index into `pmviewer.photons.roulette.RULES`
+        ("glossy", "f4"),  # roughness from which glossy lobes store photons
         ("global_trajectories", "i8"),  # photons 0 … this−1 of the pass fill the global map
         ("store_probability", "f4"),  # of a global photon (q rule "photons"); 1 otherwise
         ("caustics", "i4"),  # whether the caustic map is filled
         ("indirect_caustics", "i4"),  # whether with photons that met a diffuse surface before, too
+        ("only_direct", "i4"),  # whether the trajectories that don't fill the global map end where they meet it
+        ("indirect_scale", "f4"),  # factor for the power of indirect caustics in the units of the caustic map
     ],
     align=True,
 )
@@ -56,7 +71,8 @@ N_COUNTS = 4
 C_GLOBAL, C_CAUSTIC, C_RAYS, C_DROPPED = range(N_COUNTS)
 N_LEDGER = 5
 E_EMITTED, E_STORED, E_ABSORBED, E_ESCAPED, E_TERMINATED = range(N_LEDGER)
-"""Energy ledger: luminance of power in units of the map's; roulette balances it in the mean."""
+"""Energy ledger: luminance of power in units of the map's. What roulette gives a survivor or takes from a victim counts
+as absorbed, so that the books always balance and each entry is right in the mean."""
 
 
 @device
@@ -69,21 +85,24 @@ def _store(out, row, p, wi, beta, flags, light):
 
 
 @kernel
-def trace_photons(scenes, passes, i0, i1, global_out, normals_out, caustic_out, counts, ledger):
+def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, caustic_out, counts, ledger, paths):
     """Trace photons i0 … i1−1 of a pass.
 
-    scenes: SCENE_DTYPE (1,); passes: LIGHT_PASS_DTYPE (1,); global_out, caustic_out: float32 (capacity, 6), see
-    `pmviewer.maps.record`; normals_out: uint32 (capacity,), receives each global photon's surface normal, or (0,) when
-    nobody needs them; counts: int64 (N_COUNTS,) and ledger: float64 (N_LEDGER,) are added to, `counts[C_GLOBAL]`
-    and `counts[C_CAUSTIC]` being the rows filled so far.
+    scenes: SCENE_DTYPE (1,); passes: LIGHT_PASS_DTYPE (1,); projections: PROJECTION_DTYPE (2,) or NO_PROJECTION, of the
+    trajectories that fill the global map and of the others; global_out, caustic_out: float32 (capacity, 6), see
+    `pmviewer.maps.record`; normals_out: two arrays uint32 (capacity,), receive the surface normals of global and of
+    caustic photons, or (0,) when nobody needs them; counts: int64 (N_COUNTS,) and ledger: float64 (N_LEDGER,) are
+    added to, `counts[C_GLOBAL]` and `counts[C_CAUSTIC]` being the rows filled so far; paths: None, or where to write
+    whole paths (`pmviewer.photons.paths`).
 
     Returns the index of the next photon to trace: less than i1 when a buffer may not hold another photon's path.
     """
     scene = scenes[0]
     pass_ = passes[0]
     max_bounces = pass_.max_bounces
+    most = max_bounces if pass_.roulette != EQUAL else MOST_COPIES * max_bounces
     for i in range(i0, i1):
-        if counts[C_GLOBAL] + max_bounces > len(global_out) or counts[C_CAUSTIC] + max_bounces > len(caustic_out):
+        if counts[C_GLOBAL] + most > len(global_out) or counts[C_CAUSTIC] + most > len(caustic_out):
             return i
         to_global = i < pass_.global_trajectories
         place = np.int64(pass_.first_index) + np.int64(i)
@@ -92,9 +111,14 @@ def trace_photons(scenes, passes, i0, i1, global_out, normals_out, caustic_out, 
             seed = hash3(seed, _u4(place >> 32), _u4(LIGHT_CHOICE_SET))
         u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, _i8(0))
         u_pick = draw1(pass_.sequence, seed, index, LIGHT_CHOICE_SET)
-        p, d, beta, light = emit_photon(scene, u_pick, (u2, u3), (u0, u1))
+        projection = projections[0 if to_global else 1]
+        p, d, beta, light, kept = emission(scene, projection, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1))
         start = luminance(beta)
         ledger[E_EMITTED] += _f8(start)
+        if not kept:
+            ledger[E_ESCAPED] += _f8(start)
+            continue
+        begin_path(paths, i, p, d, beta, light)
         o = p
         flags = _u4(0)
         bounces = 0
@@ -102,59 +126,72 @@ def trace_photons(scenes, passes, i0, i1, global_out, normals_out, caustic_out, 
             t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), _INF)
             counts[C_RAYS] += 1
             if prim < 0:
+                extend_path(paths, i, prim, o, d, beta, _u4(flags | _u4(min(bounces, BOUNCES))), light)
                 ledger[E_ESCAPED] += _f8(luminance(beta))
                 break
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
-            u0, u1, u2, _ = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
-            if material_kind(scene, material) != DIFFUSE:
-                d, weight, _ = scatter_specular(scene, material, ns, d, u0)
-                flags = _u4(flags | _u4(LAST_SPECULAR))
-            else:
-                albedo = reflectance(scene, material)
-                if dot(ng, d) > _f4(0.0):
-                    if not material_two_sided(scene, material):
-                        ledger[E_ABSORBED] += _f8(luminance(beta))
-                        break
-                    ng, ns = scale(ng, _f4(-1.0)), scale(ns, _f4(-1.0))
-                if not albedo[0] + albedo[1] + albedo[2] > _f4(0.0):
-                    ledger[E_ABSORBED] += _f8(luminance(beta))
-                    break
+            beta = attenuation(scene, material, ng, d, t, beta)
+            extend_path(paths, i, prim, p, d, beta, _u4(flags | _u4(min(bounces, BOUNCES))), light)
+            wi = (-d[0], -d[1], -d[2])
+            b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
+            if b.groups == NOTHING:
+                ledger[E_ABSORBED] += _f8(luminance(beta))
+                break
+            ng = face(ng, wi)
+            u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
+            if b.groups & STORED != 0:
                 if not is_good(beta):
                     counts[C_DROPPED] += 1
                     break
-                wi = (-d[0], -d[1], -d[2])
                 path_class = np.int32(flags >> _u4(6))
                 word = _u4(flags | _u4(min(bounces, BOUNCES)))
                 is_caustic = path_class == CAUSTIC or (path_class == INDIRECT_CAUSTIC and pass_.indirect_caustics != 0)
+                times, stored = 1, beta
+                if pass_.roulette == EQUAL:
+                    times, factor = copies(beta, draw1(pass_.sequence, seed, index, COPIES_SET + bounces))
+                    stored = scale(beta, factor)
                 if is_caustic and pass_.caustics != 0:
-                    _store(caustic_out, counts[C_CAUSTIC], p, wi, beta, word, light)
-                    counts[C_CAUSTIC] += 1
+                    in_caustic = stored
+                    if path_class == INDIRECT_CAUSTIC:
+                        in_caustic = scale(stored, pass_.indirect_scale)
+                    for _ in range(times):
+                        _store(caustic_out, counts[C_CAUSTIC], p, wi, in_caustic, word, light)
+                        if len(normals_out[1]) > 0:
+                            normals_out[1][counts[C_CAUSTIC]] = encode_direction(ng[0], ng[1], ng[2])
+                        counts[C_CAUSTIC] += 1
                 if to_global and (
                     pass_.store_probability >= _f4(1.0)
                     or draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
                 ):
-                    _store(global_out, counts[C_GLOBAL], p, wi, beta, word, light)
-                    if len(normals_out) > 0:
-                        normals_out[counts[C_GLOBAL]] = encode_direction(ng[0], ng[1], ng[2])
-                    counts[C_GLOBAL] += 1
+                    for _ in range(times):
+                        _store(global_out, counts[C_GLOBAL], p, wi, stored, word, light)
+                        if len(normals_out[0]) > 0:
+                            normals_out[0][counts[C_GLOBAL]] = encode_direction(ng[0], ng[1], ng[2])
+                        counts[C_GLOBAL] += 1
                 ledger[E_STORED] += _f8(luminance(beta))
-                if not to_global and pass_.indirect_caustics == 0:
-                    ledger[E_TERMINATED] += _f8(luminance(beta))
-                    break
-                local = square_to_cosine_hemisphere(u0, u1)
-                d = from_basis(ns, local[0], local[1], local[2])
-                weight = albedo
-                flags = _u4(HAD_DIFFUSE)
-                if dot(d, ng) <= _f4(0.0):  # the cosine lobe of a shading normal may dip below the surface
-                    weight = (_f4(0.0), _f4(0.0), _f4(0.0))
-            after = mul(beta, weight)
             before = luminance(beta)
-            survival = min(luminance(after) / before, _f4(1.0))
+            group, share, u_lobe = pick_group(b, wi, u_lobe)
+            if group == FOLLOWED:
+                flags = _u4(flags | _u4(LAST_SPECULAR))
+            elif not to_global and pass_.only_direct != 0:
+                ledger[E_TERMINATED] += _f8(before)
+                break
+            else:
+                flags = _u4(HAD_DIFFUSE)
+            d, weight, _, _ = bsdf_sample(scene, b, group, wi, u_lobe, u0, u1)
+            if same_side(b, group, ng, wi, d) == 0:  # the lobe of a shading normal may dip below the surface
+                weight = (_f4(0.0), _f4(0.0), _f4(0.0))
+            elif abs(dot(shading_normal(b), ng)) < STRAIGHT:
+                weight = scale(weight, adjoint_cosines(shading_normal(b), ng, wi, d))
+            after = scale(mul(beta, weight), share)
+            survival = survival_probability(pass_.roulette, before, beta, after)
             if not u2 < survival:
                 ledger[E_ABSORBED] += _f8(before)
                 break
             beta = scale(after, _f4(1.0) / survival)
+            if pass_.roulette != BY_LUMINANCE:  # which keeps it
+                ledger[E_ABSORBED] += _f8(before) - _f8(luminance(beta))
             bounces += 1
             if bounces >= max_bounces:
                 ledger[E_TERMINATED] += _f8(luminance(beta))

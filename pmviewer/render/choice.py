@@ -25,7 +25,7 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.jit import device
-from pmviewer.kernels.light import find_interval, light_probability
+from pmviewer.kernels.light import light_probability
 from pmviewer.kernels.memory import (
     count_trailing_zeros,
     load_f4,
@@ -36,6 +36,7 @@ from pmviewer.kernels.memory import (
     stack_put_f4,
     stack_put_i4,
 )
+from pmviewer.kernels.table import find_interval
 from pmviewer.maps.grid import BLOCK_BYTES, ROW_BYTES, grid_ranges, lanes_between
 from pmviewer.maps.simd import WIDTH, facing8, within8
 from pmviewer.maps.stored import ALL_CLASSES

@@ -1,26 +1,25 @@
-"""Direct light on a diffuse surface: light samples, and the other half of multiple importance sampling (R2).
+"""Direct light on a surface: light samples, and the other half of multiple importance sampling (R2).
 
 Which lights are sampled, and how often, is `pmviewer.render.choice`.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from pmviewer.kernels.jit import device
-from pmviewer.kernels.light import emitted, one_light_pdf, sample_one_light
+from pmviewer.kernels.light import emitted, environment_radiance, one_light_pdf, sample_one_light
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.raycast import occluded
-from pmviewer.kernels.scene import L_RADIANCE, light_of, light_vector
+from pmviewer.kernels.scattering import bsdf_f, bsdf_pdf, compressed, same_side, shading_normal
+from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.surface import leave
-from pmviewer.kernels.vector import add, dot, scale, sub
+from pmviewer.kernels.vector import add, dot, mul, scale, sub
 from pmviewer.render.choice import chosen_light, expected_samples
+from pmviewer.render.shadow import LIT, UNKNOWN, known_visibility
 
 _f4 = np.float32
 _u4 = np.uint32
-INV_PI = _f4(1.0 / math.pi)
 EXTRA_SET = np.int64(1000)
 """Dimension set of the second light sample; further ones follow."""
 BEFORE_LIGHT = _f4(1.0 - 2.0**-13)
@@ -44,44 +43,53 @@ def visible(scene, p, ng, gap, wi, end):
 
 
 @device
-def light_samples(scene, p, ng, ns, gap, choice, n_bsdf, sequence, seed, index, u_pick, u, v):
-    """Irradiance at p by the light samples of the choice, each weighted against n_bsdf cosine-distributed BSDF samples.
+def light_samples(scene, shadows, p, ng, gap, b, group, wo, choice, n_bsdf, sequence, seed, index, u_pick, u, v):
+    """Radiance towards wo from the light samples of the choice, reflected at p by a group of the BSDF b's lobes.
 
-    (u_pick, u, v) are the first sample's numbers; further ones are drawn. Returns E (W/m²) and the shadow rays cast.
+    Each is weighted against n_bsdf BSDF samples of the group (0: no MIS). ng is the geometric normal on the side of wo.
+    (u_pick, u, v) are the first sample's numbers; further ones are drawn. `shadows` is for
+    `known_visibility`. Returns L, the shadow rays cast and those that shadow photons saved.
     """
     total = BLACK
-    rays = 0
+    rays, saved = 0, 0
     for s in range(choice[4]):
         if s > 0:
             u_pick, u, v, _ = draw4(sequence, seed, index, EXTRA_SET + s)
         light, m = chosen_light(scene, choice, s, u_pick)
         wi, end, L, pdf, findable = sample_one_light(scene, light, p, u, v)
-        cos = dot(wi, ns)
-        if m * pdf > _f4(0.0) and cos > _f4(0.0) and dot(wi, ng) > _f4(0.0):
-            rays += 1
-            if visible(scene, p, ng, gap, wi, end):
+        if not m * pdf > _f4(0.0) or same_side(b, group, ng, wo, wi) == 0:
+            continue
+        f = compressed(b, wo, wi, bsdf_f(b, group, wo, wi))
+        cos = abs(dot(wi, shading_normal(b)))
+        if f[0] + f[1] + f[2] > _f4(0.0) and cos > _f4(0.0):
+            known = known_visibility(shadows, p, ng, light)
+            if known == UNKNOWN:
+                rays += 1
+            else:
+                saved += 1
+            if known == LIT or (known == UNKNOWN and visible(scene, p, ng, gap, wi, end)):
                 weight = cos / (m * pdf)
                 if findable and n_bsdf > 0:
-                    weight *= power_heuristic(m, pdf, _f4(n_bsdf), cos * INV_PI)
-                total = add(total, scale(L, weight))
-    return total, rays
+                    weight *= power_heuristic(m, pdf, _f4(n_bsdf), bsdf_pdf(b, group, wo, wi))
+                total = add(total, scale(mul(f, L), weight))
+    return total, rays, saved
 
 
 @device
-def found_light(scene, p, wi, cos, n_bsdf, choice, biased, prim, q, nq):
+def found_light(scene, p, wi, pdf_bsdf, n_bsdf, choice, biased, prim, q, nq):
     """A BSDF sample from p in direction wi found primitive `prim` at q with geometric normal nq (prim < 0: nothing).
 
-    Its emission (radiance), weighted against the light samples of the choice; a biased choice leaves the lights that it
-    does not sample out of both halves.
+    Its emission (radiance), weighted against the light samples of the choice, where `pdf_bsdf` is the density of the
+    BSDF sample; a biased choice leaves the lights that it does not sample out of both halves.
     """
     light = scene.environment if prim < 0 else light_of(scene, prim)
     if light < 0:
         return BLACK
-    L = light_vector(scene, light, L_RADIANCE) if prim < 0 else emitted(scene, light, nq, wi)
+    L = environment_radiance(scene, wi) if prim < 0 else emitted(scene, light, prim, q, nq, wi)
     if not L[0] + L[1] + L[2] > _f4(0.0):
         return BLACK
     m = expected_samples(scene, choice, light)
     if biased != 0 and not m > _f4(0.0):
         return BLACK
     pdf = one_light_pdf(scene, light, p, q, nq, wi)
-    return scale(L, power_heuristic(_f4(n_bsdf), cos * INV_PI, m, pdf))
+    return scale(L, power_heuristic(_f4(n_bsdf), pdf_bsdf, m, pdf))

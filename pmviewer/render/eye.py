@@ -1,41 +1,43 @@
 """The eye pass: one sample per pixel of Jensen's four-way split (R1), from the maps of this pass.
 
-From the camera, mirrors and glass are followed to the first diffuse surface. There, direct light is sampled, caustics
-come from the caustic map, and indirect light from the global map: shown directly (`progressive`) or by a final gather,
-BSDF-sampled rays that look the map up where they land (`gather`), or radiance photons near there (R3).
+From the camera, mirrors, glass and smooth glossy lobes are followed. Wherever a surface has lobes that photons are
+stored for, direct light is sampled, caustics come from the caustic map, and indirect light from the global map: shown
+directly (`progressive`) or by a final gather (`gather`, see `pmviewer.render.gather`). A surface with lobes of both
+kinds does both, so that a chain may light up at every surface it meets.
 
 Random numbers of a pixel are Owen-scrambled Sobol points over the passes, keyed by (seed, pixel): dimension set 0 is
-the place in the pixel and on the light, 1 the choice of light and the BSDF sample, 2 + d the specular choice at depth
-d.
+the place in the pixel and on the light, 1 the choice of light and the BSDF sample, 2 + d the lobe followed at depth d.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.bsdf import scatter_specular
 from pmviewer.kernels.jit import device, kernel
-from pmviewer.kernels.light import emitted
+from pmviewer.kernels.light import emitted, environment_radiance
 from pmviewer.kernels.memory import stack_i4
-from pmviewer.kernels.random import draw1, draw4, hash3
+from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.raycast import closest_hit
-from pmviewer.kernels.scene import (
-    DIFFUSE,
-    L_RADIANCE,
-    light_of,
-    light_vector,
-    material_kind,
-    material_of,
-    material_two_sided,
-    reflectance,
+from pmviewer.kernels.scattering import (
+    FOLLOWED,
+    NOTHING,
+    STORED,
+    attenuation,
+    bsdf_at,
+    bsdf_sample,
+    chain_numbers,
+    is_delta,
+    shading_normal,
 )
+from pmviewer.kernels.scene import light_of, material_of
 from pmviewer.kernels.surface import face, leave, surface_at
-from pmviewer.kernels.vector import add, dot, from_basis, is_good, largest, mul, normalize, scale
-from pmviewer.kernels.warp import square_to_cosine_hemisphere
+from pmviewer.kernels.vector import add, dot, is_good, largest, mul, normalize, scale
+from pmviewer.render.cached import cached, surface_rays
 from pmviewer.render.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near
-from pmviewer.render.direct import BLACK, INV_PI, found_light, light_samples
-from pmviewer.render.lookup import gathered_irradiance, irradiance
-from pmviewer.render.record import C_DROPPED, C_RAYS, C_SHADOW_RAYS
+from pmviewer.render.direct import BLACK, found_light, light_samples
+from pmviewer.render.guide import AIM_WORDS, aim
+from pmviewer.render.record import C_DROPPED, C_RAYS, C_SAVED, C_SHADOW_RAYS
+from pmviewer.render.reflect import reflected
 
 _f4 = np.float32
 _f8 = np.float64
@@ -44,7 +46,9 @@ _INF = _f4(np.inf)
 
 EMISSION, DIRECT, SPECULAR, CAUSTIC, INDIRECT = 0, 3, 6, 9, 12
 ALBEDO, NORMAL, DEPTH = 15, 18, 21
-PIXEL_SET, BSDF_SET, CHAIN_SET, GATHER_SET, GATHER_CHAIN_SET = np.array([0, 1, 2, 2000, 3000], np.int64)
+PIXEL_SET, BSDF_SET, CHAIN_SET, CHAIN_LIGHT_SET, OUTLINE_SET = np.array([0, 1, 2, 4000, 5000], np.int64)
+FORKS = 3
+"""Chains that fork go on at least so deep before they are thinned out."""
 
 
 @device
@@ -90,62 +94,56 @@ def properties(scene, film, eye, pixel, albedo, n, p):
 
 
 @device
-def bsdf_ray(scene, p, ng, gap, wi):
-    """What a ray from the surface point p in direction wi meets: primitive (−1: nothing), point, normals, gap."""
-    o = leave(p, ng, gap, wi[0], wi[1], wi[2])
-    t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], wi[0], wi[1], wi[2], _f4(0.0), _INF)
-    if prim < 0:
-        return prim, o, wi, wi, gap
-    q, nq, sq, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], wi[0], wi[1], wi[2], t)
-    return prim, q, nq, sq, gap
-
-
-@device
-def gather_light(scene, eye, photons, sites, prim, q, nq, sq, gap, d, seed, index):
-    """Radiance that a gather ray brings back: the global map's at the first diffuse surface, on the side it hit.
-
-    Mirrors and glass end the ray unless the map holds what they reflect (`gather_specular`). Returns L and rays cast.
-    """
-    beta = (_f4(1.0), _f4(1.0), _f4(1.0))
-    rays = 0
-    for depth in range(eye.max_depth):
+def outline_emission(scene, eye, pixel, seed):
+    """Mean radiance that camera rays through the pixel meet at lights and the environment."""
+    total = BLACK
+    for j in range(eye.outline_rays):
+        ux, uy, _, _ = draw4(eye.sequence, seed, _u4(eye.index * _u4(eye.outline_rays) + _u4(j)), OUTLINE_SET)
+        d, near, far = camera_ray(eye, pixel, ux, uy)
+        o = (eye.x_eye, eye.y_eye, eye.z_eye)
+        t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], near, far)
         if prim < 0:
-            return BLACK, rays
-        material = material_of(scene, prim)
-        if material_kind(scene, material) == DIFFUSE:
-            if dot(nq, d) > _f4(0.0) and not material_two_sided(scene, material):
-                return BLACK, rays
-            albedo = reflectance(scene, material)
-            if not albedo[0] + albedo[1] + albedo[2] > _f4(0.0):
-                return BLACK, rays
-            n = face(nq, scale(d, _f4(-1.0)))
-            E = gathered_irradiance(photons, sites, eye, q, n)
-            return scale(mul(mul(beta, albedo), E), INV_PI), rays
-        if eye.gather_specular == 0:
-            return BLACK, rays
-        u = draw1(eye.sequence, seed, index, GATHER_CHAIN_SET + depth)
-        d, weight, compression = scatter_specular(scene, material, sq, d, u)
-        beta = scale(mul(beta, weight), compression)
-        if not largest(beta) > _f4(0.0):
-            return BLACK, rays
-        rays += 1
-        prim, q, nq, sq, gap = bsdf_ray(scene, q, nq, gap, d)
-    return BLACK, rays
+            if scene.environment >= 0:
+                total = add(total, environment_radiance(scene, d))
+        elif light_of(scene, prim) >= 0:
+            p, ng, _, _ = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
+            total = add(total, emitted(scene, light_of(scene, prim), prim, p, ng, d))
+    return scale(total, _f4(1.0) / _f4(eye.outline_rays))
 
 
 @kernel
-def eye_pass(scenes, eyes, caustic_maps, global_maps, choice_maps, site_maps, film, counts, first, last):
+def eye_pass(
+    scenes,
+    eyes,
+    caustic_maps,
+    global_maps,
+    choice_maps,
+    site_maps,
+    caches,
+    shadow_maps,
+    guide_maps,
+    corners,
+    outline,
+    film,
+    counts,
+    first,
+    last,
+):
     """Add one sample to each of the pixels first … last−1.
 
     scenes: SCENE_DTYPE (1,); eyes: EYE_DTYPE (1,); caustic_maps, global_maps: records (1,) of grids or kd-trees;
     choice_maps: record (1,) of the grid of photons that choose lights;
-    site_maps: record (1,) of the radiance photons, or NO_SITES;
+    site_maps: record (1,) of the radiance photons, or NO_SITES; caches: of the irradiance cache, or NO_CACHE;
+    shadow_maps: of the shadow photons, or NO_SHADOWS;
+    guide_maps: record (1,) of the photons that guide gather rays, or NO_GUIDES; corners: CORNERS or NO_CORNERS;
+    outline: uint8 (pixels,), 1 where emission gets camera rays of its own (`pmviewer.render.outline`), or (0,);
     film: float64 (pixels, CHANNELS), see `pmviewer.render.planes`; counts: int64 (N_COUNTS,).
     """
     scene, eye = scenes[0], eyes[0]
     caustic_map, global_map = caustic_maps[0], global_maps[0]
-    choice_map, sites = choice_maps[0], site_maps[0]
-    lights = stack_i4(LIST_WORDS)
+    choice_map, sites, cache, shadows = choice_maps[0], site_maps[0], caches[0], shadow_maps[0]
+    guides, corner = guide_maps[0], corners[0]
+    lights, found = stack_i4(LIST_WORDS), stack_i4(AIM_WORDS)
     index = eye.index
     for pixel in range(first, last):
         seed = pixel_seed(eye, pixel)
@@ -153,88 +151,161 @@ def eye_pass(scenes, eyes, caustic_maps, global_maps, choice_maps, site_maps, fi
         d, near, far = camera_ray(eye, pixel, ux, uy)
         o = (eye.x_eye, eye.y_eye, eye.z_eye)
         beta = (_f4(1.0), _f4(1.0), _f4(1.0))
+        outlined = len(outline) > 0 and outline[pixel] != 0
+        if outlined:
+            deposit(film, counts, pixel, EMISSION, outline_emission(scene, eye, pixel, seed))
+            counts[C_RAYS] += eye.outline_rays
+        left, pdf = o, _f4(0.0)  # where, and with which density, a lobe was left that is not a delta
+        choice = choose_by_power(lights, eye.light_samples)
         for depth in range(eye.max_depth + 1):
             t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], near, far)
             counts[C_RAYS] += 1
-            seen = EMISSION if depth == 0 else SPECULAR
+            whole = depth == 0
+            seen = EMISSION if whole else SPECULAR
             if prim < 0:
                 if scene.environment >= 0:
-                    L = light_vector(scene, scene.environment, L_RADIANCE)
-                    deposit(film, counts, pixel, seen, mul(beta, L))
+                    L = environment_radiance(scene, d)
+                    if pdf > _f4(0.0):
+                        L = found_light(scene, left, d, pdf, eye.mis, choice, eye.biased, prim, o, d)
+                    if not (whole and outlined):
+                        deposit(film, counts, pixel, seen, mul(beta, L))
                 break
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             wo = (-d[0], -d[1], -d[2])
             material = material_of(scene, prim)
-            albedo = reflectance(scene, material)
-            if depth == 0:
-                properties(scene, film, eye, pixel, albedo, face(ns, wo), p)
+            beta = attenuation(scene, material, ng, d, t, beta)
+            b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, eye.glossy)
+            if whole:
+                properties(scene, film, eye, pixel, b.albedo, face(shading_normal(b), wo), p)
             light = light_of(scene, prim)
-            if light >= 0:
-                deposit(film, counts, pixel, seen, mul(beta, emitted(scene, light, ng, d)))
-            if material_kind(scene, material) != DIFFUSE:
-                if depth == eye.max_depth:
-                    break
-                choice = draw1(eye.sequence, seed, index, CHAIN_SET + depth)
-                d, weight, compression = scatter_specular(scene, material, ns, d, choice)
-                beta = scale(mul(beta, weight), compression)
-                if not largest(beta) > _f4(0.0):
-                    break
-                o = leave(p, ng, gap, d[0], d[1], d[2])
-                near, far = _f4(0.0), _INF
-                continue
-            if dot(ng, d) > _f4(0.0):
-                if not material_two_sided(scene, material):
-                    break
-                ng, ns = scale(ng, _f4(-1.0)), scale(ns, _f4(-1.0))
-            beta = mul(beta, albedo)
-            if not largest(beta) > _f4(0.0):
+            if light >= 0 and not (whole and outlined):
+                L = emitted(scene, light, prim, p, ng, d)
+                if pdf > _f4(0.0):
+                    L = found_light(scene, left, d, pdf, eye.mis, choice, eye.biased, prim, p, ng)
+                deposit(film, counts, pixel, seen, mul(beta, L))
+            if b.groups == NOTHING:
                 break
-            per_E = scale(beta, INV_PI)
-            u_pick, bu, bv, _ = draw4(eye.sequence, seed, index, BSDF_SET)
-            n_bsdf = 0
-            if eye.mis != 0:
-                n_bsdf = max(eye.gather_rays, 1)
-            choice = choose_by_power(lights, eye.light_samples)
-            if eye.direct != 0:
-                if eye.choice != BY_POWER:
-                    choice = choose_near(scene, eye, choice_map, p, ng, lights)
-                E, rays = light_samples(
-                    scene, p, ng, ns, gap, choice, n_bsdf, eye.sequence, seed, index, u_pick, lu, lv
+            ng = face(ng, wo)
+            if b.groups & STORED != 0:
+                u_pick, bu, bv, u_lobe = draw4(eye.sequence, seed, index, BSDF_SET)
+                known, gather = cached(cache, eye, p, b, counts)
+                guided, m = 0, 0
+                if gather > 0:
+                    guided, m = aim(guides, eye, p, ng, b, wo, seed, found)
+                n_bsdf = 0
+                if eye.mis != 0:
+                    n_bsdf = max(gather - guided, 1)
+                choice = choose_by_power(lights, eye.light_samples)
+                if eye.direct != 0:
+                    if eye.choice != BY_POWER:
+                        choice = choose_near(scene, eye, choice_map, p, ng, lights)
+                    L, rays, saved = light_samples(
+                        scene,
+                        shadows,
+                        p,
+                        ng,
+                        gap,
+                        b,
+                        STORED,
+                        wo,
+                        choice,
+                        n_bsdf,
+                        eye.sequence,
+                        seed,
+                        index,
+                        u_pick,
+                        lu,
+                        lv,
+                    )
+                    counts[C_RAYS] += rays
+                    counts[C_SHADOW_RAYS] += rays
+                    counts[C_SAVED] += saved
+                    deposit(film, counts, pixel, DIRECT if whole else SPECULAR, mul(beta, L))
+                if eye.caustic_mask != 0:
+                    L = reflected(caustic_map, eye, eye.caustic_radius, p, ng, b, wo, eye.caustic_mask)
+                    deposit(film, counts, pixel, CAUSTIC if whole else SPECULAR, mul(beta, L))
+                if eye.global_mask != 0:
+                    L = reflected(global_map, eye, eye.global_radius, p, ng, b, wo, eye.global_mask)
+                    deposit(film, counts, pixel, INDIRECT if whole else SPECULAR, mul(beta, L))
+                n = gather
+                if eye.direct != 0:
+                    n = max(n, n_bsdf)
+                if eye.gather_rays > 0:
+                    n = max(n, 1)
+                if n > 0:
+                    direct, indirect = surface_rays(
+                        cache,
+                        known,
+                        gather,
+                        scene,
+                        eye,
+                        global_map,
+                        sites,
+                        guides,
+                        corner,
+                        shadows,
+                        caustic_map,
+                        choice_map,
+                        choice,
+                        found,
+                        guided,
+                        m,
+                        beta,
+                        p,
+                        ng,
+                        gap,
+                        b,
+                        wo,
+                        n,
+                        u_lobe,
+                        bu,
+                        bv,
+                        seed,
+                        counts,
+                    )
+                    share = scale(beta, _f4(1.0) / _f4(n))
+                    deposit(film, counts, pixel, DIRECT if whole else SPECULAR, mul(share, direct))
+                    if eye.gather_rays > 0:
+                        deposit(film, counts, pixel, INDIRECT if whole else SPECULAR, mul(share, indirect))
+            if b.groups & FOLLOWED == 0 or depth == eye.max_depth:
+                break
+            u_lobe, bu, bv, u_end = chain_numbers(scene, eye.sequence, seed, index, CHAIN_SET + depth)
+            if not is_delta(b) and eye.direct != 0:
+                choice = choose_by_power(lights, eye.light_samples)
+                u_pick, cu, cv, _ = draw4(eye.sequence, seed, index, CHAIN_LIGHT_SET + depth)
+                L, rays, saved = light_samples(
+                    scene,
+                    shadows,
+                    p,
+                    ng,
+                    gap,
+                    b,
+                    FOLLOWED,
+                    wo,
+                    choice,
+                    eye.mis,
+                    eye.sequence,
+                    seed,
+                    index,
+                    u_pick,
+                    cu,
+                    cv,
                 )
                 counts[C_RAYS] += rays
                 counts[C_SHADOW_RAYS] += rays
-                deposit(film, counts, pixel, DIRECT if depth == 0 else SPECULAR, mul(per_E, E))
-            if eye.caustic_mask != 0:
-                E = irradiance(caustic_map, eye, eye.caustic_radius, p, ng, eye.caustic_mask)
-                deposit(film, counts, pixel, CAUSTIC if depth == 0 else SPECULAR, mul(per_E, E))
-            if eye.global_mask != 0:
-                E = irradiance(global_map, eye, eye.global_radius, p, ng, eye.global_mask)
-                deposit(film, counts, pixel, INDIRECT if depth == 0 else SPECULAR, mul(per_E, E))
-            bsdf_rays = eye.gather_rays
-            if eye.direct != 0:
-                bsdf_rays = max(bsdf_rays, n_bsdf)
-            direct, indirect = BLACK, BLACK
-            for j in range(bsdf_rays):
-                sample = index
-                if eye.gather_rays > 0:
-                    sample = _u4(index * _u4(eye.gather_rays) + _u4(j))
-                    bu, bv, _, _ = draw4(eye.sequence, seed, sample, GATHER_SET)
-                local = square_to_cosine_hemisphere(bu, bv)
-                wi = from_basis(ns, local[0], local[1], local[2])
-                if dot(wi, ng) <= _f4(0.0):
-                    continue
-                counts[C_RAYS] += 1
-                hit, q, nq, sq, far_gap = bsdf_ray(scene, p, ng, gap, wi)
-                if eye.direct != 0 and eye.mis != 0:
-                    L = found_light(scene, p, wi, local[2], bsdf_rays, choice, eye.biased, hit, q, nq)
-                    direct = add(direct, L)
-                if eye.gather_rays > 0:
-                    L, rays = gather_light(scene, eye, global_map, sites, hit, q, nq, sq, far_gap, wi, seed, sample)
-                    counts[C_RAYS] += rays
-                    indirect = add(indirect, L)
-            if bsdf_rays > 0:
-                share = scale(beta, _f4(1.0) / _f4(bsdf_rays))
-                deposit(film, counts, pixel, DIRECT if depth == 0 else SPECULAR, mul(share, direct))
-                if eye.gather_rays > 0:
-                    deposit(film, counts, pixel, INDIRECT if depth == 0 else SPECULAR, mul(share, indirect))
-            break
+                counts[C_SAVED] += saved
+                deposit(film, counts, pixel, SPECULAR, mul(beta, L))
+            d, weight, pdf, compression = bsdf_sample(scene, b, FOLLOWED, wo, u_lobe, bu, bv)
+            if eye.direct == 0:
+                pdf = _f4(0.0)
+            beta = scale(mul(beta, weight), compression)
+            if b.groups & STORED != 0 and depth >= FORKS:
+                survival = min(largest(beta), _f4(1.0))
+                if not u_end < survival:
+                    break
+                beta = scale(beta, _f4(1.0) / survival)
+            if not largest(beta) > _f4(0.0):
+                break
+            left = p
+            o = leave(p, ng, gap, d[0], d[1], d[2])
+            near, far = _f4(0.0), _INF

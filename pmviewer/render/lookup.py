@@ -1,6 +1,7 @@
 """One look-up for both kinds of map: a grid searches the pass's radius, a kd-tree the k nearest photons.
 
-Kernels are compiled for the kind of map they are given, so that nobody compiles a search that is not used.
+Kernels are compiled for the kind of map they are given and for the mark it may bear (`pmviewer.maps.variant`), so that
+nobody compiles a search or an estimate that is not used.
 """
 
 from __future__ import annotations
@@ -8,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numba.extending import overload
 
+from pmviewer.maps.differential import checked_irradiance
 from pmviewer.maps.estimate import irradiance_knn, irradiance_radius
+from pmviewer.maps.hull import hull_irradiance
 from pmviewer.maps.radiance import UNKNOWN, nearest_site, site_irradiance, site_place, site_slot, store_irradiance
 from pmviewer.maps.stored import ALL_CLASSES
 
@@ -24,6 +27,20 @@ def irradiance(photons, eye, radius, p, n, class_mask):
 
 @overload(irradiance)
 def _irradiance(photons, eye, radius, p, n, class_mask):
+    if "hull" in photons.fields:
+
+        def by_hull(photons, eye, radius, p, n, class_mask):
+            return hull_irradiance(photons, eye, radius, p, n, class_mask)
+
+        return by_hull
+
+    if "differential" in photons.fields:
+
+        def checked(photons, eye, radius, p, n, class_mask):
+            return checked_irradiance(photons, eye, radius, p, n, class_mask)
+
+        return checked
+
     if "planes" in photons.fields:
 
         def nearest(photons, eye, radius, p, n, class_mask):

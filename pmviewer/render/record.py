@@ -21,6 +21,8 @@ EYE_DTYPE = np.dtype(
         ("seed", "u4"),
         ("index", "u4"),  # the pass: the sample index of every pixel's sequences
         ("max_depth", "i4"),
+        ("glossy", "f4"),  # roughness from which glossy lobes are looked up
+        ("outline_rays", "i4"),  # camera rays for emission in pixels on a light's outline
         ("direct", "i4"),  # whether direct light is sampled
         ("light_samples", "i4"),
         ("mis", "i4"),
@@ -33,11 +35,16 @@ EYE_DTYPE = np.dtype(
         ("global_mask", "i4"),  # path classes shown directly from the global map
         ("gather_rays", "i4"),  # final-gather rays, 0 for none
         ("gather_specular", "i4"),  # whether gather rays follow mirrors and glass
+        ("guided_rays", "i4"),  # how many of them photons guide
+        ("guide_mask", "i4"),  # path classes of these photons
+        ("roulette", "f4"),  # gather rays that may bring less than this are thinned out
+        ("corner", "f4"),  # gather rays shorter than this gather again where they land
         ("filter", "i4"),
         ("rim", "i4"),
         ("k", "i4"),
         ("cone_k", "f4"),
         ("flatness", "f4"),
+        ("boundary", "f4"),  # what photons on a convex hull's boundary count
         ("caustic_radius", "f4"),
         ("global_radius", "f4"),
         ("site_radius", "f4"),  # radiance photons farther away are not used
@@ -48,9 +55,11 @@ EYE_DTYPE = np.dtype(
 
 RIMS = ("left out", "half", "whole")
 
-N_COUNTS = 3
-C_RAYS, C_SHADOW_RAYS, C_DROPPED = range(N_COUNTS)
-"""All rays, those of them that test visibility towards a light sample, and samples dropped."""
+N_COUNTS = 6
+C_RAYS, C_SHADOW_RAYS, C_DROPPED, C_SAVED, C_CACHED, C_GATHERED = range(N_COUNTS)
+"""All rays, those of them that test visibility towards a light sample, samples dropped, and shadow rays not cast,
+because shadow photons know; with an irradiance cache, surface points that it served and those that gathered
+themselves."""
 
 
 def eye_record(camera: CameraPose, settings: Settings, index: int) -> NDArray[np.void]:
@@ -65,11 +74,14 @@ def eye_record(camera: CameraPose, settings: Settings, index: int) -> NDArray[np
     r["width"], r["height"] = camera.width, camera.height
     r["sequence"], r["seed"], r["index"] = SOBOL, settings.render.seed & 0xFFFFFFFF, index & 0xFFFFFFFF
     r["max_depth"] = settings.render.max_depth
+    r["outline_rays"] = settings.render.outline_rays
+    r["glossy"] = settings.photons.glossy
     direct = settings.direct
     r["light_samples"], r["mis"] = direct.samples, direct.mis
     r["con_samples"], r["noncon_samples"] = direct.con_samples, direct.noncon_samples
     estimate = settings.estimate
     r["filter"], r["rim"], r["k"] = FILTERS.index(estimate.filter), RIMS.index(estimate.rim), estimate.k
-    r["cone_k"], r["flatness"] = estimate.cone_k, estimate.flatness
+    r["cone_k"], r["flatness"], r["boundary"] = estimate.cone_k, estimate.flatness, estimate.boundary
+    r["roulette"] = settings.gather.roulette
     r["site_similarity"] = settings.gather.similarity
     return record

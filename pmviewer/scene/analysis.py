@@ -4,38 +4,72 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pmviewer.scene.description import ConstantEnvironment, Material, Scene
+from pmviewer.scene.description import Environment, Material, Scene
+from pmviewer.scene.material_row import is_rich, used_materials
 
 
 @dataclass(frozen=True)
 class SceneTraits:
-    """`has_specular`: a mirror or glass that can make caustics; `has_diffuse`: a surface that photons can be stored on;
-    `many_lights`: more than one light to choose from."""
+    """`has_specular`: a smooth or transparent surface that can make caustics; `has_diffuse`: a surface that photons can
+    be stored on whatever the settings; `many_lights`: more than one light to choose from; `rich`: materials beyond
+    diffuse, mirrors that reflect the same at all angles, and clear smooth glass.
+
+    `glossy_roughness`: the roughness of every glossy reflection, ascending; those below the setting `glossy` are
+    followed like mirrors, the others store photons.
+    """
 
     has_specular: bool
     has_diffuse: bool
     has_environment: bool
     has_smooth_normals: bool
     n_lights: int
+    rich: bool = False
+    glossy_roughness: tuple[float, ...] = ()
 
     @property
     def many_lights(self) -> bool:
         return self.n_lights > 1
 
+    def follows(self, glossy: float) -> bool:
+        """Are lobes followed, so that there may be caustics, when roughness from `glossy` on is stored?"""
+        return self.has_specular or any(alpha < glossy for alpha in self.glossy_roughness)
 
-def _scatters_specularly(material: Material) -> bool:
+    def stores(self, glossy: float) -> bool:
+        """Are photons stored for any lobe, when roughness from `glossy` on is stored?"""
+        return self.has_diffuse or any(alpha >= glossy for alpha in self.glossy_roughness)
+
+
+def glossy_roughness(material: Material) -> float | None:
+    """Roughness of the material's glossy reflection as kernels compare it with the setting; None without one."""
+    glossy = {"rough conductor": material.reflectance, "rough plastic": material.specular}
+    glossy |= {"schlick": material.specular, "ward": material.specular}
+    if material.kind not in glossy or not max(glossy[material.kind]) > 0:
+        return None
+    return min(material.alpha)
+
+
+def _always_followed(material: Material) -> bool:
     if material.kind == "conductor":
         return max(material.reflectance) > 0
-    return material.kind == "dielectric" and max(*material.reflectance, *material.transmittance) > 0
+    if material.kind == "plastic":
+        return max(material.specular) > 0
+    return material.transparent and max(*material.reflectance, *material.transmittance) > 0
+
+
+def _has_diffuse_lobe(material: Material) -> bool:
+    based = ("diffuse", "plastic", "rough plastic", "schlick", "ward")
+    return material.kind in based and max(material.reflectance) > 0
 
 
 def analyse(scene: Scene) -> SceneTraits:
     """Traits of what is actually used by the scene's shapes."""
-    used = [scene.materials[i] for i in {s.material for s in scene.shapes}]
+    used = used_materials(scene)
     return SceneTraits(
-        has_specular=any(_scatters_specularly(m) for m in used),
-        has_diffuse=any(m.kind == "diffuse" and max(m.reflectance) > 0 for m in used),
-        has_environment=any(isinstance(light, ConstantEnvironment) for light in scene.lights),
-        has_smooth_normals=any(getattr(s.geometry, "normals", None) is not None for s in scene.shapes),
+        has_specular=any(_always_followed(m) for m in used),
+        has_diffuse=any(_has_diffuse_lobe(m) for m in used),
+        has_environment=any(isinstance(light, Environment) for light in scene.lights),
+        has_smooth_normals=any(getattr(s.geometry, "normals", None) is not None for s in scene.all_shapes),
         n_lights=len(scene.lights) + sum(s.radiance is not None and max(s.radiance) > 0 for s in scene.shapes),
+        rich=is_rich(scene),
+        glossy_roughness=tuple(sorted({a for m in used if (a := glossy_roughness(m)) is not None})),
     )

@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError
 from pmviewer.scene.description import (
     Camera,
-    ConstantEnvironment,
     Cylinder,
     Disk,
     Geometry,
+    Light,
     Mesh,
     Parallelogram,
-    PointLight,
     Shape,
     Sphere,
 )
 from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.emission import emitted_power
 
 LARGEST_SIDE = 16384
 """Pixels; the camera's settings have the same bound."""
@@ -55,7 +55,8 @@ def clean_shapes(shapes: list[Shape], diagnostics: Diagnostics) -> tuple[Shape, 
         if radiance is not None and not max(radiance) > 0:
             diagnostics.dropped["light of no power"] += 1
             radiance = None
-        kept.append(replace(shape, geometry=geometry, radiance=radiance))
+        emission = None if radiance is None else shape.emission
+        kept.append(replace(shape, geometry=geometry, radiance=radiance, emission=emission))
     return tuple(kept)
 
 
@@ -63,14 +64,11 @@ def _kind(geometry: Geometry) -> str:
     return type(geometry).__name__.lower()
 
 
-def clean_lights(
-    lights: list[PointLight | ConstantEnvironment], diagnostics: Diagnostics
-) -> tuple[PointLight | ConstantEnvironment, ...]:
+def clean_lights(lights: list[Light], diagnostics: Diagnostics) -> tuple[Light, ...]:
     """Lights that emit something."""
     kept = []
     for light in lights:
-        power = light.intensity if isinstance(light, PointLight) else light.radiance
-        if max(power) > 0:
+        if emitted_power(light, 1.0).max() > 0:
             kept.append(light)
         else:
             diagnostics.dropped["light of no power"] += 1
@@ -128,7 +126,8 @@ def clean_mesh(mesh: Mesh, dropped: Counter[str]) -> Mesh | None:
     normals = mesh.normals
     if normals is not None:
         normals = _mended(Mesh(vertices, faces, normals))[used]
-    return Mesh(np.ascontiguousarray(vertices[used]), index.reshape(-1, 3).astype(np.int32), normals)
+    uv = None if mesh.uv is None else np.nan_to_num(mesh.uv[used], posinf=0.0, neginf=0.0)
+    return Mesh(np.ascontiguousarray(vertices[used]), index.reshape(-1, 3).astype(np.int32), normals, uv)
 
 
 def _flat(corners: NDArray[np.float64]) -> NDArray[np.bool_]:

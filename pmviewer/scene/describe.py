@@ -11,17 +11,29 @@ from pmviewer.scene.description import (
     RGB,
     ConstantEnvironment,
     Cylinder,
+    DirectionalLight,
     Disk,
     Geometry,
+    ImageEnvironment,
     Material,
     Mesh,
     Parallelogram,
     PointLight,
     Scene,
+    Shape,
+    SpotLight,
 )
-from pmviewer.scene.framing import bounds
+from pmviewer.scene.emission import emitted_power
+from pmviewer.scene.instances import joint_bounds
 
 _LISTED = 8
+_LIGHT_KINDS = {
+    PointLight: "point light",
+    SpotLight: "spot light",
+    DirectionalLight: "directional light",
+    ConstantEnvironment: "constant environment",
+    ImageEnvironment: "image environment",
+}
 
 
 def area(geometry: Geometry) -> float:
@@ -41,13 +53,14 @@ def area(geometry: Geometry) -> float:
 
 def describe(scene: Scene) -> list[tuple[str, str]]:
     """Label and text of every line worth showing; warnings and dropped things come last, one line each."""
-    low, high = bounds(scene.shapes)
+    low, high = joint_bounds(scene.shapes, scene.instances)
     size, radius = high - low, float(np.linalg.norm(high - low)) / 2
     rows = [("scene", scene.name)]
     if scene.path is not None:
         rows.append(("file", str(scene.path)))
     rows += [
-        ("surfaces", _surfaces(scene)),
+        ("surfaces", _surfaces(scene.shapes) or "none"),
+        *_instances(scene),
         ("bounds", f"{_numbers(low)} to {_numbers(high)}, size {' × '.join(f'{s:.4g}' for s in size)}"),
         ("materials", _materials(scene)),
         *_lights(scene, radius),
@@ -74,22 +87,40 @@ def _plural(count: int, noun: str) -> str:
     return f"{count:,} {noun}" + ("" if count == 1 else "s")
 
 
-def _surfaces(scene: Scene) -> str:
-    triangles = sum(len(s.geometry.faces) for s in scene.shapes if isinstance(s.geometry, Mesh))
-    meshes = sum(isinstance(s.geometry, Mesh) for s in scene.shapes)
-    smooth = sum(isinstance(s.geometry, Mesh) and s.geometry.normals is not None for s in scene.shapes)
+def _elements(shapes: tuple[Shape, ...]) -> int:
+    """Triangles and round shapes that are stored for these."""
+    counts = {Mesh: lambda g: len(g.faces), Parallelogram: lambda g: 2}
+    return sum(counts.get(type(s.geometry), lambda g: 1)(s.geometry) for s in shapes)
+
+
+def _instances(scene: Scene) -> list[tuple[str, str]]:
+    if not scene.instances:
+        return []
+    in_group = {group: _elements(group.shapes) for group in scene.groups}
+    total = _elements(scene.shapes) + sum(in_group[instance.group] for instance in scene.instances)
+    stored = _elements(scene.all_shapes)
+    groups = "; ".join(f"{group.name}: {_surfaces(group.shapes)}" for group in scene.groups[:_LISTED])
+    more = " …" if len(in_group) > _LISTED else ""
+    copies = f"{_plural(len(scene.instances), 'copy').replace('copys', 'copies')} of {_plural(len(in_group), 'group')}"
+    return [("instances", f"{copies} ({groups}{more})"), ("elements", f"{total:,} to be hit, {stored:,} stored")]
+
+
+def _surfaces(shapes: tuple[Shape, ...]) -> str:
+    triangles = sum(len(s.geometry.faces) for s in shapes if isinstance(s.geometry, Mesh))
+    meshes = sum(isinstance(s.geometry, Mesh) for s in shapes)
+    smooth = sum(isinstance(s.geometry, Mesh) and s.geometry.normals is not None for s in shapes)
     parts = []
     if meshes:
         shading = f", {smooth} smooth" if smooth else ""
         where = "1 mesh" if meshes == 1 else f"{meshes} meshes"
         parts.append(f"{_plural(triangles, 'triangle')} in {where}{shading}")
-    kinds = Counter(type(s.geometry).__name__.lower() for s in scene.shapes if not isinstance(s.geometry, Mesh))
+    kinds = Counter(type(s.geometry).__name__.lower() for s in shapes if not isinstance(s.geometry, Mesh))
     parts += [_plural(count, kind) for kind, count in sorted(kinds.items())]
     return ", ".join(parts)
 
 
 def _materials(scene: Scene) -> str:
-    used = [scene.materials[i] for i in sorted({s.material for s in scene.shapes})]
+    used = [scene.materials[i] for i in sorted({s.material for s in scene.all_shapes})]
     groups: dict[str, list[Material]] = {}
     for material in used:
         groups.setdefault(material.kind, []).append(material)
@@ -107,11 +138,7 @@ def _lights(scene: Scene, radius: float) -> list[tuple[str, str]]:
         if shape.radiance is not None:
             lights.append((f"area light '{shape.name}'", _power(shape.radiance, math.pi * area(shape.geometry))))
     for light in scene.lights:
-        if isinstance(light, PointLight):
-            lights.append((f"point light '{light.name}'", _power(light.intensity, 4 * math.pi)))
-        elif isinstance(light, ConstantEnvironment):
-            through_bounds = 4 * math.pi**2 * radius**2
-            lights.append((f"constant environment '{light.name}'", _power(light.radiance, through_bounds)))
+        lights.append((f"{_LIGHT_KINDS[type(light)]} '{light.name}'", emitted_power(light, radius)))
     rows = [("light", f"{name}, {_numbers(power)} W") for name, power in lights[:_LISTED]]
     if len(lights) > _LISTED:
         total = sum(power for _, power in lights)

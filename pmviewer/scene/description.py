@@ -16,6 +16,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.scene.texture import LUMINANCE as LUMINANCE
+from pmviewer.scene.texture import Texture
+
 RGB = tuple[float, float, float]
 Vec3 = tuple[float, float, float]
 Matrix = NDArray[np.float64]
@@ -26,75 +29,146 @@ BLACK: RGB = (0.0, 0.0, 0.0)
 @dataclass(frozen=True)
 class Mesh:
     """Triangles. `vertices` (V, 3) float64 in world space, `faces` (F, 3) int32 counter-clockwise seen from the front,
-    `normals` (V, 3) float64 unit shading normals or None for flat shading."""
+    `normals` (V, 3) float64 unit shading normals or None for flat shading, `uv` (V, 2) float64 texture coordinates or
+    None."""
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
     normals: NDArray[np.float64] | None = None
+    uv: NDArray[np.float64] | None = None
+
+
+Frame = tuple[Vec3, Vec3, Vec3]
+"""Unit x, y and z axes of a round shape's own coordinates in world space, which its texture coordinates refer to. Left-
+handed when the shape was mirrored."""
 
 
 @dataclass(frozen=True)
 class Sphere:
-    """Normals point outwards, or inwards with `flip_normals`."""
+    """Normals point outwards, or inwards with `flip_normals`. Texture coordinates are azimuth / 2π about the frame's z
+    axis and polar angle / π; without `frame` the world's axes count."""
 
     center: Vec3
     radius: float
     flip_normals: bool = False
+    frame: Frame | None = None
 
 
 @dataclass(frozen=True)
 class Cylinder:
-    """An open tube from `p0` to `p1`. Normals point away from the axis, or towards it with `flip_normals`."""
+    """An open tube from `p0` to `p1`. Normals point away from the axis, or towards it with `flip_normals`. Texture
+    coordinates are azimuth / 2π about the frame's z axis (that from p0 to p1) and height / length."""
 
     p0: Vec3
     p1: Vec3
     radius: float
     flip_normals: bool = False
+    frame: Frame | None = None
 
 
 @dataclass(frozen=True)
 class Disk:
-    """A flat round disk; it faces `normal` (unit length, flipping already applied)."""
+    """A flat round disk; it faces `normal` (unit length, flipping already applied). Texture coordinates are distance
+    from the centre / radius and azimuth / 2π in the frame's x-y plane."""
 
     center: Vec3
     normal: Vec3
     radius: float
+    frame: Frame | None = None
 
 
 @dataclass(frozen=True)
 class Parallelogram:
-    """corner + u·edge_u + v·edge_v for u, v in [0, 1]; it faces edge_u × edge_v."""
+    """corner + u·edge_u + v·edge_v for u, v in [0, 1]; it faces edge_u × edge_v. (u, v) are its texture coordinates,
+    with `swap_uv` (v, u)."""
 
     corner: Vec3
     edge_u: Vec3
     edge_v: Vec3
+    swap_uv: bool = False
 
 
 Geometry = Mesh | Sphere | Cylinder | Disk | Parallelogram
 
 
+MaterialKind = Literal[
+    "diffuse",
+    "conductor",
+    "dielectric",
+    "rough conductor",
+    "rough dielectric",
+    "thin dielectric",
+    "plastic",
+    "rough plastic",
+    "schlick",
+    "ward",
+]
+
+
 @dataclass(frozen=True)
 class Material:
-    """A BSDF. `reflectance` scales reflection (albedo of `diffuse`, specular reflectance of `conductor` and
-    `dielectric`), `transmittance` scales refraction; `eta` is inside IOR over outside IOR. `two_sided` makes the back
-    of an opaque material reflect like its front; without it the back is black."""
+    """A BSDF. `reflectance` scales reflection (albedo of a diffuse surface or base, specular reflectance of conductors
+    and dielectrics), `transmittance` scales refraction; `eta` is inside IOR over outside IOR. `two_sided` makes the
+    back of an opaque material reflect like its front; without it the back is black.
+
+    `specular` is the colour of a coat (plastic) or of the glossy lobe (ward; schlick: at normal incidence). `alpha` is
+    the roughness along the tangent and across it; for `schlick` the square root of Schlick's factor. `metal` is the
+    complex index of a conductor, real and imaginary part per channel; without it it reflects the same at all angles.
+    `nonlinear`: colours of a coated base shift by what the coat sends back to it. `absorption` is that of a
+    dielectric's inside, per channel and scene unit (Beer–Lambert).
+    """
 
     name: str
-    kind: Literal["diffuse", "conductor", "dielectric"]
+    kind: MaterialKind
     reflectance: RGB = (0.5, 0.5, 0.5)
     transmittance: RGB = (1.0, 1.0, 1.0)
     eta: float = 1.5
     two_sided: bool = False
+    specular: RGB = (1.0, 1.0, 1.0)
+    alpha: tuple[float, float] = (0.1, 0.1)
+    distribution: Literal["ggx", "beckmann"] = "ggx"
+    metal: tuple[RGB, RGB] | None = None
+    nonlinear: bool = False
+    absorption: RGB = BLACK
+    textures: Mapping[str, Texture] = field(default_factory=dict, hash=False)
+    """By slot (`pmviewer.scene.texture.SLOTS`). A texture replaces the number of its slot's name, which is its mean."""
+    bump_scale: float = 1.0
+    """Multiplies the heights of `textures["bump"]`."""
+
+    @property
+    def transparent(self) -> bool:
+        """Does light pass through?"""
+        return self.kind in ("dielectric", "rough dielectric", "thin dielectric")
 
 
 @dataclass(frozen=True)
 class Shape:
-    """Geometry with a material (index into `Scene.materials`) and, when it is a light, its emitted `radiance`."""
+    """Geometry with a material (index into `Scene.materials`) and, when it is a light, its emitted `radiance`, which
+    is the mean of `emission` if that is given."""
 
     name: str
     geometry: Geometry
     material: int
     radiance: RGB | None = None
+    emission: Texture | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Shapes in coordinates of their own, stored once and shown by instances; none of them is a light."""
+
+    name: str
+    shapes: tuple[Shape, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """A copy of a group in the scene. `to_world` (4, 4) is affine and can be inverted; it may shear and mirror, and
+    what was the outside of a surface stays its outside."""
+
+    name: str
+    group: Group
+    to_world: Matrix
 
 
 @dataclass(frozen=True)
@@ -112,6 +186,43 @@ class ConstantEnvironment:
 
     name: str
     radiance: RGB
+
+
+@dataclass(frozen=True)
+class SpotLight:
+    """A point that shines around the unit vector `axis`: `intensity` (W/sr) up to the angle `beam` off the axis, then
+    falling linearly to nothing at `cutoff` (degrees, beam ≤ cutoff ≤ 180)."""
+
+    name: str
+    position: Vec3
+    axis: Vec3
+    intensity: RGB
+    cutoff: float
+    beam: float
+
+
+@dataclass(frozen=True)
+class DirectionalLight:
+    """Parallel light travelling along the unit vector `direction`; `irradiance` in W/m² on what faces it."""
+
+    name: str
+    direction: Vec3
+    irradiance: RGB
+
+
+@dataclass(frozen=True)
+class ImageEnvironment:
+    """Radiance from outside by direction: `pixels` (h, w, 3) float32, finite and not negative, h ≥ 3, w ≥ 2, in the
+    lat-long layout of Mitsuba's `envmap`. `to_world` (3, 3) is orthonormal; it takes the image's up (0, 1, 0), its
+    middle (0, 0, 1) and the middle of its left half (1, 0, 0) to the scene's."""
+
+    name: str
+    pixels: NDArray[np.float32]
+    to_world: Matrix
+
+
+Environment = ConstantEnvironment | ImageEnvironment
+Light = PointLight | SpotLight | DirectionalLight | Environment
 
 
 @dataclass(frozen=True)
@@ -139,9 +250,20 @@ class Scene:
     path: Path | None
     shapes: tuple[Shape, ...]
     materials: tuple[Material, ...]
-    lights: tuple[PointLight | ConstantEnvironment, ...]
+    lights: tuple[Light, ...]
     camera: Camera
     width: int
     height: int
     warnings: tuple[str, ...] = ()
     dropped: Mapping[str, int] = field(default_factory=dict)
+    instances: tuple[Instance, ...] = ()
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """The groups that instances show, each once, in the order of their first instance."""
+        return tuple(dict.fromkeys(instance.group for instance in self.instances))
+
+    @property
+    def all_shapes(self) -> tuple[Shape, ...]:
+        """The scene's own shapes, then those of its groups: everything that is stored."""
+        return self.shapes + tuple(shape for group in self.groups for shape in group.shapes)

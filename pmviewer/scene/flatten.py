@@ -5,7 +5,6 @@ Primitives are numbered triangles first, then quadrics (spheres, cylinders, disk
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,22 +14,23 @@ from pmviewer.errors import SceneError
 from pmviewer.kernels import scene as K
 from pmviewer.kernels.bvh import Bvh, build
 from pmviewer.scene.description import (
-    ConstantEnvironment,
+    LUMINANCE,
     Cylinder,
     Disk,
-    Material,
     Mesh,
     Parallelogram,
-    PointLight,
     Scene,
     Shape,
     Sphere,
 )
+from pmviewer.scene.flatten_textures import TextureTable, coordinates, light_arrays, needs_tangents
+from pmviewer.scene.instances import build_instanced, instance_bounds, normalised
+from pmviewer.scene.light_table import LightTable, axis_of, side_of
+from pmviewer.scene.material_row import is_rich, material_table
+from pmviewer.scene.textured_emission import textured_lights
 
 Float = NDArray[np.float32]
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
-_MATERIAL_KIND = {"diffuse": K.DIFFUSE, "conductor": K.CONDUCTOR, "dielectric": K.DIELECTRIC}
 _QUADRIC_KIND = {Sphere: 0, Cylinder: 1, Disk: 2}
 
 
@@ -38,7 +38,9 @@ _QUADRIC_KIND = {Sphere: 0, Cylinder: 1, Disk: 2}
 class FlatScene:
     """Arrays of a scene. `record` is the one-element record array for kernels; the other fields keep its memory alive.
 
-    `light_power` is (n_lights, 3) float64 in watts, in the order of the light table; `light_names` likewise.
+    `light_power` is (n_lights, 3) float64 in watts, in the order of the light table; `light_names` and
+    the table's rows `lights` (n_lights, LIGHT_COLUMNS) likewise. `light_corners` (n, 3, 3) are the triangles of mesh
+    lights.
     """
 
     record: NDArray[np.void]
@@ -46,11 +48,18 @@ class FlatScene:
     arrays: tuple[NDArray, ...]
     light_power: NDArray[np.float64]
     light_names: tuple[str, ...]
+    lights: Float
+    light_corners: Float
     center: NDArray[np.float64]
     radius: float
     n_triangles: int
     n_quadrics: int
     owner: Scene = field(repr=False)
+    n_instances: int = 0
+    n_elements: int = 0
+    """Triangles and quadrics that rays can meet, those of instances counted as often as they are shown."""
+    trees: tuple[Bvh, ...] = field(default=(), repr=False)
+    """Of the instanced groups."""
 
     @property
     def total_luminance(self) -> float:
@@ -59,11 +68,14 @@ class FlatScene:
 
 
 def bounding_sphere(scene: Scene) -> tuple[NDArray[np.float64], float]:
-    """Centre and radius of the sphere around the bounding box of all shapes."""
+    """Centre and radius of the sphere around the bounding box of all shapes and instances."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for shape in scene.shapes:
         for corner in _bounds(shape):
             low, high = np.minimum(low, corner), np.maximum(high, corner)
+    if scene.instances:
+        more_low, more_high = instance_bounds(scene.instances)
+        low, high = np.minimum(low, more_low), np.maximum(high, more_high)
     center = (low + high) / 2
     return center, max(float(np.linalg.norm(high - low)) / 2, 1e-30)
 
@@ -88,56 +100,84 @@ def flatten(scene: Scene) -> FlatScene:
 
     Raises SceneError when the scene has no surface or no light that emits.
     """
-    meshes = [(i, _triangulate(s.geometry)) for i, s in enumerate(scene.shapes) if _is_triangles(s)]
-    round_shapes = [i for i, s in enumerate(scene.shapes) if not _is_triangles(s)]
-    if not scene.shapes:
+    if scene.instances:
+        groups = [normalised(group, scene) for group in scene.groups]
+        shapes = scene.shapes + tuple(shape for group in groups for shape in group.shapes)
+    else:
+        groups, shapes = [], scene.shapes
+    meshes = [(i, _triangulate(s.geometry)) for i, s in enumerate(shapes) if _is_triangles(s)]
+    round_shapes = [i for i, s in enumerate(shapes) if not _is_triangles(s)]
+    if not shapes:
         raise SceneError("The scene has no surface.", scene.path, hint="Add at least one shape.")
     vertices = np.concatenate([m.vertices[m.faces] for _, m in meshes] or [np.zeros((0, 3, 3))]).astype(np.float32)
     smooth = any(m.normals is not None for _, m in meshes)
     normals = np.concatenate([_corner_normals(m) for _, m in meshes]).astype(np.float32) if smooth else None
-    quadrics = np.array([_quadric_row(scene.shapes[i]) for i in round_shapes], np.float32).reshape(-1, 12)
+    quadrics = np.array([_quadric_row(shapes[i]) for i in round_shapes], np.float32).reshape(-1, 12)
     counts = [len(m.faces) for _, m in meshes]
     shape_of_prim = np.concatenate([np.repeat([i for i, _ in meshes], counts), round_shapes]).astype(np.int64)
-    materials = np.array([_material_row(m) for m in scene.materials], np.float32)
-    prim_material = np.array([scene.shapes[i].material for i in shape_of_prim], np.int32)
+    materials, rich = material_table(scene), is_rich(scene)
+    prim_material = np.array([shapes[i].material for i in shape_of_prim], np.int32)
 
     center, radius = bounding_sphere(scene)
-    lights = _LightTable(scene, vertices, shape_of_prim, radius)
-    prim_light = lights.of_shape[shape_of_prim].astype(np.int32)
-    bvh = build(vertices, quadrics)
-
-    record = np.zeros(1, K.SCENE_DTYPE)
+    lit, emissions = textured_lights(scene)
+    lights = LightTable(lit, vertices, shape_of_prim, radius)
+    of_shape = np.concatenate([lights.of_shape, np.full(len(shapes) - len(scene.shapes), -1)])
+    prim_light = of_shape[shape_of_prim].astype(np.int32)
+    textured = bool(emissions) or (rich and needs_tangents(scene))
+    record = np.zeros(1, K.scene_dtype(bsdfs=rich, lights=lights.more, instances=bool(groups), textures=textured))
     r = record[0]
-    r["bvh_nodes"], r["bvh_blocks"], r["bvh_quadrics"] = bvh.nodes_address, bvh.blocks_address, bvh.quadrics_address
-    r["bvh_n_blocks"], r["n_triangles"] = bvh.n_blocks, len(vertices)
+    if groups:
+        bvh, shown = build_instanced(scene, groups, vertices, quadrics, shape_of_prim, r)
+    else:
+        bvh, shown = build(vertices, quadrics), None
+        bvh.store(r)
     arrays: dict[str, NDArray] = {
         "vertices": vertices,
         "prim_material": prim_material,
         "prim_light": prim_light,
-        "materials": materials,
+        "materials": materials.rows,
         "lights": lights.rows,
         "light_cdf": lights.cdf,
         "light_triangles": lights.triangles,
         "light_triangle_cdf": lights.triangle_cdf,
+        **lights.sky_arrays(),
     }
     if normals is not None:
         arrays["normals"] = normals
+    textures = TextureTable()
+    if rich:
+        r["bsdfs"] = 1
+        arrays["bsdf_tables"] = materials.tables
+        textures.write_rows(materials.rows, scene.materials)
+    if textured:
+        arrays |= coordinates([shapes[i].geometry for i, _ in meshes], [shapes[i].geometry for i in round_shapes])
+        arrays |= light_arrays(emissions, lights.of_shape, len(lights.rows), textures)
+        arrays |= textures.arrays(scene)
     for name, array in arrays.items():
         arrays[name] = np.ascontiguousarray(array)
         r[name] = arrays[name].ctypes.data
     r["n_lights"], r["environment"] = len(lights.rows), lights.environment
+    if lights.more:
+        r["more_lights"] = 1
+        if lights.sky is not None:
+            r["sky_height"], r["sky_width"] = lights.sky.pixels.shape[:2]
     r["center_x"], r["center_y"], r["center_z"], r["radius"] = *center, radius
     return FlatScene(
         record=record,
         bvh=bvh,
-        arrays=tuple(arrays.values()),
+        arrays=(*arrays.values(), quadrics, *(shown.arrays if shown else ())),
         light_power=lights.power,
         light_names=lights.names,
+        lights=lights.rows,
+        light_corners=vertices[lights.triangles],
         center=center,
         radius=radius,
         n_triangles=len(vertices),
         n_quadrics=len(quadrics),
         owner=scene,
+        n_instances=len(scene.instances),
+        n_elements=shown.n_elements if shown else len(vertices) + len(quadrics),
+        trees=shown.trees if shown else (),
     )
 
 
@@ -166,103 +206,9 @@ def _corner_normals(mesh: Mesh) -> NDArray[np.float64]:
 def _quadric_row(shape: Shape) -> list[float]:
     g = shape.geometry
     if isinstance(g, Sphere):
-        return [0, *g.center, 0, 0, 1, g.radius, 0, _side(g), 0, 0]
+        return [0, *g.center, 0, 0, 1, g.radius, 0, side_of(g), 0, 0]
     if isinstance(g, Cylinder):
-        axis, length = _axis(g)
-        return [1, *g.p0, *axis, g.radius, length, _side(g), 0, 0]
+        axis, length = axis_of(g)
+        return [1, *g.p0, *axis, g.radius, length, side_of(g), 0, 0]
     assert isinstance(g, Disk)
     return [2, *g.center, *g.normal, g.radius, 0, 1, 0, 0]
-
-
-def _side(g: Sphere | Cylinder) -> float:
-    return -1.0 if g.flip_normals else 1.0
-
-
-def _axis(g: Cylinder) -> tuple[NDArray[np.float64], float]:
-    offset = np.subtract(g.p1, g.p0)
-    length = float(np.linalg.norm(offset))
-    return offset / length, length
-
-
-def _material_row(m: Material) -> list[float]:
-    return [_MATERIAL_KIND[m.kind], m.two_sided, m.eta, 0, *m.reflectance, 0, *m.transmittance, 0]
-
-
-class _LightTable:
-    """Rows, powers and distributions of all lights: emitting shapes in order, then the scene's other lights."""
-
-    def __init__(self, scene: Scene, vertices: Float, shape_of_prim: NDArray[np.int64], radius: float) -> None:
-        self.of_shape = np.full(len(scene.shapes), -1, np.int64)
-        self.environment = -1
-        rows: list[list[float]] = []
-        powers: list[NDArray[np.float64]] = []
-        names: list[str] = []
-        triangles: list[NDArray[np.int64]] = [np.zeros(0, np.int64)]
-        cdfs: list[NDArray[np.float64]] = [np.zeros(0)]
-        listed = 0
-        for index, shape in enumerate(scene.shapes):
-            if shape.radiance is None or not any(c > 0 for c in shape.radiance):
-                continue
-            row = [0.0] * K.LIGHT_COLUMNS
-            row[K.L_RADIANCE : K.L_RADIANCE + 3] = shape.radiance
-            if isinstance(shape.geometry, Mesh):
-                own = np.flatnonzero(shape_of_prim == index)
-                corners = vertices[own].astype(float)
-                cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-                areas = np.linalg.norm(cross, axis=1) / 2
-                area = float(areas.sum())
-                row[K.L_KIND], row[K.L_FIRST], row[K.L_COUNT] = K.MESH, listed, len(own)
-                triangles.append(own)
-                cdfs.append(np.cumsum(areas) / area)
-                listed += len(own)
-            else:
-                area = _fill_shape(row, shape.geometry)
-            row[K.L_AREA] = area
-            self.of_shape[index] = len(rows)
-            rows.append(row)
-            powers.append(math.pi * area * np.array(shape.radiance))
-            names.append(shape.name)
-        for light in scene.lights:
-            row = [0.0] * K.LIGHT_COLUMNS
-            if isinstance(light, PointLight):
-                row[K.L_KIND] = K.POINT
-                row[K.L_RADIANCE : K.L_RADIANCE + 3] = light.intensity
-                row[K.L_A : K.L_A + 3] = light.position
-                powers.append(4 * math.pi * np.array(light.intensity))
-            elif isinstance(light, ConstantEnvironment):
-                row[K.L_KIND] = K.ENVIRONMENT
-                row[K.L_RADIANCE : K.L_RADIANCE + 3] = light.radiance
-                self.environment = len(rows)
-                powers.append(4 * math.pi**2 * radius**2 * np.array(light.radiance))
-            rows.append(row)
-            names.append(light.name)
-        if not rows or not any(p.max() > 0 for p in powers):
-            raise SceneError("The scene has no light.", scene.path, hint="Add an emitter, or open it with one.")
-        self.rows = np.array(rows, np.float32)
-        self.power = np.array(powers)
-        self.names = tuple(names)
-        share = np.cumsum(self.power @ LUMINANCE)
-        self.cdf = np.concatenate([[0.0], share / share[-1]]).astype(np.float32)
-        self.triangles = np.concatenate(triangles).astype(np.int32)
-        self.triangle_cdf = np.concatenate(cdfs).astype(np.float32)
-
-
-def _fill_shape(row: list[float], g: object) -> float:
-    """Write an analytic light's geometry into its row; its area."""
-    if isinstance(g, Parallelogram):
-        row[K.L_KIND] = K.PARALLELOGRAM
-        row[K.L_A : K.L_A + 3], row[K.L_B : K.L_B + 3], row[K.L_C : K.L_C + 3] = g.corner, g.edge_u, g.edge_v
-        return float(np.linalg.norm(np.cross(g.edge_u, g.edge_v)))
-    if isinstance(g, Disk):
-        row[K.L_KIND], row[K.L_RADIUS] = K.DISK, g.radius
-        row[K.L_A : K.L_A + 3], row[K.L_B : K.L_B + 3] = g.center, g.normal
-        return math.pi * g.radius**2
-    if isinstance(g, Sphere):
-        row[K.L_KIND], row[K.L_RADIUS], row[K.L_FLIP] = K.SPHERE, g.radius, _side(g)
-        row[K.L_A : K.L_A + 3] = g.center
-        return 4 * math.pi * g.radius**2
-    assert isinstance(g, Cylinder)
-    axis, length = _axis(g)
-    row[K.L_KIND], row[K.L_RADIUS], row[K.L_FLIP], row[K.L_LENGTH] = K.CYLINDER, g.radius, _side(g), length
-    row[K.L_A : K.L_A + 3], row[K.L_B : K.L_B + 3] = g.p0, axis
-    return 2 * math.pi * g.radius * length

@@ -44,9 +44,10 @@ def _bounds(g: Geometry) -> tuple[Float, Float]:
     return np.array(g.center) - g.radius, np.array(g.center) + g.radius
 
 
-def framed(shapes: Sequence[Shape], up: Literal["y", "z"] = "y") -> Camera:
-    """Three-quarter view from slightly above with everything inside the picture, whatever its shape."""
-    low, high = bounds(shapes)
+def framed(shapes: Sequence[Shape], up: Literal["y", "z"] = "y", box: tuple[Float, Float] | None = None) -> Camera:
+    """Three-quarter view from slightly above with everything inside the picture, whatever its shape: all shapes, or
+    the box with these corners."""
+    low, high = bounds(shapes) if box is None else box
     center, radius = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-12)
     direction = np.array([0.55, 0.4, 0.75] if up == "y" else [0.55, -0.75, 0.4])
     direction /= np.linalg.norm(direction)

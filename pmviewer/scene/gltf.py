@@ -16,9 +16,10 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from pmviewer.scene.description import Camera, Mesh, PointLight, Shape
+from pmviewer.scene.description import Camera, DirectionalLight, Mesh, PointLight, Shape, SpotLight
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.gltf_material import GltfMaterials
+from pmviewer.scene.gltf_shared import SharedMeshes
 from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
 from pmviewer.scene.mitsuba_transform import Matrix, mirrors, scaling, translation
 from pmviewer.scene.primitives import transformed
@@ -28,6 +29,7 @@ _LUMENS_PER_WATT = 683.0
 _MOST_NODES = 1_000_000
 _MOST_ITEMS = 1 << 28
 _HARMLESS = ("KHR_materials_", "KHR_lights_punctual", "KHR_texture_", "EXT_texture_")
+_UV = "_UV"
 _GLB_JSON, _GLB_BIN = 0x4E4F534A, 0x004E4942
 
 
@@ -54,8 +56,13 @@ def read_gltf(path: Path, diagnostics: Diagnostics) -> MeshFile:
     meshes = _decode(header, binary, path)
     result = MeshFile()
     materials = GltfMaterials(header, binary, path, diagnostics)
-    for node, matrix in _nodes(header, diagnostics):
-        if "mesh" in node:
+    nodes = list(_nodes(header, diagnostics))
+    shared = SharedMeshes(header, meshes, nodes)
+    for node, matrix in nodes:
+        instance = shared.instance(node, matrix, result, materials)
+        if instance is not None:
+            result.instances.append(instance)
+        elif "mesh" in node:
             source = header["meshes"][node["mesh"]]
             for j, primitive in enumerate(source.get("primitives", [])):
                 mesh = meshes.get(f"{node['mesh']}.{j}")
@@ -63,9 +70,10 @@ def read_gltf(path: Path, diagnostics: Diagnostics) -> MeshFile:
                     diagnostics.warn("Points, lines and other primitives without triangles are ignored.")
                     continue
                 index = primitive.get("material")
-                material, radiance = (DEFAULT_MATERIAL, None) if index is None else materials.of(index)
+                material, radiance, emission = (DEFAULT_MATERIAL, None, None) if index is None else materials.of(index)
                 name = str(node.get("name") or source.get("name") or f"mesh {node['mesh']}")
-                result.shapes.append(Shape(name, transformed(mesh, matrix), result.material(material), radiance))
+                shape = Shape(name, transformed(mesh, matrix), result.material(material), radiance, emission)
+                result.shapes.append(shape)
         if "camera" in node and result.camera is None:
             _camera(header["cameras"][node["camera"]], matrix, result, diagnostics)
         light = node.get("extensions", {}).get("KHR_lights_punctual")
@@ -115,7 +123,7 @@ def _decode(header: Json, binary: bytes, path: Path) -> dict[str, Mesh]:
     # Each primitive becomes a mesh of a known name, and the rest of the file is kept from trimesh.
     alone: Json = {key: header[key] for key in ("asset", "accessors", "bufferViews", "buffers") if key in header}
     alone["meshes"] = [
-        {"name": f"{i}.{j}", "primitives": [{k: v for k, v in primitive.items() if k != "material"}]}
+        {"name": f"{i}.{j}", "primitives": [_with_uv({k: v for k, v in primitive.items() if k != "material"})]}
         for i, mesh in enumerate(header.get("meshes", []))
         for j, primitive in enumerate(mesh.get("primitives", []))
     ]
@@ -137,11 +145,30 @@ def _decode(header: Json, binary: bytes, path: Path) -> dict[str, Mesh]:
         vertices = np.asarray(kwargs["vertices"], np.float64)
         faces = np.asarray(kwargs["faces"]).reshape(-1, 3).astype(np.int32)
         normals = kwargs.get("vertex_normals")
-        if normals is not None and np.shape(normals) == vertices.shape:
-            meshes[name] = Mesh(vertices, faces, np.asarray(normals, np.float64))
-        else:
-            meshes[name] = Mesh(vertices, faces)
+        whole = normals is not None and np.shape(normals) == vertices.shape
+        uv = kwargs.get("vertex_attributes", {}).get(_UV)
+        meshes[name] = Mesh(
+            vertices, faces, np.asarray(normals, np.float64) if whole else None, _coordinates(uv, len(vertices))
+        )
     return meshes
+
+
+def _with_uv(primitive: Json) -> Json:
+    """The primitive with its texture coordinates under a name that trimesh hands through without materials."""
+    attributes = dict(primitive.get("attributes", {}))
+    if "TEXCOORD_0" in attributes:
+        attributes[_UV] = attributes.pop("TEXCOORD_0")
+    return {**primitive, "attributes": attributes}
+
+
+def _coordinates(uv: Any, count: int) -> np.ndarray | None:
+    """Texture coordinates (count, 2); whole numbers stand for fractions of their type's range."""
+    if uv is None or np.shape(uv) != (count, 2):
+        return None
+    array = np.asarray(uv)
+    if array.dtype.kind == "u":
+        return array.astype(np.float64) / np.iinfo(array.dtype).max
+    return array.astype(np.float64)
 
 
 def _nodes(header: Json, diagnostics: Diagnostics) -> Iterator[tuple[Json, Matrix]]:
@@ -200,12 +227,33 @@ def _camera(camera: Json, matrix: Matrix, result: MeshFile, diagnostics: Diagnos
 
 
 def _light(light: Json, matrix: Matrix, result: MeshFile, diagnostics: Diagnostics) -> None:
-    """KHR_lights_punctual: candela become W/sr at the luminous efficacy that exporters use."""
+    """KHR_lights_punctual: candela become W/sr, and lux W/m², at the luminous efficacy that exporters use. Spots and
+    directional lights shine along −z."""
     kind = light.get("type")
-    if kind != "point":
+    if kind not in ("point", "spot", "directional"):
         diagnostics.warn(f"A light of type '{kind}' is not supported and was ignored.")
         return
     intensity = float(light.get("intensity", 1.0)) / _LUMENS_PER_WATT
     r, g, b = (float(c) * intensity for c in light.get("color", (1, 1, 1)))
+    name = str(light.get("name") or f"{kind} light")
     x, y, z = (float(c) for c in matrix[:3, 3])
-    result.lights.append(PointLight(str(light.get("name") or "point light"), (x, y, z), (r, g, b)))
+    if kind == "point":
+        result.lights.append(PointLight(name, (x, y, z), (r, g, b)))
+        return
+    forward = -matrix[:3, 2]
+    length = float(np.linalg.norm(forward))
+    if not 0 < length < math.inf:
+        diagnostics.warn(f"The {kind} light '{name}' has no direction and was ignored.")
+        return
+    dx, dy, dz = (float(c) for c in forward / length)
+    if kind == "directional":
+        result.lights.append(DirectionalLight(name, (dx, dy, dz), (r, g, b)))
+        return
+    cone = light.get("spot", {})
+    inner = math.degrees(float(cone.get("innerConeAngle", 0.0)))
+    outer = math.degrees(float(cone.get("outerConeAngle", math.pi / 4)))
+    if not 0 <= inner < outer <= 90 * (1 + 1e-6):
+        what = f"The spot light '{name}' has an inner angle of {inner:g}° and an outer one of {outer:g}°."
+        raise diagnostics.error(what, hint="0 ≤ inner < outer ≤ 90 is what glTF allows.")
+    diagnostics.warn("The intensity of spot lights falls linearly between their inner and outer angle.")
+    result.lights.append(SpotLight(name, (x, y, z), (dx, dy, dz), (r, g, b), outer, inner))

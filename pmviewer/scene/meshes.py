@@ -20,8 +20,9 @@ from pmviewer.scene.description import (
     Shape,
 )
 from pmviewer.scene.diagnostics import Diagnostics
-from pmviewer.scene.framing import bounds, framed
+from pmviewer.scene.framing import framed
 from pmviewer.scene.gltf import read_gltf
+from pmviewer.scene.instances import clean_instances, joint_bounds
 from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
 from pmviewer.scene.obj import as_utf8, joined, obj_parts, read_obj
 from pmviewer.scene.ply import read_ply
@@ -36,23 +37,26 @@ def load_mesh_scene(path: Path) -> Scene:
     ending = path.suffix.lower()
     diagnostics = Diagnostics(path)
     content = _guarded(lambda: _read(path, ending, diagnostics), path)
-    for shape in content.shapes:
+    groups = dict.fromkeys(instance.group for instance in content.instances)
+    for shape in (*content.shapes, *(shape for group in groups for shape in group.shapes)):
         if isinstance(shape.geometry, Mesh):
             check_faces(shape.geometry, path)
     shapes = clean_shapes(content.shapes, diagnostics)
-    if not shapes:
+    instances = clean_instances(content.instances, diagnostics)
+    if not shapes and not instances:
         raise SceneError(
             "The file has no triangle that can be shown.", path, hint=diagnostics.left_out() or "Is it empty?"
         )
     lights = clean_lights(content.lights, diagnostics)
     materials = list(content.materials)
     up: Literal["y", "z"] = "z" if ending == ".stl" else "y"
-    camera = content.camera or framed(shapes, up)
+    box = joint_bounds(shapes, instances)
+    camera = content.camera or framed((), up, box)
     if content.camera is not None:
-        camera = _aimed(camera, shapes)
+        camera = _aimed(camera, box)
     if not lights and not any(s.radiance for s in shapes):
         diagnostics.warn("The file has no light: a soft light above it, a dim sky and a floor were added.")
-        studio = studio_of(shapes, up, len(materials))
+        studio = studio_of(box, up, len(materials))
         lights, shapes = (studio.sky,), (*shapes, *studio.shapes)
         materials += studio.materials
     width, height = SIDE, SIDE
@@ -71,6 +75,7 @@ def load_mesh_scene(path: Path) -> Scene:
         height=height,
         warnings=diagnostics.warnings(),
         dropped=dict(diagnostics.dropped),
+        instances=instances,
     )
 
 
@@ -125,9 +130,9 @@ def _stl_meshes(path: Path) -> list[Mesh]:
     ]
 
 
-def _aimed(camera: Camera, shapes: tuple[Shape, ...]) -> Camera:
-    """The file's camera with its orbit point as far away as the scene's middle."""
-    low, high = bounds(shapes)
+def _aimed(camera: Camera, box: tuple[np.ndarray, np.ndarray]) -> Camera:
+    """The file's camera with its orbit point as far away as the middle of the scene's bounds."""
+    low, high = box
     eye, target = np.array(camera.origin), np.array(camera.target)
     distance = float(((low + high) / 2 - eye) @ (target - eye))
     x, y, z = (float(c) for c in eye + (target - eye) * (distance if distance > 1e-6 else 1.0))

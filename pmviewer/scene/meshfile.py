@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from pmviewer.scene.description import Camera, ConstantEnvironment, Material, PointLight, Shape
+from pmviewer.scene.description import Camera, Instance, Light, Material, Shape
 
 DEFAULT_MATERIAL = Material("default", "diffuse", (0.7, 0.7, 0.7), two_sided=True)
 """For triangles whose file says nothing about their material."""
@@ -16,7 +16,8 @@ class MeshFile:
 
     shapes: list[Shape] = field(default_factory=list)
     materials: list[Material] = field(default_factory=list)
-    lights: list[PointLight | ConstantEnvironment] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)
+    instances: list[Instance] = field(default_factory=list)
     camera: Camera | None = None
     aspect: float = 1.0
 

@@ -11,14 +11,18 @@ from pathlib import Path
 import numpy as np
 
 from pmviewer.scene.clean import clean_lights, clean_shapes, on_a_surface
-from pmviewer.scene.description import RGB, ConstantEnvironment, PointLight, Scene, Shape
+from pmviewer.scene.description import RGB, Light, Scene, Shape
 from pmviewer.scene.diagnostics import Diagnostics
-from pmviewer.scene.framing import bounds, framed
+from pmviewer.scene.framing import framed
+from pmviewer.scene.instances import joint_bounds
 from pmviewer.scene.mitsuba_bsdf import Materials
 from pmviewer.scene.mitsuba_camera import DEFAULT_SIZE, View, film_size, view
 from pmviewer.scene.mitsuba_document import SILENT_TAGS, Document, Properties
+from pmviewer.scene.mitsuba_emitter import read_light
+from pmviewer.scene.mitsuba_group import GROUP, INSTANCE, Groups
 from pmviewer.scene.mitsuba_shape import SUPPORTED, geometry
 from pmviewer.scene.mitsuba_xml import Element, read_xml, substitute
+from pmviewer.scene.texture import Texture
 
 # Definitions that other objects refer to change nothing where they stand.
 _SILENT = SILENT_TAGS | {"bsdf", "texture", "spectrum", "alias"}
@@ -38,14 +42,15 @@ def load_mitsuba(path: Path, parameters: Mapping[str, str]) -> Scene:
     scene = _Reader(document)
     shapes = clean_shapes(scene.shapes, diagnostics)
     lights = clean_lights(scene.lights, diagnostics)
-    if not shapes:
+    instances = scene.groups.checked()
+    if not shapes and not instances:
         hint = diagnostics.left_out() or f"Add a <shape> of type {', '.join(SUPPORTED)}."
         raise diagnostics.error("The scene has no surface.", hint=hint)
     if not lights and not any(s.radiance for s in shapes):
-        hint = diagnostics.left_out() or 'Add an <emitter> of type "area", "point" or "constant".'
+        hint = diagnostics.left_out() or 'Add an <emitter>, for example of type "area", "point" or "envmap".'
         raise diagnostics.error("The scene has no light.", hint=hint)
-    low, high = bounds(shapes)
-    seen = scene.view((low + high) / 2, shapes)
+    low, high = box = joint_bounds(shapes, instances)
+    seen = scene.view(box)
     touched = on_a_surface(seen.camera.origin, shapes, float(np.linalg.norm(high - low)))
     if touched is not None:
         diagnostics.warn(f"The camera stands on the surface of '{touched}' and may see nothing.")
@@ -60,6 +65,7 @@ def load_mitsuba(path: Path, parameters: Mapping[str, str]) -> Scene:
         height=seen.height,
         warnings=diagnostics.warnings(),
         dropped=dict(diagnostics.dropped),
+        instances=instances,
     )
 
 
@@ -70,12 +76,20 @@ class _Reader:
         self.document = document
         self.materials = Materials(document)
         self.shapes: list[Shape] = []
-        self.lights: list[PointLight | ConstantEnvironment] = []
+        self.groups = Groups(document, self._shape)
+        self.lights: list[Light] = []
         self.sensors: list[Element] = []
         for child in document.root.children:
             element = document.resolve(child) if child.tag == "ref" else child
-            if element.tag == "shape":
-                self._shape(element)
+            kind = element.attributes.get("type")
+            if element.tag == "shape" and kind == INSTANCE:
+                self.groups.add(element)
+            elif element.tag == "shape" and kind == GROUP:
+                continue  # a definition; read when an instance shows it
+            elif element.tag == "shape":
+                shape = self._shape(element)
+                if shape is not None:
+                    self.shapes.append(shape)
             elif element.tag == "emitter":
                 self._emitter(element)
             elif element.tag == "sensor":
@@ -87,13 +101,13 @@ class _Reader:
             elif element.tag not in _SILENT:
                 document.ignore(element)
 
-    def _shape(self, element: Element) -> None:
+    def _shape(self, element: Element) -> Shape | None:
         p = Properties(element, self.document)
         if p.type not in SUPPORTED:
             self.document.ignore(element, "is not supported: the shape is left out")
-            return
+            return None
         emitters = p.objects("emitter")
-        radiance = self._area_light(emitters[0]) if emitters else None
+        radiance, emission = self._area_light(emitters[0]) if emitters else (None, None)
         bsdfs = p.objects("bsdf")
         if len(bsdfs) > 1:
             self.document.warn(f"{element} has more than one BSDF: the first is used.", element)
@@ -101,56 +115,38 @@ class _Reader:
         file = p.values.get("filename")
         stem = Path(file.attributes.get("value", "")).stem if file is not None else p.type
         name = element.attributes.get("id") or f"{stem} (line {element.line})"
-        self.shapes.append(Shape(name, geometry(p), material, radiance))
+        shape = Shape(name, geometry(p), material, radiance, emission)
         p.known("silhouette_sampling_weight")
         p.warn_unused("bsdf", "emitter")
+        return shape
 
-    def _area_light(self, element: Element) -> RGB | None:
+    def _area_light(self, element: Element) -> tuple[RGB | None, Texture | None]:
         p = Properties(element, self.document)
         if p.type != "area":
             self.document.ignore(element, "inside a shape is not supported and was ignored")
-            return None
+            return None, None
         radiance = p.bounded_colour("radiance", 1.0, None)
         p.known("sampling_weight")
         p.warn_unused()
-        return radiance
+        return radiance, p.textures.get("radiance")
 
     def _emitter(self, element: Element) -> None:
-        p = Properties(element, self.document)
-        name = element.attributes.get("id") or f"{p.type} (line {element.line})"
-        p.known("sampling_weight")
-        if p.type == "point":
-            if "position" in p and "to_world" in p:
-                raise self.document.error(
-                    f"{element} has both 'position' and 'to_world'.", element, "Keep one of them."
-                )
-            x, y, z = p.point("position", (0.0, 0.0, 0.0)) if "position" in p else p.transform()[:3, 3].tolist()
-            self.lights.append(PointLight(name, (x, y, z), p.bounded_colour("intensity", 1.0, None)))
-        elif p.type == "constant":
-            if any(isinstance(light, ConstantEnvironment) for light in self.lights):
-                self.document.ignore(element, "beside another one was ignored")
-                return
-            self.lights.append(ConstantEnvironment(name, p.bounded_colour("radiance", 1.0, None)))
-        elif p.type == "area":
-            self.document.ignore(element, "outside a shape has no surface to shine from and was ignored")
-            return
-        else:
-            self.document.ignore(element)
-            return
-        p.warn_unused()
+        light = read_light(Properties(element, self.document), self.lights)
+        if light is not None:
+            self.lights.append(light)
 
-    def view(self, center: np.ndarray, shapes: tuple[Shape, ...]) -> View:
-        """The first usable sensor, or a camera framed on the scene."""
+    def view(self, box: tuple[np.ndarray, np.ndarray]) -> View:
+        """The first usable sensor, or a camera framed on the scene, whose bounds are given."""
         usable = [s for s in self.sensors if s.attributes.get("type") in _PERSPECTIVE]
         if usable:
             if len(self.sensors) > 1:
                 sentence = f"{usable[0]} in line {usable[0].line} is used, the scene's other sensors are ignored."
                 self.document.diagnostics.warn(sentence)
-            return view(usable[0], self.document, center)
+            return view(usable[0], self.document, (box[0] + box[1]) / 2)
         width, height = DEFAULT_SIZE
         for sensor in self.sensors[:1]:
             self.document.ignore(sensor, "is not supported: a camera framed on the scene replaces it")
             width, height = film_size(Properties(sensor, self.document))
         if not self.sensors:
             self.document.diagnostics.warn("The scene has no camera: one framed on it is used.")
-        return View(framed(shapes), width, height)
+        return View(framed((), box=box), width, height)

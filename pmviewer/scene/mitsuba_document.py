@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.description import RGB, Vec3
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.mitsuba_spectrum import spectrum_object
+from pmviewer.scene.mitsuba_texture import TYPES as TEXTURE_TYPES
+from pmviewer.scene.mitsuba_texture import read_texture
 from pmviewer.scene.mitsuba_transform import Matrix, operation
 from pmviewer.scene.mitsuba_values import (
     LARGEST,
@@ -26,6 +29,7 @@ from pmviewer.scene.mitsuba_values import (
     parse_vector,
 )
 from pmviewer.scene.mitsuba_xml import Element
+from pmviewer.scene.texture import LUMINANCE, Texture, limited
 
 T = TypeVar("T")
 MOST_NESTED = 32
@@ -52,6 +56,7 @@ class Document:
         self.root = root
         self.folder = path.parent if path is not None else Path()
         self.diagnostics = diagnostics
+        self.pictures: dict[tuple[str, bool], NDArray[np.float32]] = {}
         self.ids: dict[str, Element] = {}
         self._index(root)
         for alias in (c for c in root.children if c.tag == "alias"):
@@ -107,7 +112,10 @@ class Document:
 
 
 class Properties:
-    """Typed access to the values inside one object element. What nobody asks for ends up in a warning."""
+    """Typed access to the values inside one object element. What nobody asks for ends up in a warning.
+
+    `textures` has those that were found where a colour or number was asked for, by its name; the answer is their mean.
+    """
 
     def __init__(self, element: Element, document: Document, depth: int = 0) -> None:
         if depth > MOST_NESTED:
@@ -118,6 +126,7 @@ class Properties:
         self._depth = depth
         self.type = element.attributes.get("type", "")
         self.values: dict[str, Element] = {}
+        self.textures: dict[str, Texture] = {}
         self._objects: list[tuple[Element, Element]] = []
         self._asked: set[str] = set()
         for child in element.children:
@@ -183,6 +192,34 @@ class Properties:
         except ValueError as error:
             raise self.document.error(f"'{name}' of {self.element}: {error}.", element) from None
 
+    def choice(self, name: str, words: tuple[str, ...]) -> str:
+        """One of these words; the first one if nothing is given."""
+        word = self.string(name, words[0])
+        if word not in words:
+            what = f"'{name}' of {self.element}: expected {' or '.join(words)}, found '{word[:40]}'."
+            raise self.document.error(what, self.values[name])
+        return word
+
+    def texture(self, name: str) -> Texture | None:
+        """The value of that name if it is a texture that varies; None for anything else."""
+        element = self.values.get(name)
+        if element is None or element.tag != "texture" or element.attributes.get("type") not in TEXTURE_TYPES:
+            return None
+        self._asked.add(name)
+        if name not in self.textures:
+            self.textures[name] = read_texture(Properties(element, self.document, self._depth + 1))
+        return self.textures[name]
+
+    def unnamed_textures(self) -> list[Texture]:
+        """Nested textures that vary and have no name of a property."""
+        found = [target for target in self.objects("texture") if target.attributes.get("type") in TEXTURE_TYPES]
+        return [read_texture(Properties(element, self.document, self._depth + 1)) for element in found]
+
+    def roughness(self, name: str, default: float) -> float:
+        """A number, or a texture's mean luminance."""
+        texture = self.texture(name)
+        return float(np.dot(texture.mean, LUMINANCE)) if texture is not None else self.number(name, default)
+
     def number(self, name: str, default: float) -> float:
         return self._take(name, ("float", "integer"), parse_float, default)
 
@@ -203,11 +240,14 @@ class Properties:
         return self.values[name].tag if name in self.values else None
 
     def colour(self, name: str, default: float) -> RGB:
-        """RGB value written in any of Mitsuba's ways; textures give their mean with a warning."""
+        """RGB value written in any of Mitsuba's ways; textures give their mean."""
         self._asked.add(name)
         element = self.values.get(name)
         if element is None:
             return (default, default, default)
+        texture = self.texture(name)
+        if texture is not None:
+            return texture.mean
         text = element.attributes.get("value")
         if element.tag == "texture" or "type" in element.attributes:
             nested = Properties(element, self.document, self._depth + 1)
@@ -236,6 +276,12 @@ class Properties:
         """Colour that must not be negative; values above `most` are cut with a warning."""
         value = self.colour(name, default)
         at = self.values.get(name, self.element)
+        if name in self.textures:
+            texture, changed = limited(self.textures[name], most)
+            if changed:
+                self.document.warn(f"'{name}' of {self.element}: {changed}", at)
+            self.textures[name] = texture
+            return texture.mean
         if min(value) < 0:
             raise self.document.error(f"'{name}' of {self.element} must not be negative, found {value}.", at)
         if most is not None and max(value) > most:
@@ -243,6 +289,16 @@ class Properties:
             r, g, b = (min(c, most) for c in value)
             return (r, g, b)
         return value
+
+    def texture_properties(self, name: str) -> Properties | None:
+        """What stands inside the <texture> of this name; None if it is not there."""
+        self._asked.add(name)
+        element = self.values.get(name)
+        if element is None:
+            return None
+        if element.tag != "texture":
+            raise self.document.error(f"'{name}' of {self.element} must be <texture>, not {element}.", element)
+        return Properties(element, self.document, self._depth + 1)
 
     def transform(self, name: str = "to_world") -> Matrix:
         """World from object, (4, 4)."""

@@ -11,10 +11,12 @@ import numpy as np
 from pmviewer.errors import SceneError
 from pmviewer.scene import primitives
 from pmviewer.scene.clean import check_faces
-from pmviewer.scene.description import Cylinder, Disk, Geometry, Mesh, Parallelogram, Sphere, Vec3
+from pmviewer.scene.description import Cylinder, Disk, Frame, Geometry, Mesh, Parallelogram, Sphere, Vec3
+from pmviewer.scene.mitsuba_displacement import displacement
 from pmviewer.scene.mitsuba_document import Properties
 from pmviewer.scene.mitsuba_transform import Matrix, apply, mirrors, similar_columns
 from pmviewer.scene.ply import read_ply
+from pmviewer.scene.texture_coordinates import orthonormal
 
 SUPPORTED = ("obj", "ply", "rectangle", "cube", "sphere", "disk", "cylinder")
 
@@ -25,7 +27,11 @@ def _vec3(v: np.ndarray) -> Vec3:
 
 
 def geometry(p: Properties) -> Geometry:
-    """Geometry of a supported <shape>. Raises SceneError."""
+    """Geometry of a supported <shape>, displaced if it has a displacement. Raises SceneError."""
+    return displacement(p, _smooth_geometry(p))
+
+
+def _smooth_geometry(p: Properties) -> Geometry:
     to_world = p.transform()
     flip = p.boolean("flip_normals", False)
     if p.type in ("obj", "ply"):
@@ -43,9 +49,16 @@ def geometry(p: Properties) -> Geometry:
 
 def _rectangle(m: Matrix, flip: bool) -> Parallelogram:
     edge_u, edge_v = _vec3(2 * m[:3, 0]), _vec3(2 * m[:3, 1])
-    if mirrors(m) != flip:
+    swap = mirrors(m) != flip
+    if swap:
         edge_u, edge_v = edge_v, edge_u
-    return Parallelogram(_vec3(apply(m, (-1, -1, 0))), edge_u, edge_v)
+    return Parallelogram(_vec3(apply(m, (-1, -1, 0))), edge_u, edge_v, swap)
+
+
+def _frame(m: Matrix) -> Frame:
+    """The transformation's axes at unit length."""
+    x, y, z = (_vec3(row) for row in primitives.unit(m[:3, :3].T))
+    return x, y, z
 
 
 def _uneven(p: Properties) -> None:
@@ -58,7 +71,7 @@ def _sphere(p: Properties, to_world: Matrix, flip: bool) -> Geometry:
     flip = flip != (mirrors(to_world) != (radius < 0))
     scale = similar_columns(to_world)
     if scale is not None:
-        return Sphere(_vec3(apply(to_world, center)), abs(radius) * scale, flip)
+        return Sphere(_vec3(apply(to_world, center)), abs(radius) * scale, flip, _frame(to_world))
     _uneven(p)
     local = np.eye(4)
     local[:3, :3] *= abs(radius)
@@ -72,7 +85,10 @@ def _disk(p: Properties, to_world: Matrix, flip: bool) -> Geometry:
         _uneven(p)
         return primitives.transformed(primitives.disk(), to_world, flip)
     normal = primitives.unit(np.cross(to_world[:3, 0], to_world[:3, 1])[None])[0]
-    return Disk(_vec3(to_world[:3, 3]), _vec3(-normal if mirrors(to_world) != flip else normal), radius)
+    facing = -normal if mirrors(to_world) != flip else normal
+    upright = to_world.copy()
+    upright[:3, 2] = normal
+    return Disk(_vec3(to_world[:3, 3]), _vec3(facing), radius, _frame(upright))
 
 
 def _cylinder(p: Properties, to_world: Matrix, flip: bool) -> Geometry:
@@ -83,15 +99,15 @@ def _cylinder(p: Properties, to_world: Matrix, flip: bool) -> Geometry:
     if length == 0:
         return Cylinder(p0, p0, radius, flip)
     w = axis / length
-    u = primitives.unit(np.cross(w, np.eye(3)[np.argmin(np.abs(w))])[None])[0]
+    u, v, _ = orthonormal(w)
     local = np.eye(4)
-    local[:3, 0], local[:3, 1], local[:3, 2], local[:3, 3] = radius * u, radius * np.cross(w, u), axis, p0
+    local[:3, 0], local[:3, 1], local[:3, 2], local[:3, 3] = radius * u, radius * v, axis, p0
     m = to_world @ local
     flip = flip != mirrors(to_world)
     world_radius = similar_columns(m, 2)
     upright = np.abs(m[:3, 2] @ m[:3, :2]).max() <= 1e-5 * np.linalg.norm(m[:3, 2]) * (world_radius or 0)
     if world_radius is not None and (upright or math.isclose(radius, 0)):
-        return Cylinder(_vec3(m[:3, 3]), _vec3(m[:3, 3] + m[:3, 2]), world_radius, flip)
+        return Cylinder(_vec3(m[:3, 3]), _vec3(m[:3, 3] + m[:3, 2]), world_radius, flip, _frame(m))
     _uneven(p)
     return primitives.transformed(primitives.cylinder(), m, flip)
 
@@ -101,7 +117,8 @@ def _mesh_file(p: Properties, to_world: Matrix, flip: bool) -> Mesh:
     if not name:
         raise p.document.error(f"{p.element} needs a 'filename'.", p.element)
     flat = p.boolean("face_normals", False)
-    p.known("flip_tex_coords")
+    # OBJ counts v from a picture's lower edge, which `read_obj` has turned round already.
+    flip_v = p.boolean("flip_tex_coords", p.type == "obj") != (p.type == "obj")
     path = p.document.file(name, p.element)
     try:
         mesh = read_ply(path) if p.type == "ply" else _read_obj(path)
@@ -110,6 +127,8 @@ def _mesh_file(p: Properties, to_world: Matrix, flip: bool) -> Mesh:
         raise p.document.error(
             f"The mesh {path.name} named by {p.element}: {error.what}", p.element, error.hint
         ) from None
+    if flip_v and mesh.uv is not None:
+        mesh = replace(mesh, uv=mesh.uv * [1, -1] + [0, 1])
     if flat:
         mesh = replace(mesh, normals=None)
     elif mesh.normals is None:

@@ -1,13 +1,11 @@
-"""Spectra and textures written as objects (`<spectrum type="…">`, `<texture type="…">`), reduced to one RGB colour."""
+"""Spectra written as objects (`<spectrum type="…">`), reduced to one RGB colour."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pmviewer.errors import SceneError
 from pmviewer.scene.description import RGB
 from pmviewer.scene.mitsuba_values import average_spectrum, parse_float
-from pmviewer.scene.texture import mean_colour
 
 if TYPE_CHECKING:
     from pmviewer.scene.mitsuba_document import Properties
@@ -16,7 +14,8 @@ WHITE: RGB = (1.0, 1.0, 1.0)
 
 
 def spectrum_object(properties: Properties, default: RGB) -> RGB:
-    """Colour of a nested texture or spectrum; whatever varies is replaced by its mean, with a warning."""
+    """Colour of a nested spectrum, or of a texture that is not read as one; what varies becomes its mean, with a
+    warning."""
     kind, element, document = properties.type, properties.element, properties.document
     if kind in ("rgb", "srgb"):
         return properties.colour("color", default[0])
@@ -30,26 +29,9 @@ def spectrum_object(properties: Properties, default: RGB) -> RGB:
     if kind in ("regular", "irregular"):
         document.warn(f"{element} is approximated by its means over three bands of wavelengths.", element)
         return _sampled(properties)
-    if kind == "checkerboard":
-        a, b = properties.colour("color0", 0.4), properties.colour("color1", 0.2)
-        document.warn(f"{element} is not supported: its mean colour is used.", element)
-        return _mean(a, b)
-    if kind == "bitmap":
-        document.warn(f"{element} is not supported: its mean colour is used.", element)
-        raw = properties.boolean("raw", False)
-        path = document.file(properties.string("filename", ""), element)
-        try:
-            return mean_colour(path, raw)
-        except SceneError as error:
-            raise document.error(error.what, element, error.hint) from None
     grey = ", ".join(f"{c:g}" for c in default)
     document.warn(f"{element} is not supported: the default ({grey}) is used.", element)
     return default
-
-
-def _mean(a: RGB, b: RGB) -> RGB:
-    r, g, b_ = ((x + y) / 2 for x, y in zip(a, b))
-    return (r, g, b_)
 
 
 def _sampled(properties: Properties) -> RGB:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,12 @@ from pmviewer.errors import SceneError
 from pmviewer.scene.description import RGB, Material, Mesh, Shape
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
+from pmviewer.scene.mtl_maps import load_maps, read_maps
 from pmviewer.scene.primitives import fans
-from pmviewer.scene.texture import mean_of_image
+from pmviewer.scene.texture import Bitmap, Texture, limited, scaled
 
+_TEXTURES, _BUMP_SCALE = " textures", " bump scale"
+"""Beside the file's own keys, which have no spaces."""
 _MIRROR_MODELS, _GLASS_MODELS = (3, 5, 8), (4, 6, 7, 9)
 
 
@@ -33,8 +37,14 @@ def obj_parts(path: Path, skip_materials: bool) -> list[tuple[str, Mesh, str | N
             raise SceneError("The OBJ file's vertices do not have three coordinates each.", path)
         faces = fans(np.asarray(kwargs["faces"])).astype(np.int32)  # quads come as quads
         normals = kwargs.get("vertex_normals")
-        mesh = Mesh(vertices, faces, None if normals is None else np.asarray(normals, np.float64))
         visual = kwargs.get("visual")
+        uv = getattr(visual, "uv", None)
+        if uv is not None and np.shape(uv)[:1] == vertices.shape[:1] and np.shape(uv)[1] >= 2:
+            # The format counts v from a picture's lower edge.
+            uv = np.asarray(uv, np.float64)[:, :2] * [1, -1] + [0, 1]
+        else:
+            uv = None
+        mesh = Mesh(vertices, faces, None if normals is None else np.asarray(normals, np.float64), uv)
         parts.append((str(name), mesh, str(visual.material.name) if visual is not None else None))
     return parts
 
@@ -49,25 +59,34 @@ def as_utf8(data: bytes) -> bytes:
 
 
 def joined(meshes: list[Mesh]) -> Mesh:
-    """All parts as one mesh; normals survive only if every part has them."""
+    """All parts as one mesh; normals and texture coordinates survive only if every part has them."""
     offsets = np.cumsum([0] + [len(m.vertices) for m in meshes[:-1]])
     vertices = np.concatenate([m.vertices for m in meshes])
     faces = np.concatenate([m.faces + o for m, o in zip(meshes, offsets)]).astype(np.int32)
     normals = [m.normals for m in meshes if m.normals is not None]
-    return Mesh(vertices, faces, np.concatenate(normals) if len(normals) == len(meshes) else None)
+    uvs = [m.uv for m in meshes if m.uv is not None]
+    return Mesh(
+        vertices,
+        faces,
+        np.concatenate(normals) if len(normals) == len(meshes) else None,
+        np.concatenate(uvs) if len(uvs) == len(meshes) else None,
+    )
 
 
 def read_obj(path: Path, diagnostics: Diagnostics) -> MeshFile:
     """The file's parts with their materials."""
     materials = _libraries(path, diagnostics)
     result = MeshFile()
+    built: dict[str, tuple[Material, RGB | None, Texture | None]] = {}
     for name, mesh, material_name in obj_parts(path, skip_materials=not materials):
-        material, radiance = DEFAULT_MATERIAL, None
+        material, radiance, emission = DEFAULT_MATERIAL, None, None
         if material_name in materials:
-            material, radiance = _material(material_name, materials[material_name], diagnostics)
+            if material_name not in built:
+                built[material_name] = _material(material_name, materials[material_name], diagnostics)
+            material, radiance, emission = built[material_name]
         # trimesh names nameless parts after the file it was given.
         shape_name = path.stem if name in ("geometry", path.name) else name
-        result.shapes.append(Shape(shape_name, mesh, result.material(material), radiance))
+        result.shapes.append(Shape(shape_name, mesh, result.material(material), radiance, emission))
     return result
 
 
@@ -84,7 +103,17 @@ def _libraries(path: Path, diagnostics: Diagnostics) -> dict[str, dict[str, Any]
         if not library.is_file():
             diagnostics.warn(f"The material file {match[1]!r} does not exist: grey replaces its materials.", line)
             continue
-        materials |= parse_mtl(as_utf8(library.read_bytes()), resolver=FilePathResolver(str(library)))
+        content = as_utf8(library.read_bytes())
+        maps, ignored = read_maps(content.decode("utf-8"))
+        if ignored:
+            diagnostics.warn(f"The textures {', '.join(sorted(ignored))} are ignored.")
+        # Pictures are read here, so trimesh need not know of them.
+        plain = re.sub(rb"(?im)^[ \t]*map_kd[ \t].*$", b"", content)
+        for name, m in parse_mtl(plain, resolver=FilePathResolver(str(library))).items():
+            m[_TEXTURES] = load_maps(maps.get(" ".join(name.split()), {}), library, diagnostics)
+            if "bump" in maps.get(name, {}):
+                m[_BUMP_SCALE] = maps[name]["bump"].factor
+            materials[name] = m
     return materials
 
 
@@ -98,27 +127,42 @@ def _numbers(m: dict[str, Any], key: str, default: float) -> RGB:
     return (max(0.0, r), max(0.0, g), max(0.0, b))
 
 
-def _material(name: str, m: dict[str, Any], diagnostics: Diagnostics) -> tuple[Material, RGB | None]:
-    """Kd, Ks, Ke, Ni and the illumination model as a material and the radiance it emits."""
+def _material(name: str, m: dict[str, Any], diagnostics: Diagnostics) -> tuple[Material, RGB | None, Texture | None]:
+    """Kd, Ks, Ke, Ni, the illumination model and the maps as a material, the radiance it emits and its texture."""
     kd, ks, ke = _numbers(m, "kd", 0.7), _numbers(m, "ks", 0.0), _numbers(m, "ke", 0.0)
     model = int(_numbers(m, "illum", 2)[0])
-    if "image" in m:
-        diagnostics.warn("Textures are not supported: their mean colours are used.")
-        mean = mean_of_image(m["image"])
-        kd = mean if not any(kd) else (kd[0] * mean[0], kd[1] * mean[1], kd[2] * mean[2])
-    ignored = sorted(key for key in m if key.startswith(("map_", "bump", "disp", "refl", "norm")))
-    if ignored:
-        diagnostics.warn(f"The textures {', '.join(ignored)} are ignored.")
+    maps: dict[str, Bitmap] = m[_TEXTURES]
+    textures: dict[str, Texture] = {}
     if model in _GLASS_MODELS:
         tint = _numbers(m, "tf", 1.0)
         material = Material(name, "dielectric", (1.0, 1.0, 1.0), _capped(tint), eta=max(1.0, _numbers(m, "ni", 1.5)[0]))
     elif model in _MIRROR_MODELS and max(ks) >= 0.5 and max(ks) > max(kd):
+        ks, colour = _textured(ks, maps.get("ks"), 1.0)
+        if colour is not None:
+            textures["reflectance"] = colour
         material = Material(name, "conductor", _capped(ks), two_sided=True)
     else:
         if _numbers(m, "d", 1.0)[0] < 1:
             diagnostics.warn("Transparency (d) is ignored except in the glass models (illum 4, 6, 7, 9).")
+        kd, colour = _textured(kd, maps.get("kd"), 1.0)
+        if colour is not None:
+            textures["reflectance"] = colour
         material = Material(name, "diffuse", _capped(kd), two_sided=True)
-    return material, ke if max(ke) > 0 else None
+    if "bump" in maps:
+        textures["bump"] = maps["bump"]
+    if "norm" in maps:
+        textures["normal"] = maps["norm"]
+    ke, emission = _textured(ke, maps.get("ke"), None)
+    material = replace(material, textures=textures, bump_scale=float(m.get(_BUMP_SCALE, 1.0)))
+    return (material, ke, emission) if max(ke) > 0 else (material, None, None)
+
+
+def _textured(colour: RGB, bitmap: Bitmap | None, most: float | None) -> tuple[RGB, Texture | None]:
+    """The colour times a map's mean, and the map times the colour; a black colour leaves the map as it is."""
+    if bitmap is None:
+        return colour, None
+    texture, _ = limited(scaled(bitmap, colour if any(colour) else (1.0, 1.0, 1.0)), most)
+    return texture.mean, texture
 
 
 def _capped(colour: RGB) -> RGB:

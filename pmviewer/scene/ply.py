@@ -20,6 +20,7 @@ _TYPES = {
 }  # fmt: skip
 _FORMATS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _HEADER_LIMIT = 1 << 16
+_COORDINATES = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"))
 _FACE_LISTS = ("vertex_indices", "vertex_index")
 
 
@@ -38,7 +39,8 @@ class _Element:
 
 
 def read_ply(path: Path) -> Mesh:
-    """The file's triangles (polygons are cut into fans), with its normals if it has them.
+    """The file's triangles (polygons are cut into fans), with its normals and texture coordinates if it has
+    them.
 
     Raises SceneError for anything unreadable; indices are checked by `clean`.
     """
@@ -60,13 +62,17 @@ def read_ply(path: Path) -> Mesh:
     normals = None
     if {"nx", "ny", "nz"} <= vertex.keys():
         normals = np.stack([vertex[c] for c in ("nx", "ny", "nz")], axis=1).astype(np.float64)
+    uv = None
+    pair = next((names for names in _COORDINATES if set(names) <= vertex.keys()), None)
+    if pair is not None:
+        uv = np.stack([vertex[c] for c in pair], axis=1).astype(np.float64)
     face = columns.get("face", {})
     lists = next((face[name] for name in _FACE_LISTS if name in face), None)
     if lists is None or lists.ndim != 2:
         raise SceneError("The PLY file has no faces (it may be a point cloud).", path, hint="Export it with triangles.")
     # Indices beyond 32 bits must not wrap around to valid ones.
     faces = np.where((lists >= 0) & (lists < 2**31), lists, -1).astype(np.int32)
-    return Mesh(vertices, faces, normals)
+    return Mesh(vertices, faces, normals, uv)
 
 
 def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:

@@ -14,45 +14,68 @@ Float = NDArray[np.float64]
 
 
 def cube() -> Mesh:
-    """[-1, 1]³ with flat faces, outwards."""
+    """[-1, 1]³ with flat faces, outwards; each face has the whole square as texture coordinates."""
     vertices = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    return Mesh(vertices, np.array([[a, b, c] for a, b, c, _ in quads] + [[a, c, d] for a, _, c, d in quads], np.int32))
+    # Where each face's first corner lies on the texture, counted round it: as Mitsuba lays it on.
+    starts = (0, 1, 0, 2, 3, 0)
+    corners = vertices[np.array(quads)].reshape(-1, 3)
+    square = np.array([[0.0, 0], [0, 1], [1, 1], [1, 0]])
+    uv = np.concatenate([np.roll(square, -start, axis=0) for start in starts])
+    a = np.arange(0, 24, 4)
+    faces = np.concatenate([np.stack([a, a + 1, a + 2], 1), np.stack([a, a + 2, a + 3], 1)]).astype(np.int32)
+    return Mesh(corners, faces, uv=uv)
 
 
 def _grid_faces(rows: int, columns: int) -> NDArray[np.int32]:
-    """Triangles of a grid of vertices whose last column joins the first."""
+    """Triangles of a grid of vertices that is `columns` cells wide."""
     i, j = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
-    a, b = i * columns + j, i * columns + (j + 1) % columns
-    c, d = b + columns, a + columns
+    a = i * (columns + 1) + j
+    b, d = a + 1, a + columns + 1
+    c = d + 1
     return np.concatenate([np.stack([a, d, c], -1), np.stack([a, c, b], -1)]).reshape(-1, 3).astype(np.int32)
 
 
 def sphere(rows: int = 64, columns: int = 128) -> Mesh:
     """Unit sphere, normals outwards. Triangles collapse at the poles; `clean` drops them."""
     theta = np.linspace(0, math.pi, rows + 1)[:, None]
-    phi = np.linspace(0, 2 * math.pi, columns, endpoint=False)
+    phi = _around(columns)
     ring = [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta) * np.ones_like(phi)]
     points = np.stack(ring, axis=-1).reshape(-1, 3)
-    return Mesh(points, _grid_faces(rows + 1, columns), points.copy())
+    return Mesh(points, _grid_faces(rows + 1, columns), points.copy(), _grid_uv(theta[:, 0] / math.pi, columns))
+
+
+def _around(columns: int) -> Float:
+    """(columns + 1,) angles once round; the last one is the first, for a seam in the texture without one in space."""
+    return np.append(np.linspace(0, 2 * math.pi, columns, endpoint=False), 0.0)
+
+
+def _grid_uv(v: Float, columns: int) -> Float:
+    """Texture coordinates of a grid of rows at these v, u running from 0 to 1."""
+    u = np.linspace(0, 1, columns + 1)
+    return np.stack(np.broadcast_arrays(u, v[:, None]), axis=-1).reshape(-1, 2)
 
 
 def cylinder(columns: int = 128) -> Mesh:
     """Open tube of radius 1 from z = 0 to z = 1, normals away from the axis."""
-    phi = np.linspace(0, 2 * math.pi, columns, endpoint=False)
+    phi = _around(columns)
     normal = np.stack([np.cos(phi), np.sin(phi), np.zeros_like(phi)], axis=1)
     points = np.concatenate([normal + [0, 0, 1], normal])
-    return Mesh(points, _grid_faces(2, columns), np.concatenate([normal, normal]))
+    faces = _grid_faces(2, columns)
+    return Mesh(points, faces, np.concatenate([normal, normal]), _grid_uv(np.array([1.0, 0.0]), columns))
 
 
 def disk(columns: int = 128) -> Mesh:
     """Unit disk in z = 0, facing +z."""
-    phi = np.linspace(0, 2 * math.pi, columns, endpoint=False)
+    phi = _around(columns)
     rim = np.stack([np.cos(phi), np.sin(phi), np.zeros_like(phi)], axis=1)
     j = np.arange(columns)
-    return Mesh(
-        np.concatenate([[[0.0, 0, 0]], rim]), np.stack([0 * j, 1 + j, 1 + (j + 1) % columns], 1).astype(np.int32)
-    )
+    # The centre once for every triangle: azimuths don't meet there.
+    points = np.concatenate([np.zeros((columns, 3)), rim])
+    middle = np.stack([np.zeros(columns), (j + 0.5) / columns], axis=1)
+    edge = np.stack([np.ones(columns + 1), np.arange(columns + 1) / columns], axis=1)
+    faces = np.stack([j, columns + j, columns + j + 1], axis=1).astype(np.int32)
+    return Mesh(points, faces, uv=np.concatenate([middle, edge]))
 
 
 def fans(polygons: NDArray[np.number]) -> NDArray[np.int64]:
@@ -74,7 +97,7 @@ def transformed(mesh: Mesh, m: Matrix, flip: bool = False) -> Mesh:
         if normals is not None:
             normals = unit(normals @ cofactor(m).T) * (-1.0 if mirrored != flip else 1.0)
     faces = mesh.faces[:, ::-1] if mirrored != flip else mesh.faces
-    return Mesh(vertices, np.ascontiguousarray(faces), normals)
+    return Mesh(vertices, np.ascontiguousarray(faces), normals, mesh.uv)
 
 
 def unit(vectors: Float) -> Float:
@@ -104,4 +127,4 @@ def with_smooth_normals(mesh: Mesh) -> Mesh:
             index = position[mesh.faces[:, i]]
             for axis in range(3):
                 total[:, axis] += np.bincount(index, weighted[:, axis], minlength=len(total))
-    return Mesh(mesh.vertices, mesh.faces, unit(total)[position])
+    return Mesh(mesh.vertices, mesh.faces, unit(total)[position], mesh.uv)

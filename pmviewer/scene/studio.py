@@ -8,7 +8,6 @@ from typing import Literal
 import numpy as np
 
 from pmviewer.scene.description import BLACK, ConstantEnvironment, Disk, Material, Parallelogram, Shape
-from pmviewer.scene.framing import bounds
 
 # Lengths in radii of the bounding sphere. A white surface that faces the light comes out a little below 1.
 LIGHT_DISTANCE, LIGHT_SIDE, LIGHT_RADIANCE = 3.0, 1.2, 15.0
@@ -25,9 +24,9 @@ class Studio:
     sky: ConstantEnvironment
 
 
-def studio_of(shapes: tuple[Shape, ...], up: Literal["y", "z"], first_material: int) -> Studio:
-    """A studio around the shapes, lit from above, left of and behind the framed camera's shoulder."""
-    low, high = bounds(shapes)
+def studio_of(box: tuple[np.ndarray, np.ndarray], up: Literal["y", "z"], first_material: int) -> Studio:
+    """A studio around a scene with these bounds, lit from above, left of and behind the framed camera's shoulder."""
+    low, high = box
     center = (low + high) / 2
     radius = max(float(np.linalg.norm(high - low)) / 2, 1e-12)
     top = np.array([0.0, 1.0, 0.0] if up == "y" else [0.0, 0.0, 1.0])

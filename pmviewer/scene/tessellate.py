@@ -8,11 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.scene.description import Cylinder, Disk, Mesh, Parallelogram, Scene, Sphere
+from pmviewer.scene.description import Cylinder, Disk, Group, Mesh, Parallelogram, Scene, Shape, Sphere
 from pmviewer.scene.flatten import bounding_sphere
+from pmviewer.scene.mitsuba_transform import cofactor, mirrors
+from pmviewer.scene.primitives import unit
 
 Float = NDArray[np.float64]
+Drawn = tuple[Float, Float, Float]
 SEGMENTS = 96
+INSTANCE_BUDGET = 600_000
+"""Triangles that all instances together are drawn with."""
+FINEST_CELLS = 128
 
 
 @dataclass(frozen=True)
@@ -25,22 +31,18 @@ class DrawGeometry:
     albedo: NDArray[np.float32]
     center: Float
     radius: float
+    note: str = ""
+    """Says how instances were simplified, if they were."""
 
 
 def tessellate(scene: Scene) -> DrawGeometry:
-    """All shapes of the scene as triangles."""
-    vertices, normals, albedos = [], [], []
-    for shape in scene.shapes:
-        corners, corner_normals = _triangles(shape.geometry)
-        material = scene.materials[shape.material]
-        colour = np.array(material.reflectance)
-        if shape.radiance is not None and max(shape.radiance) > 0:
-            colour = np.array(shape.radiance) / max(shape.radiance)
-        elif material.kind == "dielectric":
-            colour = 0.5 + 0.5 * np.array(material.transmittance) * np.array([0.8, 0.9, 1.0])
-        vertices.append(corners.reshape(-1, 3))
-        normals.append(corner_normals.reshape(-1, 3))
-        albedos.append(np.broadcast_to(colour, (corners.shape[0] * 3, 3)))
+    """All shapes and instances of the scene as triangles."""
+    parts = [_drawn(scene, shape) for shape in scene.shapes]
+    note = ""
+    if scene.instances:
+        copies, note = _copies(scene)
+        parts += copies
+    vertices, normals, albedos = zip(*parts)
     center, radius = bounding_sphere(scene)
     return DrawGeometry(
         vertices=np.ascontiguousarray(np.concatenate(vertices), np.float32),
@@ -48,7 +50,67 @@ def tessellate(scene: Scene) -> DrawGeometry:
         albedo=np.ascontiguousarray(np.concatenate(albedos), np.float32),
         center=center,
         radius=radius,
+        note=note,
     )
+
+
+def _drawn(scene: Scene, shape: Shape) -> Drawn:
+    """Corners, normals and albedo of a shape, (3n, 3) each."""
+    corners, corner_normals = _triangles(shape.geometry)
+    material = scene.materials[shape.material]
+    colour = np.array(material.reflectance)
+    if shape.radiance is not None and max(shape.radiance) > 0:
+        colour = np.array(shape.radiance) / max(shape.radiance)
+    elif material.transparent:
+        colour = 0.5 + 0.5 * np.array(material.transmittance) * np.array([0.8, 0.9, 1.0])
+    albedo = np.broadcast_to(colour, (corners.shape[0] * 3, 3))
+    return corners.reshape(-1, 3), corner_normals.reshape(-1, 3), albedo
+
+
+def _copies(scene: Scene) -> tuple[list[Drawn], str]:
+    """The triangles of all instances, and what to say when they had to be simplified to fit the budget."""
+    whole: dict[Group, Drawn] = {}
+    for group in scene.groups:
+        parts = [_drawn(scene, shape) for shape in group.shapes]
+        whole[group] = tuple(np.concatenate(column) for column in zip(*parts))  # type: ignore[assignment]
+    asked = sum(len(whole[instance.group][0]) for instance in scene.instances) // 3
+    drawn = whole
+    cells = FINEST_CELLS
+    count = asked
+    while count > INSTANCE_BUDGET and cells >= 1:
+        drawn = {group: _clustered(part, cells) for group, part in whole.items()}
+        count = sum(len(drawn[instance.group][0]) for instance in scene.instances) // 3
+        cells //= 2
+    shown = scene.instances[:: max(1, -(-count // INSTANCE_BUDGET))]
+    found: list[Drawn] = []
+    for instance in shown:
+        corners, normals, albedo = drawn[instance.group]
+        m = instance.to_world
+        found.append(
+            (corners @ m[:3, :3].T + m[:3, 3], unit(normals @ cofactor(m).T) * (-1.0 if mirrors(m) else 1.0), albedo)
+        )
+    if count == asked:
+        return found, ""
+    total = sum(len(corners) for corners, _, _ in found) // 3
+    return found, f"the geometry view draws {total:,} of {asked:,} instanced triangles"
+
+
+def _clustered(part: Drawn, cells: int) -> Drawn:
+    """Vertices moved to the mean of those in their cell of a cubic grid; triangles that collapse are left out.
+
+    Rossignac and Borrel, "Multi-resolution 3D approximations for rendering complex scenes", 1993.
+    """
+    corners, normals, albedo = part
+    low = corners.min(axis=0)
+    size = float((corners.max(axis=0) - low).max()) / cells
+    _, cell = np.unique(((corners - low) / max(size, 1e-300)).astype(np.int64), axis=0, return_inverse=True)
+    cell = cell.reshape(-1)
+    number = np.bincount(cell)[:, None]
+    mean = np.stack([np.bincount(cell, corners[:, k]) for k in range(3)], axis=1) / number
+    triangles = cell.reshape(-1, 3)
+    kept = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    at = np.repeat(kept, 3)
+    return mean[cell[at]], normals[at], albedo[at]
 
 
 def _flat(corners: Float) -> tuple[Float, Float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import moderngl
@@ -13,15 +14,27 @@ from pmviewer.resources import data_folder
 
 
 def load_program(context: moderngl.Context, name: str) -> moderngl.Program:
-    """Compile and link `shaders/NAME.vert` and `.frag`. Raises WindowError with the driver's message."""
+    """Compile and link `shaders/NAME.vert`, `.frag` and, if there is one, `.geom`. Raises WindowError with the driver's
+    message."""
     folder = data_folder("shaders")
+    geometry = folder / f"{name}.geom"
     try:
         return context.program(
-            vertex_shader=(folder / f"{name}.vert").read_text(encoding="utf-8"),
-            fragment_shader=(folder / f"{name}.frag").read_text(encoding="utf-8"),
+            vertex_shader=_source(folder / f"{name}.vert"),
+            fragment_shader=_source(folder / f"{name}.frag"),
+            geometry_shader=_source(geometry) if geometry.exists() else None,
         )
     except moderngl.Error as error:
         raise WindowError(f"The OpenGL driver refused the shader '{name}': {error}") from None
+
+
+def _source(path: Path) -> str:
+    """The shader's text; a line `#include "FILE"` stands for a file beside it."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    prefix = '#include "'
+    return "\n".join(
+        _source(path.parent / line[len(prefix) : -1]) if line.startswith(prefix) else line for line in lines
+    )
 
 
 def set_uniforms(program: moderngl.Program, **values: Any) -> None:

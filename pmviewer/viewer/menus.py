@@ -8,6 +8,7 @@ from imgui_bundle import hello_imgui, imgui
 
 from pmviewer.settings import SETTINGS, get
 from pmviewer.viewer import theme
+from pmviewer.viewer.overlay_panel import OVERLAYS
 from pmviewer.viewer.shortcuts import keys_of
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.toolbar import Actions
@@ -30,7 +31,7 @@ class Menus:
             self._render()
             imgui.end_menu()
         if imgui.begin_menu("Overlays"):
-            for name in ("caustic", "global", "radiance"):
+            for name in OVERLAYS:
                 shown = get(self._state.settings, f"overlays.{name}.show")
                 self._item(SETTINGS[f"overlays.{name}.show"].group.capitalize(), f"toggle_{name}", shown)
             imgui.end_menu()

@@ -6,7 +6,7 @@ vertex format, so a map of millions costs no work on the CPU.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import moderngl
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.frame import PhotonCloud
 from pmviewer.render.camera import Matrix
-from pmviewer.settings import PointOverlay
+from pmviewer.settings import PointOverlay, ShadowOverlay
 from pmviewer.viewer.gl_program import load_program, set_uniforms
 
 RGB = tuple[float, float, float]
@@ -42,7 +42,20 @@ LIGHT_PALETTE: tuple[RGB, ...] = (
 )
 """Distinct with colour-blind eyes too (after Okabe and Ito); lights beyond the eighth start again."""
 
-_COLOUR_BY = {"power": 0, "bounce": 1, "light": 2}
+LIT_COLOUR: RGB = (1.0, 0.80, 0.25)
+SHADOW_COLOUR: RGB = (0.35, 0.30, 0.95)
+"""Of shadow photons where the light arrives and where it does not."""
+
+COLOUR_BY = {
+    "power": 0,
+    "bounce": 1,
+    "light": 2,
+    "lit or shadow": 3,
+    "importance": 0,
+    "map": 2,
+    "brought": 0,
+    "source": 2,
+}
 _EXPONENT_BASE = np.uint32(80 << 23)
 
 
@@ -58,6 +71,17 @@ def brightest_channel(photons: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.where(codes == 0, np.float32(0), ((codes << np.uint32(13)) + _EXPONENT_BASE).view(np.float32))
 
 
+def palettes() -> dict[str, NDArray[np.float32]]:
+    """Uniforms of `shaders/photon.glsl` that never change."""
+    colours = {
+        "bounce_palette": BOUNCE_PALETTE,
+        "light_palette": LIGHT_PALETTE,
+        "lit_colour": LIT_COLOUR,
+        "shadow_colour": SHADOW_COLOUR,
+    }
+    return {name: np.array(value, np.float32) for name, value in colours.items()}
+
+
 @dataclass(frozen=True)
 class CloudSummary:
     """For the legend: photons in the map, photons drawn, and the 1st and 99th percentile of their power in watts."""
@@ -70,23 +94,39 @@ class CloudSummary:
     """Ids of the lights they came from, of a sample."""
 
 
+def _percentiles(photons: NDArray[np.float32]) -> tuple[float, float]:
+    """1st and 99th percentile of the powers of photons (n, 6) that have any."""
+    power = brightest_channel(photons)
+    low, high = np.percentile(power[power > 0], [1, 99]) if np.any(power > 0) else (1.0, 1.0)
+    return float(low), float(high)
+
+
+def log_range(photons: NDArray[np.float32]) -> tuple[float, float]:
+    """Logarithms (base 2) of the powers that are drawn dim and bright; those that hardly differ are all bright."""
+    low, high = _percentiles(photons)
+    return float(np.log2(min(low, high / 16))), float(np.log2(high))
+
+
+def summary_of(sample: NDArray[np.float32], power_unit: float, total: int, drawn: int) -> CloudSummary:
+    """What the legend says of `total` photons of which `sample` (n, 6) are some."""
+    low, high = _percentiles(sample)
+    lights = tuple(int(i) for i in np.unique(sample.view(np.uint32)[:, 5] >> 16)[:64])
+    return CloudSummary(total, drawn, low * power_unit, high * power_unit, lights)
+
+
 class PointCloud:
     """One map's photons."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
         self._program = load_program(context, "points")
-        set_uniforms(
-            self._program,
-            bounce_palette=np.array(BOUNCE_PALETTE, np.float32),
-            light_palette=np.array(LIGHT_PALETTE, np.float32),
-        )
+        set_uniforms(self._program, **palettes())
         self._buffer: moderngl.Buffer | None = None
         self._arrays: dict[int, moderngl.VertexArray] = {}
         self._count = 0
         self._log_range = (0.0, 1.0)
         self._uploaded: PhotonCloud | None = None
-        self._sample: tuple[float, float, tuple[int, ...]] = (0.0, 0.0, ())
+        self._summary = CloudSummary(0, 0, 0.0, 0.0, ())
 
     def upload(self, cloud: PhotonCloud | None) -> bool:
         """Take this cloud; False when it is the one that is there already."""
@@ -100,12 +140,8 @@ class PointCloud:
         photons = np.ascontiguousarray(cloud.photons, np.float32)
         self._buffer = self._context.buffer(photons)
         sample = photons[:: even_thinning(self._count, 20_000)]
-        power = brightest_channel(sample)
-        low, high = np.percentile(power[power > 0], [1, 99]) if np.any(power > 0) else (1.0, 1.0)
-        dim = min(low, high / 16)  # powers that hardly differ are all bright
-        self._log_range = (float(np.log2(dim)), float(np.log2(high)))
-        lights = tuple(int(i) for i in np.unique(sample.view(np.uint32)[:, 5] >> 16)[:64])
-        self._sample = (float(low) * cloud.power_unit, float(high) * cloud.power_unit, lights)
+        self._log_range = log_range(sample)
+        self._summary = summary_of(sample, cloud.power_unit, self._count, 0)
         return True
 
     def release(self) -> None:
@@ -119,7 +155,7 @@ class PointCloud:
 
     def summary(self, limit: int) -> CloudSummary:
         drawn = -(-self._count // even_thinning(self._count, limit)) if self._count else 0
-        return CloudSummary(self._count, drawn, *self._sample)
+        return replace(self._summary, total=self._count, drawn=drawn)
 
     def draw(self, style: PointOverlay, view: Matrix, projection: Matrix, limit: int, pixel_ratio: float) -> None:
         """Draw at most `limit` photons into the bound framebuffer. Depth test and viewport are the caller's."""
@@ -132,7 +168,8 @@ class PointCloud:
             view=view,
             projection=projection,
             size=size,
-            colour_by=_COLOUR_BY[style.colour],
+            colour_by=COLOUR_BY[style.colour],
+            only_shadow=int(isinstance(style, ShadowOverlay) and not style.lit),
             power_range=self._log_range,
             round_points=int(size >= 3),
         )

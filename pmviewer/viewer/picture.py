@@ -4,31 +4,50 @@ photon maps over it, with the same camera to the pixel."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.frame import Frame
-from pmviewer.output.falsecolour import ERROR_SCALE
+from pmviewer.engine.frame import Frame, PhotonCloud
+from pmviewer.output.diagnostic_views import DIAGNOSTICS, GREY, LUMINANCE, view_scale
+from pmviewer.output.falsecolour import ERROR_SCALE, Scale
 from pmviewer.output.tone import depth_bounds
 from pmviewer.render.camera import CameraPose, Matrix
-from pmviewer.settings import Display, Overlays
+from pmviewer.settings import (
+    CacheOverlay,
+    Display,
+    GatherOverlay,
+    Overlays,
+    PathOverlay,
+    PointOverlay,
+    ProjectionOverlay,
+)
+from pmviewer.viewer.cells import CellCloud
 from pmviewer.viewer.gl_program import load_program, set_uniforms
+from pmviewer.viewer.lines import LineCloud, circles, flights, gather_lines
 from pmviewer.viewer.overlays import PointCloud
 from pmviewer.viewer.reference_plane import COLOUR_UNIT, REFERENCE_UNIT, ReferencePlane
 
-CLOUDS = ("caustic", "global", "radiance")
+if TYPE_CHECKING:
+    from pmviewer.photons.paths import PhotonPaths
+    from pmviewer.photons.projection import ProjectionMap
+
+CLOUDS = ("caustic", "global", "radiance", "cache", "shadow", "importons")
 SURROUND = (0.105, 0.105, 0.105)
-_CONTENT = {"albedo": 1, "normal": 2, "depth": 3, "error": 4}
+_CONTENT = {"albedo": 1, "normal": 2, "depth": 3, "error": 4} | {
+    view: 6 if how.cells else 5 for view, how in DIAGNOSTICS.items()
+}
 _CURVE = {"sRGB": 0, "Reinhard": 1, "filmic": 2, "linear": 3}
 BEHIND_POINTS = 0.3
 """Surfaces are this bright under points, which would drown on white walls."""
 NEAREST_FROM = 3.0
 """Magnification from which pixels are shown as squares."""
+GATHER_ENDS = 1 << 16
+"""Most ends of gather rays that are drawn: all of them."""
 NAVIGATION_LIMIT = 30_000
 """Points drawn while the camera moves, on a driver without a GPU."""
 
@@ -58,7 +77,15 @@ class Picture:
         context.gc_mode = "auto"
         self.software = any(name in context.info["GL_RENDERER"].lower() for name in ("llvmpipe", "softpipe", "swrast"))
         self.clouds = {name: PointCloud(context) for name in CLOUDS}
+        self.paths = LineCloud(context)
+        self.gathered = LineCloud(context)
+        self.gather_ends = PointCloud(context)
+        self.circles = LineCloud(context)
+        self.cells = CellCloud(context)
+        self._drawn_ways: dict[str, Any] = {}
         self.depth_range = (0.0, 1.0)
+        self.scale = Scale(0.0, 1.0)
+        """Of the diagnostic view that is shown."""
         self.reference = ReferencePlane(context)
         self._picture_program = load_program(context, "picture")
         self._geometry_program = load_program(context, "geometry")
@@ -78,6 +105,8 @@ class Picture:
         changed = False
         if view in ("reference", "error"):
             view = "beauty"  # the error is that of the image; the reference is there already
+        if view in DIAGNOSTICS and view not in frame.diagnostics:
+            view = "beauty"  # until it is there
         if view != "geometry" and self._shown != (frame.serial, view):
             self._upload_plane(frame.image(view), view)
             self._shown, self._coarse = (frame.serial, view), frame.coarse
@@ -91,6 +120,8 @@ class Picture:
         height, width, channels = image.shape
         if view == "depth":
             self.depth_range = depth_bounds(image)
+        elif view in DIAGNOSTICS:
+            self.scale = view_scale(view, image)
         plane = self._plane
         if plane is None or plane.size != (width, height) or plane.components != channels:
             if plane is not None:
@@ -117,11 +148,65 @@ class Picture:
             self._center, self._radius = np.asarray(geometry.center, float), float(geometry.radius)
         return True
 
+    def upload_paths(self, paths: PhotonPaths | None, style: PathOverlay) -> bool:
+        """Take the photon paths as far as they are drawn. True when anything changed."""
+        if not self._is_new("paths", (paths, style.first, style.length) if style.show else None):
+            return False
+        if paths is None or not style.show:
+            self.paths.upload(None)
+        else:
+            self.paths.upload(flights(paths, style.first, style.length), paths.power_unit)
+        return True
+
+    def upload_gathered(self, rows: NDArray[np.float32] | None, style: GatherOverlay) -> bool:
+        """Take a pixel's gather rays. True when anything changed."""
+        if not self._is_new("gathered", (rows,) if style.show else None):
+            return False
+        if rows is None or not style.show:
+            self.gathered.upload(None)
+            self.gather_ends.upload(None)
+        else:
+            ends, unit = gather_lines(rows)
+            self.gathered.upload(ends, unit)
+            self.gather_ends.upload(PhotonCloud(np.ascontiguousarray(ends[1::2]), unit))
+        return True
+
+    def upload_circles(self, cloud: PhotonCloud | None, style: CacheOverlay) -> bool:
+        """Take the circles of the cache's records. True when anything changed."""
+        shown = style.show and style.circles
+        if not self._is_new("circles", (cloud,) if shown else None):
+            return False
+        if shown and cloud is not None and cloud.reach is not None and len(cloud.photons):
+            self.circles.upload(circles(cloud.photons, cloud.reach))
+        else:
+            self.circles.upload(None)
+        return True
+
+    def upload_cells(self, maps: Mapping[str, Sequence[ProjectionMap]], style: ProjectionOverlay) -> bool:
+        """Take the lights' projection maps. True when anything changed."""
+        key = (maps.get(style.map), style.size, self._radius) if style.show else None
+        if not self._is_new("cells", key):
+            return False
+        self.cells.upload(maps.get(style.map, ()) if style.show else (), style.size * self._radius)
+        return True
+
+    def _is_new(self, what: str, key: tuple[Any, ...] | None) -> bool:
+        """Whether that is another one than was uploaded last. Arrays count as themselves, not by their values."""
+        before = self._drawn_ways.get(what)
+        same = (before is None) == (key is None)
+        if same and before is not None and key is not None:
+            same = all(a is b or (isinstance(a, int | float) and a == b) for a, b in zip(before, key, strict=True))
+        self._drawn_ways[what] = key
+        return not same
+
     def forget_frame(self) -> None:
         """Another scene: what was uploaded of the last one is stale."""
         self._shown = None
         for cloud in self.clouds.values():
             cloud.release()
+        for ways in (self.paths, self.gathered, self.gather_ends, self.circles, self.cells):
+            ways.release()
+        self._drawn_ways.clear()
 
     @property
     def has_plane(self) -> bool:
@@ -171,7 +256,7 @@ class Picture:
         view, projection = camera.view_matrix(), camera.projection_matrix(near, far)
         as_geometry = display.view == "geometry" or not self.has_plane
         if as_geometry:
-            points = overlays is not None and any(style.show for style in overlays.by_map().values())
+            points = overlays is not None and overlays.any_shown
             self._draw_geometry(view, projection, BEHIND_POINTS if points else 1.0)
         else:
             self._draw_plane(display, width)
@@ -184,12 +269,14 @@ class Picture:
         plane = self.reference.texture if display.view == "reference" else self._plane
         assert plane is not None
         coarse = self._coarse and display.view != "reference"
-        squares = (width / plane.width >= NEAREST_FROM and not coarse) or display.view == "error"
+        diagnostic = DIAGNOSTICS.get(display.view)
+        squares = (width / plane.width >= NEAREST_FROM and not coarse) or display.view == "error" or diagnostic
         sampling = moderngl.NEAREST if squares else moderngl.LINEAR
         plane.filter = (sampling, sampling)
         plane.use(0)
-        if display.view == "error":
+        if display.view == "error" or diagnostic:
             self.reference.bind()
+        low, high = self.scale.lower, self.scale.upper
         set_uniforms(
             self._picture_program,
             plane=0,
@@ -200,6 +287,10 @@ class Picture:
             reference=REFERENCE_UNIT,
             colours=COLOUR_UNIT,
             error_range=(math.log(ERROR_SCALE.lower), math.log(ERROR_SCALE.upper)),
+            value_range=(math.log(low), math.log(high)) if self.scale.log else (low, high),
+            value_log=int(self.scale.log),
+            value_weights=LUMINANCE if plane.components == 3 else (1.0, 0.0, 0.0),
+            grey=GREY,
         )
         self.context.disable(moderngl.DEPTH_TEST)
         self._triangle.render(moderngl.TRIANGLES, vertices=3)
@@ -224,10 +315,12 @@ class Picture:
         navigating: bool,
     ) -> None:
         styles = overlays.by_map()
-        if not any(style.show for style in styles.values()):
+        if not overlays.any_shown:
             return
         context = self.context
-        if any(style.show and style.depth for style in styles.values()):
+        ways = overlays.paths, overlays.gather, overlays.projection
+        tested = [style.show and style.depth for style in styles.values()]
+        if any(tested) or any(way.show and way.depth for way in ways):
             self._draw_depth(framebuffer, view, projection)
         for name, style in styles.items():
             if not style.show:
@@ -235,6 +328,39 @@ class Picture:
             context.enable_only(moderngl.PROGRAM_POINT_SIZE | (moderngl.DEPTH_TEST if style.depth else 0))
             limit = min(style.limit, NAVIGATION_LIMIT) if navigating and self.software else style.limit
             self.clouds[name].draw(style, view, projection, limit, pixel_ratio)
+        self._draw_ways(framebuffer, overlays, view, projection, pixel_ratio)
+
+    def _draw_ways(
+        self,
+        framebuffer: moderngl.Framebuffer,
+        overlays: Overlays,
+        view: Matrix,
+        projection: Matrix,
+        pixel_ratio: float,
+    ) -> None:
+        """Cells, circles and lines, which are translucent and leave the depth buffer as it is."""
+        framebuffer.depth_mask = False
+        framebuffer.use()
+        enable, viewport = self.context.enable_only, framebuffer.viewport[2:]
+        cells, cache, paths, gather = overlays.projection, overlays.cache, overlays.paths, overlays.gather
+        if cells.show:
+            enable(moderngl.DEPTH_TEST if cells.depth else 0)
+            self.cells.draw(cells, view, projection)
+        if cache.show and cache.circles:
+            enable(moderngl.DEPTH_TEST if cache.depth else 0)
+            self.circles.draw(pixel_ratio, "power", view, projection, viewport, flow=False)
+        if paths.show:
+            enable(moderngl.DEPTH_TEST if paths.depth else 0)
+            self.paths.draw(paths.size * pixel_ratio, paths.colour, view, projection, viewport)
+        if gather.show:
+            enable(moderngl.DEPTH_TEST if gather.depth else 0)
+            self.gathered.draw(gather.size * pixel_ratio, gather.colour, view, projection, viewport, flow=False)
+            enable(moderngl.PROGRAM_POINT_SIZE | (moderngl.DEPTH_TEST if gather.depth else 0))
+            colour: Literal["light", "power"] = "light" if gather.colour == "source" else "power"
+            ends = PointOverlay(size=min(3.0 * gather.size, 12.0), colour=colour)
+            self.gather_ends.draw(ends, view, projection, GATHER_ENDS, pixel_ratio)
+        framebuffer.depth_mask = True
+        framebuffer.use()
 
     def _draw_depth(self, framebuffer: moderngl.Framebuffer, view: Matrix, projection: Matrix) -> None:
         """Surfaces into the depth buffer alone. moderngl hands a framebuffer's mask to OpenGL when it is bound."""

@@ -40,8 +40,9 @@ class ReferencePlane:
         return True
 
     def bind(self) -> None:
-        """For the error view: pixels are compared one by one, so nothing is interpolated."""
-        assert self.texture is not None
-        self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self.texture.use(REFERENCE_UNIT)
+        """For the error view: pixels are compared one by one, so nothing is interpolated. Diagnostic views use the
+        colours alone."""
+        if self.texture is not None:
+            self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            self.texture.use(REFERENCE_UNIT)
         self._colours.use(COLOUR_UNIT)

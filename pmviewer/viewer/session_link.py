@@ -44,6 +44,7 @@ class SessionLike(Protocol):
     def pause(self) -> None: ...
     def resume(self) -> None: ...
     def restart(self) -> None: ...
+    def inspect(self, pixel: tuple[int, int] | None) -> None: ...
     def take_messages(self) -> list[Message]: ...
     def close(self) -> None: ...
 
@@ -131,6 +132,11 @@ class SessionLink:
         with self._lock:
             if self._session is not None:
                 self._session.restart()
+
+    def inspect(self, pixel: tuple[int, int] | None) -> None:
+        with self._lock:
+            if self._session is not None:
+                self._session.inspect(pixel)
 
     def close(self) -> None:
         with self._lock:

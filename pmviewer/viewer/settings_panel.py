@@ -68,9 +68,25 @@ class SettingsPanel:
         changed = sum(self._value(i.path) != i.default for i in infos)
         note = f"   {changed} changed" if changed else ""
         if imgui.collapsing_header(f"{heading}{note}###{heading}") and self.begin_rows(heading):
+            section = ""
             for info in infos:
+                if info.section != section:
+                    section = info.section
+                    self._section(section)
                 self.row(info)
             imgui.end_table()
+
+    @staticmethod
+    def _section(heading: str) -> None:
+        """A line over the settings that belong together within a group."""
+        imgui.table_next_row()
+        imgui.table_next_column()
+        imgui.spacing()
+        imgui.text_colored(imgui.ImVec4(*theme.ACCENT), theme.drawable(heading))
+
+    def reason(self, path: str) -> str | None:
+        """Why the setting has no effect now, or None."""
+        return self._facts()[1][path]
 
     def _value(self, path: str) -> Any:
         return self._facts()[0][path]
@@ -84,7 +100,7 @@ class SettingsPanel:
         return self._known[2], self._known[3]
 
     @staticmethod
-    def begin_rows(name: str, name_em: float = 6.8, room: float = 0) -> bool:
+    def begin_rows(name: str, name_em: float = 8.8, room: float = 0) -> bool:
         """Open the table that `row` fills; end it with `imgui.end_table()` when True."""
         width = imgui.get_content_region_avail().x - room
         if not imgui.begin_table(f"##{name}", 3, imgui.TableFlags_.none, (width, 0)):

@@ -44,6 +44,13 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Picture", "C", "Caustic photons on or off", "toggle_caustic", K.c),
     Binding("Picture", "G", "Global photons on or off", "toggle_global", K.g),
     Binding("Picture", "Shift+G", "Radiance photons on or off", "toggle_radiance", K.g, shift=True),
+    Binding("Picture", "Shift+C", "Shadow photons on or off", "toggle_shadow", K.c, shift=True),
+    Binding("Picture", "Shift+M", "Importons on or off", "toggle_importons", K.m, shift=True),
+    Binding("Picture", "P", "Photon paths on or off", "toggle_paths", K.p),
+    Binding("Picture", "Shift+I", "Irradiance cache on or off", "toggle_cache", K.i, shift=True),
+    Binding("Picture", "J", "Gather rays of a pixel on or off", "toggle_gather", K.j),
+    Binding("Picture", "I held", "Gather rays of the pixel under the mouse"),
+    Binding("Picture", "M", "Projection maps of the lights on or off", "toggle_projection", K.m),
     Binding("Picture", "Ctrl+wheel, Ctrl+drag", "Magnify the picture's pixels and move it"),
     Binding("Picture", "Z", "Fit the picture again", "fit_picture", K.z),
     Binding("Camera", "Left drag", "Orbit around the target"),
@@ -62,6 +69,7 @@ BINDINGS: tuple[Binding, ...] = (
 
 _DIGITS = (K._1, K._2, K._3, K._4, K._5, K._6, K._7, K._8, K._9, K._0)
 FLIP_KEY = K.v
+INSPECT_KEY = K.i
 FLY_KEYS = (K.w, K.a, K.s, K.d, K.q, K.e)
 
 

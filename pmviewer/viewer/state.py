@@ -11,6 +11,7 @@ from typing import Any
 
 from pmviewer.engine.frame import Frame, Level, Message
 from pmviewer.errors import PmviewerError
+from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.settings import CameraSettings, Display, Settings, info_of, parse_assignments, with_values
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
@@ -125,10 +126,15 @@ class ViewerState:
         display = self.settings.display
         if self.flipped and self.refused_view("reference") is None:
             return display.model_copy(update={"view": "reference"})
-        return display if self.refused_view(display.view) is None else display.model_copy(update={"view": "beauty"})
+        missing = display.view in DIAGNOSTICS and (self.frame is None or display.view not in self.frame.diagnostics)
+        if missing or self.refused_view(display.view) is not None:
+            return display.model_copy(update={"view": "beauty"})
+        return display
 
     def refused_view(self, view: str) -> str | None:
         """Why that view can't be shown now, or None."""
+        if view in DIAGNOSTICS:
+            return self.inactive_reason(f"display.view={view}", self.settings, self.session.traits)
         return self.comparison.problem(self.frame) if view in COMPARED_VIEWS else None
 
     def live_camera(self) -> CameraPose | None:

@@ -30,6 +30,15 @@ def time_rows(s: Statistics) -> Rows:
         ("Rays per second", si(s.rays_per_second)),
         ("Shadow rays per pixel and pass", f"{s.shadow_rays_per_pixel:.2f}"),
     ]
+    if s.cache_records:
+        rows += [
+            ("Records of the irradiance cache", grouped(s.cache_records)),
+            ("Gathers per pixel and pass", f"{s.gathers_per_pixel:.3f}"),
+            ("Interpolated", f"{s.interpolated:.1%}"),
+        ]
+    if s.saved_rays:
+        share = s.saved_rays / (s.saved_rays + s.shadow_rays)
+        rows.append(("Shadow rays saved by shadow photons", f"{100 * share:.0f} %"))
     if s.passes and s.seconds:
         rows.append(("Time of a pass", duration(s.seconds / s.passes)))
     return rows

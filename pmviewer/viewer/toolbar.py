@@ -30,7 +30,7 @@ class Toolbar:
         self._button(fa.ICON_FA_ARROW_ROTATE_RIGHT, "restart", "Restart")
         self._gap()
         self._setting("render.method", "method", 8.5)
-        self._setting("display.view", "view", 7)
+        self._setting("display.view", "view", 10)
         data = is_data_view(self._state.shown_display)
         self._setting("display.exposure", "exposure", 8, faded=data)
         self._setting("display.tone", "tone", 6.5, faded=data)

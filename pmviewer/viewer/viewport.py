@@ -11,11 +11,12 @@ import moderngl
 import numpy as np
 from imgui_bundle import imgui
 
+from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose
 from pmviewer.settings import Display
 from pmviewer.viewer import controls
 from pmviewer.viewer.picture import Picture, Target
-from pmviewer.viewer.shortcuts import K
+from pmviewer.viewer.shortcuts import INSPECT_KEY, K, is_held
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport_hud import draw_hud
 
@@ -46,6 +47,8 @@ class Viewport:
         self.state = state
         self.picture: Picture | None = None
         self.fit = Fit()
+        self.inspected: tuple[int, int] | None = None
+        """The pixel whose gather rays are drawn."""
         self.redraws = 0
         """How often the picture was drawn: an idle window draws nothing."""
         self.origin = (0.0, 0.0)
@@ -84,6 +87,7 @@ class Viewport:
             return
         if self.state.scene_changed():
             picture.forget_frame()
+            self.inspected = None
             self.fit = Fit()
         settings, frame = self.state.settings, self.state.frame
         changed = picture.upload_geometry(self.state.session.geometry)
@@ -93,6 +97,10 @@ class Viewport:
         if frame is not None:
             shown = {name: style.show for name, style in overlays.by_map().items()}
             changed |= picture.upload_frame(frame, display.view, shown)
+            changed |= picture.upload_paths(frame.inspection.paths, overlays.paths)
+            changed |= picture.upload_gathered(frame.inspection.gathered, overlays.gather)
+            changed |= picture.upload_circles(frame.clouds.get("cache"), overlays.cache)
+            changed |= picture.upload_cells(frame.projections, overlays.projection)
         camera, target = self.shown_camera(), self.target()
         navigating = self.state.navigating and picture.software
         key = (camera, target, display, overlays, navigating)
@@ -139,6 +147,8 @@ class Viewport:
         hovered, active = imgui.is_item_hovered(), imgui.is_item_active()
         if hovered:
             imgui.set_item_key_owner(imgui.Key.mouse_wheel_y)
+        if hovered and self.state.settings.overlays.gather.show and is_held(INSPECT_KEY):
+            self._inspect()
         pose = self.state.live_camera() if hovered or active or self.state.flying else None
         if pose is not None:
             self._handle(pose, hovered, active)
@@ -207,6 +217,13 @@ class Viewport:
             u, v = self.fit.center
             self.fit = replace(self.fit, center=(min(max(u - dx / width, 0), 1), min(max(v - dy / height, 0), 1)))
 
+    def _inspect(self) -> None:
+        """Ask for the gather rays of the pixel under the mouse."""
+        pixel = self.pixel_under_mouse()
+        if pixel is not None and pixel != self.inspected:
+            self.inspected = pixel
+            self.state.session.inspect(pixel)
+
     def pixel_under_mouse(self) -> tuple[int, int] | None:
         """Pixel (x, y) of the image, or None when the mouse is elsewhere."""
         frame = self.state.frame
@@ -223,4 +240,4 @@ class Viewport:
 
 def is_data_view(display: Display) -> bool:
     """True for views that exposure and tone curve leave alone."""
-    return display.view in ("albedo", "normal", "depth", "geometry", "error")
+    return display.view in ("albedo", "normal", "depth", "geometry", "error", *DIAGNOSTICS)

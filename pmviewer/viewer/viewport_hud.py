@@ -10,7 +10,8 @@ from imgui_bundle import imgui
 from numpy.typing import NDArray
 
 from pmviewer.engine.frame import Frame
-from pmviewer.output.falsecolour import COLOURS, ERROR_SCALE
+from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.output.falsecolour import COLOURS, ERROR_SCALE, Scale
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import si
 
@@ -18,8 +19,10 @@ if TYPE_CHECKING:
     from pmviewer.output.compare import Reference
     from pmviewer.viewer.viewport import Viewport
 
-_TITLES = {"error": "error: (I–R)²/(R²+0.01) of each pixel, no unit"}
-_UNITS = {"albedo": "", "normal": "", "depth": "m"}
+_TITLES = {"error": "error: (I–R)²/(R²+0.01) of each pixel, no unit"} | {
+    view: f"{view}: {how.text}; grey: {how.none}" for view, how in DIAGNOSTICS.items()
+}
+_UNITS = {"albedo": "", "normal": "", "depth": "m"} | {view: how.unit for view, how in DIAGNOSTICS.items()}
 
 
 def draw_hud(viewport: Viewport, hovered: bool) -> None:
@@ -41,7 +44,7 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         )
         _caption(viewport, text, (margin, margin))
     elif view != state.settings.display.view and not state.flipped:
-        refusal = state.refused_view(state.settings.display.view)
+        refusal = state.refused_view(state.settings.display.view) or "is being made"
         _caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.WARNING)
     elif view != "beauty":
         _caption(viewport, _TITLES.get(view, view), (margin, margin))
@@ -49,6 +52,11 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         _depth_legend(viewport, *viewport.picture.depth_range)
     if view == "error":
         _error_legend(viewport)
+    if view in DIAGNOSTICS and not DIAGNOSTICS[view].cells and viewport.picture is not None:
+        _scale_legend(viewport, viewport.picture.scale)
+    if state.settings.overlays.gather.show and viewport.inspected is None and state.frame is not None:
+        text = "hold I over the picture: gather rays of the pixel under the mouse"
+        _caption(viewport, text, (width / 2, height - line - 2 * margin), anchor=0.5, colour=theme.ACCENT)
     if state.flying:
         text = "flying: W A S D, Q down, E up, drag to look, Shift faster, F or Esc to leave"
         _caption(viewport, text, (width / 2, height - line - 2 * margin), anchor=0.5, colour=theme.ACCENT)
@@ -72,7 +80,14 @@ def _value_under_mouse(viewport: Viewport) -> str:
         return f"{pixel[0]}, {pixel[1]}    {_compared(frame, reference, view, *pixel)}"
     from pmviewer.render.planes import view_of
 
-    values = view_of(frame.planes[y : y + 1, x : x + 1], view)[0, 0]
+    if view in DIAGNOSTICS:
+        values = frame.image(view)[y, x]
+        if values[0] < 0:
+            return f"{pixel[0]}, {pixel[1]}    {DIAGNOSTICS[view].none}"
+        if DIAGNOSTICS[view].cells:
+            return f"{pixel[0]}, {pixel[1]}    cell {int(values[0])}{', beyond the cut-off' if values[0] % 1 else ''}"
+    else:
+        values = view_of(frame.planes[y : y + 1, x : x + 1], view)[0, 0]
     unit = _UNITS.get(view, "W/(m² sr)")
     return f"{pixel[0]}, {pixel[1]}    " + "  ".join(f"{v:.4g}" for v in values) + f"  {unit}"
 
@@ -96,6 +111,13 @@ def _error_legend(viewport: Viewport) -> None:
     lowest, highest = (round(math.log10(bound)) for bound in (ERROR_SCALE.lower, ERROR_SCALE.upper))
     powers = range(highest, lowest - 1, -1)
     labels = [((highest - p) / (highest - lowest), f"1e{p}" if p < -2 else f"{10.0**p:g}") for p in powers]
+    _legend(viewport, labels, COLOURS[::-8])
+
+
+def _scale_legend(viewport: Viewport, scale: Scale) -> None:
+    """Large values are on top; the unit stands at the highest tick alone."""
+    labels = [(1.0 - tick.position, tick.label.removesuffix(f" {scale.unit}")) for tick in scale.ticks()]
+    labels[-1] = (labels[-1][0], f"{labels[-1][1]} {scale.unit}")
     _legend(viewport, labels, COLOURS[::-8])
 
 

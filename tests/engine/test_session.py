@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.engine import renderer as renderer_module
+from pmviewer.engine import light_stage
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.session import Session
 from pmviewer.scene.description import Scene
@@ -139,8 +139,8 @@ def test_a_slider_that_keeps_moving_shows_frames(session):
 
 def count_light_passes(monkeypatch):
     calls = []
-    trace = renderer_module.trace_pass
-    monkeypatch.setattr(renderer_module, "trace_pass", lambda *a, **k: calls.append(a) or trace(*a, **k))
+    trace = light_stage.trace_pass
+    monkeypatch.setattr(light_stage, "trace_pass", lambda *a, **k: calls.append(a) or trace(*a, **k))
     return calls
 
 
@@ -177,6 +177,32 @@ def test_display_settings_recompute_nothing(session):
     assert session.frame is before
     assert session.status.state == "finished"
     assert session.settings.display.exposure == 2.0
+
+
+@pytest.mark.parametrize("paused", [False, True])
+def test_a_diagnostic_view_is_added_to_the_frame_that_is_there(session, paused):
+    """No new version, no new pass, the same planes; and the view that nothing can show asks for nothing."""
+    session.open(cornell_box(), with_values(SMALL, {"render.passes": 100_000 if paused else 4}))
+    assert session.wait(passes=3, timeout=PATIENCE)
+    if paused:
+        session.pause()
+        until(lambda: session.status.state == "paused")
+        time.sleep(0.2)  # the pass that was under way ends
+    session.wait(timeout=0.5)
+    before = session.frame
+    values = {"display.view": "photon count", "overlays.paths.show": True}
+    assert session.set(with_values(session.settings, values)) == before.version
+    until(lambda: "photon count" in session.frame.diagnostics)
+    frame = session.frame
+    assert frame.version == before.version
+    assert frame.statistics is before.statistics
+    assert frame.planes is before.planes
+    assert frame.inspection.paths.n == session.settings.overlays.paths.count
+    session.set(with_values(session.settings, {"display.view": "radiance cells"}))  # without radiance photons
+    time.sleep(0.2)
+    assert session.frame is frame
+    assert session.status.state == ("paused" if paused else "finished")
+    assert not errors(session)
 
 
 def test_display_settings_do_not_disturb_rendering(session):

@@ -1,12 +1,14 @@
 """Device functions can't be called from Python: they say so instead of crashing."""
 
 import os
+import shutil
 import subprocess
 import sys
 
 import pytest
 
-from pmviewer.kernels.jit import CACHE_FOLDER, source_hash, user_cache_root
+from pmviewer.kernels import sources
+from pmviewer.kernels.jit import CACHE_FOLDER, user_cache_root
 from pmviewer.kernels.vector import dot
 
 
@@ -15,9 +17,40 @@ def test_device_function_called_from_python_is_an_error():
         dot((1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
 
-def test_compiled_code_is_kept_under_a_hash_of_the_sources():
-    assert CACHE_FOLDER.name == source_hash()
+def test_compiled_code_is_kept_in_the_users_cache():
     assert CACHE_FOLDER.is_relative_to(user_cache_root())
+
+
+def test_compiled_code_depends_on_what_its_module_imports_and_on_nothing_else():
+    eye = {
+        path.relative_to(sources.PACKAGE).as_posix() for path in sources.sources_of(sources.PACKAGE / "render/eye.py")
+    }
+    assert {"render/eye.py", "kernels/bvh.py", "maps/grid.py", "kernels/jit.py"} <= eye
+    assert not {"render/path.py", "photons/trace.py", "viewer/app.py"} & eye
+
+
+def test_an_edit_in_an_imported_source_makes_compiled_code_stale(tmp_path):
+    package = tmp_path / "pmviewer"
+    shutil.copytree(sources.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    code = "from pathlib import Path; from pmviewer.kernels.sources import stamp, PACKAGE as p; "
+    code += "print(stamp(p / 'render/eye.py'), stamp(p / 'photons/trace.py'), stamp(p / 'kernels/vector.py'))"
+
+    def stamps() -> list[str]:
+        run = subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "PYTHONPATH": str(tmp_path)},
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=120,
+        )
+        return run.stdout.split()
+
+    before = stamps()
+    (package / "maps" / "grid.py").open("a").write("# edited\n")
+    after = stamps()
+    assert [a == b for a, b in zip(before, after, strict=True)] == [False, True, True]
 
 
 def test_unwritable_cache_falls_back_to_the_temporary_folder(tmp_path):

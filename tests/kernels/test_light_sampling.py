@@ -18,6 +18,8 @@ from pmviewer.photons.trace import LIGHT_CHOICE_SET
 from pmviewer.scene.flatten import LUMINANCE, flatten
 from tests.scenes_for_tests import LIGHTS, light_scene
 
+MANY = 1_000_000
+"""Samples of the chi-square tests."""
 RADIANCE = np.array([2.0, 1.5, 1.0])
 AREA_LIGHTS = [name for name in LIGHTS if name not in ("point", "environment")]
 
@@ -65,7 +67,7 @@ def _look(scenes, x, directions, radiance, pdf):
         if prim >= 0 and light_of(scene, prim) >= 0:
             q, ng, _, _ = surface_at(scene, prim, b1, b2, x[0], x[1], x[2], d[0], d[1], d[2], t)
             light = light_of(scene, prim)
-            radiance[i] = emitted(scene, light, ng, d)
+            radiance[i] = emitted(scene, light, prim, q, ng, d)
             if radiance[i, 0] > zero:
                 pdf[i] = light_pdf(scene, light, (x[0], x[1], x[2]), q, ng, d)
 
@@ -154,7 +156,7 @@ def test_light_choice_follows_power_with_independent_numbers():
 @pytest.mark.parametrize("name", AREA_LIGHTS)
 def test_photons_leave_area_lights_uniformly_by_the_cosine_law(name):
     g = LIGHTS[name]
-    position, direction, _, _ = emit(flatten(light_scene(name)), 50_000, INDEPENDENT)
+    position, direction, _, _ = emit(flatten(light_scene(name)), MANY, INDEPENDENT)
     on_surface = 2e-4  # photons start a little off the light
     if name == "parallelogram":
         u, v = np.array(g.edge_u), np.array(g.edge_v)
@@ -212,18 +214,18 @@ def test_photons_leave_area_lights_uniformly_by_the_cosine_law(name):
 
 
 def test_photons_of_point_light_and_environment():
-    position, direction, _, _ = emit(flatten(light_scene("point")), 50_000, INDEPENDENT)
+    position, direction, _, _ = emit(flatten(light_scene("point")), MANY, INDEPENDENT)
     assert np.abs(position - LIGHTS["point"].position).max() < 1e-6
     assert p_uniform((direction[:, 2] + 1) / 2) > 1e-3
     assert p_uniform(turn(direction[:, 0], direction[:, 1])) > 1e-3
 
     flat = flatten(light_scene("environment"))
-    position, direction, _, _ = emit(flat, 50_000, INDEPENDENT)
+    position, direction, _, _ = emit(flat, MANY, INDEPENDENT)
     assert p_uniform((direction[:, 2] + 1) / 2) > 1e-3
     assert p_uniform(turn(direction[:, 0], direction[:, 1])) > 1e-3
     offset = (position - flat.center) / flat.radius
     depth = (offset * direction).sum(1)
-    assert depth == pytest.approx(-1, abs=1e-5)  # on a disc outside the bounding sphere
+    np.testing.assert_allclose(depth, -1, atol=1e-5)  # on a disc outside the bounding sphere
     across = offset - depth[:, None] * direction
     assert p_uniform((across**2).sum(1)) > 1e-3
 
@@ -301,6 +303,47 @@ def test_density_is_the_samplers(name):
         error = density.std() * 4 * math.pi / math.sqrt(len(density))
         print(f"{name}: density integrates to {total:.4f} ± {error:.4f}")
         assert abs(total - 1) < 4 * error + 1e-4
+
+
+@pytest.mark.parametrize("name", AREA_LIGHTS)
+def test_directions_to_a_light_have_the_density_of_light_pdf(name):
+    """Chi-square of a million directions in 16 × 16 cells of the cone that holds the light. A cell expects the integral
+    of `light_pdf` over the directions in it that find the light; samples of parts that other parts of the light hide,
+    that face away or are seen edge-on are a cell of their own."""
+    flat = flatten(light_scene(name, floor=False))
+    x = np.array([0.3, 0.4, -0.2])
+    wi, _, _, pdf, other, found = sample(flat, x, MANY)
+    counted = (pdf > 0) & (found == 1) & (np.abs(other / np.where(pdf > 0, pdf, 1) - 1) < 2e-3)
+    most = 8 * pdf[pdf > 0].min()  # along a silhouette the density has a pole, which no quadrature would get right
+    counted &= pdf < most
+    axis = np.array([0.0, 0.0, 1.0]) if name.endswith("inside") else wi.mean(0) / np.linalg.norm(wi.mean(0))
+    s, t = (a[0] for a in axes_of(axis[None]))
+    lowest = float((wi @ axis).min()) - 1e-4
+    n, fine = 16, 100
+    cos = lowest + (1 - lowest) * (np.arange(n * fine) + 0.5) / (n * fine)
+    phi = 2 * math.pi * (np.arange(n * fine) + 0.5) / (n * fine)
+    expected = np.zeros((n, n))
+    for k in range(n):  # a ring of cells at a time
+        c = cos[k * fine : (k + 1) * fine, None]
+        sin = np.sqrt(np.maximum(1 - c**2, 0))
+        d = c[..., None] * axis + sin[..., None] * (np.cos(phi)[:, None] * s + np.sin(phi)[:, None] * t)
+        _, density = look(flat, x, d.reshape(-1, 3))
+        density[density >= most] = 0
+        expected[k] = density.reshape(fine, n, fine).mean(axis=(0, 2))
+    expected *= MANY * 2 * math.pi * (1 - lowest) / n**2
+    ring = np.clip(((wi @ axis - lowest) / (1 - lowest) * n).astype(int), 0, n - 1)
+    sector = np.clip((turn(wi @ s, wi @ t) * n).astype(int), 0, n - 1)
+    counts = np.bincount((ring * n + sector)[counted], minlength=n * n).astype(float)
+    expected = expected.ravel()
+    kept = expected > 50
+    counts = np.append(counts[kept], MANY - counts[kept].sum())
+    expected = np.append(expected[kept], MANY - expected[kept].sum())
+    if expected[-1] < 50:
+        counts, expected = counts[:-1], expected[:-1] * counts[:-1].sum() / expected[:-1].sum()
+    p = stats.chisquare(counts, expected).pvalue
+    print(f"{name}: p = {p:.3f} over {len(counts)} cells, {1 - counted.mean():.3f} hidden or facing away")
+    assert len(counts) > 20
+    assert p > 0.01 / len(AREA_LIGHTS)
 
 
 def test_receiver_on_and_inside_the_sphere_light():

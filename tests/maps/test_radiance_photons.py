@@ -160,7 +160,7 @@ def test_radiance_of_the_closed_sphere_is_one(share, lookup):
     image = renderer.frame(1).image()
     print(f"{share}, {lookup}: mean {image.mean():.5f}, standard deviation {image.std():.4f}")
     assert image.mean() == pytest.approx(1.0, abs=0.005)
-    assert renderer.dropped == {"photons": 0, "samples": 0}
+    assert renderer.tally.dropped == {"photons": 0, "samples": 0}
 
 
 @pytest.mark.parametrize("N", [1000, 4000, 16_000])
@@ -197,7 +197,7 @@ def test_light_does_not_leak_through_a_thin_wall(share):
         render={"method": "gather"}, photons={"N": 20_000}, gather={"radiance_photons": share, "cutoff": 2.0}
     )
     renderer = rendered(below_a_lit_wall(), settings, passes=2)
-    assert renderer.stored["global"] > 10_000
+    assert renderer.tally.stored["global"] > 10_000
     assert renderer.frame(1).image().max() == 0
     assert renderer.frame(1).image("normal")[..., 1].max() == 1  # the floor is in the picture
 
@@ -262,5 +262,5 @@ def test_no_photons_no_light():
     black = diffuse("black", (0.0, 0.0, 0.0))
     scene = Scene("away", None, (floor, upwards), (diffuse(), black), (), camera, 8, 8)
     renderer = rendered(scene, settings, passes=1)
-    assert renderer.stored["global"] == 0
+    assert renderer.tally.stored["global"] == 0
     assert renderer.frame(1).image().max() == 0

@@ -45,12 +45,12 @@ def test_error_falls_below_a_thousandth(scene, method, pool):
         assert n < 160, f"relMSE is still {errors[-1]:.2e} after {n} passes"
     slope = loglog_slope(passes, errors)
     print(
-        f"{scene} {method}: relMSE {errors[-1]:.2e} after {passes[-1]} passes, {renderer.cpu_seconds:.1f} CPU s, "
+        f"{scene} {method}: relMSE {errors[-1]:.2e} after {passes[-1]} passes, {renderer.tally.cpu_seconds:.1f} CPU s, "
         f"slope {slope:.2f}, mean ratio {measured.mean_ratio:.4f}"
     )
     assert slope < -0.7
     assert measured.mean_ratio == pytest.approx(1, abs=5e-3)
-    assert renderer.dropped == {"photons": 0, "samples": 0}
+    assert renderer.tally.dropped == {"photons": 0, "samples": 0}
 
 
 def test_radiance_photons_keep_the_mean(pool):

@@ -33,7 +33,7 @@ def test_radiance_of_the_closed_sphere_is_one(case):
     image = renderer.frame(1).image()
     print(f"{case}: mean {image.mean():.5f}, standard deviation {image.std():.4f}")
     assert image.mean() == pytest.approx(1.0, abs=0.005)
-    assert renderer.dropped == {"photons": 0, "samples": 0}
+    assert renderer.tally.dropped == {"photons": 0, "samples": 0}
 
 
 @pytest.mark.parametrize("smooth", [False, True])
@@ -49,7 +49,7 @@ def test_radiance_of_a_closed_ball_of_triangles_is_one(method, smooth):
     image = renderer.frame(1).image()
     print(f"{method}, {'smooth' if smooth else 'flat'} normals: mean {image.mean():.5f}")
     assert image.mean() == pytest.approx(1.0, abs=0.005)
-    assert renderer.dropped == {"photons": 0, "samples": 0}
+    assert renderer.tally.dropped == {"photons": 0, "samples": 0}
 
 
 def test_terms_of_the_closed_sphere():

@@ -82,7 +82,7 @@ def direct_light(opened, method, seeds=SEEDS, **direct):
         renderer = Renderer(opened, settings_of(**groups), pool, StageCache(0))
         renderer.step()
         renderer.step()
-        assert renderer.dropped == {"photons": 0, "samples": 0}
+        assert renderer.tally.dropped == {"photons": 0, "samples": 0}
         images.append(renderer.film.sums[:, DIRECT : DIRECT + 3].reshape(SIZE, SIZE, 3) / 2)
     pool.close()
     return np.mean(images, axis=0), np.var(images, axis=0, ddof=1) / seeds
@@ -130,8 +130,8 @@ def test_many_lights_are_chosen_by_photons_and_one_is_not(rooms):
     power = rendered(rooms, settings_of(photons={"N": 5000}, direct={"choice": "power"}), 1)
     assert np.array_equal(automatic.film.sums, photons.film.sums)
     assert not np.array_equal(power.film.sums, photons.film.sums)
-    assert automatic.radius["light choice"] > 0
-    assert "light choice" not in power.radius
+    assert automatic.tally.radius["light choice"] > 0
+    assert "light choice" not in power.tally.radius
 
 
 def test_threads_and_caches_change_nothing(rooms):

@@ -28,8 +28,12 @@ def test_threads_change_nothing(method, lookup):
     opened = open_scene(cornell_box(size=64))
     one, two = (rendered(opened, settings, 3, threads) for threads in (1, 2))
     assert np.array_equal(one.film.sums, two.film.sums)
-    assert (one.rays, one.emitted, one.stored) == (two.rays, two.emitted, two.stored)
-    assert one.dropped == {"photons": 0, "samples": 0}
+    assert (one.tally.rays, one.tally.emitted, one.tally.stored) == (
+        two.tally.rays,
+        two.tally.emitted,
+        two.tally.stored,
+    )
+    assert one.tally.dropped == {"photons": 0, "samples": 0}
 
 
 def test_caches_change_nothing():
@@ -75,10 +79,10 @@ def test_size_of_the_scene_changes_nothing(method, scale):
     expected, scaled = (rendered(cornell_box(s), settings, 4) for s in (1.0, scale))
     a, b = expected.frame(1).image().astype(float), scaled.frame(1).image().astype(float)
     print(f"{method} at {scale:g}: mean ratio {b.mean() / a.mean():.5f}, relMSE between both {rel_mse(b, a):.1e}")
-    assert scaled.dropped == {"photons": 0, "samples": 0}
+    assert scaled.tally.dropped == {"photons": 0, "samples": 0}
     assert b.mean() == pytest.approx(a.mean(), rel=0.005)
     assert rel_mse(b, a) < 0.05 * rel_mse(a, a.mean())
-    assert scaled.stored["global"] == pytest.approx(expected.stored["global"], rel=0.002)
+    assert scaled.tally.stored["global"] == pytest.approx(expected.tally.stored["global"], rel=0.002)
 
 
 def test_place_of_the_scene_changes_nothing():

@@ -25,7 +25,7 @@ def test_white_ball_vanishes(ball, method):
     assert image.mean() == pytest.approx(1.0, abs=1e-3 if method == "path" else 1e-5)
     if method != "path":
         assert np.abs(image - 1).max() < 1e-4
-    assert sum(renderer.dropped.values()) == 0
+    assert sum(renderer.tally.dropped.values()) == 0
 
 
 def test_tinted_mirror_dims_once():

@@ -56,7 +56,7 @@ ERRORS: dict[str, tuple[int | None, tuple[str, ...]]] = {
     "two_coordinates.obj": (None, ("three coordinates",)),
     "unknown_encoding.xml": (1, ("encoding", "UTF-8")),
     "unknown_ref.xml": (4, ("'velvet'", "not defined")),
-    "unsupported_light.xml": (None, ("no light", "line 4", "envmap")),
+    "unsupported_light.xml": (None, ("no light", "line 4", "projector")),
     "zero_area_light.xml": (None, ("no light", "zero-area light")),
     "zero_bytes.obj": (None, ("empty (0 bytes)",)),
     "zero_bytes.ply": (None, ("empty (0 bytes)",)),

@@ -10,7 +10,7 @@ from pmviewer.errors import PmviewerError
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.describe import describe, description_text
 from pmviewer.scene.description import Cylinder, Mesh, Parallelogram, Sphere
-from pmviewer.scene.load import bundled_scenes, load_scene
+from pmviewer.scene.load import bundled_scenes, load_scene, reference_of
 from pmviewer.settings import CameraSettings
 
 NAMES = ("cornell_caustic", "cornell_diffuse", "ring_caustic", "rooms_10x10")
@@ -46,8 +46,8 @@ def test_bundled_scene_opens_without_a_word(name: str) -> None:
     assert scene.name == name
     assert scene.warnings == ()
     assert scene.dropped == {}
-    image = reference(name)
-    assert image.shape == (scene.height, scene.width, 3)
+    if reference_of(scene) is not None:
+        assert reference(name).shape == (scene.height, scene.width, 3)
 
 
 def test_contents() -> None:

@@ -1,6 +1,7 @@
 """glTF, OBJ, PLY and STL, from files made here."""
 
 import json
+import math
 import struct
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from pmviewer.errors import SceneError
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.description import BLACK, Mesh, Parallelogram, PointLight, Scene
+from pmviewer.scene.flatten import flatten
 from pmviewer.scene.framing import bounds
 from pmviewer.scene.load import load_scene
 from pmviewer.scene.ply import read_ply
@@ -79,10 +81,40 @@ def test_gltf_mesh_used_twice_and_matrix(tmp_path: Path) -> None:
     assert np.ptp([m.vertices.min(axis=0) for m in meshes], axis=0) == pytest.approx([7, 8, 9])
 
 
+@pytest.mark.parametrize("emits", [False, True])
+def test_gltf_shared_meshes_become_instances_where_that_saves_memory(tmp_path: Path, monkeypatch, emits: bool) -> None:
+    monkeypatch.setattr("pmviewer.scene.gltf_shared.FEWEST_SAVED", 2)
+    material = {"emissiveFactor": [1, 1, 1]} if emits else {}
+    nodes = [{"mesh": 0, "translation": [3 * i, 0, 0], "name": f"tri {i}"} for i in range(3)]
+    flat = {"mesh": 0, "scale": [1, 1, 0]}  # a flat node can't be an instance
+    path = gltf(tmp_path, scenes=[{"nodes": [0, 1, 2, 3]}], nodes=[*nodes, flat], materials=[material])
+    scene = load_scene(path)
+    written_out = [shape for shape in scene.shapes if isinstance(shape.geometry, Mesh)]
+    if emits:  # nor can a light
+        assert scene.instances == ()
+        assert len(written_out) == 4
+        return
+    assert [i.name for i in scene.instances] == ["tri 0", "tri 1", "tri 2"]
+    assert len(scene.groups) == len(written_out) == 1
+    assert [i.to_world[0, 3] for i in scene.instances] == [0, 3, 6]
+    assert flatten(scene).n_elements == 4 + 2 + 1  # with the studio's light and floor
+    monkeypatch.setattr("pmviewer.scene.gltf_shared.FEWEST_SAVED", 4)
+    alone = load_scene(path)
+    assert alone.instances == ()
+    assert alone.camera == scene.camera
+
+
 @pytest.mark.parametrize(
     ("source", "kind", "reflectance", "transmittance"),
     [
-        ({"pbrMetallicRoughness": {"baseColorFactor": [0.123, 0.2, 0.3, 1]}}, "diffuse", (0.123, 0.2, 0.3), (1,) * 3),
+        (
+            {"pbrMetallicRoughness": {"baseColorFactor": [0.123, 0.2, 0.3, 1], "metallicFactor": 0}},
+            "diffuse",
+            (0.123, 0.2, 0.3),
+            (1,) * 3,
+        ),
+        ({"pbrMetallicRoughness": {"roughnessFactor": 0.5}}, "rough conductor", (1,) * 3, (1,) * 3),
+        ({"pbrMetallicRoughness": {"roughnessFactor": 0.5, "metallicFactor": 0}}, "rough plastic", (1,) * 3, (1,) * 3),
         (
             {"pbrMetallicRoughness": {"baseColorFactor": [0.9, 0.8, 0.7, 1], "roughnessFactor": 0.05}},
             "conductor",
@@ -91,10 +123,11 @@ def test_gltf_mesh_used_twice_and_matrix(tmp_path: Path) -> None:
         ),
         (
             {
-                "pbrMetallicRoughness": {"baseColorFactor": [0.9, 1, 1, 1]},
+                "pbrMetallicRoughness": {"baseColorFactor": [0.9, 1, 1, 1], "roughnessFactor": 0},
                 "extensions": {
                     "KHR_materials_transmission": {"transmissionFactor": 1},
                     "KHR_materials_ior": {"ior": 1.33},
+                    "KHR_materials_volume": {"attenuationDistance": 2, "attenuationColor": [1, 0.5, 0.25]},
                 },
             },
             "dielectric",
@@ -111,6 +144,9 @@ def test_gltf_materials(tmp_path: Path, source, kind, reflectance, transmittance
     assert material.transmittance == transmittance
     if kind == "dielectric":
         assert material.eta == 1.33
+        assert material.absorption == pytest.approx((0, math.log(2) / 2, math.log(4) / 2))
+    if kind.startswith("rough"):
+        assert material.alpha == (0.25, 0.25)
 
 
 def test_gltf_texture_gives_its_mean(tmp_path: Path) -> None:
@@ -126,11 +162,12 @@ def test_gltf_texture_gives_its_mean(tmp_path: Path) -> None:
     )
     scene = load_scene(path)
     assert scene.materials[0].reflectance == pytest.approx((0.5, 0, 0))
-    assert any("mean colours" in w for w in scene.warnings)
+    assert scene.materials[0].textures["reflectance"].scale == (0.5, 1, 1)
+    assert not any("exture" in w for w in scene.warnings)
 
 
 def test_gltf_camera_light_and_emission(tmp_path: Path) -> None:
-    lights = {"lights": [{"type": "point", "intensity": 683, "color": [1, 0.5, 0]}, {"type": "spot"}]}
+    lights = {"lights": [{"type": "point", "intensity": 683, "color": [1, 0.5, 0]}, {"type": "tube"}]}
     nodes = [
         {"mesh": 0},
         {"camera": 0, "translation": [0, 0, 3]},
@@ -157,7 +194,7 @@ def test_gltf_camera_light_and_emission(tmp_path: Path) -> None:
     # 90° vertically from z = 3: the point (0, 3, 0) is on the upper edge, +x to the right.
     projected = resolve_camera(scene, CameraSettings()).project(np.array([[0, 3, 0], [3, 0, 0]], float))
     assert projected[:, :2] == pytest.approx(np.array([[512, 0], [768, 256]]), abs=1e-6)
-    assert any("'spot'" in w for w in scene.warnings)
+    assert any("'tube'" in w for w in scene.warnings)
 
 
 def test_obj_with_materials_polygons_and_old_encoding(tmp_path: Path) -> None:

@@ -22,8 +22,11 @@ def test_parameters_replace_defaults_and_the_longest_name_wins(tmp_path: Path) -
         '<shape type="sphere"><float name="radius" value="$radius"/><point name="center" value="$r 0 0"/></shape>',
     )
     shape = load(tmp_path, *lines).shapes[0].geometry
-    assert shape == Sphere((1, 0, 0), 2)
-    assert load(tmp_path, *lines, radius="5").shapes[0].geometry == Sphere((1, 0, 0), 5)
+    assert isinstance(shape, Sphere)
+    assert (shape.center, shape.radius) == ((1, 0, 0), 2)
+    larger = load(tmp_path, *lines, radius="5").shapes[0].geometry
+    assert isinstance(larger, Sphere)
+    assert (larger.center, larger.radius) == ((1, 0, 0), 5)
     unused = load(tmp_path, *lines, colour="red")
     assert unused.warnings == ("Parameter 'colour' was given, but the scene has no such <default>.",)
 

@@ -98,6 +98,7 @@ class FakeSession:
         self.restarts = 0
         self.version = 1
         self.closed = False
+        self.inspected: tuple[int, int] | None = None
         self._messages: list[Message] = []
 
     def open(self, source: str | Path, settings: Settings | None = None, parameters=None) -> None:
@@ -167,6 +168,9 @@ class FakeSession:
 
     def restart(self) -> None:
         self.restarts += 1
+
+    def inspect(self, pixel: tuple[int, int] | None) -> None:
+        self.inspected = pixel
 
     def take_messages(self) -> list[Message]:
         taken, self._messages = self._messages, []

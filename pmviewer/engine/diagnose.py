@@ -1,0 +1,138 @@
+"""Making what a frame holds only while it is shown.
+
+Made from the maps of the latest pass, beside the film, when the display asks for it. A change of the display restarts
+nothing; the session adds what is missing to the frame that is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.engine.importance import ImportanceMaps
+from pmviewer.engine.inspection import Wanted
+from pmviewer.engine.method import Plan
+from pmviewer.engine.pool import WorkPool
+from pmviewer.importance.view import CHANNELS as IMPORTANCE_CHANNELS
+from pmviewer.importance.view import importance_view
+from pmviewer.maps.grid import PhotonGrid, build_grid
+from pmviewer.maps.radiance import RadianceMap
+from pmviewer.maps.radius import neighbourhood
+from pmviewer.maps.stored import ALL_CLASSES
+from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.render.diagnostics import FAMILY_CHANNELS, lookup_view, shadow_view, site_view
+from pmviewer.settings import Settings
+
+TILE = 2048
+CELL_NEIGHBOURS = 12
+Record = NDArray[np.void]
+
+
+@dataclass(frozen=True)
+class Looked:
+    """What the latest pass looked up, for kernels: the scene's and the eye's record and those of all maps."""
+
+    scene: Record
+    eye: Record
+    caustic: Record
+    global_: Record
+    choice: Record
+    sites: Record
+    shadows: Record
+    radiance: RadianceMap | None
+    """What the record `sites` belongs to."""
+    width: int
+    height: int
+    importance: ImportanceMaps | None = None
+    M_r: tuple[float, float] = (0.0, 0.0)
+    """Photons wanted per pixel in the caustic and the global map."""
+
+
+def wanted_of(settings: Settings, plan: Plan, pixel: tuple[int, int] | None = None) -> Wanted:
+    """What these settings show of what this plan makes, with `pixel` the one whose gather rays were asked for; what
+    can't be shown is not asked for."""
+    view = settings.display.view
+    wanted = Wanted()
+    if view in DIAGNOSTICS and refused_view(view, plan) is None:
+        family = DIAGNOSTICS[view].family
+        wanted = Wanted(family, looked_map(settings, plan) if family in ("look-up", "importance") else "")
+    if settings.overlays.paths.show and plan.photons:
+        wanted = replace(wanted, paths=settings.overlays.paths.count)
+    if settings.overlays.gather.show and plan.gather:
+        wanted = replace(wanted, pixel=pixel)
+    return wanted
+
+
+def looked_map(settings: Settings, plan: Plan) -> str:
+    """The map whose look-ups are shown: the one asked for, or the other where there is only that."""
+    if settings.display.map == "caustic" and plan.caustic_mask:
+        return "caustic"
+    return "global" if plan.global_classes else "caustic"
+
+
+def refused_view(view: str, plan: Plan) -> str | None:
+    """Why a diagnostic view has nothing to show, None if it has."""
+    family = DIAGNOSTICS[view].family
+    if family == "look-up" and not plan.photons:
+        return "Nothing is looked up: this method uses no photons, or no surface stores them."
+    if family == "importance" and not plan.importance:
+        return "Only with importance (importance.map)."
+    if family == "shadow rays" and not plan.shadows:
+        return "Only with shadow photons (direct.shadow_photons)."
+    if family == "radiance photons" and not plan.radiance:
+        return "Only with the method 'gather' and radiance photons (gather.radiance_photons)."
+    return None
+
+
+def diagnostic_planes(wanted: Wanted, looked: Looked, plan: Plan, pool: WorkPool) -> dict[str, NDArray[np.float32]]:
+    """The planes of the family that is wanted, by view; none without one."""
+    if wanted.family is None:
+        return {}
+    pixels = looked.width * looked.height
+    channels = {**FAMILY_CHANNELS, "importance": IMPORTANCE_CHANNELS}
+    out = np.empty((pixels, channels[wanted.family]), np.float32)
+    draw = _kernel(wanted, looked, plan, out)
+    pool.run([partial(draw, first, min(first + TILE, pixels)) for first in range(0, pixels, TILE)])
+    planes = np.ascontiguousarray(out.T).reshape(-1, looked.height, looked.width)
+
+    def plane(*channels: int) -> NDArray[np.float32]:
+        return np.ascontiguousarray(planes[list(channels)].transpose(1, 2, 0))
+
+    if wanted.family == "look-up":
+        return {"look-up radius": plane(0), "photon count": plane(1)}
+    if wanted.family == "shadow rays":
+        return {"shadow rays skipped": plane(0)}
+    if wanted.family == "importance":
+        return {"importance": plane(0), "required density": plane(1)}
+    return {"radiance photons": plane(0, 1, 2), "radiance cells": plane(3)}
+
+
+def cells_of(sites: RadianceMap) -> PhotonGrid:
+    """Radiance photons in a grid whose look-ups reach some dozen of them nearly everywhere."""
+    photons = sites.grid.photons
+    return build_grid(photons, max(neighbourhood(photons[:, :3], CELL_NEIGHBOURS), sites.grid.radius))
+
+
+def _kernel(wanted: Wanted, looked: Looked, plan: Plan, out: NDArray[np.float32]) -> Callable[[int, int], Any]:
+    if wanted.family == "shadow rays":
+        return partial(shadow_view, looked.scene, looked.eye, looked.choice, looked.shadows, out)
+    if wanted.family == "radiance photons":
+        assert looked.radiance is not None
+        cells = cells_of(looked.radiance)
+        draw = partial(site_view, looked.scene, looked.eye, looked.global_, looked.sites, cells.record, out)
+        return lambda first, last: (draw(first, last), cells)  # the grid lives as long as its record is used
+    by_caustic = wanted.map == "caustic"
+    if wanted.family == "importance":
+        assert looked.importance is not None
+        M_r = np.float32(looked.M_r[0 if by_caustic else 1])
+        importance = looked.importance.record(wanted.map)
+        return partial(importance_view, looked.scene, looked.eye, importance, M_r, out)
+    radius = looked.eye[0]["caustic_radius" if by_caustic else "global_radius"]
+    mask = np.int32((plan.caustic_mask if by_caustic else plan.global_classes) & ALL_CLASSES)
+    photons = looked.caustic if by_caustic else looked.global_
+    return partial(lookup_view, looked.scene, looked.eye, photons, radius, mask, out)

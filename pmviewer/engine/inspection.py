@@ -1,0 +1,48 @@
+"""What a frame holds only while it is shown: planes of diagnostic views, photon paths.
+
+`pmviewer.engine.diagnose` makes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.output.diagnostic_views import Family
+
+if TYPE_CHECKING:  # numba, which the window doesn't wait for
+    from pmviewer.photons.paths import PhotonPaths
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the display asks for: a family of diagnostic planes (of which map, for look-ups), so many photon paths, the
+    gather rays of a pixel (x, y)."""
+
+    family: Family | None = None
+    map: str = ""
+    paths: int = 0
+    pixel: tuple[int, int] | None = None
+
+    def lacks(self, held: Wanted) -> bool:
+        """Whether a frame that holds `held` lacks something of this."""
+        if self.family is not None and (self.family, self.map) != (held.family, held.map):
+            return True
+        if self.pixel is not None and self.pixel != held.pixel:
+            return True
+        return self.paths > 0 and self.paths != held.paths
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """`planes` by view, (h, w, channels) float32, see `pmviewer.output.diagnostic_views`; `gathered`: the gather rays
+    of the pixel, (n, 10) float32, see `pmviewer.render.gather_points`."""
+
+    wanted: Wanted = Wanted()
+    planes: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
+    paths: PhotonPaths | None = None
+    gathered: NDArray[np.float32] | None = None

@@ -1,0 +1,27 @@
+"""Which projection maps (T7) a scene and its settings use, made once and kept with the scene."""
+
+from __future__ import annotations
+
+from pmviewer.engine.method import plan_of
+from pmviewer.engine.opened import OpenScene
+from pmviewer.photons.lightpass import trajectories
+from pmviewer.photons.projection import Projection, projection_of
+from pmviewer.settings import Settings
+
+MOST_LIGHTS = 64
+"""Of more lights, `auto` makes no maps: they would take longer than they spare."""
+
+
+def projection_for(scene: OpenScene, settings: Settings) -> Projection | None:
+    """The maps for these settings; None where photons start everywhere."""
+    wanted, plan = settings.photons.projection, plan_of(settings, scene.traits)
+    if wanted == "off" or not plan.photons:
+        return None
+    if wanted == "auto" and len(scene.flat.light_names) > MOST_LIGHTS:
+        return None
+    traced, filling, _ = trajectories(settings.photons, settings.photons.N, bool(plan.caustic_mask))
+    key = (wanted, traced > filling)
+    if key not in scene.projections:
+        made = projection_of(scene.flat, wanted == "on", traced > filling)
+        scene.projections[key] = made if wanted == "on" or made.spares else None
+    return scene.projections[key]

@@ -1,0 +1,41 @@
+"""The shadow photons of a scene: traced, in a grid, ready for the eye pass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.maps.grid import PhotonGrid
+from pmviewer.maps.shadow import build_shadows, shadow_record
+from pmviewer.photons.lightpass import Runner
+from pmviewer.photons.shadow import shadow_pass
+from pmviewer.scene.flatten import FlatScene
+from pmviewer.settings import Direct
+
+SEED = 0x5AD0
+"""Keeps their random numbers apart from those of the light pass."""
+
+
+@dataclass(frozen=True)
+class ShadowMap:
+    """`record` for kernels, valid while this object lives; `photons` (n, 6), for the overlay; `rays` cast for them."""
+
+    grid: PhotonGrid
+    record: NDArray[np.void]
+    photons: NDArray[np.float32]
+    rays: int
+
+    @property
+    def bytes(self) -> int:
+        return self.grid.bytes + self.photons.nbytes
+
+
+def shadows_of(flat: FlatScene, direct: Direct, glossy: float, seed: int, run: Runner) -> ShadowMap:
+    """Trace and sort the shadow photons that the settings ask for."""
+    traced = shadow_pass(flat, seed ^ SEED, direct.shadow_N, glossy, run)
+    radius = None if direct.shadow_radius == "auto" else float(direct.shadow_radius) * flat.radius
+    photons = traced.photons
+    grid = run([lambda: build_shadows(photons, direct.shadow_fewest, radius, flat.radius)])[0]
+    return ShadowMap(grid, shadow_record(grid, direct.shadow_fewest), photons, traced.rays)

@@ -1,0 +1,67 @@
+"""What a renderer counts while it works: photons, rays, seconds, memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.engine.pool import WorkPool
+from pmviewer.photons.deposition import Deposited
+from pmviewer.photons.lightpass import PhotonMaps
+from pmviewer.render.record import C_CACHED, C_DROPPED, C_GATHERED, C_RAYS, C_SAVED, C_SHADOW_RAYS
+
+
+@dataclass
+class Tally:
+    """Sums over all passes, but for `stored_in_pass`, `deposited`, `radius`, `map_bytes` and `map_photons`: those of
+    the latest."""
+
+    emitted: int = 0
+    rays: int = 0
+    shadow_rays: int = 0
+    saved_rays: int = 0
+    cached: int = 0
+    gathered: int = 0
+    records: int = 0
+    seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    stored: dict[str, int] = field(default_factory=lambda: {"caustic": 0, "global": 0})
+    stored_in_pass: dict[str, int] = field(default_factory=dict)
+    deposited: dict[str, Deposited] = field(default_factory=dict)
+    radius: dict[str, float] = field(default_factory=dict)
+    stage_seconds: dict[str, float] = field(default_factory=dict)
+    dropped: dict[str, int] = field(default_factory=lambda: {"photons": 0, "samples": 0})
+    map_bytes: int = 0
+    map_photons: int = 0
+
+    def timed(self, pool: WorkPool, stage: str, run: Callable[[], Any]) -> Any:
+        """What `run` returns; the CPU seconds that the pool spends on it count for the stage."""
+        before = pool.cpu_seconds
+        result = run()
+        spent = pool.cpu_seconds - before
+        self.stage_seconds[stage] = self.stage_seconds.get(stage, 0.0) + spent
+        self.cpu_seconds += spent
+        return result
+
+    def add_photons(self, photons: PhotonMaps) -> None:
+        """Photons that have just been traced."""
+        self.emitted += photons.emitted
+        self.rays += photons.rays
+        self.dropped["photons"] += photons.dropped
+        self.stored_in_pass = {"caustic": len(photons.caustic), "global": len(photons.global_)}
+        self.deposited = dict(photons.deposited)
+        for name, count in self.stored_in_pass.items():
+            self.stored[name] += count
+
+    def add_counts(self, counts: NDArray[np.int64]) -> None:
+        """Counts of an eye-pass kernel (`pmviewer.render.record`)."""
+        self.rays += int(counts[C_RAYS])
+        self.shadow_rays += int(counts[C_SHADOW_RAYS])
+        self.cached += int(counts[C_CACHED])
+        self.gathered += int(counts[C_GATHERED])
+        self.saved_rays += int(counts[C_SAVED])
+        self.dropped["samples"] += int(counts[C_DROPPED])

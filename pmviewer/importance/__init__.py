@@ -1,0 +1,1 @@
+"""Visual importance: importons from the camera, and what they ask of the photons."""

@@ -1,0 +1,77 @@
+"""What deposition rules ask of importance: the probability of storing a photon, and the density required around it.
+
+Keller and Wald (2000, §2.2) store a photon with p = min(1, f·ΣW) over the importons nearest to it. f comes from test
+rays of the camera: with the inverse of the smallest ΣW that they find, p is 1 wherever the camera looks directly.
+Density control wants D_r = Γ·M_r/A_pix photons per unit area (course guide, eq. 3.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.maps.importance import ImportanceMap, importance_sums, importances, required_density
+from pmviewer.maps.record import decode_directions
+
+Float = NDArray[np.float32]
+Codes = NDArray[np.uint32]
+Evaluate = Callable[[Float, Codes], Float]
+
+NEAREST = 50
+"""Importons summed for a photon. The camera sees fewer within the radius of the sum in most pictures' farthest corner,
+which sets f; summing more would not change p."""
+TESTS = 1024
+"""Test rays."""
+
+
+def _evaluated(kernel: Any, importance: ImportanceMap, positions: Float, normals: Codes, *more: Any) -> Float:
+    out = np.zeros(len(positions), np.float32)
+    if importance.n and len(positions):
+        points, directions = np.ascontiguousarray(positions, np.float32), decode_directions(normals)
+        kernel(importance.record, points, directions, *more, out, 0, len(points))
+    return out
+
+
+def important_weight(importance: ImportanceMap, positions: Float, normals: Codes) -> Float:
+    """ΣW in pixels at positions (n, 3) with normal codes (n,)."""
+    return _evaluated(importance_sums, importance, positions, normals, np.int32(NEAREST))
+
+
+def probability_of(importance: ImportanceMap, f: float) -> Evaluate:
+    """f·ΣW: the probability of storing a photon where it is below 1."""
+
+    def evaluate(positions: Float, normals: Codes) -> Float:
+        return np.float32(f) * important_weight(importance, positions, normals)
+
+    return evaluate
+
+
+def density_of(importance: ImportanceMap, M_r: float) -> Evaluate:
+    """D_r in photons per unit area, 0 where nothing looks; M_r photons a pixel."""
+
+    def evaluate(positions: Float, normals: Codes) -> Float:
+        gamma = _evaluated(importances, importance, positions, normals)
+        return np.asarray(required_density(gamma, M_r), np.float32)
+
+    return evaluate
+
+
+def automatic_f(importance: ImportanceMap, positions: Float, normals: Codes) -> tuple[float, str | None]:
+    """f from the places (n, 3), with normal codes (n,), where test rays end, and a sentence where they tell nothing.
+
+    Places without importance are left out: p stays below 1 there, as at everything else that importons missed.
+    """
+    found = important_weight(importance, positions, normals)
+    found = found[found > 0]
+    if len(found):
+        return 1.0 / float(found.min()), None
+    if importance.n:
+        typical = float(np.median(important_weight(importance, importance.positions, importance.tree.payload[:, 0])))
+        if typical > 0:
+            return 1.0 / typical, (
+                "Keller-Wald: no test ray of the camera met an important place; f is set by the importons themselves."
+            )
+    return 0.0, "Keller-Wald: there is no importance; every photon is stored with the cut-off probability ε."

@@ -1,0 +1,257 @@
+"""What integrators know of materials: one interface, compiled for simple scenes or for rich ones.
+
+A material's lobes fall into two groups, and a path is told apart by the group that it took, the same way by photons,
+eye paths and the path tracer:
+
+- STORED lobes: photons are stored for them and looked up with them; diffuse reflection, and glossy reflection from a
+  roughness of `glossy` on. They never transmit.
+- FOLLOWED lobes are sampled and followed, as mirrors are: smooth ones, smoother glossy ones, everything that transmits.
+  Of one material either all of them are deltas or none.
+
+Directions are unit vectors that point away from the surface. `f` never contains the cosine. On refraction f is that of
+power; radiance is multiplied by the `compression` (n_i/n_t)² as well.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba.core import types
+from numba.extending import overload
+
+from pmviewer.kernels import lobes
+from pmviewer.kernels.material_textures import texture_params
+from pmviewer.kernels.normal_map import shading_frame
+from pmviewer.kernels.plain_bsdf import (
+    FOLLOWED,
+    NOTHING,
+    STORED,
+    PlainBsdf,
+    plain_bsdf,
+    plain_f,
+    plain_pdf,
+    plain_sample,
+)
+from pmviewer.kernels.random import draw1, draw4
+from pmviewer.kernels.vector import dot, scale
+
+__all__ = [
+    "FOLLOWED",
+    "NOTHING",
+    "STORED",
+    "attenuation",
+    "bsdf_at",
+    "bsdf_f",
+    "bsdf_pdf",
+    "bsdf_sample",
+    "chain_numbers",
+    "compressed",
+    "followed_share",
+    "is_delta",
+    "is_lambertian",
+    "is_plain",
+    "pick_group",
+    "same_side",
+    "shading_normal",
+]
+
+
+_f4 = np.float32
+
+
+def is_plain(b: object) -> bool:
+    """Whether the type of a BSDF in a kernel is that of simple scenes."""
+    return isinstance(b, types.BaseNamedTuple) and b.instance_class is PlainBsdf
+
+
+def bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+    """The BSDF at the point p of primitive `prim`, at its coordinates (u, v), with normals ng and ns, seen from wo.
+
+    Its fields `groups` (NOTHING, or bits STORED and FOLLOWED) and `albedo` are for anyone to read. A black surface, or
+    the back of a one-sided one, has no groups.
+    """
+    raise NotImplementedError("only for kernels")
+
+
+@overload(bsdf_at)
+def _bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+    if "bsdfs" in scene.fields and "textures" in scene.fields:
+
+        def textured(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+            numbers = texture_params(scene, material, prim, u, v, p)
+            ns, tangent = shading_frame(scene, material, prim, u, v, p, ng, ns)
+            return lobes.bsdf_at(scene, material, numbers, ng, ns, tangent, wo, glossy)
+
+        return textured
+
+    if "bsdfs" in scene.fields:
+
+        def rich(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+            tangent = (_f4(0.0), _f4(0.0), _f4(0.0))
+            return lobes.bsdf_at(scene, material, lobes.material_params(scene, material), ng, ns, tangent, wo, glossy)
+
+        return rich
+
+    def plain(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+        return plain_bsdf(scene, material, ng, ns, wo)
+
+    return plain
+
+
+def bsdf_f(b, group, wo, wi):
+    """Value of a group's lobes (red, green, blue); 0 for deltas."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(bsdf_f)
+def _bsdf_f(b, group, wo, wi):
+    if not is_plain(b):
+        return lambda b, group, wo, wi: lobes.bsdf_f(b, group, wo, wi)
+    return lambda b, group, wo, wi: plain_f(b, group, wo, wi)
+
+
+def bsdf_pdf(b, group, wo, wi):
+    """Density per solid angle of `bsdf_sample` within the group; 0 for deltas."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(bsdf_pdf)
+def _bsdf_pdf(b, group, wo, wi):
+    if not is_plain(b):
+        return lambda b, group, wo, wi: lobes.bsdf_pdf(b, group, wo, wi)
+    return lambda b, group, wo, wi: plain_pdf(b, group, wo, wi)
+
+
+def bsdf_sample(scene, b, group, wo, u_lobe, u, v):
+    """A direction from the group's lobes: (wi, f·|cos|/pdf, pdf, compression); the pdf of a delta is 0."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(bsdf_sample)
+def _bsdf_sample(scene, b, group, wo, u_lobe, u, v):
+    if not is_plain(b):
+        return lambda scene, b, group, wo, u_lobe, u, v: lobes.bsdf_sample(b, group, wo, u_lobe, u, v)
+    return lambda scene, b, group, wo, u_lobe, u, v: plain_sample(scene, b, group, wo, u_lobe, u, v)
+
+
+def same_side(b, group, ng, wo, wi):
+    """1 when wi may leave the surface by the group: on the side of ng, which points to wo, or by transmission."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(same_side)
+def _same_side(b, group, ng, wo, wi):
+    if not is_plain(b):
+        return lambda b, group, ng, wo, wi: 1 if lobes.sees_side(b, group, ng, wo, wi) else 0
+    return lambda b, group, ng, wo, wi: 1 if group == FOLLOWED or dot(ng, wi) > _f4(0.0) else 0
+
+
+def shading_normal(b):
+    """The normal that cosines are measured with."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(shading_normal)
+def _shading_normal(b):
+    if not is_plain(b):
+        return lambda b: b.n
+    return lambda b: b.facing
+
+
+def followed_share(b, wo):
+    """Probability with which a path that can take one group only takes FOLLOWED; 0 or 1 when there is but one."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(followed_share)
+def _followed_share(b, wo):
+    if not is_plain(b):
+        return lambda b, wo: lobes.followed_share(b, wo)
+    return lambda b, wo: _f4(1.0) if b.groups == FOLLOWED else _f4(0.0)
+
+
+def pick_group(b, wo, u):
+    """A group for a path that can take one only: (group, one over its probability, a number to use again)."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(pick_group)
+def _pick_group(b, wo, u):
+    if not is_plain(b):
+
+        def rich(b, wo, u):
+            share = lobes.followed_share(b, wo)
+            if u < share:
+                return FOLLOWED, _f4(1.0) / share, u / share
+            rest = _f4(1.0) - share
+            return STORED, _f4(1.0) / rest, min((u - share) / rest, _f4(0.99999994))
+
+        return rich
+    return lambda b, wo, u: (b.groups, _f4(1.0), u)
+
+
+def compressed(b, wo, wi, f):
+    """f for radiance from wi: times the `compression` (n_i/n_t)², given apart by `bsdf_sample`, if refracted."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(compressed)
+def _compressed(b, wo, wi, f):
+    if not is_plain(b):
+        return lambda b, wo, wi, f: scale(f, lobes.bsdf_compression(b, wo, wi))
+    return lambda b, wo, wi, f: f
+
+
+def is_delta(b):
+    """Whether the FOLLOWED lobes are deltas."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(is_delta)
+def _is_delta(b):
+    if not is_plain(b):
+        return lambda b: b.delta
+    return lambda b: True
+
+
+def is_lambertian(b):
+    """Whether the STORED lobes are Lambertian, so that irradiance says everything."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(is_lambertian)
+def _is_lambertian(b):
+    if not is_plain(b):
+        return lambda b: lobes.bsdf_is_lambertian(b)
+    return lambda b: True
+
+
+def chain_numbers(scene, sequence, seed, index, dimension):
+    """Four numbers for following a lobe: for the choice of lobe, two for the direction, one for roulette.
+
+    Simple materials use the first of the direction's alone.
+    """
+    raise NotImplementedError("only for kernels")
+
+
+@overload(chain_numbers)
+def _chain_numbers(scene, sequence, seed, index, dimension):
+    if "bsdfs" in scene.fields:
+        return lambda scene, sequence, seed, index, dimension: draw4(sequence, seed, index, dimension)
+
+    def one(scene, sequence, seed, index, dimension):
+        return _f4(0.0), draw1(sequence, seed, index, dimension), _f4(0.0), _f4(0.0)
+
+    return one
+
+
+def attenuation(scene, material, ng, d, t, beta):
+    """beta after a ray of direction d and length t that ends on this material: less when it came through a dielectric
+    that absorbs (Beer–Lambert)."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(attenuation)
+def _attenuation(scene, material, ng, d, t, beta):
+    if "bsdfs" in scene.fields:
+        return lambda scene, material, ng, d, t, beta: lobes.interior_attenuation(scene, material, ng, d, t, beta)
+    return lambda scene, material, ng, d, t, beta: beta

@@ -1,0 +1,21 @@
+"""Tabulated distributions: which entry of a cumulative table a number belongs to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.jit import device
+from pmviewer.kernels.memory import load_f4
+
+
+@device
+def find_interval(address, count, first, u):
+    """Index of the first of the cumulative numbers `first` … first+count−1 at `address` (the last one is 1) above u."""
+    low, high = np.int64(0), np.int64(count) - 1
+    while low < high:
+        middle = (low + high) >> 1
+        if u < load_f4(address, first + middle):
+            high = middle
+        else:
+            low = middle + 1
+    return low

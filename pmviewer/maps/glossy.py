@@ -1,0 +1,113 @@
+"""Reflected radiance from the photons around a point with any BSDF (E5).
+
+    L(wo) = Σ f(wo, wi) · (n_s·wi)/(n_g·wi) · w(dᵢ/r) Φᵢ / (disc_mean · π r²)
+
+Photons are those of `pmviewer.maps.estimate`, whose rules and searches these are. Photons measure the irradiance of the
+real surface, whose normal is n_g; the quotient of cosines turns it into that of the surface that the shading normal
+n_s pretends, so that the estimate agrees with light sampling and bumps show under any light.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.jit import device
+from pmviewer.kernels.memory import (
+    count_trailing_zeros,
+    float_of_bits,
+    load_u4,
+    stack_get_f4,
+    stack_get_i4,
+    stack_get_i8,
+    stack_i4,
+)
+from pmviewer.kernels.scattering import STORED, bsdf_f, shading_normal
+from pmviewer.kernels.vector import dot, normalize
+from pmviewer.maps.filters import filter_disc_mean, filter_weight
+from pmviewer.maps.grid import BLOCK_BYTES, ROW_BYTES, grid_ranges, lanes_between
+from pmviewer.maps.kdtree import KEYS, nearest
+from pmviewer.maps.record import decode_direction, decode_power
+from pmviewer.maps.simd import WIDTH, facing8, within8
+from pmviewer.maps.stored import stored_power
+
+_f4 = np.float32
+_f8 = np.float64
+_i4 = np.int32
+_i8 = np.int64
+_u4 = np.uint32
+_PI = _f8(np.pi)
+_FLATTEST = _f4(1e-3)
+GRAZING = _f4(0.02)
+"""Least n_g·wi that the quotient of cosines divides by: a bound on what one photon can become."""
+
+
+@device
+def reflected_share(b, n, wo, wi):
+    """f times the quotient of cosines for light from wi, at a surface with geometric normal n towards wo."""
+    shading = dot(shading_normal(b), wi)
+    if shading <= _f4(0.0):
+        return _f4(0.0), _f4(0.0), _f4(0.0)
+    r, g, bl = bsdf_f(b, STORED, wo, wi)
+    s = shading / max(dot(n, wi), min(GRAZING, shading))
+    return r * s, g * s, bl * s
+
+
+@device
+def radiance_radius(grid, p, n, radius, flatness, class_mask, filter_kind, cone_k, b, wo):
+    """Radiance towards wo reflected at p from all photons closer than `radius`; arguments as for `irradiance_radius`.
+
+    b is the BSDF of `pmviewer.kernels.scattering`; n the geometric normal on the side of wo.
+    """
+    radius = min(radius, grid.radius)
+    r2 = radius * radius
+    inverse_r2 = _f4(1.0) / r2
+    ranges, squared = stack_i4(16), stack_i4(8)
+    red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
+    for k in range(grid_ranges(grid, p[0], p[1], p[2], radius, ranges)):
+        first, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
+        for block in range(first // WIDTH, (end - 1) // WIDTH + 1):
+            x = grid.blocks + block * BLOCK_BYTES
+            y, z, words = x + ROW_BYTES, x + 2 * ROW_BYTES, x + 3 * ROW_BYTES
+            mask = _i4(within8(x, y, z, p[0], p[1], p[2], r2, squared) & lanes_between(first, end, block))
+            if mask != 0:
+                mask &= facing8(x, y, z, words, p[0], p[1], p[2], n[0], n[1], n[2], flatness * radius, class_mask)
+            while mask != 0:
+                lane = count_trailing_zeros(mask)
+                mask &= mask - _i4(1)
+                f = reflected_share(b, n, wo, normalize(decode_direction(load_u4(words, lane))))
+                w = filter_weight(filter_kind, cone_k, stack_get_f4(squared, lane) * inverse_r2)
+                rg, last = load_u4(x + 4 * ROW_BYTES, lane), load_u4(x + 5 * ROW_BYTES, lane)
+                red += _f8(w * f[0] * decode_power(rg & _u4(0xFFFF)))
+                green += _f8(w * f[1] * decode_power(rg >> _u4(16)))
+                blue += _f8(w * f[2] * decode_power(last & _u4(0xFFFF)))
+    scale = _f8(grid.power_unit) / (_f8(filter_disc_mean(filter_kind, cone_k)) * _PI * _f8(radius) * _f8(radius))
+    return _f4(red * scale), _f4(green * scale), _f4(blue * scale)
+
+
+@device
+def radiance_knn(tree, p, n, k, max_radius, flatness, class_mask, filter_kind, cone_k, rim, b, wo):
+    """The same from the k nearest photons; arguments as for `irradiance_knn`."""
+    keys = stack_i4(KEYS)
+    flatness = max(flatness, _FLATTEST)
+    steepness = _f4(1.0) / (flatness * flatness)
+    largest = max_radius * max_radius
+    count, r2 = nearest(tree, p[0], p[1], p[2], k, largest, keys, True, n[0], n[1], n[2], steepness, class_mask)
+    farthest = _i8(-1)
+    if count == k:
+        for j in range(count):
+            farthest = max(farthest, stack_get_i8(keys, j))
+    r2 = max(r2, tree.smallest_radius * tree.smallest_radius)
+    red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
+    for j in range(count):
+        key = stack_get_i8(keys, j)
+        i = key & _i8(0xFFFFFFFF)
+        power = stored_power(tree, i)
+        f = reflected_share(b, n, wo, normalize(decode_direction(load_u4(tree.payload, 3 * i))))
+        w = filter_weight(filter_kind, cone_k, float_of_bits(_u4(key >> 32)) / r2)
+        if key == farthest:
+            w *= _f4(rim) * _f4(0.5)
+        red += _f8(w * f[0] * power[0])
+        green += _f8(w * f[1] * power[1])
+        blue += _f8(w * f[2] * power[2])
+    scale = _f8(tree.power_unit) / (_f8(filter_disc_mean(filter_kind, cone_k)) * _PI * _f8(r2))
+    return _f4(red * scale), _f4(green * scale), _f4(blue * scale)

@@ -1,0 +1,182 @@
+"""Irradiance by the convex hull of the photons (E4; Christensen in Jensen et al. 2004, §5.5.4).
+
+A disc over the edge of a surface is divided by area that holds no surface: edges and corners come out too dark. Instead
+divide by the area that the photons span, their convex hull in the tangent plane.
+
+What does a photon on the boundary of the hull count? For independently scattered photons, nothing, and that is exact:
+the hull is found from outside, and knowing it tells nothing about how many photons lie within. In a Poisson process of
+density D they are D·area on average, whatever the hull and whatever the convex region that the photons fill, so that
+
+    E = Σ_inside Φᵢ / area
+
+has the right mean at edges and corners too. The same holds with the k nearest: the k−1 photons within the distance of
+the k-th are such a process in its disc. Stratified photons lie more evenly, and Christensen's fifth of the boundary's
+power suits them (`boundary`).
+
+The hull is that of the photons farthest out in DIRECTIONS directions. Its corners are corners of the exact hull; what
+lies between both is left out of the sum as of the area, and the argument above is the same. It needs no memory for
+photons, so that a fixed radius may hold any number of them.
+
+Fewer than FEWEST photons span too little: there the disc is used. In the middle of a surface that changes no mean, for
+any number of photons: the mean of E over places of N uniform photons in a disc is exactly N/(πr²), as Σ_N p(N)·E_N = D
+for all D leaves no other E_N.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pmviewer.kernels.jit import device
+from pmviewer.kernels.memory import stack_get_f4, stack_get_i4, stack_i4, stack_put_f4, stack_put_i4
+from pmviewer.kernels.vector import basis, dot, sub
+from pmviewer.maps.neighbours import (
+    BATCH_WORDS,
+    FOUND_WORDS,
+    SQUARED_WORDS,
+    next_batch,
+    place_of,
+    power_of,
+    search,
+)
+
+DIRECTIONS = 32
+FEWEST = 8
+"""Photons that it takes to make a hull."""
+
+_HALF = DIRECTIONS // 2
+_COS = np.array([math.cos(2 * math.pi * j / DIRECTIONS) for j in range(_HALF)], np.float32)
+_SIN = np.array([math.sin(2 * math.pi * j / DIRECTIONS) for j in range(_HALF)], np.float32)
+_U, _V = DIRECTIONS, 2 * DIRECTIONS
+HULL_WORDS = 3 * DIRECTIONS
+EDGE = np.float32(1e-5)
+"""A photon counts as inside if it lies this share of the radius off every edge: photons of a wall project onto one."""
+SMALLEST_AREA = np.float32(1e-6)
+
+_f4 = np.float32
+_f8 = np.float64
+_i4 = np.int32
+_i8 = np.int64
+LOWEST = _f4(-np.inf)
+
+
+@device
+def in_plane(photons, place, p, s, t):
+    """Coordinates of a photon in the tangent plane at p, which s and t span."""
+    d = sub(place_of(photons, place), p)
+    return dot(d, s), dot(d, t)
+
+
+@device
+def keep_farthest(farthest, hull, place, u, v):
+    """Take the photon at (u, v) for each direction in which it is the farthest so far. `hull`: places, then u and v."""
+    for j in range(_HALF):
+        along = u * _COS[j] + v * _SIN[j]
+        if along > stack_get_f4(farthest, j):
+            _put(farthest, hull, j, along, place, u, v)
+        if -along > stack_get_f4(farthest, _HALF + j):
+            _put(farthest, hull, _HALF + j, -along, place, u, v)
+
+
+@device
+def _put(farthest, hull, j, along, place, u, v):
+    stack_put_f4(farthest, j, along)
+    stack_put_i4(hull, j, _i4(place))
+    stack_put_f4(hull, _U + j, u)
+    stack_put_f4(hull, _V + j, v)
+
+
+@device
+def corners_of(hull):
+    """Drop repeated corners; returns how many are left, in order."""
+    count = _i8(0)
+    for j in range(DIRECTIONS):
+        place = stack_get_i4(hull, j)
+        if count > 0 and (stack_get_i4(hull, count - 1) == place or stack_get_i4(hull, 0) == place):
+            continue
+        stack_put_i4(hull, count, place)
+        stack_put_f4(hull, _U + count, stack_get_f4(hull, _U + j))
+        stack_put_f4(hull, _V + count, stack_get_f4(hull, _V + j))
+        count += 1
+    return count
+
+
+@device
+def _edge(hull, corners, j):
+    """Corner j (u, v) and the way from it to the next."""
+    following = j + 1 if j + 1 < corners else _i8(0)
+    u, v = stack_get_f4(hull, _U + j), stack_get_f4(hull, _V + j)
+    return u, v, stack_get_f4(hull, _U + following) - u, stack_get_f4(hull, _V + following) - v
+
+
+@device
+def area_of(hull, corners):
+    u0, v0 = stack_get_f4(hull, _U), stack_get_f4(hull, _V)
+    twice = _f4(0.0)
+    for j in range(corners):
+        u, v, du, dv = _edge(hull, corners, _i8(j))
+        twice += (u - u0) * dv - (v - v0) * du
+    return _f4(0.5) * twice
+
+
+@device
+def share_of(hull, corners, place, u, v, margin, boundary):
+    """What the photon at (u, v) counts: 1 inside, `boundary` at a corner, nothing outside."""
+    weight = _f4(1.0)
+    for j in range(corners):
+        if stack_get_i4(hull, j) == place:
+            return boundary
+        cu, cv, du, dv = _edge(hull, corners, _i8(j))
+        if not du * (v - cv) - dv * (u - cu) > margin * (abs(du) + abs(dv)):
+            weight = _f4(0.0)
+    return weight
+
+
+@device
+def hull_irradiance(photons, eye, radius, p, n, class_mask):
+    """Irradiance (red, green, blue) in W per unit area at p with normal n, see `pmviewer.render.lookup.irradiance`."""
+    scratch = (stack_i4(FOUND_WORDS), stack_i4(SQUARED_WORDS), stack_i4(BATCH_WORDS))
+    farthest, hull = stack_i4(DIRECTIONS), stack_i4(HULL_WORDS)
+    for j in range(DIRECTIONS):
+        stack_put_f4(farthest, j, LOWEST)
+    s, t = basis(n)
+    found, r2, _ = search(photons, eye, radius, p, n, class_mask, scratch)
+    run, at, total = _i8(0), _i8(0), _i8(0)
+    while True:
+        run, at, some = next_batch(photons, found, run, at, scratch)
+        if some == 0:
+            break
+        total += some
+        for j in range(some):
+            place = _i8(stack_get_i4(scratch[2], j))
+            u, v = in_plane(photons, place, p, s, t)
+            keep_farthest(farthest, hull, place, u, v)
+    corners, area = _i8(0), _f4(0.0)
+    if total >= FEWEST:
+        corners = corners_of(hull)
+        area = area_of(hull, corners)
+        if not area > SMALLEST_AREA * r2:
+            corners, area = _i8(0), _f4(0.0)
+    margin = EDGE * np.sqrt(r2)
+    red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
+    run, at = _i8(0), _i8(0)
+    while True:
+        run, at, some = next_batch(photons, found, run, at, scratch)
+        if some == 0:
+            break
+        for j in range(some):
+            place = _i8(stack_get_i4(scratch[2], j))
+            weight = _f4(1.0)
+            if corners > 0:
+                u, v = in_plane(photons, place, p, s, t)
+                weight = share_of(hull, corners, _i4(place), u, v, margin, eye.boundary)
+            if weight > _f4(0.0):
+                r, g, b = power_of(photons, place)
+                red += _f8(weight * r)
+                green += _f8(weight * g)
+                blue += _f8(weight * b)
+    if corners == 0:
+        area = _f4(math.pi) * r2
+    unit = _f8(photons.power_unit) / _f8(area)
+    return _f4(red * unit), _f4(green * unit), _f4(blue * unit)

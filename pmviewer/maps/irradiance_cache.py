@@ -1,0 +1,285 @@
+"""The irradiance cache: indirect irradiance kept at few surface points and interpolated in between (R6).
+
+A record holds a surface point x_i with its normal n_i, the irradiance E_i there, its rotational and translational
+gradient (`pmviewer.maps.hemisphere`), and the distance ρ_i up to which it is used: a·R_i, with R_i the harmonic mean of
+the distances to what the point sees (Ward, Rubinstein, Clear 1988), clamped to a range in pixel footprints. At x with
+normal n its error is e_i = |x − x_i|/ρ_i + √(1 − n·n_i)/a. It counts where e_i < 1, with the weight 1/e_i − 1: Ward's
+weight 1/(a·e_i) less its value at the rim, times a, so that records fade out. A record whose tangent plane the point
+leaves is not used: |(x − x_i)·(n + n_i)/2| may be a tenth of ρ_i at most.
+
+Records lie in a hierarchy of hashed grids: one of reach ρ is listed in all cells that its ball meets, of cells that are
+at least two ρ wide and less than four, so that a look-up visits one cell a level and finds every record that counts.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.kernels.jit import device, kernel
+from pmviewer.kernels.memory import load_f4, load_i4
+from pmviewer.kernels.random import hash3
+from pmviewer.kernels.vector import add, cross, dot, scale, sub
+from pmviewer.maps.record import encode_direction, encode_power
+
+ROW = 32
+"""Floats of a record."""
+POINT, NORMAL, REACH, HARMONIC, IRRADIANCE, ROTATION, TRANSLATION, FOOTPRINT, LEVEL = 0, 3, 6, 7, 8, 11, 20, 29, 30
+"""Where its parts begin: x, n, ρ, R, E, ∂E/∂rotation and ∂E/∂x (three vectors each, of red, green, blue), the size of a
+pixel there, and its level in the hierarchy."""
+
+MOST_LEVELS = 31
+OFF_PLANE = np.float32(0.1)
+"""A point farther than so many ρ off a record's plane is on another surface."""
+NEAREST = np.float32(1e-3)
+"""Errors below this weigh the same."""
+SWEEPS = 8
+"""Most rounds of limiting radii by neighbours; two or three do."""
+
+RECORD = np.dtype(
+    [
+        ("rows", "i8"),  # float32 (n, ROW)
+        ("starts", "i8"),  # int32 (buckets + 1): first entry of each bucket
+        ("entries", "i8"),  # int32: records, ascending within a bucket
+        ("n", "i8"),
+        ("mask", "u4"),  # buckets − 1
+        ("levels", "u4"),  # bit l: level l has records
+        ("cell", "f4"),  # width of the cells of level 0
+        ("error", "f4"),  # a
+        ("least", "f4"),  # least and largest ρ in pixel footprints
+        ("most", "f4"),
+        ("pixel_angle", "f4"),  # footprint at distance 1
+        ("rings", "i4"),  # strata of a gathered hemisphere
+        ("sectors", "i4"),
+    ],
+    align=True,
+)
+"""What kernels see of a cache. The last six fields tell how records are made."""
+
+NO_CACHE = np.zeros(1, np.dtype([("none", np.int32)]))
+"""Stands for the cache where there is none: kernels are compiled without it."""
+
+_f4 = np.float32
+_i4 = np.int32
+_i8 = np.int64
+_u4 = np.uint32
+
+
+@dataclass(frozen=True, eq=False)
+class IrradianceCache:
+    """Records `rows` (n, ROW) float32 with their index; `record` is valid while this object lives."""
+
+    rows: NDArray[np.float32]
+    starts: NDArray[np.int32]
+    entries: NDArray[np.int32]
+    record: NDArray[np.void]
+
+    @property
+    def n(self) -> int:
+        return len(self.rows)
+
+    @property
+    def bytes(self) -> int:
+        return self.rows.nbytes + self.starts.nbytes + self.entries.nbytes + self.record.nbytes
+
+
+@device
+def _bucket(mask, level, cx, cy, cz):
+    return _i8(hash3(_u4(cx), _u4(cy), _u4(_u4(cz) * _u4(MOST_LEVELS + 1)) + _u4(level)) & mask)
+
+
+@device
+def _cell_of(x, width):
+    return _i8(math.floor(x / width))
+
+
+@device
+def _buckets_of(rows, i, cell, mask, buckets):
+    """The distinct buckets of record i's cells into `buckets`; returns how many there are."""
+    level = _i8(rows[i, LEVEL])
+    width = cell * _f4(_i8(1) << level)
+    reach = rows[i, REACH]
+    n = 0
+    for cx in range(_cell_of(rows[i, 0] - reach, width), _cell_of(rows[i, 0] + reach, width) + 1):
+        for cy in range(_cell_of(rows[i, 1] - reach, width), _cell_of(rows[i, 1] + reach, width) + 1):
+            for cz in range(_cell_of(rows[i, 2] - reach, width), _cell_of(rows[i, 2] + reach, width) + 1):
+                bucket = _bucket(mask, level, cx, cy, cz)
+                known = False
+                for j in range(n):
+                    known = known or buckets[j] == bucket
+                if not known:
+                    buckets[n] = bucket
+                    n += 1
+    return n
+
+
+@kernel
+def _count_entries(rows, cell, mask, starts):
+    """Adds up in starts[b + 1] how many records bucket b lists."""
+    buckets = np.empty(27, np.int64)
+    for i in range(len(rows)):
+        for j in range(_buckets_of(rows, i, cell, mask, buckets)):
+            starts[buckets[j] + 1] += 1
+    for b in range(len(starts) - 1):
+        starts[b + 1] += starts[b]
+
+
+@kernel
+def _list_entries(rows, cell, mask, starts, entries):
+    """Writes the records of each bucket in ascending order."""
+    buckets = np.empty(27, np.int64)
+    place = starts.copy()
+    for i in range(len(rows)):
+        for j in range(_buckets_of(rows, i, cell, mask, buckets)):
+            entries[place[buckets[j]]] = i
+            place[buckets[j]] += 1
+
+
+def build_cache(rows: NDArray[np.float32], like: NDArray[np.void]) -> IrradianceCache:
+    """Index records (n, ROW), whose levels are filled in; `like` is a RECORD (1,) that tells how records are made."""
+    rows = np.ascontiguousarray(rows, np.float32)
+    record = like.copy()
+    n = len(rows)
+    cell, levels = 1.0, np.zeros(0, np.int64)
+    if n:
+        cell = 2.0 ** math.ceil(math.log2(2.0 * float(rows[:, REACH].min())))
+        # Float32 widths are exact powers of two, and so is the comparison.
+        levels = np.ceil(np.log2(np.maximum(2.0 * rows[:, REACH].astype(np.float64) / cell, 1.0))).astype(np.int64)
+        levels = np.minimum(levels, MOST_LEVELS - 1)
+        rows[:, LEVEL] = levels
+        rows[:, REACH] = np.minimum(rows[:, REACH], 0.5 * cell * 2.0**levels)
+    mask = (1 << max(4, (4 * n).bit_length())) - 1
+    starts = np.zeros(mask + 2, np.int32)
+    _count_entries(rows, _f4(cell), _u4(mask), starts)
+    entries = np.empty(int(starts[-1]), np.int32)
+    _list_entries(rows, _f4(cell), _u4(mask), starts, entries)
+    record["rows"], record["starts"], record["entries"] = rows.ctypes.data, starts.ctypes.data, entries.ctypes.data
+    record["n"], record["mask"], record["cell"] = n, mask, cell
+    record["levels"] = int(np.bitwise_or.reduce(1 << levels)) if n else 0
+    return IrradianceCache(rows, starts, entries, record)
+
+
+@device
+def _load3(row, at):
+    return load_f4(row, at), load_f4(row, at + 1), load_f4(row, at + 2)
+
+
+@device
+def interpolate(cache, p, n):
+    """Irradiance (red, green, blue) at the point p with unit normal n, and the sum of the weights of the records that
+    it was made from: 0 where there is none."""
+    total = (_f4(0.0), _f4(0.0), _f4(0.0))
+    weights = _f4(0.0)
+    levels, width = cache.levels, cache.cell
+    inv_error = _f4(1.0) / cache.error
+    level = _i8(0)
+    while levels != _u4(0):
+        if levels & _u4(1) != _u4(0):
+            bucket = _bucket(cache.mask, level, _cell_of(p[0], width), _cell_of(p[1], width), _cell_of(p[2], width))
+            for at in range(load_i4(cache.starts, bucket), load_i4(cache.starts, bucket + 1)):
+                row = cache.rows + _i8(load_i4(cache.entries, at)) * _i8(4 * ROW)
+                if load_f4(row, LEVEL) != _f4(level):
+                    continue
+                d = sub(p, _load3(row, POINT))
+                reach = load_f4(row, REACH)
+                d2 = dot(d, d)
+                if not d2 < reach * reach:
+                    continue
+                m = _load3(row, NORMAL)
+                error = _f4(math.sqrt(d2)) / reach
+                error += _f4(math.sqrt(max(_f4(1.0) - dot(n, m), _f4(0.0)))) * inv_error
+                if not error < _f4(1.0) or abs(dot(d, add(n, m))) > _f4(2.0) * OFF_PLANE * reach:
+                    continue
+                weight = _f4(1.0) / max(error, NEAREST) - _f4(1.0)
+                turned = cross(m, n)
+                E = (
+                    _extrapolated(row, _i8(0), turned, d),
+                    _extrapolated(row, _i8(1), turned, d),
+                    _extrapolated(row, _i8(2), turned, d),
+                )
+                total = add(total, scale(E, weight))
+                weights += weight
+        levels = _u4(levels >> _u4(1))
+        level += 1
+        width = width * _f4(2.0)
+    if weights > _f4(0.0):
+        total = scale(total, _f4(1.0) / weights)
+    return total, weights
+
+
+@device
+def _extrapolated(row, channel, turned, d):
+    """A record's irradiance carried on by its gradients, never negative."""
+    E = load_f4(row, IRRADIANCE + channel)
+    E += dot(turned, _load3(row, ROTATION + _i8(3) * channel)) + dot(d, _load3(row, TRANSLATION + _i8(3) * channel))
+    return max(E, _f4(0.0))
+
+
+@kernel
+def interpolate_all(caches, points, normals, E, weights):
+    """`interpolate` at points, normals (n, 3) float32 into E (n, 3) and weights (n,)."""
+    for i in range(len(points)):
+        p = (points[i, 0], points[i, 1], points[i, 2])
+        n = (normals[i, 0], normals[i, 1], normals[i, 2])
+        (E[i, 0], E[i, 1], E[i, 2]), weights[i] = interpolate(caches[0], p, n)
+
+
+@device
+def reach_of(harmonic, footprint, error, least, most):
+    """ρ of a record: a·R between `least` and `most` pixel footprints."""
+    return min(max(error * harmonic, least * footprint), most * footprint)
+
+
+@kernel
+def limit_by_neighbours(caches, rows):
+    """Enforce R_i ≤ R_j + |x_i − x_j| for each record j that lies within the reach of record i (Křivánek and others
+    2006): a detail that one record found is news to those around it. `rows` are the cache's own, changed in place; the
+    index stays valid, for reaches only shrink."""
+    for _ in range(SWEEPS):
+        if _sweep(caches[0], rows) == 0:
+            break
+
+
+@device
+def _sweep(cache, rows):
+    """Limits each record by each once, in order; returns how many were lowered."""
+    lowered = 0
+    for j in range(len(rows)):
+        p = (rows[j, 0], rows[j, 1], rows[j, 2])
+        levels, width = cache.levels, cache.cell
+        level = _i8(0)
+        while levels != _u4(0):
+            if levels & _u4(1) != _u4(0):
+                bucket = _bucket(cache.mask, level, _cell_of(p[0], width), _cell_of(p[1], width), _cell_of(p[2], width))
+                for at in range(load_i4(cache.starts, bucket), load_i4(cache.starts, bucket + 1)):
+                    i = load_i4(cache.entries, at)
+                    d = sub(p, (rows[i, 0], rows[i, 1], rows[i, 2]))
+                    distance = _f4(math.sqrt(dot(d, d)))
+                    if distance < rows[i, REACH]:
+                        harmonic = rows[j, HARMONIC] + distance
+                        if harmonic < rows[i, HARMONIC]:
+                            lowered += 1
+                            rows[i, HARMONIC] = harmonic
+                            reach = reach_of(harmonic, rows[i, FOOTPRINT], cache.error, cache.least, cache.most)
+                            rows[i, REACH] = min(rows[i, REACH], reach)
+            levels = _u4(levels >> _u4(1))
+            level += 1
+            width = width * _f4(2.0)
+    return lowered
+
+
+@kernel
+def encode_records(rows, scale_E, photons, words):
+    """Records (n, ROW) as photon records (n, 6) (see `pmviewer.maps.record`), float32 and their uint32 view `words`.
+
+    The normal becomes the direction, scale_E times the irradiance the power."""
+    for i in range(len(rows)):
+        for axis in range(3):
+            photons[i, axis] = rows[i, axis]
+        words[i, 3] = encode_direction(rows[i, 3], rows[i, 4], rows[i, 5])
+        red, green = encode_power(rows[i, 8] * scale_E), encode_power(rows[i, 9] * scale_E)
+        words[i, 4] = _u4(_u4(green << _u4(16)) | red)
+        words[i, 5] = encode_power(rows[i, 10] * scale_E)

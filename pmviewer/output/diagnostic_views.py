@@ -1,0 +1,131 @@
+"""Views of how a picture is made: what each shows, in which unit, on which scale (V3).
+
+A frame holds their planes only while one of them is shown. Pixels in which there is nothing to tell hold a negative
+number (`NOTHING`) in every channel and are shown in a neutral grey.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.output.falsecolour import Scale, false_colour, scale_of
+
+Family = Literal["look-up", "shadow rays", "radiance photons", "importance"]
+NOTHING = -1.0
+DIMMED = 0.4
+"""Brightness of cells whose radiance photon is the nearest, but not near enough to be used."""
+GREY = (0.16, 0.16, 0.16)
+"""Display-encoded colour of pixels in which there is nothing to tell."""
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+
+
+@dataclass(frozen=True)
+class DiagnosticView:
+    """`family`: views that one computation gives; `channels` of its plane, three for a colour whose luminance is
+    shown; `text`: caption; `unit` of the plane's values; `none`: what a pixel is told that has nothing."""
+
+    family: Family
+    text: str
+    unit: str
+    none: str
+    channels: int = 1
+    log: bool = False
+    fixed: tuple[float, float] | None = None
+    """Ends of the scale, where they don't follow the picture."""
+    cells: bool = False
+    """Values are numbers of cells, each with a colour of its own, dimmed where a half is added."""
+
+
+DIAGNOSTICS: Mapping[str, DiagnosticView] = {
+    "look-up radius": DiagnosticView(
+        "look-up", "radius of the photon look-up at the first surface, latest pass", "m", "no look-up"
+    ),
+    "photon count": DiagnosticView(
+        "look-up", "photons in the look-up at the first surface, latest pass", "photons", "no look-up"
+    ),
+    "shadow rays skipped": DiagnosticView(
+        "shadow rays",
+        "share of light samples whose shadow ray shadow photons spared",
+        "%",
+        "no light sample counts here",
+        fixed=(0.0, 100.0),
+    ),
+    "radiance photons": DiagnosticView(
+        "radiance photons",
+        "irradiance that a gather ray would take here, from the nearest radiance photon",
+        "W/m²",
+        "no surface that stores photons",
+        channels=3,
+        log=True,
+    ),
+    "radiance cells": DiagnosticView(
+        "radiance photons",
+        "the nearest radiance photon; dim: beyond the cut-off, a look-up of its own",
+        "",
+        "no radiance photon near",
+        cells=True,
+    ),
+    "importance": DiagnosticView(
+        "importance",
+        "importance of the first surface: pixels of the picture that ask for a unit of its area",
+        "px/m²",
+        "no surface that stores photons",
+        log=True,
+    ),
+    "required density": DiagnosticView(
+        "importance",
+        "density that the photon map should have at the first surface: importance × M_r",
+        "photons/m²",
+        "no surface that stores photons",
+        log=True,
+    ),
+}
+
+
+def scalar(values: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(h, w) of a plane (h, w, 1), or the luminance of (h, w, 3); negative where there is nothing."""
+    if values.shape[-1] == 1:
+        return np.ascontiguousarray(values[..., 0], np.float32)
+    return (values @ np.array(LUMINANCE, np.float32)).astype(np.float32)
+
+
+def view_scale(view: str, plane: NDArray[np.floating]) -> Scale:
+    """The scale on which a plane of that view is shown."""
+    how = DIAGNOSTICS[view]
+    if how.fixed is not None:
+        return Scale(*how.fixed, unit=how.unit)
+    values = scalar(plane)
+    scale = scale_of(values[values >= 0], how.log, how.unit)
+    if how.unit == "photons":  # counts start at none
+        return Scale(0.0, max(scale.upper, 1.0), unit=how.unit)
+    return scale
+
+
+def cell_colours(cells: NDArray[Any]) -> NDArray[np.float32]:
+    """Display-encoded colours (n, 3) of cell numbers (n,) ≥ 0: pseudo-random, never dark. `shaders/picture.frag` has
+    the same hash."""
+    h = np.asarray(cells).astype(np.uint32)
+    for factor in (np.uint32(0x7FEB352D), np.uint32(0x846CA68B)):
+        h ^= h >> np.uint32(16)
+        h *= factor
+    h ^= h >> np.uint32(16)
+    parts = np.stack([h & 255, (h >> 8) & 255, (h >> 16) & 255], axis=-1).astype(np.float32) / np.float32(255)
+    return (np.float32(0.25) + np.float32(0.75) * parts).astype(np.float32)
+
+
+def coloured(view: str, plane: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Display-encoded picture (h, w, 3) of a plane."""
+    values = scalar(plane)
+    if DIAGNOSTICS[view].cells:
+        cells = np.floor(np.maximum(values, 0))
+        pixels = cell_colours(cells)
+        pixels[values > cells] *= np.float32(DIMMED)
+    else:
+        pixels = false_colour(values, view_scale(view, plane))
+    pixels[values < 0] = GREY
+    return pixels

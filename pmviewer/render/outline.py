@@ -1,0 +1,137 @@
+"""Where the outlines of lights cross the picture.
+
+A pixel that a light covers in part holds most of the error of a picture with few passes: its light is a hundred times
+brighter than the wall beside it, and one sample either meets it or not. These pixels are known beforehand, and the eye
+pass spends some more camera rays on what they emit. It stays unbiased, because the choice of pixels depends on scene
+and camera alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.render.camera import CameraPose
+from pmviewer.scene.description import Cylinder, Disk, Mesh, Parallelogram, Scene, Sphere
+
+Float = NDArray[np.float64]
+SEGMENTS = 256
+"""Straight pieces of a circle."""
+STEP, REACH = 0.25, 0.15
+"""Points along an outline lie this far apart, and mark all pixels this near; in pixels."""
+NEAREST = 1e-6
+"""Outlines are cut off in front of the eye at this depth, relative to the scene's size seen from it."""
+
+
+def outline_pixels(scene: Scene, camera: CameraPose) -> NDArray[np.uint8]:
+    """(width · height,) uint8, 1 for pixels that the outline of an emitting shape crosses; (0,) when there is none."""
+    eye = np.array(camera.origin, float)
+    pieces = [
+        _outline(shape.geometry, eye)
+        for shape in scene.shapes
+        if shape.radiance is not None and max(shape.radiance) > 0
+    ]
+    segments = np.concatenate([np.zeros((0, 2, 3)), *pieces])
+    marked = np.zeros(camera.width * camera.height, np.uint8)
+    points = _points(segments, eye, camera)
+    for dx in (-REACH, REACH):
+        for dy in (-REACH, REACH):
+            x, y = np.floor(points[:, 0] + dx), np.floor(points[:, 1] + dy)
+            inside = (x >= 0) & (x < camera.width) & (y >= 0) & (y < camera.height)
+            marked[(y[inside] * camera.width + x[inside]).astype(np.int64)] = 1
+    return marked if marked.any() else np.zeros(0, np.uint8)
+
+
+def _outline(g: object, eye: Float) -> Float:
+    """Segments (m, 2, 3) of a shape's outline as seen from the eye."""
+    if isinstance(g, Mesh):
+        return _mesh_outline(g, eye)
+    if isinstance(g, Parallelogram):
+        a, u, v = (np.array(x, float) for x in (g.corner, g.edge_u, g.edge_v))
+        return _closed(np.array([a, a + u, a + u + v, a + v]))
+    if isinstance(g, Disk):
+        return _circle(np.array(g.center, float), np.array(g.normal, float), g.radius)
+    if isinstance(g, Sphere):
+        offset = eye - np.array(g.center, float)
+        distance = float(np.linalg.norm(offset))
+        if distance <= g.radius:
+            return np.zeros((0, 2, 3))
+        share = g.radius / distance
+        center = np.array(g.center, float) + offset * share**2
+        return _circle(center, offset / distance, g.radius * np.sqrt(1 - share**2))
+    assert isinstance(g, Cylinder)
+    p0, p1 = np.array(g.p0, float), np.array(g.p1, float)
+    axis = (p1 - p0) / np.linalg.norm(p1 - p0)
+    across = eye - p0 - axis * ((eye - p0) @ axis)
+    distance = float(np.linalg.norm(across))
+    pieces = [_circle(p0, axis, g.radius), _circle(p1, axis, g.radius)]
+    if distance > g.radius:
+        s, share = across / distance, g.radius / distance
+        t = np.cross(axis, s)
+        for side in (-1, 1):
+            rim = g.radius * (share * s + side * np.sqrt(1 - share**2) * t)
+            pieces.append(np.array([[p0 + rim, p1 + rim]]))
+    return np.concatenate(pieces)
+
+
+def _mesh_outline(mesh: Mesh, eye: Float) -> Float:
+    """Edges between a triangle that faces the eye and none or one that does not."""
+    corners = mesh.vertices[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    faces = mesh.faces[((eye - corners[:, 0]) * normals).sum(1) > 0]
+    if not len(faces):
+        return np.zeros((0, 2, 3))
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    return mesh.vertices[unique[count == 1]]
+
+
+def _closed(points: Float) -> Float:
+    return np.stack([points, np.roll(points, -1, axis=0)], axis=1)
+
+
+def _circle(center: Float, normal: Float, radius: float) -> Float:
+    s = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    s /= np.linalg.norm(s)
+    t = np.cross(normal, s)
+    phi = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)[:, None]
+    return _closed(center + radius * (np.cos(phi) * s + np.sin(phi) * t))
+
+
+def _points(segments: Float, eye: Float, camera: CameraPose) -> Float:
+    """Points (m, 2) in pixels along the visible parts of the segments."""
+    _, corner, right, down = camera.ray_frame()
+    inverse = np.linalg.inv(np.stack([right, down, corner], axis=1))
+    ends = (segments - eye) @ inverse.T  # (m, 2, 3): x·depth, y·depth, depth
+    nearest = NEAREST * max(float(np.abs(ends[..., 2]).max(initial=0.0)), 1e-300)
+    ends = ends[(ends[..., 2] > nearest).any(axis=1)]
+    behind = ends[..., 2] < nearest
+    t = (nearest - ends[:, 0, 2]) / np.where(behind.any(axis=1), ends[:, 1, 2] - ends[:, 0, 2], 1.0)
+    cut = ends[:, 0] + t[:, None] * (ends[:, 1] - ends[:, 0])
+    ends = np.where(behind[..., None], cut[:, None], ends)
+    screen = ends[..., :2] / ends[..., 2:]
+    first, last = _clipped(screen, camera.width, camera.height)
+    seen = last > first
+    start, step = screen[seen, 0], screen[seen, 1] - screen[seen, 0]
+    a, b = start + first[seen, None] * step, start + last[seen, None] * step
+    count = np.ceil(np.linalg.norm(b - a, axis=1) / STEP).astype(np.int64) + 1
+    piece = np.repeat(np.arange(len(a)), count)
+    place = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
+    share = (place / np.maximum(count[piece] - 1, 1))[:, None]
+    return a[piece] * (1 - share) + b[piece] * share
+
+
+def _clipped(screen: Float, width: int, height: int) -> tuple[Float, Float]:
+    """Where each segment (m, 2, 2) enters and leaves the picture, as shares of its length (Liang and Barsky 1984)."""
+    first, last = np.zeros(len(screen)), np.ones(len(screen))
+    for axis, size in enumerate((width, height)):
+        start, step = screen[:, 0, axis], screen[:, 1, axis] - screen[:, 0, axis]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            low, high = (-1.0 - start) / step, (size + 1.0 - start) / step
+        outside = (start < -1.0) | (start > size + 1.0)
+        low, high = (
+            np.where(step == 0, np.where(outside, np.inf, -np.inf), np.minimum(low, high)),
+            np.where(step == 0, np.where(outside, -np.inf, np.inf), np.maximum(low, high)),
+        )
+        first, last = np.maximum(first, low), np.minimum(last, high)
+    return first, last

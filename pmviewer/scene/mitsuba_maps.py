@@ -1,0 +1,63 @@
+"""What textures make of a Mitsuba BSDF: colours and roughness that vary, bump and normal maps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pmviewer.scene.description import Material
+from pmviewer.scene.mitsuba_document import Properties
+from pmviewer.scene.texture import Texture, scaled
+
+_ALPHAS = ("alpha", "alpha_u", "alpha_v")
+
+
+def _slots(material: Material) -> dict[str, str]:
+    """Slot by property name. Where there is no diffuse part, `reflectance` is that of the surface itself."""
+    bare = material.transparent or material.kind in ("conductor", "rough conductor")
+    specular = "reflectance" if bare else "specular_reflectance"
+    return {
+        "reflectance": "reflectance",
+        "diffuse_reflectance": "reflectance",
+        "specular_reflectance": specular,
+        "specular_transmittance": "transmittance",
+        **dict.fromkeys(_ALPHAS, "alpha"),
+    }
+
+
+def with_textures(p: Properties, material: Material) -> Material:
+    """The material with the textures that were found while its numbers were read.
+
+    A metal's colour multiplies its `specular_reflectance`; the texture is scaled so that its mean is the material's.
+    """
+    found: dict[str, Texture] = {}
+    for name, slot in _slots(material).items():
+        if name in p.textures:
+            found[slot] = p.textures[name]
+    if "reflectance" in found:
+        r, g, b = (c / m if m > 0 else 1.0 for c, m in zip(material.reflectance, found["reflectance"].mean))
+        if max(abs(r - 1), abs(g - 1), abs(b - 1)) > 1e-6:
+            found["reflectance"] = scaled(found["reflectance"], (r, g, b))
+    if not found:
+        return material
+    if sum(name in p.textures for name in _ALPHAS) > 1:
+        p.document.warn(
+            f"{p.element} has two textures of roughness: the last one is used for both directions.", p.element
+        )
+    return replace(material, textures={**material.textures, **found})
+
+
+def mapped(p: Properties, material: Material) -> Material:
+    """A `bumpmap` or `normalmap` around a material."""
+    slot = "normal" if p.type == "normalmap" else "bump"
+    found = [texture for name in p.values if (texture := p.texture(name)) is not None] + p.unnamed_textures()
+    if not found:
+        what = f"{p.element} needs a <texture> of type bitmap or checkerboard inside."
+        raise p.document.error(what, p.element)
+    if len(found) > 1:
+        p.document.warn(f"{p.element} has more than one texture: the first is used.", p.element)
+    p.known("flip_invalid_normals", "use_shadowing_function")
+    scale = p.number("scale", 1.0) if slot == "bump" else material.bump_scale
+    if slot in material.textures:
+        p.document.warn(f"{p.element} around another one replaces it.", p.element)
+    p.warn_unused("bsdf", "texture")
+    return replace(material, textures={**material.textures, slot: found[0]}, bump_scale=scale)

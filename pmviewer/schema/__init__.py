@@ -1,0 +1,69 @@
+"""The single schema of everything a user can change.
+
+Sliders, tooltips, `--set`, session files, EXR metadata and the table in the documentation are all made from this tree
+(`pmviewer.settings` reads it). A setting's `stage` is the earliest stage of the pipeline that reads it: changing the
+setting recomputes that stage and what follows, nothing before it (see `docs/architecture.md`).
+"""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from pmviewer.schema.base import Auto, Group, Scale, Stage, Vec3, setting
+from pmviewer.schema.display import (
+    CacheOverlay,
+    Colour,
+    Display,
+    GatherOverlay,
+    ImportonOverlay,
+    Overlays,
+    PathOverlay,
+    PointOverlay,
+    ProjectionOverlay,
+    ShadowOverlay,
+)
+from pmviewer.schema.estimate import Estimate
+from pmviewer.schema.image import CameraSettings, Direct, Gather, Render
+from pmviewer.schema.importance import Importance
+from pmviewer.schema.light_pass import Photons
+
+__all__ = [
+    "Auto",
+    "CacheOverlay",
+    "CameraSettings",
+    "Colour",
+    "Direct",
+    "Display",
+    "Estimate",
+    "Gather",
+    "GatherOverlay",
+    "Group",
+    "Importance",
+    "ImportonOverlay",
+    "Overlays",
+    "PathOverlay",
+    "Photons",
+    "PointOverlay",
+    "ProjectionOverlay",
+    "Render",
+    "Scale",
+    "Settings",
+    "ShadowOverlay",
+    "Stage",
+    "Vec3",
+    "setting",
+]
+
+
+class Settings(Group):
+    """All settings of a session."""
+
+    photons: Photons = Field(default_factory=Photons)
+    importance: Importance = Field(default_factory=Importance)
+    estimate: Estimate = Field(default_factory=Estimate)
+    direct: Direct = Field(default_factory=Direct)
+    gather: Gather = Field(default_factory=Gather)
+    render: Render = Field(default_factory=Render)
+    camera: CameraSettings = Field(default_factory=CameraSettings)
+    display: Display = Field(default_factory=Display)
+    overlays: Overlays = Field(default_factory=Overlays)

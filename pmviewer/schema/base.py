@@ -1,0 +1,46 @@
+"""What the schema is made of: a field with its bounds, scale, unit and stage, and a frozen group of fields."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+
+Scale = Literal["linear", "log", "integer", "choice", "switch", "vector"]
+Stage = Literal["photons", "maps", "image", "display", "stop"]
+Auto = Literal["auto"]
+Vec3 = tuple[float, float, float]
+
+
+def setting(
+    default: Any,
+    description: str,
+    *,
+    stage: Stage,
+    scale: Scale,
+    title: str = "",
+    unit: str = "",
+    ge: float | None = None,
+    le: float | None = None,
+    section: str = "",
+) -> Any:
+    """A field of the schema. `ge` and `le` bound numbers, `unit` is shown behind the value, `section` is a heading for
+    it and those that follow in the group."""
+    extra: dict[str, Any] = {"stage": stage, "scale": scale, "unit": unit, "ge": ge, "le": le, "section": section}
+    return Field(default, description=description, title=title or None, json_schema_extra=extra)
+
+
+class Group(BaseModel):
+    """A frozen group of settings; unknown names are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _in_bounds(cls, value: Any, field: ValidationInfo) -> Any:
+        """Bounds live in the schema's extras, not in pydantic's own constraints, which "auto" would not pass."""
+        extra: Any = cls.model_fields[field.field_name or ""].json_schema_extra
+        if extra and isinstance(value, int | float) and not isinstance(value, bool):
+            if (extra["ge"] is not None and value < extra["ge"]) or (extra["le"] is not None and value > extra["le"]):
+                raise ValueError("out of bounds")
+        return value

@@ -1,0 +1,113 @@
+"""Settings of visual importance."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pmviewer.schema.base import Auto, Group, setting
+
+
+class Importance(Group):
+    """Importance"""
+
+    map: Literal["off", "screen", "footprint", "average"] = setting(
+        "off",
+        "Importance of places for this picture, from importons that start at the camera. screen: how many pixels look "
+        "at a place. footprint: how little of the surroundings one pixel sees there (path differentials). average: of "
+        "both. Shown by the overlay 'importons' and the view 'required density'.",
+        stage="photons",
+        scale="choice",
+        title="importance",
+    )
+    N: int = setting(
+        20_000,
+        "Importons traced from the camera for the first pass; so many more for each of the next three.",
+        stage="photons",
+        scale="log",
+        unit="importons",
+        ge=100,
+        le=5_000_000,
+    )
+    neighbours: int = setting(
+        200,
+        "Importons that an estimate of the importance averages over: fewer are sharper, more are smoother.",
+        stage="photons",
+        scale="log",
+        unit="importons",
+        ge=10,
+        le=1024,
+    )
+    M_r: float = setting(
+        2.0,
+        "Photons of the global map wanted for each pixel: the required density is importance × M_r per pixel.",
+        stage="photons",
+        scale="log",
+        unit="photons/px",
+        title="M_r, global map",
+        ge=1e-3,
+        le=1e4,
+    )
+    caustic_M_r: float = setting(
+        25.0,
+        "The same for the caustic map, which is shown directly and needs more.",
+        stage="photons",
+        scale="log",
+        unit="photons/px",
+        title="M_r, caustic map",
+        ge=1e-3,
+        le=1e5,
+    )
+    deposition: Literal["all", "Keller-Wald", "density control", "constant density"] = setting(
+        "all",
+        "Which photons the maps store. all: every one. Keller-Wald: with a probability by importance, the power of the "
+        "stored ones raised (Keller and Wald §2.2). density control: up to the required density by importance, the "
+        "power of the others added to their neighbours' (course guide §3.5). constant density: the same with one "
+        "density everywhere, without importance.",
+        stage="photons",
+        scale="choice",
+    )
+    f: float | Auto = setting(
+        "auto",
+        "Probability of storing a photon per pixel of importance around it. Automatic: by test rays, so that every "
+        "photon is stored wherever the camera looks directly.",
+        stage="photons",
+        scale="log",
+        unit="1/px",
+        title="f",
+        ge=1e-9,
+        le=1e6,
+    )
+    epsilon: float = setting(
+        0.02,
+        "Probability of storing a photon below which the cut-off acts.",
+        stage="photons",
+        scale="log",
+        title="cut-off ε",
+        ge=1e-3,
+        le=1.0,
+    )
+    cut_off: Literal["clamp", "discard"] = setting(
+        "clamp",
+        "What happens below ε. clamp: the probability is ε, which is unbiased. discard: the photon is dropped, and the "
+        "picture is too dark by the power that the statistics show.",
+        stage="photons",
+        scale="choice",
+        title="below the cut-off",
+    )
+    acceptance: Literal["step", "cosine"] = setting(
+        "step",
+        "How density control decides by the density so far: store below the required one and never above, or with a "
+        "probability that falls smoothly, as a translated cosine (Suykens and Willems 2000).",
+        stage="photons",
+        scale="choice",
+    )
+    density: float | Auto = setting(
+        "auto",
+        "Density of photons to store everywhere. Automatic: so many that a look-up finds 20 of them.",
+        stage="photons",
+        scale="log",
+        unit="photons/m²",
+        title="constant density",
+        ge=1e-6,
+        le=1e12,
+    )

@@ -1,0 +1,35 @@
+"""The made scenes by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from make.boxes import glossy, lights, water
+from make.cardioid import cardioid
+from make.document import MadeScene
+from make.door import door_slit
+from make.egg import glass_egg
+from make.fractal import fractal_box
+from make.glasses import cognac, three_glasses
+from make.museum import museum
+from make.office import office
+from make.room import skylight_room
+
+SCENES: dict[str, Callable[[], MadeScene]] = {
+    "cardioid_100": partial(cardioid, 1.0),
+    "cardioid_050": partial(cardioid, 0.5),
+    "cardioid_010": partial(cardioid, 0.1),
+    "cardioid_001": partial(cardioid, 0.01),
+    "cognac": cognac,
+    "cornell_fractal": fractal_box,
+    "cornell_glossy": glossy,
+    "cornell_lights": lights,
+    "cornell_water": water,
+    "door_slit": door_slit,
+    "glass_egg": glass_egg,
+    "museum": museum,
+    "office": office,
+    "skylight_room": skylight_room,
+    "three_glasses": three_glasses,
+}

@@ -1,0 +1,24 @@
+// The colour of a photon as it is stored (pmviewer/maps/record.py).
+uniform int colour_by;      // 0 power, 1 bounces, 2 light, 3 lit or in shadow
+uniform vec2 power_range;   // logarithms (base 2) of the brightest channel, dim and bright end
+uniform vec3 bounce_palette[8];
+uniform vec3 light_palette[8];
+uniform vec3 lit_colour;
+uniform vec3 shadow_colour;
+
+const uint HAD_DIFFUSE = 0x40u; // of a shadow photon: the light does not arrive
+
+float decode(uint code) {
+    return code == 0u ? 0.0 : uintBitsToFloat((code << 13u) + (80u << 23u));
+}
+
+vec3 photon_hue(uint flags, uvec2 power_and_light) {
+    if (colour_by == 1) return bounce_palette[min(int(flags & 63u), 7)];
+    if (colour_by == 2) return light_palette[int((power_and_light.y >> 16u) % 8u)];
+    if (colour_by == 3) return (flags & HAD_DIFFUSE) != 0u ? shadow_colour : lit_colour;
+    vec3 power = vec3(decode(power_and_light.x & 0xFFFFu), decode(power_and_light.x >> 16u),
+                      decode(power_and_light.y & 0xFFFFu));
+    float peak = max(max(power.r, power.g), power.b);
+    float level = clamp((log2(max(peak, 1e-30)) - power_range.x) / max(power_range.y - power_range.x, 1e-3), 0.0, 1.0);
+    return peak > 0.0 ? pow(power / peak, vec3(1.0 / 2.2)) * mix(0.55, 1.0, level) : vec3(0.35);
+}

@@ -1,0 +1,175 @@
+"""Density control: the density asked for, all power kept, the same set in whatever rounds (I5)."""
+
+import numpy as np
+import pytest
+
+from pmviewer.engine.pool import WorkPool
+from pmviewer.maps.density_control import CAPACITY, COSINE, SETTLES, STEP, DensityControl, M
+from pmviewer.maps.record import unpack
+from tests.naive_maps import pack
+
+f4, f8, u4 = np.float32, np.float64, np.uint32
+UP = u4(2047 << 20 | 2047 << 8)
+"""Code of the direction (0, 0, 1)."""
+
+
+def in_order(tasks):
+    return [task() for task in tasks]
+
+
+def plane(n, seed, height=0.0):
+    """Photons (n, 6) of power 1 from above, anywhere in the unit square."""
+    positions = np.random.default_rng(seed).random((n, 3))
+    positions[:, 2] = height
+    photons = pack(positions.astype(f4))
+    words = photons.view(u4)
+    words[:, 3] = UP
+    words[:, 4], words[:, 5] = 47 << 10 | 47 << 26, 47 << 10
+    assert np.all(unpack(photons[:1], 1.0)["Phi"] == 1)
+    return photons
+
+
+def control(photons, required, rule=STEP, rounds=20_000, run=in_order, normals=None, seed=1):
+    made = DensityControl(rule, 0.5, seed)
+    codes = np.full(len(photons), UP, u4) if normals is None else normals
+    needed = np.broadcast_to(np.asarray(required, f4), len(photons))
+    for i in range(0, len(photons), rounds):
+        part = slice(i, i + rounds)
+        made.add(photons[part], codes[part], needed[part], run)
+    return made
+
+
+def inner_density(made, margin=0.15):
+    places = made.result().photons[:, :2]
+    return np.count_nonzero(np.all((places > margin) & (places < 1 - margin), axis=1)) / (1 - 2 * margin) ** 2
+
+
+@pytest.mark.parametrize(("rule", "tolerance"), [(STEP, 0.05), (COSINE, 0.1)])
+@pytest.mark.parametrize("required", [1000, 4000])
+def test_density_settles_where_it_is_required(rule, tolerance, required):
+    made = control(plane(40 * required, 1), required, rule)
+    assert inner_density(made) == pytest.approx(required, rel=tolerance)
+
+
+def test_density_follows_a_requirement_that_varies():
+    photons = plane(200_000, 2)
+    required = np.where(photons[:, 0] < 0.5, 800, 4000).astype(f4)
+    places = control(photons, required).result().photons[:, :2]
+    for first, wanted in ((0.1, 800), (0.6, 4000)):
+        inside = (places[:, 0] > first) & (places[:, 0] < first + 0.3) & (abs(places[:, 1] - 0.5) < 0.4)
+        assert np.count_nonzero(inside) / 0.24 == pytest.approx(wanted, rel=0.08)
+
+
+@pytest.mark.parametrize("rule", [STEP, COSINE])
+def test_all_power_is_kept(rule):
+    made = control(plane(50_000, 3), 1000, rule)
+    result = made.result()
+    assert result.powers.sum() == pytest.approx(3 * 50_000, rel=1e-9)
+    assert made.stored + result.redistributed == made.arrived == 50_000
+    assert len(result.normals) == len(result.photons) == made.stored < 5000
+
+
+def test_photons_are_all_stored_where_more_are_required():
+    made = control(plane(500, 4), 1e9)
+    assert (made.stored, made.redistributed) == (500, 0)
+    assert np.all(made.result().powers == 1)
+
+
+def naive_step(photons, required):
+    """Which of photons from above on a plane are stored, one after another."""
+    kept = []
+    reach2 = M / (np.pi * required / SETTLES[STEP])
+    for i, p in enumerate(photons[:, :3].astype(f8)):
+        near = ((photons[kept, :3].astype(f8) - p) ** 2).sum(axis=1) < reach2
+        if np.count_nonzero(near) < M:
+            kept.append(i)
+    return kept
+
+
+@pytest.mark.parametrize("rounds", [1, 137, 3000])
+def test_stored_set_is_that_of_one_photon_after_another(rounds):
+    photons = plane(3000, 5)
+    places = control(photons, 600, rounds=rounds).result().photons
+    np.testing.assert_array_equal(places[:, :3], photons[naive_step(photons, 600), :3])
+
+
+def test_threads_do_not_matter():
+    photons = plane(60_000, 6)
+    pool = WorkPool(3)
+    try:
+        many = control(photons, 1500, COSINE, run=pool.run).result()
+    finally:
+        pool.close()
+    one = control(photons, 1500, COSINE).result()
+    np.testing.assert_array_equal(many.photons.view(u4), one.photons.view(u4))
+    np.testing.assert_array_equal(many.powers, one.powers)
+
+
+def test_sides_of_a_surface_are_apart():
+    """As many photons from below change nothing above, and no power crosses."""
+    above, below = plane(20_000, 7), plane(20_000, 8)
+    below.view(u4)[:, 3] = _code(-1.0)
+    below.view(u4)[:, 4] = 0  # blue alone
+    photons = np.empty((40_000, 6), f4)
+    photons[::2], photons[1::2] = above, below
+    normals = np.where(np.arange(40_000) % 2 == 0, UP, _code(-1.0)).astype(u4)
+    result = control(photons, 1000, normals=normals).result()
+    from_above = result.photons.view(u4)[:, 3] == UP
+    alone = control(above, 1000, rounds=10_000).result()
+    np.testing.assert_array_equal(result.photons[from_above, :3], alone.photons[:, :3])
+    assert result.powers[from_above].sum() == pytest.approx(60_000)
+    differing = np.any(abs(result.powers[from_above] - alone.powers) > 1e-9, axis=1)
+    assert np.count_nonzero(differing) < 10  # neighbours equally far share by chance
+    assert result.powers[~from_above, 0].sum() == 0
+
+
+def _code(z):
+    from pmviewer.kernels.jit import kernel
+    from pmviewer.maps.record import encode_direction
+
+    @kernel
+    def encode(z):
+        return encode_direction(f4(0.0), f4(0.0), z)
+
+    return u4(encode(f4(z)))
+
+
+def test_power_does_not_seep_into_more_important_places():
+    """Photons in a place that needs little, beside one that needs a hundred times more, as behind a thin wall."""
+    important, other = plane(40_000, 9), plane(40_000, 10)
+    other[:, 0] -= 1
+    other.view(u4)[:, 5] = 0  # red and green alone
+    important.view(u4)[:, 4] = 0  # blue alone
+    photons = np.concatenate([important, other])
+    required = np.where(photons[:, 0] > 0, 5000, 50).astype(f4)
+    result = control(photons, required).result()
+    received = result.powers[result.photons[:, 0] > 0]
+    assert received[:, 0].sum() == 0
+    assert result.powers[:, 0].sum() == pytest.approx(40_000)
+
+
+@pytest.mark.parametrize("required", [0.0, -1.0, np.nan, np.inf, 1e-30])
+@pytest.mark.parametrize("rule", [STEP, COSINE])
+def test_any_requirement_is_survived(required, rule):
+    made = control(plane(5000, 11), required, rule)
+    powers = made.result().powers
+    assert np.isfinite(powers).all()
+    assert powers.sum() == pytest.approx(15_000)
+    assert 0 < made.stored <= 5000
+
+
+def test_photons_in_one_place():
+    photons = plane(2000, 12)
+    photons[:, :3] = 0.25
+    made = control(photons, 1000.0)
+    assert made.stored == M
+    assert M > CAPACITY  # a leaf was split that no plane can part
+    assert made.result().powers.sum() == pytest.approx(6000)
+
+
+def test_no_photons():
+    made = control(np.empty((0, 6), f4), 10.0)
+    result = made.result()
+    assert made.stored == 0
+    assert result.photons.shape == (0, 6)
+    assert result.powers.shape == (0, 3)

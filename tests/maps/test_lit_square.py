@@ -1,0 +1,152 @@
+"""Christensen's lit square (course notes 2004, §5.5): a unit square under 1 W of parallel light, 40 000 photons.
+
+The true irradiance is 1 everywhere. Run with `-rP` to see the figures.
+"""
+
+import numpy as np
+import pytest
+
+from pmviewer.maps.estimate import RIM_HALF, RIM_LEFT_OUT
+from pmviewer.maps.filters import FILTERS
+from pmviewer.maps.grid import build_grid
+from pmviewer.maps.kdtree import build_kdtree
+from tests import naive_maps as naive
+from tests.maps.lookups import estimate
+
+SIDE = 200
+N = SIDE * SIDE
+SQUARES = 8
+DISTRIBUTIONS = ("independent", "stratified")
+SPHERE, FLAT = 1.0, 0.2
+WIDEST = 0.0631
+"""Radius of a disc of 500 photons."""
+
+TILT = np.linalg.qr(np.random.default_rng(7).normal(size=(3, 3)))[0]
+NORMAL = TILT[:, 2].astype(np.float32)
+
+
+def on_square(u, v):
+    """Points of the square, which lies askew, so that heights above the tangent plane are not exactly 0."""
+    return np.c_[u, v, np.zeros(len(u))] @ TILT.T
+
+
+def photons(seed, distribution):
+    rng = np.random.default_rng(seed)
+    place = rng.random((N, 2))
+    if distribution == "stratified":
+        cells = np.stack(np.meshgrid(np.arange(SIDE), np.arange(SIDE)), axis=-1).reshape(-1, 2)
+        place = (cells + place) / SIDE
+    return naive.pack(on_square(*place.T), NORMAL)
+
+
+@pytest.fixture(scope="module")
+def squares():
+    clouds = {d: [photons(seed, d) for seed in range(SQUARES)] for d in DISTRIBUTIONS}
+    trees = {d: [build_kdtree(cloud, 1 / N) for cloud in clouds[d]] for d in DISTRIBUTIONS}
+    grids = {d: [build_grid(cloud, WIDEST, 1 / N) for cloud in clouds[d]] for d in DISTRIBUTIONS}
+    return {"nearest": trees, "radius": grids}
+
+
+def radius_of(n):
+    """Of a disc with n photons on average."""
+    return float(np.sqrt(n / (np.pi * N)))
+
+
+def mean(squares, how, distribution, n, points, **settings):
+    """Mean of the red irradiance over points and squares; points(rng) gives u, v."""
+    if how == "nearest" and settings.get("estimator") != "hull":
+        settings["rim"] = RIM_HALF if distribution == "stratified" else RIM_LEFT_OUT
+    radius = radius_of(n) if how == "radius" else 1.0
+    return np.mean(
+        [
+            estimate(m, on_square(*points(np.random.default_rng(i))), radius, normals=NORMAL, k=n, **settings)[:, 0]
+            for i, m in enumerate(squares[how][distribution])
+        ]
+    )
+
+
+def middle(rng):
+    return rng.uniform(0.1, 0.9, (2, 1000))
+
+
+def along_edge(distance, n=800):
+    """Points at distances from 0 … `distance` (a pair: from … to) of one edge of the square."""
+    low, high = distance if isinstance(distance, tuple) else (0.0, distance)
+    return lambda rng: (rng.uniform(low, high, n), rng.uniform(0.1, 0.9, n))
+
+
+@pytest.mark.parametrize("flatness", [SPHERE, FLAT], ids=["sphere", "flattened"])
+@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
+def test_E1_the_disc_is_unbiased(squares, distribution, flatness):
+    for n in (25, 50, 100, 250, 500):
+        for how in ("nearest", "radius"):
+            found = mean(squares, how, distribution, n, middle, flatness=flatness)
+            print(f"E1 {distribution} {how} n = {n} flatness {flatness}: mean {found:.4f}")
+            assert found == pytest.approx(1, abs=0.005)
+
+
+@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
+def test_E2_all_kernels_have_the_same_mean(squares, distribution):
+    for how, n in (("radius", 25), ("radius", 500), ("nearest", 50), ("nearest", 500)):
+        means = {kind: mean(squares, how, distribution, n, middle, kind=kind) for kind in FILTERS}
+        print(f"E2 {distribution} {how} n = {n}:", {kind: round(float(m), 4) for kind, m in means.items()})
+        assert all(m == pytest.approx(1, abs=0.005) for m in means.values())
+
+
+@pytest.mark.parametrize("how", ["nearest", "radius"])
+@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
+def test_E3_differential_checking_brightens_the_edge(squares, distribution, how):
+    """The dark rim of a disc of 500 photons is a quarter of its radius wide where it can tell a trend, not all of it;
+    stratified photons of different folds know of each other, which costs some of it."""
+    r = radius_of(500)
+    inside = mean(squares, how, distribution, 500, middle, estimator="differential")
+    plain = mean(squares, how, distribution, 500, along_edge((0.2 * r, 0.6 * r)))
+    checked = mean(squares, how, distribution, 500, along_edge((0.2 * r, 0.6 * r)), estimator="differential")
+    print(f"E3 {distribution} {how}: middle {inside:.4f}, rim (0.2 … 0.6) r {checked:.4f}, without {plain:.4f}")
+    assert inside == pytest.approx(1, abs=0.005)
+    assert plain < 0.78
+    assert checked == pytest.approx(1, abs=0.05 if distribution == "independent" else 0.12)
+
+
+def test_E3_nothing_happens_without_a_trend(squares):
+    """In the middle of the square nearly all estimates are those of the whole disc."""
+    points = on_square(*middle(np.random.default_rng(3)))
+    for how, radius in (("nearest", 1.0), ("radius", WIDEST)):
+        m = squares[how]["independent"][0]
+        plain = estimate(m, points, radius, normals=NORMAL, k=500)
+        checked = estimate(m, points, radius, "differential", normals=NORMAL, k=500)
+        same = np.isclose(plain, checked, rtol=1e-5).all(axis=1).mean()
+        assert 0.9 < same < 1
+
+
+@pytest.mark.parametrize("kind", FILTERS)
+def test_E3_with_any_kernel(squares, kind):
+    found = mean(squares, "radius", "independent", 100, middle, estimator="differential", kind=kind)
+    assert found == pytest.approx(1, abs=0.005)
+
+
+BOUNDARY = {"independent": 0.0, "stratified": 0.2}
+
+
+@pytest.mark.parametrize("how", ["nearest", "radius"])
+@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
+def test_E4_the_convex_hull_has_no_dark_edge(squares, distribution, how):
+    for n in (50, 500):
+        settings = {"estimator": "hull", "boundary": BOUNDARY[distribution]}
+        r = radius_of(n)
+        inside = mean(squares, how, distribution, n, middle, **settings)
+        edge = mean(squares, how, distribution, n, along_edge(r, 4000), **settings)
+        disc = mean(squares, how, distribution, n, along_edge(r, 4000))
+        print(f"E4 {distribution} {how} n = {n}: middle {inside:.4f}, edge {edge:.4f}, of a disc {disc:.4f}")
+        assert inside == pytest.approx(1, abs=0.005)
+        assert edge == pytest.approx(inside, rel=0.02)
+        assert disc < 0.82
+
+
+def test_E4_the_boundary_share_matters(squares):
+    """What is right for stratified photons is too bright for independent ones, and the other way round."""
+    bright = mean(squares, "nearest", "independent", 50, middle, estimator="hull", boundary=0.2)
+    dark = mean(squares, "nearest", "stratified", 50, middle, estimator="hull", boundary=0.0)
+    print(f"E4 boundary share 0.2 of independent photons {bright:.4f}, 0 of stratified ones {dark:.4f}")
+    assert bright > 1.03
+    assert dark < 0.97

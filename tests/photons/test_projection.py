@@ -1,0 +1,200 @@
+"""Projection maps (T7): conservative, unbiased, and worth it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.projection import projection_for
+from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.random import INDEPENDENT
+from pmviewer.maps.record import CAUSTIC, INDIRECT_CAUSTIC, unpack
+from pmviewer.photons.bounds import MOST_SPHERES, enclosing, spheres_of
+from pmviewer.photons.lightpass import trace_pass
+from pmviewer.photons.projected import concentric_from_polar
+from pmviewer.photons.projection import projection_of
+from pmviewer.photons.trace import E_ABSORBED, E_EMITTED, E_ESCAPED, E_TERMINATED
+from pmviewer.scene.description import Disk, Parallelogram, PointLight, Shape, Sphere
+from pmviewer.scene.flatten import LUMINANCE, flatten
+from pmviewer.settings import Photons
+from tests.device import from_python
+from tests.kernels.test_light_sampling import emit
+from tests.kernels.test_more_lights import MORE
+from tests.scenes_for_tests import GLASS, LIGHTS, ball_mesh, diffuse_box, light_scene, settings_of
+
+BALL = Sphere((-0.2, 0.25, 0.15), 0.12)
+ALL = {**LIGHTS, **MORE}
+
+
+def lit(name, ball=BALL):
+    """A floor with a small glass ball under one light."""
+    light = ALL[name]
+    scene = light_scene()
+    floor = Shape("floor", Parallelogram((-1.0, 0.0, -1.0), (0.0, 0.0, 2.0), (2.0, 0.0, 0.0)), 0)
+    shapes, lights = [floor, Shape("ball", ball, 2)], ()
+    if isinstance(light, Disk | Sphere | Parallelogram) or name in ("cylinder", "cylinder inside", "mesh"):
+        shapes.append(Shape(name, light, 1, (2.0, 1.5, 1.0)))
+    else:
+        lights = (light,)
+    return replace(scene, shapes=tuple(shapes), lights=lights, materials=(*scene.materials, GLASS))
+
+
+def serially(tasks):
+    return [task() for task in tasks]
+
+
+def trace(flat, projection, N=60_000, q=0.2, seed=1, **settings):
+    return trace_pass(flat, Photons(q=q, **settings), seed, 0, N, True, serially, projection=projection)
+
+
+def caustic_power(maps, path_class):
+    """Photons of that class and their mean-square, for the error: power in watts (luminance)."""
+    found = unpack(maps.caustic, maps.caustic_unit)
+    power = found["Phi"][found["path_class"] == path_class].astype(float) @ LUMINANCE
+    return power.sum(), math.sqrt((power**2).sum()), len(power)
+
+
+def meets(position, direction, center, radius):
+    offset = np.asarray(center) - position
+    along = (offset * direction).sum(1)
+    miss = (offset**2).sum(1) - along**2
+    return (miss <= radius**2) & ((along > 0) | ((offset**2).sum(1) <= radius**2))
+
+
+@pytest.mark.parametrize("name", [n for n in ALL if n not in ("thin spot", "sphere inside", "cylinder inside")])
+def test_maps_are_conservative(name):
+    """200 000 photons that start anywhere: each that meets the ball lies in a cell that is on."""
+    flat = flatten(lit(name))
+    (chart,) = projection_of(flat).caustic
+    position, direction, _, _ = emit(flat, 200_000, INDEPENDENT)
+    hit = meets(position, direction, BALL.center, BALL.radius)
+    print(f"{name}: mode {chart.mode}, share {chart.share:.4f}, {hit.mean():.4f} of all photons meet the ball")
+    if chart.mode == "whole":
+        return
+    assert hit.sum() > 20
+    assert hit.mean() < chart.share * 4.01 if chart.mode == "world directions" else hit.mean() <= chart.share * 1.01
+    if chart.mode == "disc":
+        across = position[hit] - chart.origin
+        across -= (across * direction[hit]).sum(1, keepdims=True) * direction[hit]
+        assert np.linalg.norm(across, axis=1).max() <= chart.edges[-1]
+        return
+    if chart.mode == "places":
+        x, y, _ = ((position[hit] - chart.origin) @ chart.axes.T).T
+        radius = np.hypot(x, y)
+    else:
+        x, y, z = (direction[hit] @ chart.axes.T).T
+        radius = np.arctan2(np.hypot(x, y), z)
+    row = np.clip(np.searchsorted(chart.edges, radius, side="right") - 1, 0, len(chart.edges) - 2)
+    column = np.clip((np.arctan2(y, x) / (2 * math.pi) % 1.0 * chart.on.shape[1]).astype(int), 0, chart.on.shape[1] - 1)
+    assert chart.on[row, column].all()
+
+
+@pytest.mark.parametrize("name", list(ALL))
+def test_equal_expected_power(name):
+    """z-tests: caustic and global power with projection maps and without are estimates of the same; the energy ledger
+    balances; and where the map is small, many more photons reach the ball."""
+    flat = flatten(lit(name))
+    projection = projection_of(flat)
+    plain, mapped = (trace(flat, p, sequence="independent", seed=s) for p, s in ((None, 1), (projection, 2)))
+    (a, ea, na), (b, eb, nb) = (caustic_power(m, CAUSTIC) for m in (plain, mapped))
+    z = (a - b) / max(math.hypot(ea, eb), 1e-12)
+    (chart,) = projection.caustic
+    print(
+        f"{name} ({chart.mode}, share {chart.share:.4f}): caustic {a:.5f} and {b:.5f} W, z {z:+.2f}, "
+        f"{na} and {nb} photons"
+    )
+    assert abs(z) < 4
+    stored = [unpack(m.global_, m.global_unit)["Phi"].astype(float) @ LUMINANCE for m in (plain, mapped)]
+    # Photons of one trajectory are correlated: at most two or three lie on the floor and in the ball's light.
+    error = math.sqrt(3 * sum((s**2).sum() for s in stored))
+    assert abs(stored[0].sum() - stored[1].sum()) < 4 * error
+    ledger = mapped.ledger
+    ended = ledger[E_ABSORBED] + ledger[E_ESCAPED] + ledger[E_TERMINATED]
+    assert ended == pytest.approx(ledger[E_EMITTED], rel=1e-6)
+    if chart.mode != "whole":
+        assert nb >= na
+
+
+def test_caustics_after_a_diffuse_bounce_keep_their_power():
+    """They come from the trajectories of the global map alone, and weigh more than direct ones."""
+    flat = flatten(lit("point", Sphere((-0.2, 0.4, 0.15), 0.3)))
+    plain, mapped = (
+        trace(flat, p, N=400_000, q=0.5, sequence="independent", seed=s)
+        for p, s in ((None, 1), (projection_of(flat), 2))
+    )
+    (a, ea, na), (b, eb, nb) = (caustic_power(m, INDIRECT_CAUSTIC) for m in (plain, mapped))
+    print(f"indirect caustics {a:.5f} and {b:.5f} W, {na} and {nb} photons")
+    assert abs(a - b) < 4 * math.hypot(ea, eb) * math.sqrt(2)
+    assert nb > 40
+
+
+def test_five_times_more_caustic_photons_for_a_small_ball():
+    flat = flatten(lit("point"))
+    N = 100_000
+    plain, mapped = (trace(flat, p, N=N, q=0.1) for p in (None, projection_of(flat)))
+    counts = [(unpack(m.caustic, 1.0)["path_class"] == CAUSTIC).sum() / m.emitted for m in (plain, mapped)]
+    print(f"caustic photons per trajectory {counts[0]:.5f} and {counts[1]:.5f}, ratio {counts[1] / counts[0]:.1f}")
+    assert counts[1] >= 5 * counts[0]
+
+
+def test_nothing_is_traced_for_caustics_that_cannot_be():
+    """The ball stands behind a spot: no light reaches it."""
+    spot = MORE["sharp spot"]
+    behind = np.array(spot.position) - np.array(spot.axis)
+    flat = flatten(lit("sharp spot", Sphere(tuple(behind), 0.1)))
+    projection = projection_of(flat)
+    assert projection.caustic_power == 0
+    maps = trace(flat, projection, N=10_000, q=0.25)
+    assert maps.emitted == 2500
+    assert np.isfinite(maps.caustic_unit)
+
+
+def test_auto_leaves_closed_rooms_alone():
+    closed = open_scene(diffuse_box())
+    assert projection_for(closed, settings_of(photons={"q": 0.5})) is None
+    scene = open_scene(lit("point"))
+    assert projection_for(scene, settings_of(photons={"q": 0.5})) is not None
+    assert projection_for(scene, settings_of(photons={"projection": "off"})) is None
+    assert projection_for(scene, settings_of(render={"method": "path"})) is None
+    assert projection_for(closed, settings_of(photons={"projection": "on"})) is not None
+
+
+def test_mesh_spheres_cover_the_mesh():
+    mesh = ball_mesh(0.7, 4)
+    spheres = spheres_of(replace(light_scene(), shapes=(Shape("mesh", mesh, 0),)))
+    assert MOST_SPHERES <= len(spheres) < 2 * MOST_SPHERES
+    weights = np.random.default_rng(1).dirichlet((1, 1, 1), len(mesh.faces))
+    points = (mesh.vertices[mesh.faces] * weights[:, :, None]).sum(1)
+    gap = np.linalg.norm(points[:, None] - spheres[None, :, :3], axis=2) - spheres[None, :, 3]
+    assert gap.min(axis=1).max() <= 1e-12
+    center, radius = enclosing(spheres)
+    assert np.linalg.norm(points - center, axis=1).max() <= radius
+
+
+@kernel
+def _disc_points(u, v, out):
+    for i in range(len(u)):
+        out[i] = concentric_from_polar(u[i], v[i])
+
+
+def test_polar_numbers_through_the_concentric_map():
+    from pmviewer.kernels import warp
+
+    rng = np.random.default_rng(2)
+    u, v = rng.random((2, 2000)).astype(np.float32)
+    out = np.zeros((2000, 2), np.float32)
+    _disc_points(u, v, out)
+    disk = from_python(warp.square_to_disk)
+    points = np.array([disk(np.float32(a), np.float32(b)) for a, b in out])
+    expected = np.sqrt(u)[:, None] * np.stack([np.cos(2 * np.pi * v), np.sin(2 * np.pi * v)], 1)
+    assert points == pytest.approx(expected, abs=2e-6)
+
+
+def test_points_in_a_sphere_see_everything():
+    inside = replace(lit("point"), lights=(PointLight("inside", BALL.center, (1.0, 1.0, 1.0)),))
+    (chart,) = projection_of(flatten(inside)).caustic
+    assert chart.mode == "whole"

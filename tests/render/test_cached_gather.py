@@ -1,0 +1,146 @@
+"""Pictures with the irradiance cache: the plain gather's mean, the same for any threads and history."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pmviewer.engine.cache import StageCache
+from pmviewer.engine.cache_stage import lattices, recipe
+from pmviewer.engine.effects import inactive_reason
+from pmviewer.engine.method import plan_of
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.renderer import Renderer
+from pmviewer.maps.record import unpack
+from pmviewer.render.camera import resolve_camera
+from pmviewer.scene.analysis import analyse
+from tests.scenes_for_tests import closed_sphere, cornell_box, diffuse_box, rendered, settings_of
+
+ON = {"cache": "on", "cache_samples": 32}
+
+
+def cached(scene, passes=2, threads=1, gather=None, **groups):
+    values = {"render": {"method": "gather"}, "photons": {"N": 20_000}, "gather": {**ON, **(gather or {})}}
+    return rendered(scene, settings_of(**{**values, **groups}), passes, threads)
+
+
+def test_the_closed_sphere_stays_uniform():
+    """Everything is 1 in the limit: curved surfaces, all of them interpolated; biased by nothing."""
+    renderer = cached(closed_sphere(), 8)
+    frame = renderer.frame(1)
+    assert frame.statistics.interpolated > 0.9
+    assert frame.image().mean() == pytest.approx(1.0, rel=0.01)
+    plain = rendered(closed_sphere(), settings_of(render={"method": "gather"}, photons={"N": 20_000}), 8).frame(1)
+    assert frame.image("indirect").mean() == pytest.approx(plain.image("indirect").mean(), rel=0.01)
+    assert frame.image("indirect").std() < 0.5 * plain.image("indirect").std()
+
+
+@pytest.mark.parametrize("scene", [diffuse_box(), cornell_box()], ids=["diffuse box", "mirror and glass"])
+def test_the_mean_is_that_of_the_plain_gather_at_less_noise(scene):
+    groups = {"render": {"method": "gather"}, "photons": {"N": 50_000}}
+    plain = rendered(scene, settings_of(**groups), 16)
+    renderer = cached(scene, 16, photons={"N": 50_000}, gather={"cache_samples": 64})
+    for term in ("direct", "indirect", "specular"):
+        ours, theirs = renderer.frame(1).image(term).mean(), plain.frame(1).image(term).mean()
+        print(term, ours, theirs)
+        assert ours == pytest.approx(theirs, rel=0.02)
+
+
+def test_threads_do_not_change_the_picture():
+    one = cached(cornell_box(), 3, threads=1).frame(1)
+    four = cached(cornell_box(), 3, threads=4).frame(1)
+    assert np.array_equal(one.planes, four.planes)
+    a, b = (frame.clouds["cache"].photons.view(np.uint32) for frame in (one, four))
+    assert np.array_equal(a, b)
+
+
+def test_neither_coarse_frames_nor_other_cameras_change_the_picture():
+    """A session's history: another camera, a coarse frame, then this one, all on one stage cache."""
+    opened, pool, stages = open_scene(cornell_box()), WorkPool(2), StageCache()
+    settings = settings_of(render={"method": "gather"}, photons={"N": 20_000}, gather=ON)
+    moved = settings_of(
+        render={"method": "gather"}, photons={"N": 20_000}, gather=ON, camera={"origin": (0.2, 0.1, 0.9)}
+    )
+    other = Renderer(opened, moved, pool, stages)
+    other.coarse_frame(1)
+    other.step()
+    renderer = Renderer(opened, settings, pool, stages)
+    renderer.coarse_frame(2)
+    for _ in range(2):
+        renderer.step()
+    pool.close()
+    assert np.array_equal(renderer.frame(3).planes, cached(opened, 2).frame(1).planes)
+
+
+def test_a_coarse_frame_has_few_records():
+    opened, pool = open_scene(diffuse_box(size=256)), WorkPool(2)
+    settings = settings_of(render={"method": "gather"}, photons={"N": 20_000}, gather=ON)
+    frame = Renderer(opened, settings, pool, StageCache(0)).coarse_frame(1)
+    pool.close()
+    assert 0 < frame.statistics.cache_records < 0.25 * frame.planes.shape[0] * frame.planes.shape[1]
+
+
+def test_without_mis_indirect_light_is_still_there():
+    with_mis = cached(diffuse_box(), 4).frame(1).image("indirect")
+    without = cached(diffuse_box(), 4, direct={"mis": False}).frame(1).image("indirect")
+    assert without.mean() == pytest.approx(with_mis.mean(), rel=0.02)
+
+
+def test_statistics_and_cloud():
+    renderer = cached(diffuse_box(size=64), 2)
+    frame = renderer.frame(1)
+    statistics, cloud = frame.statistics, frame.clouds["cache"]
+    assert statistics.cache_records == len(cloud.photons) == len(cloud.reach) == statistics.stored_in_pass["cache"]
+    # Every point seen is either interpolated or gathers; the panel reflects too, the box is closed.
+    assert statistics.gathers_per_pixel == pytest.approx(
+        renderer.tally.records / 64**2 / 2 + (1 - statistics.interpolated), abs=1e-6
+    )
+    named = unpack(cloud.photons, cloud.power_unit)
+    assert np.abs(named["position"]).max() < 1.001
+    inwards = (named["wi"] * -named["position"]).sum(1)
+    assert (inwards > 0).mean() > 0.9
+    assert named["Phi"].min() >= 0
+    assert named["Phi"].max() > 0
+    assert statistics.map_bytes > renderer._cache.bytes > 128 * statistics.cache_records
+
+
+def test_the_candidates_of_all_rounds_are_a_lattice():
+    rounds = lattices(50, 30, 1, 4)
+    together = np.concatenate(rounds)
+    assert len(np.unique(together)) == len(together)
+    x, y = np.unique(together % 50), np.unique(together // 50)
+    assert len(together) == len(x) * len(y)
+    assert set(np.diff(x)) == set(np.diff(y)) == {4}
+    assert all((np.diff(r) > 0).all() for r in rounds)
+    assert any(not np.array_equal(a, b) for a, b in zip(rounds, lattices(50, 30, 1, 5), strict=True))
+
+
+def test_reaches_shrink_with_the_passes():
+    settings = settings_of(gather={"cache_error": 0.4, "cache_min": 3.0, "cache_max": 32.0})
+    camera = resolve_camera(diffuse_box(), settings.camera)
+    first, late = recipe(settings.gather, camera, 0)[0], recipe(settings.gather, camera, 63)[0]
+    assert first["error"] == pytest.approx(0.4)
+    for field in ("error", "least", "most"):
+        assert late[field] == pytest.approx(first[field] / 2, rel=1e-5)
+
+
+def test_later_passes_gather_more():
+    """What lies between smaller reaches is gathered: the share of interpolation falls, and with it the bias."""
+    few = cached(diffuse_box(), 1, gather={"cache_min": 1.0, "cache_error": 0.05}).frame(1).statistics
+    many = cached(diffuse_box(), 1).frame(1).statistics
+    assert few.interpolated < many.interpolated
+
+
+def test_what_the_cache_is_for():
+    traits = analyse(diffuse_box())
+    gather = settings_of(render={"method": "gather"})
+    assert not plan_of(gather, traits).cache
+    assert ("irradiance cache", "off") in plan_of(gather, traits).skipped
+    assert plan_of(settings_of(render={"method": "gather"}, gather=ON), traits).cache
+    assert not plan_of(settings_of(render={"method": "progressive"}, gather=ON), traits).cache
+    assert inactive_reason("gather.cache_error", gather, traits) == "Only with the irradiance cache."
+    on = settings_of(render={"method": "gather"}, gather=ON)
+    assert inactive_reason("gather.cache_error", on, traits) is None
+    assert inactive_reason("overlays.cache.show", on, traits) is None
+    assert inactive_reason("overlays.cache.show", gather, traits)

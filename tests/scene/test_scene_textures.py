@@ -1,0 +1,293 @@
+"""Textures in scene files of every kind, and what happens to broken ones."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pmviewer.errors import SceneError
+from pmviewer.output.exr import write_exr
+from pmviewer.scene import texture_file
+from pmviewer.scene.description import Mesh, Scene
+from pmviewer.scene.load import load_scene
+from pmviewer.scene.texture import Bitmap, Checkerboard
+from pmviewer.scene.texture_file import linear, read_picture
+from tests.scene.helpers import load
+from tests.scene.test_scene_meshes import gltf, only_mesh
+
+RED = ((188 / 255 + 0.055) / 1.055) ** 2.4
+
+
+def picture(folder: Path, name: str = "a.png", size: tuple[int, int] = (4, 2)) -> None:
+    Image.new("RGB", size, (188, 0, 255)).save(folder / name)
+
+
+def bitmap(name: str, file: str = "a.png", more: str = "") -> str:
+    return f'<texture name="{name}" type="bitmap"><string name="filename" value="{file}"/>{more}</texture>'
+
+
+def sphere(folder: Path, bsdf: str, *lines: str) -> Scene:
+    return load(folder, f'<shape type="sphere">{bsdf}</shape>', *lines)
+
+
+def test_bitmap_with_all_its_options(tmp_path: Path) -> None:
+    picture(tmp_path)
+    more = (
+        '<boolean name="raw" value="true"/><string name="wrap_mode" value="mirror"/>'
+        '<string name="filter_type" value="nearest"/>'
+        '<transform name="to_uv"><scale x="2" y="3"/><translate x="0.5" y="0.25"/></transform>'
+    )
+    scene = sphere(tmp_path, f'<bsdf type="diffuse">{bitmap("reflectance", more=more)}</bsdf>')
+    (texture,) = scene.materials[scene.shapes[0].material].textures.values()
+    assert isinstance(texture, Bitmap)
+    assert (texture.wrap, texture.filter, texture.to_uv) == ("mirror", "nearest", (2, 0, 0.5, 0, 3, 0.25))
+    assert texture.pixels.shape == (2, 4, 3)
+    assert texture.mean == pytest.approx((188 / 255, 0, 1))
+    assert scene.warnings == ()
+
+
+def test_texture_used_twice_is_read_once(tmp_path: Path) -> None:
+    picture(tmp_path)
+    shape = '<shape type="sphere"><bsdf type="diffuse"><ref name="reflectance" id="t"/></bsdf></shape>'
+    named = bitmap("x").replace('name="x" ', 'id="t" ')
+    scene = load(tmp_path, named, shape, shape)
+    first, second = (scene.materials[s.material].textures["reflectance"] for s in scene.shapes)
+    assert isinstance(first, Bitmap)
+    assert isinstance(second, Bitmap)
+    assert first.pixels is second.pixels
+
+
+def test_checkerboard_bump_and_normal_map(tmp_path: Path) -> None:
+    picture(tmp_path)
+    board = '<texture name="reflectance" type="checkerboard"><rgb name="color0" value="0.1 0.2 0.3"/></texture>'
+    inner = f'<bsdf type="normalmap">{bitmap("normalmap")}<bsdf type="diffuse">{board}</bsdf></bsdf>'
+    bsdf = (
+        f'<bsdf type="twosided"><bsdf type="bumpmap">{bitmap("x")}<float name="scale" value="3"/>{inner}</bsdf></bsdf>'
+    )
+    scene = sphere(tmp_path, bsdf)
+    material = scene.materials[scene.shapes[0].material]
+    assert material.textures.keys() == {"reflectance", "normal", "bump"}
+    assert (material.two_sided, material.bump_scale) == (True, 3)
+    checks = material.textures["reflectance"]
+    assert isinstance(checks, Checkerboard)
+    assert (checks.color0, checks.color1) == ((0.1, 0.2, 0.3), (0.2, 0.2, 0.2))
+    assert scene.warnings == ()
+
+
+def test_textured_area_light(tmp_path: Path) -> None:
+    picture(tmp_path)
+    scene = load(
+        tmp_path, f'<shape type="rectangle"><emitter type="area">{bitmap("radiance")}</emitter></shape>', sky=""
+    )
+    assert scene.shapes[0].radiance == pytest.approx((RED, 0, 1), rel=1e-5)
+    assert isinstance(scene.shapes[0].emission, Bitmap)
+
+
+@pytest.mark.parametrize("kind", ["a.png", "a.jpg", "a.exr", "grey.png", "deep.png", "palette.png", "alpha.png"])
+def test_kinds_of_pictures(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / kind
+    rgb = np.zeros((3, 5, 3), np.uint8) + np.uint8([188, 0, 255])
+    whole = Image.fromarray(rgb)
+    if kind == "a.exr":
+        write_exr(path, {"": linear(np.float32(rgb / 255))})
+    elif kind == "grey.png":
+        whole.convert("L").save(path)
+    elif kind == "deep.png":
+        Image.fromarray(np.full((3, 5), 40000, np.uint16)).save(path)
+    elif kind == "palette.png":
+        whole.quantize(4).save(path)
+    elif kind == "alpha.png":
+        whole.convert("RGBA").save(path)
+    else:
+        whole.save(path, quality=100) if kind == "a.jpg" else whole.save(path)
+    pixels, sentence = read_picture(path, kind, raw=False)
+    assert sentence == ""
+    assert pixels.dtype == np.float32
+    assert pixels.shape[:2] == (3, 5)
+    if kind == "deep.png":
+        assert pixels.shape[2] == 1
+        assert pixels == pytest.approx(((40000 / 65535 + 0.055) / 1.055) ** 2.4, rel=1e-4)
+    elif kind == "grey.png":
+        assert pixels.shape[2] == 1
+    else:
+        assert pixels[1, 2] == pytest.approx([RED, 0, 1], abs=0.03 if kind in ("a.jpg", "palette.png") else 1e-5)
+
+
+BROKEN = {
+    "empty.png": (b"", "is empty"),
+    "text.png": (b"this is no picture", "can't be read"),
+    "cut.exr": (b"\x76\x2f\x31\x01" + b"\0" * 20, "can't be read"),
+    "huge.png": (
+        b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sIIBBBBBI", 13, b"IHDR", 2**31 - 1, 2**31 - 1, 8, 2, 0, 0, 0, 0),
+        "can't be read",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", [*BROKEN, "gone.png"])
+def test_broken_texture_is_one_error_with_its_line(tmp_path: Path, name: str) -> None:
+    content, words = BROKEN.get(name, (None, "does not exist"))
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(SceneError, match=words) as caught:
+        load(tmp_path, '<shape type="sphere">', '<bsdf type="diffuse">', bitmap("reflectance", name), "</bsdf></shape>")
+    assert caught.value.line == 4
+    assert name in str(caught.value)
+
+
+@pytest.mark.filterwarnings("error")
+def test_every_cut_of_a_picture_opens_or_raises(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    Image.fromarray(rng.integers(0, 255, (6, 6, 3), dtype=np.uint8)).save(tmp_path / "whole.png")
+    Image.fromarray(rng.integers(0, 255, (6, 6, 3), dtype=np.uint8)).save(tmp_path / "whole.jpg")
+    write_exr(tmp_path / "whole.exr", {"": rng.random((6, 6, 3), dtype=np.float32)})
+    for whole in ("whole.png", "whole.jpg", "whole.exr"):
+        data = (tmp_path / whole).read_bytes()
+        for length in [*range(80), *range(80, len(data), 13)]:
+            try:
+                pixels, _ = read_picture(data[:length], whole, raw=False)
+            except SceneError:
+                continue
+            assert np.isfinite(pixels).all()
+        for _ in range(150):
+            noisy = bytearray(data)
+            for _ in range(4):
+                noisy[rng.integers(len(data))] = rng.integers(256)
+            try:
+                pixels, _ = read_picture(bytes(noisy), whole, raw=False)
+            except SceneError:
+                continue
+            assert np.isfinite(pixels).all()
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (
+            '<string name="wrap_mode" value="bounce"/>',
+            "'wrap_mode'.*expected repeat or mirror or clamp, found 'bounce'",
+        ),
+        ('<string name="filter_type" value="cubic"/>', "'filter_type'.*expected bilinear or nearest"),
+        ('<boolean name="raw" value="maybe"/>', "'raw'.*expected true or false"),
+    ],
+)
+def test_wrong_options_are_errors(tmp_path: Path, more: str, words: str) -> None:
+    picture(tmp_path)
+    with pytest.raises(SceneError, match=words):
+        sphere(tmp_path, f'<bsdf type="diffuse">{bitmap("reflectance", more=more)}</bsdf>')
+
+
+def test_maps_need_a_texture(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="needs a <texture>"):
+        sphere(tmp_path, '<bsdf type="bumpmap"><bsdf type="diffuse"/></bsdf>')
+
+
+def test_large_pictures_are_reduced_and_full_memory_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pixels = np.arange(40 * 30 * 3, dtype=np.uint8).reshape(30, 40, 3)
+    Image.fromarray(pixels).save(tmp_path / "a.png")
+    monkeypatch.setattr(texture_file, "MOST_PIXELS", 300)
+    small, sentence = read_picture(tmp_path / "a.png", "a.png", raw=True)
+    assert small.shape == (15, 20, 3)
+    assert small == pytest.approx(pixels.reshape(15, 2, 20, 2, 3).mean(axis=(1, 3)) / 255, abs=1e-5)
+    assert sentence == "The texture 'a.png' of 40 × 30 pixels was reduced to 20 × 15."
+    monkeypatch.setattr(texture_file, "available_memory", lambda: 1000)
+    with pytest.raises(SceneError, match=r"needs about .* GB of memory"):
+        read_picture(tmp_path / "a.png", "a.png", raw=True)
+
+
+def test_colours_above_one_are_cut(tmp_path: Path) -> None:
+    write_exr(tmp_path / "a.exr", {"": np.full((2, 2, 3), [3.0, 0.5, -1.0], np.float32)})
+    scene = sphere(tmp_path, f'<bsdf type="diffuse">{bitmap("reflectance", "a.exr")}</bsdf>')
+    texture = scene.materials[scene.shapes[0].material].textures["reflectance"]
+    assert isinstance(texture, Bitmap)
+    assert texture.pixels[0, 0] == pytest.approx([1, 0.5, 0])
+    assert any("above 1 were cut" in w for w in scene.warnings)
+
+
+def test_obj_with_texture_coordinates_and_maps(tmp_path: Path) -> None:
+    picture(tmp_path)
+    (tmp_path / "a.mtl").write_text(
+        "newmtl wood\nKd 0.5 0.5 0.5\nmap_Kd -s 2 3 1 -o 0.1 0.2 0 a.png\nbump -bm 0.3 a.png\n"
+        "newmtl lamp\nKd 0 0 0\nKe 2 2 2\nmap_Ke a.png\nmap_Kd gone.png\n"
+    )
+    text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 0.75\nusemtl wood\nf 1/1 2/2 3/3\n"
+    (tmp_path / "a.obj").write_text(text + "usemtl lamp\nf 3/3 2/2 1/1\n")
+    scene = load_scene(tmp_path / "a.obj")
+    by_name = {scene.materials[s.material].name: (scene.materials[s.material], s) for s in scene.shapes}
+    wood, shape = by_name["wood"]
+    texture = wood.textures["reflectance"]
+    assert isinstance(texture, Bitmap)
+    assert (texture.scale, wood.bump_scale) == ((0.5, 0.5, 0.5), 0.3)
+    assert texture.to_uv == pytest.approx((2, 0, 0.1, 0, 3, -2.2))
+    assert isinstance(shape.geometry, Mesh)
+    assert shape.geometry.uv is not None
+    order = np.argsort(shape.geometry.vertices @ [1, 2, 0])
+    assert shape.geometry.uv[order] == pytest.approx(np.array([[0, 1], [1, 1], [1, 0.25]]))
+    _, lamp = by_name["lamp"]
+    assert isinstance(lamp.emission, Bitmap)
+    assert lamp.radiance == pytest.approx((2 * RED, 0, 2), rel=1e-5)
+    assert any("'gone.png' does not exist" in w and "line 9" in w for w in scene.warnings)
+
+
+def test_gltf_with_all_its_textures(tmp_path: Path) -> None:
+    picture(tmp_path)
+    data = np.array([[0, 0], [1, 0], [0, 65535]], np.uint16)
+    (tmp_path / "uv.bin").write_bytes(data.tobytes())
+    info = {"index": 0, "extensions": {"KHR_texture_transform": {"offset": [0.5, 0.25], "scale": [2, 4]}}}
+    material = {
+        "pbrMetallicRoughness": {
+            "baseColorTexture": info,
+            "metallicRoughnessTexture": {"index": 0},
+            "roughnessFactor": 0.01,
+        },
+        "normalTexture": {"index": 0, "scale": 0.5},
+        "emissiveTexture": {"index": 0},
+        "emissiveFactor": [1, 1, 1],
+    }
+    path = gltf(tmp_path, binary=False, materials=[material], textures=[{"source": 0, "sampler": 0}],
+                samplers=[{"wrapS": 33648, "wrapT": 33648, "magFilter": 9728}], images=[{"uri": "a.png"}])  # fmt: skip
+    import json
+
+    header = json.loads(path.read_text())
+    header["buffers"].append({"uri": "uv.bin", "byteLength": 12})
+    header["bufferViews"].append({"buffer": 1, "byteLength": 12})
+    header["accessors"].append({"bufferView": 2, "componentType": 5123, "normalized": True, "count": 3, "type": "VEC2"})
+    header["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = 2
+    path.write_text(json.dumps(header))
+    scene = load_scene(path)
+    shape = scene.shapes[0]
+    found = scene.materials[shape.material].textures
+    assert found.keys() >= {"reflectance", "normal"}
+    base, normal = found["reflectance"], found["normal"]
+    assert isinstance(base, Bitmap)
+    assert isinstance(normal, Bitmap)
+    assert (base.wrap, base.filter) == ("mirror", "nearest")
+    assert base.to_uv == pytest.approx((2, 0, 0.5, 0, 4, 0.25))
+    assert normal.pixels[0, 0] == pytest.approx([0.5 + 0.5 * (188 / 255 - 0.5), 0.25, 1])
+    assert isinstance(shape.emission, Bitmap)
+    uv = only_mesh(scene).uv
+    assert uv is not None
+    assert uv == pytest.approx(np.array([[0, 0], [1 / 65535, 0], [0, 1]]))
+
+
+def test_gltf_without_its_picture_opens(tmp_path: Path) -> None:
+    pbr = {"baseColorTexture": {"index": 0}}
+    path = gltf(
+        tmp_path, materials=[{"pbrMetallicRoughness": pbr}], textures=[{"source": 0}], images=[{"uri": "gone.png"}]
+    )
+    scene = load_scene(path)
+    assert not scene.materials[0].textures
+    assert any("'gone.png' does not exist. It is left out." in w for w in scene.warnings)
+
+
+def test_a_map_takes_a_texture_without_a_name(tmp_path: Path) -> None:
+    picture(tmp_path)
+    unnamed = bitmap("x").replace('name="x" ', "", 1)
+    assert 'name="x"' not in unnamed
+    scene = sphere(tmp_path, f'<bsdf type="bumpmap">{unnamed}<bsdf type="diffuse"/></bsdf>')
+    assert scene.materials[scene.shapes[0].material].textures.keys() == {"bump"}
+    assert scene.warnings == ()
