@@ -66,6 +66,6 @@ def overrides(
 def check_output(path: Path, formats: tuple[str, ...]) -> None:
     """Raises OutputError where no file of these formats can be written."""
     if path.suffix.lower() not in formats:
-        raise OutputError(f"{path}: unknown format '{path.suffix}'. Use {' or '.join(reversed(formats))}.")
+        raise OutputError(f"{path}: unknown format '{path.suffix}'. Use {' or '.join(formats)}.")
     if not path.absolute().parent.is_dir():
         raise OutputError(f"{path}: the folder {path.absolute().parent} does not exist. Create it first.")
