@@ -107,6 +107,7 @@ def shot(
     pixel: Annotated[
         str | None, typer.Option(metavar="X,Y", help="Pixel whose gather rays overlays.gather.show draws.")
     ] = None,
+    captions: Annotated[bool, typer.Option(help="Say in the picture which view it is.")] = True,
     threads: ThreadsOption = None,
     set_: SetOption = None,
     define: ParameterOption = None,
@@ -115,7 +116,7 @@ def shot(
     from pmviewer.job import load_job
     from pmviewer.viewer.shot import shot_job
 
-    shot_job(load_job(scene, set_ or [], define or []), output, passes, size, window, pixel, threads)
+    shot_job(load_job(scene, set_ or [], define or []), output, passes, size, window, pixel, captions, threads)
 
 
 @app.command()

@@ -51,6 +51,7 @@ class ViewerApp:
     remember: keep the window's layout between runs.
     shot: a picture to take, after which the window closes.
     picture_size: make a window of that size with the picture alone.
+    captions: name views in the picture.
     """
 
     def __init__(
@@ -62,6 +63,7 @@ class ViewerApp:
         remember: bool = True,
         shot: Shot | None = None,
         picture_size: tuple[int, int] | None = None,
+        captions: bool = True,
     ) -> None:
         self.state = ViewerState(session, inactive_reason, recent or RecentFiles())
         self.viewport = Viewport(self.state)
@@ -73,7 +75,7 @@ class ViewerApp:
         self._running = False
         self.viewport.draw_toasts = lambda: draw_toasts(self.state, *self.viewport.origin, self.viewport.size[0])
         self.params = layout.runner_params(self._callbacks(), remember=remember, alone=picture_size)
-        self._shot, self.viewport.alone = shot, picture_size is not None
+        self._shot, self.viewport.alone, self.viewport.captions = shot, picture_size is not None, captions
         self.add_ons = immapp.AddOnsParams(with_implot=True)
 
     def _callbacks(self) -> layout.Callbacks:

@@ -91,6 +91,7 @@ def shot_job(
     size: str | None,
     window: bool,
     pixel: str | None,
+    captions: bool,
     threads: int | None,
 ) -> None:
     """Take a picture of the window (`pmviewer.viewer.shot`). Raises PmviewerError; WindowError without a display."""
@@ -108,7 +109,8 @@ def shot_job(
         chosen = int(match[1]), int(match[2])
     camera = resolve_camera(load_scene(job.scene, job.parameters), settings.camera)
     shot = Shot(output, chosen)
-    make = partial(ViewerApp, remember=False, shot=shot, picture_size=None if window else (camera.width, camera.height))
+    picture_size = None if window else (camera.width, camera.height)
+    make = partial(ViewerApp, remember=False, shot=shot, picture_size=picture_size, captions=captions)
     start_viewer(make, job.scene, settings, threads, job.parameters)
     if not shot.done:
         raise shot.error or WindowError("The window was closed before the picture was taken.")

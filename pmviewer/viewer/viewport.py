@@ -51,6 +51,8 @@ class Viewport:
         """The pixel whose gather rays are drawn."""
         self.alone = False
         """Whether the picture fills the window."""
+        self.captions = True
+        """Whether views are named in the picture."""
         self.redraws = 0
         """How often the picture was drawn: an idle window draws nothing."""
         self.origin = (0.0, 0.0)

@@ -49,7 +49,7 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
     elif view != state.settings.display.view and not state.flipped:
         refusal = state.refused_view(state.settings.display.view) or "is being made"
         _caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.WARNING)
-    elif view != "beauty":
+    elif view != "beauty" and viewport.captions:
         _caption(viewport, _TITLES.get(view, view), (margin, margin))
     if view == "depth" and state.frame is not None and viewport.picture is not None:
         _depth_legend(viewport, *viewport.picture.depth_range)
@@ -139,9 +139,13 @@ def _legend(viewport: Viewport, labels: list[tuple[float, str]], colours: NDArra
     edges = np.linspace(y0, y1, len(codes))
     for top, bottom, above, below in zip(edges[:-1], edges[1:], codes[:-1], codes[1:], strict=True):
         draw.add_rect_filled_multi_color((x0, float(top)), (x1, float(bottom)), above, above, below, below)
-    for position, text in labels:
+    lowest = -np.inf  # labels that would run into the one above are left out
+    for position, text in sorted(labels):
         size = imgui.calc_text_size(text)
         top = y0 + position * (y1 - y0) - size.y / 2
+        if top < lowest:
+            continue
+        lowest = top + 0.9 * size.y
         draw.add_text((x0 - size.x - 0.4 * line, top), imgui.get_color_u32(theme.grey(0.9)), text)
 
 

@@ -13,9 +13,9 @@ from pmviewer.viewer.shot import shot_job
 SMALL = ["camera.width=200", "camera.height=160", "photons.N=2000", "importance.N=500"]
 
 
-def take(tmp_path, *settings, pixel=None, window=False):
+def take(tmp_path, *settings, pixel=None, window=False, captions=True):
     path = tmp_path / "shot.png"
-    shot_job(load_job("cornell_diffuse", [*SMALL, *settings], []), path, 1, None, window, pixel, 1)
+    shot_job(load_job("cornell_diffuse", [*SMALL, *settings], []), path, 1, None, window, pixel, captions, 1)
     return read_png(path)[0]
 
 
@@ -25,6 +25,8 @@ def test_overlays_and_legends_are_in_the_picture(tmp_path):
     photons = take(tmp_path, "overlays.global.show=true").astype(int)
     view = take(tmp_path, "display.view=look-up radius").astype(int)
     assert 200 < (np.abs(photons - plain).max(axis=-1) > 20).sum() < 20_000
+    unnamed = take(tmp_path, "display.view=look-up radius", captions=False).astype(int)
+    assert (view[5:40, 5:100] != unnamed[5:40, 5:100]).any(axis=-1).mean() > 0.3
     legend = view[10:80, -22:-12]
     assert np.abs(np.diff(legend.mean(axis=1), axis=0)).sum() > 100, "no colour bar"
 
