@@ -1,7 +1,7 @@
 """`python docs/figures.py [NAME …]`: make the figures of docs/importance.md by the commands that stand there.
 
-A block of commands that begins with ```sh figure=NAME columns=N gives images/NAME.png: each command writes one panel, in
-order, N of them a row. The commands open windows: without a display, run all of it under xvfb-run -a.
+A block of commands that begins with ```sh figure=NAME columns=N gives images/NAME.png: each command writes one panel,
+in order, N of them a row. The commands open windows: without a display, run all of it under xvfb-run -a.
 """
 
 from __future__ import annotations
