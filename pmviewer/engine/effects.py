@@ -64,6 +64,12 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
         return "Direct light is not computed: a map is shown alone, or nothing is diffuse."
     if group == "direct":
         return _direct(path, settings, plan, traits)
+    if group == "free_camera" and path != "free_camera.on" and not settings.free_camera.on:
+        return "Only with the free camera (free_camera.on)."
+    if path == "free_camera.cut_height" and not settings.free_camera.cut:
+        return "Nothing is cut open (free_camera.cut)."
+    if path == "free_camera.length" and not settings.free_camera.frustum:
+        return "The frustum is not drawn."
     if path == "render.outline_rays" and plan.path:
         return "The path tracer treats all pixels alike."
     if path == "render.max_depth" and not (plan.path or traits.follows(settings.photons.glossy)):

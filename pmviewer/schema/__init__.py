@@ -23,6 +23,7 @@ from pmviewer.schema.display import (
     ShadowOverlay,
 )
 from pmviewer.schema.estimate import Estimate
+from pmviewer.schema.free_camera import FreeCamera
 from pmviewer.schema.image import CameraSettings, Direct, Gather, Render
 from pmviewer.schema.importance import Importance
 from pmviewer.schema.light_pass import Photons
@@ -35,6 +36,7 @@ __all__ = [
     "Direct",
     "Display",
     "Estimate",
+    "FreeCamera",
     "Gather",
     "GatherOverlay",
     "Group",
@@ -65,5 +67,6 @@ class Settings(Group):
     gather: Gather = Field(default_factory=Gather)
     render: Render = Field(default_factory=Render)
     camera: CameraSettings = Field(default_factory=CameraSettings)
+    free_camera: FreeCamera = Field(default_factory=FreeCamera)
     display: Display = Field(default_factory=Display)
     overlays: Overlays = Field(default_factory=Overlays)

@@ -38,7 +38,7 @@ class Exports:
     def png(self, path: Path, *, overlays: bool) -> None:
         """The picture at its own resolution as it is shown, with or without the points over it."""
         settings, frame = self._state.settings, self._state.frame
-        points = overlays and settings.overlays.any_shown
+        points = overlays and (settings.overlays.any_shown or self._state.frustum() is not None)
         display = self._state.shown_display
         if frame is not None and not points and display.view not in ("geometry", *COMPARED_VIEWS):
             # The same code as `pmviewer render` uses, so that both write the same picture.

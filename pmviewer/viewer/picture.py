@@ -27,6 +27,7 @@ from pmviewer.settings import (
     ProjectionOverlay,
 )
 from pmviewer.viewer.cells import CellCloud
+from pmviewer.viewer.frustum import FrustumLines
 from pmviewer.viewer.gl_program import load_program, set_uniforms
 from pmviewer.viewer.lines import LineCloud, circles, flights, gather_lines
 from pmviewer.viewer.overlays import PointCloud
@@ -82,6 +83,7 @@ class Picture:
         self.gather_ends = PointCloud(context)
         self.circles = LineCloud(context)
         self.cells = CellCloud(context)
+        self.frustum = FrustumLines(context)
         self._drawn_ways: dict[str, Any] = {}
         self.depth_range = (0.0, 1.0)
         self.scale = Scale(0.0, 1.0)
@@ -253,7 +255,7 @@ class Picture:
         framebuffer.viewport = (left, target.size[1] - top - height, width, height)
         framebuffer.scissor = clip
         near, far = clip_planes(camera, self._center, self._radius)
-        view, projection = camera.view_matrix(), camera.projection_matrix(near, far)
+        view, projection = camera.view_matrix(), camera.cut_projection(near, far)
         as_geometry = display.view == "geometry" or not self.has_plane
         if as_geometry:
             points = overlays is not None and overlays.any_shown
@@ -262,6 +264,7 @@ class Picture:
             self._draw_plane(display, width)
         if overlays is not None:
             self._draw_points(framebuffer, overlays, view, projection, target.pixel_ratio, navigating)
+            self._draw_frustum(framebuffer, view, projection, target.pixel_ratio, overlays)
         self.context.disable(moderngl.DEPTH_TEST)
         return colour
 
@@ -318,9 +321,7 @@ class Picture:
         if not overlays.any_shown:
             return
         context = self.context
-        ways = overlays.paths, overlays.gather, overlays.projection
-        tested = [style.show and style.depth for style in styles.values()]
-        if any(tested) or any(way.show and way.depth for way in ways):
+        if overlays.tests_depth:
             self._draw_depth(framebuffer, view, projection)
         for name, style in styles.items():
             if not style.show:
@@ -359,6 +360,24 @@ class Picture:
             colour: Literal["light", "power"] = "light" if gather.colour == "source" else "power"
             ends = PointOverlay(size=min(3.0 * gather.size, 12.0), colour=colour)
             self.gather_ends.draw(ends, view, projection, GATHER_ENDS, pixel_ratio)
+        framebuffer.depth_mask = True
+        framebuffer.use()
+
+    def _draw_frustum(
+        self,
+        framebuffer: moderngl.Framebuffer,
+        view: Matrix,
+        projection: Matrix,
+        pixel_ratio: float,
+        overlays: Overlays,
+    ) -> None:
+        if not self.frustum.shown:
+            return
+        if not overlays.tests_depth:  # else surfaces are in the depth buffer already
+            self._draw_depth(framebuffer, view, projection)
+        framebuffer.depth_mask = False
+        framebuffer.use()
+        self.frustum.draw(view, projection, framebuffer.viewport[2:], pixel_ratio)
         framebuffer.depth_mask = True
         framebuffer.use()
 

@@ -37,6 +37,9 @@ class Toolbar:
         self._gap()
         self._button(fa.ICON_FA_EXPAND, "frame_all", "Frame the whole scene")
         self._button(fa.ICON_FA_PAPER_PLANE, "toggle_fly", "Fly through the scene", on=self._state.flying)
+        free = self._state.settings.free_camera.on
+        text = "Free camera: see the render camera's importance from elsewhere"
+        self._button(fa.ICON_FA_VIDEO, "toggle_free", text, on=free)
         self._gap()
         self._button(fa.ICON_FA_FOLDER_OPEN, "open", "Open a scene or session")
         self._button(fa.ICON_FA_IMAGE, "export_png", "Export the picture as PNG")

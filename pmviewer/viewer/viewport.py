@@ -105,6 +105,7 @@ class Viewport:
             changed |= picture.upload_gathered(frame.inspection.gathered, overlays.gather)
             changed |= picture.upload_circles(frame.clouds.get("cache"), overlays.cache)
             changed |= picture.upload_cells(frame.projections, overlays.projection)
+        changed |= picture.frustum.upload(self.state.frustum())
         camera, target = self.shown_camera(), self.target()
         navigating = self.state.navigating and picture.software
         key = (camera, target, display, overlays, navigating)
@@ -169,7 +170,7 @@ class Viewport:
         before = pose
         geometry = self.state.session.geometry
         radius = float(geometry.radius) if geometry is not None else 1.0
-        if geometry is not None and self.state.settings.camera.target == "auto":
+        if geometry is not None and self._target_is_automatic():
             pose = controls.with_pivot(pose, geometry.center, radius)
             before = pose
         height = max(self.rectangle()[3], 1.0)
@@ -189,6 +190,11 @@ class Viewport:
             pose = self._fly(pose, radius, right)
         if pose != before:
             self.state.move_camera(pose)
+
+    def _target_is_automatic(self) -> bool:
+        """Whether the target is the scene file's, which may lie anywhere. An automatic free camera's is well placed."""
+        settings = self.state.settings
+        return settings.camera.target == "auto" and not settings.free_camera.on
 
     def _drag(self, pose: CameraPose, dx: float, dy: float, right: bool, radius: float) -> CameraPose:
         if imgui.is_mouse_down(imgui.MouseButton_.middle) or (imgui.get_io().key_shift and not self.state.flying):

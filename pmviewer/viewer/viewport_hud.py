@@ -51,6 +51,9 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         _caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.WARNING)
     elif view != "beauty" and viewport.captions:
         _caption(viewport, _TITLES.get(view, view), (margin, margin))
+    if state.settings.free_camera.on:
+        plain = view == "beauty" and state.frame is not None and view == state.settings.display.view
+        _free_camera_label(viewport, (margin, margin if plain else 2.2 * margin + line))
     if view == "depth" and state.frame is not None and viewport.picture is not None:
         _depth_legend(viewport, *viewport.picture.depth_range)
     if view == "error":
@@ -67,6 +70,19 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         text = _value_under_mouse(viewport)
         if text:
             _caption(viewport, text, (margin, height - line - 1.2 * margin))
+
+
+def _free_camera_label(viewport: Viewport, position: tuple[float, float]) -> None:
+    """Whose importance is shown."""
+    state = viewport.state
+    text = "free camera · importance of the render camera"
+    if state.inactive_reason("importance.N", state.settings, state.session.traits) is not None:
+        text = "free camera · importance is off: the render camera sets the look-up radius alone"
+    pose, geometry = state.live_camera(), state.session.geometry
+    if pose is not None and geometry is not None and pose.near_normal is not None:
+        height = state.settings.free_camera.cut_height * float(geometry.radius)
+        text += f" · cut open {si(abs(height), 'm')} {'above' if height >= 0 else 'below'} its eye"
+    _caption(viewport, text, position, colour=theme.FREE)
 
 
 def _value_under_mouse(viewport: Viewport) -> str:
