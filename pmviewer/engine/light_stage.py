@@ -26,6 +26,7 @@ from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import automatic_radius, largest_power, neighbourhood
 from pmviewer.maps.record import DIRECT, in_classes
 from pmviewer.maps.variant import marked
+from pmviewer.photons.light_importance import LightImportance
 from pmviewer.photons.lightpass import PhotonMaps, trace_pass, trajectories
 from pmviewer.render.choice import CHOICES
 from pmviewer.settings import Settings
@@ -39,8 +40,8 @@ CHOOSING_PHOTONS = 1 << 17
 
 class LightStage:
     """Photons and maps of one scene with one set of settings. The attributes without underscore are of the latest pass:
-    `photons`, radiance photons `sites`, `guides` of gather rays, the deposition `rules`, and `traced`, the (pass, N) of
-    its light pass."""
+    `photons`, radiance photons `sites`, `guides` of gather rays, the deposition `rules`, `traced`, the (pass, N) of
+    its light pass, and `emission`, the importance of the lights with guided emission."""
 
     def __init__(
         self, scene: OpenScene, settings: Settings, plan: Plan, pool: WorkPool, cache: StageCache, tally: Tally
@@ -55,6 +56,7 @@ class LightStage:
         self.guides: PhotonGrid | None = None
         self.rules = Rules()
         self.traced: tuple[int, int] | None = None
+        self.emission: LightImportance | None = None
 
     def run(
         self, eye: np.void, index: int, N: int, first_radius: float, importance: ImportanceStage

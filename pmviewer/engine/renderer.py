@@ -215,6 +215,7 @@ class Renderer:
             statistics=statistics,
             clouds=clouds,
             projections=self.light.projection.maps if self.light.projection is not None else {},
+            lights=self.light.emission,
             scene_name=self.scene.scene.name,
             inspection=self._inspect(wanted or wanted_of(self.settings, self.plan), film),
         )
