@@ -113,6 +113,13 @@ class Frame:
     """
     lights: LightImportance | None = None
     """Importance of the lights in the latest pass, with guided emission."""
+    light_places: NDArray[np.float64] | None = None
+    """(n, 3) middles of the lights, NaN where they shine from outside; None without importance."""
+
+    @property
+    def known_lights(self) -> LightImportance | None:
+        """Importance of the lights: by guided emission, or by photons while the overlay is shown."""
+        return self.lights if self.lights is not None else self.inspection.lights
 
     def image(self, view: str = "beauty") -> NDArray[np.float32]:
         """(height, width, 3), or 1 channel for depth; view is `beauty`, a term or a first-hit property, or one of

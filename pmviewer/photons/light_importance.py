@@ -26,3 +26,10 @@ class LightImportance:
     def factor(self) -> Float:
         """How many times as many trajectories leave a light as by its power; 1 for a light without power."""
         return np.divide(self.share, self.power, out=np.ones_like(self.share), where=self.power > 0)
+
+    @property
+    def lit(self) -> Float:
+        """(n,) share of the picture's light that comes from each, together 1, or 0 where nothing is important."""
+        brought = self.power * self.met
+        total = brought.sum()
+        return brought / total if total > 0 else brought
