@@ -1,4 +1,4 @@
-"""Views of achieved density, its ratio to the required one and the probability of storing, against their definitions."""
+"""Views of achieved density, its ratio to the required one and the probability of storing, by their definitions."""
 
 from __future__ import annotations
 
@@ -87,13 +87,13 @@ def test_achieved_density_sums_up_to_the_photons_that_are_seen(box, pool, deposi
 
 def test_ratio_is_one_where_photons_suffice(box, pool):
     """Far more photons arrive than are asked for: density control stores as many, without it there are too many."""
-    controlled = stepped(box, pool, map="screen", deposition="density control", M_r=100.0)
+    controlled = stepped(box, pool, map="screen", deposition="density control", M_r=100.0, N=150_000)
     planes = controlled.inspect(Wanted("density", "global")).planes
     required = controlled.inspect(Wanted("importance", "global")).planes["required density"]
     ratio = planes["density ratio"]
     np.testing.assert_allclose(ratio[ratio >= 0], (planes["achieved density"] / required)[ratio >= 0], rtol=1e-5)
     assert np.exp(np.median(np.log(ratio[ratio > 0]))) == pytest.approx(1.0, abs=0.25)
-    everything = stepped(box, pool, map="screen", M_r=100.0)
+    everything = stepped(box, pool, map="screen", M_r=100.0, N=150_000)
     assert np.median(everything.inspect(Wanted("density", "global")).planes["density ratio"]) > 2.0
 
 
@@ -121,17 +121,19 @@ def test_required_density_is_the_rules(box, pool):
 
 @pytest.mark.parametrize("cut_off", ["clamp", "discard"])
 def test_probability_is_that_of_the_rule(box, pool, cut_off):
-    renderer = stepped(box, pool, map="average", deposition="Keller-Wald", f=0.002, epsilon=0.05, cut_off=cut_off)
+    how = {"map": "average", "neighbours": 20, "f": 0.4, "epsilon": 0.3, "cut_off": cut_off}
+    renderer = stepped(box, pool, deposition="Keller-Wald", **how)
     shown = renderer.inspect(Wanted("storing", "global")).planes["storing probability"].reshape(-1)
     rule = renderer.light.rules.deposition.global_
     p, n = hits(renderer.camera)
     some = ~np.isnan(p[:, 0])
     asked = rule.probability(p[some].astype(np.float32), encode_normals(n[some]))
-    again = probability_of(renderer.importance.latest.global_, 0.002)
+    again = probability_of(renderer.importance.latest.global_, 0.4)
     np.testing.assert_array_equal(asked, again(p[some].astype(np.float32), encode_normals(n[some])))
-    expected = np.where(asked < 0.05, 0.05 if cut_off == "clamp" else 0.0, np.minimum(asked, 1.0))
+    expected = np.where(asked < 0.3, 0.3 if cut_off == "clamp" else 0.0, np.minimum(asked, 1.0))
     np.testing.assert_allclose(shown[some], expected, rtol=2e-2, atol=1e-6)
-    assert len(np.unique(shown[some])) > 20
+    assert len(np.unique(shown[some])) > 10
+    assert 0.02 < (asked < 0.3).mean() < 0.98
     scale = view_scale("storing probability", shown.reshape(SIZE, SIZE, 1))
     assert (scale.lower, scale.upper) == (0.0, 1.0)
 
