@@ -7,7 +7,8 @@ uniform int curve;        // 0 sRGB, 1 Reinhard, 2 filmic, 3 linear
 uniform float scale;      // 2^exposure
 uniform vec2 depth_range; // nearest and farthest finite depth
 uniform sampler2D reference;
-uniform sampler2D colours; // of errors and quantities, small to large (pmviewer/output/falsecolour.py)
+uniform sampler2D colours; // of errors and quantities, small to large (pmviewer/output/falsecolour.py): a table a row
+uniform int colour_row;    // the table of quantities
 uniform vec2 value_range;  // quantities at the ends of the colours, or their logarithms
 uniform int value_log;     // whether they are
 uniform vec3 value_weights; // of the channels in the quantity
@@ -31,9 +32,9 @@ vec3 tone(vec3 x) {
     return srgb_oetf(x);
 }
 
-vec3 false_colour(float share) {
+vec3 false_colour(float share, int row) {
     share = clamp(share, 0.0, 1.0);
-    return texelFetch(colours, ivec2(int(share * float(textureSize(colours, 0).x - 1) + 0.5), 0), 0).rgb;
+    return texelFetch(colours, ivec2(int(share * float(textureSize(colours, 0).x - 1) + 0.5), row), 0).rgb;
 }
 
 // As in pmviewer/output/diagnostic_views.py; a half marks cells that are only the nearest, not near enough.
@@ -63,11 +64,12 @@ void main() {
         // As in pmviewer/output/metric.py.
         vec3 truth = texture(reference, uv).rgb, off = value.rgb - truth;
         float error = dot(off * off / (truth * truth + 0.01), vec3(1.0 / 3.0));
-        shown = false_colour((log(max(error, 1e-30)) - error_range.x) / (error_range.y - error_range.x));
+        shown = false_colour((log(max(error, 1e-30)) - error_range.x) / (error_range.y - error_range.x), 0);
     } else if (content == 5) {
         float quantity = dot(value.rgb, value_weights);
         float at = value_log == 1 ? log(max(quantity, 1e-30)) : quantity;
-        shown = quantity < 0.0 ? grey : false_colour((at - value_range.x) / (value_range.y - value_range.x));
+        float share = (at - value_range.x) / (value_range.y - value_range.x);
+        shown = quantity < 0.0 ? grey : false_colour(share, colour_row);
     } else if (content == 6) {
         shown = value.r < 0.0 ? grey : cell_colour(value.r);
     } else {

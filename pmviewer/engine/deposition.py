@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -38,12 +38,16 @@ TEST_SEED = 0x7E57
 class Rules:
     """The pass's `deposition` for the light pass, None where all photons are stored; `key` names it in caches, () where
     it is None; `notes` are sentences for the log; `required` are the functions of required density by map, for density
-    control."""
+    control. For views: `f` of Keller and Wald by map, the constant density by map where it is required (`everywhere`),
+    and the `growth` of required densities since the first pass."""
 
     deposition: Deposition | None = None
     key: tuple[Any, ...] = ()
     notes: tuple[str, ...] = ()
     required: dict[str, Evaluate] | None = None
+    f: dict[str, float] = field(default_factory=dict)
+    everywhere: dict[str, float] = field(default_factory=dict)
+    growth: float = 1.0
 
 
 def rules_of(
@@ -70,6 +74,7 @@ def rules_of(
     rules: dict[str, Rule | None] = {"caustic": None, "global": None}
     classes = {"caustic": plan.caustic_mask, "global": plan.global_classes}
     f: dict[str, float] = {}
+    everywhere: dict[str, float] = {}
     if plan.deposition == "Keller-Wald":
         assert maps is not None
         key += (how.epsilon, how.cut_off, how.f)
@@ -83,7 +88,7 @@ def rules_of(
         chosen = importance_of(maps, name) if needs_importance else None
         if plan.deposition == "Keller-Wald":
             assert chosen is not None
-            factor = f[name] if how.f == "auto" else float(how.f)
+            factor = f[name] = f[name] if how.f == "auto" else float(how.f)
             rules[name] = KellerWald(
                 probability_of(chosen, factor), how.epsilon, how.cut_off == "discard", seed + (name == "global")
             )
@@ -91,15 +96,16 @@ def rules_of(
         if chosen is not None:
             required[name] = density_of(chosen, growth * (how.M_r if name == "global" else how.caustic_M_r))
         else:
-            required[name] = constant(
-                constant_density(settings, radii[name]) if how.density == "auto" else growth * float(how.density)
-            )
+            automatic = constant_density(settings, radii[name])
+            everywhere[name] = automatic if how.density == "auto" else growth * float(how.density)
+            required[name] = constant(everywhere[name])
         rules[name] = Density(
             required[name], ACCEPTANCE.index(how.acceptance), farthest_of(scene_radius), seed + (name == "global")
         )
     sample = (1 << DIRECT if plan.choice != "power" or plan.caustic_mask else 0) | plan.guide_mask
     deposition = Deposition(rules["caustic"], rules["global"], classes["caustic"], classes["global"], sample)
-    return Rules(deposition, key, tuple(notes), required or None)
+    grown = 1.0 if plan.deposition == "Keller-Wald" else growth
+    return Rules(deposition, key, tuple(notes), required or None, f, everywhere, grown)
 
 
 def constant_density(settings: Settings, radius: float) -> float:

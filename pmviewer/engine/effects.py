@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pmviewer.engine.diagnose import refused_view
+from pmviewer.engine.diagnose import OF_A_MAP, refused_view
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.scene.analysis import SceneTraits
@@ -94,8 +94,9 @@ def _display(path: str, settings: Settings, plan: Plan) -> str | None:
         return refused_view(view, plan)
     shown = settings.display.view
     if path == "display.map":
-        if shown not in DIAGNOSTICS or DIAGNOSTICS[shown].family not in ("look-up", "importance"):
-            return "Only with the views 'look-up radius', 'photon count', 'importance' and 'required density'."
+        if shown not in DIAGNOSTICS or DIAGNOSTICS[shown].family not in OF_A_MAP:
+            views = ", ".join(f"'{view}'" for view, how in DIAGNOSTICS.items() if how.family in OF_A_MAP)
+            return f"Only with the views {views}."
         if not (plan.caustic_mask and plan.global_classes):
             return "There is one map."
     return None
@@ -107,8 +108,15 @@ def _overlays(path: str, settings: Settings, plan: Plan) -> str | None:
         return None if plan.shadows else "Only with shadow photons (direct.shadow_photons)."
     if not plan.photons:
         return "This method traces no photons."
-    if name == "importons":
-        return None if plan.importance else "Only with importance (importance.map)."
+    if name in ("importons", "lights") and not plan.importance:
+        return "Only with importance (importance.map)."
+    if name == "fates" and plan.deposition == "all":
+        return "Every photon is stored (importance.deposition)."
+    two_maps = plan.caustic_mask and plan.global_classes
+    if path == "overlays.fates.map" and not two_maps:
+        return "There is one map."
+    if path == "overlays.importons.map" and not (two_maps and plan.gather):
+        return "One importance serves both maps: they are shown at the same places."
     if name == "gather":
         return None if plan.gather else "Only the method 'gather' casts gather rays."
     if name == "projection" and settings.photons.projection == "off":

@@ -19,6 +19,7 @@ from pmviewer.settings import Settings
 
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
     from pmviewer.photons.deposition import Deposited
+    from pmviewer.photons.light_importance import LightImportance
     from pmviewer.photons.projection import ProjectionMap
 
 State = Literal["empty", "loading", "preparing", "rendering", "paused", "finished", "failed"]
@@ -110,6 +111,15 @@ class Frame:
     projections: Mapping[str, tuple[ProjectionMap, ...]] = field(default_factory=dict)
     """Projection maps of the lights by what they show, "surfaces" and "caustic"; empty where photons start everywhere.
     """
+    lights: LightImportance | None = None
+    """Importance of the lights in the latest pass, with guided emission."""
+    light_places: NDArray[np.float64] | None = None
+    """(n, 3) middles of the lights, NaN where they shine from outside; None without importance."""
+
+    @property
+    def known_lights(self) -> LightImportance | None:
+        """Importance of the lights: by guided emission, or by photons while the overlay is shown."""
+        return self.lights if self.lights is not None else self.inspection.lights
 
     def image(self, view: str = "beauty") -> NDArray[np.float32]:
         """(height, width, 3), or 1 channel for depth; view is `beauty`, a term or a first-hit property, or one of

@@ -15,18 +15,21 @@ from numpy.typing import NDArray
 from pmviewer.output.diagnostic_views import Family
 
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
+    from pmviewer.photons.light_importance import LightImportance
     from pmviewer.photons.paths import PhotonPaths
 
 
 @dataclass(frozen=True)
 class Wanted:
     """What the display asks for: a family of diagnostic planes (of which map, for look-ups), so many photon paths, the
-    gather rays of a pixel (x, y)."""
+    gather rays of a pixel (x, y), the fates of the photons of so many trajectories, the importance of the lights."""
 
     family: Family | None = None
     map: str = ""
     paths: int = 0
     pixel: tuple[int, int] | None = None
+    fates: int = 0
+    lights: bool = False
 
     def lacks(self, held: Wanted) -> bool:
         """Whether a frame that holds `held` lacks something of this."""
@@ -34,15 +37,22 @@ class Wanted:
             return True
         if self.pixel is not None and self.pixel != held.pixel:
             return True
+        if self.fates > 0 and self.fates != held.fates:
+            return True
+        if self.lights and not held.lights:
+            return True
         return self.paths > 0 and self.paths != held.paths
 
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
     """`planes` by view, (h, w, channels) float32, see `pmviewer.output.diagnostic_views`; `gathered`: the gather rays
-    of the pixel, (n, 10) float32, see `pmviewer.render.gather_points`."""
+    of the pixel, (n, 10) float32, see `pmviewer.render.gather_points`; `fates`: photons (n, 6) float32, see
+    `pmviewer.photons.fates`; `lights`: importance of the lights as photons tell it."""
 
     wanted: Wanted = Wanted()
     planes: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     paths: PhotonPaths | None = None
     gathered: NDArray[np.float32] | None = None
+    fates: NDArray[np.float32] | None = None
+    lights: LightImportance | None = None

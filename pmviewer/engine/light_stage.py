@@ -20,27 +20,36 @@ from pmviewer.engine.projection import projection_for
 from pmviewer.engine.radius import pass_radius
 from pmviewer.engine.sites import median_radius, sites_of
 from pmviewer.engine.tally import Tally
+from pmviewer.importance.lights import importance_of_lights
 from pmviewer.maps.grid import PhotonGrid, build_grid
 from pmviewer.maps.kdtree import PhotonKdTree, build_kdtree
 from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import automatic_radius, largest_power, neighbourhood
 from pmviewer.maps.record import DIRECT, in_classes
 from pmviewer.maps.variant import marked
+from pmviewer.photons.deposition import Deposition
+from pmviewer.photons.fates import Fates
+from pmviewer.photons.light_importance import LightImportance
 from pmviewer.photons.lightpass import PhotonMaps, trace_pass, trajectories
 from pmviewer.render.choice import CHOICES
+from pmviewer.scene.flatten import LUMINANCE
+from pmviewer.scene.light_places import light_places
 from pmviewer.settings import Settings
 
 CACHED_PASSES = 4
 """Photons and maps of the first passes are kept, so that a new camera or radius starts from them."""
 
+SHOWN_TRAJECTORIES = 50_000
+"""Most that are traced to show how important lights are."""
 CHOOSING_PHOTONS = 1 << 17
 """Most photons in the map that chooses lights."""
 
 
 class LightStage:
     """Photons and maps of one scene with one set of settings. The attributes without underscore are of the latest pass:
-    `photons`, radiance photons `sites`, `guides` of gather rays, the deposition `rules`, and `traced`, the (pass, N) of
-    its light pass."""
+    `photons`, radiance photons `sites`, `guides` of gather rays, the deposition `rules`, `traced`, the (pass, N) of
+    its light pass, and `emission`, the importance of the lights with guided emission; `places` (n, 3) are the lights',
+    None without importance."""
 
     def __init__(
         self, scene: OpenScene, settings: Settings, plan: Plan, pool: WorkPool, cache: StageCache, tally: Tally
@@ -55,6 +64,8 @@ class LightStage:
         self.guides: PhotonGrid | None = None
         self.rules = Rules()
         self.traced: tuple[int, int] | None = None
+        self.emission: LightImportance | None = None
+        self.places = light_places(scene.flat) if plan.importance else None
 
     def run(
         self, eye: np.void, index: int, N: int, first_radius: float, importance: ImportanceStage
@@ -74,6 +85,58 @@ class LightStage:
             assert self.photons is not None
             self.tally.add_photons(self.photons)
         return maps
+
+    def stored(self, name: str) -> NDArray[np.float32]:
+        """Photons of the latest pass in the map of that name, "caustic" or "global": those of the path classes that are
+        looked up."""
+        if self.photons is None:
+            return np.empty((0, 6), np.float32)
+        if name == "caustic":
+            return of_classes(self.photons.caustic, self.plan.caustic_mask)
+        return of_classes(self.photons.global_, self.plan.global_classes)
+
+    def fates(self, count: int) -> NDArray[np.float32] | None:
+        """What became of the photons of the first `count` trajectories of the latest pass (`pmviewer.photons.fates`).
+        None where all are stored."""
+        if self.traced is None or self.rules.deposition is None:
+            return None
+        index, N = self.traced
+        fates = Fates(count)
+        self._trace(index, N, self.rules.deposition, fates)
+        return fates.cloud()
+
+    def importance_of_lights(self, importance: ImportanceStage) -> LightImportance | None:
+        """How much of the picture each light lights, by new photons that are forgotten. None without importance."""
+        maps, plan, flat = importance.latest, self.plan, self.scene.flat
+        if self.traced is None or maps is None:
+            return None
+        direct = 0 if plan.gather or not plan.global_classes else 1 << DIRECT
+        of_global = plan.global_classes | direct
+        everything = Deposition(None, None, plan.caustic_mask, of_global)
+        photons = self._trace(self.traced[0], min(self.traced[1], SHOWN_TRAJECTORIES), everything)
+        arrived = []
+        if maps.caustic is not None and plan.caustic_mask:
+            arrived.append((photons.caustic, photons.caustic_normals, photons.caustic_unit, maps.caustic))
+        if maps.global_ is not None and of_global:
+            arrived.append((photons.global_, photons.normals, photons.global_unit, maps.global_))
+        return importance_of_lights(flat.light_names, flat.light_power @ LUMINANCE, arrived, self.pool.run)
+
+    def _trace(self, index: int, N: int, deposition: Deposition, fates: Fates | None = None) -> PhotonMaps:
+        """The light pass again, for showing something of it."""
+        settings, caustics = self.settings, bool(self.plan.caustic_mask)
+        traced, _, _ = trajectories(settings.photons, N, caustics)
+        return trace_pass(
+            self.scene.flat,
+            settings.photons,
+            settings.render.seed,
+            index * traced,
+            N,
+            caustics,
+            self.pool.run,
+            projection=self.projection,
+            deposition=deposition,
+            fates=fates,
+        )
 
     def _timed(self, stage: str, run: Callable[[], Any]) -> Any:
         return self.tally.timed(self.pool, stage, run)

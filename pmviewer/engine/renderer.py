@@ -139,13 +139,28 @@ class Renderer:
         shadows = self._shadows.record if self._shadows else NO_SHADOWS
         scene = self.scene.flat.record
         size = film.width, film.height
-        importance = self.importance.latest
-        M_r = self.settings.importance.caustic_M_r, self.settings.importance.M_r
-        looked = Looked(scene, eye, caustic, global_, choice, sites, shadows, self.light.sites, *size, importance, M_r)
+        looked = Looked(
+            scene,
+            eye,
+            caustic,
+            global_,
+            choice,
+            sites,
+            shadows,
+            self.light.sites,
+            *size,
+            self.importance.latest,
+            self.settings.importance,
+            self.light.rules,
+            self.light.stored,
+            self.scene.flat.radius,
+        )
         planes = diagnostic_planes(wanted, looked, self.plan, self.pool)
         paths = self._paths(wanted.paths) if wanted.paths else None
         gathered = self.gather_points(*wanted.pixel) if wanted.pixel else None
-        return Inspection(wanted, planes, paths, gathered)
+        fates = self.light.fates(wanted.fates) if wanted.fates else None
+        lights = self.light.importance_of_lights(self.importance) if wanted.lights else None
+        return Inspection(wanted, planes, paths, gathered, fates, lights)
 
     def _paths(self, count: int) -> PhotonPaths | None:
         """Where the first photons of the latest pass went."""
@@ -221,6 +236,8 @@ class Renderer:
             statistics=statistics,
             clouds=clouds,
             projections=self.light.projection.maps if self.light.projection is not None else {},
+            light_places=self.light.places,
+            lights=self.light.emission,
             scene_name=self.scene.scene.name,
             inspection=self._inspect(wanted or wanted_of(self.settings, self.plan), film),
         )

@@ -310,6 +310,8 @@ class DensityControl:
         self.least = np.float32(M / (math.pi * farthest**2))
         self.size = np.array([1, 1, 0], np.int64)
         self.arrived = self.redistributed = 0
+        self.kept = np.zeros(0, bool)
+        """Which photons of the latest round are stored."""
         self._stored = np.empty((0, 6), np.uint32)
         self._normals: list[NDArray[np.uint32]] = []
         self._powers = np.empty((0, 3), np.float64)
@@ -325,6 +327,7 @@ class DensityControl:
         """One round: photons (n, 6) with normal codes (n,) and the densities required at them (n,), in photons per unit
         area; what is not a number counts as 0."""
         n = len(photons)
+        self.kept = kept = np.zeros(n, bool)
         if n == 0:
             return
         photons = np.ascontiguousarray(photons, np.float32)
@@ -346,7 +349,6 @@ class DensityControl:
             run([compare(i0) for i0 in range(0, n, CHUNK)])
         before = self.stored
         rows = self._stored, self._powers
-        kept = np.empty(n, bool)
         settle = run(
             [
                 lambda: _settle(

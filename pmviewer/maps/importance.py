@@ -51,6 +51,7 @@ from pmviewer.maps.record import decode_direction, decode_directions, encode_pow
 from pmviewer.maps.stored import ALL_CLASSES
 
 Kind = Literal["screen", "footprint", "average"]
+KINDS: tuple[Kind, ...] = ("screen", "footprint", "average")
 Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 
 NEIGHBOURS = 200
@@ -124,13 +125,17 @@ class Importons:
 class ImportanceMap:
     """An importance map. All arrays are in the order of the tree, which differs from that of the importons it was
     built from; `tree.index` tells their places there. `record` (1,) of IMPORTON_DTYPE is valid while this lives;
-    `spikes`: importons whose footprint was left out."""
+    `spikes`: importons whose footprint was left out. `screen` and `footprint` (n,) are both estimates, −1 where an
+    importon takes another one's, and `ratio` brings the latter to the mean of the former."""
 
     tree: PhotonKdTree
     record: NDArray[np.void]
     reach: NDArray[np.float32]
     weights: NDArray[np.float32]
     spikes: int
+    screen: NDArray[np.float32]
+    footprint: NDArray[np.float32]
+    ratio: float
 
     @property
     def n(self) -> int:
@@ -138,7 +143,7 @@ class ImportanceMap:
 
     @property
     def bytes(self) -> int:
-        return self.tree.bytes + self.reach.nbytes + self.weights.nbytes
+        return self.tree.bytes + sum(a.nbytes for a in (self.reach, self.weights, self.screen, self.footprint))
 
     @property
     def positions(self) -> NDArray[np.float32]:
@@ -156,9 +161,17 @@ class ImportanceMap:
         """(n,) float32 importance Γ in pixels per unit area."""
         return np.ascontiguousarray(self.tree.payload[:, 1]).view(np.float32)
 
+    def gamma_of(self, kind: Kind) -> NDArray[np.float32]:
+        """(n,) float32 importance by one of the estimates or their average, whichever the map uses."""
+        made = np.zeros(self.n, np.float32)
+        if self.n:
+            number = KINDS.index(kind)
+            _fill(self.record, self.screen, self.footprint, self.reach, made, number, np.float32(self.ratio))
+        return made
+
     def cloud(self, unit: float | None = None) -> tuple[NDArray[np.float32], float]:
-        """The importons as photon records (n, 6) with the normal as direction and Γ as power, and the power's unit: the
-        mean of Γ unless given."""
+        """The importons as photon records (n, 6) with the normal as direction and the importance as power: red Γ, green
+        screen, blue footprint importance; and the power's unit: the mean of Γ unless given."""
         gamma = self.gamma
         if unit is None:
             unit = float(gamma.mean(dtype=np.float64)) if self.n else 0.0
@@ -167,9 +180,10 @@ class ImportanceMap:
         rows[:, :3] = self.positions
         words = rows.view(np.uint32)
         words[:, 3] = self.tree.payload[:, 0] & 0xFFFFFF00
-        codes = np.empty(self.n, np.uint32)
-        _encode(gamma / np.float32(unit), codes)
-        words[:, 4], words[:, 5] = codes | codes << 16, codes
+        codes = np.empty((3, self.n), np.uint32)
+        for values, row in zip((gamma, self.gamma_of("screen"), self.gamma_of("footprint")), codes, strict=True):
+            _encode(values / np.float32(unit), row)
+        words[:, 4], words[:, 5] = codes[0] | codes[1] << 16, codes[2]
         return rows, unit
 
 
@@ -447,13 +461,12 @@ def build_importance(
         return lambda: _estimate(record, np.int32(k), widest, even, first, end, screen, footprint, reach, discs)
 
     run([task(first) for first in range(0, leaves, LEAVES_A_TASK)])
+    ratio = 0.0
     if n:
         made = screen >= 0
         typical, of_pixels = float(screen[made].mean(dtype=np.float64)), float(footprint[made].mean(dtype=np.float64))
         ratio = typical / of_pixels if of_pixels > 0 else 0.0
         gamma = tree.payload[:, 1].view(np.float32)
-        _fill(
-            record, screen, footprint, reach, gamma, ("screen", "footprint", "average").index(kind), np.float32(ratio)
-        )
+        _fill(record, screen, footprint, reach, gamma, KINDS.index(kind), np.float32(ratio))
         record["farthest"], record["sum_radius"] = reach.max(), np.median(discs[made])
-    return ImportanceMap(tree, record, reach, weights, spikes)
+    return ImportanceMap(tree, record, reach, weights, spikes, screen, footprint, ratio)

@@ -13,9 +13,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.output.falsecolour import Scale, false_colour, scale_of
+from pmviewer.output.falsecolour import COLOURS, DIVERGING, Scale, false_colour, scale_around_one, scale_of
 
-Family = Literal["look-up", "shadow rays", "radiance photons", "importance"]
+Family = Literal["look-up", "shadow rays", "radiance photons", "importance", "density", "storing"]
 NOTHING = -1.0
 DIMMED = 0.4
 """Brightness of cells whose radiance photon is the nearest, but not near enough to be used."""
@@ -39,6 +39,13 @@ class DiagnosticView:
     """Ends of the scale, where they don't follow the picture."""
     cells: bool = False
     """Values are numbers of cells, each with a colour of its own, dimmed where a half is added."""
+    diverging: bool = False
+    """Values are ratios, shown by how far they are below or above 1."""
+
+    @property
+    def colours(self) -> NDArray[np.float32]:
+        """The table (256, 3) of its colours."""
+        return DIVERGING if self.diverging else COLOURS
 
 
 DIAGNOSTICS: Mapping[str, DiagnosticView] = {
@@ -79,10 +86,32 @@ DIAGNOSTICS: Mapping[str, DiagnosticView] = {
     ),
     "required density": DiagnosticView(
         "importance",
-        "density that the photon map should have at the first surface: importance × M_r",
+        "density that the photon map should have at the first surface",
         "photons/m²",
         "no surface that stores photons",
         log=True,
+    ),
+    "achieved density": DiagnosticView(
+        "density",
+        "density of the photons stored at the first surface, latest pass",
+        "photons/m²",
+        "no surface that stores photons",
+        log=True,
+    ),
+    "density ratio": DiagnosticView(
+        "density",
+        "achieved / required density at the first surface; blue: too few photons, orange: more than enough",
+        "×",
+        "nothing required",
+        log=True,
+        diverging=True,
+    ),
+    "storing probability": DiagnosticView(
+        "storing",
+        "probability with which Keller and Wald's rule stores a photon that arrives at the first surface",
+        "",
+        "no surface that stores photons",
+        fixed=(0.0, 1.0),
     ),
 }
 
@@ -100,6 +129,8 @@ def view_scale(view: str, plane: NDArray[np.floating]) -> Scale:
     if how.fixed is not None:
         return Scale(*how.fixed, unit=how.unit)
     values = scalar(plane)
+    if how.diverging:
+        return scale_around_one(values, unit=how.unit)
     scale = scale_of(values[values >= 0], how.log, how.unit)
     if how.unit == "photons":  # counts start at none
         return Scale(0.0, max(scale.upper, 1.0), unit=how.unit)
@@ -126,6 +157,6 @@ def coloured(view: str, plane: NDArray[np.floating]) -> NDArray[np.float32]:
         pixels = cell_colours(cells)
         pixels[values > cells] *= np.float32(DIMMED)
     else:
-        pixels = false_colour(values, view_scale(view, plane))
+        pixels = false_colour(values, view_scale(view, plane), DIAGNOSTICS[view].colours)
     pixels[values < 0] = GREY
     return pixels

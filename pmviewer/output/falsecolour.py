@@ -44,8 +44,22 @@ def _table(size: int) -> NDArray[np.float32]:
     return srgb_encode(rgb.astype(np.float32))
 
 
+def _diverging(size: int) -> NDArray[np.float32]:
+    """From blue over a light grey to orange: lightness falls evenly from the middle to both ends, which colour-blind
+    eyes tell apart as well."""
+    t = np.linspace(-1.0, 1.0, size)
+    off = np.abs(t)
+    lightness = 0.93 - 0.48 * off
+    hue = np.radians(np.where(t < 0, 255.0, 55.0))
+    chroma = 0.13 * np.sin(0.5 * np.pi * np.minimum(1.6 * off, 1.0))
+    rgb = _oklab_to_rgb(np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], 1))
+    return srgb_encode(np.clip(rgb, 0.0, 1.0).astype(np.float32))
+
+
 COLOURS: NDArray[np.float32] = _table(256)
 """(256, 3), display-encoded, dark violet to light yellow. Its lightness alone tells the order, also in grey print."""
+DIVERGING: NDArray[np.float32] = _diverging(256)
+"""(256, 3), display-encoded: below, at and above a middle that matters."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +68,7 @@ class Tick:
 
     position: float
     label: str
+    value: float
 
 
 @dataclass(frozen=True)
@@ -83,7 +98,7 @@ class Scale:
         """Round values within the scale, about `count`, with the unit."""
         values = _log_values(self.lower, self.upper, count) if self.log else _even_values(self.lower, self.upper, count)
         unit = f" {self.unit}" if self.unit else ""
-        return [Tick(float(self.normalise(np.array(v))), f"{v:.6g}{unit}") for v in values]
+        return [Tick(float(self.normalise(np.array(v))), f"{v:.6g}{unit}", v) for v in values]
 
 
 ERROR_SCALE = Scale(1e-5, 1.0, log=True)
@@ -104,14 +119,25 @@ def scale_of(values: NDArray[Any], log: bool = False, unit: str = "") -> Scale:
     return Scale(low, high, log, unit)
 
 
-def false_colour(values: NDArray[Any], scale: Scale) -> NDArray[np.float32]:
-    """(h, w) or (h, w, 1) to display-encoded (h, w, 3) in [0, 1]; what is not finite is magenta."""
+def scale_around_one(values: NDArray[Any], widest: float = 64.0, unit: str = "") -> Scale:
+    """A logarithmic scale with 1 in its middle that holds 98 % of the positive values, 2 to `widest` either way."""
+    values = np.asarray(values, np.float64)
+    good = values[np.isfinite(values) & (values > 0)]
+    reach = max(2.0, *(np.exp(np.abs(np.log(np.percentile(good, (1, 99))))))) if good.size else 2.0
+    reach = min(float(reach), widest)
+    return Scale(1.0 / reach, reach, log=True, unit=unit)
+
+
+def false_colour(values: NDArray[Any], scale: Scale, colours: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+    """(h, w) or (h, w, 1) to display-encoded (h, w, 3) in [0, 1] by a table (COLOURS unless given); what is not finite
+    is magenta."""
+    colours = COLOURS if colours is None else colours
     values = np.asarray(values)
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
     good = np.isfinite(values)
     position = scale.normalise(np.where(good, values, scale.lower))
-    pixels = COLOURS[np.rint(position * (len(COLOURS) - 1)).astype(np.intp)]
+    pixels = colours[np.rint(position * (len(colours) - 1)).astype(np.intp)]
     pixels[~good] = MAGENTA
     return pixels
 
@@ -129,8 +155,8 @@ def _log_values(low: float, high: float, count: int) -> list[float]:
     """Powers of ten, every n-th when there are many; with 2 and 5 between when there are few."""
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
     decades = math.log10(high / low)
-    digits = (1,) if decades >= 3 else (1, 2, 5) if decades >= 1 else tuple(range(1, 10))
+    digits = (1,) if decades >= 3 else (1, 2, 5) if decades >= 1 else (1, 2, 3, 5, 7)
     skip = max(1, math.ceil((last - first) / max(count, 1)))
     values = [float(f"{d}e{e}") for e in range(first, last + 1, skip) for d in digits]
     inside = [v for v in values if low * (1 - 1e-9) <= v <= high * (1 + 1e-9)]
-    return inside or _even_values(low, high, count)
+    return inside if len(inside) > 1 else _even_values(low, high, count)

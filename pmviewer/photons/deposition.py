@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.vector import luminance
 from pmviewer.maps.density_control import Controlled, DensityControl
@@ -38,6 +38,10 @@ Evaluate = Callable[[Float, Codes], Float]
 
 SMALLEST_EPSILON = 1e-3
 """Powers grow by at most its inverse, for which the photon's code has room."""
+STORED, REJECTED, REDISTRIBUTED, DISCARDED = range(4)
+FATES = ("stored", "rejected", "redistributed", "discarded")
+"""What becomes of a photon that arrives: rejected ones are stood for by stored ones of more power, the power of
+redistributed ones is their neighbours', that of discarded ones is lost."""
 FIRST_WEIGHT, WEIGHTS = -10, 32
 """Histogram bins: weights from 2^FIRST_WEIGHT on, one a doubling; the outermost hold what is beyond."""
 
@@ -54,6 +58,11 @@ class KellerWald:
     epsilon: float
     discard: bool = False
     seed: int = 0
+
+    def arguments(self, index: int) -> tuple[np.float32, bool, np.uint32]:
+        """For kernels: cut-off, whether it discards, and the seed of the batch whose first trajectory is `index`."""
+        seed = np.uint32((self.seed * 0x9E3779B1 + index * 0x85EBCA77 + (index >> 32)) & 0xFFFFFFFF)
+        return np.float32(min(max(self.epsilon, SMALLEST_EPSILON), 1.0)), self.discard, seed
 
 
 @dataclass(frozen=True)
@@ -114,6 +123,20 @@ class Deposited:
         return self.rejected * BYTES_PER_PHOTON
 
 
+@device
+def judged(p, epsilon, discard, seed, i):
+    """What becomes of photon i of a batch, to be stored with probability p: its fate, that probability after the
+    cut-off, and random bits to go on with."""
+    if not p >= epsilon:  # or no number
+        if discard:
+            return DISCARDED, p, _u4(0)
+        p = epsilon
+    noise = hash3(seed, _u4(i), _u4(0x4B57))
+    if p < _f4(1.0) and not unit_float(noise) < p:
+        return REJECTED, p, noise
+    return STORED, p, noise
+
+
 @kernel
 def _thin(photons, words, normals, p, epsilon, discard, seed, kept, kept_normals, books):
     """Keep photon i with probability p[i] and power Φ/p[i]. kept: (n, 6) uint32 rows, kept_normals: (n,); books:
@@ -126,14 +149,10 @@ def _thin(photons, words, normals, p, epsilon, discard, seed, kept, kept_normals
         start = _f8(luminance((red, green, blue)))
         books[0] += start
         books[2] = max(books[2], start)
-        q = p[i]
-        if not q >= epsilon:  # or no number
-            if discard:
+        fate, q, noise = judged(p[i], epsilon, discard, seed, i)
+        if fate != STORED:
+            if fate == DISCARDED:
                 books[1] += start
-                continue
-            q = epsilon
-        noise = hash3(seed, _u4(i), _u4(0x4B57))
-        if q < _f4(1.0) and not unit_float(noise) < q:
             continue
         for w in range(6):
             kept[count, w] = words[i, w]
@@ -171,11 +190,9 @@ class Filling:
             required = rule.required(photons[:, :3], normals) if n else np.empty(0, np.float32)
             return photons, normals, n, _power_of(photons), required
         p = rule.probability(photons[:, :3], normals) if n else np.empty(0, np.float32)
-        seed = np.uint32((rule.seed * 0x9E3779B1 + index * 0x85EBCA77 + (index >> 32)) & 0xFFFFFFFF)
         kept, kept_normals, books = np.empty((n, 6), np.uint32), np.empty(n, np.uint32), np.zeros(3)
-        epsilon = np.float32(min(max(rule.epsilon, SMALLEST_EPSILON), 1.0))
         words = photons.view(np.uint32)
-        count = _thin(photons, words, normals, p, epsilon, rule.discard, seed, kept, kept_normals, books)
+        count = _thin(photons, words, normals, p, *rule.arguments(index), kept, kept_normals, books)
         return kept[:count].view(np.float32).copy(), kept_normals[:count].copy(), n, books
 
     def take(self, judged: list[Prepared], run: Runner) -> None:

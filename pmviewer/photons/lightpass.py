@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
 from pmviewer.maps.record import in_classes
 from pmviewer.photons.deposition import Deposited, Deposition, Filling, Prepared, rounds
+from pmviewer.photons.fates import Fates
 from pmviewer.photons.paths import PhotonPaths
 from pmviewer.photons.projected import NO_PROJECTION
 from pmviewer.photons.projection import Projection
@@ -93,8 +94,10 @@ def trace_pass(
     projection: Projection | None = None,
     paths: PhotonPaths | None = None,
     deposition: Deposition | None = None,
+    fates: Fates | None = None,
 ) -> PhotonMaps:
-    """Trace one pass of N trajectories; with `paths` only the first ones, whose paths are written there.
+    """Trace one pass of N trajectories; with `paths` only the first ones, whose paths are written there; with
+    `deposition` and `fates` only the first ones, whose photons are kept there with what the rules made of them.
 
     Photon powers are the same for all trajectories of a map: Φ/N in the caustic map, Φ/⌊qN⌋ in the global one
     (trajectory split) or Φ/(qN) (photon rule), K §2.4.
@@ -136,6 +139,8 @@ def trace_pass(
     )
 
     last = traced if paths is None else min(traced, paths.n)
+    if fates is not None:
+        last = min(last, fates.trajectories)
     normals = NORMALS if deposition is not None else GLOBAL_NORMALS if with_normals else NO_NORMALS
 
     def batch(i0: int) -> Callable[[], _Batch]:
@@ -146,7 +151,7 @@ def trace_pass(
     caustic_unit = unit / traced if projection is None else 1.0 / direct_density
     global_unit = surface_power / (filling * probability)
     if deposition is not None:
-        return _deposited(deposition, batch, last, first_index, run, caustic_unit, global_unit, filling)
+        return _deposited(deposition, batch, last, first_index, run, caustic_unit, global_unit, filling, fates)
     results = run([batch(i0) for i0 in range(0, last, BATCH)])
     counts = sum((r[2] for r in results), np.zeros(N_COUNTS, np.int64))
     return PhotonMaps(
@@ -171,9 +176,12 @@ def _deposited(
     caustic_unit: float,
     global_unit: float,
     filling: int,
+    fates: Fates | None = None,
 ) -> PhotonMaps:
     """The pass's maps by the rules of `deposition`, from its batches, round by round where rounds matter."""
     caustic, global_ = Filling(deposition.caustic), Filling(deposition.global_)
+    if fates is not None:
+        caustic, global_ = fates.fillings(deposition)
     sampled: list[Float] = []
     counts, ledger = np.zeros(N_COUNTS, np.int64), np.zeros(N_LEDGER)
 

@@ -32,6 +32,9 @@ class Display(Group):
         "radiance cells",
         "importance",
         "required density",
+        "achieved density",
+        "density ratio",
+        "storing probability",
     ] = setting(
         "beauty",
         "What the viewport shows: the image, one of its terms, a property of the first hit, the shaded geometry, the "
@@ -42,8 +45,8 @@ class Display(Group):
     )
     map: Literal["global", "caustic"] = setting(
         "global",
-        "The map whose look-ups the views 'look-up radius' and 'photon count' show, and whose importance the views "
-        "'importance' and 'required density'. With the method 'gather', the "
+        "The map whose look-ups the views 'look-up radius' and 'photon count' show, and whose photons or importance "
+        "the views of importance, densities and the probability of storing. With the method 'gather', the "
         "global map is looked up where gather rays end, not at the first surface; shown is the look-up there.",
         stage="display",
         scale="choice",
@@ -112,11 +115,73 @@ class ShadowOverlay(PointOverlay):
 class ImportonOverlay(PointOverlay):
     """Importons drawn as points"""
 
-    colour: Literal["importance", "map"] = setting(  # type: ignore[assignment]
+    colour: Literal["importance", "screen", "footprint", "average", "map"] = setting(  # type: ignore[assignment]
         "importance",
-        "Colour by the importance of the place, or by the map that it is for: caustic or global.",
+        "Colour by the importance of the place, as it is used or by either estimate or their average, or by the map "
+        "that it is for: caustic or global.",
         stage="display",
         scale="choice",
+    )
+    map: Literal["both", "caustic", "global"] = setting(
+        "both", "Importons of which importance map are drawn.", stage="display", scale="choice"
+    )
+
+
+class FateOverlay(PointOverlay):
+    """What becomes of photons, drawn as points"""
+
+    show: bool = setting(
+        False,
+        "Draw where photons of the latest pass arrived and what the deposition rule made of them.",
+        stage="display",
+        scale="switch",
+    )
+    colour: Literal["fate", "bounce"] = setting(  # type: ignore[assignment]
+        "fate",
+        "Colour by what became of the photon, or by number of bounces.",
+        stage="display",
+        scale="choice",
+    )
+    map: Literal["both", "caustic", "global"] = setting(
+        "both", "Photons of which map are drawn.", stage="display", scale="choice"
+    )
+    only: Literal["all", "stored", "not stored"] = setting(
+        "all", "Draw all photons, or some.", stage="display", scale="choice"
+    )
+    count: int = setting(
+        100_000,
+        "Trajectories of the pass whose photons are judged again, the first ones: density control finds an empty map "
+        "with them.",
+        stage="display",
+        scale="log",
+        unit="trajectories",
+        ge=100,
+        le=5_000_000,
+    )
+
+
+class LightOverlay(PointOverlay):
+    """Lights as points, by their importance"""
+
+    show: bool = setting(
+        False, "Mark the lights by how much of the picture each one lights.", stage="display", scale="switch"
+    )
+    size: float = setting(12.0, "Point size.", stage="display", scale="linear", unit="px", ge=1, le=40)
+    colour: Literal["picture", "emission"] = setting(  # type: ignore[assignment]
+        "picture",
+        "Colour by the share of the picture's light that comes from the light, or by how many times as many photons "
+        "leave it as by its power (guided emission).",
+        stage="display",
+        scale="choice",
+    )
+    depth: bool = setting(False, "Hide points behind surfaces.", stage="display", scale="switch", title="depth test")
+    labels: int = setting(
+        5,
+        "Lights that are labelled with their share, the most important ones.",
+        stage="display",
+        scale="integer",
+        ge=0,
+        le=50,
     )
 
 
@@ -207,6 +272,8 @@ class Overlays(Group):
     cache: CacheOverlay = Field(default_factory=CacheOverlay, title="irradiance cache")
     shadow: ShadowOverlay = Field(default_factory=ShadowOverlay, title="shadow photons")
     importons: ImportonOverlay = Field(default_factory=ImportonOverlay, title="importons")
+    fates: FateOverlay = Field(default_factory=FateOverlay, title="photons by fate")
+    lights: LightOverlay = Field(default_factory=LightOverlay, title="light importance")
     paths: PathOverlay = Field(default_factory=PathOverlay, title="photon paths")
     gather: GatherOverlay = Field(default_factory=GatherOverlay, title="gather rays")
     projection: ProjectionOverlay = Field(default_factory=ProjectionOverlay, title="projection maps")
@@ -216,7 +283,8 @@ class Overlays(Group):
     def by_map(self) -> dict[str, PointOverlay]:
         """Name in a frame's clouds → how its points are drawn."""
         maps = {"caustic": self.caustic, "global": self.global_, "radiance": self.radiance}
-        return {**maps, "cache": self.cache, "shadow": self.shadow, "importons": self.importons}
+        own = {"cache": self.cache, "shadow": self.shadow, "importons": self.importons}
+        return {**maps, **own, "fates": self.fates, "lights": self.lights}
 
     @property
     def any_shown(self) -> bool:

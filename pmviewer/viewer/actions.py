@@ -55,6 +55,8 @@ class Commands:
             "toggle_cache": lambda: self._toggle("overlays.cache.show"),
             "toggle_shadow": lambda: self._toggle("overlays.shadow.show"),
             "toggle_importons": lambda: self._toggle("overlays.importons.show"),
+            "toggle_fates": lambda: self._toggle("overlays.fates.show"),
+            "toggle_lights": lambda: self._toggle("overlays.lights.show"),
             "toggle_paths": lambda: self._toggle("overlays.paths.show"),
             "toggle_gather": lambda: self._toggle("overlays.gather.show"),
             "toggle_projection": lambda: self._toggle("overlays.projection.show"),

@@ -20,6 +20,7 @@ from pmviewer.viewer.actions import Commands
 from pmviewer.viewer.dialogs import FileDialogs
 from pmviewer.viewer.error_panel import ErrorPanel
 from pmviewer.viewer.help_overlay import draw_help
+from pmviewer.viewer.importance_panel import ImportancePanel
 from pmviewer.viewer.log_panel import LogPanel, draw_toasts
 from pmviewer.viewer.menus import Menus
 from pmviewer.viewer.overlay_panel import OverlayPanel
@@ -84,6 +85,7 @@ class ViewerApp:
             "Settings": self.settings_panel.gui,
             "Overlays": OverlayPanel(self.viewport, self.settings_panel).gui,
             "Statistics": StatisticsPanel(self.state).gui,
+            "Importance": ImportancePanel(self.state).gui,
             "Error": ErrorPanel(self.state, actions).gui,
             "Log": LogPanel(self.state).gui,
         }

@@ -11,8 +11,9 @@ from pmviewer.viewer import theme
 from pmviewer.viewer.viewport import VIEWPORT
 
 Draw = Callable[[], None]
-PANELS = ("Settings", "Overlays", "Statistics", "Error", "Log")
-_PLACE = {"Settings": "Left", "Overlays": "Right", "Statistics": "Bottom", "Error": "Bottom", "Log": "Bottom"}
+PANELS = ("Settings", "Overlays", "Statistics", "Importance", "Error", "Log")
+_PLACE = {"Settings": "Left", "Overlays": "Right"}
+"""Where panels are docked; the others at the bottom."""
 WINDOW_SIZE = (1440, 900)
 SMALLEST_WINDOW = (1000, 640)
 FPS_MAX = 60
@@ -111,5 +112,6 @@ def _dock(docking: hello_imgui.DockingParams, callbacks: Callbacks) -> None:
     ]
     picture = hello_imgui.DockableWindow(VIEWPORT, "MainDockSpace", callbacks.viewport, True, False)
     picture.call_begin_end = False  # the viewport opens its window itself, without padding
-    panels = [hello_imgui.DockableWindow(label, _PLACE[label], callbacks.panels[label]) for label in PANELS]
+    places = {label: _PLACE.get(label, "Bottom") for label in PANELS}
+    panels = [hello_imgui.DockableWindow(label, place, callbacks.panels[label]) for label, place in places.items()]
     docking.dockable_windows = [picture, *panels]

@@ -12,11 +12,13 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.frame import PhotonCloud
 from pmviewer.render.camera import Matrix
 from pmviewer.viewer.gl_program import load_program, set_uniforms
 from pmviewer.viewer.overlays import COLOUR_BY, CloudSummary, log_range, palettes, summary_of
 
 if TYPE_CHECKING:
+    from pmviewer.photons.light_importance import LightImportance
     from pmviewer.photons.paths import PhotonPaths
 
 
@@ -54,6 +56,18 @@ def gather_lines(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]
     words[..., 4] = (red | green << 16)[:, None]
     words[..., 5] = (blue | rows[:, 9].astype(np.uint32) << 16)[:, None]
     return ends.reshape(-1, 6), unit
+
+
+def light_points(lights: LightImportance, places: NDArray[np.float64]) -> PhotonCloud:
+    """The lights that have a place as points: red is the share of the picture's light that comes from each, green how
+    many times as many photons leave it as by its power."""
+    shown = np.flatnonzero(np.isfinite(places).all(axis=1))
+    rows = np.zeros((len(shown), 6), np.float32)
+    rows[:, :3] = places[shown]
+    words = rows.view(np.uint32)
+    words[:, 4] = encoded(lights.lit[shown]) | encoded(lights.factor[shown]) << np.uint32(16)
+    words[:, 5] = (shown.astype(np.uint32) & np.uint32(0xFFFF)) << np.uint32(16)
+    return PhotonCloud(rows, 1.0)
 
 
 def circles(records: NDArray[np.float32], reach: NDArray[np.float32]) -> NDArray[np.float32]:

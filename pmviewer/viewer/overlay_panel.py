@@ -4,18 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from imgui_bundle import imgui
+from numpy.typing import NDArray
 
+from pmviewer.output.falsecolour import COLOURS, DIVERGING
 from pmviewer.settings import SETTINGS, get
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import grouped, si
+from pmviewer.viewer.light_list import light_rows
 from pmviewer.viewer.overlays import (
+    AROUND_ONE,
     BOUNCE_PALETTE,
+    CHANNELS,
+    FATE_PALETTE,
+    FATES,
     LIGHT_PALETTE,
     LIT_COLOUR,
     RGB,
     SHADOW_COLOUR,
     CloudSummary,
+    fate_counts,
 )
 from pmviewer.viewer.picture import CLOUDS
 from pmviewer.viewer.settings_panel import SettingsPanel
@@ -40,6 +49,8 @@ OVERLAYS = {
     "cache": Overlay("toggle_cache", "W/m²", "Records of the irradiance cache in the latest pass"),
     "shadow": Overlay("toggle_shadow", things="Shadow photons, which serve all passes"),
     "importons": Overlay("toggle_importons", "px/m²", "Importons stored for the importance maps of the latest pass"),
+    "fates": Overlay("toggle_fates", things="Photons of the latest pass that were judged again"),
+    "lights": Overlay("toggle_lights", things="Lights that have a place in the scene"),
     "paths": Overlay("toggle_paths"),
     "gather": Overlay("toggle_gather"),
     "projection": Overlay("toggle_projection"),
@@ -91,10 +102,13 @@ class OverlayPanel:
 
     def _count(self, name: str, overlay: Overlay) -> None:
         """How many there are, at the right edge of the row."""
-        frame = self._state.frame
-        if frame is None or name not in CLOUDS:
+        frame, picture = self._state.frame, self._viewport.picture
+        if name in ("fates", "lights") and picture is not None:
+            count = picture.clouds[name].summary(1).total
+        elif frame is None or name not in CLOUDS:
             return
-        count = frame.statistics.stored_in_pass.get(name, 0)
+        else:
+            count = frame.statistics.stored_in_pass.get(name, 0)
         text = grouped(count) if count else "none"
         imgui.same_line()
         room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
@@ -121,10 +135,33 @@ class OverlayPanel:
             self._projection_legend()
             return
         style = overlays.by_map()[name]
-        cloud = picture.clouds[name].summary(style.limit)
+        cloud = picture.clouds[name].summary(style.limit, style.colour)
         _colour_legend(style.colour, cloud, overlay.unit)
+        if name == "fates":
+            self._fate_counts(overlays.fates.map)
+        if name == "lights":
+            self._top_lights()
         if cloud.drawn < cloud.total:
             imgui.text_disabled(f"{grouped(cloud.drawn)} of {grouped(cloud.total)} drawn")
+
+    def _fate_counts(self, map_: str) -> None:
+        """How many photons met which fate, in the maps that are drawn."""
+        frame = self._state.frame
+        if frame is None or frame.inspection.fates is None:
+            return
+        counts = fate_counts(frame.inspection.fates, map_)
+        total = max(sum(counts), 1)
+        for name, count, colour in zip(FATES, counts, FATE_PALETTE, strict=True):
+            if count:
+                _swatches("", [(f"{name}: {grouped(count)}, {count / total:.1%}", colour)])
+
+    def _top_lights(self) -> None:
+        frame = self._state.frame
+        lights = None if frame is None else frame.known_lights
+        if lights is None:
+            return
+        for text, share in light_rows(lights, 8):
+            _wrapped(f"{text}: {share}")
 
     def _gather_legend(self, colour: str) -> None:
         picture, pixel = self._viewport.picture, self._viewport.inspected
@@ -170,9 +207,18 @@ def _colour_legend(colour: str, cloud: CloudSummary, unit: str) -> None:
         low, high = si(cloud.power_low, unit), si(cloud.power_high, unit)
         amount = f"all near {high}" if low == high else f"brightness from {low} to {high}, logarithmic"
         _wrapped(f"Hue of the {'power' if unit == 'W' else 'irradiance'}; {amount}")
-    elif colour == "importance":
-        low, high = si(cloud.power_low, unit), si(cloud.power_high, unit)
-        _wrapped(f"Brightness by importance, from {low} to {high}, logarithmic")
+    elif colour in CHANNELS:
+        _wrapped(_QUANTITIES[colour])
+        table = DIVERGING if colour in AROUND_ONE else COLOURS
+        if colour == "picture":
+            ends = f"{cloud.power_low:.2%}", f"{cloud.power_high:.2%}"
+        elif colour in AROUND_ONE:
+            ends = f"{cloud.power_low:.3g}×", f"{cloud.power_high:.3g}×"
+        else:
+            ends = si(cloud.power_low, unit), si(cloud.power_high, unit)
+        _colour_bar(table, *ends)
+    elif colour == "fate":
+        pass  # its counts are the legend
     elif colour == "map":
         _swatches("Importance for the ", [("caustic map", LIGHT_PALETTE[0]), ("global map", LIGHT_PALETTE[1])])
     elif colour == "bounce":
@@ -186,6 +232,33 @@ def _colour_legend(colour: str, cloud: CloudSummary, unit: str) -> None:
         _swatches("", shown[:12])
         if len(shown) > 12:
             imgui.text_disabled(f"and {len(shown) - 12} more; colours repeat after {len(LIGHT_PALETTE)}")
+
+
+_QUANTITIES = {
+    "importance": "Importance, as it is used",
+    "screen": "Screen importance",
+    "footprint": "Footprint importance",
+    "average": "Average of screen and footprint importance",
+    "picture": "Share of the picture's light that comes from a light",
+    "emission": "Photons that leave a light, relative to its power",
+}
+
+
+def _colour_bar(table: NDArray[np.floating], low: str, high: str) -> None:
+    """Colours (n, 3) of a logarithmic scale from left to right, with what its ends mean."""
+    draw, start = imgui.get_window_draw_list(), imgui.get_cursor_screen_pos()
+    line = imgui.get_text_line_height()
+    width = min(imgui.get_content_region_avail().x, 16 * line)
+    codes = [imgui.get_color_u32(imgui.ImVec4(float(r), float(g), float(b), 1.0)) for r, g, b in table[::15]]
+    edges = [start.x + width * i / (len(codes) - 1) for i in range(len(codes))]
+    for x0, x1, left, right in zip(edges[:-1], edges[1:], codes[:-1], codes[1:], strict=True):
+        draw.add_rect_filled_multi_color((x0, start.y), (x1, start.y + 0.6 * line), left, right, right, left)
+    imgui.dummy((width, 0.6 * line))
+    imgui.text_disabled(theme.drawable(low))
+    size = imgui.calc_text_size(theme.drawable(high)).x
+    imgui.same_line()
+    imgui.set_cursor_screen_pos((start.x + max(width - size, 0), imgui.get_cursor_screen_pos().y))
+    imgui.text_disabled(theme.drawable(high))
 
 
 def _swatches(title: str, entries: list[tuple[str, RGB]]) -> None:

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.frame import PhotonCloud
+from pmviewer.output.falsecolour import COLOURS, DIVERGING
 from pmviewer.render.camera import Matrix
-from pmviewer.settings import PointOverlay, ShadowOverlay
+from pmviewer.settings import FateOverlay, ImportonOverlay, PointOverlay, ShadowOverlay
 from pmviewer.viewer.gl_program import load_program, set_uniforms
 
 RGB = tuple[float, float, float]
@@ -46,16 +47,29 @@ LIT_COLOUR: RGB = (1.0, 0.80, 0.25)
 SHADOW_COLOUR: RGB = (0.35, 0.30, 0.95)
 """Of shadow photons where the light arrives and where it does not."""
 
+FATE_PALETTE: tuple[RGB, ...] = (
+    (0.45, 0.85, 0.40),
+    (0.90, 0.35, 0.30),
+    (0.35, 0.60, 0.98),
+    (0.98, 0.85, 0.25),
+)
+"""Of photons that are stored, rejected, redistributed and discarded (`pmviewer.photons.deposition.FATES`)."""
+FATES = ("stored", "rejected", "redistributed", "discarded")
+
 COLOUR_BY = {
     "power": 0,
     "bounce": 1,
     "light": 2,
     "lit or shadow": 3,
-    "importance": 0,
     "map": 2,
     "brought": 0,
     "source": 2,
+    "fate": 5,
 }
+CHANNELS = {"importance": 0, "screen": 1, "footprint": 2, "average": 3, "picture": 0, "emission": 1}
+"""Quantities in false colours: the channel of the stored power that holds each, 3 for the mean of green and blue."""
+AROUND_ONE = ("emission",)
+"""Those that tell how far they are from 1."""
 _EXPONENT_BASE = np.uint32(80 << 23)
 
 
@@ -71,6 +85,35 @@ def brightest_channel(photons: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.where(codes == 0, np.float32(0), ((codes << np.uint32(13)) + _EXPONENT_BASE).view(np.float32))
 
 
+def quantity(photons: NDArray[np.float32], colour: str) -> NDArray[np.float32]:
+    """(n,) what photons (n, 6) are coloured by, in units of the map's power."""
+    if colour not in CHANNELS:
+        return brightest_channel(photons)
+    words = photons.view(np.uint32)
+    codes = np.stack([words[:, 4] & 0xFFFF, words[:, 4] >> 16, words[:, 5] & 0xFFFF]).astype(np.uint32)
+    values = np.where(codes == 0, np.float32(0), ((codes << np.uint32(13)) + _EXPONENT_BASE).view(np.float32))
+    channel = CHANNELS[colour]
+    return (values[1] + values[2]) / 2 if channel == 3 else values[channel]
+
+
+def light_mask(style: PointOverlay) -> int:
+    """Bits of the lights' ids, or of what stands in their place, that are drawn."""
+    if isinstance(style, ImportonOverlay) and style.map != "both":
+        return 1 << (style.map == "global")
+    if isinstance(style, FateOverlay):
+        fates = {"all": 0b1111, "stored": 0b0001, "not stored": 0b1110}[style.only]
+        return (fates if style.map != "global" else 0) | (fates << 8 if style.map != "caustic" else 0)
+    return 0xFFFFFFFF
+
+
+def fate_counts(photons: NDArray[np.float32], map_: str = "both") -> tuple[int, ...]:
+    """How many of photons (n, 6) of `pmviewer.photons.fates` met each of FATES, in the maps chosen."""
+    ids = photons.view(np.uint32)[:, 5] >> 16
+    if map_ != "both":
+        ids = ids[(ids >> 3) == (map_ == "global")]
+    return tuple(int(n) for n in np.bincount(ids & 7, minlength=len(FATES)))
+
+
 def palettes() -> dict[str, NDArray[np.float32]]:
     """Uniforms of `shaders/photon.glsl` that never change."""
     colours = {
@@ -78,6 +121,8 @@ def palettes() -> dict[str, NDArray[np.float32]]:
         "light_palette": LIGHT_PALETTE,
         "lit_colour": LIT_COLOUR,
         "shadow_colour": SHADOW_COLOUR,
+        "fate_palette": FATE_PALETTE,
+        "false_colours": np.concatenate([COLOURS[::17], DIVERGING[::17]]),
     }
     return {name: np.array(value, np.float32) for name, value in colours.items()}
 
@@ -94,22 +139,30 @@ class CloudSummary:
     """Ids of the lights they came from, of a sample."""
 
 
-def _percentiles(photons: NDArray[np.float32]) -> tuple[float, float]:
-    """1st and 99th percentile of the powers of photons (n, 6) that have any."""
-    power = brightest_channel(photons)
+def _percentiles(photons: NDArray[np.float32], colour: str = "power") -> tuple[float, float]:
+    """1st and 99th percentile of the powers of photons (n, 6) that have any, or of another quantity."""
+    power = quantity(photons, colour)
     low, high = np.percentile(power[power > 0], [1, 99]) if np.any(power > 0) else (1.0, 1.0)
+    if colour in AROUND_ONE:
+        reach = max(2.0, 1.0 / low, high)
+        return 1.0 / reach, reach
+    if colour in CHANNELS:
+        low = min(low, 0.8 * high)
     return float(low), float(high)
 
 
-def log_range(photons: NDArray[np.float32]) -> tuple[float, float]:
-    """Logarithms (base 2) of the powers that are drawn dim and bright; those that hardly differ are all bright."""
-    low, high = _percentiles(photons)
-    return float(np.log2(min(low, high / 16))), float(np.log2(high))
+def log_range(photons: NDArray[np.float32], colour: str = "power") -> tuple[float, float]:
+    """Logarithms (base 2) of the powers that are drawn dim and bright; those that hardly differ are all bright. Other
+    quantities are drawn in false colours between their percentiles."""
+    low, high = _percentiles(photons, colour)
+    return float(np.log2(low if colour in CHANNELS else min(low, high / 16))), float(np.log2(high))
 
 
-def summary_of(sample: NDArray[np.float32], power_unit: float, total: int, drawn: int) -> CloudSummary:
+def summary_of(
+    sample: NDArray[np.float32], power_unit: float, total: int, drawn: int, colour: str = "power"
+) -> CloudSummary:
     """What the legend says of `total` photons of which `sample` (n, 6) are some."""
-    low, high = _percentiles(sample)
+    low, high = _percentiles(sample, colour)
     lights = tuple(int(i) for i in np.unique(sample.view(np.uint32)[:, 5] >> 16)[:64])
     return CloudSummary(total, drawn, low * power_unit, high * power_unit, lights)
 
@@ -124,9 +177,10 @@ class PointCloud:
         self._buffer: moderngl.Buffer | None = None
         self._arrays: dict[int, moderngl.VertexArray] = {}
         self._count = 0
-        self._log_range = (0.0, 1.0)
         self._uploaded: PhotonCloud | None = None
-        self._summary = CloudSummary(0, 0, 0.0, 0.0, ())
+        self._sample = np.empty((0, 6), np.float32)
+        self._ranges: dict[str, tuple[float, float]] = {}
+        self._summaries: dict[str, CloudSummary] = {}
 
     def upload(self, cloud: PhotonCloud | None) -> bool:
         """Take this cloud; False when it is the one that is there already."""
@@ -139,9 +193,7 @@ class PointCloud:
             return True
         photons = np.ascontiguousarray(cloud.photons, np.float32)
         self._buffer = self._context.buffer(photons)
-        sample = photons[:: even_thinning(self._count, 20_000)]
-        self._log_range = log_range(sample)
-        self._summary = summary_of(sample, cloud.power_unit, self._count, 0)
+        self._sample = photons[:: even_thinning(self._count, 20_000)]
         return True
 
     def release(self) -> None:
@@ -152,25 +204,36 @@ class PointCloud:
         if self._buffer is not None:
             self._buffer.release()
         self._buffer, self._uploaded, self._count = None, None, 0
+        self._ranges.clear()
+        self._summaries.clear()
 
-    def summary(self, limit: int) -> CloudSummary:
-        drawn = -(-self._count // even_thinning(self._count, limit)) if self._count else 0
-        return replace(self._summary, total=self._count, drawn=drawn)
+    def summary(self, limit: int, colour: str = "power") -> CloudSummary:
+        if self._uploaded is None or not self._count:
+            return CloudSummary(0, 0, 0.0, 0.0, ())
+        drawn = -(-self._count // even_thinning(self._count, limit))
+        if colour not in self._summaries:
+            self._summaries[colour] = summary_of(self._sample, self._uploaded.power_unit, self._count, 0, colour)
+        return replace(self._summaries[colour], total=self._count, drawn=drawn)
 
     def draw(self, style: PointOverlay, view: Matrix, projection: Matrix, limit: int, pixel_ratio: float) -> None:
         """Draw at most `limit` photons into the bound framebuffer. Depth test and viewport are the caller's."""
         if self._buffer is None:
             return
         stride = even_thinning(self._count, limit)
-        size = style.size * pixel_ratio
+        size, colour = style.size * pixel_ratio, style.colour
+        if colour not in self._ranges:
+            self._ranges[colour] = log_range(self._sample, colour)
         set_uniforms(
             self._program,
             view=view,
             projection=projection,
             size=size,
-            colour_by=COLOUR_BY[style.colour],
+            colour_by=4 if colour in CHANNELS else COLOUR_BY[colour],
+            channel=CHANNELS.get(colour, 0),
+            colour_row=int(colour in AROUND_ONE),
+            light_mask=light_mask(style),
             only_shadow=int(isinstance(style, ShadowOverlay) and not style.lit),
-            power_range=self._log_range,
+            power_range=self._ranges[colour],
             round_points=int(size >= 3),
         )
         self._array(stride).render(moderngl.POINTS, vertices=-(-self._count // stride))

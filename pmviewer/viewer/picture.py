@@ -20,7 +20,9 @@ from pmviewer.render.camera import CameraPose, Matrix
 from pmviewer.settings import (
     CacheOverlay,
     Display,
+    FateOverlay,
     GatherOverlay,
+    LightOverlay,
     Overlays,
     PathOverlay,
     PointOverlay,
@@ -29,15 +31,17 @@ from pmviewer.settings import (
 from pmviewer.viewer.cells import CellCloud
 from pmviewer.viewer.frustum import FrustumLines
 from pmviewer.viewer.gl_program import load_program, set_uniforms
-from pmviewer.viewer.lines import LineCloud, circles, flights, gather_lines
+from pmviewer.viewer.lines import LineCloud, circles, flights, gather_lines, light_points
 from pmviewer.viewer.overlays import PointCloud
 from pmviewer.viewer.reference_plane import COLOUR_UNIT, REFERENCE_UNIT, ReferencePlane
 
 if TYPE_CHECKING:
+    from pmviewer.photons.light_importance import LightImportance
     from pmviewer.photons.paths import PhotonPaths
     from pmviewer.photons.projection import ProjectionMap
 
 CLOUDS = ("caustic", "global", "radiance", "cache", "shadow", "importons")
+"""Clouds that a frame has whether or not they are shown; 'fates' and 'lights' are made while they are."""
 SURROUND = (0.105, 0.105, 0.105)
 _CONTENT = {"albedo": 1, "normal": 2, "depth": 3, "error": 4} | {
     view: 6 if how.cells else 5 for view, how in DIAGNOSTICS.items()
@@ -77,7 +81,7 @@ class Picture:
         self.context = context
         context.gc_mode = "auto"
         self.software = any(name in context.info["GL_RENDERER"].lower() for name in ("llvmpipe", "softpipe", "swrast"))
-        self.clouds = {name: PointCloud(context) for name in CLOUDS}
+        self.clouds = {name: PointCloud(context) for name in (*CLOUDS, "fates", "lights")}
         self.paths = LineCloud(context)
         self.gathered = LineCloud(context)
         self.gather_ends = PointCloud(context)
@@ -113,9 +117,9 @@ class Picture:
             self._upload_plane(frame.image(view), view)
             self._shown, self._coarse = (frame.serial, view), frame.coarse
             changed = True
-        for name, cloud in self.clouds.items():
+        for name in CLOUDS:
             if shown_clouds[name]:
-                changed |= cloud.upload(frame.clouds.get(name))
+                changed |= self.clouds[name].upload(frame.clouds.get(name))
         return changed
 
     def _upload_plane(self, image: NDArray[np.float32], view: str) -> None:
@@ -183,6 +187,21 @@ class Picture:
         else:
             self.circles.upload(None)
         return True
+
+    def upload_fates(self, photons: NDArray[np.float32] | None, style: FateOverlay) -> bool:
+        """Take photons with their fates. True when anything changed."""
+        if not self._is_new("fates", (photons,) if style.show else None):
+            return False
+        return self.clouds["fates"].upload(PhotonCloud(photons, 1.0) if style.show and photons is not None else None)
+
+    def upload_lights(
+        self, lights: LightImportance | None, places: NDArray[np.float64] | None, style: LightOverlay
+    ) -> bool:
+        """Take the lights' importance. True when anything changed."""
+        if not self._is_new("lights", (lights, places) if style.show else None):
+            return False
+        shown = style.show and lights is not None and places is not None
+        return self.clouds["lights"].upload(light_points(lights, places) if shown else None)  # type: ignore[arg-type]
 
     def upload_cells(self, maps: Mapping[str, Sequence[ProjectionMap]], style: ProjectionOverlay) -> bool:
         """Take the lights' projection maps. True when anything changed."""
@@ -294,6 +313,7 @@ class Picture:
             value_log=int(self.scale.log),
             value_weights=LUMINANCE if plane.components == 3 else (1.0, 0.0, 0.0),
             grey=GREY,
+            colour_row=int(diagnostic is not None and diagnostic.diverging),
         )
         self.context.disable(moderngl.DEPTH_TEST)
         self._triangle.render(moderngl.TRIANGLES, vertices=3)

@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.output.falsecolour import COLOURS
+from pmviewer.output.falsecolour import COLOURS, DIVERGING
 
 REFERENCE_UNIT, COLOUR_UNIT = 1, 2
 """Texture units; the picture's own is 0."""
@@ -21,7 +21,8 @@ class ReferencePlane:
         self.texture: moderngl.Texture | None = None
         self._context = context
         self._image: Any = None
-        self._colours = context.texture((len(COLOURS), 1), 3, np.ascontiguousarray(COLOURS).tobytes(), dtype="f4")
+        tables = np.stack([COLOURS, DIVERGING])  # rows, as the shader's `colour_row` counts them
+        self._colours = context.texture((len(COLOURS), len(tables)), 3, tables.tobytes(), dtype="f4")
         self._colours.filter = (moderngl.NEAREST, moderngl.NEAREST)
 
     def upload(self, image: NDArray[np.float32] | None) -> bool:

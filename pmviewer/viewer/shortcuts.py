@@ -46,6 +46,8 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Picture", "Shift+G", "Radiance photons on or off", "toggle_radiance", K.g, shift=True),
     Binding("Picture", "Shift+C", "Shadow photons on or off", "toggle_shadow", K.c, shift=True),
     Binding("Picture", "Shift+M", "Importons on or off", "toggle_importons", K.m, shift=True),
+    Binding("Picture", "Shift+F", "Photons by fate on or off", "toggle_fates", K.f, shift=True),
+    Binding("Picture", "L", "Importance of the lights on or off", "toggle_lights", K.l),
     Binding("Picture", "P", "Photon paths on or off", "toggle_paths", K.p),
     Binding("Picture", "Shift+I", "Irradiance cache on or off", "toggle_cache", K.i, shift=True),
     Binding("Picture", "J", "Gather rays of a pixel on or off", "toggle_gather", K.j),

@@ -105,6 +105,8 @@ class Viewport:
             changed |= picture.upload_gathered(frame.inspection.gathered, overlays.gather)
             changed |= picture.upload_circles(frame.clouds.get("cache"), overlays.cache)
             changed |= picture.upload_cells(frame.projections, overlays.projection)
+            changed |= picture.upload_fates(frame.inspection.fates, overlays.fates)
+            changed |= picture.upload_lights(frame.known_lights, frame.light_places, overlays.lights)
         changed |= picture.frustum.upload(self.state.frustum())
         camera, target = self.shown_camera(), self.target()
         navigating = self.state.navigating and picture.software

@@ -14,9 +14,11 @@ from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.output.falsecolour import COLOURS, ERROR_SCALE, Scale
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import si
+from pmviewer.viewer.light_list import share_text, top_lights
 
 if TYPE_CHECKING:
     from pmviewer.output.compare import Reference
+    from pmviewer.render.camera import CameraPose
     from pmviewer.viewer.viewport import Viewport
 
 _TITLES = {"error": "error: (I–R)²/(R²+0.01) of each pixel, no unit"} | {
@@ -39,27 +41,31 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         status = state.session.status
         _caption(viewport, status.text or "Drop a scene here or press Ctrl+O", (width / 2, height / 2), anchor=0.5)
         return
+    below = margin
     if state.frame is None or view == "geometry":
         text = (
             "geometry"
             if view == "geometry"
             else f"geometry, while the first picture is made: {state.session.status.text}"
         )
-        _caption(viewport, text, (margin, margin))
+        if viewport.captions:
+            below = _caption(viewport, text, (margin, margin))
     elif view != state.settings.display.view and not state.flipped:
         refusal = state.refused_view(state.settings.display.view) or "is being made"
-        _caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.WARNING)
+        text = f"{state.settings.display.view}: {refusal}"
+        below = _caption(viewport, text, (margin, margin), colour=theme.WARNING)
     elif view != "beauty" and viewport.captions:
-        _caption(viewport, _TITLES.get(view, view), (margin, margin))
-    if state.settings.free_camera.on:
-        plain = view == "beauty" and state.frame is not None and view == state.settings.display.view
-        _free_camera_label(viewport, (margin, margin if plain else 2.2 * margin + line))
+        below = _caption(viewport, _title(viewport, view), (margin, margin))
+    if state.settings.free_camera.on and viewport.captions:
+        _free_camera_label(viewport, (margin, below))
     if view == "depth" and state.frame is not None and viewport.picture is not None:
         _depth_legend(viewport, *viewport.picture.depth_range)
     if view == "error":
         _error_legend(viewport)
     if view in DIAGNOSTICS and not DIAGNOSTICS[view].cells and viewport.picture is not None:
-        _scale_legend(viewport, viewport.picture.scale)
+        _scale_legend(viewport, viewport.picture.scale, DIAGNOSTICS[view].colours)
+    if state.settings.overlays.lights.show:
+        _light_labels(viewport)
     if state.settings.overlays.gather.show and viewport.inspected is None and state.frame is not None:
         text = "hold I over the picture: gather rays of the pixel under the mouse"
         _caption(viewport, text, (width / 2, height - line - 2 * margin), anchor=0.5, colour=theme.ACCENT)
@@ -83,6 +89,39 @@ def _free_camera_label(viewport: Viewport, position: tuple[float, float]) -> Non
         height = state.settings.free_camera.cut_height * float(geometry.radius)
         text += f" · cut open {si(abs(height), 'm')} {'above' if height >= 0 else 'below'} its eye"
     _caption(viewport, text, position, colour=theme.FREE)
+
+
+def _light_labels(viewport: Viewport) -> None:
+    """Shares of the most important lights, beside them."""
+    frame, camera, style = viewport.state.frame, viewport.shown_camera(), viewport.state.settings.overlays.lights
+    if frame is None or camera is None or frame.known_lights is None or frame.light_places is None:
+        return
+    left, top, width, height = viewport.rectangle()
+    line = imgui.get_text_line_height()
+    for light in top_lights(frame.known_lights, style.labels):
+        place = projected(camera, frame.light_places[light])
+        if place is not None:
+            position = left + place[0] * width + 0.5 * style.size + 0.4 * line, top + place[1] * height - 0.5 * line
+            if 0 <= position[0] < viewport.size[0] and 0 <= position[1] < viewport.size[1] - line:
+                _caption(viewport, share_text(frame.known_lights, light), position)
+
+
+def projected(camera: CameraPose, point: NDArray[np.floating]) -> tuple[float, float] | None:
+    """Where a point is in the picture, from (0, 0) top left to (1, 1); None where the camera doesn't see it."""
+    if not np.isfinite(point).all():
+        return None
+    clip = camera.projection_matrix(1e-3, 1.0) @ camera.view_matrix() @ np.append(point, 1.0)
+    if not clip[3] > 0:
+        return None
+    x, y = 0.5 + 0.5 * clip[0] / clip[3], 0.5 - 0.5 * clip[1] / clip[3]
+    return (float(x), float(y)) if 0 <= x <= 1 and 0 <= y <= 1 else None
+
+
+def _title(viewport: Viewport, view: str) -> str:
+    """What is shown, with the map where there are two."""
+    frame = viewport.state.frame
+    of = frame.inspection.wanted.map if view in DIAGNOSTICS and frame is not None else ""
+    return f"{of} map, {_TITLES[view]}" if of else _TITLES.get(view, view)
 
 
 def _value_under_mouse(viewport: Viewport) -> str:
@@ -133,11 +172,19 @@ def _error_legend(viewport: Viewport) -> None:
     _legend(viewport, labels, COLOURS[::-8])
 
 
-def _scale_legend(viewport: Viewport, scale: Scale) -> None:
+def _scale_legend(viewport: Viewport, scale: Scale, colours: NDArray[np.floating]) -> None:
     """Large values are on top; the unit stands at the highest tick alone."""
-    labels = [(1.0 - tick.position, tick.label.removesuffix(f" {scale.unit}")) for tick in scale.ticks()]
+    labels = [(1.0 - tick.position, tick_text(tick.value)) for tick in scale.ticks()]
     labels[-1] = (labels[-1][0], f"{labels[-1][1]} {scale.unit}")
-    _legend(viewport, labels, COLOURS[::-8])
+    _legend(viewport, labels, colours[::-8])
+
+
+def tick_text(value: float) -> str:
+    """Of a legend's tick, which is a round number: thousands and millions with a prefix, as there is little room."""
+    for factor, prefix in ((1e9, " G"), (1e6, " M"), (1e3, " k")):
+        if abs(value) >= 10 * factor:
+            return f"{value / factor:.6g}{prefix}"
+    return f"{value:.6g}"
 
 
 def _legend(viewport: Viewport, labels: list[tuple[float, str]], colours: NDArray[np.floating]) -> None:
@@ -172,8 +219,9 @@ def _caption(
     *,
     anchor: float = 0.0,
     colour: theme.Colour = theme.TEXT,
-) -> None:
-    """Text on a translucent ground, in lines that leave room for a legend; `anchor` 0.5 centres it on the position."""
+) -> float:
+    """Text on a translucent ground, in lines that leave room for a legend; `anchor` 0.5 centres it on the position.
+    Returns where a caption below it goes."""
     text = theme.drawable(text)
     room = viewport.size[0] - position[0] - LEGEND_EMS * imgui.get_font_size()
     wrap = room if anchor == 0.0 and room > 0 else 0.0
@@ -185,3 +233,4 @@ def _caption(
     draw.add_rect_filled((x - pad, y - 0.5 * pad), (x + size.x + pad, y + size.y + 0.5 * pad), ground, 3)
     code = imgui.get_color_u32(imgui.ImVec4(*colour))
     draw.add_text(imgui.get_font(), imgui.get_font_size(), (x, y), code, text, wrap_width=wrap)
+    return position[1] + size.y + 3 * pad
