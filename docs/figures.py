@@ -1,7 +1,8 @@
 """`python docs/figures.py [NAME …]`: make the figures of docs/importance.md by the commands that stand there.
 
 A block of commands that begins with ```sh figure=NAME columns=N gives images/NAME.png: each command writes one panel,
-in order, N of them a row. The commands open windows: without a display, run all of it under xvfb-run -a.
+in order, N of them a row; NAME='…' above them stands for words that they share. The commands open windows: without a
+display, run all of it under xvfb-run -a.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
 _BLOCK = re.compile(r"^```sh figure=(\S+) columns=(\d+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+_SHARED = re.compile(r"(\w+)='([^']*)'")
+_USE = re.compile(r"\$(\w+)")
 GAP = 6
 
 
@@ -37,8 +40,15 @@ class Figure:
 def figures(text: str) -> Iterator[Figure]:
     """The figures of a Markdown text; a command may go on behind a backslash at a line's end."""
     for name, columns, body in _BLOCK.findall(text):
-        lines = body.replace("\\\n", " ").splitlines()
-        yield Figure(name, int(columns), tuple(tuple(shlex.split(line)) for line in lines if line.strip()))
+        commands: list[tuple[str, ...]] = []
+        shared: dict[str, str] = {}
+        for line in body.replace("\\\n", " ").splitlines():
+            meaning = _SHARED.fullmatch(line)
+            if meaning:
+                shared[meaning[1]] = meaning[2]
+            elif line.strip():
+                commands.append(tuple(shlex.split(_USE.sub(lambda use: shared[use[1]], line))))  # noqa: B023
+        yield Figure(name, int(columns), tuple(commands))
 
 
 def make(figure: Figure, folder: Path) -> None:

@@ -24,6 +24,7 @@ from pmviewer.render.camera import resolve_camera
 from pmviewer.settings import with_values
 
 if TYPE_CHECKING:
+    from pmviewer.engine.frame import Frame
     from pmviewer.viewer.state import ViewerState
     from pmviewer.viewer.viewport import Viewport
 
@@ -34,11 +35,12 @@ SETTLING = 4
 @dataclass
 class Shot:
     """What to write; `pixel` is the one whose gather rays are shown. `error` is why there is no file, once the window
-    has closed."""
+    has closed, `stored` what the last pass stored."""
 
     path: Path
     pixel: tuple[int, int] | None = None
     error: PmviewerError | None = None
+    stored: str = ""
     done: bool = field(default=False, init=False)
     _still: int = field(default=0, init=False)
     _asked: bool = field(default=False, init=False)
@@ -52,6 +54,7 @@ class Shot:
         try:
             if self._ready(state, viewport):
                 write_png(self.path, pixels())
+                self.stored = _stored(state.frame)
                 self._end()
         except PmviewerError as error:
             self.error = error
@@ -82,6 +85,19 @@ class Shot:
     def _end(self) -> None:
         self.done = True
         hello_imgui.get_runner_params().app_shall_exit = True
+
+
+def _stored(frame: Frame | None) -> str:
+    """Photons of the latest pass, for the one line that the command says."""
+    if frame is None:
+        return ""
+    parts = []
+    for name, count in frame.statistics.stored_in_pass.items():
+        if name in ("caustic", "global") and count:
+            fate = frame.statistics.deposited.get(name)
+            of = f" of {fate.arrived:,}" if fate is not None and fate.arrived != count else ""
+            parts.append(f"{count:,}{of} {name} photons")
+    return f" ({', '.join(parts)} in the last pass)" if parts else ""
 
 
 def shot_job(
@@ -116,4 +132,4 @@ def shot_job(
         raise shot.error or WindowError("The window was closed before the picture was taken.")
     if shot.error is not None:
         raise shot.error
-    print(f"wrote {output.absolute()}")
+    print(f"wrote {output.absolute()}{shot.stored}")
