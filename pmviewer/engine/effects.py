@@ -64,6 +64,8 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
         return _direct(path, settings, plan, traits)
     if group == "free_camera" and path != "free_camera.on" and not settings.free_camera.on:
         return "Only with the free camera (free_camera.on)."
+    if path == "compare.limit" and settings.compare.equal != "error":
+        return "Only at equal error (compare.equal)."
     if path == "free_camera.cut_height" and not settings.free_camera.cut:
         return "Nothing is cut open (free_camera.cut)."
     if path == "free_camera.length" and not settings.free_camera.frustum:

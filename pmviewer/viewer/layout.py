@@ -11,8 +11,15 @@ from pmviewer.viewer import theme
 from pmviewer.viewer.viewport import VIEWPORT
 
 Draw = Callable[[], None]
-PANELS = ("Settings", "Overlays", "Statistics", "Error", "Log")
-_PLACE = {"Settings": "Left", "Overlays": "Right", "Statistics": "Bottom", "Error": "Bottom", "Log": "Bottom"}
+PANELS = ("Settings", "Overlays", "Statistics", "Error", "Comparison", "Log")
+_PLACE = {
+    "Settings": "Left",
+    "Overlays": "Right",
+    "Statistics": "Bottom",
+    "Error": "Bottom",
+    "Comparison": "Bottom",
+    "Log": "Bottom",
+}
 WINDOW_SIZE = (1440, 900)
 SMALLEST_WINDOW = (1000, 640)
 FPS_MAX = 60

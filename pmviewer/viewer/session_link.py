@@ -36,6 +36,8 @@ class SessionLike(Protocol):
     @property
     def geometry(self) -> Any: ...
     @property
+    def opened_scene(self) -> Any: ...
+    @property
     def paused(self) -> bool: ...
     def open(
         self, source: Any, settings: Settings | None = None, parameters: Mapping[str, str] | None = None
@@ -178,6 +180,10 @@ class SessionLink:
     @property
     def geometry(self) -> Any:
         return self._session.geometry if self._session else None
+
+    @property
+    def opened_scene(self) -> Any:
+        return self._session.opened_scene if self._session else None
 
     @property
     def paused(self) -> bool:

@@ -36,6 +36,7 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("File", "Ctrl+Q", "Quit", "quit", K.q, ctrl=True),
     Binding("Render", "Space", "Pause or resume", "toggle_pause", K.space),
     Binding("Render", "R", "Restart", "restart", K.r),
+    Binding("Render", "N", "Compare with and without importance", "compare_importance", K.n),
     Binding("Picture", "1 … 9, 0", "View: beauty, one of its terms, a property, geometry"),
     Binding("Picture", "E", "Exposure up by half a stop", "exposure_up", K.e, repeat=True),
     Binding("Picture", "Shift+E", "Exposure down by half a stop", "exposure_down", K.e, shift=True, repeat=True),

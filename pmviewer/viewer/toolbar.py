@@ -40,6 +40,8 @@ class Toolbar:
         free = self._state.settings.free_camera.on
         text = "Free camera: see the render camera's importance from elsewhere"
         self._button(fa.ICON_FA_VIDEO, "toggle_free", text, on=free)
+        text = "Compare with and without importance"
+        self._button(fa.ICON_FA_SCALE_BALANCED, "compare_importance", text, on=self._state.gain.running)
         self._gap()
         self._button(fa.ICON_FA_FOLDER_OPEN, "open", "Open a scene or session")
         self._button(fa.ICON_FA_IMAGE, "export_png", "Export the picture as PNG")

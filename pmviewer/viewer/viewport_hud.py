@@ -13,7 +13,7 @@ from pmviewer.engine.frame import Frame
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.output.falsecolour import COLOURS, ERROR_SCALE, Scale
 from pmviewer.viewer import theme
-from pmviewer.viewer.format import si
+from pmviewer.viewer.format import duration, si
 
 if TYPE_CHECKING:
     from pmviewer.output.compare import Reference
@@ -35,6 +35,11 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
     if viewport.shown_camera() is None:
         status = state.session.status
         _caption(viewport, status.text or "Drop a scene here or press Ctrl+O", (width / 2, height / 2), anchor=0.5)
+        return
+    if state.gain.frames() is not None:
+        _compared_pictures(viewport)
+        if hovered and (text := _value_under_mouse(viewport)):
+            _caption(viewport, text, (margin, height - line - 1.2 * margin))
         return
     if state.frame is None or view == "geometry":
         text = (
@@ -69,6 +74,30 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
             _caption(viewport, text, (margin, height - line - 1.2 * margin))
 
 
+def _compared_pictures(viewport: Viewport) -> None:
+    """The line between the pictures with and without importance, and what each of them is."""
+    state, x = viewport.state, viewport.split_x()
+    gain, pair = state.gain.gain, state.shown_pair()
+    if gain is None or pair is None or x is None:
+        return
+    line = imgui.get_text_line_height()
+    draw, (ox, oy), height = imgui.get_window_draw_list(), viewport.origin, viewport.size[1]
+    for colour, wide in ((theme.grey(0.0, 0.6), 5.0), (theme.grey(1.0), 2.0)):
+        draw.add_line((ox + x, oy), (ox + x, oy + height), imgui.get_color_u32(colour), wide)
+    draw.add_circle_filled((ox + x, oy + height / 2), 0.5 * line, imgui.get_color_u32(theme.grey(1.0)))
+    gap = 0.8 * line
+    view = "" if pair[1].view == "beauty" else f" · {pair[1].view}"
+    for title, side, anchor, at in (
+        (f"with importance{view}", gain.with_, 1.0, x - gap),
+        (f"without{view}", gain.without, 0.0, x + gap),
+    ):
+        _caption(viewport, title, (at, 0.6 * line), anchor=anchor, colour=theme.ACCENT)
+        facts = (
+            f"{si(side.stored)} photons stored · relMSE {side.error.relmse_all:.2e} · {duration(side.cpu_seconds)} CPU"
+        )
+        _caption(viewport, facts, (at, 2.2 * line), anchor=anchor)
+
+
 def _free_camera_label(viewport: Viewport, position: tuple[float, float]) -> None:
     """Whose importance is shown."""
     state = viewport.state
@@ -83,12 +112,14 @@ def _free_camera_label(viewport: Viewport, position: tuple[float, float]) -> Non
 
 
 def _value_under_mouse(viewport: Viewport) -> str:
-    pixel, frame = viewport.pixel_under_mouse(), viewport.state.frame
+    pixel = viewport.pixel_under_mouse()
+    frame = viewport.frame_at(pixel) if pixel is not None else None
     if pixel is None or frame is None:
         return ""
     rows, columns = frame.planes.shape[:2]
     x, y = pixel[0] * columns // frame.camera.width, pixel[1] * rows // frame.camera.height
-    view = viewport.state.shown_display.view
+    pair = viewport.state.shown_pair()
+    view = pair[1].view if pair is not None else viewport.state.shown_display.view
     if view == "geometry":
         return f"{pixel[0]}, {pixel[1]}"
     reference = viewport.state.comparison.reference
