@@ -226,7 +226,7 @@ def _until(
 def _side(renderer: Renderer, error: Metrics) -> Side:
     tally, maps = renderer.tally, renderer.importance.latest
     return Side(
-        frame=renderer.frame(0, Wanted()),
+        frame=replace(renderer.frame(0, Wanted()), clouds={}),  # photons are not compared
         N=renderer.settings.photons.N,
         passes=renderer.passes,
         traced=tally.emitted,

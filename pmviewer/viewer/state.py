@@ -118,7 +118,8 @@ class ViewerState:
         """What "auto" means now for that setting, or None when it isn't known yet."""
         group, _, name = path.partition(".")
         if group in ("camera", "free_camera"):
-            pose = self.render_camera() if group == "camera" else self.live_camera()
+            free = self.live_camera() if self.settings.free_camera.on else None
+            pose = self.render_camera() if group == "camera" else free
             return getattr(pose, name) if pose else None
         frame, geometry = self.frame, self.session.geometry
         if path == "estimate.radius" and frame is not None and geometry is not None:

@@ -38,6 +38,8 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         return
     if state.gain.frames() is not None:
         _compared_pictures(viewport)
+        if state.settings.free_camera.on:
+            _free_camera_label(viewport, (margin, height - 2.6 * line - 1.2 * margin))
         if hovered and (text := _value_under_mouse(viewport)):
             _caption(viewport, text, (margin, height - line - 1.2 * margin))
         return
