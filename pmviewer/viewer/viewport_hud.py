@@ -42,7 +42,7 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
     if state.gain.frames() is not None:
         _compared_pictures(viewport)
         if state.settings.free_camera.on:
-            _free_camera_label(viewport, (margin, height - 2.6 * line - 1.2 * margin))
+            _free_camera_label(viewport)
         if hovered and (text := _value_under_mouse(viewport)):
             _caption(viewport, text, (margin, height - line - 1.2 * margin))
         return
@@ -58,9 +58,8 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         _caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.WARNING)
     elif view != "beauty" and viewport.captions:
         _caption(viewport, _TITLES.get(view, view), (margin, margin))
-    if state.settings.free_camera.on:
-        plain = view == "beauty" and state.frame is not None and view == state.settings.display.view
-        _free_camera_label(viewport, (margin, margin if plain else 2.2 * margin + line))
+    if state.settings.free_camera.on and viewport.captions:
+        _free_camera_label(viewport)
     if view == "depth" and state.frame is not None and viewport.picture is not None:
         _depth_legend(viewport, *viewport.picture.depth_range)
     if view == "error":
@@ -103,8 +102,8 @@ def _compared_pictures(viewport: Viewport) -> None:
         _caption(viewport, facts, (at, 2.2 * line), anchor=anchor)
 
 
-def _free_camera_label(viewport: Viewport, position: tuple[float, float]) -> None:
-    """Whose importance is shown."""
+def _free_camera_label(viewport: Viewport) -> None:
+    """Whose importance is shown, above the line of the value under the mouse."""
     state = viewport.state
     text = "free camera · importance of the render camera"
     if state.inactive_reason("importance.N", state.settings, state.session.traits) is not None:
@@ -113,7 +112,11 @@ def _free_camera_label(viewport: Viewport, position: tuple[float, float]) -> Non
     if pose is not None and geometry is not None and pose.near_normal is not None:
         height = state.settings.free_camera.cut_height * float(geometry.radius)
         text += f" · cut open {si(abs(height), 'm')} {'above' if height >= 0 else 'below'} its eye"
-    _caption(viewport, text, position, colour=theme.FREE)
+    line = imgui.get_text_line_height()
+    x = 0.6 * line
+    wrap = max(viewport.size[0] - x - LEGEND_EMS * imgui.get_font_size(), 1.0)  # as the caption does
+    lines = imgui.calc_text_size(text, wrap_width=wrap).y
+    _caption(viewport, text, (x, viewport.size[1] - lines - 2.4 * line), colour=theme.FREE)
 
 
 def _value_under_mouse(viewport: Viewport) -> str:
