@@ -18,15 +18,14 @@ from numpy.typing import NDArray
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.frame import Frame
 from pmviewer.engine.inspection import Wanted
-from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.without_importance import plain, refusal
 from pmviewer.errors import SettingError
 from pmviewer.output.metric import Metrics, metrics
-from pmviewer.scene.analysis import SceneTraits
-from pmviewer.settings import SETTINGS, Importance, Settings, with_values
+from pmviewer.settings import SETTINGS, Settings, with_values
 
 Tell = Callable[[str, float | None], None]
 Truth = tuple[NDArray[np.float32], str]
@@ -75,8 +74,14 @@ class Gain:
 
     def table(self) -> list[tuple[str, str, str, str]]:
         """`rows` under their heading."""
-        what = "equal stored photons" if self.equal == "photons" else "equal error"
-        return [(what, "with importance", "without", "without / with"), *self.rows()]
+        return [(self.heading, "with importance", "without", "without / with"), *self.rows()]
+
+    @property
+    def heading(self) -> str:
+        """What is equal."""
+        if self.equal == "photons":
+            return "equal stored photons" if not self.notes else "photons stored differ"
+        return "equal error" if self.without.error.relmse_all <= self.with_.error.relmse_all else "error not reached"
 
     def sentences(self) -> list[str]:
         """What errors are against, and what to know besides."""
@@ -108,21 +113,6 @@ class Gain:
 
 def _size(count: float) -> str:
     return f"{count / 1024:,.0f} KiB" if count < 1 << 24 else f"{count / (1 << 20):,.1f} MiB"
-
-
-def plain(settings: Settings) -> Settings:
-    """The same picture without importance: all photons stored, plain emission."""
-    return settings.model_copy(update={"importance": Importance()})
-
-
-def refusal(settings: Settings, traits: SceneTraits) -> str | None:
-    """Why there is nothing to compare, None if there is."""
-    plan, without = plan_of(settings, traits), plan_of(plain(settings), traits)
-    if not plan.photons:
-        return "This method traces no photons, or no surface stores them."
-    if replace(plan, importance=False, skipped=(), warnings=()) == replace(without, skipped=(), warnings=()):
-        return "Importance decides nothing now: choose a rule that uses it, such as importance.deposition."
-    return None
 
 
 def compare(opened: OpenScene, settings: Settings, pool: WorkPool, tell: Tell, truth: Truth | None = None) -> Gain:
@@ -220,7 +210,7 @@ def _until(
             found = metrics(_image(renderer), truth).relmse_all
             if found <= error:
                 return []
-    return [f"Without importance the error was not reached in {most} passes: what it would have cost is more."]
+    return [f"Without importance the error was not reached in {most} passes (compare.limit): it would cost more."]
 
 
 def _side(renderer: Renderer, error: Metrics) -> Side:

@@ -161,6 +161,11 @@ class Session:
         return self._opened.traits if self._opened else None
 
     @property
+    def threads(self) -> int:
+        """How many the kernels run on."""
+        return self._pool.threads
+
+    @property
     def opened_scene(self) -> OpenScene | None:
         """The open scene with all that was derived from it, for renderers beside the session's."""
         return self._opened

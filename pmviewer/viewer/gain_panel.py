@@ -24,7 +24,7 @@ class GainPanel:
 
     def gui(self) -> None:
         run = self._state.gain
-        if imgui.begin_child("##how", (20 * imgui.get_font_size(), 0)):
+        if imgui.begin_child("##how", (min(20 * imgui.get_font_size(), 0.42 * imgui.get_content_region_avail().x), 0)):
             self._button()
             if self._rows.begin_rows("compare", name_em=5.5):
                 for name in ("equal", "passes", "limit"):
@@ -87,7 +87,10 @@ class GainPanel:
         if changed:
             names = ", ".join(changed[:3]) + (" …" if len(changed) > 3 else "")
             _wrapped(f"Of settings before the last change ({names}).", theme.WARNING)
-        heading, *rows = run.gain.table()
+        rows = run.gain.rows()
+        heading = run.gain.heading, "with", "without", "ratio"
+        for note in run.gain.notes:
+            _wrapped(note, theme.WARNING)
         flags = imgui.TableFlags_.borders_inner_h | imgui.TableFlags_.sizing_stretch_prop
         imgui.push_style_var(imgui.StyleVar_.cell_padding, (imgui.get_style().cell_padding.x, 1))
         if imgui.begin_table("##gain", 4, flags):
@@ -98,8 +101,7 @@ class GainPanel:
                     _cell(text, right=column > 0, dim=number == 0 or column == 0)
             imgui.end_table()
         imgui.pop_style_var()
-        for sentence in run.gain.sentences():
-            _wrapped(sentence, theme.DIM)
+        _wrapped(run.gain.sentences()[0], theme.DIM)
 
 
 def _cell(text: str, *, right: bool, dim: bool) -> None:

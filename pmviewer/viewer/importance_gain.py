@@ -49,7 +49,7 @@ class GainRun:
         traits = self._session.traits
         if traits is None or self._session.opened_scene is None:
             return "Open a scene first."
-        from pmviewer.engine.importance_gain import refusal
+        from pmviewer.engine.without_importance import refusal
 
         return refusal(self._session.settings, traits)
 
@@ -63,7 +63,7 @@ class GainRun:
         from pmviewer.engine.pool import WorkPool
 
         self._ticket += 1
-        self._pool = WorkPool()
+        self._pool = WorkPool(self._session.threads)
         self.progress = "starting", None
         arguments = self._ticket, self._session.opened_scene, self._session.settings, self._pool, truth
         self._thread = threading.Thread(target=self._run, args=arguments, name="pmviewer comparison", daemon=True)

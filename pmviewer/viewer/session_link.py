@@ -38,6 +38,8 @@ class SessionLike(Protocol):
     @property
     def opened_scene(self) -> Any: ...
     @property
+    def threads(self) -> int | None: ...
+    @property
     def paused(self) -> bool: ...
     def open(
         self, source: Any, settings: Settings | None = None, parameters: Mapping[str, str] | None = None
@@ -180,6 +182,10 @@ class SessionLink:
     @property
     def geometry(self) -> Any:
         return self._session.geometry if self._session else None
+
+    @property
+    def threads(self) -> int | None:
+        return self._session.threads if self._session else None
 
     @property
     def opened_scene(self) -> Any:

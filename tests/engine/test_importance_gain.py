@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.engine.importance_gain import LONGER, compare, plain, refusal
+from pmviewer.engine.effects import inactive_reason
+from pmviewer.engine.importance_gain import LONGER, compare
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import Cancelled, WorkPool
+from pmviewer.engine.without_importance import plain, refusal
 from pmviewer.errors import OutputError, SettingError
 from pmviewer.gain_job import gain_job, table
 from pmviewer.job import load_job
@@ -112,6 +114,7 @@ def test_equal_error_adds_passes_until_the_error_is_reached(scene, pool):
     )
     assert bounded.without.passes == 2
     assert "not reached in 2 passes" in bounded.notes[0]
+    assert (gain.heading, bounded.heading) == ("equal error", "error not reached")
     shares = [share for _, share in told]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
@@ -125,10 +128,12 @@ def test_nothing_to_compare_is_refused(scene, pool):
         {"render.method": "caustic map"},
     ):
         asked = with_values(settings(), values)
-        assert refusal(asked, scene.traits) is not None
+        assert refusal(asked, scene.traits) == inactive_reason("compare.passes", asked, scene.traits) is not None
         with pytest.raises(SettingError, match="No comparison"):
             compare(scene, asked, pool, lambda text, share: None)
     assert refusal(with_values(settings(), {"importance.deposition": "constant density"}), scene.traits) is None
+    assert inactive_reason("compare.passes", settings(), scene.traits) is None
+    assert inactive_reason("compare.limit", settings(), scene.traits) is not None
     blind = wide_floor()
     blind = Scene(
         "blind", None, blind.shapes, blind.materials, (), Camera((0, 1, 0), (0, 1, -9), (0, 1, 0), 20.0), 8, 8

@@ -95,6 +95,7 @@ class FakeSession:
         self.frame: Frame | None = None
         self.status = Status()
         self.opened_scene = None
+        self.threads = None
         self.paused = False
         self.restarts = 0
         self.version = 1
