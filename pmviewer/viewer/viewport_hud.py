@@ -93,11 +93,16 @@ def _compared_pictures(viewport: Viewport) -> None:
     view = "" if pair[1].view == "beauty" else f" · {pair[1].view}"
     for title, side, anchor, at in (
         (f"with importance{view}", gain.with_, 1.0, x - gap),
-        (f"without{view}, {gain.heading}", gain.without, 0.0, x + gap),
+        (f"without{view}", gain.without, 0.0, x + gap),
     ):
         _caption(viewport, title, (at, 0.6 * line), anchor=anchor, colour=theme.ACCENT)
         stored, error, spent = si(side.stored), f"{side.error.relmse_all:.2e}", duration(side.cpu_seconds)
-        facts = f"{stored} photons stored", f"relMSE {error}", f"{spent} CPU"
+        facts = (
+            f"{stored} photons stored",
+            f"relMSE {error}",
+            f"{spent} CPU",
+            *((gain.heading,) if side is gain.without else ()),
+        )
         for number, fact in enumerate(facts):  # one below the other: narrow windows have no room for a line of them
             _caption(viewport, fact, (at, (2.2 + 1.4 * number) * line), anchor=anchor)
 
