@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pmviewer.engine.diagnose import OF_A_MAP, refused_view
 from pmviewer.engine.method import Plan, plan_of
+from pmviewer.engine.without_importance import refusal
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings import Settings
@@ -66,6 +67,10 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
         return _direct(path, settings, plan, traits)
     if group == "free_camera" and path != "free_camera.on" and not settings.free_camera.on:
         return "Only with the free camera (free_camera.on)."
+    if group == "compare" and (why := refusal(settings, traits)) is not None:
+        return why
+    if path == "compare.limit" and settings.compare.equal != "error":
+        return "Only at equal error (compare.equal)."
     if path == "free_camera.cut_height" and not settings.free_camera.cut:
         return "Nothing is cut open (free_camera.cut)."
     if path == "free_camera.length" and not settings.free_camera.frustum:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from pmviewer.schema.base import Auto, Group, Scale, Stage, Vec3, setting
+from pmviewer.schema.compare import Compare
 from pmviewer.schema.display import (
     CacheOverlay,
     Colour,
@@ -35,6 +36,7 @@ __all__ = [
     "CacheOverlay",
     "CameraSettings",
     "Colour",
+    "Compare",
     "Direct",
     "Display",
     "Estimate",
@@ -72,5 +74,6 @@ class Settings(Group):
     render: Render = Field(default_factory=Render)
     camera: CameraSettings = Field(default_factory=CameraSettings)
     free_camera: FreeCamera = Field(default_factory=FreeCamera)
+    compare: Compare = Field(default_factory=Compare)
     display: Display = Field(default_factory=Display)
     overlays: Overlays = Field(default_factory=Overlays)

@@ -18,6 +18,8 @@ from pmviewer.viewer.exports import Exports, default_path, fresh_path
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport import VIEWPORT, Fit, Viewport
 
+COMPARISON = "Comparison"
+"""The panel's label."""
 SCENE_PATTERNS = ["*.xml", "*.toml", "*.glb", "*.gltf", "*.obj", "*.ply", "*.stl"]
 EXPOSURE_STEP = 0.5
 
@@ -61,6 +63,7 @@ class Commands:
             "toggle_gather": lambda: self._toggle("overlays.gather.show"),
             "toggle_projection": lambda: self._toggle("overlays.projection.show"),
             "fit_picture": self._fit,
+            "compare_importance": self._compare_importance,
             "toggle_fly": self._toggle_fly,
             "frame_all": self._frame_all,
             "reset_camera": self._reset_camera,
@@ -125,6 +128,12 @@ class Commands:
         choices = SETTINGS["display.tone"].choices
         now = choices.index(self.state.settings.display.tone)
         self.state.change({"display.tone": choices[(now + 1) % len(choices)]})
+
+    def _compare_importance(self) -> None:
+        """Start the comparison and bring its panel to the front."""
+        window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(COMPARISON)
+        window.is_visible = window.focus_window_at_next_frame = True
+        self.state.compare_importance()
 
     # camera -----------------------------------------------------------------------------------------------------
 

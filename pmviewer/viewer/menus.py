@@ -112,6 +112,7 @@ class Menus:
     def _render(self) -> None:
         self._item("Resume" if self._state.session.paused else "Pause", "toggle_pause")
         self._item("Restart", "restart")
+        self._item("Compare with and without importance", "compare_importance", self._state.gain.running)
         imgui.separator()
         info = SETTINGS["render.method"]
         method = get(self._state.settings, info.path)

@@ -36,6 +36,7 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("File", "Ctrl+Q", "Quit", "quit", K.q, ctrl=True),
     Binding("Render", "Space", "Pause or resume", "toggle_pause", K.space),
     Binding("Render", "R", "Restart", "restart", K.r),
+    Binding("Render", "N", "Compare with and without importance", "compare_importance", K.n),
     Binding("Picture", "1 … 9, 0", "View: beauty, one of its terms, a property, geometry"),
     Binding("Picture", "E", "Exposure up by half a stop", "exposure_up", K.e, repeat=True),
     Binding("Picture", "Shift+E", "Exposure down by half a stop", "exposure_down", K.e, shift=True, repeat=True),
@@ -61,15 +62,11 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Camera", "F", "Fly: W A S D, Q down, E up, drag to look; Shift is faster", "toggle_fly", K.f),
     Binding("Camera", "Right button + W A S D Q E", "Fly while the button is held"),
     Binding("Camera", "Home or A", "Frame the whole scene", "frame_all", K.home, alternative=K.a),
-    Binding(
-        "Camera", "Backspace", "The scene file's camera, or the free camera's overview", "reset_camera", K.backspace
-    ),
-    Binding("Camera", "O", "Free camera: the render camera's importance from elsewhere", "toggle_free", K.o),
-    Binding("Camera", "Shift+Home", "Free camera: from above", "free_from_above", K.home, shift=True),
-    Binding(
-        "Camera", "Shift+Backspace", "Free camera: to the render camera", "free_to_render", K.backspace, shift=True
-    ),
-    Binding("Camera", "Shift+O", "Free camera: becomes the render camera", "free_becomes_render", K.o, shift=True),
+    Binding("Camera", "Backspace", "The scene file's camera; the free one's overview", "reset_camera", K.backspace),
+    Binding("Free camera", "O", "The render camera's importance from elsewhere", "toggle_free", K.o),
+    Binding("Free camera", "Shift+Home", "From above", "free_from_above", K.home, shift=True),
+    Binding("Free camera", "Shift+Backspace", "To the render camera", "free_to_render", K.backspace, shift=True),
+    Binding("Free camera", "Shift+O", "Becomes the render camera", "free_becomes_render", K.o, shift=True),
     Binding("Window", "Tab", "Hide or show the panels", "toggle_panels", K.tab),
     Binding("Window", "H or F1", "This overview", "toggle_help", K.h, alternative=K.f1),
     Binding("Settings", "Double click or Ctrl+click", "Type an exact value"),

@@ -17,6 +17,7 @@ from pmviewer.errors import PmviewerError
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.free_camera import frustum_lines, resolve_view
+from pmviewer.render.planes import AOVS, TERMS
 from pmviewer.settings import (
     CameraSettings,
     Display,
@@ -28,11 +29,13 @@ from pmviewer.settings import (
 )
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.controls import camera_values
+from pmviewer.viewer.importance_gain import GainRun
 from pmviewer.viewer.jobs import Jobs
 from pmviewer.viewer.recent import RecentFiles
 from pmviewer.viewer.session_link import SessionLike
 
 InactiveReason = Callable[[str, Settings, Any], str | None]
+LAYERS = ("beauty", *TERMS, *AOVS)
 LOG_LINES = 2000
 TOAST_SECONDS = 8.0
 
@@ -72,6 +75,7 @@ class ViewerState:
         self.recent = recent
         self.jobs = Jobs(self.say)
         self.comparison = Comparison(session, self.jobs, self.say)
+        self.gain = GainRun(session, self.say)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
         self._said: deque[Message] = deque()
@@ -114,7 +118,8 @@ class ViewerState:
         """What "auto" means now for that setting, or None when it isn't known yet."""
         group, _, name = path.partition(".")
         if group in ("camera", "free_camera"):
-            pose = self.render_camera() if group == "camera" else self.live_camera()
+            free = self.live_camera() if self.settings.free_camera.on else None
+            pose = self.render_camera() if group == "camera" else free
             return getattr(pose, name) if pose else None
         frame, geometry = self.frame, self.session.geometry
         if path == "estimate.radius" and frame is not None and geometry is not None:
@@ -171,6 +176,23 @@ class ViewerState:
         if not (free.on and free.frustum) or geometry is None or camera is None:
             return None
         return frustum_lines(camera, free.length * float(geometry.radius))
+
+    def shown_pair(self) -> tuple[tuple[Frame, Frame], Display] | None:
+        """The frames with and without importance while the viewport compares them, with a view that both have."""
+        frames = self.gain.frames()
+        if frames is None:
+            return None
+        display = self.settings.display
+        layer = display.view if display.view in LAYERS else "beauty"
+        return frames, display.model_copy(update={"view": layer})
+
+    def compare_importance(self) -> None:
+        """Start the comparison with and without importance, against the reference where that can be compared."""
+        comparison, truth = self.comparison, None
+        if comparison.reference is not None and comparison.problem(self.frame) is None:
+            path = comparison.reference.path
+            truth = comparison.reference.image, f"the reference {path.parent.name}/{path.name}"
+        self.gain.start(truth)
 
     def scene_changed(self) -> bool:
         """True once after another scene was opened; frames of the one before are not shown any more."""
@@ -239,4 +261,5 @@ class ViewerState:
             self._take(self._said.popleft())
         parameters = self._opening[1] if self._opening is not None else self.parameters
         self.comparison.poll(self.frame, with_own=not parameters)
+        self.gain.poll(self.live_camera())
         self.toasts = [toast for toast in self.toasts if not toast.is_over()][-4:]

@@ -94,6 +94,8 @@ class FakeSession:
         self.geometry: Triangles | None = None
         self.frame: Frame | None = None
         self.status = Status()
+        self.opened_scene = None
+        self.threads = None
         self.paused = False
         self.restarts = 0
         self.version = 1
