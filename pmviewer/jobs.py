@@ -71,6 +71,12 @@ def render_job(
     if statistics.importons:
         stored = statistics.stored_in_pass["importons"]
         print(f"importance: {statistics.importons:,} importons, stored at {stored:,} places")
+    for name, books in statistics.deposited.items():
+        if books.arrived:
+            lost = books.discarded_power / books.arrived_power if books.arrived_power > 0 else 0.0
+            biased = f"; biased: {lost:.2%} of the power discarded" if lost > 0 else ""
+            saved = f"{books.saved_bytes / 2**20:.1f} MiB saved"
+            print(f"{name} map: {books.stored:,} of {books.arrived:,} photons stored in the last pass, {saved}{biased}")
     _print_warnings(statistics.warnings, {})
     for path in outputs:
         if path.suffix.lower() == ".exr":
