@@ -119,7 +119,7 @@ def scale_of(values: NDArray[Any], log: bool = False, unit: str = "") -> Scale:
     return Scale(low, high, log, unit)
 
 
-def scale_around_one(values: NDArray[Any], widest: float = 64.0, unit: str = "") -> Scale:
+def scale_around_one(values: NDArray[Any], widest: float = 1000.0, unit: str = "") -> Scale:
     """A logarithmic scale with 1 in its middle that holds 98 % of the positive values, 2 to `widest` either way."""
     values = np.asarray(values, np.float64)
     good = values[np.isfinite(values) & (values > 0)]

@@ -14,7 +14,7 @@ from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.output.falsecolour import COLOURS, ERROR_SCALE, Scale
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import si
-from pmviewer.viewer.light_list import share_text, top_lights
+from pmviewer.viewer.light_list import top_lights
 
 if TYPE_CHECKING:
     from pmviewer.output.compare import Reference
@@ -85,7 +85,7 @@ def _light_labels(viewport: Viewport) -> None:
         if place is not None:
             position = left + place[0] * width + 0.5 * style.size + 0.4 * line, top + place[1] * height - 0.5 * line
             if 0 <= position[0] < viewport.size[0] and 0 <= position[1] < viewport.size[1] - line:
-                _caption(viewport, share_text(frame.known_lights, light), position)
+                _caption(viewport, f"{light + 1}: {frame.known_lights.lit[light]:.1%}", position)
 
 
 def projected(camera: CameraPose, point: NDArray[np.floating]) -> tuple[float, float] | None:

@@ -131,7 +131,7 @@ def test_the_light_in_the_other_room_lights_nothing(pool, method):
     np.testing.assert_allclose(lights.lit, [1.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(lights.factor, 1.0)
     assert top_lights(lights, 5) == [0]
-    assert light_rows(lights, 5) == [("panel (1)", "100.0%"), ("1 others", "0.0%")]
+    assert light_rows(lights, 5) == [("1: panel", "100.0%"), ("1 others", "0.0%")]
     frame = renderer.frame(1, Wanted(lights=True))
     assert frame.known_lights.names == lights.names
     points = unpack(light_points(lights, frame.light_places).photons, 1.0)

@@ -152,7 +152,7 @@ def test_importance_is_drawn_by_its_keys(app):
         wait_until(c, lambda: finished(app))
         c.yield_(3)
         passes = app.state.frame.statistics.passes
-        c.item_click("//Importance")
+        c.window_focus("//Importance")
         c.key_press(chord(K.m, K.mod_shift))
         app.state.change({"overlays.importons.colour": "map", "overlays.importons.depth": False})
         c.yield_(4)
