@@ -157,6 +157,7 @@ def _log_values(low: float, high: float, count: int) -> list[float]:
     decades = math.log10(high / low)
     digits = (1,) if decades >= 3 else (1, 2, 5) if decades >= 1 else (1, 2, 3, 5, 7)
     skip = max(1, math.ceil((last - first) / max(count, 1)))
+    first -= first % skip  # 1 is among them
     values = [float(f"{d}e{e}") for e in range(first, last + 1, skip) for d in digits]
     inside = [v for v in values if low * (1 - 1e-9) <= v <= high * (1 + 1e-9)]
     return inside if len(inside) > 1 else _even_values(low, high, count)

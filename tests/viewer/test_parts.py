@@ -14,7 +14,7 @@ from pmviewer.photons.deposition import Deposited, weight_histogram
 from pmviewer.render.camera import resolve_camera
 from pmviewer.settings import Settings, with_values
 from pmviewer.viewer import format as fmt
-from pmviewer.viewer.importance_panel import FIRST_WEIGHT, deposition_rows, discarded_text, histogram_of, weight_text
+from pmviewer.viewer.importance_panel import FIRST_WEIGHT, bias_row, deposition_rows, histogram_of, weight_text
 from pmviewer.viewer.jobs import Jobs
 from pmviewer.viewer.overlays import FATES, brightest_channel, even_thinning
 from pmviewer.viewer.recent import LENGTH, RecentFiles
@@ -167,16 +167,16 @@ def test_figures_of_deposition():
     lossy = Deposited(
         1000, 250, 0, 10.0, 7.5, 2.5, 1.0, (0.5, 1.0, 4.0, 9.0), weight_histogram(np.array([0.6, 1.0, 5.0]))
     )
-    rows = dict(deposition_rows(lossy))
-    assert rows["Stored"].split() == ["250", "25%"]
-    assert rows["Rejected"].split() == ["750", "75%"]
-    assert rows["Memory saved"] == fmt.data_size(750 * 24)
-    assert discarded_text(lossy) == "Biased: 25.00% of the power is discarded"
     shared = Deposited(1000, 400, 600, 10.0, 10.0)
-    rows = dict(deposition_rows(shared))
-    assert rows["Power redistributed"].split() == ["600", "60%"]
-    assert "Rejected" not in rows
-    assert discarded_text(shared) is None
+    rows = {name: [text.split() for text in texts] for name, texts in deposition_rows({"a": lossy, "b": shared})}
+    assert rows["Arrived"] == [["1,000"], ["1,000"]]
+    assert rows["Stored"] == [["250", "25%"], ["400", "40%"]]
+    assert rows["Rejected"] == [["750", "75%"], ["0", "0%"]]
+    assert rows["Redistributed"] == [["0", "0%"], ["600", "60%"]]
+    assert rows["Memory saved"] == [fmt.data_size(24 * n).split() for n in (750, 600)]
+    assert "Rejected" not in dict(deposition_rows({"b": shared}))
+    assert bias_row({"a": lossy, "b": shared}) == ["25.00%", "0.00%"]
+    assert bias_row({"b": shared}) is None
     middles, counts = histogram_of(lossy)
     np.testing.assert_array_equal(middles, [-0.5, 0.5, 1.5, 2.5])
     np.testing.assert_array_equal(counts, [1, 1, 0, 1])
