@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.deposition import Rules, rules_of
+from pmviewer.engine.emission import emission_key, guidance_of, guided_photons, note_of
 from pmviewer.engine.guides import GUIDING_PHOTONS, guide_grid, guide_radius
 from pmviewer.engine.importance import ImportanceStage
 from pmviewer.engine.method import Plan, estimator_of
@@ -26,6 +27,7 @@ from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import automatic_radius, largest_power, neighbourhood
 from pmviewer.maps.record import DIRECT, in_classes
 from pmviewer.maps.variant import marked
+from pmviewer.photons.guided import Known
 from pmviewer.photons.light_importance import LightImportance
 from pmviewer.photons.lightpass import PhotonMaps, trace_pass, trajectories
 from pmviewer.render.choice import CHOICES
@@ -41,7 +43,8 @@ CHOOSING_PHOTONS = 1 << 17
 class LightStage:
     """Photons and maps of one scene with one set of settings. The attributes without underscore are of the latest pass:
     `photons`, radiance photons `sites`, `guides` of gather rays, the deposition `rules`, `traced`, the (pass, N) of
-    its light pass, and `emission`, the importance of the lights with guided emission."""
+    its light pass, `emission`, the importance of the lights with guided emission, `known`, the pass and
+    what test photons told it so far, and `notes` for the log."""
 
     def __init__(
         self, scene: OpenScene, settings: Settings, plan: Plan, pool: WorkPool, cache: StageCache, tally: Tally
@@ -57,6 +60,8 @@ class LightStage:
         self.rules = Rules()
         self.traced: tuple[int, int] | None = None
         self.emission: LightImportance | None = None
+        self.notes: tuple[str, ...] = ()
+        self.known: tuple[int, Known] | None = None
 
     def run(
         self, eye: np.void, index: int, N: int, first_radius: float, importance: ImportanceStage
@@ -80,7 +85,7 @@ class LightStage:
     def _timed(self, stage: str, run: Callable[[], Any]) -> Any:
         return self.tally.timed(self.pool, stage, run)
 
-    def _photons_of(self, index: int, N: int) -> tuple[PhotonMaps, tuple]:
+    def _photons_of(self, index: int, N: int, importance: ImportanceStage) -> tuple[PhotonMaps, tuple]:
         """The photons of a pass by the deposition rules, and what names them in the cache."""
         settings, scene = self.settings, self.scene
         caustics = bool(self.plan.caustic_mask)
@@ -96,9 +101,16 @@ class LightStage:
             caustics,
             normals,
             *self.rules.key,
+            *emission_key(settings, self.plan, importance),
         )
 
         def make() -> PhotonMaps:
+            guidance = guidance_of(settings, self.plan, importance)
+            if guidance is not None:
+                before = self.known[1] if self.known and self.known[0] == index - 1 else None
+                guided = guided_photons(guidance, self.rules, settings, self.plan, importance, index, N, before)
+                if guided is not None:
+                    return guided
             return trace_pass(
                 scene.flat,
                 settings.photons,
@@ -125,9 +137,15 @@ class LightStage:
         radii = {"caustic": radius * estimate.caustic_radius, "global": radius}
         if plan.deposition != "all":
             self.rules = rules_of(self.settings, plan, importance, index, radii, first_radius)
-        photons, key = self._timed("light pass", lambda: self._photons_of(index, N))
+        photons, key = self._timed("light pass", lambda: self._photons_of(index, N, importance))
         self.traced = index, N
         self.photons = photons
+        self.emission = None
+        if photons.guided is not None:
+            self.emission = photons.guided.lights
+            self.known = index, photons.guided.known
+        guidance = guidance_of(self.settings, plan, importance)
+        self.notes = (*self.rules.notes, *note_of(plan, photons, guidance))
         units = {"caustic": photons.caustic_unit, "global": photons.global_unit}
         clouds = {"caustic": photons.caustic, "global": photons.global_}
         classes = {"caustic": plan.caustic_mask, "global": plan.global_classes}
@@ -257,6 +275,8 @@ class LightStage:
         """Luminance of the brightest photon of a map, in watts. Of photons stored with a probability it is that before:
         those that grew stand for many that are not there, and k of them don't meet in a disc that matters."""
         assert self.photons is not None
+        if self.photons.guided is not None and self.plan.deposition in ("all", "Keller-Wald"):
+            return unit  # that of photons that leave by power: the few strong ones are not where the camera looks
         if self.plan.deposition == "Keller-Wald":
             return self.photons.deposited[name].largest_arrived
         return largest_power(photons, unit)

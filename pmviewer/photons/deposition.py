@@ -6,6 +6,8 @@ function for that (`pmviewer.importance.rules`); constants do as well.
 
 - `KellerWald`: stored with probability p and power Φ/p (Keller and Wald 2000, §2.2). Where p is below ε, it is raised
   to ε, which is free of bias, or the photon is discarded, which is not; the discarded power is counted.
+- `Homogeneous`: stored with a probability and power so that no photon has less than Φ₁/I where the importance is I,
+  Φ₁ being the power of photons in the most important places (Christensen, course guide §5.7.4).
 - `Density`: stored up to the required density, otherwise its power goes to its neighbours
   (`pmviewer.maps.density_control`).
 
@@ -67,7 +69,18 @@ class Density:
     seed: int = 0
 
 
-Rule = KellerWald | Density
+@dataclass(frozen=True)
+class Homogeneous:
+    """`importance` gives I, above 1 likewise; a photon of luminance Φ is stored with probability p = I·Φ/Φ₁, if below
+    1, and then has Φ/p. I is at least `epsilon`. `power` is Φ₁ in units of the map's."""
+
+    importance: Evaluate
+    epsilon: float
+    power: float
+    seed: int = 0
+
+
+Rule = KellerWald | Density | Homogeneous
 
 
 @dataclass(frozen=True)
@@ -170,12 +183,20 @@ class Filling:
         if isinstance(rule, Density):
             required = rule.required(photons[:, :3], normals) if n else np.empty(0, np.float32)
             return photons, normals, n, _power_of(photons), required
-        p = rule.probability(photons[:, :3], normals) if n else np.empty(0, np.float32)
+        evaluate = rule.importance if isinstance(rule, Homogeneous) else rule.probability
+        p = evaluate(photons[:, :3], normals) if n else np.empty(0, np.float32)
+        discard, epsilon = False, np.float32(min(max(rule.epsilon, SMALLEST_EPSILON), 1.0))
+        if isinstance(rule, Homogeneous):
+            power = np.empty(n, np.float32)
+            luminances(photons.view(np.uint32), power)
+            p = np.maximum(p, epsilon) * (power / np.float32(rule.power))
+            epsilon = np.float32(SMALLEST_EPSILON)
+        else:
+            discard = rule.discard
         seed = np.uint32((rule.seed * 0x9E3779B1 + index * 0x85EBCA77 + (index >> 32)) & 0xFFFFFFFF)
         kept, kept_normals, books = np.empty((n, 6), np.uint32), np.empty(n, np.uint32), np.zeros(3)
-        epsilon = np.float32(min(max(rule.epsilon, SMALLEST_EPSILON), 1.0))
         words = photons.view(np.uint32)
-        count = _thin(photons, words, normals, p, epsilon, rule.discard, seed, kept, kept_normals, books)
+        count = _thin(photons, words, normals, p, epsilon, discard, seed, kept, kept_normals, books)
         return kept[:count].view(np.float32).copy(), kept_normals[:count].copy(), n, books
 
     def take(self, judged: list[Prepared], run: Runner) -> None:
