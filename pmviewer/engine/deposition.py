@@ -102,10 +102,15 @@ def rules_of(
         rules[name] = Density(
             required[name], ACCEPTANCE.index(how.acceptance), farthest_of(scene_radius), seed + (name == "global")
         )
-    sample = (1 << DIRECT if plan.choice != "power" or plan.caustic_mask else 0) | plan.guide_mask
+    sample = sampled_classes(plan)
     deposition = Deposition(rules["caustic"], rules["global"], classes["caustic"], classes["global"], sample)
     grown = 1.0 if plan.deposition == "Keller-Wald" else growth
     return Rules(deposition, key, tuple(notes), required or None, f, everywhere, grown)
+
+
+def sampled_classes(plan: Plan) -> int:
+    """Path classes (bit set) whose photons somebody counts as they arrive."""
+    return (1 << DIRECT if plan.choice != "power" or plan.caustic_mask else 0) | plan.guide_mask
 
 
 def constant_density(settings: Settings, radius: float) -> float:

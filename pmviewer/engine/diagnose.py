@@ -77,13 +77,18 @@ def wanted_of(settings: Settings, plan: Plan, pixel: tuple[int, int] | None = No
         wanted = Wanted(family, looked_map(settings, plan) if family in OF_A_MAP else "")
     if settings.overlays.paths.show and plan.photons:
         wanted = replace(wanted, paths=settings.overlays.paths.count)
-    if settings.overlays.fates.show and plan.deposition != "all":
+    if settings.overlays.fates.show and judges(plan):
         wanted = replace(wanted, fates=settings.overlays.fates.count)
     if settings.overlays.lights.show and plan.importance:
         wanted = replace(wanted, lights=True)
     if settings.overlays.gather.show and plan.gather:
         wanted = replace(wanted, pixel=pixel)
     return wanted
+
+
+def judges(plan: Plan) -> bool:
+    """Whether a rule decides which photons are stored."""
+    return plan.deposition != "all" or plan.emission not in ("off", "Peter-Pietrek")
 
 
 def looked_map(settings: Settings, plan: Plan) -> str:

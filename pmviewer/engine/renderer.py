@@ -152,7 +152,7 @@ class Renderer:
         planes = diagnostic_planes(wanted, looked, self.plan, self.pool)
         paths = self._paths(wanted.paths) if wanted.paths else None
         gathered = self.gather_points(*wanted.pixel) if wanted.pixel else None
-        fates = self.light.fates(wanted.fates) if wanted.fates else None
+        fates = self.light.fates(wanted.fates, self.importance) if wanted.fates else None
         lights = self.light.importance_of_lights(self.importance) if wanted.lights else None
         return Inspection(wanted, planes, paths, gathered, fates, lights)
 
@@ -163,7 +163,10 @@ class Renderer:
         index, N = self.light.traced
         settings, caustics = self.settings, bool(self.plan.caustic_mask)
         traced, _, _ = trajectories(settings.photons, N, caustics)
-        paths = empty_paths(min(count, traced), self.scene.flat.radius)
+        guided = self.light.photons.guided if self.light.photons else None
+        if guided is not None:
+            traced = N
+        paths = empty_paths(min(count, traced if guided is None else guided.n), self.scene.flat.radius)
         photons = trace_pass(
             self.scene.flat,
             settings.photons,
@@ -174,6 +177,7 @@ class Renderer:
             self.pool.run,
             projection=self.light.projection,
             paths=paths,
+            guided=guided,
         )
         return replace(paths, power_unit=photons.global_unit)
 
@@ -239,7 +243,7 @@ class Renderer:
     def _warnings(self) -> tuple[str, ...]:
         """Sentences for the log."""
         latest = self.importance.latest
-        return (*self.plan.warnings, *(latest.warnings if latest else ()), *self.light.rules.notes)
+        return (*self.plan.warnings, *(latest.warnings if latest else ()), *self.light.notes)
 
     def _pass(self, film: Film, camera: CameraPose, index: int, N: int) -> None:
         eye = eye_record(camera, self.settings, index)

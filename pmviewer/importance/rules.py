@@ -75,3 +75,17 @@ def automatic_f(importance: ImportanceMap, positions: Float, normals: Codes) -> 
                 "Keller-Wald: no test ray of the camera met an important place; f is set by the importons themselves."
             )
     return 0.0, "Keller-Wald: there is no importance; every photon is stored with the cut-off probability ε."
+
+
+def relative_importance(importance: ImportanceMap) -> Evaluate:
+    """Γ relative to the typical one, the median over importons, at most 1. Christensen takes the largest for 1; but one
+    corner that is near the camera would make everything else unimportant."""
+    gamma = importance.gamma
+    typical = float(np.median(gamma)) if importance.n else 0.0
+
+    def evaluate(positions: Float, normals: Codes) -> Float:
+        if not typical > 0:
+            return np.zeros(len(positions), np.float32)
+        return np.minimum(_evaluated(importances, importance, positions, normals) / np.float32(typical), np.float32(1))
+
+    return evaluate

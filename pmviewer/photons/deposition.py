@@ -6,6 +6,8 @@ function for that (`pmviewer.importance.rules`); constants do as well.
 
 - `KellerWald`: stored with probability p and power Φ/p (Keller and Wald 2000, §2.2). Where p is below ε, it is raised
   to ε, which is free of bias, or the photon is discarded, which is not; the discarded power is counted.
+- `Homogeneous`: stored with a probability and power so that no photon has less than Φ₁/I where the importance is I,
+  Φ₁ being the power of photons in the most important places (Christensen, course guide §5.7.4).
 - `Density`: stored up to the required density, otherwise its power goes to its neighbours
   (`pmviewer.maps.density_control`).
 
@@ -59,11 +61,6 @@ class KellerWald:
     discard: bool = False
     seed: int = 0
 
-    def arguments(self, index: int) -> tuple[np.float32, bool, np.uint32]:
-        """For kernels: cut-off, whether it discards, and the seed of the batch whose first trajectory is `index`."""
-        seed = np.uint32((self.seed * 0x9E3779B1 + index * 0x85EBCA77 + (index >> 32)) & 0xFFFFFFFF)
-        return np.float32(min(max(self.epsilon, SMALLEST_EPSILON), 1.0)), self.discard, seed
-
 
 @dataclass(frozen=True)
 class Density:
@@ -76,7 +73,18 @@ class Density:
     seed: int = 0
 
 
-Rule = KellerWald | Density
+@dataclass(frozen=True)
+class Homogeneous:
+    """`importance` gives I, above 1 likewise; a photon of luminance Φ is stored with probability p = I·Φ/Φ₁, if below
+    1, and then has Φ/p. I is at least `epsilon`. `power` is Φ₁ in units of the map's."""
+
+    importance: Evaluate
+    epsilon: float
+    power: float
+    seed: int = 0
+
+
+Rule = KellerWald | Density | Homogeneous
 
 
 @dataclass(frozen=True)
@@ -164,6 +172,25 @@ def _thin(photons, words, normals, p, epsilon, discard, seed, kept, kept_normals
     return count
 
 
+def probabilities(
+    rule: KellerWald | Homogeneous, photons: Float, normals: Codes, index: int
+) -> tuple[Float, np.float32, bool, np.uint32]:
+    """For kernels: probabilities of storing photons (n, 6) with normal codes (n,), cut-off, whether it discards, and
+    the seed of their batch, whose first trajectory is `index`."""
+    evaluate = rule.importance if isinstance(rule, Homogeneous) else rule.probability
+    p = evaluate(photons[:, :3], normals) if len(photons) else np.empty(0, np.float32)
+    discard, epsilon = False, np.float32(min(max(rule.epsilon, SMALLEST_EPSILON), 1.0))
+    if isinstance(rule, Homogeneous):
+        power = np.empty(len(photons), np.float32)
+        luminances(photons.view(np.uint32), power)
+        p = np.maximum(p, epsilon) * (power / np.float32(rule.power))
+        epsilon = np.float32(SMALLEST_EPSILON)
+    else:
+        discard = rule.discard
+    seed = np.uint32((rule.seed * 0x9E3779B1 + index * 0x85EBCA77 + (index >> 32)) & 0xFFFFFFFF)
+    return p, epsilon, discard, seed
+
+
 Prepared = tuple[Any, ...]
 
 
@@ -189,10 +216,10 @@ class Filling:
         if isinstance(rule, Density):
             required = rule.required(photons[:, :3], normals) if n else np.empty(0, np.float32)
             return photons, normals, n, _power_of(photons), required
-        p = rule.probability(photons[:, :3], normals) if n else np.empty(0, np.float32)
+        p, epsilon, discard, seed = probabilities(rule, photons, normals, index)
         kept, kept_normals, books = np.empty((n, 6), np.uint32), np.empty(n, np.uint32), np.zeros(3)
         words = photons.view(np.uint32)
-        count = _thin(photons, words, normals, p, *rule.arguments(index), kept, kept_normals, books)
+        count = _thin(photons, words, normals, p, epsilon, discard, seed, kept, kept_normals, books)
         return kept[:count].view(np.float32).copy(), kept_normals[:count].copy(), n, books
 
     def take(self, judged: list[Prepared], run: Runner) -> None:

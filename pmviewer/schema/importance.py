@@ -138,3 +138,34 @@ class Importance(Group):
         ge=1e-6,
         le=1e12,
     )
+    emission: Literal["off", "Peter-Pietrek", "Christensen discard", "Christensen keep"] = setting(
+        "off",
+        "Where photons leave the lights, by what test photons meet. Peter-Pietrek: as often as they met importance. "
+        "Christensen discard: strata whose test photons met nothing important keep them, others get many weaker ones "
+        "instead; light that test photons miss is lost. Christensen keep: test photons stay and are topped up, which "
+        "is unbiased. Both store photons in unimportant places by roulette.",
+        stage="photons",
+        scale="choice",
+        title="guided emission",
+    )
+    tests: int = setting(
+        2,
+        "Test photons from each stratum of a light's directions, at least: fewer allow finer strata. An eighth "
+        "(Peter-Pietrek) or a quarter (Christensen) of a pass's photons are test photons.",
+        stage="photons",
+        scale="log",
+        unit="photons",
+        title="test photons",
+        ge=2,
+        le=1024,
+    )
+    important: float = setting(
+        0.05,
+        "Importance, relative to the typical one, from which a place is important: Christensen discard drops test "
+        "photons that reach such a place, and those around them, and sends more of less power.",
+        stage="photons",
+        scale="log",
+        title="important from",
+        ge=1e-4,
+        le=1.0,
+    )
