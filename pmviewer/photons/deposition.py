@@ -45,7 +45,7 @@ FATES = ("stored", "rejected", "redistributed", "discarded")
 """What becomes of a photon that arrives: rejected ones are stood for by stored ones of more power, the power of
 redistributed ones is their neighbours', that of discarded ones is lost."""
 FIRST_WEIGHT, WEIGHTS = -10, 32
-"""Histogram bins: weights from 2^FIRST_WEIGHT on, one a doubling; the outermost hold what is beyond."""
+"""Histogram bins: weights around 2^FIRST_WEIGHT and so on, one a doubling; the outermost hold what is beyond."""
 
 _f4 = np.float32
 _f8 = np.float64
@@ -120,7 +120,8 @@ class Deposited:
     percentiles: tuple[float, ...] = ()
     """Weights that 1, 50, 99 and 100 % of the stored photons don't exceed."""
     histogram: tuple[int, ...] = ()
-    """Photons by weight: bin i from 2^(FIRST_WEIGHT + i) on, twice as wide as the last."""
+    """Photons by weight: bin i from 2^(FIRST_WEIGHT + i − ½) on, twice as wide as the last, so that the weight 1, which
+    most have but for rounding, is within a bin."""
 
     @property
     def rejected(self) -> int:
@@ -268,8 +269,8 @@ class Filling:
 
 def weight_histogram(weights: Float) -> tuple[int, ...]:
     """Photons by their weight, see `Deposited.histogram`."""
-    exponents = np.frexp(weights)[1] - 1  # weight = 2^exponent · [1, 2)
-    bins = np.clip(exponents - FIRST_WEIGHT, 0, WEIGHTS - 1)
+    exponents = np.frexp(weights * np.float32(math.sqrt(2.0)))[1] - 1  # weight · √2 = 2^exponent · [1, 2)
+    bins = np.clip(np.where(weights > 0, exponents - FIRST_WEIGHT, 0), 0, WEIGHTS - 1)
     return tuple(int(n) for n in np.bincount(bins, minlength=WEIGHTS))
 
 

@@ -70,7 +70,7 @@ def histogram_of(books: Deposited) -> tuple[NDArray[np.float64], NDArray[np.floa
     if not len(used):
         return np.empty(0), np.empty(0)
     some = np.arange(used[0], used[-1] + 1)
-    return FIRST_WEIGHT + some + 0.5, counts[some]
+    return FIRST_WEIGHT + some.astype(np.float64), counts[some]
 
 
 def _share(part: int, whole: int) -> str:

@@ -178,7 +178,7 @@ def test_figures_of_deposition():
     assert bias_row({"a": lossy, "b": shared}) == ["25.00%", "0.00%"]
     assert bias_row({"b": shared}) is None
     middles, counts = histogram_of(lossy)
-    np.testing.assert_array_equal(middles, [-0.5, 0.5, 1.5, 2.5])
+    np.testing.assert_array_equal(middles, [-1.0, 0.0, 1.0, 2.0])
     np.testing.assert_array_equal(counts, [1, 1, 0, 1])
     assert histogram_of(shared)[0].size == 0
     assert [weight_text(e) for e in (-2.0, 0.0, 5.0)] == ["1/4", "1", "32"]
