@@ -4,15 +4,26 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from pmviewer.engine.deposition import SEED, Rules, importance_of, sampled_classes
 from pmviewer.engine.importance import ImportanceStage
 from pmviewer.engine.method import Plan
-from pmviewer.importance.rules import relative_importance
+from pmviewer.importance.rules import relative_importance, typical_importance
+from pmviewer.maps.importance import ImportanceMap, Importons, build_importance
+from pmviewer.maps.power import luminances
+from pmviewer.maps.record import CAUSTIC, DIRECT
 from pmviewer.photons.deposition import Deposition, Homogeneous, Rule
 from pmviewer.photons.guided import Guidance, Guided, Known
-from pmviewer.photons.lightpass import PhotonMaps, guided_emission_of, trace_pass
+from pmviewer.photons.lightpass import PhotonMaps, guided_emission_of, scattered_photons, trace_pass
+from pmviewer.photons.scattered import FIRST
 from pmviewer.photons.tested import Sought
 from pmviewer.settings import Settings
+
+MOST_SCATTERED = 1 << 15
+"""Importons that are scattered on."""
+SCATTERED_NEIGHBOURS = 50
+SCATTER_SEED = 0x5CA77E
 
 
 def emission_key(settings: Settings, plan: Plan, importance: ImportanceStage) -> tuple[Any, ...]:
@@ -32,12 +43,44 @@ def guidance_of(settings: Settings, plan: Plan, importance: ImportanceStage) -> 
     maps, how = importance.latest, settings.importance
     if plan.emission == "off" or maps is None or maps.n == 0:
         return None
-    sought = {}
-    for name, classes in (("caustic", plan.caustic_mask), ("global", plan.global_classes)):
-        if classes:
-            weight = how.caustic_M_r / how.M_r if name == "caustic" and plan.global_classes else 1.0
-            sought[name] = Sought(relative_importance(importance_of(maps, name)), classes, weight)
+    sought, first = [], 1 << DIRECT | 1 << CAUSTIC
+    if classes := plan.caustic_mask:
+        made = importance_of(maps, "caustic")
+        weight = how.caustic_M_r / how.M_r if plan.global_classes else 1.0
+        evaluate = relative_importance(made, typical_importance(made))
+        sought.append(Sought("caustic", evaluate, classes, classes, weight))
+    if classes := plan.global_classes:
+        made = importance_of(maps, "global")
+        typical, further = typical_importance(made), _scattered(settings, importance, made)
+        sought.append(Sought("global", relative_importance(made, typical), classes & first, classes))
+        sought.append(Sought("global", relative_importance(further, typical, np.inf), first, 0))
     return Guidance(plan.emission, sought, how.tests, how.important)
+
+
+def _scattered(settings: Settings, importance: ImportanceStage, made: ImportanceMap) -> ImportanceMap:
+    """Importance to photons that are scattered on: of the importons of the map, and how many are wanted of them."""
+    stage, scene = importance, importance.scene.flat
+    assert stage.latest is not None
+
+    def make() -> ImportanceMap:
+        places = np.empty((made.n, 7), np.float32)
+        places[:, :3], places[:, 3:6] = made.positions, made.normals
+        mean = float(made.weights.mean()) if made.n else 1.0
+        places[:, 6] = FIRST * made.weights / mean
+        places = np.ascontiguousarray(places[:: -(-made.n // MOST_SCATTERED)] if made.n else places)
+        photons, normals = np.empty((0, 6), np.float32), np.empty(0, np.uint32)
+        if len(places):
+            seed = settings.render.seed ^ SCATTER_SEED
+            photons, normals = scattered_photons(scene, settings.photons, seed, places, stage.pool.run)
+        weights = np.empty(len(photons), np.float32)
+        luminances(photons.view(np.uint32), weights)
+        weights *= np.float32(mean * made.n / max(len(places), 1))
+        positions = np.ascontiguousarray(photons[:, :3])
+        further = Importons(positions, normals, weights, np.zeros(len(photons), np.float32))
+        return build_importance(further, "screen", scene.radius, SCATTERED_NEIGHBOURS, False, stage.pool.run)
+
+    key = "scattered importance", stage.key, settings.photons, stage.latest.traced
+    return stage.cache.get(key, make, lambda map_: map_.bytes)
 
 
 def guided_photons(
@@ -68,9 +111,11 @@ def storage(guidance: Guidance, guided: Guided, settings: Settings, plan: Plan) 
     """The rules of Christensen's emission; Peter and Pietrek's stores all photons."""
     rules: dict[str, Rule] = {}
     if guidance.variant != "Peter-Pietrek":
-        for name, goal in guidance.sought.items():
-            seed = settings.render.seed ^ SEED ^ (name == "global")
-            rules[name] = Homogeneous(goal.importance, settings.importance.epsilon, guided.smallest, seed)
+        for goal in guidance.sought:
+            if goal.places:
+                seed = settings.render.seed ^ SEED ^ (goal.photons == "global")
+                epsilon = settings.importance.epsilon
+                rules[goal.photons] = Homogeneous(goal.importance, epsilon, guided.smallest, seed)
     classes = plan.caustic_mask, plan.global_classes
     return Deposition(rules.get("caustic"), rules.get("global"), *classes, sampled_classes(plan))
 

@@ -77,15 +77,20 @@ def automatic_f(importance: ImportanceMap, positions: Float, normals: Codes) -> 
     return 0.0, "Keller-Wald: there is no importance; every photon is stored with the cut-off probability ε."
 
 
-def relative_importance(importance: ImportanceMap) -> Evaluate:
-    """Γ relative to the typical one, the median over importons, at most 1. Christensen takes the largest for 1; but one
-    corner that is near the camera would make everything else unimportant."""
-    gamma = importance.gamma
-    typical = float(np.median(gamma)) if importance.n else 0.0
+def typical_importance(importance: ImportanceMap) -> float:
+    """The median Γ over importons; 0 without any."""
+    return float(np.median(importance.gamma)) if importance.n else 0.0
+
+
+def relative_importance(importance: ImportanceMap, typical: float, most: float = 1.0) -> Evaluate:
+    """Γ relative to the typical one, at most `most`. Christensen takes the largest for 1; but one corner that is near
+    the camera would make everything else unimportant."""
 
     def evaluate(positions: Float, normals: Codes) -> Float:
         if not typical > 0:
             return np.zeros(len(positions), np.float32)
-        return np.minimum(_evaluated(importances, importance, positions, normals) / np.float32(typical), np.float32(1))
+        return np.minimum(
+            _evaluated(importances, importance, positions, normals) / np.float32(typical), np.float32(most)
+        )
 
     return evaluate

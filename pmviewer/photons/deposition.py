@@ -83,6 +83,16 @@ class Homogeneous:
     power: float
     seed: int = 0
 
+    def probability(self, photons: Float, normals: Codes, least: np.float32) -> Float:
+        """p of photons (n, 6) where importance is at least `least`; strong ones are stored whatever it is."""
+        relative = np.empty(len(photons), np.float32)
+        luminances(photons.view(np.uint32), relative)
+        relative /= np.float32(self.power)
+        weak = relative * least < 1
+        if weak.any():
+            relative[weak] *= np.maximum(self.importance(np.ascontiguousarray(photons[weak, :3]), normals[weak]), least)
+        return relative
+
 
 Rule = KellerWald | Density | Homogeneous
 
@@ -178,15 +188,11 @@ def probabilities(
 ) -> tuple[Float, np.float32, bool, np.uint32]:
     """For kernels: probabilities of storing photons (n, 6) with normal codes (n,), cut-off, whether it discards, and
     the seed of their batch, whose first trajectory is `index`."""
-    evaluate = rule.importance if isinstance(rule, Homogeneous) else rule.probability
-    p = evaluate(photons[:, :3], normals) if len(photons) else np.empty(0, np.float32)
     discard, epsilon = False, np.float32(min(max(rule.epsilon, SMALLEST_EPSILON), 1.0))
     if isinstance(rule, Homogeneous):
-        power = np.empty(len(photons), np.float32)
-        luminances(photons.view(np.uint32), power)
-        p = np.maximum(p, epsilon) * (power / np.float32(rule.power))
-        epsilon = np.float32(SMALLEST_EPSILON)
+        p, epsilon = rule.probability(photons, normals, epsilon), np.float32(SMALLEST_EPSILON)
     else:
+        p = rule.probability(photons[:, :3], normals) if len(photons) else np.empty(0, np.float32)
         discard = rule.discard
     seed = np.uint32((rule.seed * 0x9E3779B1 + index * 0x85EBCA77 + (index >> 32)) & 0xFFFFFFFF)
     return p, epsilon, discard, seed

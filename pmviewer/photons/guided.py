@@ -3,7 +3,9 @@ met.
 
 Test photons are an eighth or a quarter of all. q_s is the stratum's share of the emitted power, I_s the mean importance
 that test photons from it met, known from those of this pass and of the passes before (`estimated`); powers are in units
-of Φ/N. For n photons the error of the picture, Σ q²·I/(n·p), is least where they leave with probabilities p ∝ q·√I.
+of Φ/N. What a test photon met is taken from its first diffuse surface: the importance of that place to photons that go
+on from there (`pmviewer.photons.scattered`) tells more than the one way on that it took. For n photons the error of the
+picture, Σ q²·I/(n·p), is least where they leave with probabilities p ∝ q·√I.
 
 **Peter-Pietrek** (1998). Test photons are not stored. Photons leave stratum s with the probability
 p_s = (1 − δ)·q_s·√I_s/Σ q·√I + δ·q_s, of n in all, and have the power q_s·N/(n·p_s), never more than N/(δ·n). (Peter
@@ -11,8 +13,8 @@ and Pietrek take I itself. With it each stratum that matters at all, however lit
 other.)
 
 **Christensen discard** (course guide, §5.7.4). Strata whose test photons, and those of the strata beside, met nothing
-important keep them as their photons. Of the others test photons are dropped and n photons emitted, p_s ∝ q_s·g_s, with
-the power q_s·N/(n·p_s).
+important keep them as their photons, unless I_s asks for more than there are. Of the others test photons are dropped
+and n photons emitted, p_s ∝ q_s·g_s, with the power q_s·N/(n·p_s).
 
 **Christensen keep.** No test photon is dropped. There are two sets, A and B, of h photons a stratum. Set A says how
 many photons the stratum should have, M_s^A ≥ 2h, and a photon of set B gets the power q_s·N/M_s^A, and the other way
@@ -32,7 +34,7 @@ them. Emitted power is Φ in the mean with all.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -64,7 +66,7 @@ class Guidance:
     (0 … 1) from which a place is important to the discard variant."""
 
     variant: Variant
-    sought: Mapping[str, Sought]
+    sought: Sequence[Sought]
     tests: int
     important: float
 
@@ -184,10 +186,12 @@ def peter_pietrek(strata: Strata, known: Known, n: int, N: int) -> Decision:
 def discard(strata: Strata, known: Known, h: int, n: int, N: int) -> Decision:
     """Test photons of strata without hits, n others from the rest."""
     q, none = strata.power, np.zeros(strata.n)
-    refined = beside(strata, known.hits) > 0
+    value = graded(estimated(strata, known))
+    wanted = q * value
+    refined = (beside(strata, known.hits) > 0) | (n * wanted / wanted.sum() > 2 * h)
     if not refined.any():
         return q.copy(), np.full(strata.n, N / n), (none, none)
-    share = np.where(refined, q * np.maximum(graded(estimated(strata, known)), LEAST), 0.0)
+    share = np.where(refined, q * np.maximum(value, LEAST), 0.0)
     share /= share.sum()
     of_tests = np.where(refined, 0.0, q * N / (2 * h))
     return share, _powers(q, share, n, N), (of_tests, of_tests)
@@ -217,12 +221,12 @@ def graded(value: Float) -> Float:
 
 
 def estimated(strata: Strata, known: Known) -> Float:
-    """I_s: the mean over the light, made sharper by that over the strata around s, and by s itself, as far as they have
-    the test photons to tell."""
+    """I_s: the mean over all, made sharper by that over the light, that over the strata around s, and s itself, as far
+    as these have the test photons to tell."""
     met, tests = known.met, known.tests
     n_lights = len(strata.first)
-    of_light = np.bincount(strata.light, met, n_lights) / np.bincount(strata.light, tests, n_lights)
-    value = of_light[strata.light]
+    all_met, all_tests = np.bincount(strata.light, met, n_lights), np.bincount(strata.light, tests, n_lights)
+    value = ((all_met + PRIOR * met.sum() / tests.sum()) / (all_tests + PRIOR))[strata.light]
     for scale in SCALES:
         around, number = beside(strata, met, scale), beside(strata, tests, scale)
         value = (around + PRIOR * value) / (number + PRIOR)

@@ -18,6 +18,7 @@ from pmviewer.photons.paths import PhotonPaths
 from pmviewer.photons.projected import NO_PROJECTION
 from pmviewer.photons.projection import Projection
 from pmviewer.photons.roulette import EQUAL, MOST_COPIES, RULES
+from pmviewer.photons.scattered import scattered_record
 from pmviewer.photons.trace import (
     C_CAUSTIC,
     C_DROPPED,
@@ -198,6 +199,21 @@ def guided_emission_of(
         return _join(caustics), _join(globals_), counts, ledger, *(_joined(part) for part in normals)
 
     return guided_emission(scene, how, seed, N, BATCH, trace, run, before)
+
+
+def scattered_photons(
+    scene: FlatScene, settings: Photons, seed: int, places: Float, run: Runner
+) -> tuple[Float, Codes]:
+    """Where importons arrive that are scattered on once from each of places (n, 7), see `pmviewer.photons.scattered`:
+    as photons (m, 6) whose power is what they count, with their normals (m,)."""
+    records, n = scattered_record(places), len(places)
+    record = _record(settings, seed, 0, n, 1.0, False, False, 1.0)
+
+    def batch(i0: int) -> Callable[[], _Batch]:
+        return lambda: _trace_batch(scene, record, records, i0, min(i0 + BATCH, n), n, False, GLOBAL_NORMALS, None)
+
+    results = run([batch(i0) for i0 in range(0, n, BATCH)])
+    return _join([part for r in results for part in r[1]]), _joined([part for r in results for part in r[4]])
 
 
 def _record(

@@ -32,6 +32,7 @@ from pmviewer.kernels.surface import leave
 from pmviewer.kernels.table import find_interval
 from pmviewer.kernels.vector import along, basis, dot, luminance, scale
 from pmviewer.kernels.warp import square_to_disk, square_to_sphere
+from pmviewer.photons.scattered import emit_scattered
 from pmviewer.photons.strata import emit_stratified
 
 WHOLE, DIRECTIONS, PLACES, WORLD, DISC = range(5)
@@ -92,8 +93,8 @@ def _from_curved_light(scene, light, position, d, u):
 def emission(scene, projection, i, sequence, seed, index, u_pick, position, direction):
     """A photon leaving a light: origin, unit direction, power of luminance 1, light, whether it is to be traced, and
     the factor by which its power counts in the units of the map. `projection` is one record of PROJECTION_DTYPE, of
-    NO_PROJECTION, or of strata (`pmviewer.photons.strata`); i is its trajectory's number in the pass; the rest as
-    `emit_photon`."""
+    NO_PROJECTION, of strata (`pmviewer.photons.strata`) or of importons (`pmviewer.photons.scattered`); i is its
+    trajectory's number in the pass; the rest as `emit_photon`."""
     raise NotImplementedError("only for kernels")
 
 
@@ -114,6 +115,14 @@ def _emission(scene, projection, i, sequence, seed, index, u_pick, position, dir
             return p, d, beta, light, True, weight
 
         return stratified
+
+    if "scattered" in projection.fields:
+
+        def scattered(scene, projection, i, sequence, seed, index, u_pick, position, direction):
+            p, d, worth = emit_scattered(projection, i, direction)
+            return p, d, (_f4(1.0), _f4(1.0), _f4(1.0)), _i8(0), True, worth
+
+        return scattered
 
     def projected(scene, projection, i, sequence, seed, index, u_pick, position, direction):
         light = find_interval(projection.cdf, scene.n_lights, _i8(1), u_pick)

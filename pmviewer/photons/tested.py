@@ -5,7 +5,7 @@ They are photons like all others, of power 1 and with random numbers of their ow
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,11 +32,13 @@ _FOLD = 0x7E57F01D
 
 @dataclass(frozen=True)
 class Sought:
-    """What a photon map is for: `importance` of places for it, 0 … 1, where photons of the path classes (bit set)
-    arrive; `weight` is what a photon of it counts."""
+    """What photons of one map are for: `importance` of the places where they arrive. It counts `weight` for what a test
+    photon met if the path class is one of `classes` (bit set), and for what is important if it is one of `places`."""
 
+    photons: str
     importance: Evaluate
     classes: int
+    places: int
     weight: float = 1.0
 
 
@@ -54,8 +56,8 @@ class Batch:
 @dataclass(frozen=True, eq=False)
 class Tested:
     """One set of test photons, h of each stratum; number i is of stratum i modulo the strata. `met` (n,): the
-    importance that each one met, summed over the places where it arrived; `most` (n,): the largest of it, without
-    weights; `batches` are what they would store, `rays` cast."""
+    importance that each one met, summed over the places and all that was sought; `most` (n,): the largest importance of
+    a place; `batches` are what they would store, `rays` cast."""
 
     met: NDArray[np.float64]
     most: NDArray[np.float64]
@@ -80,10 +82,10 @@ def trace_tests(
     seed: int,
     size: int,
     trace: TraceBatch,
-    sought: Mapping[str, Sought],
+    sought: Sequence[Sought],
     run: Runner,
 ) -> Tested:
-    """`each` test photons of every stratum, in batches of `size`; `sought` by map, "caustic" and "global"."""
+    """`each` test photons of every stratum, in batches of `size`; see `Tested`."""
     table, n = table_of(strata, None, None), each * strata.n
     own = int((seed ^ _FOLD) + 0x9E3779B9 * (fold + 1)) & 0xFFFFFFFF
 
@@ -94,8 +96,8 @@ def trace_tests(
             caustics, globals_, counts, _, global_normals, caustic_normals = trace(table.records, own, first, end, n)
             met, most = np.zeros(end - first), np.zeros(end - first)
             photons = {"caustic": (caustics, caustic_normals), "global": (globals_, global_normals)}
-            for name, goal in sought.items():
-                _meet(*photons[name], goal, first, met, most)
+            for goal in sought:
+                _meet(*photons[goal.photons], goal, first, met, most)
             return Batch(first, end, photons["caustic"], photons["global"]), met, most, counts
 
         return work
@@ -110,15 +112,17 @@ def _meet(
     photons: Float, normals: Codes, goal: Sought, first: int, met: NDArray[np.float64], most: NDArray[np.float64]
 ) -> None:
     """Add what trajectories first … met with these photons."""
-    wanted = in_classes(photons, goal.classes)
+    wanted = in_classes(photons, goal.classes | goal.places)
     if wanted is not None:
         photons, normals = np.ascontiguousarray(photons[wanted]), normals[wanted]
     if not len(photons):
         return
     values = goal.importance(photons[:, :3], normals).astype(np.float64)
-    which = (photons.view(np.uint32)[:, 5] >> 16).astype(np.int64) - (first & 0xFFFF)
-    met += goal.weight * np.bincount(which, values, len(met))
-    np.maximum.at(most, which, values)
+    words = photons.view(np.uint32)
+    which, path_class = (words[:, 5] >> 16).astype(np.int64) - (first & 0xFFFF), words[:, 3] >> 6 & 3
+    counts, places = goal.classes >> path_class & 1, goal.places >> path_class & 1
+    met += goal.weight * np.bincount(which, values * counts, len(met))
+    np.maximum.at(most, which, values * places)
 
 
 @kernel
