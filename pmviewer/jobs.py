@@ -76,6 +76,15 @@ def render_job(
     if statistics.importons:
         stored = statistics.stored_in_pass["importons"]
         print(f"importance: {statistics.importons:,} importons, stored at {stored:,} places")
+    books = statistics.deposited.get("caustic")
+    if books is not None and books.converged is not None:
+        found = books.converged
+        print(
+            f"caustic map: {1 - found.more:.1%} of its light converged, {found.dense:.1%} dense enough, "
+            f"{found.spared:,} trajectories spared in the last pass"
+            if found.photons
+            else "caustic map: no photons, so nothing has converged"
+        )
     _print_warnings(statistics.warnings, {})
     for path in outputs:
         if path.suffix.lower() == ".exr":

@@ -13,9 +13,11 @@ from pmviewer.engine.method import Plan
 from pmviewer.importance.importons import Rule as ImportonRule
 from pmviewer.importance.importons import trace
 from pmviewer.importance.rules import TESTS, automatic_f, density_of, probability_of
+from pmviewer.maps.convergence import Criterion
 from pmviewer.maps.density_control import ACCEPTANCE, M
 from pmviewer.maps.importance import ImportanceMap
 from pmviewer.maps.record import DIRECT
+from pmviewer.maps.stored import ALL_CLASSES
 from pmviewer.photons.deposition import (
     Density,
     Deposition,
@@ -98,7 +100,13 @@ def rules_of(
             required[name], ACCEPTANCE.index(how.acceptance), farthest_of(scene_radius), seed + (name == "global")
         )
     sample = (1 << DIRECT if plan.choice != "power" or plan.caustic_mask else 0) | plan.guide_mask
-    deposition = Deposition(rules["caustic"], rules["global"], classes["caustic"], classes["global"], sample)
+    criterion = None
+    if plan.convergence:
+        acceptance, farthest = ACCEPTANCE.index(how.acceptance), farthest_of(scene_radius)
+        criterion = Criterion(plan.convergence, acceptance, farthest, scene_radius, plan.caustic_mask)
+        key += ("convergence", plan.convergence)
+        sample |= ALL_CLASSES & ~plan.caustic_mask
+    deposition = Deposition(rules["caustic"], rules["global"], classes["caustic"], classes["global"], sample, criterion)
     return Rules(deposition, key, tuple(notes), required or None)
 
 

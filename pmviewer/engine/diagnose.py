@@ -7,13 +7,15 @@ nothing; the session adds what is missing to the frame that is there.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.convergence import convergence_plane
+from pmviewer.engine.deposition import Rules
 from pmviewer.engine.importance import ImportanceMaps
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.method import Plan
@@ -25,6 +27,7 @@ from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import neighbourhood
 from pmviewer.maps.stored import ALL_CLASSES
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.photons.lightpass import PhotonMaps
 from pmviewer.render.diagnostics import FAMILY_CHANNELS, lookup_view, shadow_view, site_view
 from pmviewer.settings import Settings
 
@@ -51,6 +54,9 @@ class Looked:
     importance: ImportanceMaps | None = None
     M_r: tuple[float, float] = (0.0, 0.0)
     """Photons wanted per pixel in the caustic and the global map."""
+    photons: PhotonMaps | None = None
+    rules: Rules = field(default_factory=Rules)
+    """The pass's photons, and by which rules they were stored."""
 
 
 def wanted_of(settings: Settings, plan: Plan, pixel: tuple[int, int] | None = None) -> Wanted:
@@ -82,6 +88,8 @@ def refused_view(view: str, plan: Plan) -> str | None:
         return "Nothing is looked up: this method uses no photons, or no surface stores them."
     if family == "importance" and not plan.importance:
         return "Only with importance (importance.map)."
+    if family == "convergence" and not plan.convergence:
+        return "Only with density control of a caustic map, and its criterion (importance.convergence)."
     if family == "shadow rays" and not plan.shadows:
         return "Only with shadow photons (direct.shadow_photons)."
     if family == "radiance photons" and not plan.radiance:
@@ -94,6 +102,10 @@ def diagnostic_planes(wanted: Wanted, looked: Looked, plan: Plan, pool: WorkPool
     if wanted.family is None:
         return {}
     pixels = looked.width * looked.height
+    if wanted.family == "convergence":
+        assert looked.photons is not None
+        states = convergence_plane(looked.scene, looked.eye, pixels, looked.photons, looked.rules, pool.run)
+        return {"caustic convergence": states.reshape(looked.height, looked.width, 1)}
     channels = {**FAMILY_CHANNELS, "importance": IMPORTANCE_CHANNELS}
     out = np.empty((pixels, channels[wanted.family]), np.float32)
     draw = _kernel(wanted, looked, plan, out)

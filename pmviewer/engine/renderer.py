@@ -135,7 +135,21 @@ class Renderer:
         size = film.width, film.height
         importance = self.importance.latest
         M_r = self.settings.importance.caustic_M_r, self.settings.importance.M_r
-        looked = Looked(scene, eye, caustic, global_, choice, sites, shadows, self.light.sites, *size, importance, M_r)
+        looked = Looked(
+            scene,
+            eye,
+            caustic,
+            global_,
+            choice,
+            sites,
+            shadows,
+            self.light.sites,
+            *size,
+            importance,
+            M_r,
+            self.light.photons,
+            self.light.rules,
+        )
         planes = diagnostic_planes(wanted, looked, self.plan, self.pool)
         paths = self._paths(wanted.paths) if wanted.paths else None
         gathered = self.gather_points(*wanted.pixel) if wanted.pixel else None

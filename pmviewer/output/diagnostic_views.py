@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from pmviewer.output.falsecolour import Scale, false_colour, scale_of
 
-Family = Literal["look-up", "shadow rays", "radiance photons", "importance"]
+Family = Literal["look-up", "shadow rays", "radiance photons", "importance", "convergence"]
 NOTHING = -1.0
 DIMMED = 0.4
 """Brightness of cells whose radiance photon is the nearest, but not near enough to be used."""
 GREY = (0.16, 0.16, 0.16)
 """Display-encoded colour of pixels in which there is nothing to tell."""
+CLASS_COLOURS = ((0.86, 0.27, 0.22), (0.35, 0.74, 0.36), (0.27, 0.48, 0.9))
+"""Display-encoded; the caustic convergence of Suykens and Willems, figure 6: red, green, blue."""
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
@@ -39,6 +41,8 @@ class DiagnosticView:
     """Ends of the scale, where they don't follow the picture."""
     cells: bool = False
     """Values are numbers of cells, each with a colour of its own, dimmed where a half is added."""
+    classes: tuple[str, ...] = ()
+    """Values are numbers of classes with these names, in CLASS_COLOURS."""
 
 
 DIAGNOSTICS: Mapping[str, DiagnosticView] = {
@@ -84,6 +88,13 @@ DIAGNOSTICS: Mapping[str, DiagnosticView] = {
         "no surface that stores photons",
         log=True,
     ),
+    "caustic convergence": DiagnosticView(
+        "convergence",
+        "whether the caustic map needs more photons at the first surface, latest pass",
+        "",
+        "no caustic",
+        classes=("more photons needed", "converged", "dense enough"),
+    ),
 }
 
 
@@ -121,7 +132,9 @@ def cell_colours(cells: NDArray[Any]) -> NDArray[np.float32]:
 def coloured(view: str, plane: NDArray[np.floating]) -> NDArray[np.float32]:
     """Display-encoded picture (h, w, 3) of a plane."""
     values = scalar(plane)
-    if DIAGNOSTICS[view].cells:
+    if DIAGNOSTICS[view].classes:
+        pixels = np.array(CLASS_COLOURS, np.float32)[np.maximum(values, 0).astype(int)]
+    elif DIAGNOSTICS[view].cells:
         cells = np.floor(np.maximum(values, 0))
         pixels = cell_colours(cells)
         pixels[values > cells] *= np.float32(DIMMED)

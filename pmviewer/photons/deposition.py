@@ -26,9 +26,12 @@ from numpy.typing import NDArray
 from pmviewer.kernels.jit import kernel
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.vector import luminance
+from pmviewer.maps.convergence import Converged, Convergence, Criterion
 from pmviewer.maps.density_control import Controlled, DensityControl
+from pmviewer.maps.kdtree import PhotonKdTree
 from pmviewer.maps.power import encode_powers, luminances, write_power
 from pmviewer.maps.record import BYTES_PER_PHOTON, decode_power
+from pmviewer.scene.flatten import LUMINANCE
 
 Float = NDArray[np.float32]
 Codes = NDArray[np.uint32]
@@ -73,13 +76,15 @@ Rule = KellerWald | Density
 @dataclass(frozen=True)
 class Deposition:
     """Rules for the photons of the path classes (bit sets) that a map holds; None stores them all. Photons of
-    `sample_classes` from the first trajectories are also kept as they arrive."""
+    `sample_classes` from the first trajectories are also kept as they arrive. `criterion` tells when the caustic map,
+    under density control, needs no more photons."""
 
     caustic: Rule | None
     global_: Rule | None
     caustic_classes: int
     global_classes: int
     sample_classes: int = 0
+    criterion: Criterion | None = None
 
     @property
     def in_rounds(self) -> bool:
@@ -104,6 +109,8 @@ class Deposited:
     """Weights that 1, 50, 99 and 100 % of the stored photons don't exceed."""
     histogram: tuple[int, ...] = ()
     """Photons by weight: bin i from 2^(FIRST_WEIGHT + i) on, twice as wide as the last."""
+    converged: Converged | None = None
+    """How much of the map needs no more photons, where that was asked for."""
 
     @property
     def rejected(self) -> int:
@@ -192,6 +199,16 @@ class Filling:
             return
         photons, normals, required = (np.concatenate([batch[i] for batch in judged]) for i in (0, 1, 4))
         self._control.add(photons, normals, required, run)
+
+    def converged(self, criterion: Criterion, others: PhotonKdTree, unit: float, run: Runner) -> Converged:
+        """How much of the map, as it stands, needs no more photons by the criterion; `others` is the light that is not
+        in the map, `unit` as for `finish`."""
+        assert self._control is not None
+        made = self._control.result()
+        photons = made.photons.copy()
+        unit *= encode_powers(photons, made.powers, 0)
+        judge, weights = Convergence(criterion, photons, unit, others), made.powers @ LUMINANCE
+        return judge.of_map(photons, made.normals, weights, made.required, run)
 
     def finish(self, unit: float) -> tuple[Float, Codes, float, Deposited]:
         """The map's photons and normals, its unit of power in watts (`unit` is that of the photons that arrived), and

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
+from pmviewer.maps.convergence import other_light
 from pmviewer.maps.record import in_classes
 from pmviewer.photons.deposition import Deposited, Deposition, Filling, Prepared, rounds
 from pmviewer.photons.paths import PhotonPaths
@@ -146,7 +147,10 @@ def trace_pass(
     caustic_unit = unit / traced if projection is None else 1.0 / direct_density
     global_unit = surface_power / (filling * probability)
     if deposition is not None:
-        return _deposited(deposition, batch, last, first_index, run, caustic_unit, global_unit, filling)
+        # Other trajectories than those of both maps can be left out without changing what the latter count.
+        spare = projection is None and deposition.criterion is not None
+        must = last if not spare else filling if deposition.global_classes else 0
+        return _deposited(deposition, batch, (last, must), first_index, run, caustic_unit, global_unit, filling)
     results = run([batch(i0) for i0 in range(0, last, BATCH)])
     counts = sum((r[2] for r in results), np.zeros(N_COUNTS, np.int64))
     return PhotonMaps(
@@ -165,14 +169,20 @@ def trace_pass(
 def _deposited(
     deposition: Deposition,
     batch: Callable[[int], Callable[[], _Batch]],
-    last: int,
+    trajectories: tuple[int, int],
     first_index: int,
     run: Runner,
     caustic_unit: float,
     global_unit: float,
     filling: int,
 ) -> PhotonMaps:
-    """The pass's maps by the rules of `deposition`, from its batches, round by round where rounds matter."""
+    """The pass's maps by the rules of `deposition`, from its batches, round by round where rounds matter.
+
+    trajectories: how many there are, and how many must be traced even if the caustic map has converged before; beyond,
+    the pass ends when it has. caustic_unit: that of all trajectories.
+    """
+    last, must = trajectories
+    criterion, others, sampled_of, converged = deposition.criterion, None, 0, None
     caustic, global_ = Filling(deposition.caustic), Filling(deposition.global_)
     sampled: list[Float] = []
     counts, ledger = np.zeros(N_COUNTS, np.int64), np.zeros(N_LEDGER)
@@ -200,6 +210,18 @@ def _deposited(
         sampled += [r[2] for r in results]
         counts += sum((r[3] for r in results), np.zeros(N_COUNTS, np.int64))
         ledger += sum((r[4] for r in results), np.zeros(N_LEDGER))
+        traced = min(some.stop * BATCH, last)
+        if criterion is None or traced < min(must, last):
+            continue
+        if others is None or sampled_of < min(filling, SAMPLED):
+            sampled_of = min(filling, SAMPLED, traced)
+            others = other_light(criterion, _join(sampled), global_unit * filling / sampled_of)
+        converged = caustic.converged(criterion, others, caustic_unit * last / traced, run)
+        if converged.done and traced < last:
+            converged = replace(converged, spared=last - traced)
+            caustic_unit *= last / traced
+            last = traced
+            break
     (in_caustic, in_global) = run([lambda: caustic.finish(caustic_unit), lambda: global_.finish(global_unit)])
     return PhotonMaps(
         caustic=in_caustic[0],
@@ -213,8 +235,8 @@ def _deposited(
         normals=in_global[1],
         caustic_normals=in_caustic[1],
         sample=_join(sampled),
-        sample_unit=global_unit * max(filling / SAMPLED, 1.0),
-        deposited={"caustic": in_caustic[3], "global": in_global[3]},
+        sample_unit=global_unit * filling / max(min(filling, SAMPLED, last), 1),
+        deposited={"caustic": replace(in_caustic[3], converged=converged), "global": in_global[3]},
     )
 
 

@@ -32,6 +32,7 @@ class Display(Group):
         "radiance cells",
         "importance",
         "required density",
+        "caustic convergence",
     ] = setting(
         "beauty",
         "What the viewport shows: the image, one of its terms, a property of the first hit, the shaded geometry, the "

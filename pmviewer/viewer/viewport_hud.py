@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ from imgui_bundle import imgui
 from numpy.typing import NDArray
 
 from pmviewer.engine.frame import Frame
-from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.output.diagnostic_views import CLASS_COLOURS, DIAGNOSTICS
 from pmviewer.output.falsecolour import COLOURS, ERROR_SCALE, Scale
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import si
@@ -52,7 +53,9 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         _depth_legend(viewport, *viewport.picture.depth_range)
     if view == "error":
         _error_legend(viewport)
-    if view in DIAGNOSTICS and not DIAGNOSTICS[view].cells and viewport.picture is not None:
+    if view in DIAGNOSTICS and DIAGNOSTICS[view].classes:
+        _class_legend(viewport, DIAGNOSTICS[view].classes)
+    elif view in DIAGNOSTICS and not DIAGNOSTICS[view].cells and viewport.picture is not None:
         _scale_legend(viewport, viewport.picture.scale)
     if state.settings.overlays.gather.show and viewport.inspected is None and state.frame is not None:
         text = "hold I over the picture: gather rays of the pixel under the mouse"
@@ -84,6 +87,8 @@ def _value_under_mouse(viewport: Viewport) -> str:
         values = frame.image(view)[y, x]
         if values[0] < 0:
             return f"{pixel[0]}, {pixel[1]}    {DIAGNOSTICS[view].none}"
+        if DIAGNOSTICS[view].classes:
+            return f"{pixel[0]}, {pixel[1]}    {DIAGNOSTICS[view].classes[int(values[0])]}"
         if DIAGNOSTICS[view].cells:
             return f"{pixel[0]}, {pixel[1]}    cell {int(values[0])}{', beyond the cut-off' if values[0] % 1 else ''}"
     else:
@@ -119,6 +124,13 @@ def _scale_legend(viewport: Viewport, scale: Scale) -> None:
     labels = [(1.0 - tick.position, tick.label.removesuffix(f" {scale.unit}")) for tick in scale.ticks()]
     labels[-1] = (labels[-1][0], f"{labels[-1][1]} {scale.unit}")
     _legend(viewport, labels, COLOURS[::-8])
+
+
+def _class_legend(viewport: Viewport, names: Sequence[str]) -> None:
+    """A patch of colour for each class, the last one on top."""
+    bands = [colour for colour in CLASS_COLOURS[len(names) - 1 :: -1] for _ in range(16)]  # sharp edges
+    labels = [((i + 0.5) / len(names), name) for i, name in enumerate(reversed(names))]
+    _legend(viewport, labels, np.array(bands))
 
 
 def _legend(viewport: Viewport, labels: list[tuple[float, str]], colours: NDArray[np.floating]) -> None:
