@@ -98,6 +98,8 @@ class Deposited:
     photons' luminance in units of that with which photons leave the lights."""
 
     arrived: int = 0
+    important: int = 0
+    """Of these, photons at places where the rule's probability or required density is above 0."""
     stored: int = 0
     redistributed: int = 0
     arrived_power: float = 0.0
@@ -160,7 +162,7 @@ class Filling:
 
     def __init__(self, rule: Rule | None) -> None:
         self.rule = rule
-        self.arrived, self.books = 0, np.zeros(3)
+        self.arrived, self.important, self.books = 0, 0, np.zeros(3)
         self._parts: list[Float] = []
         self._normals: list[Codes] = []
         self._control = None
@@ -173,17 +175,22 @@ class Filling:
         rule, n = self.rule, len(photons)
         photons = np.ascontiguousarray(photons)
         if rule is None:
-            return photons, normals, n, _power_of(photons)
+            return photons, normals, n, np.append(_power_of(photons), n)
         if isinstance(rule, Density):
             required = rule.required(photons[:, :3], normals) if n else np.empty(0, np.float32)
-            return photons, normals, n, _power_of(photons), required
+            return photons, normals, n, np.append(_power_of(photons), np.count_nonzero(required > 0)), required
         p = rule.probability(photons[:, :3], normals) if n else np.empty(0, np.float32)
         seed = np.uint32((rule.seed * 0x9E3779B1 + index * 0x85EBCA77 + (index >> 32)) & 0xFFFFFFFF)
         kept, kept_normals, books = np.empty((n, 6), np.uint32), np.empty(n, np.uint32), np.zeros(3)
         epsilon = np.float32(min(max(rule.epsilon, SMALLEST_EPSILON), 1.0))
         words = photons.view(np.uint32)
         count = _thin(photons, words, normals, p, epsilon, rule.discard, seed, kept, kept_normals, books)
-        return kept[:count].view(np.float32).copy(), kept_normals[:count].copy(), n, books
+        return (
+            kept[:count].view(np.float32).copy(),
+            kept_normals[:count].copy(),
+            n,
+            np.append(books, np.count_nonzero(p > 0)),
+        )
 
     def take(self, judged: list[Prepared], run: Runner) -> None:
         """The next batches, in order; with density control they are one round."""
@@ -191,6 +198,7 @@ class Filling:
             return
         for batch in judged:
             self.arrived += batch[2]
+            self.important += int(batch[3][3])
             self.books[:2] += batch[3][:2]
             self.books[2] = max(self.books[2], batch[3][2])
         if self._control is None:
@@ -227,6 +235,7 @@ class Filling:
         weights *= np.float32(grown)
         books = Deposited(
             arrived=self.arrived,
+            important=self.important,
             stored=len(photons),
             redistributed=redistributed,
             arrived_power=float(self.books[0]) * unit,

@@ -112,7 +112,7 @@ def test_degenerate_scenes(case, rule, method):
     renderer = rendered(scene, settings(method, rule), 2)
     frame = check(renderer)
     said = " ".join(frame.statistics.warnings)
-    assert ("importons" in said) == blind, said
+    assert ("Importance: none of" in said) == blind, said
     if blind:
         assert renderer.importance.latest.n == 0
         if rule in ("clamp", "discard"):
@@ -121,6 +121,7 @@ def test_degenerate_scenes(case, rule, method):
         assert sum(books.stored for books in frame.statistics.deposited.values()) == 0
     if name == "no light":
         assert frame.image().max() == 0
+        assert ("Does light reach" in said) == (rule not in ("all", "constant")), said
 
 
 @pytest.mark.parametrize("method", METHODS)
