@@ -90,7 +90,7 @@ DIAGNOSTICS: Mapping[str, DiagnosticView] = {
     ),
     "caustic convergence": DiagnosticView(
         "convergence",
-        "whether the caustic map needs more photons at the first surface, latest pass",
+        "state of the caustic map at the first surface, latest pass",
         "",
         "no caustic",
         classes=("more photons needed", "converged", "dense enough"),
