@@ -78,7 +78,8 @@ def rules_of(
         if how.f == "auto":
             f, notes = factors(settings, importance, maps)
     else:
-        key += (how.acceptance, how.M_r, how.caustic_M_r, how.density, growth, first if how.density == "auto" else 0)
+        key += (how.acceptance, how.M_r, how.caustic_M_r, how.density, growth)
+        key += tuple(radii.values()) if plan.deposition == "constant density" and how.density == "auto" else ()
     for name, mask in classes.items():
         if not mask:
             continue

@@ -8,7 +8,10 @@ import sys
 import numpy as np
 import pytest
 
+from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.renderer import Renderer
 from pmviewer.scene.flatten import LUMINANCE
 from tests.scenes_for_tests import cornell_box, rendered, settings_of
 
@@ -47,6 +50,27 @@ def test_the_mean_over_passes_is_right(method):
     assert error < 0.02
     assert abs(np.mean(off)) < 3.5 * error
     assert np.mean(lost) < -0.03
+
+
+@pytest.mark.parametrize("changed", [{"caustic_radius": 0.3}, {"radius": 0.05}])
+def test_photons_kept_from_before_do_not_matter(changed):
+    """The automatic constant density follows the radii of look-ups; photons stored for others are not taken."""
+    scene, pool, cache = open_scene(cornell_box(size=8)), WorkPool(1), StageCache(1 << 26)
+    made = []
+    try:
+        for estimate, kept in ({}, cache), (changed, cache), (changed, StageCache(0)):
+            values = settings_of(
+                photons={"N": 20_000},
+                importance={"deposition": "constant density"},
+                estimate={"radius": 0.1} | estimate,
+            )
+            renderer = Renderer(scene, values, pool, kept)
+            renderer.step()
+            made.append(renderer.light.photons.caustic)
+    finally:
+        pool.close()
+    assert len(made[0]) != len(made[1])
+    np.testing.assert_array_equal(made[1], made[2])
 
 
 OFF = """
