@@ -77,6 +77,15 @@ def render_job(
             biased = f"; biased: {lost:.2%} of the power discarded" if lost > 0 else ""
             saved = f"{books.saved_bytes / 2**20:.1f} MiB saved"
             print(f"{name} map: {books.stored:,} of {books.arrived:,} photons stored in the last pass, {saved}{biased}")
+    caustic = statistics.deposited.get("caustic")
+    if caustic is not None and caustic.converged is not None:
+        found = caustic.converged
+        print(
+            f"caustic map: {1 - found.more:.1%} of its light converged, {found.dense:.1%} dense enough, "
+            f"{found.spared:,} trajectories spared in the last pass"
+            if found.photons
+            else "caustic map: no photons, so nothing has converged"
+        )
     _print_warnings(statistics.warnings, {})
     for path in outputs:
         if path.suffix.lower() == ".exr":

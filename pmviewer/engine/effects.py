@@ -14,7 +14,13 @@ _DISC_ONLY = ("estimate.filter", "estimate.cone_k", "estimate.rim", "estimate.di
 _RADIANCE_ONLY = ("gather.cutoff", "gather.similarity")
 _GUIDED_ONLY = ("gather.guided", "gather.guide_radius")
 _KELLER_WALD_ONLY = ("importance.f", "importance.epsilon", "importance.cut_off")
-_DEPOSITION = ("importance.deposition", "importance.acceptance", "importance.density", *_KELLER_WALD_ONLY)
+_DEPOSITION = (
+    "importance.deposition",
+    "importance.acceptance",
+    "importance.density",
+    "importance.convergence",
+    *_KELLER_WALD_ONLY,
+)
 _EMISSION = ("importance.emission", "importance.tests", "importance.important")
 _CACHE_ONLY = ("gather.cache_error", "gather.cache_samples", "gather.cache_min", "gather.cache_max")
 
@@ -80,6 +86,10 @@ def _deposition(path: str, settings: Settings, plan: Plan) -> str | None:
         return None if active == asked else f"{asked} needs importance (importance.map)."
     if path == "importance.epsilon" and active == "all" and plan.emission.startswith("Christensen"):
         return None
+    if path == "importance.convergence":
+        if active not in ("density control", "constant density"):
+            return "Only with density control."
+        return None if plan.caustic_mask else "No caustic map in this scene or with this method."
     if path in _KELLER_WALD_ONLY:
         return None if active == "Keller-Wald" else "Only with the deposition rule 'Keller-Wald'."
     if path == "importance.density":

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pmviewer.engine.cache_stage import prepare_cache, recipe
+from pmviewer.engine.convergence import prepare_convergence
 from pmviewer.engine.guides import gather_records
 from pmviewer.engine.importance import prepare_importance
 from pmviewer.engine.method import estimator_of, plan_of
@@ -111,6 +112,8 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
         ]
     if plan.deposition != "all" or plan.emission != "off":
         steps.append(("deposition rules", prepare_rules))
+    if plan.convergence:
+        steps.append(("caustic convergence", prepare_convergence))
     if plan.importance:
         camera = resolve_camera(scene.scene, settings.camera)
         steps.append(("importance", prepare_importance(scene, settings, plan, camera)))

@@ -29,6 +29,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import first_radius
 from pmviewer.engine.shadows import ShadowMap, shadows_of
 from pmviewer.engine.tally import Tally
+from pmviewer.maps.importance import NO_IMPORTANCE
 from pmviewer.maps.irradiance_cache import NO_CACHE, REACH, IrradianceCache
 from pmviewer.photons.lightpass import trace_pass, trajectories
 from pmviewer.photons.paths import PhotonPaths, empty_paths
@@ -146,6 +147,7 @@ class Renderer:
             self.importance.latest,
             self.settings.importance,
             self.light.rules,
+            self.light.photons,
             self.light.stored,
             self.scene.flat.radius,
         )
@@ -243,7 +245,15 @@ class Renderer:
     def _warnings(self) -> tuple[str, ...]:
         """Sentences for the log."""
         latest = self.importance.latest
-        return (*self.plan.warnings, *(latest.warnings if latest else ()), *self.light.notes)
+        unimportant: tuple[str, ...] = ()
+        if latest is not None and latest.n and self.plan.deposition in ("Keller-Wald", "density control"):
+            unimportant = tuple(
+                f"{self.plan.deposition}: none of the {books.arrived:,} photons that arrived for the {name} map in "
+                "this pass is in an important place. Does light reach what the camera sees?"
+                for name, books in self.tally.deposited.items()
+                if books.important == 0 and latest.record(name).dtype != NO_IMPORTANCE.dtype
+            )
+        return (*self.plan.warnings, *(latest.warnings if latest else ()), *self.light.notes, *unimportant)
 
     def _pass(self, film: Film, camera: CameraPose, index: int, N: int) -> None:
         eye = eye_record(camera, self.settings, index)

@@ -28,9 +28,12 @@ from numpy.typing import NDArray
 from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.vector import luminance
+from pmviewer.maps.convergence import Converged, Convergence, Criterion
 from pmviewer.maps.density_control import Controlled, DensityControl
+from pmviewer.maps.kdtree import PhotonKdTree
 from pmviewer.maps.power import encode_powers, luminances, write_power
 from pmviewer.maps.record import BYTES_PER_PHOTON, decode_power
+from pmviewer.scene.flatten import LUMINANCE
 
 Float = NDArray[np.float32]
 Codes = NDArray[np.uint32]
@@ -100,13 +103,15 @@ Rule = KellerWald | Density | Homogeneous
 @dataclass(frozen=True)
 class Deposition:
     """Rules for the photons of the path classes (bit sets) that a map holds; None stores them all. Photons of
-    `sample_classes` from the first trajectories are also kept as they arrive."""
+    `sample_classes` from the first trajectories are also kept as they arrive. `criterion` tells when the caustic map,
+    under density control, needs no more photons."""
 
     caustic: Rule | None
     global_: Rule | None
     caustic_classes: int
     global_classes: int
     sample_classes: int = 0
+    criterion: Criterion | None = None
 
     @property
     def in_rounds(self) -> bool:
@@ -120,6 +125,8 @@ class Deposited:
     photons' luminance in units of that with which photons leave the lights."""
 
     arrived: int = 0
+    important: int = 0
+    """Of these, photons at places where the rule's probability or required density is above 0."""
     stored: int = 0
     redistributed: int = 0
     arrived_power: float = 0.0
@@ -132,6 +139,8 @@ class Deposited:
     histogram: tuple[int, ...] = ()
     """Photons by weight: bin i from 2^(FIRST_WEIGHT + i − ½) on, twice as wide as the last, so that the weight 1, which
     most have but for rounding, is within a bin."""
+    converged: Converged | None = None
+    """How much of the map needs no more photons, where that was asked for."""
 
     @property
     def rejected(self) -> int:
@@ -206,7 +215,7 @@ class Filling:
 
     def __init__(self, rule: Rule | None) -> None:
         self.rule = rule
-        self.arrived, self.books = 0, np.zeros(3)
+        self.arrived, self.important, self.books = 0, 0, np.zeros(3)
         self._parts: list[Float] = []
         self._normals: list[Codes] = []
         self._control = None
@@ -219,15 +228,20 @@ class Filling:
         rule, n = self.rule, len(photons)
         photons = np.ascontiguousarray(photons)
         if rule is None:
-            return photons, normals, n, _power_of(photons)
+            return photons, normals, n, np.append(_power_of(photons), n)
         if isinstance(rule, Density):
             required = rule.required(photons[:, :3], normals) if n else np.empty(0, np.float32)
-            return photons, normals, n, _power_of(photons), required
+            return photons, normals, n, np.append(_power_of(photons), np.count_nonzero(required > 0)), required
         p, epsilon, discard, seed = probabilities(rule, photons, normals, index)
         kept, kept_normals, books = np.empty((n, 6), np.uint32), np.empty(n, np.uint32), np.zeros(3)
         words = photons.view(np.uint32)
         count = _thin(photons, words, normals, p, epsilon, discard, seed, kept, kept_normals, books)
-        return kept[:count].view(np.float32).copy(), kept_normals[:count].copy(), n, books
+        return (
+            kept[:count].view(np.float32).copy(),
+            kept_normals[:count].copy(),
+            n,
+            np.append(books, np.count_nonzero(p > 0)),
+        )
 
     def take(self, judged: list[Prepared], run: Runner) -> None:
         """The next batches, in order; with density control they are one round."""
@@ -235,6 +249,7 @@ class Filling:
             return
         for batch in judged:
             self.arrived += batch[2]
+            self.important += int(batch[3][3])
             self.books[:2] += batch[3][:2]
             self.books[2] = max(self.books[2], batch[3][2])
         if self._control is None:
@@ -243,6 +258,16 @@ class Filling:
             return
         photons, normals, required = (np.concatenate([batch[i] for batch in judged]) for i in (0, 1, 4))
         self._control.add(photons, normals, required, run)
+
+    def converged(self, criterion: Criterion, others: PhotonKdTree, unit: float, run: Runner) -> Converged:
+        """How much of the map, as it stands, needs no more photons by the criterion; `others` is the light that is not
+        in the map, `unit` as for `finish`."""
+        assert self._control is not None
+        made = self._control.result()
+        photons = made.photons.copy()
+        unit *= encode_powers(photons, made.powers, 0)
+        judge, weights = Convergence(criterion, photons, unit, others), made.powers @ LUMINANCE
+        return judge.of_map(photons, made.normals, weights, made.required, run)
 
     def finish(self, unit: float) -> tuple[Float, Codes, float, Deposited]:
         """The map's photons and normals, its unit of power in watts (`unit` is that of the photons that arrived), and
@@ -261,6 +286,7 @@ class Filling:
         weights *= np.float32(grown)
         books = Deposited(
             arrived=self.arrived,
+            important=self.important,
             stored=len(photons),
             redistributed=redistributed,
             arrived_power=float(self.books[0]) * unit,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
+from pmviewer.maps.convergence import other_light
 from pmviewer.maps.record import in_classes
 from pmviewer.photons.deposition import Deposited, Deposition, Filling, Prepared, rounds
 from pmviewer.photons.fates import Fates
@@ -159,7 +160,11 @@ def trace_pass(
         N = filling if guided is None else guided.N
         if fates is not None:
             batches = batches[: -(-fates.trajectories // BATCH)]
-        made = _deposited(deposition, batches, last, first_index, run, caustic_unit, global_unit, N, fates)
+        # Other trajectories than those of both maps can be left out without changing what the latter count.
+        spare = projection is None and guided is None and deposition.criterion is not None
+        must = last if not spare else filling if deposition.global_classes else 0
+        many = last, must
+        made = _deposited(deposition, batches, many, first_index, run, caustic_unit, global_unit, N, fates)
         return made if guided is None else _with_tests(made, guided)
     results = run([task for _, task in batches])
     counts = sum((r[2] for r in results), np.zeros(N_COUNTS, np.int64))
@@ -266,7 +271,7 @@ def _with_tests(made: PhotonMaps, guided: Guided) -> PhotonMaps:
 def _deposited(
     deposition: Deposition,
     numbered: list[Numbered],
-    last: int,
+    trajectories: tuple[int, int],
     first_index: int,
     run: Runner,
     caustic_unit: float,
@@ -274,7 +279,13 @@ def _deposited(
     filling: int,
     fates: Fates | None = None,
 ) -> PhotonMaps:
-    """The pass's maps by the rules of `deposition`, from its batches, round by round where rounds matter."""
+    """The pass's maps by the rules of `deposition`, from its batches, round by round where rounds matter.
+
+    trajectories: how many there are, and how many must be traced even if the caustic map has converged before; beyond,
+    the pass ends when it has. caustic_unit: that of all trajectories.
+    """
+    last, must = trajectories
+    criterion, others, sampled_of, converged = deposition.criterion, None, 0, None
     caustic, global_ = Filling(deposition.caustic), Filling(deposition.global_)
     if fates is not None:
         caustic, global_ = fates.fillings(deposition)
@@ -304,6 +315,18 @@ def _deposited(
         sampled += [r[2] for r in results]
         counts += sum((r[3] for r in results), np.zeros(N_COUNTS, np.int64))
         ledger += sum((r[4] for r in results), np.zeros(N_LEDGER))
+        traced = min(some.stop * BATCH, last)
+        if criterion is None or traced < min(must, last):
+            continue
+        if others is None or sampled_of < min(filling, SAMPLED):
+            sampled_of = min(filling, SAMPLED, traced)
+            others = other_light(criterion, _join(sampled), global_unit * filling / sampled_of)
+        converged = caustic.converged(criterion, others, caustic_unit * last / traced, run)
+        if converged.done and traced < last:
+            converged = replace(converged, spared=last - traced)
+            caustic_unit *= last / traced
+            last = traced
+            break
     (in_caustic, in_global) = run([lambda: caustic.finish(caustic_unit), lambda: global_.finish(global_unit)])
     return PhotonMaps(
         caustic=in_caustic[0],
@@ -317,8 +340,8 @@ def _deposited(
         normals=in_global[1],
         caustic_normals=in_caustic[1],
         sample=_join(sampled),
-        sample_unit=global_unit * max(filling / SAMPLED, 1.0),
-        deposited={"caustic": in_caustic[3], "global": in_global[3]},
+        sample_unit=global_unit * filling / max(min(filling, SAMPLED, last), 1),
+        deposited={"caustic": replace(in_caustic[3], converged=converged), "global": in_global[3]},
     )
 
 

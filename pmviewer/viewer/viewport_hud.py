@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ from imgui_bundle import imgui
 from numpy.typing import NDArray
 
 from pmviewer.engine.frame import Frame
-from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.output.diagnostic_views import CLASS_COLOURS, DIAGNOSTICS
 from pmviewer.output.falsecolour import COLOURS, ERROR_SCALE, Scale
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import si
@@ -57,7 +58,9 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         _depth_legend(viewport, *viewport.picture.depth_range)
     if view == "error":
         _error_legend(viewport)
-    if view in DIAGNOSTICS and not DIAGNOSTICS[view].cells and viewport.picture is not None:
+    if view in DIAGNOSTICS and DIAGNOSTICS[view].classes:
+        _class_legend(viewport, DIAGNOSTICS[view].classes)
+    elif view in DIAGNOSTICS and not DIAGNOSTICS[view].cells and viewport.picture is not None:
         _scale_legend(viewport, viewport.picture.scale, DIAGNOSTICS[view].colours)
     if state.settings.overlays.lights.show:
         _light_labels(viewport)
@@ -124,6 +127,8 @@ def _value_under_mouse(viewport: Viewport) -> str:
         values = frame.image(view)[y, x]
         if values[0] < 0:
             return f"{pixel[0]}, {pixel[1]}    {DIAGNOSTICS[view].none}"
+        if DIAGNOSTICS[view].classes:
+            return f"{pixel[0]}, {pixel[1]}    {DIAGNOSTICS[view].classes[int(values[0])]}"
         if DIAGNOSTICS[view].cells:
             return f"{pixel[0]}, {pixel[1]}    cell {int(values[0])}{', beyond the cut-off' if values[0] % 1 else ''}"
     else:
@@ -167,6 +172,13 @@ def tick_text(value: float) -> str:
         if abs(value) >= 10 * factor:
             return f"{value / factor:.6g}{prefix}"
     return f"{value:.6g}"
+
+
+def _class_legend(viewport: Viewport, names: Sequence[str]) -> None:
+    """A patch of colour for each class, the last one on top."""
+    bands = [colour for colour in CLASS_COLOURS[len(names) - 1 :: -1] for _ in range(16)]  # sharp edges
+    labels = [((i + 0.5) / len(names), name) for i, name in enumerate(reversed(names))]
+    _legend(viewport, labels, np.array(bands))
 
 
 def _legend(viewport: Viewport, labels: list[tuple[float, str]], colours: NDArray[np.floating]) -> None:

@@ -30,6 +30,7 @@ RULES = {
     "step": {"deposition": "density control"},
     "cosine": {"deposition": "density control", "acceptance": "cosine"},
     "constant": {"deposition": "constant density"},
+    "converging": {"deposition": "density control", "convergence": "square"},
     "guided": {"deposition": "density control", "emission": "Peter-Pietrek"},
     "Christensen": {"emission": "Christensen keep"},
 }
