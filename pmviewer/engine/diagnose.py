@@ -107,7 +107,7 @@ def refused_view(view: str, plan: Plan) -> str | None:
     family = DIAGNOSTICS[view].family
     if family == "look-up" and not plan.photons:
         return "Nothing is looked up: this method uses no photons, or no surface stores them."
-    if family == "density" and not plan.photons:
+    if family in ("importance", "density", "storing", "convergence") and not plan.photons:
         return "No photons are stored: this method uses none, or no surface stores them."
     if view in ("required density", "density ratio"):
         if not plan.importance and plan.deposition != "constant density":

@@ -164,10 +164,9 @@ def test_a_session_that_does_not_start_is_an_error_in_the_log():
 
 
 def test_figures_of_deposition():
-    lossy = Deposited(
-        1000, 250, 0, 10.0, 7.5, 2.5, 1.0, (0.5, 1.0, 4.0, 9.0), weight_histogram(np.array([0.6, 1.0, 5.0]))
-    )
-    shared = Deposited(1000, 400, 600, 10.0, 10.0)
+    counts = weight_histogram(np.array([0.6, 1.0, 5.0]))
+    lossy = Deposited(arrived=1000, stored=250, arrived_power=10.0, discarded_power=2.5, histogram=counts)
+    shared = Deposited(arrived=1000, stored=400, redistributed=600, arrived_power=10.0)
     rows = {name: [text.split() for text in texts] for name, texts in deposition_rows({"a": lossy, "b": shared})}
     assert rows["Arrived"] == [["1,000"], ["1,000"]]
     assert rows["Stored"] == [["250", "25%"], ["400", "40%"]]
