@@ -9,7 +9,7 @@ import numpy as np
 from pmviewer.engine.deposition import SEED, Rules, importance_of, sampled_classes
 from pmviewer.engine.importance import ImportanceStage
 from pmviewer.engine.method import Plan
-from pmviewer.importance.rules import relative_importance, typical_importance
+from pmviewer.importance.rules import relative_importance, full_importance
 from pmviewer.maps.importance import ImportanceMap, Importons, build_importance
 from pmviewer.maps.power import luminances
 from pmviewer.maps.record import CAUSTIC, DIRECT
@@ -47,13 +47,13 @@ def guidance_of(settings: Settings, plan: Plan, importance: ImportanceStage) -> 
     if classes := plan.caustic_mask:
         made = importance_of(maps, "caustic")
         weight = how.caustic_M_r / how.M_r if plan.global_classes else 1.0
-        evaluate = relative_importance(made, typical_importance(made))
+        evaluate = relative_importance(made, full_importance(made))
         sought.append(Sought("caustic", evaluate, classes, classes, weight))
     if classes := plan.global_classes:
         made = importance_of(maps, "global")
-        typical, further = typical_importance(made), _scattered(settings, importance, made)
-        sought.append(Sought("global", relative_importance(made, typical), classes & first, classes))
-        sought.append(Sought("global", relative_importance(further, typical, np.inf), first, 0))
+        full, further = full_importance(made), _scattered(settings, importance, made)
+        sought.append(Sought("global", relative_importance(made, full), classes & first, classes))
+        sought.append(Sought("global", relative_importance(further, full, np.inf), first, 0))
     return Guidance(plan.emission, sought, how.tests, how.important)
 
 

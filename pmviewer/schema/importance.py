@@ -123,8 +123,8 @@ class Importance(Group):
     )
     tests: int = setting(
         2,
-        "Test photons from each stratum of a light's directions, at least: fewer allow finer strata. An eighth "
-        "(Peter-Pietrek) or a quarter (Christensen) of a pass's photons are test photons.",
+        "Test photons from each stratum of a light's directions, at least: fewer allow finer strata. A sixteenth "
+        "(Peter-Pietrek) or an eighth (Christensen) of a pass's photons are test photons.",
         stage="photons",
         scale="log",
         unit="photons",
@@ -134,7 +134,8 @@ class Importance(Group):
     )
     important: float = setting(
         0.05,
-        "Importance, relative to the typical one, from which a place is important: Christensen discard drops test "
+        "Importance, relative to that which most seen places exceed, from which a place is important: Christensen discard "
+        "drops test "
         "photons that reach such a place, and those around them, and sends more of less power.",
         stage="photons",
         scale="log",
