@@ -76,8 +76,6 @@ def _deposition(path: str, settings: Settings, plan: Plan) -> str | None:
     asked, active = settings.importance.deposition, plan.deposition
     if path == "importance.deposition":
         return None if active == asked else f"{asked} needs importance (importance.map)."
-    if path == "importance.epsilon" and active == "all" and plan.emission.startswith("Christensen"):
-        return None
     if path in _KELLER_WALD_ONLY:
         return None if active == "Keller-Wald" else "Only with the deposition rule 'Keller-Wald'."
     if path == "importance.density":

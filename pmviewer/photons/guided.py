@@ -2,10 +2,10 @@
 met.
 
 Test photons are a sixteenth or an eighth of all. q_s is the stratum's share of the emitted power, I_s the mean
-importance that test photons from it met, known from those of this pass and of the passes before (`estimated`); powers are in units
-of Φ/N. What a test photon met is taken from its first diffuse surface: the importance of that place to photons that go
-on from there (`pmviewer.photons.scattered`) tells more than the one way on that it took. For n photons the error of the
-picture, Σ q²·I/(n·p), is least where they leave with probabilities p ∝ q·√I.
+importance that test photons from it met, known from those of this pass and of the passes before (`estimated`); powers
+are in units of Φ/N. What a test photon met is taken from its first diffuse surface: the importance of that place to
+photons that go on from there (`pmviewer.photons.scattered`) tells more than the one way on that it took. For n photons
+the error of the picture, Σ q²·I/(n·p), is least where they leave with probabilities p ∝ q·√I.
 
 **Peter-Pietrek** (1998). Test photons are not stored. Photons leave stratum s with the probability
 p_s = (1 − δ)·q_s·√I_s/Σ q·√I + δ·q_s, of n in all, and have the power q_s·N/(n·p_s), never more than N/(δ·n). (Peter
