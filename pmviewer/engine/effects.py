@@ -84,8 +84,6 @@ def _deposition(path: str, settings: Settings, plan: Plan) -> str | None:
     asked, active = settings.importance.deposition, plan.deposition
     if path == "importance.deposition":
         return None if active == asked else f"{asked} needs importance (importance.map)."
-    if path == "importance.epsilon" and active == "all" and plan.emission.startswith("Christensen"):
-        return None
     if path == "importance.convergence":
         if active not in ("density control", "constant density"):
             return "Only with density control."

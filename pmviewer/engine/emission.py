@@ -9,7 +9,7 @@ import numpy as np
 from pmviewer.engine.deposition import SEED, Rules, importance_of, sampled_classes
 from pmviewer.engine.importance import ImportanceStage
 from pmviewer.engine.method import Plan
-from pmviewer.importance.rules import relative_importance, typical_importance
+from pmviewer.importance.rules import full_importance, relative_importance
 from pmviewer.maps.importance import ImportanceMap, Importons, build_importance
 from pmviewer.maps.power import luminances
 from pmviewer.maps.record import CAUSTIC, DIRECT
@@ -23,6 +23,8 @@ from pmviewer.settings import Settings
 MOST_SCATTERED = 1 << 15
 """Importons that are scattered on."""
 SCATTERED_NEIGHBOURS = 50
+LEAST = 0.2
+"""Importance of places for storing photons: look-ups at the border of what is seen reach across it."""
 SCATTER_SEED = 0x5CA77E
 
 
@@ -31,7 +33,7 @@ def emission_key(settings: Settings, plan: Plan, importance: ImportanceStage) ->
     maps, how = importance.latest, settings.importance
     if plan.emission == "off" or maps is None:
         return ()
-    key = "emission", plan.emission, importance.key, maps.traced, how.tests, how.important, how.epsilon
+    key = "emission", plan.emission, importance.key, maps.traced, how.tests, how.important
     return (*key, how.caustic_M_r / how.M_r)
 
 
@@ -47,13 +49,13 @@ def guidance_of(settings: Settings, plan: Plan, importance: ImportanceStage) -> 
     if classes := plan.caustic_mask:
         made = importance_of(maps, "caustic")
         weight = how.caustic_M_r / how.M_r if plan.global_classes else 1.0
-        evaluate = relative_importance(made, typical_importance(made))
+        evaluate = relative_importance(made, full_importance(made))
         sought.append(Sought("caustic", evaluate, classes, classes, weight))
     if classes := plan.global_classes:
         made = importance_of(maps, "global")
-        typical, further = typical_importance(made), _scattered(settings, importance, made)
-        sought.append(Sought("global", relative_importance(made, typical), classes & first, classes))
-        sought.append(Sought("global", relative_importance(further, typical, np.inf), first, 0))
+        full, further = full_importance(made), _scattered(settings, importance, made)
+        sought.append(Sought("global", relative_importance(made, full), classes & first, classes))
+        sought.append(Sought("global", relative_importance(further, full, np.inf), first, 0))
     return Guidance(plan.emission, sought, how.tests, how.important)
 
 
@@ -114,8 +116,7 @@ def storage(guidance: Guidance, guided: Guided, settings: Settings, plan: Plan) 
         for goal in guidance.sought:
             if goal.places:
                 seed = settings.render.seed ^ SEED ^ (goal.photons == "global")
-                epsilon = settings.importance.epsilon
-                rules[goal.photons] = Homogeneous(goal.importance, epsilon, guided.smallest, seed)
+                rules[goal.photons] = Homogeneous(goal.importance, LEAST, guided.smallest, seed)
     classes = plan.caustic_mask, plan.global_classes
     return Deposition(rules.get("caustic"), rules.get("global"), *classes, sampled_classes(plan))
 

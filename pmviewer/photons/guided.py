@@ -1,11 +1,11 @@
 """Guided emission (I6): how many photons leave each stratum of the lights, and with which power, by what test photons
 met.
 
-Test photons are an eighth or a quarter of all. q_s is the stratum's share of the emitted power, I_s the mean importance
-that test photons from it met, known from those of this pass and of the passes before (`estimated`); powers are in units
-of Φ/N. What a test photon met is taken from its first diffuse surface: the importance of that place to photons that go
-on from there (`pmviewer.photons.scattered`) tells more than the one way on that it took. For n photons the error of the
-picture, Σ q²·I/(n·p), is least where they leave with probabilities p ∝ q·√I.
+Test photons are a sixteenth or an eighth of all. q_s is the stratum's share of the emitted power, I_s the mean
+importance that test photons from it met, known from those of this pass and of the passes before (`estimated`); powers
+are in units of Φ/N. What a test photon met is taken from its first diffuse surface: the importance of that place to
+photons that go on from there (`pmviewer.photons.scattered`) tells more than the one way on that it took. For n photons
+the error of the picture, Σ q²·I/(n·p), is least where they leave with probabilities p ∝ q·√I.
 
 **Peter-Pietrek** (1998). Test photons are not stored. Photons leave stratum s with the probability
 p_s = (1 − δ)·q_s·√I_s/Σ q·√I + δ·q_s, of n in all, and have the power q_s·N/(n·p_s), never more than N/(δ·n). (Peter
@@ -14,14 +14,15 @@ other.)
 
 **Christensen discard** (course guide, §5.7.4). Strata whose test photons, and those of the strata beside, met nothing
 important keep them as their photons, unless I_s asks for more than there are. Of the others test photons are dropped
-and n photons emitted, p_s ∝ q_s·g_s, with the power q_s·N/(n·p_s).
+and n photons emitted, p_s ∝ q_s·√I_s but ENOUGH times as many as test photons, with the power q_s·N/(n·p_s).
 
 **Christensen keep.** No test photon is dropped. There are two sets, A and B, of h photons a stratum. Set A says how
 many photons the stratum should have, M_s^A ≥ 2h, and a photon of set B gets the power q_s·N/M_s^A, and the other way
-round. What is missing, W_s = q_s·(1 − h/M_s^A − h/M_s^B), is topped up by n photons, p_s ∝ W_s·g_s, of power
+round. What is missing, W_s = q_s·(1 − h/M_s^A − h/M_s^B), is topped up by n photons, p_s ∝ W_s·√I_s, of power
 W_s·N/(n·p_s).
 
-g_s is √(I_s/max I), but at least LEAST, so that the powers of photons that meet one another differ by 1/LEAST at most.
+In both no photon has more power than test photons do, those of refined strata have less the more they matter, and what
+arrives at one place from strata of different importance differs by the root of that.
 
 **Bias.** What decides about a photon's power must not know where that photon went. Peter-Pietrek's test photons, those
 of earlier passes, and in Christensen keep those of the other set, are independent of it: both are exact in the mean.
@@ -49,14 +50,15 @@ from pmviewer.scene.flatten import FlatScene
 Variant = Literal["Peter-Pietrek", "Christensen discard", "Christensen keep"]
 Float = NDArray[np.float64]
 
-DEFENSIVE = 0.25
+DEFENSIVE = 0.1
 """δ."""
-LEAST = 1 / 16
+ENOUGH = 2.0
+"""Photons at least, relative to its test photons, that replace them in a stratum."""
 SCALES = (4, 1)
 """Blurs of growing sharpness in which importance is estimated, between the whole light and the stratum itself."""
-PRIOR = 8.0
+PRIOR = 4.0
 """Test photons that the coarser estimate counts for in the finer one."""
-TEST_SHARE = {"Peter-Pietrek": 0.125, "Christensen discard": 0.25, "Christensen keep": 0.25}
+TEST_SHARE = {"Peter-Pietrek": 1 / 16, "Christensen discard": 1 / 8, "Christensen keep": 1 / 8}
 """Most test photons of a pass relative to all its photons."""
 
 
@@ -178,20 +180,20 @@ def known_of(strata: Strata, tests: Tested, important: float) -> Known:
 def peter_pietrek(strata: Strata, known: Known, n: int, N: int) -> Decision:
     """n photons by what is known."""
     q, none = strata.power, np.zeros(strata.n)
-    wanted = q * np.sqrt(estimated(strata, known))
-    share = (1 - DEFENSIVE) * wanted / wanted.sum() + DEFENSIVE * q if wanted.any() else q.copy()
+    wanted = q * _root(estimated(strata, known))
+    share = (1 - DEFENSIVE) * wanted / wanted.sum() + DEFENSIVE * q
     return share, _powers(q, share, n, N), (none, none)
 
 
 def discard(strata: Strata, known: Known, h: int, n: int, N: int) -> Decision:
     """Test photons of strata without hits, n others from the rest."""
     q, none = strata.power, np.zeros(strata.n)
-    value = graded(estimated(strata, known))
-    wanted = q * value
-    refined = (beside(strata, known.hits) > 0) | (n * wanted / wanted.sum() > 2 * h)
+    asked = q * _root(estimated(strata, known))
+    asked *= n / asked.sum()
+    refined = (beside(strata, known.hits) > 0) | (asked > 2 * h)
     if not refined.any():
         return q.copy(), np.full(strata.n, N / n), (none, none)
-    share = np.where(refined, q * np.maximum(value, LEAST), 0.0)
+    share = np.where(refined, np.maximum(asked, ENOUGH * 2 * h), 0.0)
     share /= share.sum()
     of_tests = np.where(refined, 0.0, q * N / (2 * h))
     return share, _powers(q, share, n, N), (of_tests, of_tests)
@@ -201,23 +203,20 @@ def keep(strata: Strata, a: Known, b: Known, h: int, n: int, N: int) -> Decision
     """Test photons of set A by what is known without them, `b`, and the other way round; n photons on top."""
     q, asked = strata.power, []
     for known in (a, b):
-        value = graded(estimated(strata, known))
-        there = n + 2 * h * strata.n * float(q[value > 0].sum())
-        asked.append(np.maximum(there * q * value / (q * value).sum(), 2 * h))
+        wanted = q * _root(estimated(strata, known))
+        asked.append(np.maximum((n + 2 * h) * wanted / wanted.sum(), 2 * h))
     missing = np.maximum(q * (1 - h / asked[0] - h / asked[1]), 0.0)
     missing[missing < 1e-9 * q] = 0.0
-    share = missing * np.maximum(graded(estimated(strata, a + b)), LEAST)
+    share = missing * np.maximum(_root(estimated(strata, a + b)), 1e-6)
     if share.any():
         share /= share.sum()
     return share, _powers(missing, share, n, N), (q * N / asked[1], q * N / asked[0])
 
 
-def graded(value: Float) -> Float:
-    """g of the module's text; 0 where nothing was met, and 1 everywhere if nothing was met at all."""
+def _root(value: Float) -> Float:
+    """√I relative to its largest; 1 everywhere if nothing was met at all."""
     largest = float(value.max(initial=0.0))
-    if not largest > 0:
-        return np.ones_like(value)
-    return np.where(value > 0, np.clip(np.sqrt(value / largest), LEAST, 1.0), 0.0)
+    return np.sqrt(value / largest) if largest > 0 else np.ones_like(value)
 
 
 def estimated(strata: Strata, known: Known) -> Float:

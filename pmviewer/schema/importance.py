@@ -160,8 +160,8 @@ class Importance(Group):
     )
     tests: int = setting(
         2,
-        "Test photons from each stratum of a light's directions, at least: fewer allow finer strata. An eighth "
-        "(Peter-Pietrek) or a quarter (Christensen) of a pass's photons are test photons.",
+        "Test photons from each stratum of a light's directions, at least: fewer allow finer strata. A sixteenth "
+        "(Peter-Pietrek) or an eighth (Christensen) of a pass's photons are test photons.",
         stage="photons",
         scale="log",
         unit="photons",
@@ -171,8 +171,8 @@ class Importance(Group):
     )
     important: float = setting(
         0.05,
-        "Importance, relative to the typical one, from which a place is important: Christensen discard drops test "
-        "photons that reach such a place, and those around them, and sends more of less power.",
+        "Importance, relative to what most seen places have, from which a place is important: Christensen discard drops "
+        "test photons that reach such a place, and those around them, and sends more of less power.",
         stage="photons",
         scale="log",
         title="important from",
