@@ -130,6 +130,29 @@ def compare(
     typer.echo(compare_files(image, reference))
 
 
+@app.command("compare-importance")
+def compare_importance(
+    scene: SceneArgument,
+    equal: Annotated[str | None, typer.Option(help="What is equal: photons (stored) or error.")] = None,
+    passes: Annotated[int | None, typer.Option(min=1, help="Passes with importance.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="PNG file: both pictures and the table.")
+    ] = None,
+    reference: Annotated[
+        str, typer.Option(metavar="FILE", help="EXR to measure against; auto: the scene's own if it fits; none.")
+    ] = "auto",
+    threads: ThreadsOption = None,
+    set_: SetOption = None,
+    define: ParameterOption = None,
+) -> None:
+    """Compare the picture with importance and without, at as many stored photons or at equal error."""
+    from pmviewer.gain_job import gain_job
+    from pmviewer.job import load_job
+
+    job = load_job(scene, set_ or [], define or [])
+    gain_job(job, output, equal=equal, passes=passes, reference=reference, threads=threads)
+
+
 @app.command()
 def scenes() -> None:
     """List the bundled scenes."""

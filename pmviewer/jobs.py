@@ -110,6 +110,8 @@ def _view(settings: Settings, opened: OpenScene) -> str:
 
 def _reference(source: str, scene: Scene, settings: Settings) -> Reference:
     """Read the reference, checked against the picture that will be rendered. Raises SceneError."""
+    if settings.free_camera.on:
+        raise SettingError("References are seen by the render camera: leave out free_camera.on, or --reference.")
     camera = resolve_camera(scene, settings.camera)
     path = reference_of(scene) if source == "auto" else Path(source)
     if path is None:

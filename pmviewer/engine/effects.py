@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pmviewer.engine.diagnose import OF_A_MAP, judges, refused_view
 from pmviewer.engine.method import Plan, plan_of
+from pmviewer.engine.without_importance import refusal
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings import Settings
@@ -73,6 +74,16 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
         return "Direct light is not computed: a map is shown alone, or nothing is diffuse."
     if group == "direct":
         return _direct(path, settings, plan, traits)
+    if group == "free_camera" and path != "free_camera.on" and not settings.free_camera.on:
+        return "Only with the free camera (free_camera.on)."
+    if group == "compare" and (why := refusal(settings, traits)) is not None:
+        return why
+    if path == "compare.limit" and settings.compare.equal != "error":
+        return "Only at equal error (compare.equal)."
+    if path == "free_camera.cut_height" and not settings.free_camera.cut:
+        return "Nothing is cut open (free_camera.cut)."
+    if path == "free_camera.length" and not settings.free_camera.frustum:
+        return "The frustum is not drawn."
     if path == "render.outline_rays" and plan.path:
         return "The path tracer treats all pixels alike."
     if path == "render.max_depth" and not (plan.path or traits.follows(settings.photons.glossy)):

@@ -37,6 +37,7 @@ from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.choice import CHOICES
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
+from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.gather_points import POINT_COLUMNS, gather_points
 from pmviewer.render.lookup import NO_SITES
 from pmviewer.render.outline import outline_pixels
@@ -57,26 +58,31 @@ COARSE_PIXELS = 160 * 160
 
 
 class Renderer:
-    """One scene with one set of settings. `film` holds what was rendered, `passes` how many passes that is."""
+    """One scene with one set of settings. `film` holds what was rendered, `passes` how many passes that is.
+
+    `render_camera` decides importance, stored photons and radii, `camera` what the film shows: the same unless the free
+    camera is on.
+    """
 
     def __init__(
         self, scene: OpenScene, settings: Settings, pool: WorkPool, cache: StageCache, version: int = 0
     ) -> None:
         """Raises SettingError when the camera is impossible or the image can't fit into memory."""
         self.scene, self.settings, self.pool, self.cache, self.version = scene, settings, pool, cache, version
-        self.camera = resolve_camera(scene.scene, settings.camera)
+        self.render_camera = resolve_camera(scene.scene, settings.camera)
+        self.camera = resolve_view(scene.scene, settings, scene.flat.center, scene.flat.radius)
         check_memory(self.camera.width, self.camera.height, settings.photons.N)
         self.plan: Plan = plan_of(settings, scene.traits)
         self.film = Film(self.camera.width, self.camera.height)
         self.first_radius = (
-            first_radius(scene.flat, self.camera, settings.estimate, settings.render.method)
+            first_radius(scene.flat, self.render_camera, settings.estimate, settings.render.method)
             if self.plan.photons
             else 0.0
         )
         self.tally = Tally()
         self.light = LightStage(scene, settings, self.plan, pool, cache, self.tally)
         self.importance = ImportanceStage(
-            scene, settings, self.plan, self.camera, self.first_radius, pool, cache, self.tally
+            scene, settings, self.plan, self.render_camera, self.first_radius, pool, cache, self.tally
         )
         self._cache: IrradianceCache | None = None
         self._shadows: ShadowMap | None = None

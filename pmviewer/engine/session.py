@@ -160,6 +160,16 @@ class Session:
     def traits(self) -> SceneTraits | None:
         return self._opened.traits if self._opened else None
 
+    @property
+    def threads(self) -> int:
+        """How many the kernels run on."""
+        return self._pool.threads
+
+    @property
+    def opened_scene(self) -> OpenScene | None:
+        """The open scene with all that was derived from it, for renderers beside the session's."""
+        return self._opened
+
     def take_messages(self) -> list[Message]:
         """Messages since the last call."""
         with self._changed:

@@ -14,11 +14,13 @@ from pmviewer.errors import OutputError
 from pmviewer.output.diagnostic_views import DIAGNOSTICS, coloured
 from pmviewer.output.exr import BEAUTY, PREFIX, Value, write_exr
 from pmviewer.output.png import write_png
-from pmviewer.output.tone import display_image
+from pmviewer.output.side_by_side import side_by_side
+from pmviewer.output.tone import display_image, to_uint8
 from pmviewer.settings import Display, Settings, flat
 
 LAYERS = ("beauty", "emission", "direct", "specular", "caustic", "indirect", "albedo", "normal", "depth")
 """The beauty image, its terms in the order in which their sum gives it bit for bit, and the first hit's properties."""
+BEAUTY_VIEW = LAYERS[0]
 _EXR_NAMES = {"beauty": BEAUTY, "normal": "N"}
 RADIANCE_UNIT = "W/(m^2 sr)"
 
@@ -142,6 +144,26 @@ def write_frame_png(
         pixels = display_image(view, frame.image(view), display.exposure, display.tone).pixels
     texts = {PREFIX + name: _text(value) for name, value in frame_metadata(frame).items()}
     write_png(path, pixels, {"Software": f"pmviewer {__version__}", "Title": frame.scene_name, **texts})
+
+
+class Pair(Protocol):
+    """What an exporter reads of `pmviewer.engine.importance_gain.Gain`."""
+
+    def frames(self) -> tuple[Exportable, Exportable]: ...
+    def table(self) -> list[tuple[str, str, str, str]]: ...
+    def sentences(self) -> list[str]: ...
+
+
+def gain_sheet(pair: Pair, display: Display | None = None) -> NDArray[np.uint8]:
+    """Both pictures of a comparison beside each other, with its table. `display`: view, exposure and tone curve; the
+    frames' own if None. What is no layer gives the image."""
+    frames = pair.frames()
+    display = display or frames[0].settings.display
+    view = display.view if display.view in LAYERS else BEAUTY_VIEW
+    left, right = (
+        to_uint8(display_image(view, frame.image(view), display.exposure, display.tone).pixels) for frame in frames
+    )
+    return side_by_side(left, right, ("with importance", "without importance"), pair.table(), pair.sentences())
 
 
 def _plain(value: Any) -> Value:

@@ -44,6 +44,8 @@ class CameraPose:
     near: float = 0.0
     far: float = math.inf
     mirrored: bool = False
+    near_normal: Vec3 | None = None
+    """Unit normal of the near plane, at the distance `near` along it from the eye; None: along the view."""
 
     def axes(self) -> tuple[Matrix, Matrix, Matrix]:
         """Unit vectors to the right of the image, to its top, and into the view.
@@ -101,6 +103,25 @@ class CameraPose:
         projection[0, 0], projection[1, 1] = 1 / half_x, 1 / half_y
         projection[2, 2], projection[2, 3] = -(far + near) / (far - near), -2 * far * near / (far - near)
         projection[3, 2] = -1
+        return projection
+
+    def cut_projection(self, near: float, far: float) -> Matrix:
+        """`projection_matrix` with the camera's own near plane, whichever way it faces, for what is nearer.
+
+        The third row is replaced by the plane's, scaled so that nothing before `far` falls out (Lengyel 2005).
+        """
+        if self.near <= 0:
+            return self.projection_matrix(near, far)
+        if self.near_normal is None:
+            return self.projection_matrix(min(max(near, self.near), 0.99 * far), far)
+        projection = self.projection_matrix(near, far)
+        plane = np.append(self.view_matrix()[:3, :3] @ np.asarray(self.near_normal, float), -self.near)
+        corner = np.linalg.solve(projection, [math.copysign(1, plane[0]), math.copysign(1, plane[1]), 1, 1])
+        reach = float(plane @ corner)
+        if reach > 0:  # else all that the camera can see is cut away, and the plane below is kept for depth
+            projection[2] = 2 / reach * plane - projection[3]
+        else:
+            projection[2] = -2 * projection[3] + plane / max(float(np.abs(plane).max()), 1e-300)
         return projection
 
     def project(self, points: NDArray[np.floating]) -> NDArray[np.float64]:

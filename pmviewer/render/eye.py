@@ -68,8 +68,12 @@ def camera_ray(eye, pixel, u, v):
             eye.z_corner + x * eye.z_right + y * eye.z_down,
         )
     )
-    inv = _f4(1.0) / dot(d, (eye.x_forward, eye.y_forward, eye.z_forward))
-    return d, eye.near * inv, eye.far * inv
+    far = eye.far / dot(d, (eye.x_forward, eye.y_forward, eye.z_forward))
+    near = _f4(0.0)
+    if eye.near > near:
+        towards = dot(d, (eye.x_near, eye.y_near, eye.z_near))
+        near = eye.near / towards if towards > near else _INF
+    return d, near, far
 
 
 @device

@@ -12,7 +12,7 @@ from pmviewer.settings import Settings
 
 EYE_DTYPE = np.dtype(
     [
-        *[(f"{axis}_{part}", "f4") for part in ("eye", "corner", "right", "down", "forward") for axis in "xyz"],
+        *[(f"{axis}_{part}", "f4") for part in ("eye", "corner", "right", "down", "forward", "near") for axis in "xyz"],
         ("near", "f4"),
         ("far", "f4"),
         ("width", "i4"),
@@ -66,8 +66,10 @@ def eye_record(camera: CameraPose, settings: Settings, index: int) -> NDArray[np
     """The part of the record that camera and settings give; the engine fills in masks and radii for the method."""
     record = np.zeros(1, EYE_DTYPE)
     r = record[0]
-    frame = np.concatenate([camera.ray_frame(), camera.axes()[2][None]])
-    for part, vector in zip(("eye", "corner", "right", "down", "forward"), frame, strict=True):
+    forward = camera.axes()[2]
+    near = forward if camera.near_normal is None else camera.near_normal
+    frame = np.concatenate([camera.ray_frame(), [forward, near]])
+    for part, vector in zip(("eye", "corner", "right", "down", "forward", "near"), frame, strict=True):
         for axis, value in zip("xyz", vector, strict=True):
             r[f"{axis}_{part}"] = value
     r["near"], r["far"] = camera.near, camera.far

@@ -10,6 +10,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from pmviewer.schema.base import Auto, Group, Scale, Stage, Vec3, setting
+from pmviewer.schema.compare import Compare
 from pmviewer.schema.display import (
     CacheOverlay,
     Colour,
@@ -25,6 +26,7 @@ from pmviewer.schema.display import (
     ShadowOverlay,
 )
 from pmviewer.schema.estimate import Estimate
+from pmviewer.schema.free_camera import FreeCamera
 from pmviewer.schema.image import CameraSettings, Direct, Gather, Render
 from pmviewer.schema.importance import Importance
 from pmviewer.schema.light_pass import Photons
@@ -34,10 +36,12 @@ __all__ = [
     "CacheOverlay",
     "CameraSettings",
     "Colour",
+    "Compare",
     "Direct",
     "Display",
     "Estimate",
     "FateOverlay",
+    "FreeCamera",
     "Gather",
     "GatherOverlay",
     "Group",
@@ -69,5 +73,7 @@ class Settings(Group):
     gather: Gather = Field(default_factory=Gather)
     render: Render = Field(default_factory=Render)
     camera: CameraSettings = Field(default_factory=CameraSettings)
+    free_camera: FreeCamera = Field(default_factory=FreeCamera)
+    compare: Compare = Field(default_factory=Compare)
     display: Display = Field(default_factory=Display)
     overlays: Overlays = Field(default_factory=Overlays)

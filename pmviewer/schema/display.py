@@ -292,3 +292,10 @@ class Overlays(Group):
         """Whether anything is drawn over the picture."""
         others = self.paths.show or self.gather.show or self.projection.show
         return others or any(style.show for style in self.by_map().values())
+
+    @property
+    def tests_depth(self) -> bool:
+        """Whether surfaces hide any of it."""
+        ways = self.paths, self.gather, self.projection
+        points = any(style.show and style.depth for style in self.by_map().values())
+        return points or any(way.show and way.depth for way in ways)

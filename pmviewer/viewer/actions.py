@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from imgui_bundle import hello_imgui
 
+from pmviewer.render.camera import CameraPose
+from pmviewer.render.free_camera import plan_pose
 from pmviewer.settings import SETTINGS, get
 from pmviewer.viewer import controls
 from pmviewer.viewer.dialogs import FileDialogs
@@ -14,6 +18,8 @@ from pmviewer.viewer.exports import Exports, default_path, fresh_path
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport import VIEWPORT, Fit, Viewport
 
+COMPARISON = "Comparison"
+"""The panel's label."""
 SCENE_PATTERNS = ["*.xml", "*.toml", "*.glb", "*.gltf", "*.obj", "*.ply", "*.stl"]
 EXPOSURE_STEP = 0.5
 
@@ -57,11 +63,14 @@ class Commands:
             "toggle_gather": lambda: self._toggle("overlays.gather.show"),
             "toggle_projection": lambda: self._toggle("overlays.projection.show"),
             "fit_picture": self._fit,
+            "compare_importance": self._compare_importance,
             "toggle_fly": self._toggle_fly,
             "frame_all": self._frame_all,
-            "reset_camera": lambda: state.change(
-                {f"camera.{name}": "auto" for name in ("origin", "target", "up", "fov")}
-            ),
+            "reset_camera": self._reset_camera,
+            "toggle_free": lambda: self._toggle("free_camera.on"),
+            "free_from_above": self._free_from_above,
+            "free_to_render": self._free_to_render,
+            "free_becomes_render": self._free_becomes_render,
             "toggle_panels": self._toggle_panels,
             "toggle_help": self._toggle_help,
             "escape": self._escape,
@@ -120,12 +129,49 @@ class Commands:
         now = choices.index(self.state.settings.display.tone)
         self.state.change({"display.tone": choices[(now + 1) % len(choices)]})
 
+    def _compare_importance(self) -> None:
+        """Start the comparison and bring its panel to the front."""
+        window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(COMPARISON)
+        window.is_visible = window.focus_window_at_next_frame = True
+        self.state.compare_importance()
+
     # camera -----------------------------------------------------------------------------------------------------
 
     def _frame_all(self) -> None:
         pose, geometry = self.state.live_camera(), self.state.session.geometry
         if pose is not None and geometry is not None:
             self.state.move_camera(controls.frame_all(pose, geometry.center, float(geometry.radius)))
+
+    def _reset_camera(self) -> None:
+        """The scene file's camera; the automatic overview while the free camera is on."""
+        group = "free_camera" if self.state.settings.free_camera.on else "camera"
+        self.state.change({f"{group}.{name}": "auto" for name in ("origin", "target", "up", "fov")})
+
+    def _free_from_above(self) -> None:
+        """The free camera straight above scene and render camera, with what is ahead of the latter on top."""
+        self._place_free(lambda render, center, radius: plan_pose(render, center, radius))
+
+    def _free_to_render(self) -> None:
+        """The free camera where the render camera is."""
+        self._place_free(lambda render, center, radius: controls.with_pivot(render, center, radius))
+
+    def _place_free(self, place: Callable[[CameraPose, np.ndarray, float], CameraPose]) -> None:
+        render, geometry = self.state.render_camera(), self.state.session.geometry
+        if render is None or geometry is None:
+            self.state.say("error", "There is no camera yet: open a scene first.")
+            return
+        pose = place(render, geometry.center, float(geometry.radius))
+        values: dict[str, Any] = dict(controls.camera_values(pose, "free_camera"))
+        self.state.change({**values, "free_camera.fov": pose.fov, "free_camera.on": True})
+
+    def _free_becomes_render(self) -> None:
+        """Render what the free camera sees, with importance of its own."""
+        pose = self.state.live_camera()
+        if pose is None or not self.state.settings.free_camera.on:
+            self.state.say("warning", "The free camera is off: the picture is the render camera's already.")
+            return
+        values: dict[str, Any] = dict(controls.camera_values(pose))
+        self.state.change({**values, "camera.fov": pose.fov, "free_camera.on": False})
 
     def _toggle_fly(self) -> None:
         self.state.flying = not self.state.flying

@@ -19,6 +19,7 @@ from pmviewer.viewer import layout
 from pmviewer.viewer.actions import Commands
 from pmviewer.viewer.dialogs import FileDialogs
 from pmviewer.viewer.error_panel import ErrorPanel
+from pmviewer.viewer.gain_panel import GainPanel
 from pmviewer.viewer.help_overlay import draw_help
 from pmviewer.viewer.importance_panel import ImportancePanel
 from pmviewer.viewer.log_panel import LogPanel, draw_toasts
@@ -87,6 +88,7 @@ class ViewerApp:
             "Statistics": StatisticsPanel(self.state).gui,
             "Importance": ImportancePanel(self.state).gui,
             "Error": ErrorPanel(self.state, actions).gui,
+            "Comparison": GainPanel(self.state, actions, self.settings_panel).gui,
             "Log": LogPanel(self.state).gui,
         }
         return layout.Callbacks(
@@ -143,6 +145,7 @@ class ViewerApp:
             glfw.set_window_size_limits(glfw_window_hello_imgui(), width, height, glfw.DONT_CARE, glfw.DONT_CARE)
         self._running = True
         self.state.session.on_update = self.wake
+        self.state.gain.on_update = self.wake
         self.state.jobs.on_done = self.state.comparison.measuring.on_done = self.wake
 
     def _pre_new_frame(self) -> None:
@@ -193,6 +196,7 @@ class ViewerApp:
     def _before_exit(self) -> None:
         self._running = False
         self.state.session.on_update = None
+        self.state.gain.finish()
         for jobs in (self.state.jobs, self.state.comparison.measuring):
             jobs.on_done = None
             jobs.finish()

@@ -22,7 +22,15 @@ if TYPE_CHECKING:  # brings OpenEXR and scipy along, which the window doesn't wa
 COMPARED_VIEWS = ("reference", "error")
 EARLIER_RUNS = 8
 NO_REFERENCE = "There is no reference: load one with File > Load reference, or drop an EXR file onto the window."
-_SAME_PICTURE = ("display.", "overlays.", "camera.", "render.method", "render.passes", "render.time_limit")
+_SAME_PICTURE = (
+    "display.",
+    "overlays.",
+    "camera.",
+    "free_camera.",
+    "render.method",
+    "render.passes",
+    "render.time_limit",
+)
 """Settings that don't tell one run's curve from another's, or are named apart."""
 
 
@@ -204,6 +212,8 @@ def _mismatch(reference: Reference, scene: Scene, frame: Frame) -> str | None:
         wanted = "×".join(str(side) for side in reference.size)
         return f"The reference has {wanted} pixels, the picture {width}×{height}: only the same size can be compared."
     if not frame.camera.sees_like(resolve_camera(scene, size_only(frame.settings.camera))):
+        if frame.settings.free_camera.on:
+            return "The free camera is on: the reference is seen by the scene's own camera."
         return "The camera was moved: the reference is seen by the scene's own. Press Backspace to return to it."
     return None
 

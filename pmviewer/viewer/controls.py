@@ -124,6 +124,6 @@ def frame_all(pose: CameraPose, center: Vector, radius: float) -> CameraPose:
     return replace(pose, origin=_vec3(center - forward * distance), target=_vec3(np.asarray(center, float)))
 
 
-def camera_values(pose: CameraPose) -> dict[str, Vec3]:
-    """The pose as settings."""
-    return {"camera.origin": pose.origin, "camera.target": pose.target, "camera.up": pose.up}
+def camera_values(pose: CameraPose, group: str = "camera") -> dict[str, Vec3]:
+    """The pose as settings of that group, "camera" or "free_camera"."""
+    return {f"{group}.origin": pose.origin, f"{group}.target": pose.target, f"{group}.up": pose.up}

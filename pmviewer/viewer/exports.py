@@ -38,8 +38,20 @@ class Exports:
     def png(self, path: Path, *, overlays: bool) -> None:
         """The picture at its own resolution as it is shown, with or without the points over it."""
         settings, frame = self._state.settings, self._state.frame
-        points = overlays and settings.overlays.any_shown
+        points = overlays and (settings.overlays.any_shown or self._state.frustum() is not None)
         display = self._state.shown_display
+        pair, gain = self._state.shown_pair(), self._state.gain.gain
+        if pair is not None and gain is not None:
+
+            def sheet() -> str:
+                from pmviewer.output.frame_export import gain_sheet
+                from pmviewer.output.png import write_png
+
+                write_png(path, gain_sheet(gain, pair[1]))
+                return f"wrote {path.absolute()}"
+
+            self._state.jobs.start("writing PNG", sheet)
+            return
         if frame is not None and not points and display.view not in ("geometry", *COMPARED_VIEWS):
             # The same code as `pmviewer render` uses, so that both write the same picture.
 

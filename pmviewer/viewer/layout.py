@@ -11,7 +11,7 @@ from pmviewer.viewer import theme
 from pmviewer.viewer.viewport import VIEWPORT
 
 Draw = Callable[[], None]
-PANELS = ("Settings", "Overlays", "Statistics", "Importance", "Error", "Log")
+PANELS = ("Settings", "Overlays", "Statistics", "Importance", "Error", "Comparison", "Log")
 _PLACE = {"Settings": "Left", "Overlays": "Right"}
 """Where panels are docked; the others at the bottom."""
 WINDOW_SIZE = (1440, 900)

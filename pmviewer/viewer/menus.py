@@ -39,8 +39,8 @@ class Menus:
             self._item("Keys and mouse", "toggle_help", self._state.help_open)
             imgui.end_menu()
 
-    def _item(self, text: str, action: str, selected: bool = False) -> None:
-        if imgui.menu_item(text, keys_of(action), selected)[0]:
+    def _item(self, text: str, action: str, selected: bool = False, enabled: bool = True) -> None:
+        if imgui.menu_item(text, keys_of(action), selected, enabled)[0]:
             self._actions[action]()
 
     def _file(self) -> None:
@@ -90,6 +90,16 @@ class Menus:
         self._item("Reset the camera", "reset_camera")
         self._item("Fly", "toggle_fly", self._state.flying)
         self._item("Fit the picture", "fit_picture")
+        if imgui.begin_menu("Free camera"):
+            free = self._state.settings.free_camera
+            self._item("Free camera", "toggle_free", free.on)
+            if imgui.menu_item("Frustum of the render camera", "", free.frustum, free.on)[0]:
+                self._state.change({"free_camera.frustum": not free.frustum})
+            imgui.separator()
+            self._item("From above", "free_from_above")
+            self._item("Go to the render camera", "free_to_render")
+            self._item("Take this view as render camera", "free_becomes_render", enabled=free.on)
+            imgui.end_menu()
         imgui.separator()
         params = hello_imgui.get_runner_params()
         for label in self._panels:
@@ -102,6 +112,7 @@ class Menus:
     def _render(self) -> None:
         self._item("Resume" if self._state.session.paused else "Pause", "toggle_pause")
         self._item("Restart", "restart")
+        self._item("Compare with and without importance", "compare_importance", self._state.gain.running)
         imgui.separator()
         info = SETTINGS["render.method"]
         method = get(self._state.settings, info.path)

@@ -29,9 +29,11 @@ from pmviewer.settings import (
     ProjectionOverlay,
 )
 from pmviewer.viewer.cells import CellCloud
+from pmviewer.viewer.frustum import FrustumLines
 from pmviewer.viewer.gl_program import load_program, set_uniforms
 from pmviewer.viewer.lines import LineCloud, circles, flights, gather_lines, light_points
 from pmviewer.viewer.overlays import PointCloud
+from pmviewer.viewer.pair import PairPlanes
 from pmviewer.viewer.reference_plane import COLOUR_UNIT, REFERENCE_UNIT, ReferencePlane
 
 if TYPE_CHECKING:
@@ -86,11 +88,13 @@ class Picture:
         self.gather_ends = PointCloud(context)
         self.circles = LineCloud(context)
         self.cells = CellCloud(context)
+        self.frustum = FrustumLines(context)
         self._drawn_ways: dict[str, Any] = {}
         self.depth_range = (0.0, 1.0)
         self.scale = Scale(0.0, 1.0)
         """Of the diagnostic view that is shown."""
         self.reference = ReferencePlane(context)
+        self.pair = PairPlanes(context)
         self._picture_program = load_program(context, "picture")
         self._geometry_program = load_program(context, "geometry")
         self._triangle = context.vertex_array(self._picture_program, [])
@@ -251,10 +255,12 @@ class Picture:
         overlays: Overlays | None,
         *,
         navigating: bool = False,
+        split: float | None = None,
     ) -> moderngl.Texture:
         """Draw into the framebuffer of that name and return its colour texture (rows bottom to top).
 
-        `camera` is the frame's; None draws the surround alone. `overlays` None leaves the points out.
+        `camera` is the frame's; None draws the surround alone. `overlays` None leaves the points out. With
+        `split` the uploaded pair is drawn instead of the frame: its first picture up to that share of the width.
         """
         framebuffer = self._framebuffer(name, target.size)
         framebuffer.scissor = (0, 0, *framebuffer.size)
@@ -272,7 +278,10 @@ class Picture:
         framebuffer.viewport = (left, target.size[1] - top - height, width, height)
         framebuffer.scissor = clip
         near, far = clip_planes(camera, self._center, self._radius)
-        view, projection = camera.view_matrix(), camera.projection_matrix(near, far)
+        view, projection = camera.view_matrix(), camera.cut_projection(near, far)
+        if split is not None and self.pair.planes:
+            self._draw_pair(framebuffer, target, clip, display, split)
+            return colour
         as_geometry = display.view == "geometry" or not self.has_plane
         if as_geometry:
             points = overlays is not None and overlays.any_shown
@@ -281,13 +290,33 @@ class Picture:
             self._draw_plane(display, width)
         if overlays is not None:
             self._draw_points(framebuffer, overlays, view, projection, target.pixel_ratio, navigating)
+            self._draw_frustum(framebuffer, view, projection, target.pixel_ratio, overlays)
         self.context.disable(moderngl.DEPTH_TEST)
         return colour
 
-    def _draw_plane(self, display: Display, width: int) -> None:
-        plane = self.reference.texture if display.view == "reference" else self._plane
+    def _draw_pair(
+        self,
+        framebuffer: moderngl.Framebuffer,
+        target: Target,
+        clip: tuple[int, int, int, int],
+        display: Display,
+        split: float,
+    ) -> None:
+        """The two pictures of the pair on both sides of the split."""
+        left, _, width, _ = target.picture
+        x, y, w, h = clip
+        middle = min(max(round(left + split * width), x), x + w)
+        for plane, start, end in zip(self.pair.planes, (x, middle), (middle, x + w), strict=True):
+            if end > start:
+                framebuffer.scissor = (start, y, end - start, h)
+                framebuffer.use()
+                self._draw_plane(display, width, plane)
+
+    def _draw_plane(self, display: Display, width: int, other: moderngl.Texture | None = None) -> None:
+        """The frame's plane, or another one of the same kind."""
+        plane = other or (self.reference.texture if display.view == "reference" else self._plane)
         assert plane is not None
-        coarse = self._coarse and display.view != "reference"
+        coarse = self._coarse and display.view != "reference" and other is None
         diagnostic = DIAGNOSTICS.get(display.view)
         squares = (width / plane.width >= NEAREST_FROM and not coarse) or display.view == "error" or diagnostic
         sampling = moderngl.NEAREST if squares else moderngl.LINEAR
@@ -339,9 +368,7 @@ class Picture:
         if not overlays.any_shown:
             return
         context = self.context
-        ways = overlays.paths, overlays.gather, overlays.projection
-        tested = [style.show and style.depth for style in styles.values()]
-        if any(tested) or any(way.show and way.depth for way in ways):
+        if overlays.tests_depth:
             self._draw_depth(framebuffer, view, projection)
         for name, style in styles.items():
             if not style.show:
@@ -380,6 +407,24 @@ class Picture:
             colour: Literal["light", "power"] = "light" if gather.colour == "source" else "power"
             ends = PointOverlay(size=min(3.0 * gather.size, 12.0), colour=colour)
             self.gather_ends.draw(ends, view, projection, GATHER_ENDS, pixel_ratio)
+        framebuffer.depth_mask = True
+        framebuffer.use()
+
+    def _draw_frustum(
+        self,
+        framebuffer: moderngl.Framebuffer,
+        view: Matrix,
+        projection: Matrix,
+        pixel_ratio: float,
+        overlays: Overlays,
+    ) -> None:
+        if not self.frustum.shown:
+            return
+        if not overlays.tests_depth:  # else surfaces are in the depth buffer already
+            self._draw_depth(framebuffer, view, projection)
+        framebuffer.depth_mask = False
+        framebuffer.use()
+        self.frustum.draw(view, projection, framebuffer.viewport[2:], pixel_ratio)
         framebuffer.depth_mask = True
         framebuffer.use()
 

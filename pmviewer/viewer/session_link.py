@@ -36,6 +36,10 @@ class SessionLike(Protocol):
     @property
     def geometry(self) -> Any: ...
     @property
+    def opened_scene(self) -> Any: ...
+    @property
+    def threads(self) -> int | None: ...
+    @property
     def paused(self) -> bool: ...
     def open(
         self, source: Any, settings: Settings | None = None, parameters: Mapping[str, str] | None = None
@@ -178,6 +182,14 @@ class SessionLink:
     @property
     def geometry(self) -> Any:
         return self._session.geometry if self._session else None
+
+    @property
+    def threads(self) -> int | None:
+        return self._session.threads if self._session else None
+
+    @property
+    def opened_scene(self) -> Any:
+        return self._session.opened_scene if self._session else None
 
     @property
     def paused(self) -> bool:

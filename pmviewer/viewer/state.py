@@ -9,18 +9,33 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pmviewer.engine.frame import Frame, Level, Message
 from pmviewer.errors import PmviewerError
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose, resolve_camera
-from pmviewer.settings import CameraSettings, Display, Settings, info_of, parse_assignments, with_values
+from pmviewer.render.free_camera import frustum_lines, resolve_view
+from pmviewer.render.planes import AOVS, TERMS
+from pmviewer.settings import (
+    CameraSettings,
+    Display,
+    FreeCamera,
+    Settings,
+    info_of,
+    parse_assignments,
+    with_values,
+)
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.controls import camera_values
+from pmviewer.viewer.importance_gain import GainRun
 from pmviewer.viewer.jobs import Jobs
 from pmviewer.viewer.recent import RecentFiles
 from pmviewer.viewer.session_link import SessionLike
 
 InactiveReason = Callable[[str, Settings, Any], str | None]
+LAYERS = ("beauty", *TERMS, *AOVS)
 LOG_LINES = 2000
 TOAST_SECONDS = 8.0
 
@@ -60,6 +75,7 @@ class ViewerState:
         self.recent = recent
         self.jobs = Jobs(self.say)
         self.comparison = Comparison(session, self.jobs, self.say)
+        self.gain = GainRun(session, self.say)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
         self._said: deque[Message] = deque()
@@ -100,9 +116,11 @@ class ViewerState:
 
     def resolved(self, path: str) -> Any:
         """What "auto" means now for that setting, or None when it isn't known yet."""
-        pose = self.live_camera()
-        if path.startswith("camera."):
-            return getattr(pose, path.removeprefix("camera.")) if pose else None
+        group, _, name = path.partition(".")
+        if group in ("camera", "free_camera"):
+            free = self.live_camera() if self.settings.free_camera.on else None
+            pose = self.render_camera() if group == "camera" else free
+            return getattr(pose, name) if pose else None
         frame, geometry = self.frame, self.session.geometry
         if path == "estimate.radius" and frame is not None and geometry is not None:
             return _first_radius(frame, float(geometry.radius))
@@ -138,9 +156,43 @@ class ViewerState:
         return self.comparison.problem(self.frame) if view in COMPARED_VIEWS else None
 
     def live_camera(self) -> CameraPose | None:
-        """The camera of the newest settings, ahead of the frame's while the user moves it."""
+        """The camera that the newest settings look through, ahead of the frame's while the user moves it; the free
+        camera while it is on."""
+        scene, geometry = self.session.scene, self.session.geometry
+        if scene is None:
+            return None
+        if not self.settings.free_camera.on or geometry is None:
+            return resolve_camera(scene, self.settings.camera)
+        return resolve_view(scene, self.settings, geometry.center, float(geometry.radius))
+
+    def render_camera(self) -> CameraPose | None:
+        """The camera that importance belongs to, by the newest settings."""
         scene = self.session.scene
         return resolve_camera(scene, self.settings.camera) if scene is not None else None
+
+    def frustum(self) -> NDArray[np.float64] | None:
+        """Line ends (2n, 3) of the render camera's frustum while it is drawn."""
+        free, geometry, camera = self.settings.free_camera, self.session.geometry, self.render_camera()
+        if not (free.on and free.frustum) or geometry is None or camera is None:
+            return None
+        return frustum_lines(camera, free.length * float(geometry.radius))
+
+    def shown_pair(self) -> tuple[tuple[Frame, Frame], Display] | None:
+        """The frames with and without importance while the viewport compares them, with a view that both have."""
+        frames = self.gain.frames()
+        if frames is None:
+            return None
+        display = self.settings.display
+        layer = display.view if display.view in LAYERS else "beauty"
+        return frames, display.model_copy(update={"view": layer})
+
+    def compare_importance(self) -> None:
+        """Start the comparison with and without importance, against the reference where that can be compared."""
+        comparison, truth = self.comparison, None
+        if comparison.reference is not None and comparison.problem(self.frame) is None:
+            path = comparison.reference.path
+            truth = comparison.reference.image, f"the reference {path.parent.name}/{path.name}"
+        self.gain.start(truth)
 
     def scene_changed(self) -> bool:
         """True once after another scene was opened; frames of the one before are not shown any more."""
@@ -159,7 +211,8 @@ class ViewerState:
 
     def move_camera(self, pose: CameraPose) -> None:
         self.last_camera_move = time.monotonic()
-        self.change(dict(camera_values(pose)))
+        group = "free_camera" if self.settings.free_camera.on else "camera"
+        self.change(dict(camera_values(pose, group)))
 
     @property
     def navigating(self) -> bool:
@@ -173,7 +226,11 @@ class ViewerState:
         Settings stay when it is a scene, but for the camera's: that was another scene's unless `keep_camera` says
         otherwise. `parameters` are values for the scene file's `<default>` names.
         """
-        settings = self.settings if keep_camera else self.settings.model_copy(update={"camera": CameraSettings()})
+        settings = (
+            self.settings
+            if keep_camera
+            else self.settings.model_copy(update={"camera": CameraSettings(), "free_camera": FreeCamera()})
+        )
         source: str | Path = path
         if str(path).lower().endswith(".toml"):
             from pmviewer.output.session_file import read_session
@@ -204,4 +261,5 @@ class ViewerState:
             self._take(self._said.popleft())
         parameters = self._opening[1] if self._opening is not None else self.parameters
         self.comparison.poll(self.frame, with_own=not parameters)
+        self.gain.poll(self.live_camera())
         self.toasts = [toast for toast in self.toasts if not toast.is_over()][-4:]

@@ -12,6 +12,8 @@ DIM: Colour = (0.60, 0.60, 0.60, 1.0)
 FAINT: Colour = (0.42, 0.42, 0.42, 1.0)
 GOOD: Colour = (0.56, 0.78, 0.48, 1.0)
 WARNING: Colour = (0.95, 0.77, 0.36, 1.0)
+FREE: Colour = (1.0, 0.82, 0.25, 1.0)
+"""Of the free camera: its label and the frustum that it sees."""
 ERROR: Colour = (0.95, 0.45, 0.40, 1.0)
 LEVELS: dict[str, Colour] = {"info": TEXT, "warning": WARNING, "error": ERROR}
 

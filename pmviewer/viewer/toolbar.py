@@ -29,14 +29,19 @@ class Toolbar:
         self._button(icon, "toggle_pause", "Resume" if paused else "Pause", on=paused)
         self._button(fa.ICON_FA_ARROW_ROTATE_RIGHT, "restart", "Restart")
         self._gap()
-        self._setting("render.method", "method", 8.5)
-        self._setting("display.view", "view", 10)
+        self._setting("render.method", "method", 7)
+        self._setting("display.view", "view", 9)
         data = is_data_view(self._state.shown_display)
-        self._setting("display.exposure", "exposure", 8, faded=data)
-        self._setting("display.tone", "tone", 6.5, faded=data)
+        self._setting("display.exposure", "exposure", 6, faded=data)
+        self._setting("display.tone", "tone", 6, faded=data)
         self._gap()
         self._button(fa.ICON_FA_EXPAND, "frame_all", "Frame the whole scene")
         self._button(fa.ICON_FA_PAPER_PLANE, "toggle_fly", "Fly through the scene", on=self._state.flying)
+        free = self._state.settings.free_camera.on
+        text = "Free camera: see the render camera's importance from elsewhere"
+        self._button(fa.ICON_FA_VIDEO, "toggle_free", text, on=free)
+        text = "Compare with and without importance"
+        self._button(fa.ICON_FA_SCALE_BALANCED, "compare_importance", text, on=self._state.gain.running)
         self._gap()
         self._button(fa.ICON_FA_FOLDER_OPEN, "open", "Open a scene or session")
         self._button(fa.ICON_FA_IMAGE, "export_png", "Export the picture as PNG")
@@ -52,9 +57,9 @@ class Toolbar:
 
     @staticmethod
     def _gap() -> None:
-        imgui.same_line(0, imgui.get_font_size() * 0.7)
+        imgui.same_line(0, imgui.get_font_size() * 0.4)
         imgui.text_disabled("|")
-        imgui.same_line(0, imgui.get_font_size() * 0.7)
+        imgui.same_line(0, imgui.get_font_size() * 0.4)
 
     def _setting(self, path: str, label: str, width_em: float, *, faded: bool = False) -> None:
         info, value = SETTINGS[path], get(self._state.settings, path)
@@ -73,4 +78,4 @@ class Toolbar:
             tooltip_text(lines)
         if new is not None:
             self._state.change({path: new})
-        imgui.same_line(0, imgui.get_font_size())
+        imgui.same_line(0, imgui.get_font_size() * 0.6)

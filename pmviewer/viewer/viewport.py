@@ -11,6 +11,7 @@ import moderngl
 import numpy as np
 from imgui_bundle import imgui
 
+from pmviewer.engine.frame import Frame
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose
 from pmviewer.settings import Display
@@ -22,6 +23,8 @@ from pmviewer.viewer.viewport_hud import draw_hud
 
 VIEWPORT = "Viewport"
 MOST_ZOOM = 64.0
+SPLIT_REACH = 8.0
+"""Points from the line between compared pictures at which a drag moves it."""
 _FLY_AXES = {K.d: (1, 0, 0), K.a: (-1, 0, 0), K.e: (0, 1, 0), K.q: (0, -1, 0), K.w: (0, 0, 1), K.s: (0, 0, -1)}
 
 
@@ -61,12 +64,16 @@ class Viewport:
         self._texture: moderngl.Texture | None = None
         self._drawn_key: Any = None
         self._flew_with_right = False
+        self._splitting = False
         self.draw_toasts: Callable[[], None] = lambda: None
 
     # drawing ----------------------------------------------------------------------------------------------------
 
     def shown_camera(self) -> CameraPose | None:
         """The frame's camera, so that points lie on the picture; the newest one when only geometry is shown."""
+        pair = self.state.gain.frames()
+        if pair is not None:
+            return pair[0].camera
         frame = self.state.frame
         if frame is None or self.state.shown_display.view == "geometry":
             return self.state.live_camera() if self.state.session.geometry is not None else None
@@ -107,11 +114,18 @@ class Viewport:
             changed |= picture.upload_cells(frame.projections, overlays.projection)
             changed |= picture.upload_fates(frame.inspection.fates, overlays.fates)
             changed |= picture.upload_lights(frame.known_lights, frame.light_places, overlays.lights)
+        changed |= picture.frustum.upload(self.state.frustum())
+        pair, split = self.state.shown_pair(), None
+        if pair is not None:
+            display, split = pair[1], settings.compare.split
+        changed |= picture.pair.upload(pair[0] if pair is not None else None, display.view)
         camera, target = self.shown_camera(), self.target()
         navigating = self.state.navigating and picture.software
-        key = (camera, target, display, overlays, navigating)
+        key = (camera, target, display, overlays, navigating, split)
         if changed or key != self._drawn_key:
-            self._texture = picture.draw("window", target, camera, display, overlays, navigating=navigating)
+            self._texture = picture.draw(
+                "window", target, camera, display, overlays, navigating=navigating, split=split
+            )
             self._drawn_key = key
             self.redraws += 1
 
@@ -161,17 +175,51 @@ class Viewport:
         if hovered and self.state.settings.overlays.gather.show and is_held(INSPECT_KEY):
             self._inspect()
         pose = self.state.live_camera() if hovered or active or self.state.flying else None
+        if self._drags_split(hovered, active):
+            pose = None
         if pose is not None:
             self._handle(pose, hovered, active)
         draw_hud(self, hovered and not self.alone)
         self.draw_toasts()
+
+    def split_x(self) -> float | None:
+        """Where the line between the compared pictures is, in points from the panel's left edge; None without."""
+        if self.state.gain.frames() is None:
+            return None
+        left, _, width, _ = self.rectangle()
+        return left + self.state.settings.compare.split * width
+
+    def _drags_split(self, hovered: bool, active: bool) -> bool:
+        """Move the line between the compared pictures with the mouse. True while the mouse does that."""
+        x, mouse = self.split_x(), imgui.get_mouse_pos()
+        if x is None:
+            self._splitting = False
+            return False
+        near = hovered and abs(mouse.x - self.origin[0] - x) < SPLIT_REACH
+        if near and imgui.is_mouse_clicked(imgui.MouseButton_.left):
+            self._splitting = True
+        self._splitting = self._splitting and active
+        if near or self._splitting:
+            imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
+        if self._splitting:
+            left, _, width, _ = self.rectangle()
+            share = (mouse.x - self.origin[0] - left) / max(width, 1.0)
+            self.state.change({"compare.split": min(max(share, 0.0), 1.0)})
+        return self._splitting
+
+    def frame_at(self, pixel: tuple[int, int]) -> Frame | None:
+        """The frame that is shown at a pixel of the image."""
+        pair = self.state.gain.frames()
+        if pair is None:
+            return self.state.frame
+        return pair[0 if pixel[0] + 0.5 < self.state.settings.compare.split * pair[0].camera.width else 1]
 
     def _handle(self, pose: CameraPose, hovered: bool, active: bool) -> None:
         io = imgui.get_io()
         before = pose
         geometry = self.state.session.geometry
         radius = float(geometry.radius) if geometry is not None else 1.0
-        if geometry is not None and self.state.settings.camera.target == "auto":
+        if geometry is not None and self._target_is_automatic():
             pose = controls.with_pivot(pose, geometry.center, radius)
             before = pose
         height = max(self.rectangle()[3], 1.0)
@@ -191,6 +239,11 @@ class Viewport:
             pose = self._fly(pose, radius, right)
         if pose != before:
             self.state.move_camera(pose)
+
+    def _target_is_automatic(self) -> bool:
+        """Whether the target is the scene file's, which may lie anywhere. An automatic free camera's is well placed."""
+        settings = self.state.settings
+        return settings.camera.target == "auto" and not settings.free_camera.on
 
     def _drag(self, pose: CameraPose, dx: float, dy: float, right: bool, radius: float) -> CameraPose:
         if imgui.is_mouse_down(imgui.MouseButton_.middle) or (imgui.get_io().key_shift and not self.state.flying):

@@ -14,7 +14,7 @@ from pmviewer.engine.frame import Frame
 from pmviewer.output.diagnostic_views import CLASS_COLOURS, DIAGNOSTICS
 from pmviewer.output.falsecolour import COLOURS, ERROR_SCALE, Scale
 from pmviewer.viewer import theme
-from pmviewer.viewer.format import si
+from pmviewer.viewer.format import duration, si
 from pmviewer.viewer.light_list import top_lights
 
 if TYPE_CHECKING:
@@ -42,6 +42,13 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         status = state.session.status
         _caption(viewport, status.text or "Drop a scene here or press Ctrl+O", (width / 2, height / 2), anchor=0.5)
         return
+    if state.gain.frames() is not None:
+        _compared_pictures(viewport)
+        if state.settings.free_camera.on:
+            _free_camera_label(viewport)
+        if hovered and (text := _value_under_mouse(viewport)):
+            _caption(viewport, text, (margin, height - line - 1.2 * margin))
+        return
     if state.frame is None or view == "geometry":
         text = (
             "geometry"
@@ -54,6 +61,8 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         _caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.WARNING)
     elif view != "beauty" and viewport.captions:
         _caption(viewport, _title(viewport, view), (margin, margin))
+    if state.settings.free_camera.on and viewport.captions:
+        _free_camera_label(viewport)
     if view == "depth" and state.frame is not None and viewport.picture is not None:
         _depth_legend(viewport, *viewport.picture.depth_range)
     if view == "error":
@@ -109,13 +118,61 @@ def _title(viewport: Viewport, view: str) -> str:
     return f"{of} map, {_TITLES[view]}" if of else _TITLES.get(view, view)
 
 
+def _compared_pictures(viewport: Viewport) -> None:
+    """The line between the pictures with and without importance, and what each of them is."""
+    state, x = viewport.state, viewport.split_x()
+    gain, pair = state.gain.gain, state.shown_pair()
+    if gain is None or pair is None or x is None:
+        return
+    line = imgui.get_text_line_height()
+    draw, (ox, oy), height = imgui.get_window_draw_list(), viewport.origin, viewport.size[1]
+    for colour, wide in ((theme.grey(0.0, 0.6), 5.0), (theme.grey(1.0), 2.0)):
+        draw.add_line((ox + x, oy), (ox + x, oy + height), imgui.get_color_u32(colour), wide)
+    draw.add_circle_filled((ox + x, oy + height / 2), 0.5 * line, imgui.get_color_u32(theme.grey(1.0)))
+    gap = 0.8 * line
+    view = "" if pair[1].view == "beauty" else f" · {pair[1].view}"
+    for title, side, anchor, at in (
+        (f"with importance{view}", gain.with_, 1.0, x - gap),
+        (f"without{view}", gain.without, 0.0, x + gap),
+    ):
+        _caption(viewport, title, (at, 0.6 * line), anchor=anchor, colour=theme.ACCENT)
+        stored, error, spent = si(side.stored), f"{side.error.relmse_all:.2e}", duration(side.cpu_seconds)
+        facts = (
+            f"{stored} photons stored",
+            f"relMSE {error}",
+            f"{spent} CPU",
+            *((gain.heading,) if side is gain.without else ()),
+        )
+        for number, fact in enumerate(facts):  # one below the other: narrow windows have no room for a line of them
+            _caption(viewport, fact, (at, (2.2 + 1.4 * number) * line), anchor=anchor)
+
+
+def _free_camera_label(viewport: Viewport) -> None:
+    """Whose importance is shown, above the line of the value under the mouse."""
+    state = viewport.state
+    text = "free camera · importance of the render camera"
+    if state.inactive_reason("importance.N", state.settings, state.session.traits) is not None:
+        text = "free camera · importance is off: the render camera sets the look-up radius alone"
+    pose, geometry = state.live_camera(), state.session.geometry
+    if pose is not None and geometry is not None and pose.near_normal is not None:
+        height = state.settings.free_camera.cut_height * float(geometry.radius)
+        text += f" · cut open {si(abs(height), 'm')} {'above' if height >= 0 else 'below'} its eye"
+    line = imgui.get_text_line_height()
+    x = 0.6 * line
+    wrap = max(viewport.size[0] - x - LEGEND_EMS * imgui.get_font_size(), 1.0)  # as the caption does
+    lines = imgui.calc_text_size(text, wrap_width=wrap).y
+    _caption(viewport, text, (x, viewport.size[1] - lines - 2.4 * line), colour=theme.FREE)
+
+
 def _value_under_mouse(viewport: Viewport) -> str:
-    pixel, frame = viewport.pixel_under_mouse(), viewport.state.frame
+    pixel = viewport.pixel_under_mouse()
+    frame = viewport.frame_at(pixel) if pixel is not None else None
     if pixel is None or frame is None:
         return ""
     rows, columns = frame.planes.shape[:2]
     x, y = pixel[0] * columns // frame.camera.width, pixel[1] * rows // frame.camera.height
-    view = viewport.state.shown_display.view
+    pair = viewport.state.shown_pair()
+    view = pair[1].view if pair is not None else viewport.state.shown_display.view
     if view == "geometry":
         return f"{pixel[0]}, {pixel[1]}"
     reference = viewport.state.comparison.reference

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pmviewer.engine.frame import Frame, Message, PhotonCloud, Statistics, Status
-from pmviewer.render.camera import resolve_camera
+from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.planes import CHANNELS, PLANES
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.scene.description import Camera, Scene
@@ -94,6 +94,8 @@ class FakeSession:
         self.geometry: Triangles | None = None
         self.frame: Frame | None = None
         self.status = Status()
+        self.opened_scene = None
+        self.threads = None
         self.paused = False
         self.restarts = 0
         self.version = 1
@@ -145,7 +147,7 @@ class FakeSession:
             coarse=coarse,
             planes=picture_planes(np.random.default_rng(0)) if planes is None else planes,
             settings=self.settings,
-            camera=resolve_camera(self.scene, self.settings.camera),
+            camera=resolve_view(self.scene, self.settings, self.geometry.center, self.geometry.radius),
             statistics=statistics,
             clouds=clouds,
             scene_name=self.scene.name,
