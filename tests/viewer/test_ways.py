@@ -11,6 +11,7 @@ from pmviewer.engine.session import Session
 from pmviewer.output.diagnostic_views import DIAGNOSTICS, coloured
 from pmviewer.output.exr import read_exr
 from pmviewer.output.falsecolour import COLOURS
+from pmviewer.output.frame_export import layer_name
 from pmviewer.output.tone import to_uint8
 from pmviewer.photons.projection import ProjectionMap
 from pmviewer.settings import Settings, get, with_values
@@ -90,8 +91,12 @@ def test_views_are_made_on_demand_in_the_legends_colours(app, tmp_path):
         assert near.mean() > 0.99, view
         assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 1
     layers, metadata = read_exr(tmp_path / "a.exr")
-    np.testing.assert_array_equal(layers["radiance_cells"], frames[-1].image("radiance cells"))
-    assert any(name.endswith("units.radiance_photons") and value == "W/m²" for name, value in metadata.items())
+    last = [view for view in seen if view in frames[-1].diagnostics]
+    for view in last:
+        np.testing.assert_array_equal(layers[layer_name(view)], frames[-1].image(view))
+        unit = [value for name, value in metadata.items() if name.endswith(f"units.{layer_name(view)}")]
+        assert unit == [DIAGNOSTICS[view].unit]
+    assert list(seen)[-1] in last
 
 
 def test_every_way_of_light_is_drawn_by_its_key(app):
