@@ -134,8 +134,8 @@ class Importance(Group):
     )
     important: float = setting(
         0.05,
-        "Importance, relative to what most seen places have, from which a place is important: Christensen discard drops "
-        "test photons that reach such a place, and those around them, and sends more of less power.",
+        "Importance, relative to what most seen places have, from which a place is important: Christensen discard "
+        "drops test photons that reach such a place, and those around them, and sends more of less power.",
         stage="photons",
         scale="log",
         title="important from",
