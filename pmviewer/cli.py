@@ -98,6 +98,28 @@ def render(
 
 
 @app.command()
+def shot(
+    scene: SceneArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", help="PNG file to write.")],
+    passes: Annotated[int | None, typer.Option(min=1, help="Passes to render before.")] = None,
+    size: Annotated[str | None, typer.Option(metavar="WxH", help="Image size, for example 1280x720.")] = None,
+    window: Annotated[bool, typer.Option("--window", help="The whole window instead of the picture.")] = False,
+    pixel: Annotated[
+        str | None, typer.Option(metavar="X,Y", help="Pixel whose gather rays overlays.gather.show draws.")
+    ] = None,
+    captions: Annotated[bool, typer.Option(help="Say in the picture which view it is.")] = True,
+    threads: ThreadsOption = None,
+    set_: SetOption = None,
+    define: ParameterOption = None,
+) -> None:
+    """Open the window, wait for the last pass, write the picture with all overlays, captions and legends, close it."""
+    from pmviewer.job import load_job
+    from pmviewer.viewer.shot import shot_job
+
+    shot_job(load_job(scene, set_ or [], define or []), output, passes, size, window, pixel, captions, threads)
+
+
+@app.command()
 def compare(
     image: Annotated[Path, typer.Argument(help="An EXR file.")],
     reference: Annotated[Path, typer.Argument(help="The EXR file to compare it with, of the same size.")],

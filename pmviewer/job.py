@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pmviewer.errors import SettingError
+from pmviewer.errors import OutputError, SettingError
 from pmviewer.output.session_file import read_session
 from pmviewer.settings import Settings, parse_assignments, with_values
+
+DEFAULT_PASSES = 64
 
 
 @dataclass(frozen=True)
@@ -37,3 +40,32 @@ def _definition(text: str) -> tuple[str, str]:
     if not separator or not name:
         raise SettingError(f"'{text}' defines nothing: write name=value, for example -D res=512.")
     return name, value
+
+
+def overrides(
+    passes: int | None, seconds: float | None, size: str | None, seed: int | None, session_passes: int | None
+) -> dict[str, object]:
+    """Settings by the command line's other options. Raises SettingError."""
+    values: dict[str, object] = {}
+    if seconds is not None:
+        values["render.time_limit"] = seconds
+        values["render.passes"] = 1_000_000
+    else:
+        values["render.passes"] = passes or session_passes or DEFAULT_PASSES
+        values["render.time_limit"] = 0.0
+    if size is not None:
+        match = re.fullmatch(r"\s*(\d{1,6})\s*[xX×]\s*(\d{1,6})\s*", size)
+        if not match:
+            raise SettingError(f"--size {size} is not a size: write WIDTHxHEIGHT, for example 1280x720.")
+        values["camera.width"], values["camera.height"] = int(match[1]), int(match[2])
+    if seed is not None:
+        values["render.seed"] = seed
+    return values
+
+
+def check_output(path: Path, formats: tuple[str, ...]) -> None:
+    """Raises OutputError where no file of these formats can be written."""
+    if path.suffix.lower() not in formats:
+        raise OutputError(f"{path}: unknown format '{path.suffix}'. Use {' or '.join(formats)}.")
+    if not path.absolute().parent.is_dir():
+        raise OutputError(f"{path}: the folder {path.absolute().parent} does not exist. Create it first.")

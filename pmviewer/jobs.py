@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
@@ -16,8 +15,8 @@ from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
-from pmviewer.errors import OutputError, SceneError, SettingError
-from pmviewer.job import Job
+from pmviewer.errors import SceneError, SettingError
+from pmviewer.job import Job, check_output, overrides
 from pmviewer.output.compare import ERROR_COLUMNS, Reference, error_row, load_reference
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.output.frame_export import LAYERS, write_frame_exr, write_frame_png
@@ -29,7 +28,6 @@ from pmviewer.scene.description import Scene
 from pmviewer.scene.load import load_scene, reference_of
 from pmviewer.settings import Settings, with_values
 
-DEFAULT_PASSES = 64
 FORMATS = (".exr", ".png")
 
 
@@ -51,11 +49,8 @@ def render_job(
     Raises PmviewerError; refuses bad file names and references that don't fit before rendering.
     """
     for path in outputs:
-        if path.suffix.lower() not in FORMATS:
-            raise OutputError(f"{path}: unknown format '{path.suffix}'. Use .exr or .png.")
-        if not path.absolute().parent.is_dir():
-            raise OutputError(f"{path}: the folder {path.absolute().parent} does not exist. Create it first.")
-    settings = with_values(job.settings, _overrides(passes, seconds, size, seed, job.passes))
+        check_output(path, FORMATS)
+    settings = with_values(job.settings, overrides(passes, seconds, size, seed, job.passes))
     opened = open_scene(job.scene, job.parameters)
     _print_warnings(opened.scene.warnings, opened.scene.dropped)
     target = None if reference is None else _reference(reference, opened.scene, settings)
@@ -96,26 +91,6 @@ def _view(settings: Settings, opened: OpenScene) -> str:
             raise SettingError(f"display.view = {view}: {reason}")
         return view
     return view if view in LAYERS else "beauty"
-
-
-def _overrides(
-    passes: int | None, seconds: float | None, size: str | None, seed: int | None, session_passes: int | None
-) -> dict[str, object]:
-    values: dict[str, object] = {}
-    if seconds is not None:
-        values["render.time_limit"] = seconds
-        values["render.passes"] = 1_000_000
-    else:
-        values["render.passes"] = passes or session_passes or DEFAULT_PASSES
-        values["render.time_limit"] = 0.0
-    if size is not None:
-        match = re.fullmatch(r"\s*(\d{1,6})\s*[xX×]\s*(\d{1,6})\s*", size)
-        if not match:
-            raise SettingError(f"--size {size} is not a size: write WIDTHxHEIGHT, for example 1280x720.")
-        values["camera.width"], values["camera.height"] = int(match[1]), int(match[2])
-    if seed is not None:
-        values["render.seed"] = seed
-    return values
 
 
 def _reference(source: str, scene: Scene, settings: Settings) -> Reference:

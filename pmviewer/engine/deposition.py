@@ -133,6 +133,7 @@ def factors(
         corner=0.0,
         glossy=s.photons.glossy,
         max_depth=s.render.max_depth,
+        pixel=stage.pixel,
     )
 
     def make() -> tuple[dict[str, float], list[str]]:

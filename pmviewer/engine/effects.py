@@ -38,6 +38,8 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
             return _emission(path, settings, plan)
         if path != "importance.map" and not plan.importance:
             return "Only with importance (importance.map)."
+        if path in ("importance.x", "importance.y") and settings.importance.of != "pixel":
+            return "Only for the importance of a pixel (importance.of)."
         if path == "importance.caustic_M_r" and not plan.caustic_mask:
             return "No caustic map in this scene or with this method."
         if path == "importance.M_r" and not plan.global_classes:

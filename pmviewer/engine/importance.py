@@ -116,8 +116,17 @@ class ImportanceStage:
         s, p = self.settings, self.plan
         how = s.importance.map, s.importance.N, s.importance.neighbours
         gather = p.gather, s.gather.secondary if p.corners else 0.0
-        rule = bool(p.caustic_mask), bool(p.global_classes), s.photons.indirect_caustics, s.photons.glossy
+        rule = bool(p.caustic_mask), bool(p.global_classes), s.photons.indirect_caustics, s.photons.glossy, self.pixel
         return (self.scene.uid, self.camera, s.render.seed, s.render.max_depth, how, gather, rule)
+
+    @property
+    def pixel(self) -> tuple[int, int] | None:
+        """The only pixel (x, y) whose importance is asked for, None for the whole image."""
+        how = self.settings.importance
+        if how.of == "image":
+            return None
+        width, height = self.camera.width, self.camera.height
+        return min(int(how.x * width), width - 1), min(int(how.y * height), height - 1)
 
     def run(self, index: int) -> None:
         """Bring `latest` to pass `index`."""
@@ -138,6 +147,7 @@ class ImportanceStage:
             corner=s.gather.secondary * self.first_radius if plan.corners else 0.0,
             glossy=s.photons.glossy,
             max_depth=s.render.max_depth,
+            pixel=self.pixel,
         )
 
     def _maps(self, count: int) -> ImportanceMaps:
@@ -158,7 +168,8 @@ class ImportanceStage:
                 self.tally.dropped["importons"] = self.tally.dropped.get("importons", 0) + part.dropped
 
         def build() -> ImportanceMaps:
-            caustic, global_ = joined(self._parts[:count], self.camera.width * self.camera.height)
+            pixels = 1 if self.pixel is not None else self.camera.width * self.camera.height
+            caustic, global_ = joined(self._parts[:count], pixels)
             both = self._build(global_, even=not plan.gather)
             if not plan.gather:
                 return ImportanceMaps(both if plan.caustic_mask else None, both, count * N)

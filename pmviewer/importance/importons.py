@@ -33,7 +33,7 @@ SEED = 0x1347
 @dataclass(frozen=True)
 class Rule:
     """Where importons are stored: as the final pass looks maps up, see `pmviewer.importance.trace`. `corner` in scene
-    units, `glossy` a roughness."""
+    units, `glossy` a roughness; `pixel` (x, y) is the only one that importons start through, None for all."""
 
     caustic: bool
     global_: bool
@@ -42,6 +42,7 @@ class Rule:
     corner: float
     glossy: float
     max_depth: int
+    pixel: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +67,8 @@ def trace(scene: FlatScene, eye: NDArray[np.void], rule: Rule, seed: int, first:
 
     eye: EYE_DTYPE (1,), camera and size of the image.
     """
+    camera = eye[0]
+    part = (0, 0, camera["width"], camera["height"]) if rule.pixel is None else (*rule.pixel, 1, 1)
     record = np.zeros(1, IMPORTON_PASS_DTYPE)
     record[0] = (
         (seed ^ SEED) & 0xFFFFFFFF,
@@ -76,6 +79,7 @@ def trace(scene: FlatScene, eye: NDArray[np.void], rule: Rule, seed: int, first:
         rule.gather,
         rule.gather_specular,
         rule.corner,
+        *part,
     )
     most = 2 * rule.max_depth + 2
     last = first + N
@@ -116,7 +120,7 @@ def _importons(parts: list[NDArray[np.float32]]) -> Importons:
 
 
 def joined(parts: list[Traced], pixels: int) -> tuple[Importons, Importons]:
-    """Caustic and global importons of all parts together, with weights Ψ in pixels of an image of so many."""
+    """Caustic and global importons of all parts together, with weights Ψ in pixels, of which they stand for so many."""
     unit = np.float32(pixels / max(sum(part.N for part in parts), 1))
 
     def of(importons: list[Importons]) -> Importons:

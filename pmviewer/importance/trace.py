@@ -72,6 +72,10 @@ IMPORTON_PASS_DTYPE = np.dtype(
         ("gather", "i4"),  # whether the global map is looked up after a bounce, or at the first surface
         ("gather_specular", "i4"),  # whether gather rays follow mirrors and glass
         ("corner", "f4"),  # gather rays shorter than this gather again where they land
+        ("left", "f4"),  # part of the image that importons start through, in pixels
+        ("top", "f4"),
+        ("across", "f4"),
+        ("down", "f4"),
     ],
     align=True,
 )
@@ -107,7 +111,7 @@ def _store(out, row, p, n, weight, footprint):
 def trace_importons(scenes, eyes, passes, i0, i1, caustic_out, global_out, counts):
     """Trace importons i0 … i1−1.
 
-    scenes: SCENE_DTYPE (1,); eyes: EYE_DTYPE (1,) of the whole image; passes: IMPORTON_PASS_DTYPE (1,);
+    scenes: SCENE_DTYPE (1,); eyes: EYE_DTYPE (1,); passes: IMPORTON_PASS_DTYPE (1,);
     caustic_out, global_out: float32 (capacity, IMPORTON_COLUMNS), weights in units of an importon's at the start;
     counts: int64 (N_COUNTS,), added to, the first two being rows filled.
 
@@ -120,7 +124,7 @@ def trace_importons(scenes, eyes, passes, i0, i1, caustic_out, global_out, count
         if counts[C_CAUSTIC] + most > len(caustic_out) or counts[C_GLOBAL] + most > len(global_out):
             return i
         x, y, _, _ = draw4(SOBOL, pass_.seed, _u4(i), _i8(0))
-        d, dx, dy, near, far = image_ray(eye, x * _f4(eye.width), y * _f4(eye.height))
+        d, dx, dy, near, far = image_ray(eye, pass_.left + x * pass_.across, pass_.top + y * pass_.down)
         P, D = start(dx, dy)
         o = (eye.x_eye, eye.y_eye, eye.z_eye)
         beta, compressed = (one, one, one), one

@@ -37,6 +37,33 @@ class Importance(Group):
         ge=10,
         le=1024,
     )
+    of: Literal["image", "pixel"] = setting(
+        "image",
+        "What the importance is for: the whole image, or one pixel of it, to see what that one needs.",
+        stage="photons",
+        scale="choice",
+        title="importance of",
+    )
+    x: float = setting(
+        0.5,
+        "Place of that pixel from left (0) to right (1).",
+        stage="photons",
+        scale="linear",
+        unit="× width",
+        ge=0.0,
+        le=1.0,
+        title="pixel, across",
+    )
+    y: float = setting(
+        0.5,
+        "Place of that pixel from top (0) to bottom (1).",
+        stage="photons",
+        scale="linear",
+        unit="× height",
+        ge=0.0,
+        le=1.0,
+        title="pixel, down",
+    )
     M_r: float = setting(
         2.0,
         "Photons of the global map wanted for each pixel: the required density is importance × M_r per pixel.",

@@ -28,6 +28,7 @@ from pmviewer.viewer.recent import RecentFiles
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.settings_panel import SettingsPanel
 from pmviewer.viewer.shortcuts import FLIP_KEY, is_held, run_shortcuts
+from pmviewer.viewer.shot import Shot
 from pmviewer.viewer.state import InactiveReason, ViewerState
 from pmviewer.viewer.statistics_panel import StatisticsPanel
 from pmviewer.viewer.status_bar import draw_status_bar
@@ -48,6 +49,9 @@ class ViewerApp:
     inactive_reason: why a setting has no effect now, or None.
     recent: the list of recent files; the user's own by default.
     remember: keep the window's layout between runs.
+    shot: a picture to take, after which the window closes.
+    picture_size: make a window of that size with the picture alone.
+    captions: name views in the picture.
     """
 
     def __init__(
@@ -57,6 +61,9 @@ class ViewerApp:
         inactive_reason: InactiveReason = _always_active,
         recent: RecentFiles | None = None,
         remember: bool = True,
+        shot: Shot | None = None,
+        picture_size: tuple[int, int] | None = None,
+        captions: bool = True,
     ) -> None:
         self.state = ViewerState(session, inactive_reason, recent or RecentFiles())
         self.viewport = Viewport(self.state)
@@ -67,7 +74,8 @@ class ViewerApp:
         self._title = ""
         self._running = False
         self.viewport.draw_toasts = lambda: draw_toasts(self.state, *self.viewport.origin, self.viewport.size[0])
-        self.params = layout.runner_params(self._callbacks(), remember=remember)
+        self.params = layout.runner_params(self._callbacks(), remember=remember, alone=picture_size)
+        self._shot, self.viewport.alone, self.viewport.captions = shot, picture_size is not None, captions
         self.add_ons = immapp.AddOnsParams(with_implot=True)
 
     def _callbacks(self) -> layout.Callbacks:
@@ -129,7 +137,8 @@ class ViewerApp:
         self.state.say("info", f"OpenGL {self.context.info['GL_VERSION']} on {self.context.info['GL_RENDERER']}")
         scale = hello_imgui.dpi_window_size_factor()
         width, height = (round(side * scale) for side in layout.SMALLEST_WINDOW)
-        glfw.set_window_size_limits(glfw_window_hello_imgui(), width, height, glfw.DONT_CARE, glfw.DONT_CARE)
+        if not self.viewport.alone:
+            glfw.set_window_size_limits(glfw_window_hello_imgui(), width, height, glfw.DONT_CARE, glfw.DONT_CARE)
         self._running = True
         self.state.session.on_update = self.wake
         self.state.jobs.on_done = self.state.comparison.measuring.on_done = self.wake
@@ -164,6 +173,8 @@ class ViewerApp:
         path, self.commands.window_shot = self.commands.window_shot, None
         if path is not None:
             self.commands.exports.pixels(path, self._window_pixels())
+        if self._shot is not None:
+            self._shot.after_drawing(self.state, self.viewport, self._window_pixels)
 
     def _window_pixels(self) -> np.ndarray:
         """(height, width, 3) uint8 of the whole window."""

@@ -36,26 +36,33 @@ class Callbacks:
     before_exit: Draw
 
 
-def runner_params(callbacks: Callbacks, *, remember: bool) -> hello_imgui.RunnerParams:
-    """`remember` keeps window and panel positions in the user's configuration folder."""
+def runner_params(
+    callbacks: Callbacks, *, remember: bool, alone: tuple[int, int] | None = None
+) -> hello_imgui.RunnerParams:
+    """`remember` keeps window and panel positions in the user's configuration folder; `alone`: a window of that size
+    with the picture and nothing else."""
     params = hello_imgui.RunnerParams()
     window = params.app_window_params
     window.window_title = "pmviewer"
-    window.window_geometry.size = WINDOW_SIZE
+    window.window_geometry.size = alone or WINDOW_SIZE
     window.restore_previous_geometry = remember
     params.ini_disable = not remember
     params.ini_folder_type = hello_imgui.IniFolderType.app_user_config_folder
     params.ini_filename = "pmviewer/window.ini"
     params.renderer_backend_options.open_gl_options = _opengl()
     _pace(params.fps_idling)
-    _bars(params, callbacks)
-    _dock(params.docking_params, callbacks)
+    params.imgui_window_params.background_color = theme.grey(0.105)
+    if alone is None:
+        _bars(params, callbacks)
+        _dock(params.docking_params, callbacks)
+    else:
+        params.imgui_window_params.default_imgui_window_type = hello_imgui.DefaultImGuiWindowType.no_default_window
     c = params.callbacks
     c.load_additional_fonts = theme.load_fonts
     c.setup_imgui_style = theme.apply
     c.show_menus = callbacks.menus
     c.show_status = callbacks.status
-    c.show_gui = callbacks.over_everything
+    c.show_gui = callbacks.over_everything if alone is None else callbacks.viewport
     c.post_init = callbacks.post_init
     c.post_init_add_platform_backend_callbacks = callbacks.add_platform_callbacks
     c.pre_new_frame = callbacks.pre_new_frame
@@ -89,7 +96,6 @@ def _bars(params: hello_imgui.RunnerParams, callbacks: Callbacks) -> None:
     frame.show_status_fps = False
     frame.remember_theme = False
     frame.remember_status_bar_settings = False
-    frame.background_color = theme.grey(0.105)
     options = hello_imgui.EdgeToolbarOptions()
     options.size_em = 2.4
     options.window_padding_em = imgui.ImVec2(0.5, 0.3)

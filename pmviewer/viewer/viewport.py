@@ -49,6 +49,10 @@ class Viewport:
         self.fit = Fit()
         self.inspected: tuple[int, int] | None = None
         """The pixel whose gather rays are drawn."""
+        self.alone = False
+        """Whether the picture fills the window."""
+        self.captions = True
+        """Whether views are named in the picture."""
         self.redraws = 0
         """How often the picture was drawn: an idle window draws nothing."""
         self.origin = (0.0, 0.0)
@@ -127,6 +131,11 @@ class Viewport:
         flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
         if self._texture is not None:
             flags |= imgui.WindowFlags_.no_background  # the picture covers it
+        if self.alone:
+            area = imgui.get_main_viewport()
+            imgui.set_next_window_pos(area.pos)
+            imgui.set_next_window_size(area.size)
+            flags |= imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_saved_settings
         imgui.push_style_var(imgui.StyleVar_.window_padding, (0, 0))
         shown, _ = imgui.begin(VIEWPORT, None, flags | imgui.WindowFlags_.no_collapse)
         imgui.pop_style_var()
@@ -152,7 +161,7 @@ class Viewport:
         pose = self.state.live_camera() if hovered or active or self.state.flying else None
         if pose is not None:
             self._handle(pose, hovered, active)
-        draw_hud(self, hovered)
+        draw_hud(self, hovered and not self.alone)
         self.draw_toasts()
 
     def _handle(self, pose: CameraPose, hovered: bool, active: bool) -> None:

@@ -24,6 +24,9 @@ _TITLES = {"error": "error: (I–R)²/(R²+0.01) of each pixel, no unit"} | {
 }
 _UNITS = {"albedo": "", "normal": "", "depth": "m"} | {view: how.unit for view, how in DIAGNOSTICS.items()}
 
+LEGEND_EMS = 9.0
+"""Width that captions leave to legends, in font sizes."""
+
 
 def draw_hud(viewport: Viewport, hovered: bool) -> None:
     """Small captions in the panel's corners."""
@@ -46,7 +49,7 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
     elif view != state.settings.display.view and not state.flipped:
         refusal = state.refused_view(state.settings.display.view) or "is being made"
         _caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.WARNING)
-    elif view != "beauty":
+    elif view != "beauty" and viewport.captions:
         _caption(viewport, _TITLES.get(view, view), (margin, margin))
     if view == "depth" and state.frame is not None and viewport.picture is not None:
         _depth_legend(viewport, *viewport.picture.depth_range)
@@ -136,9 +139,13 @@ def _legend(viewport: Viewport, labels: list[tuple[float, str]], colours: NDArra
     edges = np.linspace(y0, y1, len(codes))
     for top, bottom, above, below in zip(edges[:-1], edges[1:], codes[:-1], codes[1:], strict=True):
         draw.add_rect_filled_multi_color((x0, float(top)), (x1, float(bottom)), above, above, below, below)
-    for position, text in labels:
+    lowest = -np.inf  # labels that would run into the one above are left out
+    for position, text in sorted(labels):
         size = imgui.calc_text_size(text)
         top = y0 + position * (y1 - y0) - size.y / 2
+        if top < lowest:
+            continue
+        lowest = top + 0.9 * size.y
         draw.add_text((x0 - size.x - 0.4 * line, top), imgui.get_color_u32(theme.grey(0.9)), text)
 
 
@@ -150,12 +157,15 @@ def _caption(
     anchor: float = 0.0,
     colour: theme.Colour = theme.TEXT,
 ) -> None:
-    """Text on a translucent ground; `anchor` 0.5 centres it on the position."""
+    """Text on a translucent ground, in lines that leave room for a legend; `anchor` 0.5 centres it on the position."""
     text = theme.drawable(text)
-    size = imgui.calc_text_size(text)
+    room = viewport.size[0] - position[0] - LEGEND_EMS * imgui.get_font_size()
+    wrap = room if anchor == 0.0 and room > 0 else 0.0
+    size = imgui.calc_text_size(text, wrap_width=wrap or -1.0)
     x, y = viewport.origin[0] + position[0] - anchor * size.x, viewport.origin[1] + position[1]
     draw = imgui.get_window_draw_list()
-    pad = 0.35 * size.y
+    pad = 0.35 * imgui.get_text_line_height()
     ground = imgui.get_color_u32(theme.grey(0.08, 0.7))
     draw.add_rect_filled((x - pad, y - 0.5 * pad), (x + size.x + pad, y + size.y + 0.5 * pad), ground, 3)
-    draw.add_text((x, y), imgui.get_color_u32(imgui.ImVec4(*colour)), text)
+    code = imgui.get_color_u32(imgui.ImVec4(*colour))
+    draw.add_text(imgui.get_font(), imgui.get_font_size(), (x, y), code, text, wrap_width=wrap)

@@ -14,6 +14,7 @@ from make.fractal import fractal_box
 from make.glasses import cognac, three_glasses
 from make.museum import museum
 from make.office import office
+from make.plane import lit_plane
 from make.room import skylight_room
 
 SCENES: dict[str, Callable[[], MadeScene]] = {
@@ -28,6 +29,7 @@ SCENES: dict[str, Callable[[], MadeScene]] = {
     "cornell_water": water,
     "door_slit": door_slit,
     "glass_egg": glass_egg,
+    "lit_plane": lit_plane,
     "museum": museum,
     "office": office,
     "skylight_room": skylight_room,

@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
+from pmviewer.importance.importons import joined
 from pmviewer.maps.importance import build_importance
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.description import Camera, Material, Parallelogram, Scene, Shape, Sphere
@@ -107,6 +109,28 @@ def test_where_importons_are_stored():
     # Gather rays end at mirrors and glass, unless their caustics are in the global map.
     behind, _, _ = traced(scene, replace(GATHER, gather_specular=True), 20_000)
     assert behind.global_.weights.sum() > 1.05 * gather.global_.weights.sum()
+
+
+def test_importance_of_one_pixel():
+    """Its importons are those that start through it; all weigh as the picture's: together they are one pixel."""
+    scene = cornell_box()
+    rule = replace(SHOWN, pixel=(40, 90))
+    found, eye, _ = traced(scene, rule, 500)
+    width, height = int(eye[0]["width"]), int(eye[0]["height"])
+    camera = resolve_camera(open_scene(scene).scene, Settings().camera)
+    right = np.cross(camera.target - np.asarray(camera.origin), camera.up)
+    right /= np.linalg.norm(right)
+    forward = np.asarray(camera.target) - camera.origin
+    forward = forward / np.linalg.norm(forward)
+    down = np.cross(forward, right)
+    to = found.global_.positions - np.asarray(camera.origin)
+    half = np.tan(np.radians(camera.fov) / 2)
+    x = (1 + to @ right / (to @ forward) / half) / 2 * width
+    y = (height + to @ down / (to @ forward) / half * width) / 2
+    assert found.global_.n == 500
+    assert (np.floor(x) == 40).all()
+    assert (np.floor(y) == 90).all()
+    assert joined([found], 1)[1].weights.sum() == pytest.approx(1.0, rel=1e-5)
 
 
 def test_same_importons_for_any_threads_and_batches():

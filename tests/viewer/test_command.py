@@ -15,7 +15,7 @@ import pytest
 from pmviewer.output.png import read_png
 
 SIZE = ["--set", "camera.width=48", "--set", "camera.height=48", "--set", "photons.N=1000"]
-PATIENCE = 240.0
+PATIENCE = 480.0
 """Seconds: a cold start compiles everything first."""
 
 

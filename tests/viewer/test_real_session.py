@@ -18,7 +18,7 @@ from tests.viewer.driver import chord, drag, drive, item, make_app, on_window_th
 K = imgui.Key
 
 
-def wait_until(context, condition, seconds=240.0):
+def wait_until(context, condition, seconds=480.0):
     """Let the window run until the condition holds. Kernels may have to be compiled first."""
     engine = imgui.test_engine.get_io(hello_imgui.get_imgui_test_engine())
     engine.config_watchdog_warning = engine.config_watchdog_kill_test = 1e6

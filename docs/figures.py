@@ -1,0 +1,77 @@
+"""`python docs/figures.py [NAME …]`: make the figures of docs/importance.md by the commands that stand there.
+
+A block of commands that begins with ```sh figure=NAME columns=N gives images/NAME.png: each command writes one panel,
+in order, N of them a row. The commands open windows: without a display, run all of it under xvfb-run -a.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent
+_BLOCK = re.compile(r"^```sh figure=(\S+) columns=(\d+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+GAP = 6
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure's name, panels a row, and its commands, each a list of words that begins with pmviewer."""
+
+    name: str
+    columns: int
+    commands: tuple[tuple[str, ...], ...]
+
+    @property
+    def panels(self) -> list[str]:
+        """The file that each command writes."""
+        return [words[words.index("-o") + 1] for words in self.commands]
+
+
+def figures(text: str) -> Iterator[Figure]:
+    """The figures of a Markdown text; a command may go on behind a backslash at a line's end."""
+    for name, columns, body in _BLOCK.findall(text):
+        lines = body.replace("\\\n", " ").splitlines()
+        yield Figure(name, int(columns), tuple(tuple(shlex.split(line)) for line in lines if line.strip()))
+
+
+def make(figure: Figure, folder: Path) -> None:
+    """Run the commands in `folder` and write images/NAME.png."""
+    from PIL import Image, ImageDraw
+
+    for words in figure.commands:
+        subprocess.run([sys.executable, "-m", *words], cwd=folder, check=True)
+    panels = [Image.open(folder / name).convert("RGB") for name in figure.panels]
+    width, height = (max(side) for side in zip(*(panel.size for panel in panels), strict=True))
+    rows = -(-len(panels) // figure.columns)
+    page = Image.new("RGB", (figure.columns * (width + GAP) - GAP, rows * (height + GAP) - GAP), "white")
+    for i, panel in enumerate(panels):
+        x, y = i % figure.columns * (width + GAP), i // figure.columns * (height + GAP)
+        page.paste(panel, (x, y))
+        if len(panels) > 1:
+            draw = ImageDraw.Draw(page)
+            draw.rectangle((x, y + height - 20, x + 18, y + height), fill="white")
+            draw.text((x + 9, y + height - 10), "abcdefghijklmnopqrstuvwxyz"[i], fill="black", anchor="mm")
+    page.quantize(256, dither=Image.Dither.NONE).save(DOCS / "images" / f"{figure.name}.png", optimize=True)
+
+
+def main() -> None:
+    """Make the figures asked for, all by default."""
+    known = {figure.name: figure for figure in figures((DOCS / "importance.md").read_text(encoding="utf-8"))}
+    unknown = sorted(set(sys.argv[1:]) - known.keys())
+    if unknown:
+        sys.exit(f"there is no figure {', '.join(unknown)}; there are {', '.join(known)}")
+    for name in sys.argv[1:] or known:
+        with tempfile.TemporaryDirectory() as scratch:
+            make(known[name], Path(scratch))
+        print(f"images/{name}.png: {(DOCS / 'images' / f'{name}.png').stat().st_size // 1024} KiB")
+
+
+if __name__ == "__main__":
+    main()

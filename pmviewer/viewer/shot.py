@@ -1,0 +1,119 @@
+"""Pictures of the window from the command line: open it, wait for the last pass, write what is seen, close it.
+
+What the window draws over the picture, points, lines, captions and legends, is in no other file that the program
+writes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from imgui_bundle import hello_imgui
+from numpy.typing import NDArray
+
+from pmviewer.errors import PmviewerError, SceneError, SettingError, WindowError
+from pmviewer.job import Job, check_output, overrides
+from pmviewer.output.png import write_png
+from pmviewer.render.camera import resolve_camera
+from pmviewer.settings import with_values
+
+if TYPE_CHECKING:
+    from pmviewer.viewer.state import ViewerState
+    from pmviewer.viewer.viewport import Viewport
+
+SETTLING = 4
+"""Window frames without a change before the picture is taken: panels take two to find their places."""
+
+
+@dataclass
+class Shot:
+    """What to write; `pixel` is the one whose gather rays are shown. `error` is why there is no file, once the window
+    has closed."""
+
+    path: Path
+    pixel: tuple[int, int] | None = None
+    error: PmviewerError | None = None
+    done: bool = field(default=False, init=False)
+    _still: int = field(default=0, init=False)
+    _asked: bool = field(default=False, init=False)
+    _key: tuple[int, int] = field(default=(-1, -1), init=False)
+
+    def after_drawing(self, state: ViewerState, viewport: Viewport, pixels: Callable[[], NDArray[np.uint8]]) -> None:
+        """Once per window frame, when it is drawn; `pixels` gives (h, w, 3) of the window."""
+        if self.done:
+            return
+        hello_imgui.request_refresh()
+        try:
+            if self._ready(state, viewport):
+                write_png(self.path, pixels())
+                self._end()
+        except PmviewerError as error:
+            self.error = error
+            self._end()
+
+    def _ready(self, state: ViewerState, viewport: Viewport) -> bool:
+        status, frame = state.session.status, state.frame
+        if status.state == "failed":
+            raise SceneError(status.text)
+        if status.state != "finished" or frame is None:
+            return False
+        view = state.settings.display.view
+        refusal = state.refused_view(view)
+        if refusal is not None:
+            raise SettingError(f"display.view = {view}: {refusal}")
+        if self.pixel is not None and not self._asked:
+            self._asked = True
+            if not (0 <= self.pixel[0] < frame.camera.width and 0 <= self.pixel[1] < frame.camera.height):
+                raise SettingError(f"The pixel {self.pixel} is outside of {frame.camera.width}x{frame.camera.height}.")
+            viewport.inspected = self.pixel
+            state.session.inspect(self.pixel)
+        waiting = self.pixel is not None and frame.inspection.gathered is None
+        key = frame.serial, viewport.redraws
+        self._still = self._still + 1 if key == self._key and not waiting else 0
+        self._key = key
+        return self._still >= SETTLING and state.shown_display.view == view
+
+    def _end(self) -> None:
+        self.done = True
+        hello_imgui.get_runner_params().app_shall_exit = True
+
+
+def shot_job(
+    job: Job,
+    output: Path,
+    passes: int | None,
+    size: str | None,
+    window: bool,
+    pixel: str | None,
+    captions: bool,
+    threads: int | None,
+) -> None:
+    """Take a picture of the window (`pmviewer.viewer.shot`). Raises PmviewerError; WindowError without a display."""
+    from pmviewer.scene.load import load_scene  # numba; the window itself comes up before
+    from pmviewer.viewer.app import ViewerApp
+    from pmviewer.viewer.start import start_viewer
+
+    check_output(output, (".png",))
+    settings = with_values(job.settings, overrides(passes, None, size, None, job.passes))
+    chosen = None
+    if pixel is not None:
+        match = re.fullmatch(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*", pixel)
+        if not match:
+            raise SettingError(f"--pixel {pixel} is not a pixel: write X,Y, for example 120,80.")
+        chosen = int(match[1]), int(match[2])
+    camera = resolve_camera(load_scene(job.scene, job.parameters), settings.camera)
+    shot = Shot(output, chosen)
+    picture_size = None if window else (camera.width, camera.height)
+    make = partial(ViewerApp, remember=False, shot=shot, picture_size=picture_size, captions=captions)
+    start_viewer(make, job.scene, settings, threads, job.parameters)
+    if not shot.done:
+        raise shot.error or WindowError("The window was closed before the picture was taken.")
+    if shot.error is not None:
+        raise shot.error
+    print(f"wrote {output.absolute()}")

@@ -1,0 +1,46 @@
+"""Pictures of the window from the command line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pmviewer.errors import PmviewerError
+from pmviewer.job import load_job
+from pmviewer.output.png import read_png
+from pmviewer.viewer.shot import shot_job
+
+SMALL = ["camera.width=200", "camera.height=160", "photons.N=2000", "importance.N=500"]
+
+
+def take(tmp_path, *settings, pixel=None, window=False, captions=True):
+    path = tmp_path / "shot.png"
+    shot_job(load_job("cornell_diffuse", [*SMALL, *settings], []), path, 1, None, window, pixel, captions, 1)
+    return read_png(path)[0]
+
+
+def test_overlays_and_legends_are_in_the_picture(tmp_path):
+    plain = take(tmp_path).astype(int)
+    assert plain.shape == (160, 200, 3)
+    photons = take(tmp_path, "overlays.global.show=true").astype(int)
+    view = take(tmp_path, "display.view=look-up radius").astype(int)
+    assert 200 < (np.abs(photons - plain).max(axis=-1) > 20).sum() < 20_000
+    unnamed = take(tmp_path, "display.view=look-up radius", captions=False).astype(int)
+    assert (view[5:40, 5:100] != unnamed[5:40, 5:100]).any(axis=-1).mean() > 0.3
+    legend = view[10:80, -22:-12]
+    assert np.abs(np.diff(legend.mean(axis=1), axis=0)).sum() > 100, "no colour bar"
+
+
+@pytest.mark.parametrize(
+    ("settings", "pixel", "said"),
+    [
+        (["display.view=required density"], None, "importance"),
+        (["render.method=gather", "overlays.gather.show=true"], "500,20", "outside"),
+        ([], "20", "not a pixel"),
+        (["camera.width=99999"], None, "not allowed"),
+    ],
+)
+def test_what_cannot_be_shown_is_an_error(tmp_path, settings, pixel, said):
+    with pytest.raises(PmviewerError, match=said):
+        take(tmp_path, *settings, pixel=pixel)
+    assert not list(tmp_path.glob("*.png"))
