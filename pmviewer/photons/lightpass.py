@@ -148,20 +148,29 @@ def trace_pass(
             scene, record, projections, i0, min(i0 + BATCH, last), filling, has_specular, normals, paths
         )
 
+    def caustic_unit(n: int) -> float:
+        """That of the caustic map when the first n trajectories are traced, of those that make caustics."""
+        if guided is not None:
+            return unit / guided.N
+        if projection is None:
+            return unit / n
+        first = min(n, filling)
+        return 1.0 / (first / surface_power + ((n - first) / caustic_power if n > first else 0.0))
+
     batches = [(i0, batch(i0)) for i0 in range(0, last, BATCH)]
     if guided is not None:
-        caustic_unit, global_unit = unit / guided.N, unit / (guided.N * probability)
+        global_unit = unit / (guided.N * probability)
         kept = [(last + j, task) for j, task in enumerate(guided.kept)] if paths is None else []
         batches = _mixed(batches, kept)
     else:
-        caustic_unit = unit / traced if projection is None else 1.0 / direct_density
         global_unit = surface_power / (filling * probability)
     if deposition is not None:
         N = filling if guided is None else guided.N
         if fates is not None:
             batches = batches[: -(-fates.trajectories // BATCH)]
-        # Other trajectories than those of both maps can be left out without changing what the latter count.
-        spare = projection is None and guided is None and deposition.criterion is not None
+        # Those for the caustic map alone can be left out where all photons of that map have one weight.
+        alike = projection is None or not settings.indirect_caustics
+        spare = deposition.criterion is not None and guided is None and alike
         must = last if not spare else filling if deposition.global_classes else 0
         many = last, must
         made = _deposited(deposition, batches, many, first_index, run, caustic_unit, global_unit, N, fates)
@@ -171,7 +180,7 @@ def trace_pass(
     made = PhotonMaps(
         caustic=_join([part for r in results for part in r[0]]),
         global_=_join([part for r in results for part in r[1]]),
-        caustic_unit=caustic_unit,
+        caustic_unit=caustic_unit(traced),
         global_unit=global_unit,
         emitted=last,
         rays=int(counts[C_RAYS]),
@@ -274,7 +283,7 @@ def _deposited(
     trajectories: tuple[int, int],
     first_index: int,
     run: Runner,
-    caustic_unit: float,
+    caustic_unit: Callable[[int], float],
     global_unit: float,
     filling: int,
     fates: Fates | None = None,
@@ -282,7 +291,7 @@ def _deposited(
     """The pass's maps by the rules of `deposition`, from its batches, round by round where rounds matter.
 
     trajectories: how many there are, and how many must be traced even if the caustic map has converged before; beyond,
-    the pass ends when it has. caustic_unit: that of all trajectories.
+    the pass ends when it has. caustic_unit: by the number of trajectories traced.
     """
     last, must = trajectories
     criterion, others, sampled_of, converged = deposition.criterion, None, 0, None
@@ -321,13 +330,12 @@ def _deposited(
         if others is None or sampled_of < min(filling, SAMPLED):
             sampled_of = min(filling, SAMPLED, traced)
             others = other_light(criterion, _join(sampled), global_unit * filling / sampled_of)
-        converged = caustic.converged(criterion, others, caustic_unit * last / traced, run)
+        converged = caustic.converged(criterion, others, caustic_unit(traced), run)
         if converged.done and traced < last:
             converged = replace(converged, spared=last - traced)
-            caustic_unit *= last / traced
             last = traced
             break
-    (in_caustic, in_global) = run([lambda: caustic.finish(caustic_unit), lambda: global_.finish(global_unit)])
+    in_caustic, in_global = run([lambda: caustic.finish(caustic_unit(last)), lambda: global_.finish(global_unit)])
     return PhotonMaps(
         caustic=in_caustic[0],
         global_=in_global[0],

@@ -132,7 +132,8 @@ class Importance(Group):
         "off",
         "Where the caustic map has converged under density control: by (D/D_r)·(L/L_c)^m ≥ 1 with m = 2 or 3, since a "
         "caustic that other light outshines may be coarser (Suykens and Willems 2000). Trajectories that fill the "
-        "caustic map alone (q below 1) end when all of it has, unless projection maps aim them; the view 'caustic "
+        "caustic map alone (q below 1) end when all of it has, unless projection maps aim them and there are "
+        "indirect caustics; the view 'caustic "
         "convergence' shows where.",
         stage="photons",
         scale="choice",

@@ -76,9 +76,13 @@ def test_all_is_said_by_light():
     assert not Converged(1.0, 0.0, 0.0, FEWEST - 1).done
 
 
-def settings(convergence, N=120_000, q=0.1, method="progressive", **importance):
+def settings(convergence, N=120_000, q=0.1, method="progressive", photons=None, **importance):
     importance = {"deposition": "constant density", "density": 100.0, "convergence": convergence, **importance}
-    return settings_of(render={"method": method}, photons={"N": N, "q": q, "projection": "off"}, importance=importance)
+    return settings_of(
+        render={"method": method},
+        photons={"N": N, "q": q, "projection": "off"} | (photons or {}),
+        importance=importance,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -91,9 +95,13 @@ def caustic_light(renderer):
     return renderer.tally.deposited["caustic"].stored_power, photons.emitted
 
 
-def test_a_pass_ends_when_all_is_converged(box):
+AIMED = {"projection": "on", "indirect_caustics": False}
+
+
+@pytest.mark.parametrize("photons", [{}, AIMED], ids=["anywhere", "projection maps"])
+def test_a_pass_ends_when_all_is_converged(box, photons):
     """The power stored stays that of the light: fewer trajectories, each with more."""
-    off, on = (rendered(box, settings(how), 1) for how in ("off", "cube"))
+    off, on = (rendered(box, settings(how, photons=photons), 1) for how in ("off", "cube"))
     all_, some = caustic_light(off), caustic_light(on)
     found = on.tally.deposited["caustic"].converged
     assert found.done
@@ -102,7 +110,7 @@ def test_a_pass_ends_when_all_is_converged(box):
     assert some[0] == pytest.approx(all_[0], rel=0.03)
     assert off.tally.deposited["caustic"].converged is None
     np.testing.assert_array_equal(off.light.photons.global_, on.light.photons.global_)  # only the others are spared
-    more = rendered(box, settings("cube"), 1, threads=3)
+    more = rendered(box, settings("cube", photons=photons), 1, threads=3)
     np.testing.assert_array_equal(on.light.photons.caustic, more.light.photons.caustic)
 
 
@@ -111,6 +119,9 @@ def test_a_pass_goes_on_while_more_is_needed(box):
     found = strict.tally.deposited["caustic"].converged
     assert found.more > 0.05
     assert found.spared == 0
+    mixed = rendered(box, settings("cube", photons={"projection": "on"}), 1).tally  # weights of two kinds
+    assert mixed.deposited["caustic"].converged.spared == 0
+    assert mixed.emitted == 120_000
     assert found.dense + found.converged + found.more == pytest.approx(1)
 
 
