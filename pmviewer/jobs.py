@@ -71,6 +71,21 @@ def render_job(
     if statistics.importons:
         stored = statistics.stored_in_pass["importons"]
         print(f"importance: {statistics.importons:,} importons, stored at {stored:,} places")
+    for name, books in statistics.deposited.items():
+        if books.arrived:
+            lost = books.discarded_power / books.arrived_power if books.arrived_power > 0 else 0.0
+            biased = f"; biased: {lost:.2%} of the power discarded" if lost > 0 else ""
+            saved = f"{books.saved_bytes / 2**20:.1f} MiB saved"
+            print(f"{name} map: {books.stored:,} of {books.arrived:,} photons stored in the last pass, {saved}{biased}")
+    caustic = statistics.deposited.get("caustic")
+    if caustic is not None and caustic.converged is not None:
+        found = caustic.converged
+        print(
+            f"caustic map: {1 - found.more:.1%} of its light converged, {found.dense:.1%} dense enough, "
+            f"{found.spared:,} trajectories spared in the last pass"
+            if found.photons
+            else "caustic map: no photons, so nothing has converged"
+        )
     _print_warnings(statistics.warnings, {})
     for path in outputs:
         if path.suffix.lower() == ".exr":

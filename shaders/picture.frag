@@ -2,7 +2,8 @@
 // A plane of the frame on the screen. The tone curves are those of pmviewer/output/tone.py.
 uniform sampler2D plane;
 uniform int content;      // 0 radiance, 1 reflectance, 2 unit vector, 3 depth, 4 error against the reference,
-                          // 5 a quantity in false colours, 6 cells, each with a colour of its own
+                          // 5 a quantity in false colours, 6 cells, each with a colour of its own,
+                          // 7 classes
 uniform int curve;        // 0 sRGB, 1 Reinhard, 2 filmic, 3 linear
 uniform float scale;      // 2^exposure
 uniform vec2 depth_range; // nearest and farthest finite depth
@@ -13,6 +14,7 @@ uniform vec2 value_range;  // quantities at the ends of the colours, or their lo
 uniform int value_log;     // whether they are
 uniform vec3 value_weights; // of the channels in the quantity
 uniform vec3 grey;         // where there is nothing to tell: below zero
+uniform vec3 class_colours[3];
 uniform vec2 error_range;  // logarithms of the errors at the ends of the colours
 
 in vec2 uv;
@@ -72,6 +74,8 @@ void main() {
         shown = quantity < 0.0 ? grey : false_colour(share, colour_row);
     } else if (content == 6) {
         shown = value.r < 0.0 ? grey : cell_colour(value.r);
+    } else if (content == 7) {
+        shown = value.r < 0.0 ? grey : class_colours[clamp(int(value.r + 0.5), 0, 2)];
     } else {
         // Near is bright; pixels that see nothing are black.
         float span = max(depth_range.y - depth_range.x, 1e-30);

@@ -28,6 +28,8 @@ BENCHES: dict[str, tuple[str, str]] = {
     "cache": ("Irradiance cache against the plain final gather (R6)", "pmviewer.bench.irradiance_cache:run"),
     "gather": ("Radiance photons against the plain final gather (R3)", "pmviewer.bench.gather:run"),
     "importance": ("Importance against brute force, and its cost (I1)", "pmviewer.bench.importance:run"),
+    "deposition": ("Deposition rules: photons at equal error, power, cost (I4, I5)", "pmviewer.bench.deposition:run"),
+    "emission": ("Guided emission: photons traced for the same error (I6)", "pmviewer.bench.emission:run"),
     "projection": ("Caustic photons by projection maps (T7)", "pmviewer.bench.projection:run"),
 }
 """Name: what it measures, and where its function is."""

@@ -13,9 +13,11 @@ from pmviewer.engine.method import Plan
 from pmviewer.importance.importons import Rule as ImportonRule
 from pmviewer.importance.importons import trace
 from pmviewer.importance.rules import TESTS, automatic_f, density_of, probability_of
+from pmviewer.maps.convergence import Criterion
 from pmviewer.maps.density_control import ACCEPTANCE, M
 from pmviewer.maps.importance import ImportanceMap
 from pmviewer.maps.record import DIRECT
+from pmviewer.maps.stored import ALL_CLASSES
 from pmviewer.photons.deposition import (
     Density,
     Deposition,
@@ -81,7 +83,8 @@ def rules_of(
         if how.f == "auto":
             f, notes = factors(settings, importance, maps)
     else:
-        key += (how.acceptance, how.M_r, how.caustic_M_r, how.density, growth, first if how.density == "auto" else 0)
+        key += (how.acceptance, how.M_r, how.caustic_M_r, how.density, growth)
+        key += tuple(radii.values()) if plan.deposition == "constant density" and how.density == "auto" else ()
     for name, mask in classes.items():
         if not mask:
             continue
@@ -102,10 +105,21 @@ def rules_of(
         rules[name] = Density(
             required[name], ACCEPTANCE.index(how.acceptance), farthest_of(scene_radius), seed + (name == "global")
         )
-    sample = (1 << DIRECT if plan.choice != "power" or plan.caustic_mask else 0) | plan.guide_mask
-    deposition = Deposition(rules["caustic"], rules["global"], classes["caustic"], classes["global"], sample)
+    criterion = None
+    sample = sampled_classes(plan)
+    if plan.convergence:
+        acceptance, farthest = ACCEPTANCE.index(how.acceptance), farthest_of(scene_radius)
+        criterion = Criterion(plan.convergence, acceptance, farthest, scene_radius, plan.caustic_mask)
+        key += ("convergence", plan.convergence)
+        sample |= ALL_CLASSES & ~plan.caustic_mask
+    deposition = Deposition(rules["caustic"], rules["global"], classes["caustic"], classes["global"], sample, criterion)
     grown = 1.0 if plan.deposition == "Keller-Wald" else growth
     return Rules(deposition, key, tuple(notes), required or None, f, everywhere, grown)
+
+
+def sampled_classes(plan: Plan) -> int:
+    """Path classes (bit set) whose photons somebody counts as they arrive."""
+    return (1 << DIRECT if plan.choice != "power" or plan.caustic_mask else 0) | plan.guide_mask
 
 
 def constant_density(settings: Settings, radius: float) -> float:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.convergence import convergence_plane
 from pmviewer.engine.deposition import Rules
 from pmviewer.engine.importance import ImportanceMaps
 from pmviewer.engine.inspection import Wanted
@@ -28,6 +29,7 @@ from pmviewer.maps.radius import neighbourhood
 from pmviewer.maps.stored import ALL_CLASSES
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.photons.deposition import SMALLEST_EPSILON
+from pmviewer.photons.lightpass import PhotonMaps
 from pmviewer.render.density import WIDEST, counting_eye, counting_tree, density_view
 from pmviewer.render.diagnostics import FAMILY_CHANNELS, lookup_view, shadow_view, site_view
 from pmviewer.settings import Importance, Settings
@@ -57,6 +59,8 @@ class Looked:
     importance: ImportanceMaps | None = None
     how: Importance = field(default_factory=Importance)
     rules: Rules = field(default_factory=Rules)
+    photons: PhotonMaps | None = None
+    """The pass's photons, and by which rules they were stored."""
     stored: Callable[[str], NDArray[np.float32]] = lambda name: np.empty((0, 6), np.float32)
     """The photons of the map of that name."""
     scene_radius: float = 1.0
@@ -77,13 +81,18 @@ def wanted_of(settings: Settings, plan: Plan, pixel: tuple[int, int] | None = No
         wanted = Wanted(family, looked_map(settings, plan) if family in OF_A_MAP else "")
     if settings.overlays.paths.show and plan.photons:
         wanted = replace(wanted, paths=settings.overlays.paths.count)
-    if settings.overlays.fates.show and plan.deposition != "all":
+    if settings.overlays.fates.show and judges(plan):
         wanted = replace(wanted, fates=settings.overlays.fates.count)
     if settings.overlays.lights.show and plan.importance:
         wanted = replace(wanted, lights=True)
     if settings.overlays.gather.show and plan.gather:
         wanted = replace(wanted, pixel=pixel)
     return wanted
+
+
+def judges(plan: Plan) -> bool:
+    """Whether a rule decides which photons are stored."""
+    return plan.deposition != "all" or plan.emission not in ("off", "Peter-Pietrek")
 
 
 def looked_map(settings: Settings, plan: Plan) -> str:
@@ -98,7 +107,7 @@ def refused_view(view: str, plan: Plan) -> str | None:
     family = DIAGNOSTICS[view].family
     if family == "look-up" and not plan.photons:
         return "Nothing is looked up: this method uses no photons, or no surface stores them."
-    if family == "density" and not plan.photons:
+    if family in ("importance", "density", "storing", "convergence") and not plan.photons:
         return "No photons are stored: this method uses none, or no surface stores them."
     if view in ("required density", "density ratio"):
         if not plan.importance and plan.deposition != "constant density":
@@ -107,6 +116,8 @@ def refused_view(view: str, plan: Plan) -> str | None:
         return "Only with importance (importance.map)."
     if family == "storing" and plan.deposition != "Keller-Wald":
         return "Only with the deposition rule 'Keller-Wald' (importance.deposition)."
+    if family == "convergence" and not plan.convergence:
+        return "Only with density control of a caustic map, and its criterion (importance.convergence)."
     if family == "shadow rays" and not plan.shadows:
         return "Only with shadow photons (direct.shadow_photons)."
     if family == "radiance photons" and not plan.radiance:
@@ -118,6 +129,11 @@ def diagnostic_planes(wanted: Wanted, looked: Looked, plan: Plan, pool: WorkPool
     """The planes of the family that is wanted, by view; none without one."""
     if wanted.family is None:
         return {}
+    if wanted.family == "convergence":
+        assert looked.photons is not None
+        pixels = looked.width * looked.height
+        states = convergence_plane(looked.scene, looked.eye, pixels, looked.photons, looked.rules, pool.run)
+        return {"caustic convergence": states.reshape(looked.height, looked.width, 1)}
     channels = {**FAMILY_CHANNELS, "importance": IMPORTANCE_CHANNELS, "density": 1, "storing": 1}
     planes = _drawn(looked, channels[wanted.family], lambda out: _kernel(wanted, looked, plan, out), pool)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pmviewer.engine.diagnose import OF_A_MAP, refused_view
+from pmviewer.engine.diagnose import OF_A_MAP, judges, refused_view
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.without_importance import refusal
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
@@ -15,7 +15,14 @@ _DISC_ONLY = ("estimate.filter", "estimate.cone_k", "estimate.rim", "estimate.di
 _RADIANCE_ONLY = ("gather.cutoff", "gather.similarity")
 _GUIDED_ONLY = ("gather.guided", "gather.guide_radius")
 _KELLER_WALD_ONLY = ("importance.f", "importance.epsilon", "importance.cut_off")
-_DEPOSITION = ("importance.deposition", "importance.acceptance", "importance.density", *_KELLER_WALD_ONLY)
+_DEPOSITION = (
+    "importance.deposition",
+    "importance.acceptance",
+    "importance.density",
+    "importance.convergence",
+    *_KELLER_WALD_ONLY,
+)
+_EMISSION = ("importance.emission", "importance.tests", "importance.important")
 _CACHE_ONLY = ("gather.cache_error", "gather.cache_samples", "gather.cache_min", "gather.cache_max")
 
 
@@ -34,6 +41,8 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
     if group == "importance":
         if path in _DEPOSITION:
             return _deposition(path, settings, plan)
+        if path in _EMISSION:
+            return _emission(path, settings, plan)
         if path != "importance.map" and not plan.importance:
             return "Only with importance (importance.map)."
         if path in ("importance.x", "importance.y") and settings.importance.of != "pixel":
@@ -48,7 +57,7 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
     if group == "overlays":
         return _overlays(path, settings, plan)
     if group == "photons":
-        return _photons(path, settings, traits)
+        return _photons(path, settings, traits, plan)
     if group == "estimate":
         return _estimate(path, settings, plan.caustic_mask)
     if group == "gather" and not plan.gather:
@@ -86,11 +95,24 @@ def _deposition(path: str, settings: Settings, plan: Plan) -> str | None:
     asked, active = settings.importance.deposition, plan.deposition
     if path == "importance.deposition":
         return None if active == asked else f"{asked} needs importance (importance.map)."
+    if path == "importance.convergence":
+        if active not in ("density control", "constant density"):
+            return "Only with density control."
+        return None if plan.caustic_mask else "No caustic map in this scene or with this method."
     if path in _KELLER_WALD_ONLY:
         return None if active == "Keller-Wald" else "Only with the deposition rule 'Keller-Wald'."
     if path == "importance.density":
         return None if active == "constant density" else "Only with the deposition rule 'constant density'."
     return "Only with density control." if active in ("all", "Keller-Wald") else None
+
+
+def _emission(path: str, settings: Settings, plan: Plan) -> str | None:
+    asked, active = settings.importance.emission, plan.emission
+    if path == "importance.emission":
+        return None if active == asked else f"{asked} needs importance (importance.map)."
+    if path == "importance.important":
+        return None if active == "Christensen discard" else "Only with guided emission by Christensen discard."
+    return "Only with guided emission." if active == "off" else None
 
 
 def _display(path: str, settings: Settings, plan: Plan) -> str | None:
@@ -115,7 +137,7 @@ def _overlays(path: str, settings: Settings, plan: Plan) -> str | None:
         return "This method traces no photons."
     if name in ("importons", "lights") and not plan.importance:
         return "Only with importance (importance.map)."
-    if name == "fates" and plan.deposition == "all":
+    if name == "fates" and not judges(plan):
         return "Every photon is stored (importance.deposition)."
     two_maps = plan.caustic_mask and plan.global_classes
     if path == "overlays.fates.map" and not two_maps:
@@ -124,6 +146,8 @@ def _overlays(path: str, settings: Settings, plan: Plan) -> str | None:
         return "One importance serves both maps: they are shown at the same places."
     if name == "gather":
         return None if plan.gather else "Only the method 'gather' casts gather rays."
+    if name == "projection" and plan.emission != "off":
+        return "Guided emission takes no projection maps (importance.emission)."
     if name == "projection" and settings.photons.projection == "off":
         return "Photons leave the lights in all directions (photons.projection)."
     if path == "overlays.projection.map" and (settings.photons.q == 1.0 or settings.photons.q_rule == "photons"):
@@ -164,7 +188,12 @@ def _direct(path: str, settings: Settings, plan: Plan, traits: SceneTraits) -> s
     return None
 
 
-def _photons(path: str, settings: Settings, traits: SceneTraits) -> str | None:
+def _photons(path: str, settings: Settings, traits: SceneTraits, plan: Plan) -> str | None:
+    if plan.emission != "off":
+        if path == "photons.projection":
+            return "Guided emission finds where photons start by test photons (importance.emission)."
+        if path == "photons.q_rule":
+            return "With guided emission q is the probability of storing a global photon."
     if path == "photons.glossy" and not traits.glossy_roughness:
         return "No glossy surface in this scene."
     if path == "photons.indirect_caustics" and not traits.follows(settings.photons.glossy):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.deposition import Rules, rules_of
+from pmviewer.engine.emission import emission_key, guidance_of, guided_photons, note_of, storage
 from pmviewer.engine.guides import GUIDING_PHOTONS, guide_grid, guide_radius
 from pmviewer.engine.importance import ImportanceStage
 from pmviewer.engine.method import Plan, estimator_of
@@ -29,6 +30,7 @@ from pmviewer.maps.record import DIRECT, in_classes
 from pmviewer.maps.variant import marked
 from pmviewer.photons.deposition import Deposition
 from pmviewer.photons.fates import Fates
+from pmviewer.photons.guided import Known
 from pmviewer.photons.light_importance import LightImportance
 from pmviewer.photons.lightpass import PhotonMaps, trace_pass, trajectories
 from pmviewer.render.choice import CHOICES
@@ -48,8 +50,9 @@ CHOOSING_PHOTONS = 1 << 17
 class LightStage:
     """Photons and maps of one scene with one set of settings. The attributes without underscore are of the latest pass:
     `photons`, radiance photons `sites`, `guides` of gather rays, the deposition `rules`, `traced`, the (pass, N) of
-    its light pass, and `emission`, the importance of the lights with guided emission; `places` (n, 3) are the lights',
-    None without importance."""
+    its light pass, `emission`, the importance of the lights with guided emission, `known`, the pass and
+    what test photons told it so far, and `notes` for the log; `places` (n, 3) are the lights', None without importance.
+    """
 
     def __init__(
         self, scene: OpenScene, settings: Settings, plan: Plan, pool: WorkPool, cache: StageCache, tally: Tally
@@ -66,6 +69,8 @@ class LightStage:
         self.traced: tuple[int, int] | None = None
         self.emission: LightImportance | None = None
         self.places = light_places(scene.flat) if plan.importance else None
+        self.notes: tuple[str, ...] = ()
+        self.known: tuple[int, Known] | None = None
 
     def run(
         self, eye: np.void, index: int, N: int, first_radius: float, importance: ImportanceStage
@@ -95,20 +100,25 @@ class LightStage:
             return of_classes(self.photons.caustic, self.plan.caustic_mask)
         return of_classes(self.photons.global_, self.plan.global_classes)
 
-    def fates(self, count: int) -> NDArray[np.float32] | None:
+    def fates(self, count: int, importance: ImportanceStage) -> NDArray[np.float32] | None:
         """What became of the photons of the first `count` trajectories of the latest pass (`pmviewer.photons.fates`).
         None where all are stored."""
-        if self.traced is None or self.rules.deposition is None:
+        deposition = self.rules.deposition
+        guided = self.photons.guided if self.photons is not None else None
+        if deposition is None and guided is not None:
+            guidance = guidance_of(self.settings, self.plan, importance)
+            deposition = None if guidance is None else storage(guidance, guided, self.settings, self.plan)
+        if self.traced is None or deposition is None:
             return None
-        index, N = self.traced
         fates = Fates(count)
-        self._trace(index, N, self.rules.deposition, fates)
+        self._trace(*self.traced, deposition, fates)
         return fates.cloud()
 
     def importance_of_lights(self, importance: ImportanceStage) -> LightImportance | None:
-        """How much of the picture each light lights, by new photons that are forgotten. None without importance."""
+        """How much of the picture each light lights, by new photons that are forgotten. None without importance, and
+        with guided emission, which knows."""
         maps, plan, flat = importance.latest, self.plan, self.scene.flat
-        if self.traced is None or maps is None:
+        if self.traced is None or maps is None or self.emission is not None:
             return None
         direct = 0 if plan.gather or not plan.global_classes else 1 << DIRECT
         of_global = plan.global_classes | direct
@@ -124,7 +134,10 @@ class LightStage:
     def _trace(self, index: int, N: int, deposition: Deposition, fates: Fates | None = None) -> PhotonMaps:
         """The light pass again, for showing something of it."""
         settings, caustics = self.settings, bool(self.plan.caustic_mask)
+        guided = self.photons.guided if self.photons is not None else None
         traced, _, _ = trajectories(settings.photons, N, caustics)
+        if guided is not None:
+            traced = N
         return trace_pass(
             self.scene.flat,
             settings.photons,
@@ -133,15 +146,16 @@ class LightStage:
             N,
             caustics,
             self.pool.run,
-            projection=self.projection,
+            projection=None if guided is not None else self.projection,
             deposition=deposition,
+            guided=guided,
             fates=fates,
         )
 
     def _timed(self, stage: str, run: Callable[[], Any]) -> Any:
         return self.tally.timed(self.pool, stage, run)
 
-    def _photons_of(self, index: int, N: int) -> tuple[PhotonMaps, tuple]:
+    def _photons_of(self, index: int, N: int, importance: ImportanceStage) -> tuple[PhotonMaps, tuple]:
         """The photons of a pass by the deposition rules, and what names them in the cache."""
         settings, scene = self.settings, self.scene
         caustics = bool(self.plan.caustic_mask)
@@ -157,9 +171,16 @@ class LightStage:
             caustics,
             normals,
             *self.rules.key,
+            *emission_key(settings, self.plan, importance),
         )
 
         def make() -> PhotonMaps:
+            guidance = guidance_of(settings, self.plan, importance)
+            if guidance is not None:
+                before = self.known[1] if self.known and self.known[0] == index - 1 else None
+                guided = guided_photons(guidance, self.rules, settings, self.plan, importance, index, N, before)
+                if guided is not None:
+                    return guided
             return trace_pass(
                 scene.flat,
                 settings.photons,
@@ -186,9 +207,15 @@ class LightStage:
         radii = {"caustic": radius * estimate.caustic_radius, "global": radius}
         if plan.deposition != "all":
             self.rules = rules_of(self.settings, plan, importance, index, radii, first_radius)
-        photons, key = self._timed("light pass", lambda: self._photons_of(index, N))
+        photons, key = self._timed("light pass", lambda: self._photons_of(index, N, importance))
         self.traced = index, N
         self.photons = photons
+        self.emission = None
+        if photons.guided is not None:
+            self.emission = photons.guided.lights
+            self.known = index, photons.guided.known
+        guidance = guidance_of(self.settings, plan, importance)
+        self.notes = (*self.rules.notes, *note_of(plan, photons, guidance))
         units = {"caustic": photons.caustic_unit, "global": photons.global_unit}
         clouds = {"caustic": photons.caustic, "global": photons.global_}
         classes = {"caustic": plan.caustic_mask, "global": plan.global_classes}
@@ -318,6 +345,8 @@ class LightStage:
         """Luminance of the brightest photon of a map, in watts. Of photons stored with a probability it is that before:
         those that grew stand for many that are not there, and k of them don't meet in a disc that matters."""
         assert self.photons is not None
+        if self.photons.guided is not None and self.plan.deposition in ("all", "Keller-Wald"):
+            return unit  # that of photons that leave by power: the few strong ones are not where the camera looks
         if self.plan.deposition == "Keller-Wald":
             return self.photons.deposited[name].largest_arrived
         return largest_power(photons, unit)

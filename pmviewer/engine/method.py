@@ -12,7 +12,9 @@ from pmviewer.settings import Settings
 
 MANY_LIGHTS = 8
 """From so many lights on, the automatic choice of lights asks the photons."""
+EXPONENTS = {"off": 0, "square": 2, "cube": 3}
 Deposit = Literal["all", "Keller-Wald", "density control", "constant density"]
+Emission = Literal["off", "Peter-Pietrek", "Christensen discard", "Christensen keep"]
 ALL = 1 << DIRECT | 1 << CAUSTIC | 1 << INDIRECT | 1 << INDIRECT_CAUSTIC
 
 
@@ -23,8 +25,9 @@ class Plan:
     direct light chooses lights, `radiance` whether gather rays use radiance photons, `directions` how they look about:
     photons of the classes `guide_mask` guide `guided_rays` of them; `corners` is whether short ones gather again,
     `cache` whether diffuse surfaces gather through an irradiance cache, `shadows` whether shadow photons save shadow
-    rays, `importance` whether there are importance maps, `deposition` which photons maps store; `warnings` are
-    sentences for the log about what was asked for and can't be."""
+    rays, `importance` whether there are importance maps, `deposition` which photons maps store, `emission` how
+    importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0 without; `warnings`
+    are sentences for the log about what was asked for and can't be."""
 
     path: bool = False
     direct: bool = False
@@ -38,6 +41,8 @@ class Plan:
     shadows: bool = False
     importance: bool = False
     deposition: Deposit = "all"
+    emission: Emission = "off"
+    convergence: int = 0
     caustic_mask: int = 0
     global_mask: int = 0
     global_classes: int = 0
@@ -64,6 +69,16 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         plan = replace(plan, skipped=skipped, warnings=(*plan.warnings, warning))
     else:
         plan = replace(plan, deposition=how.deposition)
+        if "density" in how.deposition and plan.caustic_mask:
+            plan = replace(plan, convergence=EXPONENTS[how.convergence])
+    if how.emission == "off":
+        plan = replace(plan, skipped=(*plan.skipped, ("guided emission", "importance.emission is off")))
+    elif how.map == "off":
+        why = f"{how.emission} needs importance, and importance.map is off"
+        skipped, warning = (*plan.skipped, ("guided emission", why)), f"Photons leave the lights by power: {why}."
+        plan = replace(plan, skipped=skipped, warnings=(*plan.warnings, warning))
+    else:
+        plan = replace(plan, emission=how.emission)
     if how.map == "off":
         return replace(plan, skipped=(*plan.skipped, ("importance", "importance.map is off")))
     return replace(plan, importance=True)

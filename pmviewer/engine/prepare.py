@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pmviewer.engine.cache_stage import prepare_cache, recipe
+from pmviewer.engine.convergence import prepare_convergence
 from pmviewer.engine.guides import gather_records
 from pmviewer.engine.importance import prepare_importance
 from pmviewer.engine.method import estimator_of, plan_of
@@ -22,6 +23,7 @@ from pmviewer.maps.shadow import shadow_record
 from pmviewer.maps.variant import marked
 from pmviewer.photons.deposition import prepare_rules
 from pmviewer.photons.projected import NO_PROJECTION
+from pmviewer.photons.strata import STRATA_DTYPE
 from pmviewer.photons.trace import LIGHT_PASS_DTYPE, N_COUNTS, N_LEDGER, trace_photons
 from pmviewer.render.camera import resolve_camera
 from pmviewer.render.eye import eye_pass
@@ -58,6 +60,7 @@ def prepare(scene: OpenScene, settings: Settings, pool: WorkPool, tell: Tell) ->
         plan.cache,
         plan.importance,
         plan.deposition != "all",
+        plan.emission != "off",
         estimator_of(settings),
         scene.flat.record.dtype,
         with_maps,
@@ -80,6 +83,8 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
         light_pass = np.zeros(1, LIGHT_PASS_DTYPE)
         maps = projection_for(scene, settings)
         projections = NO_PROJECTION if maps is None else maps.records
+        if plan.emission != "off":
+            projections = np.zeros(2, STRATA_DTYPE)
         counts, ledger = np.zeros(N_COUNTS, np.int64), np.zeros(N_LEDGER)
         none = np.empty(0, np.float32)
         code = np.zeros(1, np.uint32)
@@ -105,8 +110,10 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
             ),
             ("kd-tree" if nearest else "photon grid", lambda: photon_map(empty)),
         ]
-    if plan.deposition != "all":
+    if plan.deposition != "all" or plan.emission != "off":
         steps.append(("deposition rules", prepare_rules))
+    if plan.convergence:
+        steps.append(("caustic convergence", prepare_convergence))
     if plan.importance:
         camera = resolve_camera(scene.scene, settings.camera)
         steps.append(("importance", prepare_importance(scene, settings, plan, camera)))

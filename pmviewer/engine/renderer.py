@@ -29,6 +29,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import first_radius
 from pmviewer.engine.shadows import ShadowMap, shadows_of
 from pmviewer.engine.tally import Tally
+from pmviewer.maps.importance import NO_IMPORTANCE
 from pmviewer.maps.irradiance_cache import NO_CACHE, REACH, IrradianceCache
 from pmviewer.photons.lightpass import trace_pass, trajectories
 from pmviewer.photons.paths import PhotonPaths, empty_paths
@@ -152,13 +153,14 @@ class Renderer:
             self.importance.latest,
             self.settings.importance,
             self.light.rules,
+            self.light.photons,
             self.light.stored,
             self.scene.flat.radius,
         )
         planes = diagnostic_planes(wanted, looked, self.plan, self.pool)
         paths = self._paths(wanted.paths) if wanted.paths else None
         gathered = self.gather_points(*wanted.pixel) if wanted.pixel else None
-        fates = self.light.fates(wanted.fates) if wanted.fates else None
+        fates = self.light.fates(wanted.fates, self.importance) if wanted.fates else None
         lights = self.light.importance_of_lights(self.importance) if wanted.lights else None
         return Inspection(wanted, planes, paths, gathered, fates, lights)
 
@@ -169,7 +171,10 @@ class Renderer:
         index, N = self.light.traced
         settings, caustics = self.settings, bool(self.plan.caustic_mask)
         traced, _, _ = trajectories(settings.photons, N, caustics)
-        paths = empty_paths(min(count, traced), self.scene.flat.radius)
+        guided = self.light.photons.guided if self.light.photons else None
+        if guided is not None:
+            traced = N
+        paths = empty_paths(min(count, traced if guided is None else guided.n), self.scene.flat.radius)
         photons = trace_pass(
             self.scene.flat,
             settings.photons,
@@ -180,6 +185,7 @@ class Renderer:
             self.pool.run,
             projection=self.light.projection,
             paths=paths,
+            guided=guided,
         )
         return replace(paths, power_unit=photons.global_unit)
 
@@ -245,7 +251,15 @@ class Renderer:
     def _warnings(self) -> tuple[str, ...]:
         """Sentences for the log."""
         latest = self.importance.latest
-        return (*self.plan.warnings, *(latest.warnings if latest else ()), *self.light.rules.notes)
+        unimportant: tuple[str, ...] = ()
+        if latest is not None and latest.n and self.plan.deposition in ("Keller-Wald", "density control"):
+            unimportant = tuple(
+                f"{self.plan.deposition}: none of the {books.arrived:,} photons that arrived for the {name} map in "
+                "this pass is in an important place. Does light reach what the camera sees?"
+                for name, books in self.tally.deposited.items()
+                if books.important == 0 and latest.record(name).dtype != NO_IMPORTANCE.dtype
+            )
+        return (*self.plan.warnings, *(latest.warnings if latest else ()), *self.light.notes, *unimportant)
 
     def _pass(self, film: Film, camera: CameraPose, index: int, N: int) -> None:
         eye = eye_record(camera, self.settings, index)

@@ -75,3 +75,20 @@ def automatic_f(importance: ImportanceMap, positions: Float, normals: Codes) -> 
                 "Keller-Wald: no test ray of the camera met an important place; f is set by the importons themselves."
             )
     return 0.0, "Keller-Wald: there is no importance; every photon is stored with the cut-off probability ε."
+
+
+def full_importance(importance: ImportanceMap) -> float:
+    """Γ that nine importons in ten exceed; 0 without any. Christensen takes the largest for 1, but one corner near the
+    camera would then make everything else unimportant."""
+    return float(np.quantile(importance.gamma, 0.1)) if importance.n else 0.0
+
+
+def relative_importance(importance: ImportanceMap, full: float, most: float = 1.0) -> Evaluate:
+    """Γ relative to `full`, at most `most`; 0 everywhere if `full` is."""
+
+    def evaluate(positions: Float, normals: Codes) -> Float:
+        if not full > 0:
+            return np.zeros(len(positions), np.float32)
+        return np.minimum(_evaluated(importances, importance, positions, normals) / np.float32(full), np.float32(most))
+
+    return evaluate

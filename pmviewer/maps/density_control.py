@@ -283,6 +283,14 @@ def _settle(tree, size, stored, powers, photons, words, normals, required, rule,
     return rejected
 
 
+def needs_of(required: NDArray[np.float32], rule: int, farthest: float) -> NDArray[np.float32]:
+    """Density (n,) at which storing stops where `required` (n,) are to be reached; `rule` and `farthest` as for
+    DensityControl."""
+    least = np.float32(M / (math.pi * farthest**2))
+    needs = np.where(np.isnan(required), np.float32(0), required) / np.float32(SETTLES[rule])
+    return np.clip(needs, least, np.float32(1e30), dtype=np.float32)
+
+
 # --- the map being filled -------------------------------------------------------------------------------------------
 
 
@@ -307,7 +315,7 @@ class DensityControl:
         """rule: STEP or COSINE; farthest: no photon's power moves farther than this (sqrt(SPARSEST) times that with the
         cosine), in scene units: where less than M photons in such a disc are required, so many are stored."""
         self.rule, self.seed = np.int32(rule), np.uint32(seed & 0xFFFFFFFF)
-        self.least = np.float32(M / (math.pi * farthest**2))
+        self.farthest = farthest
         self.size = np.array([1, 1, 0], np.int64)
         self.arrived = self.redistributed = 0
         self.kept = np.zeros(0, bool)
@@ -332,8 +340,7 @@ class DensityControl:
             return
         photons = np.ascontiguousarray(photons, np.float32)
         words = photons.view(np.uint32)
-        needs = np.where(np.isnan(required), np.float32(0), required) / np.float32(SETTLES[self.rule])
-        needs = np.clip(needs, self.least, np.float32(1e30), dtype=np.float32)
+        needs = needs_of(required, int(self.rule), self.farthest)
         counts = np.full(n, UNDECIDED, np.int32)
         self._reserve(self.stored + n)
         neighbours = np.empty((n, M), np.int32)

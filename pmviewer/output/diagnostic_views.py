@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from pmviewer.output.falsecolour import COLOURS, DIVERGING, Scale, false_colour, scale_around_one, scale_of
 
-Family = Literal["look-up", "shadow rays", "radiance photons", "importance", "density", "storing"]
+Family = Literal["look-up", "shadow rays", "radiance photons", "importance", "density", "storing", "convergence"]
 NOTHING = -1.0
 DIMMED = 0.4
 """Brightness of cells whose radiance photon is the nearest, but not near enough to be used."""
 GREY = (0.16, 0.16, 0.16)
 """Display-encoded colour of pixels in which there is nothing to tell."""
+CLASS_COLOURS = ((0.86, 0.27, 0.22), (0.35, 0.74, 0.36), (0.27, 0.48, 0.9))
+"""Display-encoded; the caustic convergence of Suykens and Willems, figure 6: red, green, blue."""
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
@@ -41,6 +43,8 @@ class DiagnosticView:
     """Values are numbers of cells, each with a colour of its own, dimmed where a half is added."""
     diverging: bool = False
     """Values are ratios, shown by how far they are below or above 1."""
+    classes: tuple[str, ...] = ()
+    """Values are numbers of classes with these names, in CLASS_COLOURS."""
 
     @property
     def colours(self) -> NDArray[np.float32]:
@@ -113,6 +117,13 @@ DIAGNOSTICS: Mapping[str, DiagnosticView] = {
         "no surface that stores photons",
         fixed=(0.0, 1.0),
     ),
+    "caustic convergence": DiagnosticView(
+        "convergence",
+        "state of the caustic map at the first surface, latest pass",
+        "",
+        "no caustic",
+        classes=("more photons needed", "converged", "dense enough"),
+    ),
 }
 
 
@@ -152,7 +163,9 @@ def cell_colours(cells: NDArray[Any]) -> NDArray[np.float32]:
 def coloured(view: str, plane: NDArray[np.floating]) -> NDArray[np.float32]:
     """Display-encoded picture (h, w, 3) of a plane."""
     values = scalar(plane)
-    if DIAGNOSTICS[view].cells:
+    if DIAGNOSTICS[view].classes:
+        pixels = np.array(CLASS_COLOURS, np.float32)[np.maximum(values, 0).astype(int)]
+    elif DIAGNOSTICS[view].cells:
         cells = np.floor(np.maximum(values, 0))
         pixels = cell_colours(cells)
         pixels[values > cells] *= np.float32(DIMMED)

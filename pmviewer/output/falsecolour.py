@@ -119,7 +119,7 @@ def scale_of(values: NDArray[Any], log: bool = False, unit: str = "") -> Scale:
     return Scale(low, high, log, unit)
 
 
-def scale_around_one(values: NDArray[Any], widest: float = 64.0, unit: str = "") -> Scale:
+def scale_around_one(values: NDArray[Any], widest: float = 1000.0, unit: str = "") -> Scale:
     """A logarithmic scale with 1 in its middle that holds 98 % of the positive values, 2 to `widest` either way."""
     values = np.asarray(values, np.float64)
     good = values[np.isfinite(values) & (values > 0)]
@@ -157,6 +157,7 @@ def _log_values(low: float, high: float, count: int) -> list[float]:
     decades = math.log10(high / low)
     digits = (1,) if decades >= 3 else (1, 2, 5) if decades >= 1 else (1, 2, 3, 5, 7)
     skip = max(1, math.ceil((last - first) / max(count, 1)))
+    first -= first % skip  # 1 is among them
     values = [float(f"{d}e{e}") for e in range(first, last + 1, skip) for d in digits]
     inside = [v for v in values if low * (1 - 1e-9) <= v <= high * (1 + 1e-9)]
     return inside if len(inside) > 1 else _even_values(low, high, count)

@@ -6,6 +6,8 @@ function for that (`pmviewer.importance.rules`); constants do as well.
 
 - `KellerWald`: stored with probability p and power Φ/p (Keller and Wald 2000, §2.2). Where p is below ε, it is raised
   to ε, which is free of bias, or the photon is discarded, which is not; the discarded power is counted.
+- `Homogeneous`: stored with a probability and power so that no photon has less than Φ₁/I where the importance is I,
+  Φ₁ being the power of photons in the most important places (Christensen, course guide §5.7.4).
 - `Density`: stored up to the required density, otherwise its power goes to its neighbours
   (`pmviewer.maps.density_control`).
 
@@ -26,9 +28,12 @@ from numpy.typing import NDArray
 from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.vector import luminance
+from pmviewer.maps.convergence import Converged, Convergence, Criterion
 from pmviewer.maps.density_control import Controlled, DensityControl
+from pmviewer.maps.kdtree import PhotonKdTree
 from pmviewer.maps.power import encode_powers, luminances, write_power
 from pmviewer.maps.record import BYTES_PER_PHOTON, decode_power
+from pmviewer.scene.flatten import LUMINANCE
 
 Float = NDArray[np.float32]
 Codes = NDArray[np.uint32]
@@ -43,7 +48,7 @@ FATES = ("stored", "rejected", "redistributed", "discarded")
 """What becomes of a photon that arrives: rejected ones are stood for by stored ones of more power, the power of
 redistributed ones is their neighbours', that of discarded ones is lost."""
 FIRST_WEIGHT, WEIGHTS = -10, 32
-"""Histogram bins: weights from 2^FIRST_WEIGHT on, one a doubling; the outermost hold what is beyond."""
+"""Histogram bins: weights around 2^FIRST_WEIGHT and so on, one a doubling; the outermost hold what is beyond."""
 
 _f4 = np.float32
 _f8 = np.float64
@@ -59,11 +64,6 @@ class KellerWald:
     discard: bool = False
     seed: int = 0
 
-    def arguments(self, index: int) -> tuple[np.float32, bool, np.uint32]:
-        """For kernels: cut-off, whether it discards, and the seed of the batch whose first trajectory is `index`."""
-        seed = np.uint32((self.seed * 0x9E3779B1 + index * 0x85EBCA77 + (index >> 32)) & 0xFFFFFFFF)
-        return np.float32(min(max(self.epsilon, SMALLEST_EPSILON), 1.0)), self.discard, seed
-
 
 @dataclass(frozen=True)
 class Density:
@@ -76,19 +76,42 @@ class Density:
     seed: int = 0
 
 
-Rule = KellerWald | Density
+@dataclass(frozen=True)
+class Homogeneous:
+    """`importance` gives I, above 1 likewise; a photon of luminance Φ is stored with probability p = I·Φ/Φ₁, if below
+    1, and then has Φ/p. I is at least `epsilon`. `power` is Φ₁ in units of the map's."""
+
+    importance: Evaluate
+    epsilon: float
+    power: float
+    seed: int = 0
+
+    def probability(self, photons: Float, normals: Codes, least: np.float32) -> Float:
+        """p of photons (n, 6) where importance is at least `least`; strong ones are stored whatever it is."""
+        relative = np.empty(len(photons), np.float32)
+        luminances(photons.view(np.uint32), relative)
+        relative /= np.float32(self.power)
+        weak = relative * least < 1
+        if weak.any():
+            relative[weak] *= np.maximum(self.importance(np.ascontiguousarray(photons[weak, :3]), normals[weak]), least)
+        return relative
+
+
+Rule = KellerWald | Density | Homogeneous
 
 
 @dataclass(frozen=True)
 class Deposition:
     """Rules for the photons of the path classes (bit sets) that a map holds; None stores them all. Photons of
-    `sample_classes` from the first trajectories are also kept as they arrive."""
+    `sample_classes` from the first trajectories are also kept as they arrive. `criterion` tells when the caustic map,
+    under density control, needs no more photons."""
 
     caustic: Rule | None
     global_: Rule | None
     caustic_classes: int
     global_classes: int
     sample_classes: int = 0
+    criterion: Criterion | None = None
 
     @property
     def in_rounds(self) -> bool:
@@ -102,6 +125,8 @@ class Deposited:
     photons' luminance in units of that with which photons leave the lights."""
 
     arrived: int = 0
+    important: int = 0
+    """Of these, photons at places where the rule's probability or required density is above 0."""
     stored: int = 0
     redistributed: int = 0
     arrived_power: float = 0.0
@@ -112,7 +137,10 @@ class Deposited:
     percentiles: tuple[float, ...] = ()
     """Weights that 1, 50, 99 and 100 % of the stored photons don't exceed."""
     histogram: tuple[int, ...] = ()
-    """Photons by weight: bin i from 2^(FIRST_WEIGHT + i) on, twice as wide as the last."""
+    """Photons by weight: bin i from 2^(FIRST_WEIGHT + i − ½) on, twice as wide as the last, so that the weight 1, which
+    most have but for rounding, is within a bin."""
+    converged: Converged | None = None
+    """How much of the map needs no more photons, where that was asked for."""
 
     @property
     def rejected(self) -> int:
@@ -164,6 +192,21 @@ def _thin(photons, words, normals, p, epsilon, discard, seed, kept, kept_normals
     return count
 
 
+def probabilities(
+    rule: KellerWald | Homogeneous, photons: Float, normals: Codes, index: int
+) -> tuple[Float, np.float32, bool, np.uint32]:
+    """For kernels: probabilities of storing photons (n, 6) with normal codes (n,), cut-off, whether it discards, and
+    the seed of their batch, whose first trajectory is `index`."""
+    discard, epsilon = False, np.float32(min(max(rule.epsilon, SMALLEST_EPSILON), 1.0))
+    if isinstance(rule, Homogeneous):
+        p, epsilon = rule.probability(photons, normals, epsilon), np.float32(SMALLEST_EPSILON)
+    else:
+        p = rule.probability(photons[:, :3], normals) if len(photons) else np.empty(0, np.float32)
+        discard = rule.discard
+    seed = np.uint32((rule.seed * 0x9E3779B1 + index * 0x85EBCA77 + (index >> 32)) & 0xFFFFFFFF)
+    return p, epsilon, discard, seed
+
+
 Prepared = tuple[Any, ...]
 
 
@@ -172,7 +215,7 @@ class Filling:
 
     def __init__(self, rule: Rule | None) -> None:
         self.rule = rule
-        self.arrived, self.books = 0, np.zeros(3)
+        self.arrived, self.important, self.books = 0, 0, np.zeros(3)
         self._parts: list[Float] = []
         self._normals: list[Codes] = []
         self._control = None
@@ -185,15 +228,20 @@ class Filling:
         rule, n = self.rule, len(photons)
         photons = np.ascontiguousarray(photons)
         if rule is None:
-            return photons, normals, n, _power_of(photons)
+            return photons, normals, n, np.append(_power_of(photons), n)
         if isinstance(rule, Density):
             required = rule.required(photons[:, :3], normals) if n else np.empty(0, np.float32)
-            return photons, normals, n, _power_of(photons), required
-        p = rule.probability(photons[:, :3], normals) if n else np.empty(0, np.float32)
+            return photons, normals, n, np.append(_power_of(photons), np.count_nonzero(required > 0)), required
+        p, epsilon, discard, seed = probabilities(rule, photons, normals, index)
         kept, kept_normals, books = np.empty((n, 6), np.uint32), np.empty(n, np.uint32), np.zeros(3)
         words = photons.view(np.uint32)
-        count = _thin(photons, words, normals, p, *rule.arguments(index), kept, kept_normals, books)
-        return kept[:count].view(np.float32).copy(), kept_normals[:count].copy(), n, books
+        count = _thin(photons, words, normals, p, epsilon, discard, seed, kept, kept_normals, books)
+        return (
+            kept[:count].view(np.float32).copy(),
+            kept_normals[:count].copy(),
+            n,
+            np.append(books, np.count_nonzero(p > 0)),
+        )
 
     def take(self, judged: list[Prepared], run: Runner) -> None:
         """The next batches, in order; with density control they are one round."""
@@ -201,6 +249,7 @@ class Filling:
             return
         for batch in judged:
             self.arrived += batch[2]
+            self.important += int(batch[3][3])
             self.books[:2] += batch[3][:2]
             self.books[2] = max(self.books[2], batch[3][2])
         if self._control is None:
@@ -209,6 +258,16 @@ class Filling:
             return
         photons, normals, required = (np.concatenate([batch[i] for batch in judged]) for i in (0, 1, 4))
         self._control.add(photons, normals, required, run)
+
+    def converged(self, criterion: Criterion, others: PhotonKdTree, unit: float, run: Runner) -> Converged:
+        """How much of the map, as it stands, needs no more photons by the criterion; `others` is the light that is not
+        in the map, `unit` as for `finish`."""
+        assert self._control is not None
+        made = self._control.result()
+        photons = made.photons.copy()
+        unit *= encode_powers(photons, made.powers, 0)
+        judge, weights = Convergence(criterion, photons, unit, others), made.powers @ LUMINANCE
+        return judge.of_map(photons, made.normals, weights, made.required, run)
 
     def finish(self, unit: float) -> tuple[Float, Codes, float, Deposited]:
         """The map's photons and normals, its unit of power in watts (`unit` is that of the photons that arrived), and
@@ -227,6 +286,7 @@ class Filling:
         weights *= np.float32(grown)
         books = Deposited(
             arrived=self.arrived,
+            important=self.important,
             stored=len(photons),
             redistributed=redistributed,
             arrived_power=float(self.books[0]) * unit,
@@ -241,8 +301,8 @@ class Filling:
 
 def weight_histogram(weights: Float) -> tuple[int, ...]:
     """Photons by their weight, see `Deposited.histogram`."""
-    exponents = np.frexp(weights)[1] - 1  # weight = 2^exponent · [1, 2)
-    bins = np.clip(exponents - FIRST_WEIGHT, 0, WEIGHTS - 1)
+    exponents = np.frexp(weights * np.float32(math.sqrt(2.0)))[1] - 1  # weight · √2 = 2^exponent · [1, 2)
+    bins = np.clip(np.where(weights > 0, exponents - FIRST_WEIGHT, 0), 0, WEIGHTS - 1)
     return tuple(int(n) for n in np.bincount(bins, minlength=WEIGHTS))
 
 

@@ -21,11 +21,13 @@ from pmviewer.photons.deposition import (
     Deposition,
     Filling,
     Float,
+    Homogeneous,
     KellerWald,
     Prepared,
     Rule,
     Runner,
     judged,
+    probabilities,
 )
 
 FATE_BITS = 3
@@ -50,8 +52,8 @@ class WatchedFilling(Filling):
 
     def judge(self, photons: Float, normals: Codes, index: int) -> Prepared:
         fates = np.full(len(photons), STORED, np.uint8)
-        if isinstance(self.rule, KellerWald) and len(photons):
-            _judge(self.rule.probability(photons[:, :3], normals), *self.rule.arguments(index), fates)
+        if isinstance(self.rule, KellerWald | Homogeneous):
+            _judge(*probabilities(self.rule, np.ascontiguousarray(photons), normals, index), fates)
         return (*super().judge(photons, normals, index), photons, fates)
 
     def take(self, judged: list[Prepared], run: Runner) -> None:
@@ -73,7 +75,8 @@ class WatchedFilling(Filling):
 
 
 class Fates:
-    """Photons of the first `trajectories` of a pass with their fates; `trace_pass` fills it."""
+    """Photons of the first `trajectories` of a pass, rounded up to whole batches, with their fates; `trace_pass` fills
+    it."""
 
     def __init__(self, trajectories: int) -> None:
         self.trajectories = trajectories

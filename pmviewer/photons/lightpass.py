@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
+from pmviewer.maps.convergence import other_light
 from pmviewer.maps.record import in_classes
 from pmviewer.photons.deposition import Deposited, Deposition, Filling, Prepared, rounds
 from pmviewer.photons.fates import Fates
+from pmviewer.photons.guided import Guidance, Guided, Known, guided_emission
 from pmviewer.photons.paths import PhotonPaths
 from pmviewer.photons.projected import NO_PROJECTION
 from pmviewer.photons.projection import Projection
 from pmviewer.photons.roulette import EQUAL, MOST_COPIES, RULES
+from pmviewer.photons.scattered import scattered_record
 from pmviewer.photons.trace import (
     C_CAUSTIC,
     C_DROPPED,
@@ -64,6 +67,8 @@ class PhotonMaps:
     sample: Float = field(default_factory=lambda: np.empty((0, 6), np.float32))
     sample_unit: float = 0.0
     deposited: Mapping[str, Deposited] = field(default_factory=dict)
+    guided: Guided | None = None
+    """The emission, where it is guided; `ledger` then leaves out its test photons."""
 
     @property
     def bytes(self) -> int:
@@ -94,10 +99,11 @@ def trace_pass(
     projection: Projection | None = None,
     paths: PhotonPaths | None = None,
     deposition: Deposition | None = None,
+    guided: Guided | None = None,
     fates: Fates | None = None,
 ) -> PhotonMaps:
     """Trace one pass of N trajectories; with `paths` only the first ones, whose paths are written there; with
-    `deposition` and `fates` only the first ones, whose photons are kept there with what the rules made of them.
+    `deposition` and `fates` only the first batches, whose photons are kept there with what the rules made of them.
 
     Photon powers are the same for all trajectories of a map: Φ/N in the caustic map, Φ/⌊qN⌋ in the global one
     (trajectory split) or Φ/(qN) (photon rule), K §2.4.
@@ -109,19 +115,131 @@ def trace_pass(
     first kind's, with 1/a.
 
     With `deposition` its rules decide about storing; the maps then hold the path classes that it names alone.
+
+    With `guided` emission, which takes no projection, its n trajectories are traced after its test photons, and all of
+    them fill both maps: q is the probability of storing a global photon whatever its rule.
     """
     traced, filling, probability = trajectories(settings, N, has_specular)
     unit = scene.total_luminance
+    if guided is not None:
+        traced = filling = guided.n
+        probability = settings.q
     projections, surface_power, caustic_power = NO_PROJECTION, unit, unit
     if projection is not None:
         projections = projection.records
         surface_power, caustic_power = projection.surface_power, projection.caustic_power
         if not caustic_power > 0:  # no light reaches what makes caustics
             traced = filling
+    if guided is not None:
+        projections = guided.table.records
     density = filling / surface_power
     direct_density = density
     if traced > filling:
         direct_density += (traced - filling) / caustic_power
+    only_direct = projection is not None or not settings.indirect_caustics
+    indirect_scale = direct_density / density if projection is not None else 1.0
+    record = _record(settings, seed, first_index, filling, probability, has_specular, only_direct, indirect_scale)
+
+    last = traced if paths is None else min(traced, paths.n)
+    normals = NORMALS if deposition is not None else GLOBAL_NORMALS if with_normals else NO_NORMALS
+
+    def batch(i0: int) -> Callable[[], _Batch]:
+        return lambda: _trace_batch(
+            scene, record, projections, i0, min(i0 + BATCH, last), filling, has_specular, normals, paths
+        )
+
+    def caustic_unit(n: int) -> float:
+        """That of the caustic map when the first n trajectories are traced, of those that make caustics."""
+        if guided is not None:
+            return unit / guided.N
+        if projection is None:
+            return unit / n
+        first = min(n, filling)
+        return 1.0 / (first / surface_power + ((n - first) / caustic_power if n > first else 0.0))
+
+    batches = [(i0, batch(i0)) for i0 in range(0, last, BATCH)]
+    if guided is not None:
+        global_unit = unit / (guided.N * probability)
+        kept = [(last + j, task) for j, task in enumerate(guided.kept)] if paths is None else []
+        batches = _mixed(batches, kept)
+    else:
+        global_unit = surface_power / (filling * probability)
+    if deposition is not None:
+        N = filling if guided is None else guided.N
+        if fates is not None:
+            batches = batches[: -(-fates.trajectories // BATCH)]
+        # Those for the caustic map alone can be left out where all photons of that map have one weight.
+        alike = projection is None or not settings.indirect_caustics
+        spare = deposition.criterion is not None and guided is None and alike
+        must = last if not spare else filling if deposition.global_classes else 0
+        many = last, must
+        made = _deposited(deposition, batches, many, first_index, run, caustic_unit, global_unit, N, fates)
+        return made if guided is None else _with_tests(made, guided)
+    results = run([task for _, task in batches])
+    counts = sum((r[2] for r in results), np.zeros(N_COUNTS, np.int64))
+    made = PhotonMaps(
+        caustic=_join([part for r in results for part in r[0]]),
+        global_=_join([part for r in results for part in r[1]]),
+        caustic_unit=caustic_unit(traced),
+        global_unit=global_unit,
+        emitted=last,
+        rays=int(counts[C_RAYS]),
+        dropped=int(counts[C_DROPPED]),
+        ledger=sum((r[3] for r in results), np.zeros(N_LEDGER)),
+        normals=_joined([part for r in results for part in r[4]]),
+    )
+    return made if guided is None else _with_tests(made, guided)
+
+
+def guided_emission_of(
+    scene: FlatScene,
+    settings: Photons,
+    seed: int,
+    first_index: int,
+    N: int,
+    has_specular: bool,
+    how: Guidance,
+    run: Runner,
+    before: Known | None = None,
+) -> Guided | None:
+    """The guided emission of a pass of N trajectories for `trace_pass`, with what is known `before` from earlier
+    passes; None where they are too few to test the lights."""
+
+    def trace(table: NDArray[np.void], seed: int, i0: int, i1: int, n: int) -> Any:
+        record = _record(settings, seed, first_index, n, settings.q, has_specular, False, 1.0)
+        caustics, globals_, counts, ledger, *normals = _trace_batch(
+            scene, record, table, i0, i1, n, has_specular, NORMALS, None
+        )
+        return _join(caustics), _join(globals_), counts, ledger, *(_joined(part) for part in normals)
+
+    return guided_emission(scene, how, seed, N, BATCH, trace, run, before)
+
+
+def scattered_photons(
+    scene: FlatScene, settings: Photons, seed: int, places: Float, run: Runner
+) -> tuple[Float, Codes]:
+    """Where importons arrive that are scattered on once from each of places (n, 7), see `pmviewer.photons.scattered`:
+    as photons (m, 6) whose power is what they count, with their normals (m,)."""
+    records, n = scattered_record(places), len(places)
+    record = _record(settings, seed, 0, n, 1.0, False, False, 1.0)
+
+    def batch(i0: int) -> Callable[[], _Batch]:
+        return lambda: _trace_batch(scene, record, records, i0, min(i0 + BATCH, n), n, False, GLOBAL_NORMALS, None)
+
+    results = run([batch(i0) for i0 in range(0, n, BATCH)])
+    return _join([part for r in results for part in r[1]]), _joined([part for r in results for part in r[4]])
+
+
+def _record(
+    settings: Photons,
+    seed: int,
+    first_index: int,
+    filling: int,
+    probability: float,
+    has_specular: bool,
+    only_direct: bool,
+    indirect_scale: float,
+) -> NDArray[np.void]:
     record = np.zeros(1, LIGHT_PASS_DTYPE)
     record[0] = (
         seed & 0xFFFFFFFF,
@@ -134,63 +252,62 @@ def trace_pass(
         probability,
         has_specular,
         settings.indirect_caustics,
-        projection is not None or not settings.indirect_caustics,
-        direct_density / density if projection is not None else 1.0,
+        only_direct,
+        indirect_scale,
     )
+    return record
 
-    last = traced if paths is None else min(traced, paths.n)
-    if fates is not None:
-        last = min(last, fates.trajectories)
-    normals = NORMALS if deposition is not None else GLOBAL_NORMALS if with_normals else NO_NORMALS
 
-    def batch(i0: int) -> Callable[[], _Batch]:
-        return lambda: _trace_batch(
-            scene, record, projections, i0, min(i0 + BATCH, last), filling, has_specular, normals, paths
-        )
+def _mixed(traced: list[Numbered], kept: list[Numbered]) -> list[Numbered]:
+    """Both in one order in which each is spread evenly, so that the first batches tell about all."""
+    places = [
+        ((j + 0.5) / len(part), which, task) for which, part in enumerate((traced, kept)) for j, task in enumerate(part)
+    ]
+    return [task for _, _, task in sorted(places, key=lambda place: place[:2])]
 
-    caustic_unit = unit / traced if projection is None else 1.0 / direct_density
-    global_unit = surface_power / (filling * probability)
-    if deposition is not None:
-        return _deposited(deposition, batch, last, first_index, run, caustic_unit, global_unit, filling, fates)
-    results = run([batch(i0) for i0 in range(0, last, BATCH)])
-    counts = sum((r[2] for r in results), np.zeros(N_COUNTS, np.int64))
-    return PhotonMaps(
-        caustic=_join([part for r in results for part in r[0]]),
-        global_=_join([part for r in results for part in r[1]]),
-        caustic_unit=caustic_unit,
-        global_unit=global_unit,
-        emitted=last,
-        rays=int(counts[C_RAYS]),
-        dropped=int(counts[C_DROPPED]),
-        ledger=sum((r[3] for r in results), np.zeros(N_LEDGER)),
-        normals=_joined([part for r in results for part in r[4]]),
+
+def _with_tests(made: PhotonMaps, guided: Guided) -> PhotonMaps:
+    """Test photons count as traced."""
+    return replace(
+        made,
+        emitted=made.emitted + guided.tested,
+        rays=made.rays + guided.rays,
+        dropped=made.dropped + guided.dropped,
+        guided=guided,
     )
 
 
 def _deposited(
     deposition: Deposition,
-    batch: Callable[[int], Callable[[], _Batch]],
-    last: int,
+    numbered: list[Numbered],
+    trajectories: tuple[int, int],
     first_index: int,
     run: Runner,
-    caustic_unit: float,
+    caustic_unit: Callable[[int], float],
     global_unit: float,
     filling: int,
     fates: Fates | None = None,
 ) -> PhotonMaps:
-    """The pass's maps by the rules of `deposition`, from its batches, round by round where rounds matter."""
+    """The pass's maps by the rules of `deposition`, from its batches, round by round where rounds matter.
+
+    trajectories: how many there are, and how many must be traced even if the caustic map has converged before; beyond,
+    the pass ends when it has. caustic_unit: by the number of trajectories traced.
+    """
+    last, must = trajectories
+    criterion, others, sampled_of, converged = deposition.criterion, None, 0, None
     caustic, global_ = Filling(deposition.caustic), Filling(deposition.global_)
     if fates is not None:
         caustic, global_ = fates.fillings(deposition)
     sampled: list[Float] = []
     counts, ledger = np.zeros(N_COUNTS, np.int64), np.zeros(N_LEDGER)
 
-    def judged(i0: int) -> Callable[[], tuple[Prepared, Prepared, Float, NDArray[np.int64], NDArray[np.float64]]]:
+    def judged(place: int) -> Callable[[], tuple[Prepared, Prepared, Float, NDArray[np.int64], NDArray[np.float64]]]:
         def task() -> tuple[Prepared, Prepared, Float, NDArray[np.int64], NDArray[np.float64]]:
-            caustics, globals_, counts, ledger, global_normals, caustic_normals = batch(i0)()
+            i0, batch = numbered[place]
+            caustics, globals_, counts, ledger, global_normals, caustic_normals = batch()
             photons, normals = _join(globals_), _joined(global_normals)
             sample = photons[:0]
-            if deposition.sample_classes and i0 < SAMPLED:
+            if deposition.sample_classes and place * BATCH < SAMPLED:
                 wanted = in_classes(photons, deposition.sample_classes)
                 sample = photons if wanted is None else photons[wanted]
             of_caustic = _chosen(_join(caustics), _joined(caustic_normals), deposition.caustic_classes)
@@ -200,15 +317,25 @@ def _deposited(
 
         return task
 
-    batches = range(0, last, BATCH)
-    for some in rounds(len(batches)) if deposition.in_rounds else [range(len(batches))]:
-        results = run([judged(batches[i]) for i in some])
+    for some in rounds(len(numbered)) if deposition.in_rounds else [range(len(numbered))]:
+        results = run([judged(place) for place in some])
         caustic.take([r[0] for r in results], run)
         global_.take([r[1] for r in results], run)
         sampled += [r[2] for r in results]
         counts += sum((r[3] for r in results), np.zeros(N_COUNTS, np.int64))
         ledger += sum((r[4] for r in results), np.zeros(N_LEDGER))
-    (in_caustic, in_global) = run([lambda: caustic.finish(caustic_unit), lambda: global_.finish(global_unit)])
+        traced = min(some.stop * BATCH, last)
+        if criterion is None or traced < min(must, last):
+            continue
+        if others is None or sampled_of < min(filling, SAMPLED):
+            sampled_of = min(filling, SAMPLED, traced)
+            others = other_light(criterion, _join(sampled), global_unit * filling / sampled_of)
+        converged = caustic.converged(criterion, others, caustic_unit(traced), run)
+        if converged.done and traced < last:
+            converged = replace(converged, spared=last - traced)
+            last = traced
+            break
+    in_caustic, in_global = run([lambda: caustic.finish(caustic_unit(last)), lambda: global_.finish(global_unit)])
     return PhotonMaps(
         caustic=in_caustic[0],
         global_=in_global[0],
@@ -221,8 +348,8 @@ def _deposited(
         normals=in_global[1],
         caustic_normals=in_caustic[1],
         sample=_join(sampled),
-        sample_unit=global_unit * max(filling / SAMPLED, 1.0),
-        deposited={"caustic": in_caustic[3], "global": in_global[3]},
+        sample_unit=global_unit * filling / max(min(filling, SAMPLED, last), 1),
+        deposited={"caustic": replace(in_caustic[3], converged=converged), "global": in_global[3]},
     )
 
 
@@ -236,6 +363,8 @@ NO_NORMALS, GLOBAL_NORMALS, NORMALS = range(3)
 
 Codes = NDArray[np.uint32]
 _Batch = tuple[list[Float], list[Float], NDArray[np.int64], NDArray[np.float64], list[Codes], list[Codes]]
+Numbered = tuple[int, Callable[[], _Batch]]
+"""A batch with a number that no other batch has in any pass."""
 
 
 def _trace_batch(

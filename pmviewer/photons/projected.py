@@ -32,6 +32,8 @@ from pmviewer.kernels.surface import leave
 from pmviewer.kernels.table import find_interval
 from pmviewer.kernels.vector import along, basis, dot, luminance, scale
 from pmviewer.kernels.warp import square_to_disk, square_to_sphere
+from pmviewer.photons.scattered import emit_scattered
+from pmviewer.photons.strata import emit_stratified
 
 WHOLE, DIRECTIONS, PLACES, WORLD, DISC = range(5)
 ROWS, COLUMNS = 64, 64
@@ -88,23 +90,41 @@ def _from_curved_light(scene, light, position, d, u):
     return leave(p, n, gap, d[0], d[1], d[2]), d, beta, u < dot(n, d)
 
 
-def emission(scene, projection, sequence, seed, index, u_pick, position, direction):
-    """A photon leaving a light: origin, unit direction, power in units of what all have, light, and whether it is to be
-    traced. `projection` is one record of PROJECTION_DTYPE or of NO_PROJECTION; the rest as `emit_photon`."""
+def emission(scene, projection, i, sequence, seed, index, u_pick, position, direction):
+    """A photon leaving a light: origin, unit direction, power of luminance 1, light, whether it is to be traced, and
+    the factor by which its power counts in the units of the map. `projection` is one record of PROJECTION_DTYPE, of
+    NO_PROJECTION, of strata (`pmviewer.photons.strata`) or of importons (`pmviewer.photons.scattered`); i is its
+    trajectory's number in the pass; the rest as `emit_photon`."""
     raise NotImplementedError("only for kernels")
 
 
 @overload(emission)
-def _emission(scene, projection, sequence, seed, index, u_pick, position, direction):
+def _emission(scene, projection, i, sequence, seed, index, u_pick, position, direction):
     if "none" in projection.fields:
 
-        def everywhere(scene, projection, sequence, seed, index, u_pick, position, direction):
+        def everywhere(scene, projection, i, sequence, seed, index, u_pick, position, direction):
             p, d, beta, light = emit_photon(scene, u_pick, position, direction)
-            return p, d, beta, light, True
+            return p, d, beta, light, True, _f4(1.0)
 
         return everywhere
 
-    def projected(scene, projection, sequence, seed, index, u_pick, position, direction):
+    if "strata" in projection.fields:
+
+        def stratified(scene, projection, i, sequence, seed, index, u_pick, position, direction):
+            p, d, beta, light, weight = emit_stratified(scene, projection, i, seed, index, u_pick, position, direction)
+            return p, d, beta, light, True, weight
+
+        return stratified
+
+    if "scattered" in projection.fields:
+
+        def scattered(scene, projection, i, sequence, seed, index, u_pick, position, direction):
+            p, d, worth = emit_scattered(projection, i, direction)
+            return p, d, (_f4(1.0), _f4(1.0), _f4(1.0)), _i8(0), True, worth
+
+        return scattered
+
+    def projected(scene, projection, i, sequence, seed, index, u_pick, position, direction):
         light = find_interval(projection.cdf, scene.n_lights, _i8(1), u_pick)
         mode = load_i4(projection.modes, light)
         first = _i8(load_i4(projection.first, light))
@@ -113,7 +133,7 @@ def _emission(scene, projection, sequence, seed, index, u_pick, position, direct
             p, d, beta = emit_from(scene, light, position, direction)
             if mode == DISC:
                 p = _on_disc(scene, projection, d, position)
-            return p, d, beta, light, True
+            return p, d, beta, light, True, _f4(1.0)
         low = load_f4(projection.cdf, light)
         rest = min((u_pick - low) / (load_f4(projection.cdf, light + 1) - low), _BELOW_ONE)
         cell = _i8(load_i4(projection.cells, first + min(_i8(rest * _f4(count)), count - 1)))
@@ -123,15 +143,15 @@ def _emission(scene, projection, sequence, seed, index, u_pick, position, direct
         if mode == WORLD:
             accept = draw1(sequence, seed, index, ACCEPT_SET)
             p, d, beta, kept = _from_curved_light(scene, light, position, square_to_sphere(u, v), accept)
-            return p, d, beta, light, kept
+            return p, d, beta, light, kept, _f4(1.0)
         if mode == PLACES:
             p, d, beta = emit_from(scene, light, concentric_from_polar(u, v), direction)
-            return p, d, beta, light, True
+            return p, d, beta, light, True, _f4(1.0)
         kind = np.int32(light_number(scene, light, L_KIND))
         if kind in (PARALLELOGRAM, DISK):
             u, v = concentric_from_polar(u, v)
         p, d, beta = emit_from(scene, light, position, (u, v))
-        return p, d, beta, light, True
+        return p, d, beta, light, True, _f4(1.0)
 
     return projected
 

@@ -1,7 +1,8 @@
 """Photon tracing: emission, scattering with Russian roulette, deposition (T1–T6).
 
 Weights stay nearly equal: lights are picked by power, and roulette decides about scatterings
-(`pmviewer.photons.roulette`).
+(`pmviewer.photons.roulette`). Photons of guided emission (`pmviewer.photons.strata`) carry a factor for their power
+that roulette does not see, so that the same paths survive.
 
 Random numbers of a photon are keyed by (seed, its index over all passes, dimension): the same photons for any number of
 threads and any batch size (T2). Dimension set 0 is emission, set 1 + b the b-th scattering.
@@ -88,12 +89,12 @@ def _store(out, row, p, wi, beta, flags, light):
 def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, caustic_out, counts, ledger, paths):
     """Trace photons i0 … i1−1 of a pass.
 
-    scenes: SCENE_DTYPE (1,); passes: LIGHT_PASS_DTYPE (1,); projections: PROJECTION_DTYPE (2,) or NO_PROJECTION, of the
-    trajectories that fill the global map and of the others; global_out, caustic_out: float32 (capacity, 6), see
-    `pmviewer.maps.record`; normals_out: two arrays uint32 (capacity,), receive the surface normals of global and of
-    caustic photons, or (0,) when nobody needs them; counts: int64 (N_COUNTS,) and ledger: float64 (N_LEDGER,) are
-    added to, `counts[C_GLOBAL]` and `counts[C_CAUSTIC]` being the rows filled so far; paths: None, or where to write
-    whole paths (`pmviewer.photons.paths`).
+    scenes: SCENE_DTYPE (1,); passes: LIGHT_PASS_DTYPE (1,); projections: PROJECTION_DTYPE (2,), STRATA_DTYPE (2,) or
+    NO_PROJECTION, of the trajectories that fill the global map and of the others; global_out, caustic_out: float32
+    (capacity, 6), see `pmviewer.maps.record`; normals_out: two arrays uint32 (capacity,), receive the surface normals
+    of global and of caustic photons, or (0,) when nobody needs them; counts: int64 (N_COUNTS,) and ledger: float64
+    (N_LEDGER,) are added to, `counts[C_GLOBAL]` and `counts[C_CAUSTIC]` being the rows filled so far; paths: None, or
+    where to write whole paths (`pmviewer.photons.paths`).
 
     Returns the index of the next photon to trace: less than i1 when a buffer may not hold another photon's path.
     """
@@ -112,13 +113,15 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
         u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, _i8(0))
         u_pick = draw1(pass_.sequence, seed, index, LIGHT_CHOICE_SET)
         projection = projections[0 if to_global else 1]
-        p, d, beta, light, kept = emission(scene, projection, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1))
-        start = luminance(beta)
+        p, d, beta, light, kept, worth = emission(
+            scene, projection, i, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1)
+        )
+        start = luminance(beta) * worth
         ledger[E_EMITTED] += _f8(start)
         if not kept:
             ledger[E_ESCAPED] += _f8(start)
             continue
-        begin_path(paths, i, p, d, beta, light)
+        begin_path(paths, i, p, d, scale(beta, worth), light)
         o = p
         flags = _u4(0)
         bounces = 0
@@ -126,17 +129,17 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
             t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), _INF)
             counts[C_RAYS] += 1
             if prim < 0:
-                extend_path(paths, i, prim, o, d, beta, _u4(flags | _u4(min(bounces, BOUNCES))), light)
-                ledger[E_ESCAPED] += _f8(luminance(beta))
+                extend_path(paths, i, prim, o, d, scale(beta, worth), _u4(flags | _u4(min(bounces, BOUNCES))), light)
+                ledger[E_ESCAPED] += _f8(luminance(beta) * worth)
                 break
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
             beta = attenuation(scene, material, ng, d, t, beta)
-            extend_path(paths, i, prim, p, d, beta, _u4(flags | _u4(min(bounces, BOUNCES))), light)
+            extend_path(paths, i, prim, p, d, scale(beta, worth), _u4(flags | _u4(min(bounces, BOUNCES))), light)
             wi = (-d[0], -d[1], -d[2])
             b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
             if b.groups == NOTHING:
-                ledger[E_ABSORBED] += _f8(luminance(beta))
+                ledger[E_ABSORBED] += _f8(luminance(beta) * worth)
                 break
             ng = face(ng, wi)
             u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
@@ -151,6 +154,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                 if pass_.roulette == EQUAL:
                     times, factor = copies(beta, draw1(pass_.sequence, seed, index, COPIES_SET + bounces))
                     stored = scale(beta, factor)
+                stored = scale(stored, worth)
                 if is_caustic and pass_.caustics != 0:
                     in_caustic = stored
                     if path_class == INDIRECT_CAUSTIC:
@@ -169,13 +173,13 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                         if len(normals_out[0]) > 0:
                             normals_out[0][counts[C_GLOBAL]] = encode_direction(ng[0], ng[1], ng[2])
                         counts[C_GLOBAL] += 1
-                ledger[E_STORED] += _f8(luminance(beta))
+                ledger[E_STORED] += _f8(luminance(beta) * worth)
             before = luminance(beta)
             group, share, u_lobe = pick_group(b, wi, u_lobe)
             if group == FOLLOWED:
                 flags = _u4(flags | _u4(LAST_SPECULAR))
             elif not to_global and pass_.only_direct != 0:
-                ledger[E_TERMINATED] += _f8(before)
+                ledger[E_TERMINATED] += _f8(before * worth)
                 break
             else:
                 flags = _u4(HAD_DIFFUSE)
@@ -187,14 +191,14 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
             after = scale(mul(beta, weight), share)
             survival = survival_probability(pass_.roulette, before, beta, after)
             if not u2 < survival:
-                ledger[E_ABSORBED] += _f8(before)
+                ledger[E_ABSORBED] += _f8(before * worth)
                 break
             beta = scale(after, _f4(1.0) / survival)
             if pass_.roulette != BY_LUMINANCE:  # which keeps it
-                ledger[E_ABSORBED] += _f8(before) - _f8(luminance(beta))
+                ledger[E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
             bounces += 1
             if bounces >= max_bounces:
-                ledger[E_TERMINATED] += _f8(luminance(beta))
+                ledger[E_TERMINATED] += _f8(luminance(beta) * worth)
                 break
             o = leave(p, ng, gap, d[0], d[1], d[2])
     return i1

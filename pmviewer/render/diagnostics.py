@@ -32,6 +32,7 @@ from pmviewer.maps.differential import reach
 from pmviewer.maps.estimate import irradiance_knn, irradiance_radius
 from pmviewer.maps.neighbours import BATCH_WORDS, FOUND_WORDS, SQUARED_WORDS, next_batch, search
 from pmviewer.maps.radiance import nearest_site, site_place
+from pmviewer.maps.record import encode_direction
 from pmviewer.maps.stored import ALL_CLASSES
 from pmviewer.render.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near, chosen_light
 from pmviewer.render.eye import BSDF_SET, PIXEL_SET, camera_ray, pixel_seed
@@ -83,6 +84,18 @@ def stored_hit(scene, eye, pixel):
         o = leave(p, face(ng, wo), gap, d[0], d[1], d[2])
         near, far = _f4(0.0), _INF
     return _i8(-1), _f4(0.0), _f4(0.0), _NOWHERE, _NOWHERE, _NOWHERE, _f4(0.0), _NOWHERE
+
+
+@kernel
+def seen_places(scenes, eyes, points, normals, found, first, last):
+    """Point (pixels, 3) and normal's code (pixels,) of `stored_hit` for pixels first … last−1; found: bool, whether it
+    found one."""
+    scene, eye = scenes[0], eyes[0]
+    for pixel in range(first, last):
+        prim, _, _, p, ng, _, _, _ = stored_hit(scene, eye, pixel)
+        found[pixel] = prim >= 0
+        points[pixel, 0], points[pixel, 1], points[pixel, 2] = p
+        normals[pixel] = encode_direction(ng[0], ng[1], ng[2]) if prim >= 0 else _u4(0)
 
 
 def looked_up(photons, eye, radius, p, n, class_mask):

@@ -35,6 +35,7 @@ class Display(Group):
         "achieved density",
         "density ratio",
         "storing probability",
+        "caustic convergence",
     ] = setting(
         "beauty",
         "What the viewport shows: the image, one of its terms, a property of the first hit, the shaded geometry, the "

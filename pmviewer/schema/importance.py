@@ -128,6 +128,17 @@ class Importance(Group):
         stage="photons",
         scale="choice",
     )
+    convergence: Literal["off", "square", "cube"] = setting(
+        "off",
+        "Where the caustic map has converged under density control: by (D/D_r)·(L/L_c)^m ≥ 1 with m = 2 or 3, since a "
+        "caustic that other light outshines may be coarser (Suykens and Willems 2000). Trajectories that fill the "
+        "caustic map alone (q below 1) end when all of it has, unless projection maps aim them and there are "
+        "indirect caustics; the view 'caustic "
+        "convergence' shows where.",
+        stage="photons",
+        scale="choice",
+        title="caustic convergence",
+    )
     density: float | Auto = setting(
         "auto",
         "Density of photons to store everywhere. Automatic: so many that a look-up finds 20 of them.",
@@ -137,4 +148,35 @@ class Importance(Group):
         title="constant density",
         ge=1e-6,
         le=1e12,
+    )
+    emission: Literal["off", "Peter-Pietrek", "Christensen discard", "Christensen keep"] = setting(
+        "off",
+        "Where photons leave the lights, by what test photons meet. Peter-Pietrek: as often as they met importance. "
+        "Christensen discard: strata whose test photons met nothing important keep them, others get many weaker ones "
+        "instead; light that test photons miss is lost. Christensen keep: test photons stay and are topped up, which "
+        "is unbiased. Both store photons in unimportant places by roulette.",
+        stage="photons",
+        scale="choice",
+        title="guided emission",
+    )
+    tests: int = setting(
+        2,
+        "Test photons from each stratum of a light's directions, at least: fewer allow finer strata. A sixteenth "
+        "(Peter-Pietrek) or an eighth (Christensen) of a pass's photons are test photons.",
+        stage="photons",
+        scale="log",
+        unit="photons",
+        title="test photons",
+        ge=2,
+        le=1024,
+    )
+    important: float = setting(
+        0.05,
+        "Importance, relative to what most seen places have, from which a place is important: Christensen discard "
+        "drops test photons that reach such a place, and those around them, and sends more of less power.",
+        stage="photons",
+        scale="log",
+        title="important from",
+        ge=1e-4,
+        le=1.0,
     )

@@ -3,6 +3,7 @@ that matter."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +16,7 @@ from pmviewer.viewer.format import data_size, grouped
 from pmviewer.viewer.light_list import light_rows
 from pmviewer.viewer.overlays import LIGHT_PALETTE
 from pmviewer.viewer.state import ViewerState
-from pmviewer.viewer.statistics_panel import Rows, table
+from pmviewer.viewer.statistics_panel import table
 
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
     from pmviewer.photons.deposition import Deposited
@@ -23,41 +24,42 @@ if TYPE_CHECKING:  # numba, which the window doesn't wait for
 FIRST_WEIGHT = -10
 """Exponent of the histogram's first bin, as `pmviewer.photons.deposition.FIRST_WEIGHT`."""
 MAP_COLOURS = {"caustic": LIGHT_PALETTE[0], "global": LIGHT_PALETTE[1]}
-PERCENTILES = ("1 %", "50 %", "99 %", "largest")
+PERCENTILES = ("1 %", "50 %", "99 %", "all")
 TOP_LIGHTS = 8
 
 
-def deposition_rows(books: Deposited) -> Rows:
-    """The figures of one map."""
-    rows = [
-        ("Arrived", grouped(books.arrived)),
-        ("Stored", f"{grouped(books.stored)}  {_share(books.stored, books.arrived)}"),
-    ]
-    rejected = books.rejected - books.redistributed
-    if books.redistributed:
-        text = f"{grouped(books.redistributed)}  {_share(books.redistributed, books.arrived)}"
-        rows.append(("Power redistributed", text))
-    if rejected:
-        rows.append(("Rejected", f"{grouped(rejected)}  {_share(rejected, books.arrived)}"))
-    rows.append(("Memory saved", data_size(books.saved_bytes)))
+def deposition_rows(deposited: Mapping[str, Deposited]) -> list[tuple[str, list[str]]]:
+    """The figures of the maps, a column each: what became of the photons of the latest pass. Rows that would be all
+    nothing are left out, but for the first two."""
+    every = list(deposited.values())
+
+    def counts(values: list[int]) -> list[str]:
+        return [f"{grouped(n)}  {_share(n, b.arrived)}" for n, b in zip(values, every, strict=True)]
+
+    rows = [("Arrived", [grouped(b.arrived) for b in every]), ("Stored", counts([b.stored for b in every]))]
+    redistributed, rejected = [b.redistributed for b in every], [b.rejected - b.redistributed for b in every]
+    if any(redistributed):
+        rows.append(("Redistributed", counts(redistributed)))
+    if any(rejected):
+        rows.append(("Rejected", counts(rejected)))
+    rows.append(("Memory saved", [data_size(b.saved_bytes) for b in every]))
     return rows
 
 
-def discarded_text(books: Deposited) -> str | None:
-    """How much too dark a biased rule makes the map, None where no power is lost."""
-    if not books.discarded_power > 0:
+def bias_row(deposited: Mapping[str, Deposited]) -> list[str] | None:
+    """Share of the power that a biased rule discards in each map, None where no power is lost."""
+    every = list(deposited.values())
+    if not any(b.discarded_power > 0 for b in every):
         return None
-    return f"Biased: {books.discarded_power / books.arrived_power:.2%} of the power is discarded"
+    return [f"{b.discarded_power / b.arrived_power:.2%}" if b.arrived_power > 0 else "–" for b in every]
 
 
-def importance_rows(s: Statistics) -> Rows:
-    """Of the importons."""
-    if not s.importons:
-        return []
-    return [
-        ("Importons traced", grouped(s.importons)),
-        ("Stored at", f"{grouped(s.stored_in_pass['importons'])} places"),
-    ]
+def traced_text(s: Statistics) -> str:
+    """What was traced: photons of all passes, importons for the latest."""
+    text = f"{grouped(s.emitted)} trajectories traced in all passes"
+    if s.importons:
+        text += f"; {grouped(s.importons)} importons, stored at {grouped(s.stored_in_pass['importons'])} places"
+    return text
 
 
 def histogram_of(books: Deposited) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -68,7 +70,7 @@ def histogram_of(books: Deposited) -> tuple[NDArray[np.float64], NDArray[np.floa
     if not len(used):
         return np.empty(0), np.empty(0)
     some = np.arange(used[0], used[-1] + 1)
-    return FIRST_WEIGHT + some + 0.5, counts[some]
+    return FIRST_WEIGHT + some.astype(np.float64), counts[some]
 
 
 def _share(part: int, whole: int) -> str:
@@ -92,7 +94,7 @@ class ImportancePanel:
         flags = imgui.TableFlags_.borders_inner_v
         if not imgui.begin_table("##columns", 3, flags):
             return
-        for name, weight in (("figures", 1.15), ("weights", 1.0), ("lights", 0.9)):
+        for name, weight in (("figures", 1.2), ("weights", 1.0), ("lights", 0.85)):
             imgui.table_setup_column(name, imgui.TableColumnFlags_.width_stretch, weight)
         imgui.table_next_column()
         self._figures(s)
@@ -104,18 +106,22 @@ class ImportancePanel:
 
     @staticmethod
     def _figures(s: Statistics) -> None:
-        table("", [("Trajectories traced, all passes", grouped(s.emitted)), *importance_rows(s)])
+        imgui.push_text_wrap_pos(0)
+        imgui.text_unformatted(traced_text(s))
         if not s.deposited:
             imgui.text_disabled("Every photon is stored (importance.deposition).")
-        for name, books in s.deposited.items():
-            if books.arrived == 0:
-                continue
-            table(f"{name.capitalize()} map, latest pass", deposition_rows(books))
-            lost = discarded_text(books)
-            if lost is not None:
-                imgui.push_text_wrap_pos(0)
-                imgui.text_colored(imgui.ImVec4(*theme.WARNING), lost)
-                imgui.pop_text_wrap_pos()
+        imgui.pop_text_wrap_pos()
+        used = {name: books for name, books in s.deposited.items() if books.arrived}
+        if not used or not imgui.begin_table("##figures", 1 + len(used)):
+            return
+        _cells("Latest pass", list(used), theme.DIM)
+        for name, values in deposition_rows(used):
+            _cells(name, values, theme.TEXT)
+        lost = bias_row(used)
+        if lost is not None:
+            _cells("Power lost (bias)", lost, theme.WARNING)
+            imgui.set_item_tooltip("Discarded below the cut-off: the picture is too dark by what this would have lit")
+        imgui.end_table()
 
     def _weights(self, s: Statistics) -> None:
         """Histogram and percentiles, of both maps in their colours."""
@@ -125,20 +131,12 @@ class ImportancePanel:
             return
         imgui.text_colored(imgui.ImVec4(*theme.DIM), "Weights of the stored photons")
         imgui.set_item_tooltip("Power relative to that with which photons leave the lights")
-        self._plot({name: histogram_of(books) for name, books in shown.items()})
         if imgui.begin_table("##percentiles", 1 + len(PERCENTILES)):
-            imgui.table_next_row()
-            for text in ("", *PERCENTILES):
-                imgui.table_next_column()
-                imgui.text_colored(imgui.ImVec4(*theme.DIM), text)
+            _cells("at most", PERCENTILES, theme.DIM)
             for name, books in shown.items():
-                imgui.table_next_row()
-                imgui.table_next_column()
-                imgui.text_colored(imgui.ImVec4(*MAP_COLOURS[name], 1.0), name)
-                for weight in books.percentiles:
-                    imgui.table_next_column()
-                    imgui.text_unformatted(f"{weight:.3g}")
+                _cells(name, [f"{weight:.3g}" for weight in books.percentiles], (*MAP_COLOURS[name], 1.0))
             imgui.end_table()
+        self._plot({name: histogram_of(books) for name, books in shown.items()})
 
     @staticmethod
     def _plot(bars: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]) -> None:
@@ -151,7 +149,8 @@ class ImportancePanel:
         implot.push_style_color(implot.Col_.plot_bg, theme.grey(0.12))
         implot.push_style_color(implot.Col_.axis_grid, theme.grey(1, 0.12))
         flags = implot.Flags_.no_inputs | implot.Flags_.no_menus | implot.Flags_.no_mouse_text | implot.Flags_.no_legend
-        size = imgui.get_content_region_avail().x, max(7.5 * imgui.get_text_line_height(), 60.0)
+        line = imgui.get_text_line_height()
+        size = imgui.get_content_region_avail().x, max(imgui.get_content_region_avail().y - 0.5 * line, 6 * line)
         if implot.begin_plot("##weights", size, flags):
             axis = implot.AxisFlags_.no_menus | implot.AxisFlags_.no_highlight
             implot.setup_axis(implot.ImAxis_.x1, "weight", axis)
@@ -183,6 +182,18 @@ class ImportancePanel:
             imgui.pop_text_wrap_pos()
             return
         table("Share of the picture's light", light_rows(lights, TOP_LIGHTS))
+
+
+def _cells(name: str, values: Sequence[str], colour: theme.Colour) -> None:
+    """A row of a table: a name and values at the right of their columns."""
+    imgui.table_next_row()
+    imgui.table_next_column()
+    imgui.text_colored(imgui.ImVec4(*colour), theme.drawable(name))
+    for value in values:
+        imgui.table_next_column()
+        room = imgui.get_content_region_avail().x - imgui.calc_text_size(value).x
+        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(room, 0))
+        imgui.text_colored(imgui.ImVec4(*colour), value)
 
 
 def weight_text(exponent: float) -> str:

@@ -32,7 +32,7 @@ def share_text(lights: LightImportance, light: int) -> str:
 def light_rows(lights: LightImportance, count: int) -> list[tuple[str, str]]:
     """Names and shares of the most important lights, and what is left for all others."""
     chosen = top_lights(lights, count)
-    rows = [(f"{lights.names[i]} ({i + 1})", share_text(lights, i)) for i in chosen]
+    rows = [(f"{i + 1}: {lights.names[i]}", share_text(lights, i)) for i in chosen]
     others = len(lights.names) - len(chosen)
     if others:
         rows.append((f"{others} others", f"{max(0.0, 1.0 - float(lights.lit[chosen].sum())):.1%}"))

@@ -103,7 +103,9 @@ class OverlayPanel:
     def _count(self, name: str, overlay: Overlay) -> None:
         """How many there are, at the right edge of the row."""
         frame, picture = self._state.frame, self._viewport.picture
-        if name in ("fates", "lights") and picture is not None:
+        if name in ("fates", "lights"):
+            if picture is None or not get(self._state.settings, f"overlays.{name}.show"):
+                return
             count = picture.clouds[name].summary(1).total
         elif frame is None or name not in CLOUDS:
             return

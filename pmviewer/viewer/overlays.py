@@ -146,6 +146,9 @@ def _percentiles(photons: NDArray[np.float32], colour: str = "power") -> tuple[f
     if colour in AROUND_ONE:
         reach = max(2.0, 1.0 / low, high)
         return 1.0 / reach, reach
+    if colour == "picture":  # every light counts, down to a thousandth of the most important one
+        high = float(power.max(initial=1e-6))
+        low = max(float(power[power > 0].min(initial=high)), 1e-3 * high)
     if colour in CHANNELS:
         low = min(low, 0.8 * high)
     return float(low), float(high)

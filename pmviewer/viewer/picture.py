@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.frame import Frame, PhotonCloud
-from pmviewer.output.diagnostic_views import DIAGNOSTICS, GREY, LUMINANCE, view_scale
+from pmviewer.output.diagnostic_views import CLASS_COLOURS, DIAGNOSTICS, GREY, LUMINANCE, view_scale
 from pmviewer.output.falsecolour import ERROR_SCALE, Scale
 from pmviewer.output.tone import depth_bounds
 from pmviewer.render.camera import CameraPose, Matrix
@@ -45,7 +45,7 @@ CLOUDS = ("caustic", "global", "radiance", "cache", "shadow", "importons")
 """Clouds that a frame has whether or not they are shown; 'fates' and 'lights' are made while they are."""
 SURROUND = (0.105, 0.105, 0.105)
 _CONTENT = {"albedo": 1, "normal": 2, "depth": 3, "error": 4} | {
-    view: 6 if how.cells else 5 for view, how in DIAGNOSTICS.items()
+    view: 7 if how.classes else 6 if how.cells else 5 for view, how in DIAGNOSTICS.items()
 }
 _CURVE = {"sRGB": 0, "Reinhard": 1, "filmic": 2, "linear": 3}
 BEHIND_POINTS = 0.3
@@ -340,6 +340,7 @@ class Picture:
             value_weights=LUMINANCE if plane.components == 3 else (1.0, 0.0, 0.0),
             grey=GREY,
             colour_row=int(diagnostic is not None and diagnostic.diverging),
+            class_colours=CLASS_COLOURS,
         )
         self.context.disable(moderngl.DEPTH_TEST)
         self._triangle.render(moderngl.TRIANGLES, vertices=3)

@@ -18,7 +18,7 @@ def photon_rows(s: Statistics) -> Rows:
     if s.bytes_per_photon:
         rows.append(("Memory of a photon", f"{s.bytes_per_photon:.1f} bytes"))
     rows.append(("Memory of the maps", data_size(s.map_bytes)))
-    return rows
+    return rows + convergence_rows(s)
 
 
 def time_rows(s: Statistics) -> Rows:
@@ -42,6 +42,19 @@ def time_rows(s: Statistics) -> Rows:
     if s.passes and s.seconds:
         rows.append(("Time of a pass", duration(s.seconds / s.passes)))
     return rows
+
+
+def convergence_rows(s: Statistics) -> Rows:
+    """How much of the caustic map's light lies where no more photons are needed; none without the criterion."""
+    books = s.deposited.get("caustic")
+    if books is None or books.converged is None:
+        return []
+    found = books.converged
+    return [
+        ("Caustic map converged", f"{1 - found.more:.1%}" if found.photons else "no caustic photons"),
+        ("Caustic map dense enough", f"{found.dense:.1%}"),
+        ("Caustic trajectories spared", grouped(found.spared)),
+    ]
 
 
 def reference_rows(point: Point) -> Rows:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,11 +11,11 @@ from imgui_bundle import imgui
 from numpy.typing import NDArray
 
 from pmviewer.engine.frame import Frame
-from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.output.diagnostic_views import CLASS_COLOURS, DIAGNOSTICS
 from pmviewer.output.falsecolour import COLOURS, ERROR_SCALE, Scale
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import duration, si
-from pmviewer.viewer.light_list import share_text, top_lights
+from pmviewer.viewer.light_list import top_lights
 
 if TYPE_CHECKING:
     from pmviewer.output.compare import Reference
@@ -58,8 +59,7 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
             _caption(viewport, text, (margin, margin))
     elif view != state.settings.display.view and not state.flipped:
         refusal = state.refused_view(state.settings.display.view) or "is being made"
-        text = f"{state.settings.display.view}: {refusal}"
-        _caption(viewport, text, (margin, margin), colour=theme.WARNING)
+        _caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.WARNING)
     elif view != "beauty" and viewport.captions:
         _caption(viewport, _title(viewport, view), (margin, margin))
     if state.settings.free_camera.on and viewport.captions:
@@ -68,7 +68,9 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         _depth_legend(viewport, *viewport.picture.depth_range)
     if view == "error":
         _error_legend(viewport)
-    if view in DIAGNOSTICS and not DIAGNOSTICS[view].cells and viewport.picture is not None:
+    if view in DIAGNOSTICS and DIAGNOSTICS[view].classes:
+        _class_legend(viewport, DIAGNOSTICS[view].classes)
+    elif view in DIAGNOSTICS and not DIAGNOSTICS[view].cells and viewport.picture is not None:
         _scale_legend(viewport, viewport.picture.scale, DIAGNOSTICS[view].colours)
     if state.settings.overlays.lights.show:
         _light_labels(viewport)
@@ -82,6 +84,39 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         text = _value_under_mouse(viewport)
         if text:
             _caption(viewport, text, (margin, height - line - 1.2 * margin))
+
+
+def _light_labels(viewport: Viewport) -> None:
+    """Shares of the most important lights, beside them."""
+    frame, camera, style = viewport.state.frame, viewport.shown_camera(), viewport.state.settings.overlays.lights
+    if frame is None or camera is None or frame.known_lights is None or frame.light_places is None:
+        return
+    left, top, width, height = viewport.rectangle()
+    line = imgui.get_text_line_height()
+    for light in top_lights(frame.known_lights, style.labels):
+        place = projected(camera, frame.light_places[light])
+        if place is not None:
+            position = left + place[0] * width + 0.5 * style.size + 0.4 * line, top + place[1] * height - 0.5 * line
+            if 0 <= position[0] < viewport.size[0] and 0 <= position[1] < viewport.size[1] - line:
+                _caption(viewport, f"{light + 1}: {frame.known_lights.lit[light]:.1%}", position)
+
+
+def projected(camera: CameraPose, point: NDArray[np.floating]) -> tuple[float, float] | None:
+    """Where a point is in the picture, from (0, 0) top left to (1, 1); None where the camera doesn't see it."""
+    if not np.isfinite(point).all():
+        return None
+    clip = camera.projection_matrix(1e-3, 1.0) @ camera.view_matrix() @ np.append(point, 1.0)
+    if not clip[3] > 0:
+        return None
+    x, y = 0.5 + 0.5 * clip[0] / clip[3], 0.5 - 0.5 * clip[1] / clip[3]
+    return (float(x), float(y)) if 0 <= x <= 1 and 0 <= y <= 1 else None
+
+
+def _title(viewport: Viewport, view: str) -> str:
+    """What is shown, with the map where there are two."""
+    frame = viewport.state.frame
+    of = frame.inspection.wanted.map if view in DIAGNOSTICS and frame is not None else ""
+    return f"{of} map, {_TITLES[view]}" if of else _TITLES.get(view, view)
 
 
 def _compared_pictures(viewport: Viewport) -> None:
@@ -130,39 +165,6 @@ def _free_camera_label(viewport: Viewport) -> None:
     _caption(viewport, text, (x, viewport.size[1] - lines - 2.4 * line), colour=theme.FREE)
 
 
-def _light_labels(viewport: Viewport) -> None:
-    """Shares of the most important lights, beside them."""
-    frame, camera, style = viewport.state.frame, viewport.shown_camera(), viewport.state.settings.overlays.lights
-    if frame is None or camera is None or frame.known_lights is None or frame.light_places is None:
-        return
-    left, top, width, height = viewport.rectangle()
-    line = imgui.get_text_line_height()
-    for light in top_lights(frame.known_lights, style.labels):
-        place = projected(camera, frame.light_places[light])
-        if place is not None:
-            position = left + place[0] * width + 0.5 * style.size + 0.4 * line, top + place[1] * height - 0.5 * line
-            if 0 <= position[0] < viewport.size[0] and 0 <= position[1] < viewport.size[1] - line:
-                _caption(viewport, share_text(frame.known_lights, light), position)
-
-
-def projected(camera: CameraPose, point: NDArray[np.floating]) -> tuple[float, float] | None:
-    """Where a point is in the picture, from (0, 0) top left to (1, 1); None where the camera doesn't see it."""
-    if not np.isfinite(point).all():
-        return None
-    clip = camera.projection_matrix(1e-3, 1.0) @ camera.view_matrix() @ np.append(point, 1.0)
-    if not clip[3] > 0:
-        return None
-    x, y = 0.5 + 0.5 * clip[0] / clip[3], 0.5 - 0.5 * clip[1] / clip[3]
-    return (float(x), float(y)) if 0 <= x <= 1 and 0 <= y <= 1 else None
-
-
-def _title(viewport: Viewport, view: str) -> str:
-    """What is shown, with the map where there are two."""
-    frame = viewport.state.frame
-    of = frame.inspection.wanted.map if view in DIAGNOSTICS and frame is not None else ""
-    return f"{of} map, {_TITLES[view]}" if of else _TITLES.get(view, view)
-
-
 def _value_under_mouse(viewport: Viewport) -> str:
     pixel = viewport.pixel_under_mouse()
     frame = viewport.frame_at(pixel) if pixel is not None else None
@@ -183,6 +185,8 @@ def _value_under_mouse(viewport: Viewport) -> str:
         values = frame.image(view)[y, x]
         if values[0] < 0:
             return f"{pixel[0]}, {pixel[1]}    {DIAGNOSTICS[view].none}"
+        if DIAGNOSTICS[view].classes:
+            return f"{pixel[0]}, {pixel[1]}    {DIAGNOSTICS[view].classes[int(values[0])]}"
         if DIAGNOSTICS[view].cells:
             return f"{pixel[0]}, {pixel[1]}    cell {int(values[0])}{', beyond the cut-off' if values[0] % 1 else ''}"
     else:
@@ -226,6 +230,13 @@ def tick_text(value: float) -> str:
         if abs(value) >= 10 * factor:
             return f"{value / factor:.6g}{prefix}"
     return f"{value:.6g}"
+
+
+def _class_legend(viewport: Viewport, names: Sequence[str]) -> None:
+    """A patch of colour for each class, the last one on top."""
+    bands = [colour for colour in CLASS_COLOURS[len(names) - 1 :: -1] for _ in range(16)]  # sharp edges
+    labels = [((i + 0.5) / len(names), name) for i, name in enumerate(reversed(names))]
+    _legend(viewport, labels, np.array(bands))
 
 
 def _legend(viewport: Viewport, labels: list[tuple[float, str]], colours: NDArray[np.floating]) -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pmviewer.output.falsecolour import COLOURS, Scale, false_colour, scale_of
+from pmviewer.output.falsecolour import COLOURS, Scale, false_colour, scale_around_one, scale_of
 from pmviewer.output.tone import MAGENTA
 
 
@@ -51,6 +51,8 @@ def test_ticks_are_round_and_carry_the_unit():
     decades = Scale(0.002, 3e4, log=True, unit="photons/m²").ticks(8)
     assert [t.label.split()[0] for t in decades] == ["0.01", "0.1", "1", "10", "100", "1000", "10000"]
     assert [t.label for t in Scale(1, 30, log=True).ticks()] == ["1", "2", "5", "10", "20"]
+    around_one = scale_around_one(np.array([0.002, 1.0, 3.0]), unit="×").ticks()
+    assert [t.label for t in around_one if t.position == pytest.approx(0.5)] == ["1 ×"]
     assert decades[0].position == pytest.approx(math.log(5) / math.log(1.5e7))
 
 

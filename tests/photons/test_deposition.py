@@ -173,9 +173,9 @@ def test_large_powers_make_the_unit_grow():
 
 
 def test_histogram_of_weights():
-    counts = weight_histogram(np.array([0.0, 1.0, 1.5, 2.0, 1e9, 2.0**FIRST_WEIGHT], f4))
-    assert sum(counts) == 6
-    assert (counts[-FIRST_WEIGHT], counts[1 - FIRST_WEIGHT], counts[-1]) == (2, 1, 1)
+    counts = weight_histogram(np.array([0.0, 0.999, 1.0, 1.4, 1.42, 2.8, 1e9, 2.0**FIRST_WEIGHT], f4))
+    assert sum(counts) == 8
+    assert (counts[0], counts[-FIRST_WEIGHT], counts[1 - FIRST_WEIGHT], counts[-1]) == (2, 3, 2, 1)
 
 
 def test_rounds_cover_all_batches_once():

@@ -30,6 +30,9 @@ RULES = {
     "step": {"deposition": "density control"},
     "cosine": {"deposition": "density control", "acceptance": "cosine"},
     "constant": {"deposition": "constant density"},
+    "converging": {"deposition": "density control", "convergence": "square"},
+    "guided": {"deposition": "density control", "emission": "Peter-Pietrek"},
+    "Christensen": {"emission": "Christensen keep"},
 }
 
 
@@ -59,13 +62,14 @@ def test_fates_are_those_of_the_pass_and_add_up(scene, pool, rule):
     """The second pass, so that its own photons and rules are meant: counts as in the books, stored ones where the map
     has them."""
     renderer = stepped(scene, pool, passes=2, **RULES[rule])
+    assert (renderer.light.emission is not None) == (rule in ("guided", "Christensen"))
     rows = renderer.inspect(Wanted(fates=1_000_000)).fates
     found = unpack(rows, 1.0)
     fates, maps = found["light"] & 7, found["light"] >> FATE_BITS
     for number, name in enumerate(("caustic", "global")):
         books = renderer.tally.deposited[name]
         counts = np.bincount(fates[maps == number], minlength=4)
-        assert counts.sum() == books.arrived > 1000
+        assert counts.sum() == books.arrived > 200
         assert counts[STORED] == books.stored
         assert counts[REDISTRIBUTED] == books.redistributed
         assert counts[REJECTED] + counts[DISCARDED] == books.rejected - books.redistributed
@@ -79,7 +83,7 @@ def test_fates_are_those_of_the_pass_and_add_up(scene, pool, rule):
 
 def test_fewer_trajectories_are_the_first_ones(scene, pool):
     renderer = stepped(scene, pool, **RULES["step"])
-    few, many = (renderer.inspect(Wanted(fates=n)).fates for n in (3000, 1_000_000))
+    few, many = (renderer.inspect(Wanted(fates=n)).fates for n in (3000, 1_000_000))  # a batch, and all
     for map_ in (0, 1):
         a, b = (rows[rows.view(np.uint32)[:, 5] >> 16 >> FATE_BITS == map_] for rows in (few, many))
         assert 100 < len(a) < len(b)
@@ -131,7 +135,7 @@ def test_the_light_in_the_other_room_lights_nothing(pool, method):
     np.testing.assert_allclose(lights.lit, [1.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(lights.factor, 1.0)
     assert top_lights(lights, 5) == [0]
-    assert light_rows(lights, 5) == [("panel (1)", "100.0%"), ("1 others", "0.0%")]
+    assert light_rows(lights, 5) == [("1: panel", "100.0%"), ("1 others", "0.0%")]
     frame = renderer.frame(1, Wanted(lights=True))
     assert frame.known_lights.names == lights.names
     points = unpack(light_points(lights, frame.light_places).photons, 1.0)

@@ -176,9 +176,12 @@ def test_any_number_of_threads_gives_the_same_planes(box, pool):
     ("values", "views"),
     [
         ({"render.method": "path"}, set()),
-        ({}, {"look-up radius", "photon count"}),
-        (GATHER, {"look-up radius", "photon count", "radiance photons", "radiance cells"}),
-        ({"direct.shadow_photons": True}, {"look-up radius", "photon count", "shadow rays skipped"}),
+        ({}, {"look-up radius", "photon count", "achieved density"}),
+        (GATHER, {"look-up radius", "photon count", "achieved density", "radiance photons", "radiance cells"}),
+        (
+            {"direct.shadow_photons": True},
+            {"look-up radius", "photon count", "achieved density", "shadow rays skipped"},
+        ),
     ],
 )
 def test_views_without_anything_to_show_are_refused_with_a_reason(box, values, views):

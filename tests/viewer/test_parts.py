@@ -9,13 +9,19 @@ import pytest
 
 from pmviewer.errors import OutputError
 from pmviewer.maps.record import unpack
+from pmviewer.photons import deposition as photons
+from pmviewer.photons.deposition import Deposited, weight_histogram
+from pmviewer.render.camera import resolve_camera
 from pmviewer.settings import Settings, with_values
 from pmviewer.viewer import format as fmt
+from pmviewer.viewer.importance_panel import FIRST_WEIGHT, bias_row, deposition_rows, histogram_of, weight_text
 from pmviewer.viewer.jobs import Jobs
-from pmviewer.viewer.overlays import brightest_channel, even_thinning
+from pmviewer.viewer.overlays import FATES, brightest_channel, even_thinning
 from pmviewer.viewer.recent import LENGTH, RecentFiles
 from pmviewer.viewer.session_link import SessionLink
 from pmviewer.viewer.theme import drawable
+from pmviewer.viewer.viewport_hud import projected, tick_text
+from tests.scenes_for_tests import diffuse_box
 from tests.viewer.fake_session import FakeSession, photons_at, wall_photons
 
 
@@ -51,6 +57,17 @@ def test_other_numbers():
 
 def test_text_has_only_characters_of_the_font():
     assert drawable("r²ᵢ₊₁ = r²ᵢ·(i+α)/(i+1)") == "r²_(i+1) = r²_i·(i+α)/(i+1)"
+
+
+def test_text_of_ticks():
+    assert [tick_text(v) for v in (0.02, 5.0, 500.0, 5000.0, 20_000.0, 3e7)] == [
+        "0.02",
+        "5",
+        "500",
+        "5000",
+        "20 k",
+        "30 M",
+    ]
 
 
 @pytest.mark.parametrize("count", [0, 1, 999, 1000, 1001, 250_000])
@@ -144,3 +161,35 @@ def test_a_session_that_does_not_start_is_an_error_in_the_log():
     assert failed.wait(10)
     assert link.status.state == "failed"
     assert [m.text for m in link.take_messages()] == ["The engine did not start: no room for the cache"]
+
+
+def test_figures_of_deposition():
+    counts = weight_histogram(np.array([0.6, 1.0, 5.0]))
+    lossy = Deposited(arrived=1000, stored=250, arrived_power=10.0, discarded_power=2.5, histogram=counts)
+    shared = Deposited(arrived=1000, stored=400, redistributed=600, arrived_power=10.0)
+    rows = {name: [text.split() for text in texts] for name, texts in deposition_rows({"a": lossy, "b": shared})}
+    assert rows["Arrived"] == [["1,000"], ["1,000"]]
+    assert rows["Stored"] == [["250", "25%"], ["400", "40%"]]
+    assert rows["Rejected"] == [["750", "75%"], ["0", "0%"]]
+    assert rows["Redistributed"] == [["0", "0%"], ["600", "60%"]]
+    assert rows["Memory saved"] == [fmt.data_size(24 * n).split() for n in (750, 600)]
+    assert "Rejected" not in dict(deposition_rows({"b": shared}))
+    assert bias_row({"a": lossy, "b": shared}) == ["25.00%", "0.00%"]
+    assert bias_row({"b": shared}) is None
+    middles, counts = histogram_of(lossy)
+    np.testing.assert_array_equal(middles, [-1.0, 0.0, 1.0, 2.0])
+    np.testing.assert_array_equal(counts, [1, 1, 0, 1])
+    assert histogram_of(shared)[0].size == 0
+    assert [weight_text(e) for e in (-2.0, 0.0, 5.0)] == ["1/4", "1", "32"]
+    assert FIRST_WEIGHT == photons.FIRST_WEIGHT
+    assert FATES == photons.FATES
+
+
+def test_points_are_projected_where_the_camera_sees_them():
+    camera = resolve_camera(diffuse_box(size=20), Settings().camera)
+    corner, right, down = camera.ray_frame()[1:4]
+    d = corner + 7.5 * right + 15 * down
+    assert projected(camera, np.asarray(camera.origin) + 2.5 * d) == pytest.approx((7.5 / 20, 15 / 20), abs=1e-4)
+    assert projected(camera, np.asarray(camera.origin) - d) is None
+    assert projected(camera, np.asarray(camera.origin) + corner - 5 * right) is None
+    assert projected(camera, np.full(3, np.nan)) is None

@@ -10,12 +10,15 @@ from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.session import Session
 from pmviewer.output.diagnostic_views import DIAGNOSTICS, coloured
 from pmviewer.output.exr import read_exr
+from pmviewer.output.falsecolour import COLOURS
+from pmviewer.output.frame_export import layer_name
 from pmviewer.output.tone import to_uint8
 from pmviewer.photons.projection import ProjectionMap
 from pmviewer.settings import Settings, get, with_values
 from pmviewer.viewer.cells import cell_corners
+from pmviewer.viewer.light_list import top_lights
 from pmviewer.viewer.lines import circles, directions, encoded, gather_lines
-from pmviewer.viewer.overlays import LIT_COLOUR, SHADOW_COLOUR
+from pmviewer.viewer.overlays import FATE_PALETTE, LIGHT_PALETTE, LIT_COLOUR, SHADOW_COLOUR
 from tests import naive_maps as naive
 from tests.viewer.driver import chord, drive, make_app, on_window_thread, overlay_item, viewport_pixels
 from tests.viewer.test_real_session import wait_until
@@ -33,6 +36,11 @@ VALUES = {
     "gather.radiance_photons": "1/4",
     "direct.shadow_photons": True,
     "direct.shadow_N": 20_000,
+    "importance.map": "average",
+    "importance.N": 2_000,
+    "importance.deposition": "density control",
+    "importance.convergence": "square",
+    "importance.f": 0.05,
 }
 
 
@@ -52,12 +60,15 @@ def finished(app):
 
 def test_views_are_made_on_demand_in_the_legends_colours(app, tmp_path):
     """Each view shows its plane in false colours, without a new pass; the exported EXR holds the plane."""
-    seen, frames = {}, []
+    seen, frames, refused = {}, [], []
 
     def script(c):
         wait_until(c, lambda: finished(app))
         frames.append(app.state.frame)
         for view in DIAGNOSTICS:
+            if app.state.refused_view(view) is not None:
+                refused.append(view)
+                continue
             app.state.change({"display.view": view})
             wait_until(c, lambda view=view: view in app.state.frame.diagnostics)
             c.yield_(3)
@@ -69,8 +80,10 @@ def test_views_are_made_on_demand_in_the_legends_colours(app, tmp_path):
         c.yield_(2)
         assert app.state.shown_display.view == "beauty"
         assert "gather" in app.state.refused_view("radiance cells")
+        assert "stored" in app.state.refused_view("storing probability")
 
     drive(app, script)
+    assert refused == ["storing probability"]
     for frame, (view, pixels) in zip(frames[1:], seen.items(), strict=True):
         assert frame.planes is frames[0].planes
         expected = to_uint8(coloured(view, frame.image(view)))
@@ -78,8 +91,12 @@ def test_views_are_made_on_demand_in_the_legends_colours(app, tmp_path):
         assert near.mean() > 0.99, view
         assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 1
     layers, metadata = read_exr(tmp_path / "a.exr")
-    np.testing.assert_array_equal(layers["radiance_cells"], frames[-1].image("radiance cells"))
-    assert any(name.endswith("units.radiance_photons") and value == "W/m²" for name, value in metadata.items())
+    last = [view for view in seen if view in frames[-1].diagnostics]
+    for view in last:
+        np.testing.assert_array_equal(layers[layer_name(view)], frames[-1].image(view))
+        unit = [value for name, value in metadata.items() if name.endswith(f"units.{layer_name(view)}")]
+        assert unit == [DIAGNOSTICS[view].unit]
+    assert list(seen)[-1] in last
 
 
 def test_every_way_of_light_is_drawn_by_its_key(app):
@@ -131,6 +148,58 @@ def test_every_way_of_light_is_drawn_by_its_key(app):
     assert all(share > 0.005 for share in changed.values()), changed
     assert colours["lit"] > 0.05 > colours["shadow"] > 0.001
     assert colours["hidden"] < 0.01 * colours["lit"]
+
+
+def test_importance_is_drawn_by_its_keys(app):
+    """Importons in false colours, of one map or both; photons by fate; the lights; and the panel with its figures."""
+    shares = {}
+
+    def near(pixels, colours):
+        off = np.abs(pixels[..., None, :].astype(int) - np.round(np.array(colours) * 255)).max(axis=-1)
+        return (off <= 2).any(axis=-1).mean()
+
+    def script(c):
+        app.state.change({"importance.deposition": "Keller-Wald", "display.view": "storing probability"})
+        wait_until(c, lambda: finished(app) and "storing probability" in app.state.frame.diagnostics)
+        c.yield_(3)
+        shares["probability"] = near(viewport_pixels(c, app), COLOURS)
+        app.state.change({"display.view": "beauty"})
+        c.yield_(3)
+        passes = app.state.frame.statistics.passes
+        c.window_focus("//Importance")
+        c.key_press(chord(K.m, K.mod_shift))
+        app.state.change({"overlays.importons.colour": "map", "overlays.importons.depth": False})
+        c.yield_(4)
+        pixels = viewport_pixels(c, app)
+        shares["both maps"] = min(near(pixels, [colour]) for colour in LIGHT_PALETTE[:2])
+        app.state.change({"overlays.importons.map": "global"})
+        c.yield_(4)
+        pixels = viewport_pixels(c, app)
+        shares["global alone"] = near(pixels, [LIGHT_PALETTE[1]])
+        shares["caustic hidden"] = 1 - near(pixels, [LIGHT_PALETTE[0]])
+        for kind in ("screen", "footprint", "average", "importance"):
+            app.state.change({"overlays.importons.colour": kind})
+            c.yield_(4)
+            shares[kind] = near(viewport_pixels(c, app), COLOURS[::3])
+        c.key_press(chord(K.m, K.mod_shift))
+        c.key_press(chord(K.f, K.mod_shift))
+        wait_until(c, lambda: app.state.frame.inspection.fates is not None)
+        c.yield_(4)
+        pixels = viewport_pixels(c, app)
+        shares["stored"], shares["rejected"] = (near(pixels, [colour]) for colour in FATE_PALETTE[:2])
+        c.key_press(chord(K.f, K.mod_shift))
+        assert not app.state.settings.overlays.fates.show
+        before = viewport_pixels(c, app)
+        c.key_press(K.l)
+        wait_until(c, lambda: app.state.frame.known_lights is not None)
+        c.yield_(4)
+        assert top_lights(app.state.frame.known_lights, 5) == [0]
+        shares["light"] = (viewport_pixels(c, app) != before).any(axis=-1).mean()
+        assert app.state.frame.statistics.passes == passes
+
+    drive(app, script)
+    assert all(share > 0.0003 for share in shares.values()), shares
+    assert shares["caustic hidden"] > 0.999
 
 
 def test_gather_rays_become_coloured_lines():
