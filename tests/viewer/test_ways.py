@@ -33,6 +33,10 @@ VALUES = {
     "gather.radiance_photons": "1/4",
     "direct.shadow_photons": True,
     "direct.shadow_N": 20_000,
+    "importance.map": "average",
+    "importance.N": 2_000,
+    "importance.deposition": "density control",
+    "importance.convergence": "square",
 }
 
 
