@@ -8,7 +8,8 @@ looks up alone: what a rule saves by leaving out the others is no merit of impor
 Z-test: pictures with the rule against pictures with all photons. The mean luminance is compared seed by seed, where
 light pass and camera rays are the same, so that the difference is the rule's alone. Blocks of pixels are compared with
 pictures of other seeds: differences seed by seed are rare and strong there (photons that stand for fifty), far from
-normal, and such a test would find their skewness.
+normal, and such a test would find their skewness. Pixels of a block see the same photons, so that its variance is
+taken from its means over the seeds.
 
 Office, density control: one light pass serves all passes, and a look-up takes the k nearest (both as in the course
 guide, §3.7.2). Compared are pictures made of the same photons by the same gather rays; the difference is the mean over
@@ -189,8 +190,9 @@ def unbiased(method: str, pool: WorkPool) -> list[Target]:
     off, others = thinned - all_[:Z_SEEDS], all_[Z_SEEDS:]
     means = (off @ LUMINANCE).mean(axis=(1, 2))
     z = float(means.mean() / (means.std(ddof=1) / math.sqrt(Z_SEEDS)))
-    variances = (images.var(axis=0, ddof=1) / Z_SEEDS for images in (thinned, others))
-    blocks = z_test(thinned.mean(axis=0), next(variances), others.mean(axis=0), next(variances))
+    a, b = (np.array([block_means(image) for image in images]) for images in (thinned, others))
+    variances = a.var(axis=0, ddof=1) / Z_SEEDS, b.var(axis=0, ddof=1) / Z_SEEDS
+    blocks = z_test(a.mean(axis=0), variances[0], b.mean(axis=0), variances[1], block=1)
     note = f"{ROOMS}, {method}, {Z_SEEDS} seeds: Keller-Wald, clamp, against storing all"
     return [
         Target("I4", abs(z), 3.0, "σ", False, f"{note}, mean luminance"),
