@@ -30,9 +30,9 @@ from pmviewer.maps.record import DIRECT, in_classes
 from pmviewer.maps.variant import marked
 from pmviewer.photons.deposition import Deposition
 from pmviewer.photons.fates import Fates
-from pmviewer.photons.guided import Known
+from pmviewer.photons.guided import Guided, Known
 from pmviewer.photons.light_importance import LightImportance
-from pmviewer.photons.lightpass import PhotonMaps, trace_pass, trajectories
+from pmviewer.photons.lightpass import PhotonMaps, guided_emission_of, trace_pass, trajectories
 from pmviewer.render.choice import CHOICES
 from pmviewer.scene.flatten import LUMINANCE
 from pmviewer.scene.light_places import light_places
@@ -71,6 +71,7 @@ class LightStage:
         self.places = light_places(scene.flat) if plan.importance else None
         self.notes: tuple[str, ...] = ()
         self.known: tuple[int, Known] | None = None
+        self._before: Known | None = None
 
     def run(
         self, eye: np.void, index: int, N: int, first_radius: float, importance: ImportanceStage
@@ -104,14 +105,20 @@ class LightStage:
         """What became of the photons of the first `count` trajectories of the latest pass (`pmviewer.photons.fates`).
         None where all are stored."""
         deposition = self.rules.deposition
-        guided = self.photons.guided if self.photons is not None else None
-        if deposition is None and guided is not None:
-            guidance = guidance_of(self.settings, self.plan, importance)
-            deposition = None if guidance is None else storage(guidance, guided, self.settings, self.plan)
-        if self.traced is None or deposition is None:
+        if self.traced is None:
+            return None
+        guided, guidance = None, guidance_of(self.settings, self.plan, importance)
+        if guidance is not None:  # again: its test photons are gone
+            index, N = self.traced
+            photons, seed, caustics = self.settings.photons, self.settings.render.seed, bool(self.plan.caustic_mask)
+            scene, run = self.scene.flat, self.pool.run
+            guided = guided_emission_of(scene, photons, seed, index * N, N, caustics, guidance, run, self._before)
+            if deposition is None and guided is not None:
+                deposition = storage(guidance, guided, self.settings, self.plan)
+        if deposition is None:
             return None
         fates = Fates(count)
-        self._trace(*self.traced, deposition, fates)
+        self._trace(*self.traced, deposition, fates, guided)
         return fates.cloud()
 
     def importance_of_lights(self, importance: ImportanceStage) -> LightImportance | None:
@@ -131,10 +138,11 @@ class LightStage:
             arrived.append((photons.global_, photons.normals, photons.global_unit, maps.global_))
         return importance_of_lights(flat.light_names, flat.light_power @ LUMINANCE, arrived, self.pool.run)
 
-    def _trace(self, index: int, N: int, deposition: Deposition, fates: Fates | None = None) -> PhotonMaps:
+    def _trace(
+        self, index: int, N: int, deposition: Deposition, fates: Fates | None = None, guided: Guided | None = None
+    ) -> PhotonMaps:
         """The light pass again, for showing something of it."""
         settings, caustics = self.settings, bool(self.plan.caustic_mask)
-        guided = self.photons.guided if self.photons is not None else None
         traced, _, _ = trajectories(settings.photons, N, caustics)
         if guided is not None:
             traced = N
@@ -211,6 +219,7 @@ class LightStage:
         self.traced = index, N
         self.photons = photons
         self.emission = None
+        self._before = self.known[1] if self.known and self.known[0] == index - 1 else None
         if photons.guided is not None:
             self.emission = photons.guided.lights
             self.known = index, photons.guided.known

@@ -267,13 +267,13 @@ def _mixed(traced: list[Numbered], kept: list[Numbered]) -> list[Numbered]:
 
 
 def _with_tests(made: PhotonMaps, guided: Guided) -> PhotonMaps:
-    """Test photons count as traced."""
+    """Test photons count as traced; those that are stored are in the maps, and needed no more."""
     return replace(
         made,
         emitted=made.emitted + guided.tested,
         rays=made.rays + guided.rays,
         dropped=made.dropped + guided.dropped,
-        guided=guided,
+        guided=replace(guided, kept=[]),
     )
 
 
