@@ -15,6 +15,8 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+MOST_PROCESSES = 4
+"""For tests: each grows to some two gigabytes."""
 ENVIRONMENT = Path(os.environ.get("PMVIEWER_VENV", ROOT / ".venv"))
 SCENE = "cornell_caustic"
 
@@ -94,6 +96,15 @@ def install(python: Path, extras: str) -> None:
     stamp.write_text(wanted)
 
 
+def side_by_side(options: list[str]) -> list[str]:
+    """pytest's options for several processes, each with files of its own: most of the time is single-threaded
+    compilation. One process where the user asks for what has none: output, the debugger, a number of their own."""
+    single = ("-s", "-n", "--pdb", "--capture", "--trace")
+    if any(option.startswith(single) for option in options):
+        return []
+    return ["-n", str(min(os.cpu_count() or 1, MOST_PROCESSES)), "--dist", "loadfile"]
+
+
 def main(arguments: list[str]) -> int:
     """`[SCENE and options]`, `test [pytest options]` or `setup` (install everything, run nothing)."""
     if tuple(sys.version_info) < (3, 11):
@@ -105,7 +116,7 @@ def main(arguments: list[str]) -> int:
     if arguments[:1] == ["setup"]:
         return 0
     if testing:
-        command = [str(python), "-m", "pytest", *arguments[1:]]
+        command = [str(python), "-m", "pytest", *side_by_side(arguments[1:]), *arguments[1:]]
     else:
         command = [str(python), "-m", "pmviewer", *(arguments or [SCENE])]
     return subprocess.run(command, check=False, cwd=ROOT).returncode
