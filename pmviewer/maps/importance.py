@@ -65,6 +65,9 @@ EVEN_BOUNDARY = np.float32(0.28)
 estimates are then right within one percent for 50, 200 and 800 neighbours."""
 CLEAR = 8.0
 """A place without an importon in an area where so many are expected is one that nothing looks at (e⁻⁸ by chance)."""
+EVEN_CLEAR = 6.0
+"""The same for importons that lie evenly: the largest empty disc among 20,000 Owen-scrambled Sobol points has room for
+4.6; discs on slanted surfaces are ellipses there."""
 FLATNESS = np.float32(0.3)
 """Half-thickness of the discs of importons, relative to their radius."""
 WIDEST = 0.25
@@ -298,7 +301,7 @@ def _encode(values, codes):
 def _estimate(maps, k, widest, even, first, end, screen, footprint, reach, discs):
     """Both importances at one importon in SHARE of the leaves first … end−1, −1 at the others; `even` as for
     `build_importance`."""
-    boundary = EVEN_BOUNDARY if even else _f4(0.0)
+    boundary, clear = (EVEN_BOUNDARY, _f8(EVEN_CLEAR)) if even else (_f4(0.0), _f8(CLEAR))
     tree = maps[0]
     keys, farthest, hull = stack_i4(KEYS), stack_i4(DIRECTIONS), stack_i4(HULL_WORDS)
     steepness = _f4(1.0) / (FLATNESS * FLATNESS)
@@ -359,7 +362,7 @@ def _estimate(maps, k, widest, even, first, end, screen, footprint, reach, discs
             screen[i] = _f4(total / _f8(area))
             footprint[i] = _f4(inverse / known) if known > 0.0 else _f4(0.0)
             discs[i] = _f4(math.sqrt(r2))
-            reach[i] = _f4(math.sqrt(min(_f8(r2), CLEAR * _f8(area) / (math.pi * max(within, 1.0)))))
+            reach[i] = _f4(math.sqrt(min(_f8(r2), clear * _f8(area) / (math.pi * max(within, 1.0)))))
 
 
 @device
