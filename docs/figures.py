@@ -40,15 +40,18 @@ class Figure:
 def figures(text: str) -> Iterator[Figure]:
     """The figures of a Markdown text; a command may go on behind a backslash at a line's end."""
     for name, columns, body in _BLOCK.findall(text):
-        commands: list[tuple[str, ...]] = []
-        shared: dict[str, str] = {}
-        for line in body.replace("\\\n", " ").splitlines():
-            meaning = _SHARED.fullmatch(line)
-            if meaning:
-                shared[meaning[1]] = meaning[2]
-            elif line.strip():
-                commands.append(tuple(shlex.split(_USE.sub(lambda use: shared[use[1]], line))))  # noqa: B023
-        yield Figure(name, int(columns), tuple(commands))
+        yield Figure(name, int(columns), tuple(_commands(body.replace("\\\n", " ").splitlines())))
+
+
+def _commands(lines: list[str]) -> Iterator[tuple[str, ...]]:
+    """The words of each command, shared ones filled in."""
+    shared: dict[str, str] = {}
+    for line in lines:
+        meaning = _SHARED.fullmatch(line)
+        if meaning:
+            shared[meaning[1]] = meaning[2]
+        elif line.strip():
+            yield tuple(shlex.split(_USE.sub(lambda use: shared[use[1]], line)))
 
 
 def make(figure: Figure, folder: Path) -> None:

@@ -156,9 +156,8 @@ def diagnostic_planes(wanted: Wanted, looked: Looked, plan: Plan, pool: WorkPool
     if wanted.family == "density":
         made = {"achieved density": plane(0)}
         if has_required:
-            of_importance = replace(wanted, family="importance")
-            draw = lambda out: _kernel(of_importance, looked, plan, out)  # noqa: E731
-            required = _drawn(looked, IMPORTANCE_CHANNELS, draw, pool)[1, ..., None]
+            of_importance = partial(_kernel, replace(wanted, family="importance"), looked, plan)
+            required = _drawn(looked, IMPORTANCE_CHANNELS, of_importance, pool)[1, ..., None]
             made["density ratio"] = ratio(made["achieved density"], required)
         return made
     return {"radiance photons": plane(0, 1, 2), "radiance cells": plane(3)}
