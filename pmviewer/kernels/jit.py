@@ -1,8 +1,9 @@
 """The two decorators that every compiled function of pmviewer uses, and where compiled code is kept.
 
 Numba decides whether a cached function is stale by looking at that function's own file alone, so an edit in a module
-that a cached function *calls* would go unnoticed. Here it is stale when any source has changed that its module imports,
-directly or not; an edit elsewhere recompiles nothing.
+that a cached function *calls* would go unnoticed. Here compiled code lies in a folder named after all sources that its
+module imports, directly or not: an edit elsewhere recompiles nothing, and copies of the package share what they have in
+common, wherever they lie.
 """
 
 from __future__ import annotations
@@ -12,13 +13,14 @@ import os
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numba
 from numba import njit
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
 
 from pmviewer.kernels.sources import PACKAGE, stamp
@@ -27,11 +29,15 @@ FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
 """Never `nnan`/`ninf`: they delete the checks for non-finite numbers."""
 
 KEPT_CACHES = 3
+"""Of different versions of Python and numba."""
+
+KEPT_DAYS = 14
+"""Compiled code that nobody has asked for in so many days is removed."""
 
 
 def _versions() -> str:
-    """Names the cache of this copy of the package under this Python and numba."""
-    what = f"{PACKAGE}{sys.version_info[:2]}{numba.__version__}"
+    """Names the cache under this Python and numba."""
+    what = f"{sys.version_info[:2]}{numba.__version__}"
     return hashlib.sha256(what.encode()).hexdigest()[:16]
 
 
@@ -69,6 +75,9 @@ def _choose_cache() -> Path:
     others = [p for p in root.iterdir() if p.is_dir() and p != folder]
     for stale in sorted(others, key=lambda p: p.stat().st_mtime, reverse=True)[KEPT_CACHES - 1 :]:
         shutil.rmtree(stale, ignore_errors=True)
+    oldest = time.time() - KEPT_DAYS * 86400
+    for unused in (p for p in folder.iterdir() if p.is_dir() and p.stat().st_mtime < oldest):
+        shutil.rmtree(unused, ignore_errors=True)
     os.utime(folder)
     return folder
 
@@ -80,7 +89,17 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": F
 
 
 class _Locator(UserProvidedCacheLocator):
-    """Stale when a source has changed that the function's module depends on."""
+    """One folder for each module and state of the sources that it depends on."""
+
+    def __init__(self, py_func: Any, py_file: str) -> None:
+        super().__init__(py_func, py_file)
+        source = Path(py_file).resolve()
+        module = source.relative_to(PACKAGE).with_suffix("") if source.is_relative_to(PACKAGE) else Path(source.stem)
+        self._cache_path = str(CACHE_FOLDER / f"{'.'.join(module.parts)}-{stamp(source)}")
+
+    def ensure_cache_path(self) -> None:
+        super().ensure_cache_path()
+        os.utime(self._cache_path)
 
     def get_source_stamp(self) -> str:
         return stamp(Path(self._py_file).resolve())
@@ -90,8 +109,35 @@ class _KernelCacheImpl(CompileResultCacheImpl):
     _locator_classes = (_Locator,)
 
 
+class _OneFileEach(IndexDataCacheFile):
+    """Compiled code in a file named after its signature. Numba's index of numbered files loses what two processes save at
+    the same time, and can hand one signature the other's code."""
+
+    def _name(self, key: Any) -> str:
+        return self._data_name_pattern.format(number=int(hashlib.sha256(str(key).encode()).hexdigest()[:15], 16))
+
+    def flush(self) -> None:
+        for file in Path(self._cache_path).glob(self._data_name_pattern.replace("{number:d}", "*")):
+            file.unlink(missing_ok=True)
+
+    def save(self, key: Any, data: Any) -> None:
+        self._save_data(self._name(key), (key, data))
+
+    def load(self, key: Any) -> Any:
+        try:
+            saved, data = self._load_data(self._name(key))
+        except OSError:
+            return None
+        return data if saved == key else None
+
+
 class _KernelCache(FunctionCache):
     _impl_class = _KernelCacheImpl
+
+    def __init__(self, py_func: Callable[..., Any]) -> None:
+        super().__init__(py_func)
+        impl = self._impl
+        self._cache_file = _OneFileEach(self._cache_path, impl.filename_base, impl.locator.get_source_stamp())
 
 
 def _cached(dispatcher: Any) -> Any:

@@ -48,6 +48,6 @@ def stamp(path: Path) -> str:
     """Hash of the sources that a file depends on (16 hex digits): changes when compiled code of it may be stale."""
     digest = hashlib.sha256()
     for file in sorted(sources_of(path)):
-        digest.update(file.name.encode())
+        digest.update(file.relative_to(PACKAGE).as_posix().encode() if file.is_relative_to(PACKAGE) else b"")
         digest.update(_read(file)[0])
     return digest.hexdigest()[:16]

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from pmviewer.kernels import sources
-from pmviewer.kernels.jit import CACHE_FOLDER, user_cache_root
+from pmviewer.kernels.jit import CACHE_FOLDER, _OneFileEach, user_cache_root
 from pmviewer.kernels.vector import dot
 
 
@@ -65,3 +65,27 @@ def test_unwritable_cache_falls_back_to_the_temporary_folder(tmp_path):
         timeout=120,
     )
     assert run.stdout.startswith(str(tmp_path / "pmviewer-kernels-"))
+
+
+def test_a_copy_of_the_package_elsewhere_shares_compiled_code(tmp_path):
+    package = tmp_path / "pmviewer"
+    shutil.copytree(sources.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    code = "from pmviewer.kernels.vector import dot; print(dot._cache.cache_path)"
+
+    def folder(path) -> str:
+        env = {**os.environ, "PYTHONPATH": str(path)}
+        run = subprocess.run(
+            [sys.executable, "-c", code], env=env, cwd=path, capture_output=True, text=True, check=True, timeout=120
+        )
+        return run.stdout
+
+    assert folder(tmp_path) == folder(sources.PACKAGE.parent)
+
+
+def test_two_signatures_saved_at_the_same_time_keep_their_own_code(tmp_path):
+    """Both writers begin with an empty cache, as two processes do."""
+    one, other = (_OneFileEach(str(tmp_path), "name", "stamp") for _ in range(2))
+    one.save("first", 1)
+    other.save("second", 2)
+    reader = _OneFileEach(str(tmp_path), "name", "stamp")
+    assert (reader.load("first"), reader.load("second"), reader.load("third")) == (1, 2, None)
