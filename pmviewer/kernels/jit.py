@@ -110,8 +110,8 @@ class _KernelCacheImpl(CompileResultCacheImpl):
 
 
 class _OneFileEach(IndexDataCacheFile):
-    """Compiled code in a file named after its signature. Numba's index of numbered files loses what two processes save at
-    the same time, and can hand one signature the other's code."""
+    """Compiled code in a file named after its signature. Numba's index of numbered files loses what two processes
+    save at the same time, and can hand one signature the other's code."""
 
     def _name(self, key: Any) -> str:
         return self._data_name_pattern.format(number=int(hashlib.sha256(str(key).encode()).hexdigest()[:15], 16))
