@@ -75,7 +75,7 @@ class Renderer:
         self.plan: Plan = plan_of(settings, scene.traits)
         self.film = Film(self.camera.width, self.camera.height)
         self.first_radius = (
-            first_radius(scene.flat, self.render_camera, settings.estimate, settings.render.method)
+            first_radius(scene.flat, self.render_camera, settings.estimate, self.plan.gather)
             if self.plan.photons
             else 0.0
         )
@@ -169,7 +169,7 @@ class Renderer:
         if self.light.traced is None:
             return None
         index, N = self.light.traced
-        settings, caustics = self.settings, bool(self.plan.caustic_mask)
+        settings, caustics = self.settings, bool(self.plan.caustic_classes)
         traced, _, _ = trajectories(settings.photons, N, caustics)
         guided = self.light.photons.guided if self.light.photons else None
         if guided is not None:
@@ -310,7 +310,8 @@ class Renderer:
         return rows[: self.pool.run([replay])[0]].copy()
 
     def _set_gather(self, eye: np.void) -> None:
-        eye["direct"] = self.plan.direct
+        eye["direct"], eye["followed_direct"] = self.plan.direct, self.plan.followed_direct
+        eye["indirect_caustics"] = self.settings.photons.indirect_caustics
         eye["gather_rays"] = self.settings.gather.rays if self.plan.gather else 0
         eye["gather_specular"] = not self.settings.photons.indirect_caustics
 

@@ -70,6 +70,13 @@ def pick_light(scene, u):
 
 
 @device
+def is_delta_light(scene, light):
+    """Whether no ray can meet the light, which has neither extent nor solid angle."""
+    kind = np.int32(light_number(scene, light, L_KIND))
+    return kind in (POINT, SPOT, DIRECTIONAL)
+
+
+@device
 def light_probability(scene, light):
     return load_f4(scene.light_cdf, light + 1) - load_f4(scene.light_cdf, light)
 

@@ -61,6 +61,7 @@ __all__ = [
     "bsdf_is_lambertian",
     "bsdf_pdf",
     "bsdf_sample",
+    "bsdf_transmits",
     "followed_share",
     "interior_attenuation",
     "material_params",
@@ -199,6 +200,12 @@ def bsdf_groups(b):
 def bsdf_is_delta(b):
     """Whether the FOLLOWED lobes are deltas."""
     return b.delta
+
+
+@device
+def bsdf_transmits(b):
+    """Whether light may reach one side of the surface from the other."""
+    return _transparent(b.p.kind)
 
 
 @device

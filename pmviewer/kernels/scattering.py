@@ -52,6 +52,7 @@ __all__ = [
     "pick_group",
     "same_side",
     "shading_normal",
+    "transmits",
 ]
 
 
@@ -187,6 +188,18 @@ def _pick_group(b, wo, u):
 
         return rich
     return lambda b, wo, u: (b.groups, _f4(1.0), u)
+
+
+def transmits(b):
+    """Whether the FOLLOWED lobes may transmit light."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(transmits)
+def _transmits(b):
+    if not is_plain(b):
+        return lambda b: lobes.bsdf_transmits(b)
+    return lambda b: False
 
 
 def compressed(b, wo, wi, f):

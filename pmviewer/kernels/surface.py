@@ -34,7 +34,9 @@ QUADRIC_SIDE = 9
 STRAIGHT = _f4(0.9999)
 """Cosine between the normals from which a shading normal is the surface's own."""
 
-_LEAST_COSINES = _f4(1e-3)
+_LEAST_COSINES = _f4(1e-5)
+"""Bound on what a shading normal makes of one photon. It costs 6e-5 of the light on a surface whose shading normals are
+unlike its own all over; 1e-3 would cost 0.4 %."""
 
 OFFSET = _f4(2.0**-17)
 """Distance off the surface in units of the coordinates' size: 64 rounding errors of float32."""

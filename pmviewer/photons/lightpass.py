@@ -138,7 +138,10 @@ def trace_pass(
         direct_density += (traced - filling) / caustic_power
     only_direct = projection is not None or not settings.indirect_caustics
     indirect_scale = direct_density / density if projection is not None else 1.0
-    record = _record(settings, seed, first_index, filling, probability, has_specular, only_direct, indirect_scale)
+    unfound = scene.delta_lights and has_specular
+    record = _record(
+        settings, seed, first_index, filling, probability, has_specular, only_direct, indirect_scale, unfound
+    )
 
     last = traced if paths is None else min(traced, paths.n)
     normals = NORMALS if deposition is not None else GLOBAL_NORMALS if with_normals else NO_NORMALS
@@ -239,6 +242,7 @@ def _record(
     has_specular: bool,
     only_direct: bool,
     indirect_scale: float,
+    unfound: bool = False,
 ) -> NDArray[np.void]:
     record = np.zeros(1, LIGHT_PASS_DTYPE)
     record[0] = (
@@ -254,6 +258,7 @@ def _record(
         settings.indirect_caustics,
         only_direct,
         indirect_scale,
+        unfound,
     )
     return record
 

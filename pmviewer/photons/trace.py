@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.jit import device, kernel
+from pmviewer.kernels.light import is_delta_light
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.raycast import closest_hit
@@ -23,6 +24,7 @@ from pmviewer.kernels.scattering import (
     attenuation,
     bsdf_at,
     bsdf_sample,
+    is_delta,
     pick_group,
     same_side,
     shading_normal,
@@ -36,6 +38,7 @@ from pmviewer.maps.record import (
     HAD_DIFFUSE,
     INDIRECT_CAUSTIC,
     LAST_SPECULAR,
+    UNFOUND,
     encode_direction,
     encode_power,
 )
@@ -64,6 +67,7 @@ LIGHT_PASS_DTYPE = np.dtype(
         ("indirect_caustics", "i4"),  # whether with photons that met a diffuse surface before, too
         ("only_direct", "i4"),  # whether the trajectories that don't fill the global map end where they meet it
         ("indirect_scale", "f4"),  # factor for the power of indirect caustics in the units of the caustic map
+        ("unfound", "i4"),  # whether followed lobes store what no path from the eye finds (`pmviewer.maps.record`)
     ],
     align=True,
 )
@@ -125,6 +129,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
         o = p
         flags = _u4(0)
         bounces = 0
+        deltas = pass_.unfound != 0 and is_delta_light(scene, light)  # and nothing but deltas since the light
         while True:
             t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), _INF)
             counts[C_RAYS] += 1
@@ -143,12 +148,15 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                 break
             ng = face(ng, wi)
             u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
-            if b.groups & STORED != 0:
+            unfound = deltas and bounces > 0 and b.groups & FOLLOWED != 0 and not is_delta(b)
+            if b.groups & STORED != 0 or unfound:
                 if not is_good(beta):
                     counts[C_DROPPED] += 1
                     break
                 path_class = np.int32(flags >> _u4(6))
                 word = _u4(flags | _u4(min(bounces, BOUNCES)))
+                if unfound:
+                    word = _u4(word | _u4(UNFOUND))
                 is_caustic = path_class == CAUSTIC or (path_class == INDIRECT_CAUSTIC and pass_.indirect_caustics != 0)
                 times, stored = 1, beta
                 if pass_.roulette == EQUAL:
@@ -164,9 +172,13 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                         if len(normals_out[1]) > 0:
                             normals_out[1][counts[C_CAUSTIC]] = encode_direction(ng[0], ng[1], ng[2])
                         counts[C_CAUSTIC] += 1
-                if to_global and (
-                    pass_.store_probability >= _f4(1.0)
-                    or draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
+                if (
+                    to_global
+                    and b.groups & STORED != 0
+                    and (
+                        pass_.store_probability >= _f4(1.0)
+                        or draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
+                    )
                 ):
                     for _ in range(times):
                         _store(global_out, counts[C_GLOBAL], p, wi, stored, word, light)
@@ -176,6 +188,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                 ledger[E_STORED] += _f8(luminance(beta) * worth)
             before = luminance(beta)
             group, share, u_lobe = pick_group(b, wi, u_lobe)
+            deltas = deltas and group == FOLLOWED and is_delta(b)
             if group == FOLLOWED:
                 flags = _u4(flags | _u4(LAST_SPECULAR))
             elif not to_global and pass_.only_direct != 0:

@@ -16,7 +16,7 @@ from tests.scenes_for_tests import cornell_box, diffuse, panel, rendered, settin
 
 def pass_means(method, passes=24, **groups):
     """(passes, terms) means of the image's terms, pass by pass: their scatter gives the standard error."""
-    values = {"render": {"method": method}, "photons": {"N": 100_000, "q": 0.5, "indirect_caustics": False}} | groups
+    values = {"render": {"method": method}, "photons": {"N": 100_000, "q": 0.5}} | groups
     opened = open_scene(cornell_box(size=32, light=0.75))
     totals = []
     pool = WorkPool(1)
