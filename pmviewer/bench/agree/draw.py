@@ -49,11 +49,11 @@ class Draw:
         return [self.number(-box, box) for _ in range(3)]
 
     def direction(self) -> list[float]:
-        """A vector of length 1, to three digits."""
+        """A vector of length 1."""
         v = self._rng.normal(0, 1, 3)
-        return [round(float(c), 3) for c in v / np.linalg.norm(v)]
+        return [round(float(c), 8) for c in v / np.linalg.norm(v)]
 
-    def turn(self, most: float = 180.0) -> list[Any]:
-        """A rotation about any axis; half of the axes are not of unit length."""
-        length = 1.0 if self.chance(0.5) else self.number(0.3, 3)
-        return ["rotate", [round(length * c, 4) for c in self.direction()], self.number(-most, most)]
+    def turn(self, free: bool = False) -> list[Any]:
+        """A rotation about any axis. Where `free`, some axes are not of unit length, which stretches and shears."""
+        length = self.number(0.7, 1.4) if free and self.chance(0.2) else 1.0
+        return ["rotate", [length * c for c in self.direction()], self.number(-180, 180)]

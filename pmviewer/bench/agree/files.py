@@ -31,7 +31,7 @@ def _unit(v: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _octahedron(levels: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """The unit sphere in 8·4^levels triangles that face outwards."""
-    points = [(1.0, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
+    points: list[tuple[float, float, float]] = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
     faces = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]
     for _ in range(levels):
         middle: dict[tuple[int, int], int] = {}
@@ -75,16 +75,22 @@ def make_mesh(spec: dict[str, Any]) -> Mesh:
             waves = rng.normal(0, 1, (3, 3))
             vertices = vertices * (1 - BUMPS * (0.5 + 0.5 * np.sin(3 * vertices @ waves).mean(axis=1, keepdims=True)))
         else:
-            vertices = _unit(np.array([(1.0, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]) + rng.uniform(-0.3, 0.3, (4, 3)))
+            vertices = _unit(
+                np.array([(1.0, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]) + rng.uniform(-0.3, 0.3, (4, 3))
+            )
             faces = np.array([(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)])
         u = np.arctan2(vertices[:, 1], vertices[:, 0]) / (2 * np.pi) + 0.5
         uv = np.stack([u, 0.5 + 0.5 * vertices[:, 2]], axis=-1)
     else:
         n = detail + 1 if kind == "sheet" else 2
-        v, u = np.mgrid[0:1 : n * 1j, 0:1 : n * 1j]
+        v, u = np.mgrid[0 : 1 : n * 1j, 0 : 1 : n * 1j]
         uv = np.stack([u.ravel(), v.ravel()], axis=-1)
         phase = rng.uniform(0, 2 * np.pi, 2)
-        height = 0.15 * (np.sin(4 * uv[:, 0] + phase[0]) + np.cos(5 * uv[:, 1] + phase[1])) if kind == "sheet" else 0 * u.ravel()
+        height = (
+            0.15 * (np.sin(4 * uv[:, 0] + phase[0]) + np.cos(5 * uv[:, 1] + phase[1]))
+            if kind == "sheet"
+            else 0 * u.ravel()
+        )
         vertices = np.stack([2 * uv[:, 0] - 1, 2 * uv[:, 1] - 1, height], axis=-1)
         a = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
         faces = np.concatenate([np.stack([a, a + 1, a + n + 1], axis=-1), np.stack([a, a + n + 1, a + n], axis=-1)])
@@ -114,7 +120,9 @@ def _obj(spec: dict[str, Any], mesh: Mesh) -> bytes:
     lines += [f"vt {u:.9g} {v:.9g}" for u, v in uv] if spec["uv"] else []
     lines += [f"vn {x:.9g} {y:.9g} {z:.9g}" for x, y, z in normals] if spec["normals"] else []
     for face in faces + 1:
-        lines.append("f " + " ".join(f"{i}/{i if spec['uv'] else ''}/{i if spec['normals'] else ''}".rstrip("/") for i in face))
+        lines.append(
+            "f " + " ".join(f"{i}/{i if spec['uv'] else ''}/{i if spec['normals'] else ''}".rstrip("/") for i in face)
+        )
     return "\n".join([*lines, ""]).encode("ascii")
 
 

@@ -71,6 +71,7 @@ def scene_of(seed: int, index: int) -> Node:
     profile = _choose(draw, profile, closed)
     made = Materials(draw, profile.rich, profile.textured)
     scene: Node = {"profile": profile.name, "scale": draw.pick(SCALES) if draw.chance(0.35) else 1.0, "groups": {}}
+    scene |= {"closed": closed, "nested": False}
     scene["shapes"] = _surroundings(draw, made, profile, closed)
     _fill(draw, made, profile, scene)
     scene["lights"] = []
@@ -85,8 +86,8 @@ def scene_of(seed: int, index: int) -> Node:
 
 
 def _choose(draw: Draw, profile: Profile, closed: bool) -> Profile:
-    """A third of the scenes with lights of one point or direction alone, a third without any, a third of rough surfaces:
-    only where both meet can't path tracers be compared with photon maps."""
+    """A third of the scenes without lights of one point or direction, a third of rough surfaces: only where both meet
+    can't path tracers be compared with photon maps."""
     what = draw.pick(("any", "soft lights", "rough surfaces"))
     if what == "soft lights":
         return replace(profile, lights=("envmap", "constant") if profile.more_lights else ("constant",))
@@ -115,7 +116,11 @@ def _surroundings(draw: Draw, made: Materials, profile: Profile, closed: bool) -
     if closed:
         walls: Node = {"type": "cube", "to_world": [["scale", [HALF, HALF, 1.25]], ["translate", [0.0, 0.0, 1.25]]]}
         return [walls | {"flip_normals": draw.chance(0.5), "bsdf": _both(made.of(draw.pick(kinds)))}]
-    ground: Node = {"type": "rectangle", "to_world": [["scale", [HALF, HALF, 1.0]]], "bsdf": _both(made.of(draw.pick(kinds)))}
+    ground: Node = {
+        "type": "rectangle",
+        "to_world": [["scale", [HALF, HALF, 1.0]]],
+        "bsdf": _both(made.of(draw.pick(kinds))),
+    }
     if profile.tilted:
         ground["type"] = draw.pick(("obj", "ply"))
         ground["mesh"] = shapes.mesh(draw, ground["type"], ("quad", "sheet"), draw.number(3, shapes.TILT), False)
@@ -159,6 +164,7 @@ def _fill(draw: Draw, made: Materials, profile: Profile, scene: Node) -> None:
         if profile.nested and kind in ("sphere", "cube") and draw.chance(0.6):
             inner = {**node, "to_world": [["scale", 3 * [draw.number(0.3, 0.7)]], *node["to_world"]]}
             scene["shapes"].append(inner | {"bsdf": made.of(draw.pick(profile.bsdfs))})
+            scene["nested"] = True
 
 
 def _instances(draw: Draw, made: Materials, profile: Profile, scene: Node, n: int) -> list[Node]:

@@ -31,7 +31,12 @@ def bare(draw: Draw, kind: str, above: float) -> Node:
     if kind == "constant":
         return {"type": "constant", "radiance": draw.colour(0.2, 1)}
     picture = {"kind": "sky", "seed": draw.seed(), "width": draw.integer(8, 32), "height": draw.integer(4, 16)}
-    return {"type": "envmap", "picture": picture, "scale": draw.number(0.3, 1.5), "to_world": [draw.turn(), draw.turn()]}
+    return {
+        "type": "envmap",
+        "picture": picture,
+        "scale": draw.number(0.3, 1.5),
+        "to_world": [draw.turn(), draw.turn()],
+    }
 
 
 def area(draw: Draw, materials: Materials, above: float, textured: bool, kind: str = "") -> Node:

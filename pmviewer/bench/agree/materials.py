@@ -49,7 +49,12 @@ class Materials:
             to_uv += [["rotate", [0.0, 0.0, 1.0], draw.number(-180, 180)]]
             to_uv += [["translate", [draw.number(-1, 1), draw.number(-1, 1), 0.0]]]
         if kind == "colour" and draw.chance(0.4):
-            return {"type": "checkerboard", "color0": draw.colour(0, 0.4), "color1": draw.colour(0.3, 0.9), "to_uv": to_uv}
+            return {
+                "type": "checkerboard",
+                "color0": draw.colour(0, 0.4),
+                "color1": draw.colour(0.3, 0.9),
+                "to_uv": to_uv,
+            }
         picture = {"kind": kind, "seed": draw.seed(), "width": draw.integer(4, 24), "height": draw.integer(4, 24)}
         filter, wrap = draw.pick(("bilinear", "nearest")), draw.pick(("repeat", "mirror", "clamp"))
         return {"type": "bitmap", "picture": picture, "raw": raw or draw.chance(0.3), "filter_type": filter,

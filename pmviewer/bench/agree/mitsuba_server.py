@@ -57,7 +57,7 @@ def pictures(mi: Any, scene: Any, request: dict[str, Any]) -> Any:
 
 
 def seen_plainly(mi: Any, scene: Any, request: dict[str, Any]) -> Any:
-    """(h, w): whether no ray of a pixel or of its neighbours meets a surface with a lobe of a single direction first."""
+    """(h, w): whether no ray of a pixel or its neighbours first meets a surface with a lobe of one direction."""
     sensor = scene.sensors()[0]
     width, height = sensor.film().size()
     delta = np.zeros((height, width), bool)

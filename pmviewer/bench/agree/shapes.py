@@ -48,17 +48,17 @@ def shape(draw: Draw, kind: str, size: float, tilted: bool = False, uv: bool = F
 
 
 def steps(draw: Draw, free: bool) -> list[Any]:
-    """A random linear transformation of about unit size: turned, at times mirrored and, where `free`, uneven, sheared."""
+    """A random linear transformation of about unit size: turned, some mirrored, where `free` uneven and sheared."""
     found: list[Any] = []
     if free and draw.chance(0.5):
         found.append(["scale", [draw.number(0.5, 1.5) for _ in range(3)]])
     if draw.chance(0.25):
         found.append(["scale", draw.pick(([-1.0, 1.0, 1.0], [1.0, 1.0, -1.0], [-1.0, -1.0, -1.0]))])
     if draw.chance(0.8):
-        found.append(draw.turn())
+        found.append(draw.turn(free))
     if free and draw.chance(0.25):
         a, b = draw.number(-0.6, 0.6), draw.number(-0.6, 0.6)
         found.append(["matrix", [1.0, a, 0.0, 0.0, 0.0, 1.0, b, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
     if draw.chance(0.3):
-        found.append(draw.turn())
+        found.append(draw.turn(free))
     return found

@@ -1,10 +1,11 @@
 """Do two programs render the same picture, when single paths may be very bright?
 
-Each run gives the means of the picture and of its blocks, channel by channel; runs are independent, so that Welch's test
-asks nothing of pixels. Bright paths that are too rare to have come yet make a mean too dark by more than its standard
-error says. With a finite variance the density of bright paths falls faster than x⁻³; what lies beyond the brightest of n
-is then at most twice the share of that one in the mean, 2·max/n (in the limit of a tail index of 2: ∫ₘ x·2m²x⁻³ dx / n =
-2m/n). The darker side is granted this much, measured on the brightest run. It falls as 1/n, faster than the noise.
+Each run gives the means of the picture and of its blocks, channel by channel; runs are independent, so that Welch's
+test asks nothing of pixels. Bright paths that are too rare to have come yet make a mean too dark by more than its
+standard error says. With a finite variance the density of bright paths falls faster than x⁻³; what lies beyond the
+brightest, m, of n is then at most twice the share of that one in the mean (in the limit of a tail index of 2:
+∫ₘ x·2m²x⁻³ dx / n = 2m/n). The darker side is granted this much, measured on the brightest run. It falls as 1/n, faster
+than the noise.
 
 A difference counts when it shows again and again: `STAGES` of fresh seeds and more samples, and the last test alone
 gives the p-value, which is corrected for the number of comparisons of the whole run (Holm).

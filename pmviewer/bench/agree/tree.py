@@ -1,9 +1,10 @@
-"""Scenes as plain trees of dictionaries, lists and numbers, in the manner of Mitsuba's own: easy to draw, cut and save.
+"""Scenes as plain trees of dictionaries, lists and numbers, as Mitsuba has them too: easy to draw, cut and save.
 
-A node is {"type": plugin, name: value, …}. Values by their type: bool, int, float and str as they are; three numbers are
-a colour, or a point or vector where the name says so; a node under a name is a texture, or the BSDF or light of a shape;
-"to_world" and "to_uv" hold steps like ["rotate", [x, y, z], degrees] or ["matrix", [16 numbers]]; "mesh" and "picture"
-describe files that are made from numbers (`pmviewer.bench.agree.files`); "group" names one of the scene's groups.
+A node is {"type": plugin, name: value, …}. Values by their type: bool, int, float and str as they are; three numbers
+are a colour, or a point or vector where the name says so; a node under a name is a texture, or the BSDF or light of a
+shape; "to_world" and "to_uv" hold steps like ["rotate", [x, y, z], degrees] or ["matrix", [16 numbers]]; "mesh" and
+"picture" describe files that are made from numbers (`pmviewer.bench.agree.files`); "group" names one of the scene's
+groups.
 
 A scene is {"scale": s, "camera": {…}, "shapes": […], "lights": […], "groups": {name: [shape, …]}}. All lengths are
 multiplied by its scale when it is written.

@@ -115,7 +115,7 @@ def scene_text(scene: Node, folder: Path, size: int = SIZE) -> str:
     lines = ['<scene version="3.0.0">', integrator, _camera(scene["camera"], s, size)]
     for name, members in scene["groups"].items():
         inside = "\n ".join(_element("shape", shape, folder) for shape in members)
-        lines.append(f"<shape type=\"shapegroup\" id={quoteattr(name)}>\n {inside}\n</shape>")
+        lines.append(f'<shape type="shapegroup" id={quoteattr(name)}>\n {inside}\n</shape>')
     lines += [_element("shape", _scaled(shape, s), folder) for shape in scene["shapes"]]
     lines += [_element("emitter", _scaled(light, s), folder) for light in scene["lights"]]
     return "\n".join([*lines, "</scene>", ""])
