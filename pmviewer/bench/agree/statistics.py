@@ -64,14 +64,14 @@ def compared(
 ) -> Outcome:
     """Test that (n, k) and (m, k) runs have the same k expectations, but for `tolerance` times the second's.
 
-    `sparse`: light may come as single photons, so that a block that none has met in any run says nothing about its mean.
-    Such blocks are left to the test of the whole picture.
+    `sparse`: light may come as single photons, so that a block that none has met in any run says nothing about its
+    mean. Such blocks are left to the test of the whole picture.
     """
     if not (np.isfinite(ours).all() and np.isfinite(theirs).all()):
         return Outcome(0.0, math.nan, math.nan, ours.shape[1])
     if sparse:
-        met = (ours > 0).any(axis=0) & (theirs > 0).any(axis=0)
-        met[:CHANNELS] = True
+        met = np.logical_and((ours > 0).any(axis=0), (theirs > 0).any(axis=0))
+        met |= np.arange(len(met)) < CHANNELS
         ours, theirs = ours[:, met], theirs[:, met]
     n, m = len(ours), len(theirs)
     mean_a, mean_b = ours.mean(axis=0), theirs.mean(axis=0)
