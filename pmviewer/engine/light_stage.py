@@ -89,7 +89,7 @@ class LightStage:
         maps = self._maps(eye, 0 if kept else index, N, first_radius, importance)
         if not (kept and index > 0):
             assert self.photons is not None
-            self.tally.add_photons(self.photons)
+            self.tally.add_photons(self.photons, self.scene.flat.total_luminance)
         return maps
 
     def stored(self, name: str) -> NDArray[np.float32]:

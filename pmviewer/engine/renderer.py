@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.cache_stage import cache_cloud, fill_cache, recipe
+from pmviewer.engine.caveats import caveats
 from pmviewer.engine.diagnose import Looked, diagnostic_planes, wanted_of
 from pmviewer.engine.frame import Frame, PhotonCloud, Statistics
 from pmviewer.engine.guides import gather_records
@@ -208,6 +209,7 @@ class Renderer:
             clouds["cache"] = PhotonCloud(*cache_cloud(self._cache), self._cache.rows[:, REACH].copy())
             stored_in_pass["cache"] = self._cache.n
         samples = max(len(film.sums) * film.passes, 1)
+        energy = self.tally.energy.close(self.plan.emission != "off")
         statistics = Statistics(
             passes=film.passes,
             emitted=self.tally.emitted,
@@ -227,9 +229,13 @@ class Renderer:
             map_bytes=self.tally.map_bytes,
             bytes_per_photon=self.tally.map_bytes / self.tally.map_photons if self.tally.map_photons else 0.0,
             dropped=dict(self.tally.dropped),
+            energy=energy,
             skipped=self.plan.skipped,
             importons=self.importance.latest.traced if self.importance.latest else 0,
-            warnings=self._warnings(),
+            warnings=(
+                *self._warnings(),
+                *caveats(self.settings, self.tally, energy, self.scene.flat.radius, len(film.sums)),
+            ),
             deposited=dict(self.tally.deposited),
         )
         return Frame(

@@ -17,8 +17,8 @@ class Estimate(Group):
         stage="maps",
         scale="log",
         unit="× scene",
-        ge=1e-5,
-        le=1.0,
+        ge=1e-7,
+        le=10.0,
     )
     caustic_radius: float = setting(
         0.5,
@@ -53,7 +53,7 @@ class Estimate(Group):
         stage="maps",
         scale="choice",
     )
-    k: int = setting(50, "Photons in a k-nearest estimate.", stage="maps", scale="log", unit="photons", ge=2, le=1000)
+    k: int = setting(50, "Photons in a k-nearest estimate.", stage="maps", scale="log", unit="photons", ge=1, le=1000)
     rim: Literal["left out", "half", "whole"] = setting(
         "left out",
         "How the k-th photon, which sets the radius, counts: leaving it out is exact for independently scattered "
@@ -68,8 +68,8 @@ class Estimate(Group):
         stage="maps",
         scale="log",
         unit="× scene",
-        ge=1e-5,
-        le=2.0,
+        ge=1e-7,
+        le=10.0,
     )
     black_level: float = setting(
         0.05,
