@@ -24,7 +24,9 @@ def _by_radius(photons, eye, radius, p, n, b, wo, class_mask):
 
 @device
 def _by_nearest(photons, eye, radius, p, n, b, wo, class_mask):
-    return radiance_knn(photons, p, n, eye.k, radius, eye.flatness, class_mask, eye.filter, eye.cone_k, eye.rim, b, wo)
+    return radiance_knn(
+        photons, p, n, eye.k, radius, eye.flatness, class_mask, eye.filter, eye.cone_k, eye.rim, eye.share, b, wo
+    )
 
 
 def _rich(photons):
