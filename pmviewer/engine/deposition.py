@@ -57,8 +57,9 @@ def rules_of(
 ) -> Rules:
     """Rules of pass `index`. radii: look-up radii of the pass by map; first: that of the first pass.
 
-    Required densities are those of the first pass. Where the look-ups of later passes shrink, they grow with 1/r²: a
-    look-up finds as many photons as before, and the blur by redistributed power vanishes with that of the look-ups.
+    Required densities are those of the first pass. As the look-ups of later passes shrink, they grow with 1/r²: a
+    look-up finds as many photons as before (the k nearest are fewer, in less space), and the blur by redistributed
+    power vanishes with that of the look-ups.
     """
     how = settings.importance
     if plan.deposition == "all":
@@ -66,7 +67,7 @@ def rules_of(
     maps = importance.latest
     needs_importance = plan.deposition != "constant density"
     assert maps is not None or not needs_importance
-    growth = (first / radii["global"]) ** 2 if settings.estimate.lookup == "radius" else 1.0
+    growth = (first / radii["global"]) ** 2
     seed = settings.render.seed ^ SEED
     scene_radius = importance.scene.flat.radius
     key: tuple[Any, ...] = ("deposition", plan.deposition, importance.key if needs_importance else ())

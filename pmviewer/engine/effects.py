@@ -10,7 +10,7 @@ from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings import Settings
 
 _KDTREE_ONLY = ("estimate.k", "estimate.rim", "estimate.max_radius", "estimate.black_level")
-_GRID_ONLY = ("estimate.radius", "estimate.caustic_radius", "estimate.alpha")
+_GRID_ONLY = ("estimate.radius", "estimate.caustic_radius")
 _DISC_ONLY = ("estimate.filter", "estimate.cone_k", "estimate.rim", "estimate.differential")
 _RADIANCE_ONLY = ("gather.cutoff", "gather.similarity")
 _GUIDED_ONLY = ("gather.guided", "gather.guide_radius")
@@ -234,6 +234,8 @@ def _estimate(path: str, settings: Settings, caustic_mask: int) -> str | None:
         return "Only with the cone filter."
     if path in ("estimate.alpha", "estimate.floor") and settings.photons.renew == "once":
         return "One photon map serves all passes: the radius does not shrink."
+    if path == "estimate.floor" and estimate.lookup == "nearest" and estimate.max_radius != "auto":
+        return "With look-up 'nearest' it bounds the automatic maximum radius."
     if path == "estimate.floor" and estimate.lookup != "nearest" and estimate.alpha == 1.0:
         return "The radius does not shrink with alpha = 1."
     return None

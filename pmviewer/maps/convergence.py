@@ -98,13 +98,27 @@ def _classify(caustics, others, points, normals, needs, own, m, widest, i0, i1, 
     """States of points i0 … i1−1, (n, 3) with unit normals (n, 3) and needed densities (n,), into int8 (n,). own: 1
     where a photon of the map lies at each point, which says nothing about the density around it, else 0."""
     caustic, other = caustics[0], others[0]
-    k, cone = _i4(M) + _i4(own), _f4(1.0)
+    k, cone, whole = _i4(M) + _i4(own), _f4(1.0), _f4(1.0)
     for i in range(i0, i1):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
         reach = _f4(math.sqrt(_f8(SPARSEST * M) / (_PI * _f8(needs[i]))))
         r, g, b, count, radius = irradiance_knn(
-            caustic, x, y, z, nx, ny, nz, k, reach, FLATNESS, _i4(ALL_CLASSES), _i4(CONSTANT), cone, _i4(RIM_LEFT_OUT)
+            caustic,
+            x,
+            y,
+            z,
+            nx,
+            ny,
+            nz,
+            k,
+            reach,
+            FLATNESS,
+            _i4(ALL_CLASSES),
+            _i4(CONSTANT),
+            cone,
+            _i4(RIM_LEFT_OUT),
+            whole,
         )
         if count == 0:
             states[i] = NO_CAUSTIC
@@ -130,6 +144,7 @@ def _classify(caustics, others, points, normals, needs, own, m, widest, i0, i1, 
             _i4(CONSTANT),
             cone,
             _i4(RIM_LEFT_OUT),
+            whole,
         )
         of_all = of_caustic + _f8(luminance((r, g, b)))
         if rho * of_all**m >= of_caustic**m:  # also where the caustic photons have no power

@@ -86,7 +86,9 @@ class Materials:
             self.document.warn(f"{p.element} has no effect on a transparent BSDF.", p.element)
         p.warn_unused("bsdf")
         mapped_inside = not _MAP_SLOTS.isdisjoint(material.textures)
-        return replace(material, two_sided=not material.transparent, mirrored_maps=mapped_inside and not material.transparent)
+        return replace(
+            material, two_sided=not material.transparent, mirrored_maps=mapped_inside and not material.transparent
+        )
 
     def _conductor(self, p: Properties, name: str) -> Material:
         scale = p.bounded_colour("specular_reflectance", 1.0, 1)
