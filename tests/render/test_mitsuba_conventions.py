@@ -22,7 +22,7 @@ from tests.scenes_for_tests import settings_of
 FOLDER = Path(__file__).parents[1] / "scene" / "mitsuba_conventions"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text("utf-8"))
 SCENES = EXPECTED["scenes"]
-RUNS = 16
+RUNS = 8
 SIGNIFICANCE = 1e-4
 ROUNDING = 1e-5
 """Relative: six digits are recorded."""
@@ -70,7 +70,7 @@ def test_every_scene_has_an_expectation():
 @pytest.mark.parametrize("name", list(SCENES))
 def test_path_tracer_shows_mitsubas_picture(name):
     expected = SCENES[name]
-    assert p_value(block_runs(name, "path", 16), expected["mean"], expected["error"], EXPECTED["runs"]) > SIGNIFICANCE
+    assert p_value(block_runs(name, "path", 64), expected["mean"], expected["error"], EXPECTED["runs"]) > SIGNIFICANCE
 
 
 @pytest.mark.parametrize("method", ["progressive", "gather"])
