@@ -1,10 +1,12 @@
 """Lights (T1): emission of photons, sampling towards a point, and the densities for multiple importance sampling.
 
 Area lights are one-sided: they emit where their normal points; a mesh with vertex normals where these point, as in
-Mitsuba 3. Photons leave it with the surface's own cosine in that half of all directions, which is π in all whatever the
-vertex normals are: cosines and densities are always those of the surface. Lights are picked with probability
-proportional to their power's luminance. Spots, directional lights and image environments have files of their own;
-scenes without them have another type of record (`pmviewer.kernels.scene`) and compile nothing of them.
+Mitsuba 3. Photons leave it with the surface's own cosine in that half of all directions, whose integral is π whatever
+the vertex normals are: cosines and densities are always those of the surface.
+
+Lights are picked with probability proportional to their power's luminance. Spots, directional lights and image
+environments have files of their own; scenes without them have another type of record (`pmviewer.kernels.scene`) and
+compile nothing of them.
 """
 
 from __future__ import annotations
@@ -74,13 +76,6 @@ def pick_light(scene, u):
 
 
 @device
-def is_delta_light(scene, light):
-    """Whether no ray can meet the light, which has neither extent nor solid angle."""
-    kind = np.int32(light_number(scene, light, L_KIND))
-    return kind in (POINT, SPOT, DIRECTIONAL)
-
-
-@device
 def light_probability(scene, light):
     return load_f4(scene.light_cdf, light + 1) - load_f4(scene.light_cdf, light)
 
@@ -92,7 +87,7 @@ def _round_gap(n, center, reach):
 
 @device
 def light_point(scene, light, u, v):
-    """A point uniform on the area light, its unit normal, the normal on whose side it emits, the gap for `leave`."""
+    """A point uniform on the area light, its unit normal, the one on whose side it emits, and the gap for `leave`."""
     kind = np.int32(light_number(scene, light, L_KIND))
     a = light_vector(scene, light, L_A)
     b = light_vector(scene, light, L_B)

@@ -40,8 +40,10 @@ def on_the_light(n, seed=7):
 
 
 def test_photons_carry_the_light_that_the_definition_says(flat):
-    """Radiance L in all directions d with ns·d > 0 is the power L |ng·d| per area and solid angle: shares of the octants
-    by brute force."""
+    """Radiance L in all directions d with ns·d > 0 is the power L |ng·d| per area and solid angle.
+
+    Shares of the octants by brute force.
+    """
     n = 400_000
     _, direction, beta, _ = emit(flat, n)
     assert (beta @ LUMINANCE) == pytest.approx(np.ones(n), rel=1e-5)

@@ -37,7 +37,12 @@ def lit(name, ball=BALL):
     scene = light_scene()
     floor = Shape("floor", Parallelogram((-1.0, 0.0, -1.0), (0.0, 0.0, 2.0), (2.0, 0.0, 0.0)), 0)
     shapes, lights = [floor, Shape("ball", ball, 2)], ()
-    if isinstance(light, Disk | Sphere | Parallelogram) or name in ("cylinder", "cylinder inside", "mesh", "leaning mesh"):
+    if isinstance(light, Disk | Sphere | Parallelogram) or name in (
+        "cylinder",
+        "cylinder inside",
+        "mesh",
+        "leaning mesh",
+    ):
         shapes.append(Shape(name, light, 1, (2.0, 1.5, 1.0)))
     else:
         lights = (light,)

@@ -1,7 +1,7 @@
 """Corners of Mitsuba's conventions: which side of a surface is its outside, and which way mapped normals lean.
 
-The expectation was rendered by Mitsuba 3 (tests/scene/mitsuba_conventions/record.py) and is recorded as block means with
-their standard errors; each picture is tested against it by Welch's t-test, as `pmviewer bench mitsuba` does.
+The expectation was rendered by Mitsuba 3 (tests/scene/mitsuba_conventions/record.py) and is recorded as block means
+with their standard errors; each picture is tested against it by Welch's t-test, as `pmviewer bench mitsuba` does.
 """
 
 from __future__ import annotations
