@@ -76,6 +76,13 @@ def pick_light(scene, u):
 
 
 @device
+def is_delta_light(scene, light):
+    """Whether no ray can meet the light, which has neither extent nor solid angle."""
+    kind = np.int32(light_number(scene, light, L_KIND))
+    return kind in (POINT, SPOT, DIRECTIONAL)
+
+
+@device
 def light_probability(scene, light):
     return load_f4(scene.light_cdf, light + 1) - load_f4(scene.light_cdf, light)
 
@@ -87,7 +94,7 @@ def _round_gap(n, center, reach):
 
 @device
 def light_point(scene, light, u, v):
-    """A point uniform on the area light, its unit normal, the one on whose side it emits, and the gap for `leave`."""
+    """A point uniform on the area light, its unit normal, the normal on whose side it emits, the gap for `leave`."""
     kind = np.int32(light_number(scene, light, L_KIND))
     a = light_vector(scene, light, L_A)
     b = light_vector(scene, light, L_B)
