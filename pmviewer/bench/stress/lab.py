@@ -72,6 +72,8 @@ class Case:
     truth: str
     run: Callable[[Lab], Outcome]
     nonsense: bool = False
+    long: bool = False
+    """Left out by `--quick`."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,10 @@ class Row:
         if self.case.nonsense and not o.said:
             return "silent"
         return "" if o.agrees else "off"
+
+    @property
+    def verdict(self) -> str:
+        return self.wrong or ("said" if self.case.nonsense else "biased as stated" if self.outcome.bias else "ok")
 
 
 @dataclass
