@@ -86,9 +86,7 @@ class LightTable:
         for name, row in zip(names, rows, strict=True):
             brightest = max(row[K.L_RADIANCE : K.L_RADIANCE + 3])
             if not brightest < BRIGHTEST:
-                what = (
-                    f"The light '{name}' is too bright for single precision: {brightest:g}, {BRIGHTEST:g} is the most."
-                )
+                what = f"The light '{name}' is too bright: {brightest:g}, where {BRIGHTEST:g} is the most."
                 raise SceneError(what, scene.path, hint="Scale all lights down alike.")
         self.rows = np.array(rows, np.float32)
         self.power = np.array(powers)
