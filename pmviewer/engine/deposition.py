@@ -75,7 +75,7 @@ def rules_of(
     notes: list[str] = []
     required: dict[str, Evaluate] = {}
     rules: dict[str, Rule | None] = {"caustic": None, "global": None}
-    classes = {"caustic": plan.caustic_mask, "global": plan.global_classes}
+    classes = {"caustic": plan.caustic_classes, "global": plan.global_classes}
     f: dict[str, float] = {}
     everywhere: dict[str, float] = {}
     if plan.deposition == "Keller-Wald":
@@ -110,9 +110,9 @@ def rules_of(
     sample = sampled_classes(plan)
     if plan.convergence:
         acceptance, farthest = ACCEPTANCE.index(how.acceptance), farthest_of(scene_radius)
-        criterion = Criterion(plan.convergence, acceptance, farthest, scene_radius, plan.caustic_mask)
+        criterion = Criterion(plan.convergence, acceptance, farthest, scene_radius, plan.caustic_classes)
         key += ("convergence", plan.convergence)
-        sample |= ALL_CLASSES & ~plan.caustic_mask
+        sample |= ALL_CLASSES & ~plan.caustic_classes
     deposition = Deposition(rules["caustic"], rules["global"], classes["caustic"], classes["global"], sample, criterion)
     grown = 1.0 if plan.deposition == "Keller-Wald" else growth
     return Rules(deposition, key, tuple(notes), required or None, f, everywhere, grown)
@@ -120,7 +120,7 @@ def rules_of(
 
 def sampled_classes(plan: Plan) -> int:
     """Path classes (bit set) whose photons somebody counts as they arrive."""
-    return (1 << DIRECT if plan.choice != "power" or plan.caustic_mask else 0) | plan.guide_mask
+    return (1 << DIRECT if plan.choice != "power" or plan.caustic_classes else 0) | plan.guide_mask
 
 
 def constant_density(settings: Settings, radius: float) -> float:

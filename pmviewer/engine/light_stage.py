@@ -90,7 +90,7 @@ class LightStage:
         maps = self._maps(eye, 0 if kept else index, N, first_radius, importance)
         if not (kept and index > 0):
             assert self.photons is not None
-            self.tally.add_photons(self.photons)
+            self.tally.add_photons(self.photons, self.scene.flat.total_luminance)
         return maps
 
     def stored(self, name: str) -> NDArray[np.float32]:
@@ -99,7 +99,7 @@ class LightStage:
         if self.photons is None:
             return np.empty((0, 6), np.float32)
         if name == "caustic":
-            return of_classes(self.photons.caustic, self.plan.caustic_mask)
+            return of_classes(self.photons.caustic, self.plan.caustic_classes)
         return of_classes(self.photons.global_, self.plan.global_classes)
 
     def fates(self, count: int, importance: ImportanceStage) -> NDArray[np.float32] | None:
@@ -111,7 +111,7 @@ class LightStage:
         guided, guidance = None, guidance_of(self.settings, self.plan, importance)
         if guidance is not None:  # again: its test photons are gone
             index, N = self.traced
-            photons, seed, caustics = self.settings.photons, self.settings.render.seed, bool(self.plan.caustic_mask)
+            photons, seed, caustics = self.settings.photons, self.settings.render.seed, bool(self.plan.caustic_classes)
             scene, run = self.scene.flat, self.pool.run
             guided = guided_emission_of(scene, photons, seed, index * N, N, caustics, guidance, run, self._before)
             if deposition is None and guided is not None:
@@ -130,10 +130,10 @@ class LightStage:
             return None
         direct = 0 if plan.gather or not plan.global_classes else 1 << DIRECT
         of_global = plan.global_classes | direct
-        everything = Deposition(None, None, plan.caustic_mask, of_global)
+        everything = Deposition(None, None, plan.caustic_classes, of_global)
         photons = self._trace(self.traced[0], min(self.traced[1], SHOWN_TRAJECTORIES), everything)
         arrived = []
-        if maps.caustic is not None and plan.caustic_mask:
+        if maps.caustic is not None and plan.caustic_classes:
             arrived.append((photons.caustic, photons.caustic_normals, photons.caustic_unit, maps.caustic))
         if maps.global_ is not None and of_global:
             arrived.append((photons.global_, photons.normals, photons.global_unit, maps.global_))
@@ -143,7 +143,7 @@ class LightStage:
         self, index: int, N: int, deposition: Deposition, fates: Fates | None = None, guided: Guided | None = None
     ) -> PhotonMaps:
         """The light pass again, for showing something of it."""
-        settings, caustics = self.settings, bool(self.plan.caustic_mask)
+        settings, caustics = self.settings, bool(self.plan.caustic_classes)
         traced, _, _ = trajectories(settings.photons, N, caustics)
         if guided is not None:
             traced = N
@@ -167,7 +167,7 @@ class LightStage:
     def _photons_of(self, index: int, N: int, importance: ImportanceStage) -> tuple[PhotonMaps, tuple]:
         """The photons of a pass by the deposition rules, and what names them in the cache."""
         settings, scene = self.settings, self.scene
-        caustics = bool(self.plan.caustic_mask)
+        caustics = bool(self.plan.caustic_classes)
         traced, _, _ = trajectories(settings.photons, N, caustics)
         normals = self.plan.radiance or (self.plan.corners and settings.estimate.lookup == "nearest")
         key = (
@@ -228,7 +228,7 @@ class LightStage:
         self.notes = (*self.rules.notes, *note_of(plan, photons, guidance))
         units = {"caustic": photons.caustic_unit, "global": photons.global_unit}
         clouds = {"caustic": photons.caustic, "global": photons.global_}
-        classes = {"caustic": plan.caustic_mask, "global": plan.global_classes}
+        classes = {"caustic": plan.caustic_classes, "global": plan.global_classes}
         nearest = estimate.lookup == "nearest"
         eye["k"], eye["share"] = pass_neighbours(index, estimate)
 
@@ -273,6 +273,8 @@ class LightStage:
         if plan.corners:
             eye["corner"] = self.settings.gather.secondary * self._typical_radius(eye, photons, *built[1])
         eye["caustic_mask"], eye["global_mask"] = plan.caustic_mask, plan.global_mask
+        eye["direct_mask"], eye["global_caustics"] = plan.direct_mask, plan.global_caustics
+        eye["unfound"] = plan.unfound
         chooser = self._chooser(eye, photons, key, index)
         records.append(chooser.record)
         self._keep = built, chooser

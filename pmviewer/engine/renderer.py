@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.cache_stage import cache_cloud, fill_cache, recipe
+from pmviewer.engine.caveats import caveats
 from pmviewer.engine.diagnose import Looked, diagnostic_planes, wanted_of
 from pmviewer.engine.frame import Frame, PhotonCloud, Statistics
 from pmviewer.engine.guides import gather_records
@@ -75,7 +76,7 @@ class Renderer:
         self.plan: Plan = plan_of(settings, scene.traits)
         self.film = Film(self.camera.width, self.camera.height)
         self.first_radius = (
-            first_radius(scene.flat, self.render_camera, settings.estimate, settings.render.method)
+            first_radius(scene.flat, self.render_camera, settings.estimate, self.plan.gather)
             if self.plan.photons
             else 0.0
         )
@@ -169,7 +170,7 @@ class Renderer:
         if self.light.traced is None:
             return None
         index, N = self.light.traced
-        settings, caustics = self.settings, bool(self.plan.caustic_mask)
+        settings, caustics = self.settings, bool(self.plan.caustic_classes)
         traced, _, _ = trajectories(settings.photons, N, caustics)
         guided = self.light.photons.guided if self.light.photons else None
         if guided is not None:
@@ -208,6 +209,7 @@ class Renderer:
             clouds["cache"] = PhotonCloud(*cache_cloud(self._cache), self._cache.rows[:, REACH].copy())
             stored_in_pass["cache"] = self._cache.n
         samples = max(len(film.sums) * film.passes, 1)
+        energy = self.tally.energy.close(self.plan.emission != "off")
         statistics = Statistics(
             passes=film.passes,
             emitted=self.tally.emitted,
@@ -227,9 +229,13 @@ class Renderer:
             map_bytes=self.tally.map_bytes,
             bytes_per_photon=self.tally.map_bytes / self.tally.map_photons if self.tally.map_photons else 0.0,
             dropped=dict(self.tally.dropped),
+            energy=energy,
             skipped=self.plan.skipped,
             importons=self.importance.latest.traced if self.importance.latest else 0,
-            warnings=self._warnings(),
+            warnings=(
+                *self._warnings(),
+                *caveats(self.settings, self.tally, energy, self.scene.flat.radius, len(film.sums)),
+            ),
             deposited=dict(self.tally.deposited),
         )
         return Frame(
@@ -313,7 +319,8 @@ class Renderer:
         return rows[: self.pool.run([replay])[0]].copy()
 
     def _set_gather(self, eye: np.void) -> None:
-        eye["direct"] = self.plan.direct
+        eye["direct"], eye["followed_direct"] = self.plan.direct, self.plan.followed_direct
+        eye["indirect_caustics"] = self.settings.photons.indirect_caustics
         eye["gather_rays"] = self.settings.gather.rays if self.plan.gather else 0
         eye["gather_specular"] = not self.settings.photons.indirect_caustics
 

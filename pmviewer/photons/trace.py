@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.jit import device, kernel
+from pmviewer.kernels.light import is_delta_light
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.raycast import closest_hit
@@ -23,6 +24,7 @@ from pmviewer.kernels.scattering import (
     attenuation,
     bsdf_at,
     bsdf_sample,
+    is_delta,
     pick_group,
     same_side,
     shading_normal,
@@ -36,12 +38,13 @@ from pmviewer.maps.record import (
     HAD_DIFFUSE,
     INDIRECT_CAUSTIC,
     LAST_SPECULAR,
+    UNFOUND,
     encode_direction,
     encode_power,
 )
 from pmviewer.photons.paths import begin_path, extend_path
 from pmviewer.photons.projected import emission
-from pmviewer.photons.roulette import BY_LUMINANCE, EQUAL, MOST_COPIES, copies, survival_probability
+from pmviewer.photons.roulette import EQUAL, MOST_COPIES, copies, survival_probability
 
 _f4 = np.float32
 _f8 = np.float64
@@ -64,16 +67,25 @@ LIGHT_PASS_DTYPE = np.dtype(
         ("indirect_caustics", "i4"),  # whether with photons that met a diffuse surface before, too
         ("only_direct", "i4"),  # whether the trajectories that don't fill the global map end where they meet it
         ("indirect_scale", "f4"),  # factor for the power of indirect caustics in the units of the caustic map
+        ("direct_scale", "f4"),  # the same for caustics straight from a light
+        ("unfound", "i4"),  # whether followed lobes store what no path from the eye finds (`pmviewer.maps.record`)
     ],
     align=True,
 )
 
 N_COUNTS = 4
 C_GLOBAL, C_CAUSTIC, C_RAYS, C_DROPPED = range(N_COUNTS)
-N_LEDGER = 5
-E_EMITTED, E_STORED, E_ABSORBED, E_ESCAPED, E_TERMINATED = range(N_LEDGER)
+N_LEDGER = 6
+E_EMITTED, E_STORED, E_ABSORBED, E_ESCAPED, E_TERMINATED, E_DROPPED = range(N_LEDGER)
 """Energy ledger: luminance of power in units of the map's. What roulette gives a survivor or takes from a victim counts
-as absorbed, so that the books always balance and each entry is right in the mean."""
+as absorbed, so that the books always balance and each entry is right in the mean. E_STORED is what arrived where
+photons are stored, as often as it arrived; the others after E_EMITTED are how a trajectory ends. A photon whose power
+becomes infinite or NaN is dropped with the power that it had before."""
+
+
+def empty_ledger():
+    """Ledgers (2, N_LEDGER) of the trajectories that fill the global map and of the others, float64."""
+    return np.zeros((2, N_LEDGER))
 
 
 @device
@@ -86,14 +98,14 @@ def _store(out, row, p, wi, beta, flags, light):
 
 
 @kernel
-def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, caustic_out, counts, ledger, paths):
+def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, caustic_out, counts, ledgers, paths):
     """Trace photons i0 … i1−1 of a pass.
 
     scenes: SCENE_DTYPE (1,); passes: LIGHT_PASS_DTYPE (1,); projections: PROJECTION_DTYPE (2,), STRATA_DTYPE (2,) or
     NO_PROJECTION, of the trajectories that fill the global map and of the others; global_out, caustic_out: float32
     (capacity, 6), see `pmviewer.maps.record`; normals_out: two arrays uint32 (capacity,), receive the surface normals
-    of global and of caustic photons, or (0,) when nobody needs them; counts: int64 (N_COUNTS,) and ledger: float64
-    (N_LEDGER,) are added to, `counts[C_GLOBAL]` and `counts[C_CAUSTIC]` being the rows filled so far; paths: None, or
+    of global and of caustic photons, or (0,) when nobody needs them; counts: int64 (N_COUNTS,) and ledgers: float64
+    (2, N_LEDGER) are added to, `counts[C_GLOBAL]` and `counts[C_CAUSTIC]` being the rows filled so far; paths: None, or
     where to write whole paths (`pmviewer.photons.paths`).
 
     Returns the index of the next photon to trace: less than i1 when a buffer may not hold another photon's path.
@@ -106,6 +118,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
         if counts[C_GLOBAL] + most > len(global_out) or counts[C_CAUSTIC] + most > len(caustic_out):
             return i
         to_global = i < pass_.global_trajectories
+        ledger = ledgers[0 if to_global else 1]
         place = np.int64(pass_.first_index) + np.int64(i)
         index, seed = _u4(place), pass_.seed
         if place >> 32 != 0:  # a Sobol set has 2³² points; the next photons use other sets
@@ -116,15 +129,19 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
         p, d, beta, light, kept, worth = emission(
             scene, projection, i, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1)
         )
-        start = luminance(beta) * worth
-        ledger[E_EMITTED] += _f8(start)
+        ledger[E_EMITTED] += _f8(worth)  # its luminance is 1
+        if not is_good(beta):
+            counts[C_DROPPED] += 1
+            ledger[E_DROPPED] += _f8(worth)
+            continue
         if not kept:
-            ledger[E_ESCAPED] += _f8(start)
+            ledger[E_ESCAPED] += _f8(worth)
             continue
         begin_path(paths, i, p, d, scale(beta, worth), light)
         o = p
         flags = _u4(0)
         bounces = 0
+        deltas = pass_.unfound != 0 and is_delta_light(scene, light)  # and nothing but deltas since the light
         while True:
             t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), _INF)
             counts[C_RAYS] += 1
@@ -134,21 +151,27 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                 break
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
+            before = luminance(beta)
             beta = attenuation(scene, material, ng, d, t, beta)
+            if not is_good(beta):
+                counts[C_DROPPED] += 1
+                ledger[E_DROPPED] += _f8(before * worth)
+                break
+            ledger[E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
             extend_path(paths, i, prim, p, d, scale(beta, worth), _u4(flags | _u4(min(bounces, BOUNCES))), light)
             wi = (-d[0], -d[1], -d[2])
             b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
-            if b.groups == NOTHING:
+            if b.groups == NOTHING or not luminance(beta) > _f4(0.0):
                 ledger[E_ABSORBED] += _f8(luminance(beta) * worth)
                 break
             ng = face(ng, wi)
             u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
-            if b.groups & STORED != 0:
-                if not is_good(beta):
-                    counts[C_DROPPED] += 1
-                    break
+            unfound = deltas and bounces > 0 and b.groups & FOLLOWED != 0 and not is_delta(b)
+            if b.groups & STORED != 0 or unfound:
                 path_class = np.int32(flags >> _u4(6))
                 word = _u4(flags | _u4(min(bounces, BOUNCES)))
+                if unfound:
+                    word = _u4(word | _u4(UNFOUND))
                 is_caustic = path_class == CAUSTIC or (path_class == INDIRECT_CAUSTIC and pass_.indirect_caustics != 0)
                 times, stored = 1, beta
                 if pass_.roulette == EQUAL:
@@ -156,7 +179,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                     stored = scale(beta, factor)
                 stored = scale(stored, worth)
                 if is_caustic and pass_.caustics != 0:
-                    in_caustic = stored
+                    in_caustic = scale(stored, pass_.direct_scale)
                     if path_class == INDIRECT_CAUSTIC:
                         in_caustic = scale(stored, pass_.indirect_scale)
                     for _ in range(times):
@@ -164,9 +187,13 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                         if len(normals_out[1]) > 0:
                             normals_out[1][counts[C_CAUSTIC]] = encode_direction(ng[0], ng[1], ng[2])
                         counts[C_CAUSTIC] += 1
-                if to_global and (
-                    pass_.store_probability >= _f4(1.0)
-                    or draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
+                if (
+                    to_global
+                    and b.groups & STORED != 0
+                    and (
+                        pass_.store_probability >= _f4(1.0)
+                        or draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
+                    )
                 ):
                     for _ in range(times):
                         _store(global_out, counts[C_GLOBAL], p, wi, stored, word, light)
@@ -176,6 +203,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                 ledger[E_STORED] += _f8(luminance(beta) * worth)
             before = luminance(beta)
             group, share, u_lobe = pick_group(b, wi, u_lobe)
+            deltas = deltas and group == FOLLOWED and is_delta(b)
             if group == FOLLOWED:
                 flags = _u4(flags | _u4(LAST_SPECULAR))
             elif not to_global and pass_.only_direct != 0:
@@ -189,13 +217,16 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
             elif abs(dot(shading_normal(b), ng)) < STRAIGHT:
                 weight = scale(weight, adjoint_cosines(shading_normal(b), ng, wi, d))
             after = scale(mul(beta, weight), share)
+            if not is_good(after):
+                counts[C_DROPPED] += 1
+                ledger[E_DROPPED] += _f8(before * worth)
+                break
             survival = survival_probability(pass_.roulette, before, beta, after)
             if not u2 < survival:
                 ledger[E_ABSORBED] += _f8(before * worth)
                 break
             beta = scale(after, _f4(1.0) / survival)
-            if pass_.roulette != BY_LUMINANCE:  # which keeps it
-                ledger[E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
+            ledger[E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
             bounces += 1
             if bounces >= max_bounces:
                 ledger[E_TERMINATED] += _f8(luminance(beta) * worth)

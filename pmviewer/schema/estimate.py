@@ -17,8 +17,8 @@ class Estimate(Group):
         stage="maps",
         scale="log",
         unit="× scene",
-        ge=1e-5,
-        le=1.0,
+        ge=1e-7,
+        le=10.0,
     )
     caustic_radius: float = setting(
         0.5,
@@ -60,7 +60,7 @@ class Estimate(Group):
         stage="maps",
         scale="log",
         unit="photons",
-        ge=2,
+        ge=1,
         le=1000,
     )
     rim: Literal["left out", "half", "whole"] = setting(
@@ -77,8 +77,8 @@ class Estimate(Group):
         stage="maps",
         scale="log",
         unit="× scene",
-        ge=1e-5,
-        le=2.0,
+        ge=1e-7,
+        le=10.0,
     )
     black_level: float = setting(
         0.05,
