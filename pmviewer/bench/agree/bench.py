@@ -158,8 +158,8 @@ def _settings_notes() -> list[str]:
     )
     return [
         f"{SIZE}² pixels; stages, each with fresh seeds, as long as there is doubt: {stages}",
-        f"photon methods may be off by {FORGIVEN:g} × this radius, {FORGIVEN * STAGES[-1].radius:.0%} of a block in the "
-        "last stage: look-ups lose light at edges, in proportion to the radius",
+        f"photon methods may be off by {FORGIVEN:g} × this radius, {FORGIVEN * STAGES[-1].radius:.0%} of a block in "
+        "the last stage: look-ups lose light at edges, in proportion to the radius",
         f"nearest: estimate.lookup=nearest with k = 10 within {NEAREST_REACH:g} of these radii",
         f"a disagreement is one by Holm's correction at {LEVEL:g} over all comparisons of the run",
         "where point, spot or directional lights meet smooth mirrors, glass or coats, photon methods are compared with "
