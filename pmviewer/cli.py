@@ -76,6 +76,7 @@ def render(
         str | None,
         typer.Option(metavar="FILE", help="EXR to print the error against; auto: the bundled scene's own."),
     ] = None,
+    stats: Annotated[bool, typer.Option(help="Print photons, rays, times and the energy ledger.")] = False,
 ) -> None:
     """Render to a file without a window; the result is what the window shows after the same passes."""
     from pmviewer.job import load_job
@@ -94,6 +95,7 @@ def render(
         seed=seed,
         half=half,
         reference=reference,
+        stats=stats,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
@@ -9,7 +10,8 @@ from pathlib import Path
 
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
-from pmviewer.engine.frame import Frame
+from pmviewer.engine.energy import ENTRIES
+from pmviewer.engine.frame import Frame, Statistics
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
@@ -26,6 +28,7 @@ from pmviewer.scene.analysis import analyse
 from pmviewer.scene.describe import describe
 from pmviewer.scene.description import Scene
 from pmviewer.scene.load import load_scene, reference_of
+from pmviewer.scene.recentre import recentred
 from pmviewer.settings import Settings, with_values
 
 FORMATS = (".exr", ".png")
@@ -42,9 +45,10 @@ def render_job(
     seed: int | None = None,
     half: bool = False,
     reference: str | None = None,
+    stats: bool = False,
 ) -> Frame:
     """Render with a progress bar and write the files; with a reference (a file or "auto") also print the error at
-    passes 1, 2, 4, … and at the end.
+    passes 1, 2, 4, … and at the end; with `stats` photons, rays, times and the energy ledger.
 
     Raises PmviewerError; refuses bad file names and references that don't fit before rendering.
     """
@@ -86,6 +90,8 @@ def render_job(
             if found.photons
             else "caustic map: no photons, so nothing has converged"
         )
+    if stats:
+        print(statistics_report(statistics))
     _print_warnings(statistics.warnings, {})
     for path in outputs:
         if path.suffix.lower() == ".exr":
@@ -167,9 +173,30 @@ def _print_warnings(warnings: Iterable[str], dropped: Mapping[str, int]) -> None
         print(f"pmviewer: warning: {count} × {reason} left out", file=sys.stderr)
 
 
+def statistics_report(s: Statistics) -> str:
+    """Text of `pmviewer render --stats`."""
+    rows = [("passes", f"{s.passes:,}"), ("rays", f"{s.rays:,}"), ("rendering time", f"{s.seconds:.2f} s")]
+    rows += [(f"CPU time, {stage}", f"{seconds:.2f} s") for stage, seconds in s.stage_seconds.items()]
+    if s.emitted:
+        rows.append(("photons emitted", f"{s.emitted:,}"))
+        rows += [(f"photons in the {name} map", f"{count:,}") for name, count in s.stored.items()]
+        rows.append(("memory of the maps", f"{s.map_bytes / 2**20:.1f} MiB"))
+    rows += [(f"{place} dropped, not finite", f"{count:,}") for place, count in s.dropped.items()]
+    if s.energy is not None:
+        rows.append(("energy emitted a pass", f"{s.energy.watts[0]:.6g} W"))
+        for entry in ENTRIES[1:]:
+            share, error = s.energy.share(entry), s.energy.share_error(entry)
+            known = "" if math.isnan(error) else f" ± {error:.2%}"
+            rows.append((f"energy {entry}", f"{share:.3%}{known}"))
+        if s.energy.uncounted > 0:
+            rows.append(("energy of test photons, not in the books", f"{s.energy.uncounted:.6g} W"))
+    width = max(len(label) for label, _ in rows)
+    return "\n".join(f"{label:{width}s}  {text}" for label, text in rows)
+
+
 def scene_report(job: Job) -> str:
     """Text of `pmviewer info`: what is in the scene, what was ignored, which stages run."""
-    scene = load_scene(job.scene, job.parameters)
+    scene = recentred(load_scene(job.scene, job.parameters))
     plan = plan_of(job.settings, analyse(scene))
     rows = describe(scene)
     needed = [

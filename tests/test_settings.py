@@ -156,7 +156,7 @@ def test_assignments_of_the_command_line():
     [
         ("photons.N", "name=value"),
         ("photons.N=", "whole number"),
-        ("photons.N=12.5", "whole number from 100"),
+        ("photons.N=12.5", "whole number from 1"),
         ("photons.N=1e99", "photons.N"),
         ("photons.N=nan", "whole number"),
         ("photons.N=inf", "whole number"),
@@ -189,9 +189,9 @@ def test_changed_stages():
 
 def test_ranges_in_words():
     assert range_text(info_of("photons.q")) == "a number from 0.001 to 1"
-    assert range_text(info_of("photons.N")) == "a whole number from 100 to 50,000,000"
+    assert range_text(info_of("photons.N")) == "a whole number from 1 to 50,000,000"
     assert range_text(info_of("render.seed")) == "a whole number from 0 to 2,147,483,647"
-    assert range_text(info_of("estimate.radius")) == "a number from 1e-05 to 1 or auto"
+    assert range_text(info_of("estimate.radius")) == "a number from 1e-07 to 10 or auto"
     assert range_text(info_of("direct.mis")) == "true or false"
     assert range_text(info_of("camera.origin")) == "three numbers (x, y, z) or auto"
     assert range_text(info_of("photons.sequence")) == "one of sobol, independent"

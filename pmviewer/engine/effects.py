@@ -10,14 +10,17 @@ from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings import Settings
 
 _KDTREE_ONLY = ("estimate.k", "estimate.rim", "estimate.max_radius", "estimate.black_level")
-_GRID_ONLY = ("estimate.radius", "estimate.caustic_radius", "estimate.alpha")
+_GRID_ONLY = ("estimate.radius", "estimate.caustic_radius")
 _DISC_ONLY = ("estimate.filter", "estimate.cone_k", "estimate.rim", "estimate.differential")
 _RADIANCE_ONLY = ("gather.cutoff", "gather.similarity")
 _GUIDED_ONLY = ("gather.guided", "gather.guide_radius")
 _KELLER_WALD_ONLY = ("importance.f", "importance.epsilon", "importance.cut_off")
+_GUARDED_ONLY = ("importance.contrast", "importance.reach")
 _DEPOSITION = (
     "importance.deposition",
     "importance.acceptance",
+    "importance.around",
+    *_GUARDED_ONLY,
     "importance.density",
     "importance.convergence",
     *_KELLER_WALD_ONLY,
@@ -115,7 +118,10 @@ def _deposition(path: str, settings: Settings, plan: Plan) -> str | None:
         return None if active == "Keller-Wald" else "Only with the deposition rule 'Keller-Wald'."
     if path == "importance.density":
         return None if active == "constant density" else "Only with the deposition rule 'constant density'."
-    return "Only with density control." if active in ("all", "Keller-Wald") else None
+    if active in ("all", "Keller-Wald"):
+        return "Only with density control."
+    guards = path not in _GUARDED_ONLY or settings.importance.around == "guarded"
+    return None if guards else "Only with guarded neighbours (importance.around)."
 
 
 def _emission(path: str, settings: Settings, plan: Plan) -> str | None:
@@ -234,6 +240,8 @@ def _estimate(path: str, settings: Settings, caustic_mask: int) -> str | None:
         return "Only with the cone filter."
     if path in ("estimate.alpha", "estimate.floor") and settings.photons.renew == "once":
         return "One photon map serves all passes: the radius does not shrink."
+    if path == "estimate.floor" and estimate.lookup == "nearest" and estimate.max_radius != "auto":
+        return "With look-up 'nearest' it bounds the automatic maximum radius."
     if path == "estimate.floor" and estimate.lookup != "nearest" and estimate.alpha == 1.0:
         return "The radius does not shrink with alpha = 1."
     return None

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.energy import Energy
 from pmviewer.engine.inspection import Inspection
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose
@@ -61,6 +62,8 @@ class Statistics:
     bytes_per_photon: float = 0.0
     dropped: Mapping[str, int] = field(default_factory=dict)
     """Samples left out because they were not finite or negative, by place; all zero in a healthy scene."""
+    energy: Energy | None = None
+    """Where the light went; None without photons."""
     deposited: Mapping[str, Deposited] = field(default_factory=dict)
     """What became of the photons that arrived in the latest pass, by map; empty where all are stored."""
     importons: int = 0

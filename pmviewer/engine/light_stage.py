@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -18,7 +19,7 @@ from pmviewer.engine.method import Plan, estimator_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.projection import projection_for
-from pmviewer.engine.radius import pass_radius
+from pmviewer.engine.radius import pass_neighbours, pass_radius
 from pmviewer.engine.sites import median_radius, sites_of
 from pmviewer.engine.tally import Tally
 from pmviewer.importance.lights import importance_of_lights
@@ -89,7 +90,7 @@ class LightStage:
         maps = self._maps(eye, 0 if kept else index, N, first_radius, importance)
         if not (kept and index > 0):
             assert self.photons is not None
-            self.tally.add_photons(self.photons)
+            self.tally.add_photons(self.photons, self.scene.flat.total_luminance)
         return maps
 
     def stored(self, name: str) -> NDArray[np.float32]:
@@ -229,13 +230,15 @@ class LightStage:
         clouds = {"caustic": photons.caustic, "global": photons.global_}
         classes = {"caustic": plan.caustic_classes, "global": plan.global_classes}
         nearest = estimate.lookup == "nearest"
+        eye["k"], eye["share"] = pass_neighbours(index, estimate)
 
         def build(name: str) -> Any:
             if not classes[name]:
                 return None
             chosen = of_classes(clouds[name], classes[name])
             if nearest:
-                return build_kdtree(chosen, units[name]), self._max_radius(self._brightest(name, chosen, units[name]))
+                brightest = self._brightest(name, chosen, units[name])
+                return build_kdtree(chosen, units[name]), self._max_radius(brightest, int(eye["k"]))
             return build_grid(chosen, radii[name], units[name]), radii[name]
 
         def cached(name: str) -> Any:
@@ -258,7 +261,7 @@ class LightStage:
             self.tally.map_bytes += structure.bytes
             self.tally.map_photons += structure.n
         if plan.radiance:
-            self.sites, eye["site_radius"] = self._timed("maps", lambda: self._build_sites(built[1], index, key))
+            self.sites, eye["site_radius"] = self._timed("maps", lambda: self._build_sites(eye, built[1], index, key))
             self.tally.map_bytes += self.sites.bytes
         if plan.guided_rays:
             self.guides = self._timed(
@@ -268,7 +271,7 @@ class LightStage:
             self.guide_radius = self.tally.radius["guides"] = self.guides.radius
             self.tally.map_bytes += self.guides.bytes
         if plan.corners:
-            eye["corner"] = self.settings.gather.secondary * self._typical_radius(photons, *built[1])
+            eye["corner"] = self.settings.gather.secondary * self._typical_radius(eye, photons, *built[1])
         eye["caustic_mask"], eye["global_mask"] = plan.caustic_mask, plan.global_mask
         eye["direct_mask"], eye["global_caustics"] = plan.direct_mask, plan.global_caustics
         eye["unfound"] = plan.unfound
@@ -282,13 +285,13 @@ class LightStage:
             return [self.pool.run([partial(cached, name)])[0] for name in ("caustic", "global")]
         return self.pool.run([partial(cached, name) for name in ("caustic", "global")])
 
-    def _build_sites(self, built: tuple[Any, float], index: int, key: tuple) -> tuple[RadianceMap, float]:
+    def _build_sites(self, eye: np.void, built: tuple[Any, float], index: int, key: tuple) -> tuple[RadianceMap, float]:
         """Radiance photons of the pass in the global map `built`, and their cut-off radius."""
         photons, (structure, radius), settings = self.photons, built, self.settings
         assert photons is not None
 
         def make() -> tuple[RadianceMap, float]:
-            return self.pool.run([lambda: sites_of(photons, structure, radius, settings)])[0]
+            return self.pool.run([lambda: sites_of(photons, structure, radius, settings, eye)])[0]
 
         if index >= CACHED_PASSES:
             return make()
@@ -309,10 +312,10 @@ class LightStage:
         guides_key = ("guides", key, self.plan.guide_mask, asked, self.guide_radius)
         return self.cache.get(guides_key, build, lambda grid: grid.bytes)
 
-    def _typical_radius(self, photons: PhotonMaps, structure: Any, radius: float) -> float:
+    def _typical_radius(self, eye: np.void, photons: PhotonMaps, structure: Any, radius: float) -> float:
         """Of look-ups in the global map: that of the pass, or the median of k-nearest ones."""
         if isinstance(structure, PhotonKdTree):
-            return median_radius(photons, structure, radius, self.settings.estimate)
+            return median_radius(photons, structure, radius, eye)
         return radius
 
     def _chooser(self, eye: np.void, photons: PhotonMaps, key: tuple, index: int) -> PhotonGrid:
@@ -362,11 +365,12 @@ class LightStage:
             return self.photons.deposited[name].largest_arrived
         return largest_power(photons, unit)
 
-    def _max_radius(self, brightest: float) -> float:
+    def _max_radius(self, brightest: float, k: int) -> float:
+        """Of a search for k photons, as many as the pass takes."""
         estimate, scene_radius = self.settings.estimate, self.scene.flat.radius
         if estimate.max_radius != "auto":
-            return float(estimate.max_radius) * scene_radius
-        automatic = automatic_radius(estimate.k, brightest, estimate.black_level)
+            return float(estimate.max_radius) * scene_radius * math.sqrt(k / estimate.k)
+        automatic = automatic_radius(k, brightest, estimate.black_level)
         return min(max(automatic, estimate.floor * scene_radius), 2 * scene_radius)
 
 

@@ -24,7 +24,7 @@ from pmviewer.maps.variant import marked
 from pmviewer.photons.deposition import prepare_rules
 from pmviewer.photons.projected import NO_PROJECTION
 from pmviewer.photons.strata import STRATA_DTYPE
-from pmviewer.photons.trace import LIGHT_PASS_DTYPE, N_COUNTS, N_LEDGER, trace_photons
+from pmviewer.photons.trace import LIGHT_PASS_DTYPE, N_COUNTS, empty_ledger, trace_photons
 from pmviewer.render.camera import resolve_camera
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
@@ -85,7 +85,7 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
         projections = NO_PROJECTION if maps is None else maps.records
         if plan.emission != "off":
             projections = np.zeros(2, STRATA_DTYPE)
-        counts, ledger = np.zeros(N_COUNTS, np.int64), np.zeros(N_LEDGER)
+        counts, ledger = np.zeros(N_COUNTS, np.int64), empty_ledger()
         none = np.empty(0, np.float32)
         code = np.zeros(1, np.uint32)
         steps += [

@@ -23,5 +23,6 @@ def projection_for(scene: OpenScene, settings: Settings) -> Projection | None:
     key = (wanted, traced > filling)
     if key not in scene.projections:
         made = projection_of(scene.flat, wanted == "on", traced > filling)
-        scene.projections[key] = made if wanted == "on" or made.spares else None
+        useful = made.surface_power > 0 and (wanted == "on" or made.spares)  # else no photon would start at all
+        scene.projections[key] = made if useful else None
     return scene.projections[key]

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from pmviewer.kernels.raycast import cast_closest
+from pmviewer.maps.nearest import shrunk
 from pmviewer.maps.radius import progressive_radius
 from pmviewer.render.camera import CameraPose
 from pmviewer.scene.flatten import FlatScene
@@ -46,6 +47,12 @@ def first_radius(scene: FlatScene, camera: CameraPose, estimate: Estimate, gathe
     wanted = (GATHER_FOOTPRINTS if gather else FOOTPRINTS) * footprint / scene.radius
     wanted = min(max(wanted, 1e-4), 0.1)
     return 2.0 ** (round(4 * math.log2(wanted)) / 4) * scene.radius
+
+
+def pass_neighbours(index: int, estimate: Estimate) -> tuple[int, float]:
+    """Neighbours that a k-nearest look-up of pass `index` searches, and the share of their disc's area that it uses: in
+    all the share r²ᵢ/r²₁ of the area that `estimate.k` fill (`pmviewer.maps.nearest`)."""
+    return shrunk(estimate.k, progressive_radius(1.0, index + 1, estimate.alpha) ** 2)
 
 
 def pass_radius(first: float, index: int, estimate: Estimate, scene_radius: float) -> float:

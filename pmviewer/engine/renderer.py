@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.cache_stage import cache_cloud, fill_cache, recipe
+from pmviewer.engine.caveats import caveats
 from pmviewer.engine.diagnose import Looked, diagnostic_planes, wanted_of
 from pmviewer.engine.frame import Frame, PhotonCloud, Statistics
 from pmviewer.engine.guides import gather_records
 from pmviewer.engine.importance import ImportanceStage
 from pmviewer.engine.inspection import Inspection, Wanted
-from pmviewer.engine.light_stage import LightStage
+from pmviewer.engine.light_stage import CACHED_PASSES, LightStage
 from pmviewer.engine.memory import check_memory
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
@@ -208,6 +209,7 @@ class Renderer:
             clouds["cache"] = PhotonCloud(*cache_cloud(self._cache), self._cache.rows[:, REACH].copy())
             stored_in_pass["cache"] = self._cache.n
         samples = max(len(film.sums) * film.passes, 1)
+        energy = self.tally.energy.close(self.plan.emission != "off")
         statistics = Statistics(
             passes=film.passes,
             emitted=self.tally.emitted,
@@ -227,9 +229,13 @@ class Renderer:
             map_bytes=self.tally.map_bytes,
             bytes_per_photon=self.tally.map_bytes / self.tally.map_photons if self.tally.map_photons else 0.0,
             dropped=dict(self.tally.dropped),
+            energy=energy,
             skipped=self.plan.skipped,
             importons=self.importance.latest.traced if self.importance.latest else 0,
-            warnings=self._warnings(),
+            warnings=(
+                *self._warnings(),
+                *caveats(self.settings, self.tally, energy, self.scene.flat.radius, len(film.sums)),
+            ),
             deposited=dict(self.tally.deposited),
         )
         return Frame(
@@ -267,22 +273,25 @@ class Renderer:
         maps = self.light.run(eye[0], index, N, self.first_radius, self.importance)
         self._set_gather(eye[0])
         if self.plan.shadows:
-            self._shadows = self.tally.timed(self.pool, "shadow photons", self._shadow_map)
+            self._shadows = self.tally.timed(self.pool, "shadow photons", lambda: self._shadow_map(index))
         if self.plan.cache:
             self.tally.timed(self.pool, "irradiance cache", lambda: self._fill_cache(eye, maps, camera, index))
         self.tally.timed(self.pool, "eye pass", lambda: self._eye_pass(eye, maps, film))
         self._last = eye, maps
 
-    def _shadow_map(self) -> ShadowMap:
-        """The shadow photons that serve all passes."""
+    def _shadow_map(self, index: int) -> ShadowMap:
+        """The shadow photons of pass `index`; those of the first where one photon map serves all passes."""
+        if self.settings.photons.renew == "once":
+            if self._shadows is not None:
+                return self._shadows
+            index = 0
         direct, glossy, seed = self.settings.direct, self.settings.photons.glossy, self.settings.render.seed
-        key = ("shadows", self.scene.uid, seed, direct.shadow_N, direct.shadow_fewest, direct.shadow_radius, glossy)
-        if self._shadows is None:
-            make = partial(shadows_of, self.scene.flat, direct, glossy, seed, self.pool.run)
-            made = self.cache.get(key, make, lambda shadows: shadows.bytes)
-            self.tally.rays += made.rays
-            return made
-        return self._shadows
+        make = partial(shadows_of, self.scene.flat, direct, glossy, seed, index, self.pool.run)
+        shape = direct.shadow_N, direct.shadow_fewest, direct.shadow_radius
+        key = ("shadows", self.scene.uid, seed, index, *shape, glossy)
+        made = make() if index >= CACHED_PASSES else self.cache.get(key, make, lambda shadows: shadows.bytes)
+        self.tally.rays += made.rays
+        return made
 
     def _eye_records(self) -> tuple[NDArray[np.void], ...]:
         """What the eye pass looks up besides the pass's three maps."""

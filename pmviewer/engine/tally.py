@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.energy import EnergyBooks
 from pmviewer.engine.pool import WorkPool
 from pmviewer.photons.deposition import Deposited
 from pmviewer.photons.lightpass import PhotonMaps
@@ -35,6 +36,7 @@ class Tally:
     radius: dict[str, float] = field(default_factory=dict)
     stage_seconds: dict[str, float] = field(default_factory=dict)
     dropped: dict[str, int] = field(default_factory=lambda: {"photons": 0, "samples": 0})
+    energy: EnergyBooks = field(default_factory=EnergyBooks)
     map_bytes: int = 0
     map_photons: int = 0
 
@@ -47,8 +49,9 @@ class Tally:
         self.cpu_seconds += spent
         return result
 
-    def add_photons(self, photons: PhotonMaps) -> None:
-        """Photons that have just been traced."""
+    def add_photons(self, photons: PhotonMaps, lights: float) -> None:
+        """Photons that have just been traced, from lights of that power in watts."""
+        self.energy.add(photons.energy, lights)
         self.emitted += photons.emitted
         self.rays += photons.rays
         self.dropped["photons"] += photons.dropped

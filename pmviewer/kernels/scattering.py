@@ -79,7 +79,7 @@ def _bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
 
         def textured(scene, prim, material, u, v, p, ng, ns, wo, glossy):
             numbers = texture_params(scene, material, prim, u, v, p)
-            ns, tangent = shading_frame(scene, material, prim, u, v, p, ng, ns)
+            ns, tangent = shading_frame(scene, material, prim, u, v, p, ng, ns, wo)
             return lobes.bsdf_at(scene, material, numbers, ng, ns, tangent, wo, glossy)
 
         return textured

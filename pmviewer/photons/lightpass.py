@@ -25,9 +25,14 @@ from pmviewer.photons.trace import (
     C_DROPPED,
     C_GLOBAL,
     C_RAYS,
+    E_ABSORBED,
+    E_DROPPED,
+    E_EMITTED,
+    E_ESCAPED,
+    E_TERMINATED,
     LIGHT_PASS_DTYPE,
     N_COUNTS,
-    N_LEDGER,
+    empty_ledger,
     trace_photons,
 )
 from pmviewer.scene.flatten import FlatScene
@@ -39,6 +44,8 @@ Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 
 BATCH = 8192
 """Photons a task: fixed, so that the result does not depend on the number of threads."""
+LARGEST_SCALE = 2.0**12
+"""Most that indirect caustics count, in units of the caustic map: powers of stored photons end at 2¹⁷."""
 SAMPLED = 64 * BATCH
 """Trajectories whose photons are also kept as they arrive, where a deposition rule asks for a sample."""
 
@@ -48,7 +55,9 @@ class PhotonMaps:
     """Photons of one pass: `caustic` and `global_` (n, 6) float32 as in `pmviewer.maps.record`, with their units of
     power in watts, `normals` (n,) uint32 of the surfaces that the global photons lie on, on the side that they came
     from, as codes of `encode_direction` (empty unless asked for), `emitted` trajectories, `rays` cast, `dropped`
-    non-finite photons and the energy `ledger`.
+    non-finite photons, the energy ledgers `books` (2, N_LEDGER), see `pmviewer.photons.trace`, and what they say of the
+    light: `energy` (5,), watts of luminance that the lights emit and that are absorbed, escape, are still on their way
+    after the last scattering allowed, and were dropped.
 
     With a deposition rule, `caustic_normals` are those of the caustic photons, `sample` (n, 6) are photons of the first
     trajectories as they arrived, a map by themselves in units of `sample_unit`, for whoever counts photons, and
@@ -61,14 +70,20 @@ class PhotonMaps:
     emitted: int
     rays: int
     dropped: int
-    ledger: NDArray[np.float64]
+    books: NDArray[np.float64]
+    energy: NDArray[np.float64]
     normals: NDArray[np.uint32]
     caustic_normals: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, np.uint32))
     sample: Float = field(default_factory=lambda: np.empty((0, 6), np.float32))
     sample_unit: float = 0.0
     deposited: Mapping[str, Deposited] = field(default_factory=dict)
     guided: Guided | None = None
-    """The emission, where it is guided; `ledger` then leaves out its test photons."""
+    """The emission, where it is guided; the books then leave out its test photons."""
+
+    @property
+    def ledger(self) -> NDArray[np.float64]:
+        """The books of all trajectories (N_LEDGER,)."""
+        return np.asarray(self.books.sum(axis=0))
 
     @property
     def bytes(self) -> int:
@@ -138,10 +153,10 @@ def trace_pass(
         direct_density += (traced - filling) / caustic_power
     only_direct = projection is not None or not settings.indirect_caustics
     indirect_scale = direct_density / density if projection is not None else 1.0
+    direct_scale = min(1.0, LARGEST_SCALE / indirect_scale)
+    scales = indirect_scale * direct_scale, direct_scale
     unfound = scene.delta_lights and has_specular
-    record = _record(
-        settings, seed, first_index, filling, probability, has_specular, only_direct, indirect_scale, unfound
-    )
+    record = _record(settings, seed, first_index, filling, probability, has_specular, only_direct, scales, unfound)
 
     last = traced if paths is None else min(traced, paths.n)
     normals = NORMALS if deposition is not None else GLOBAL_NORMALS if with_normals else NO_NORMALS
@@ -158,7 +173,17 @@ def trace_pass(
         if projection is None:
             return unit / n
         first = min(n, filling)
-        return 1.0 / (first / surface_power + ((n - first) / caustic_power if n > first else 0.0))
+        found = first / surface_power + ((n - first) / caustic_power if n > first else 0.0)
+        return 1.0 / (found * direct_scale)
+
+    def energy(books: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What the books of trajectories that fill the global map say of the scene's light: they start where they can
+        meet something, so that what no trajectory starts with has escaped."""
+        entries = books[0, [E_EMITTED, E_ABSORBED, E_ESCAPED, E_TERMINATED, E_DROPPED]]
+        if guided is not None:
+            return np.asarray(entries * (unit / guided.N))
+        watts = entries * (surface_power / max(entries[0], 1.0))
+        return np.asarray(watts + (unit - surface_power) * np.array([1.0, 0.0, 1.0, 0.0, 0.0]))
 
     batches = [(i0, batch(i0)) for i0 in range(0, last, BATCH)]
     if guided is not None:
@@ -176,7 +201,7 @@ def trace_pass(
         spare = deposition.criterion is not None and guided is None and alike
         must = last if not spare else filling if deposition.global_classes else 0
         many = last, must
-        made = _deposited(deposition, batches, many, first_index, run, caustic_unit, global_unit, N, fates)
+        made = _deposited(deposition, batches, many, first_index, run, caustic_unit, global_unit, N, energy, fates)
         return made if guided is None else _with_tests(made, guided)
     results = run([task for _, task in batches])
     counts = sum((r[2] for r in results), np.zeros(N_COUNTS, np.int64))
@@ -188,7 +213,8 @@ def trace_pass(
         emitted=last,
         rays=int(counts[C_RAYS]),
         dropped=int(counts[C_DROPPED]),
-        ledger=sum((r[3] for r in results), np.zeros(N_LEDGER)),
+        books=(books := sum((r[3] for r in results), empty_ledger())),
+        energy=energy(books),
         normals=_joined([part for r in results for part in r[4]]),
     )
     return made if guided is None else _with_tests(made, guided)
@@ -209,7 +235,8 @@ def guided_emission_of(
     passes; None where they are too few to test the lights."""
 
     def trace(table: NDArray[np.void], seed: int, i0: int, i1: int, n: int) -> Any:
-        record = _record(settings, seed, first_index, n, settings.q, has_specular, False, 1.0)
+        unfound = scene.delta_lights and has_specular
+        record = _record(settings, seed, first_index, n, settings.q, has_specular, False, (1.0, 1.0), unfound)
         caustics, globals_, counts, ledger, *normals = _trace_batch(
             scene, record, table, i0, i1, n, has_specular, NORMALS, None
         )
@@ -224,7 +251,7 @@ def scattered_photons(
     """Where importons arrive that are scattered on once from each of places (n, 7), see `pmviewer.photons.scattered`:
     as photons (m, 6) whose power is what they count, with their normals (m,)."""
     records, n = scattered_record(places), len(places)
-    record = _record(settings, seed, 0, n, 1.0, False, False, 1.0)
+    record = _record(settings, seed, 0, n, 1.0, False, False, (1.0, 1.0))
 
     def batch(i0: int) -> Callable[[], _Batch]:
         return lambda: _trace_batch(scene, record, records, i0, min(i0 + BATCH, n), n, False, GLOBAL_NORMALS, None)
@@ -241,7 +268,7 @@ def _record(
     probability: float,
     has_specular: bool,
     only_direct: bool,
-    indirect_scale: float,
+    scales: tuple[float, float],
     unfound: bool = False,
 ) -> NDArray[np.void]:
     record = np.zeros(1, LIGHT_PASS_DTYPE)
@@ -257,7 +284,7 @@ def _record(
         has_specular,
         settings.indirect_caustics,
         only_direct,
-        indirect_scale,
+        *scales,
         unfound,
     )
     return record
@@ -291,6 +318,7 @@ def _deposited(
     caustic_unit: Callable[[int], float],
     global_unit: float,
     filling: int,
+    energy: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     fates: Fates | None = None,
 ) -> PhotonMaps:
     """The pass's maps by the rules of `deposition`, from its batches, round by round where rounds matter.
@@ -304,7 +332,7 @@ def _deposited(
     if fates is not None:
         caustic, global_ = fates.fillings(deposition)
     sampled: list[Float] = []
-    counts, ledger = np.zeros(N_COUNTS, np.int64), np.zeros(N_LEDGER)
+    counts, books = np.zeros(N_COUNTS, np.int64), empty_ledger()
 
     def judged(place: int) -> Callable[[], tuple[Prepared, Prepared, Float, NDArray[np.int64], NDArray[np.float64]]]:
         def task() -> tuple[Prepared, Prepared, Float, NDArray[np.int64], NDArray[np.float64]]:
@@ -328,7 +356,7 @@ def _deposited(
         global_.take([r[1] for r in results], run)
         sampled += [r[2] for r in results]
         counts += sum((r[3] for r in results), np.zeros(N_COUNTS, np.int64))
-        ledger += sum((r[4] for r in results), np.zeros(N_LEDGER))
+        books += sum((r[4] for r in results), empty_ledger())
         traced = min(some.stop * BATCH, last)
         if criterion is None or traced < min(must, last):
             continue
@@ -349,7 +377,8 @@ def _deposited(
         emitted=last,
         rays=int(counts[C_RAYS]),
         dropped=int(counts[C_DROPPED]),
-        ledger=ledger,
+        books=books,
+        energy=energy(books),
         normals=in_global[1],
         caustic_normals=in_caustic[1],
         sample=_join(sampled),
@@ -388,7 +417,7 @@ def _trace_batch(
     most = int(record[0]["max_bounces"])
     if record[0]["roulette"] == EQUAL:
         most *= MOST_COPIES
-    total, ledger = np.zeros(N_COUNTS, np.int64), np.zeros(N_LEDGER)
+    total, ledger = np.zeros(N_COUNTS, np.int64), empty_ledger()
     caustic_parts: list[Float] = []
     global_parts: list[Float] = []
     normal_parts: list[Codes] = []

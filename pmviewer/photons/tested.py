@@ -17,7 +17,7 @@ from pmviewer.kernels.random import hash3
 from pmviewer.maps.power import write_power
 from pmviewer.maps.record import decode_power, in_classes
 from pmviewer.photons.strata import Strata, table_of
-from pmviewer.photons.trace import C_DROPPED, C_RAYS, N_COUNTS, N_LEDGER
+from pmviewer.photons.trace import C_DROPPED, C_RAYS, N_COUNTS, empty_ledger
 
 Float = NDArray[np.float32]
 Codes = NDArray[np.uint32]
@@ -160,7 +160,7 @@ def weighed(tested: Tested, strata: Strata, factor: NDArray[np.float64], seed: i
                 words, some = photons.view(np.uint32), np.ascontiguousarray(factor[numbers])
                 n = _weigh(words, normals, batch.first, some, light, np.uint32(seed & 0xFFFFFFFF), out, out_normals)
                 chosen.append((out[:n].view(np.float32).copy(), out_normals[:n].copy()))
-            counts, ledger = np.zeros(N_COUNTS, np.int64), np.zeros(N_LEDGER)
+            counts, ledger = np.zeros(N_COUNTS, np.int64), empty_ledger()
             (caustics, caustic_normals), (globals_, global_normals) = chosen
             return [caustics], [globals_], counts, ledger, [global_normals], [caustic_normals]
 

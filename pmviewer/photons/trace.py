@@ -11,6 +11,7 @@ threads and any batch size (T2). Dimension set 0 is emission, set 1 + b the b-th
 from __future__ import annotations
 
 import numpy as np
+from numba.extending import overload
 
 from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.light import is_delta_light
@@ -67,6 +68,7 @@ LIGHT_PASS_DTYPE = np.dtype(
         ("indirect_caustics", "i4"),  # whether with photons that met a diffuse surface before, too
         ("only_direct", "i4"),  # whether the trajectories that don't fill the global map end where they meet it
         ("indirect_scale", "f4"),  # factor for the power of indirect caustics in the units of the caustic map
+        ("direct_scale", "f4"),  # the same for caustics straight from a light
         ("unfound", "i4"),  # whether followed lobes store what no path from the eye finds (`pmviewer.maps.record`)
     ],
     align=True,
@@ -74,10 +76,17 @@ LIGHT_PASS_DTYPE = np.dtype(
 
 N_COUNTS = 4
 C_GLOBAL, C_CAUSTIC, C_RAYS, C_DROPPED = range(N_COUNTS)
-N_LEDGER = 5
-E_EMITTED, E_STORED, E_ABSORBED, E_ESCAPED, E_TERMINATED = range(N_LEDGER)
+N_LEDGER = 6
+E_EMITTED, E_STORED, E_ABSORBED, E_ESCAPED, E_TERMINATED, E_DROPPED = range(N_LEDGER)
 """Energy ledger: luminance of power in units of the map's. What roulette gives a survivor or takes from a victim counts
-as absorbed, so that the books always balance and each entry is right in the mean."""
+as absorbed, so that the books always balance and each entry is right in the mean. E_STORED is what arrived where
+photons are stored, as often as it arrived; the others after E_EMITTED are how a trajectory ends. A photon whose power
+becomes infinite or NaN is dropped with the power that it had before."""
+
+
+def empty_ledger():
+    """Ledgers (2, N_LEDGER) of the trajectories that fill the global map and of the others, float64."""
+    return np.zeros((2, N_LEDGER))
 
 
 @device
@@ -89,15 +98,38 @@ def _store(out, row, p, wi, beta, flags, light):
     out[row, 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
 
 
+def _on_the_way(scene, material, ng, d, t, beta, worth, counts, ledgers, book):
+    """beta after the way to a surface (`attenuation`), what was lost on it booked; black when it is no number."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(_on_the_way)
+def _book_the_way(scene, material, ng, d, t, beta, worth, counts, ledgers, book):
+    if "bsdfs" not in scene.fields:
+        return lambda scene, material, ng, d, t, beta, worth, counts, ledgers, book: beta
+
+    def booked(scene, material, ng, d, t, beta, worth, counts, ledgers, book):
+        before = luminance(beta)
+        beta = attenuation(scene, material, ng, d, t, beta)
+        if not is_good(beta):
+            counts[C_DROPPED] += 1
+            ledgers[book, E_DROPPED] += _f8(before * worth)
+            return _f4(0.0), _f4(0.0), _f4(0.0)
+        ledgers[book, E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
+        return beta
+
+    return booked
+
+
 @kernel
-def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, caustic_out, counts, ledger, paths):
+def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, caustic_out, counts, ledgers, paths):
     """Trace photons i0 … i1−1 of a pass.
 
     scenes: SCENE_DTYPE (1,); passes: LIGHT_PASS_DTYPE (1,); projections: PROJECTION_DTYPE (2,), STRATA_DTYPE (2,) or
     NO_PROJECTION, of the trajectories that fill the global map and of the others; global_out, caustic_out: float32
     (capacity, 6), see `pmviewer.maps.record`; normals_out: two arrays uint32 (capacity,), receive the surface normals
-    of global and of caustic photons, or (0,) when nobody needs them; counts: int64 (N_COUNTS,) and ledger: float64
-    (N_LEDGER,) are added to, `counts[C_GLOBAL]` and `counts[C_CAUSTIC]` being the rows filled so far; paths: None, or
+    of global and of caustic photons, or (0,) when nobody needs them; counts: int64 (N_COUNTS,) and ledgers: float64
+    (2, N_LEDGER) are added to, `counts[C_GLOBAL]` and `counts[C_CAUSTIC]` being the rows filled so far; paths: None, or
     where to write whole paths (`pmviewer.photons.paths`).
 
     Returns the index of the next photon to trace: less than i1 when a buffer may not hold another photon's path.
@@ -110,6 +142,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
         if counts[C_GLOBAL] + most > len(global_out) or counts[C_CAUSTIC] + most > len(caustic_out):
             return i
         to_global = i < pass_.global_trajectories
+        book = 0 if to_global else 1
         place = np.int64(pass_.first_index) + np.int64(i)
         index, seed = _u4(place), pass_.seed
         if place >> 32 != 0:  # a Sobol set has 2³² points; the next photons use other sets
@@ -120,10 +153,13 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
         p, d, beta, light, kept, worth = emission(
             scene, projection, i, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1)
         )
-        start = luminance(beta) * worth
-        ledger[E_EMITTED] += _f8(start)
+        ledgers[book, E_EMITTED] += _f8(worth)  # its luminance is 1
+        if not is_good(beta):
+            counts[C_DROPPED] += 1
+            ledgers[book, E_DROPPED] += _f8(worth)
+            continue
         if not kept:
-            ledger[E_ESCAPED] += _f8(start)
+            ledgers[book, E_ESCAPED] += _f8(worth)
             continue
         begin_path(paths, i, p, d, scale(beta, worth), light)
         o = p
@@ -135,24 +171,21 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
             counts[C_RAYS] += 1
             if prim < 0:
                 extend_path(paths, i, prim, o, d, scale(beta, worth), _u4(flags | _u4(min(bounces, BOUNCES))), light)
-                ledger[E_ESCAPED] += _f8(luminance(beta) * worth)
+                ledgers[book, E_ESCAPED] += _f8(luminance(beta) * worth)
                 break
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
-            beta = attenuation(scene, material, ng, d, t, beta)
+            beta = _on_the_way(scene, material, ng, d, t, beta, worth, counts, ledgers, book)
             extend_path(paths, i, prim, p, d, scale(beta, worth), _u4(flags | _u4(min(bounces, BOUNCES))), light)
             wi = (-d[0], -d[1], -d[2])
             b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
-            if b.groups == NOTHING:
-                ledger[E_ABSORBED] += _f8(luminance(beta) * worth)
+            if b.groups == NOTHING or not luminance(beta) > _f4(0.0):
+                ledgers[book, E_ABSORBED] += _f8(luminance(beta) * worth)
                 break
             ng = face(ng, wi)
             u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
             unfound = deltas and bounces > 0 and b.groups & FOLLOWED != 0 and not is_delta(b)
             if b.groups & STORED != 0 or unfound:
-                if not is_good(beta):
-                    counts[C_DROPPED] += 1
-                    break
                 path_class = np.int32(flags >> _u4(6))
                 word = _u4(flags | _u4(min(bounces, BOUNCES)))
                 if unfound:
@@ -164,7 +197,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                     stored = scale(beta, factor)
                 stored = scale(stored, worth)
                 if is_caustic and pass_.caustics != 0:
-                    in_caustic = stored
+                    in_caustic = scale(stored, pass_.direct_scale)
                     if path_class == INDIRECT_CAUSTIC:
                         in_caustic = scale(stored, pass_.indirect_scale)
                     for _ in range(times):
@@ -185,14 +218,14 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                         if len(normals_out[0]) > 0:
                             normals_out[0][counts[C_GLOBAL]] = encode_direction(ng[0], ng[1], ng[2])
                         counts[C_GLOBAL] += 1
-                ledger[E_STORED] += _f8(luminance(beta) * worth)
+                ledgers[book, E_STORED] += _f8(luminance(beta) * worth)
             before = luminance(beta)
             group, share, u_lobe = pick_group(b, wi, u_lobe)
             deltas = deltas and group == FOLLOWED and is_delta(b)
             if group == FOLLOWED:
                 flags = _u4(flags | _u4(LAST_SPECULAR))
             elif not to_global and pass_.only_direct != 0:
-                ledger[E_TERMINATED] += _f8(before * worth)
+                ledgers[book, E_TERMINATED] += _f8(before * worth)
                 break
             else:
                 flags = _u4(HAD_DIFFUSE)
@@ -202,16 +235,20 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
             elif abs(dot(shading_normal(b), ng)) < STRAIGHT:
                 weight = scale(weight, adjoint_cosines(shading_normal(b), ng, wi, d))
             after = scale(mul(beta, weight), share)
+            if not is_good(after):
+                counts[C_DROPPED] += 1
+                ledgers[book, E_DROPPED] += _f8(before * worth)
+                break
             survival = survival_probability(pass_.roulette, before, beta, after)
             if not u2 < survival:
-                ledger[E_ABSORBED] += _f8(before * worth)
+                ledgers[book, E_ABSORBED] += _f8(before * worth)
                 break
             beta = scale(after, _f4(1.0) / survival)
-            if pass_.roulette != BY_LUMINANCE:  # which keeps it
-                ledger[E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
+            if pass_.roulette != BY_LUMINANCE or not survival < _f4(1.0):  # else it stays
+                ledgers[book, E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
             bounces += 1
             if bounces >= max_bounces:
-                ledger[E_TERMINATED] += _f8(luminance(beta) * worth)
+                ledgers[book, E_TERMINATED] += _f8(luminance(beta) * worth)
                 break
             o = leave(p, ng, gap, d[0], d[1], d[2])
     return i1

@@ -151,6 +151,7 @@ def _looked_up(photons, eye, radius, p, n, class_mask):
                 eye.filter,
                 eye.cone_k,
                 eye.rim,
+                eye.share,
             )
             return r, _f4(count)
 

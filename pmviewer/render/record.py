@@ -46,7 +46,8 @@ EYE_DTYPE = np.dtype(
         ("corner", "f4"),  # gather rays shorter than this gather again where they land
         ("filter", "i4"),
         ("rim", "i4"),
-        ("k", "i4"),
+        ("k", "i4"),  # nearest photons that are looked up in this pass
+        ("share", "f4"),  # of their disc's area, in which they count
         ("cone_k", "f4"),
         ("flatness", "f4"),
         ("boundary", "f4"),  # what photons on a convex hull's boundary count

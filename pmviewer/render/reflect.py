@@ -31,10 +31,8 @@ def _by_radius(photons, eye, radius, p, n, b, group, flags, wo, class_mask):
 
 @device
 def _by_nearest(photons, eye, radius, p, n, b, group, flags, wo, class_mask):
-    how = eye.filter, eye.cone_k, eye.rim
-    return radiance_knn(
-        photons, p, n, eye.k, radius, eye.flatness, class_mask, how[0], how[1], how[2], b, group, flags, wo
-    )
+    how = eye.filter, eye.cone_k, eye.rim, eye.share
+    return radiance_knn(photons, p, n, eye.k, radius, eye.flatness, class_mask, *how, b, group, flags, wo)
 
 
 def _photon_by_photon(photons):

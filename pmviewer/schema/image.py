@@ -77,8 +77,9 @@ class Direct(Group):
         title="shadow photons",
     )
     shadow_N: int = setting(
-        100_000,
-        "Photons sent from the lights straight through the scene, once for all passes.",
+        50_000,
+        "Photons sent from the lights straight through the scene in each pass; with one photon map for all passes "
+        "(photons.renew), in the first.",
         stage="maps",
         scale="log",
         unit="photons",

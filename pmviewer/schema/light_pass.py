@@ -16,7 +16,7 @@ class Photons(Group):
         stage="photons",
         scale="log",
         unit="photons",
-        ge=100,
+        ge=1,
         le=50_000_000,
     )
     q: float = setting(

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from imgui_bundle import imgui
 
+from pmviewer.engine.energy import ENTRIES, Energy
 from pmviewer.engine.frame import Statistics
 from pmviewer.viewer import theme
 from pmviewer.viewer.comparison import Point
@@ -12,6 +15,13 @@ from pmviewer.viewer.state import ViewerState
 
 Rows = list[tuple[str, str]]
 
+LEDGER = {
+    "absorbed": "Absorbed",
+    "escaped": "Escaped from the scene",
+    "terminated": "On its way after the last scattering",
+    "dropped": "Dropped, not finite",
+}
+
 
 def photon_rows(s: Statistics) -> Rows:
     rows = [("Emitted", grouped(s.emitted))]
@@ -19,6 +29,18 @@ def photon_rows(s: Statistics) -> Rows:
         rows.append(("Memory of a photon", f"{s.bytes_per_photon:.1f} bytes"))
     rows.append(("Memory of the maps", data_size(s.map_bytes)))
     return rows + convergence_rows(s)
+
+
+def energy_rows(energy: Energy) -> Rows:
+    """Where the light of a pass went, in watts of luminance and as shares with their standard errors."""
+    rows = [("Emitted", si(energy.watts[0], "W"))]
+    for entry in ENTRIES[1:]:
+        share, error = 100 * energy.share(entry), 100 * energy.share_error(entry)
+        text = f"{share:.2f} %" if math.isnan(error) or not share else f"{share:.2f} ± {error:.2g} %"
+        rows.append((LEDGER[entry], text))
+    if energy.uncounted > 0:
+        rows.append(("With test photons, not in these books", si(energy.uncounted, "W")))
+    return rows
 
 
 def time_rows(s: Statistics) -> Rows:
@@ -81,6 +103,9 @@ class StatisticsPanel:
         imgui.table_next_column()
         table("Photons", photon_rows(s))
         _maps(s)
+        if s.energy is not None and imgui.tree_node("Energy of a pass"):
+            table("", energy_rows(s.energy))
+            imgui.tree_pop()
         imgui.table_next_column()
         table("Time", time_rows(s))
         imgui.table_next_column()

@@ -49,7 +49,21 @@ def _by_knn(records, p, n, ns, k, radius, flatness, kind, rim, out):
         normal = (n[i, 0], n[i, 1], n[i, 2])
         point = (p[i, 0], p[i, 1], p[i, 2])
         out[i] = radiance_knn(
-            records[0], point, normal, k, radius, flatness, i4(ALL_CLASSES), kind, f4(1.1), rim, b, STORED, ANY, normal
+            records[0],
+            point,
+            normal,
+            k,
+            radius,
+            flatness,
+            i4(ALL_CLASSES),
+            kind,
+            f4(1.1),
+            rim,
+            f4(1.0),
+            b,
+            STORED,
+            ANY,
+            normal,
         )
 
 
@@ -97,6 +111,7 @@ def test_lambertian_from_the_nearest_is_irradiance_times_albedo_over_pi(cloud):
         kind,
         f4(1.1),
         rim,
+        f4(1.0),
         0,
         40,
         E,

@@ -159,8 +159,8 @@ GOOD = 'format = 1\nscene = "cornell_caustic"\n'
             r"photons\.N = \{'x': 3\} is not allowed: expected a whole number from",
         ),
         (
-            GOOD + "[settings.photons]\nN = 3\n",
-            r"photons.N = 3 is not allowed: expected a whole number from 100 to 50,000,000",
+            GOOD + "[settings.photons]\nN = 0\n",
+            r"photons.N = 0 is not allowed: expected a whole number from 1 to 50,000,000",
         ),
         (GOOD + "[settings.photons]\nq = nan\n", r"photons.q = nan is not allowed: expected a number from 0.001 to 1"),
         (GOOD + "[settings.photons]\nq = 1979-05-27\n", r"photons\.q = .* is not allowed"),

@@ -1,0 +1,58 @@
+"""Sentences for the log about what a picture does not show: light that was cut off, left out, or never found."""
+
+from __future__ import annotations
+
+from pmviewer.engine.energy import Energy
+from pmviewer.engine.tally import Tally
+from pmviewer.settings import Settings
+
+CUT_OFF = 0.01
+"""Share of the light that may still be on its way after the last scattering before a sentence says so."""
+
+
+def caveats(settings: Settings, tally: Tally, energy: Energy | None, scene_radius: float, pixels: int) -> list[str]:
+    """What to know about the passes so far. scene_radius: of the bounding sphere; pixels: of the picture."""
+    said = [_dropped(place, count) for place, count in tally.dropped.items() if count]
+    if energy is None:
+        return said
+    if energy.share("terminated") > CUT_OFF:
+        said.append(
+            f"{energy.share('terminated'):.0%} of the light is still on its way after {settings.photons.max_bounces} "
+            "scatterings and left out, so the picture is too dark: raise photons.max_bounces, or lower what surfaces "
+            "reflect below 1."
+        )
+    if tally.emitted and not tally.deposited and not any(tally.stored.values()):
+        said.append(
+            f"None of {tally.emitted:,} photons arrived on a surface that shows it: do the lights shine past it?"
+        )
+    said += _too_few(settings, tally, scene_radius, pixels)
+    return said
+
+
+def _dropped(place: str, count: int) -> str:
+    return (
+        f"{count:,} {place} were not finite or negative and left out: the picture lacks their light. Is a colour, a "
+        "power or a size of the scene extreme?"
+    )
+
+
+def _too_few(settings: Settings, tally: Tally, scene_radius: float, pixels: int) -> list[str]:
+    """Look-ups that find next to nothing: a pass of them sees no light rather than noisy light."""
+    estimate = settings.estimate
+    if estimate.lookup == "nearest":
+        if estimate.k == 1 and estimate.rim == "left out":
+            return ["A look-up of k = 1 photon that leaves out the outermost finds none: choose estimate.rim = whole."]
+        return []
+    radius, photons = tally.radius.get("global", 0.0), tally.stored_in_pass.get("global", 0)
+    if not photons or not radius:
+        return []
+    # Photons on surfaces of about the bounding sphere's area, (r/2R)² of them in a disc.
+    found = photons * (radius / (2 * scene_radius)) ** 2
+    looks = pixels * (settings.gather.rays if settings.render.method == "gather" else 1)
+    if found * looks >= 0.1:  # in a whole pass
+        return []
+    seldom = 1 / max(found, 1e-300)
+    return [
+        f"A look-up radius of {radius / scene_radius:.1e} of the scene finds one photon in some {seldom:.0e} look-ups: "
+        "indirect light is missing rather than noisy. Widen estimate.radius or raise photons.N."
+    ]
