@@ -99,9 +99,9 @@ def _lights(scene: Node) -> Iterator[str]:
 
 def _whole(scene: Node) -> Iterator[str]:
     kinds = {bsdf["type"] for bsdf in bsdfs_of(scene)}
-    if kinds <= METALLIC:
+    if kinds <= {*METALLIC}:
         yield "scene: metal alone"
-    if kinds <= TRANSPARENT:
+    if kinds <= {*TRANSPARENT}:
         yield "scene: glass alone"
     if not any("diffuse" in kind or "plastic" in kind for kind in kinds):
         yield "scene: nothing diffuse"

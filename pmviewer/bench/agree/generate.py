@@ -42,19 +42,18 @@ class Profile:
         return self.lights or (lights.MORE if self.more_lights else lights.PLAIN)
 
 
-_METAL, _GLASS = tuple(sorted(METALLIC)), tuple(sorted(TRANSPARENT))
 _GLOSSY = ("roughconductor", "roughplastic", "conductor", "roughdielectric", "plastic")
 PROFILES = (
     Profile("plain", materials.PLAIN, rich=False, ground=("diffuse",)),
     Profile("materials", materials.RICH, ground=("diffuse", "diffuse", "roughplastic", "roughconductor")),
     Profile("lights", materials.RICH, more_lights=True, ground=("diffuse", "roughplastic")),
     Profile("textures", materials.RICH, more_lights=True, textured=True),
-    Profile("metal only", _METAL, more_lights=True, room=0.2),
+    Profile("metal only", METALLIC, more_lights=True, room=0.2),
     Profile("tilted normals", materials.RICH, tilted=True, room=0.0),
     Profile("instances", materials.RICH, more_lights=True, textured=True, instances=True),
-    Profile("glass only", _GLASS, room=0.1, nested=True),
+    Profile("glass only", TRANSPARENT, room=0.1, nested=True),
     Profile("no diffuse", _GLOSSY, more_lights=True, textured=True),
-    Profile("nested glass", _GLASS, ground=("diffuse",), nested=True, room=0.4),
+    Profile("nested glass", TRANSPARENT, ground=("diffuse",), nested=True, room=0.4),
     Profile("rooms", materials.RICH, room=1.0, more_lights=True, ground=("diffuse", "diffuse", "roughplastic")),
     Profile("plain lights", materials.PLAIN, rich=False, room=0.5, ground=("diffuse",)),
 )

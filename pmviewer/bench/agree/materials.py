@@ -9,9 +9,9 @@ from pmviewer.bench.agree.tree import MAPS, Node, innermost
 
 METALS = ("Au", "Cu", "Al", "Ag", "Cr")
 GLASSES = ("bk7", "water", "diamond")
-TRANSPARENT = frozenset(("dielectric", "roughdielectric", "thindielectric"))
-METALLIC = frozenset(("conductor", "roughconductor"))
-COATED = frozenset(("plastic", "roughplastic"))
+TRANSPARENT = ("dielectric", "roughdielectric", "thindielectric")
+METALLIC = ("conductor", "roughconductor")
+COATED = ("plastic", "roughplastic")
 PLAIN = ("diffuse", "diffuse", "conductor", "dielectric")
 """Kinds that don't need the code of rich materials; a conductor is then a mirror of one colour at all angles."""
 RICH = ("diffuse", *METALLIC, *TRANSPARENT, *COATED)

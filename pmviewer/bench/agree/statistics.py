@@ -24,6 +24,7 @@ from scipy.stats import t as student
 from pmviewer.output.metric import block_means
 
 BLOCK = 8
+CHANNELS = 3
 ROUNDING = 1e-5
 """Relative difference that is no error: single precision, some additions and products deep."""
 TAIL = 2.0
@@ -58,10 +59,20 @@ def summaries(images: NDArray[Any], seen: NDArray[np.bool_] | None = None) -> ND
     return np.array(rows)
 
 
-def compared(ours: NDArray[np.float64], theirs: NDArray[np.float64], tolerance: float = 0.0) -> Outcome:
-    """Test that (n, k) and (m, k) runs have the same k expectations, but for `tolerance` times the second's."""
+def compared(
+    ours: NDArray[np.float64], theirs: NDArray[np.float64], tolerance: float = 0.0, sparse: bool = False
+) -> Outcome:
+    """Test that (n, k) and (m, k) runs have the same k expectations, but for `tolerance` times the second's.
+
+    `sparse`: light may come as single photons, so that a block that none has met in any run says nothing about its
+    mean. Such blocks are left to the test of the whole picture.
+    """
     if not (np.isfinite(ours).all() and np.isfinite(theirs).all()):
         return Outcome(0.0, math.nan, math.nan, ours.shape[1])
+    if sparse:
+        met = np.logical_and((ours > 0).any(axis=0), (theirs > 0).any(axis=0))
+        met |= np.arange(len(met)) < CHANNELS
+        ours, theirs = ours[:, met], theirs[:, met]
     n, m = len(ours), len(theirs)
     mean_a, mean_b = ours.mean(axis=0), theirs.mean(axis=0)
     var_a, var_b = ours.var(axis=0, ddof=1) / n, theirs.var(axis=0, ddof=1) / m

@@ -18,7 +18,10 @@ CLEAR = 1e-4
 """p at which a simpler scene still shows the disagreement: some hundred tries shall not end at a chance."""
 LIKE = 0.3
 """Least share of the deviation in a simpler scene: another, smaller difference is not the one that is looked for."""
-SHRINK_STAGE = 1
+
+
+def _shows(outcome: Outcome | None) -> bool:
+    return outcome is not None and outcome.p <= CLEAR
 
 
 def _question(runs: Runs, like: Comparison) -> Question | None:
@@ -54,10 +57,13 @@ def explanation(scene: Node, found: Comparison, level: float, salt: tuple[int, .
 def smallest(scene: Node, found: Comparison, salt: tuple[int, ...], most: int) -> Node:
     """The smallest scene that shows the same disagreement."""
     brighter, size = found.outcome.ratio > 1, abs(found.outcome.ratio - 1)
+    stage = 0  # the cheapest that shows it
+    while stage < len(STAGES) - 1 and not _shows(outcome_of(scene, found, stage, (*salt, 3))):
+        stage += 1
 
     def still(simpler: Node) -> bool:
-        outcome = outcome_of(simpler, found, SHRINK_STAGE, (*salt, 2))
-        if outcome is None or outcome.p > CLEAR:
+        outcome = outcome_of(simpler, found, stage, (*salt, 2))
+        if outcome is None or not _shows(outcome):
             return False
         return (outcome.ratio > 1) == brighter and abs(outcome.ratio - 1) >= LIKE * size
 

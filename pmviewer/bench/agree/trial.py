@@ -7,9 +7,9 @@
 * The photon methods with our `path`, term by term: with such caustics only what the camera sees without them.
 
 Photon methods are consistent: what their look-ups blur or lose at edges goes with the radius r. A disc over a straight
-edge loses on average a fifth of its light in a strip r wide; of a surface a scene's radius wide, with two edges, that
-is some 0.4 r/R, of one a tenth as wide 4 r/R, which is forgiven. The radius is halved from stage to stage, so that a
-true error stays and what is forgiven goes.
+edge loses on average a fifth of its light in a strip r wide; of a surface as wide as the scene's radius R, with two
+edges, that is some 0.4 r/R, of one a tenth as wide 4 r/R, which is forgiven. The radius is halved from stage to stage,
+so that a true error stays and what is forgiven goes.
 """
 
 from __future__ import annotations
@@ -135,7 +135,9 @@ class Question:
 
     def answer(self, stage: int) -> Outcome:
         """The outcome of one stage."""
-        return compared(*self.pair(stage), 0.0 if self.method == "path" else FORGIVEN * STAGES[stage].radius)
+        if self.method == "path":
+            return compared(*self.pair(stage))
+        return compared(*self.pair(stage), FORGIVEN * STAGES[stage].radius, sparse=True)
 
     def asked(self, stages: int) -> Comparison:
         """Stage after stage while the answer is suspicious, at most `stages` of them."""
