@@ -203,7 +203,7 @@ def scene_report(job: Job) -> str:
         name
         for name, runs in (
             ("light pass", plan.photons),
-            ("caustic map", plan.caustic_mask),
+            ("caustic map", plan.caustic_classes),
             ("global map", plan.global_classes),
             ("direct light", plan.direct),
             ("light choice by photons", plan.choice != "power"),

@@ -102,7 +102,7 @@ class _Queries:
         self._run(lambda i, j: nearest_at(tree.record, self.points, k, reach, ordered, i, j, *out))
 
     def estimate_nearest(self, tree: PhotonKdTree, max_radius: float) -> None:
-        shape = _i4(K), _f4(max_radius), _f4(1), _i4(ALL_CLASSES), _i4(CONSTANT), _f4(1), _i4(RIM_LEFT_OUT)
+        shape = _i4(K), _f4(max_radius), _f4(1), _i4(ALL_CLASSES), _i4(CONSTANT), _f4(1), _i4(RIM_LEFT_OUT), _f4(1)
         out = self.irradiance, self.counts, self.radii
         self._run(lambda i, j: irradiance_at_knn(tree.record, self.points, self.normals, *shape, i, j, *out))
 

@@ -7,19 +7,31 @@ Its just-in-time compiler aborts the whole process when it meets an LLVM that it
 from __future__ import annotations
 
 import json
+import os
+import re
 import sys
 import time
+from glob import glob
 from typing import Any
 
 import numpy as np
 
+LIBRARIES = ("/usr/lib/*/libLLVM.so.*", "/usr/lib/*/libLLVM-*.so*", "/usr/lib/llvm-*/lib/libLLVM*.so*")
 CHUNK = 64
 """Most samples per pixel rendered at once: more would not fit into memory as one wavefront."""
+
+
+def newest_llvm() -> str | None:
+    """The newest LLVM in the system's folders. Mitsuba's own choice may be too old for it, which ends the process."""
+    named = [(re.search(r"libLLVM(?:\.so\.|-)(\d+)", file), file) for at in LIBRARIES for file in glob(at)]
+    return max(((int(match[1]), file) for match, file in named if match), default=(0, None))[1]
 
 
 def main() -> None:
     """Read {variant, path, parameters, mode, …} and write the arrays that the mode yields to the file `out` (.npz)."""
     job = json.load(sys.stdin)
+    if library := newest_llvm():
+        os.environ.setdefault("DRJIT_LIBLLVM_PATH", library)
     import mitsuba as mi
 
     mi.set_variant(job["variant"])

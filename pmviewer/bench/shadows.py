@@ -77,7 +77,7 @@ def run(quick: bool = False) -> BenchResult:
                 error = relmse_drop(found.image, truth)
                 rows.append([name, str(fewest), found.rays / pixels, saved, difference, mean, error, *cost])
                 if name == TARGET_SCENE and fewest == default:
-                    note = f"{name}, {fewest} photons decide"
+                    note = f"{name}, direct.shadow_photons=true photons.N=1000, {size} × {size}"
                     targets.append(Target("T8", saved, 70.0, "% of the shadow rays saved", True, note))
                     targets.append(Target("T8", difference, 1.0, "% mean image difference", False, note))
     finally:

@@ -87,6 +87,7 @@ def stripped_plan(needs: Needs) -> Plan:
     indirect, caustics = 1 << INDIRECT, (1 << CAUSTIC | 1 << INDIRECT_CAUSTIC) if needs.caustics else 0
     return Plan(
         direct=True,
+        followed_direct=True,
         caustic_mask=caustics,
         global_mask=indirect,
         global_classes=indirect,

@@ -12,9 +12,9 @@ from pmviewer.engine.importance import ImportanceMaps, ImportanceStage
 from pmviewer.engine.method import Plan
 from pmviewer.importance.importons import Rule as ImportonRule
 from pmviewer.importance.importons import trace
-from pmviewer.importance.rules import TESTS, automatic_f, density_of, probability_of
+from pmviewer.importance.rules import TESTS, automatic_f, density_beyond, density_of, probability_of
 from pmviewer.maps.convergence import Criterion
-from pmviewer.maps.density_control import ACCEPTANCE, M
+from pmviewer.maps.density_control import ACCEPTANCE, NEAREST, Around, M
 from pmviewer.maps.importance import ImportanceMap
 from pmviewer.maps.record import DIRECT
 from pmviewer.maps.stored import ALL_CLASSES
@@ -26,7 +26,6 @@ from pmviewer.photons.deposition import (
     Rule,
     constant,
     density_of_discs,
-    farthest_of,
 )
 from pmviewer.render.record import eye_record
 from pmviewer.settings import Settings
@@ -57,8 +56,9 @@ def rules_of(
 ) -> Rules:
     """Rules of pass `index`. radii: look-up radii of the pass by map; first: that of the first pass.
 
-    Required densities are those of the first pass. Where the look-ups of later passes shrink, they grow with 1/r²: a
-    look-up finds as many photons as before, and the blur by redistributed power vanishes with that of the look-ups.
+    Required densities are those of the first pass. As the look-ups of later passes shrink, they grow with 1/r²: a
+    look-up finds as many photons as before (the k nearest are fewer, in less space), and the blur by redistributed
+    power vanishes with that of the look-ups.
     """
     how = settings.importance
     if plan.deposition == "all":
@@ -66,7 +66,7 @@ def rules_of(
     maps = importance.latest
     needs_importance = plan.deposition != "constant density"
     assert maps is not None or not needs_importance
-    growth = (first / radii["global"]) ** 2 if settings.estimate.lookup == "radius" else 1.0
+    growth = (first / radii["global"]) ** 2
     seed = settings.render.seed ^ SEED
     scene_radius = importance.scene.flat.radius
     key: tuple[Any, ...] = ("deposition", plan.deposition, importance.key if needs_importance else ())
@@ -74,7 +74,7 @@ def rules_of(
     notes: list[str] = []
     required: dict[str, Evaluate] = {}
     rules: dict[str, Rule | None] = {"caustic": None, "global": None}
-    classes = {"caustic": plan.caustic_mask, "global": plan.global_classes}
+    classes = {"caustic": plan.caustic_classes, "global": plan.global_classes}
     f: dict[str, float] = {}
     everywhere: dict[str, float] = {}
     if plan.deposition == "Keller-Wald":
@@ -83,7 +83,7 @@ def rules_of(
         if how.f == "auto":
             f, notes = factors(settings, importance, maps)
     else:
-        key += (how.acceptance, how.M_r, how.caustic_M_r, how.density, growth)
+        key += (how.acceptance, how.around, how.contrast, how.reach, how.M_r, how.caustic_M_r, how.density, growth)
         key += tuple(radii.values()) if plan.deposition == "constant density" and how.density == "auto" else ()
     for name, mask in classes.items():
         if not mask:
@@ -96,22 +96,26 @@ def rules_of(
                 probability_of(chosen, factor), how.epsilon, how.cut_off == "discard", seed + (name == "global")
             )
             continue
+        around, beyond = NEAREST, None
+        if how.around == "guarded":
+            around = Around(True, how.contrast)
         if chosen is not None:
-            required[name] = density_of(chosen, growth * (how.M_r if name == "global" else how.caustic_M_r))
+            M_r = growth * (how.M_r if name == "global" else how.caustic_M_r)
+            required[name] = density_of(chosen, M_r)
+            if how.around == "guarded":
+                beyond = density_beyond(chosen, M_r, how.reach)
         else:
             automatic = constant_density(settings, radii[name])
             everywhere[name] = automatic if how.density == "auto" else growth * float(how.density)
             required[name] = constant(everywhere[name])
-        rules[name] = Density(
-            required[name], ACCEPTANCE.index(how.acceptance), farthest_of(scene_radius), seed + (name == "global")
-        )
+        acceptance = ACCEPTANCE.index(how.acceptance)
+        rules[name] = Density(required[name], acceptance, around, beyond, seed + (name == "global"))
     criterion = None
     sample = sampled_classes(plan)
     if plan.convergence:
-        acceptance, farthest = ACCEPTANCE.index(how.acceptance), farthest_of(scene_radius)
-        criterion = Criterion(plan.convergence, acceptance, farthest, scene_radius, plan.caustic_mask)
+        criterion = Criterion(plan.convergence, scene_radius, plan.caustic_classes)
         key += ("convergence", plan.convergence)
-        sample |= ALL_CLASSES & ~plan.caustic_mask
+        sample |= ALL_CLASSES & ~plan.caustic_classes
     deposition = Deposition(rules["caustic"], rules["global"], classes["caustic"], classes["global"], sample, criterion)
     grown = 1.0 if plan.deposition == "Keller-Wald" else growth
     return Rules(deposition, key, tuple(notes), required or None, f, everywhere, grown)
@@ -119,7 +123,7 @@ def rules_of(
 
 def sampled_classes(plan: Plan) -> int:
     """Path classes (bit set) whose photons somebody counts as they arrive."""
-    return (1 << DIRECT if plan.choice != "power" or plan.caustic_mask else 0) | plan.guide_mask
+    return (1 << DIRECT if plan.choice != "power" or plan.caustic_classes else 0) | plan.guide_mask
 
 
 def constant_density(settings: Settings, radius: float) -> float:

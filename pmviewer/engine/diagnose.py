@@ -97,7 +97,7 @@ def judges(plan: Plan) -> bool:
 
 def looked_map(settings: Settings, plan: Plan) -> str:
     """The map whose look-ups are shown: the one asked for, or the other where there is only that."""
-    if settings.display.map == "caustic" and plan.caustic_mask:
+    if settings.display.map == "caustic" and plan.caustic_classes:
         return "caustic"
     return "global" if plan.global_classes else "caustic"
 
@@ -211,6 +211,6 @@ def _kernel(wanted: Wanted, looked: Looked, plan: Plan, out: NDArray[np.float32]
         draw = partial(density_view, looked.scene, counting_eye(looked.eye), tree.record, widest, out)
         return lambda first, last: (draw(first, last), tree)  # the tree lives as long as its record is used
     radius = looked.eye[0]["caustic_radius" if by_caustic else "global_radius"]
-    mask = np.int32((plan.caustic_mask if by_caustic else plan.global_classes) & ALL_CLASSES)
+    mask = np.int32((plan.caustic_classes if by_caustic else plan.global_classes) & ALL_CLASSES)
     photons = looked.caustic if by_caustic else looked.global_
     return partial(lookup_view, looked.scene, looked.eye, photons, radius, mask, out)

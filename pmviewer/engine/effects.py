@@ -10,14 +10,17 @@ from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings import Settings
 
 _KDTREE_ONLY = ("estimate.k", "estimate.rim", "estimate.max_radius", "estimate.black_level")
-_GRID_ONLY = ("estimate.radius", "estimate.caustic_radius", "estimate.alpha")
+_GRID_ONLY = ("estimate.radius", "estimate.caustic_radius")
 _DISC_ONLY = ("estimate.filter", "estimate.cone_k", "estimate.rim", "estimate.differential")
 _RADIANCE_ONLY = ("gather.cutoff", "gather.similarity")
 _GUIDED_ONLY = ("gather.guided", "gather.guide_radius")
 _KELLER_WALD_ONLY = ("importance.f", "importance.epsilon", "importance.cut_off")
+_GUARDED_ONLY = ("importance.contrast", "importance.reach")
 _DEPOSITION = (
     "importance.deposition",
     "importance.acceptance",
+    "importance.around",
+    *_GUARDED_ONLY,
     "importance.density",
     "importance.convergence",
     *_KELLER_WALD_ONLY,
@@ -47,7 +50,7 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
             return "Only with importance (importance.map)."
         if path in ("importance.x", "importance.y") and settings.importance.of != "pixel":
             return "Only for the importance of a pixel (importance.of)."
-        if path == "importance.caustic_M_r" and not plan.caustic_mask:
+        if path == "importance.caustic_M_r" and not plan.caustic_classes:
             return "No caustic map in this scene or with this method."
         if path == "importance.M_r" and not plan.global_classes:
             return "The method shows the caustic map alone."
@@ -59,9 +62,9 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
     if group == "photons":
         return _photons(path, settings, traits, plan)
     if group == "estimate":
-        return _estimate(path, settings, plan.caustic_mask)
+        return _estimate(path, settings, plan.caustic_classes)
     if group == "gather" and not plan.gather:
-        return f"Only the method 'gather' casts gather rays, not '{method}'."
+        return f"Only a final gather casts gather rays, not the method '{method}' (render.indirect)."
     if path in ("gather.directions", *_GUIDED_ONLY) and settings.gather.rays < 2:
         return "A single gather ray follows the BSDF."
     if path in _GUIDED_ONLY and not plan.guided_rays:
@@ -70,8 +73,8 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
         return "Only with radiance photons."
     if path in _CACHE_ONLY and not plan.cache:
         return "Only with the irradiance cache."
-    if group == "direct" and not (plan.direct or plan.path):
-        return "Direct light is not computed: a map is shown alone, or nothing is diffuse."
+    if group == "direct" and not (plan.direct or plan.followed_direct or plan.path):
+        return "No light is sampled: a map is shown alone, direct light comes from photons, or all is smooth."
     if group == "direct":
         return _direct(path, settings, plan, traits)
     if group == "free_camera" and path != "free_camera.on" and not settings.free_camera.on:
@@ -86,7 +89,19 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
         return "The frustum is not drawn."
     if path == "render.outline_rays" and plan.path:
         return "The path tracer treats all pixels alike."
+    if path in ("render.direct", "render.caustic", "render.indirect"):
+        return _term(path, plan, traits, settings)
     if path == "render.max_depth" and not (plan.path or traits.follows(settings.photons.glossy)):
+        return "No mirror or glass in this scene."
+    return None
+
+
+def _term(path: str, plan: Plan, traits: SceneTraits, settings: Settings) -> str | None:
+    if settings.render.method not in ("progressive", "gather"):
+        return "Only with the methods 'progressive' and 'gather'."
+    if not plan.global_classes:
+        return "No surface of this scene stores photons."
+    if path == "render.caustic" and not traits.follows(settings.photons.glossy):
         return "No mirror or glass in this scene."
     return None
 
@@ -98,12 +113,15 @@ def _deposition(path: str, settings: Settings, plan: Plan) -> str | None:
     if path == "importance.convergence":
         if active not in ("density control", "constant density"):
             return "Only with density control."
-        return None if plan.caustic_mask else "No caustic map in this scene or with this method."
+        return None if plan.caustic_classes else "No caustic map in this scene or with this method."
     if path in _KELLER_WALD_ONLY:
         return None if active == "Keller-Wald" else "Only with the deposition rule 'Keller-Wald'."
     if path == "importance.density":
         return None if active == "constant density" else "Only with the deposition rule 'constant density'."
-    return "Only with density control." if active in ("all", "Keller-Wald") else None
+    if active in ("all", "Keller-Wald"):
+        return "Only with density control."
+    guards = path not in _GUARDED_ONLY or settings.importance.around == "guarded"
+    return None if guards else "Only with guarded neighbours (importance.around)."
 
 
 def _emission(path: str, settings: Settings, plan: Plan) -> str | None:
@@ -124,7 +142,7 @@ def _display(path: str, settings: Settings, plan: Plan) -> str | None:
         if shown not in DIAGNOSTICS or DIAGNOSTICS[shown].family not in OF_A_MAP:
             views = ", ".join(f"'{view}'" for view, how in DIAGNOSTICS.items() if how.family in OF_A_MAP)
             return f"Only with the views {views}."
-        if not (plan.caustic_mask and plan.global_classes):
+        if not (plan.caustic_classes and plan.global_classes):
             return "There is one map."
     return None
 
@@ -139,7 +157,7 @@ def _overlays(path: str, settings: Settings, plan: Plan) -> str | None:
         return "Only with importance (importance.map)."
     if name == "fates" and not judges(plan):
         return "Every photon is stored (importance.deposition)."
-    two_maps = plan.caustic_mask and plan.global_classes
+    two_maps = plan.caustic_classes and plan.global_classes
     if path == "overlays.fates.map" and not two_maps:
         return "There is one map."
     if path == "overlays.importons.map" and not (two_maps and plan.gather):
@@ -152,7 +170,7 @@ def _overlays(path: str, settings: Settings, plan: Plan) -> str | None:
         return "Photons leave the lights in all directions (photons.projection)."
     if path == "overlays.projection.map" and (settings.photons.q == 1.0 or settings.photons.q_rule == "photons"):
         return "All trajectories fill the global map, and leave for any surface (photons.q)."
-    if path == "overlays.caustic.show" and not plan.caustic_mask:
+    if path == "overlays.caustic.show" and not plan.caustic_classes:
         return "No caustic photons: the scene has no mirror or glass, or the method does not use them."
     if name == "radiance" and not plan.radiance:
         return "Only the method 'gather' has radiance photons, where they are on."
@@ -222,6 +240,8 @@ def _estimate(path: str, settings: Settings, caustic_mask: int) -> str | None:
         return "Only with the cone filter."
     if path in ("estimate.alpha", "estimate.floor") and settings.photons.renew == "once":
         return "One photon map serves all passes: the radius does not shrink."
+    if path == "estimate.floor" and estimate.lookup == "nearest" and estimate.max_radius != "auto":
+        return "With look-up 'nearest' it bounds the automatic maximum radius."
     if path == "estimate.floor" and estimate.lookup != "nearest" and estimate.alpha == 1.0:
         return "The radius does not shrink with alpha = 1."
     return None

@@ -46,7 +46,7 @@ def guidance_of(settings: Settings, plan: Plan, importance: ImportanceStage) -> 
     if plan.emission == "off" or maps is None or maps.n == 0:
         return None
     sought, first = [], 1 << DIRECT | 1 << CAUSTIC
-    if classes := plan.caustic_mask:
+    if classes := plan.caustic_classes:
         made = importance_of(maps, "caustic")
         weight = how.caustic_M_r / how.M_r if plan.global_classes else 1.0
         evaluate = relative_importance(made, full_importance(made))
@@ -101,7 +101,7 @@ def guided_photons(
     Without deposition rules, those of Christensen's emission are used with it (`Homogeneous`).
     """
     scene, run, photons = importance.scene.flat, importance.pool.run, settings.photons
-    seed, caustics = settings.render.seed, bool(plan.caustic_mask)
+    seed, caustics = settings.render.seed, bool(plan.caustic_classes)
     guided = guided_emission_of(scene, photons, seed, index * N, N, caustics, guidance, run, before)
     if guided is None:
         return None
@@ -117,7 +117,7 @@ def storage(guidance: Guidance, guided: Guided, settings: Settings, plan: Plan) 
             if goal.places:
                 seed = settings.render.seed ^ SEED ^ (goal.photons == "global")
                 rules[goal.photons] = Homogeneous(goal.importance, LEAST, guided.smallest, seed)
-    classes = plan.caustic_mask, plan.global_classes
+    classes = plan.caustic_classes, plan.global_classes
     return Deposition(rules.get("caustic"), rules.get("global"), *classes, sampled_classes(plan))
 
 

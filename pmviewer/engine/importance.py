@@ -116,7 +116,13 @@ class ImportanceStage:
         s, p = self.settings, self.plan
         how = s.importance.map, s.importance.N, s.importance.neighbours
         gather = p.gather, s.gather.secondary if p.corners else 0.0
-        rule = bool(p.caustic_mask), bool(p.global_classes), s.photons.indirect_caustics, s.photons.glossy, self.pixel
+        rule = (
+            bool(p.caustic_classes),
+            bool(p.global_classes),
+            s.photons.indirect_caustics,
+            s.photons.glossy,
+            self.pixel,
+        )
         return (self.scene.uid, self.camera, s.render.seed, s.render.max_depth, how, gather, rule)
 
     @property
@@ -140,13 +146,14 @@ class ImportanceStage:
     def _rule(self) -> Rule:
         plan, s = self.plan, self.settings
         return Rule(
-            caustic=plan.gather and bool(plan.caustic_mask),
+            caustic=plan.gather and bool(plan.caustic_classes),
             global_=True,
             gather=plan.gather,
             gather_specular=not s.photons.indirect_caustics,
             corner=s.gather.secondary * self.first_radius if plan.corners else 0.0,
             glossy=s.photons.glossy,
             max_depth=s.render.max_depth,
+            unfound=plan.unfound,
             pixel=self.pixel,
         )
 
@@ -172,8 +179,8 @@ class ImportanceStage:
             caustic, global_ = joined(self._parts[:count], pixels)
             both = self._build(global_, even=not plan.gather)
             if not plan.gather:
-                return ImportanceMaps(both if plan.caustic_mask else None, both, count * N)
-            return ImportanceMaps(self._build(caustic, even=True) if plan.caustic_mask else None, both, count * N)
+                return ImportanceMaps(both if plan.caustic_classes else None, both, count * N)
+            return ImportanceMaps(self._build(caustic, even=True) if plan.caustic_classes else None, both, count * N)
 
         return self.cache.get((*key, "maps", count), build, lambda made: made.bytes)
 

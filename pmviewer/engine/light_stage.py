@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -18,7 +19,7 @@ from pmviewer.engine.method import Plan, estimator_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.projection import projection_for
-from pmviewer.engine.radius import pass_radius
+from pmviewer.engine.radius import pass_neighbours, pass_radius
 from pmviewer.engine.sites import median_radius, sites_of
 from pmviewer.engine.tally import Tally
 from pmviewer.importance.lights import importance_of_lights
@@ -98,7 +99,7 @@ class LightStage:
         if self.photons is None:
             return np.empty((0, 6), np.float32)
         if name == "caustic":
-            return of_classes(self.photons.caustic, self.plan.caustic_mask)
+            return of_classes(self.photons.caustic, self.plan.caustic_classes)
         return of_classes(self.photons.global_, self.plan.global_classes)
 
     def fates(self, count: int, importance: ImportanceStage) -> NDArray[np.float32] | None:
@@ -110,7 +111,7 @@ class LightStage:
         guided, guidance = None, guidance_of(self.settings, self.plan, importance)
         if guidance is not None:  # again: its test photons are gone
             index, N = self.traced
-            photons, seed, caustics = self.settings.photons, self.settings.render.seed, bool(self.plan.caustic_mask)
+            photons, seed, caustics = self.settings.photons, self.settings.render.seed, bool(self.plan.caustic_classes)
             scene, run = self.scene.flat, self.pool.run
             guided = guided_emission_of(scene, photons, seed, index * N, N, caustics, guidance, run, self._before)
             if deposition is None and guided is not None:
@@ -129,10 +130,10 @@ class LightStage:
             return None
         direct = 0 if plan.gather or not plan.global_classes else 1 << DIRECT
         of_global = plan.global_classes | direct
-        everything = Deposition(None, None, plan.caustic_mask, of_global)
+        everything = Deposition(None, None, plan.caustic_classes, of_global)
         photons = self._trace(self.traced[0], min(self.traced[1], SHOWN_TRAJECTORIES), everything)
         arrived = []
-        if maps.caustic is not None and plan.caustic_mask:
+        if maps.caustic is not None and plan.caustic_classes:
             arrived.append((photons.caustic, photons.caustic_normals, photons.caustic_unit, maps.caustic))
         if maps.global_ is not None and of_global:
             arrived.append((photons.global_, photons.normals, photons.global_unit, maps.global_))
@@ -142,7 +143,7 @@ class LightStage:
         self, index: int, N: int, deposition: Deposition, fates: Fates | None = None, guided: Guided | None = None
     ) -> PhotonMaps:
         """The light pass again, for showing something of it."""
-        settings, caustics = self.settings, bool(self.plan.caustic_mask)
+        settings, caustics = self.settings, bool(self.plan.caustic_classes)
         traced, _, _ = trajectories(settings.photons, N, caustics)
         if guided is not None:
             traced = N
@@ -166,7 +167,7 @@ class LightStage:
     def _photons_of(self, index: int, N: int, importance: ImportanceStage) -> tuple[PhotonMaps, tuple]:
         """The photons of a pass by the deposition rules, and what names them in the cache."""
         settings, scene = self.settings, self.scene
-        caustics = bool(self.plan.caustic_mask)
+        caustics = bool(self.plan.caustic_classes)
         traced, _, _ = trajectories(settings.photons, N, caustics)
         normals = self.plan.radiance or (self.plan.corners and settings.estimate.lookup == "nearest")
         key = (
@@ -227,15 +228,17 @@ class LightStage:
         self.notes = (*self.rules.notes, *note_of(plan, photons, guidance))
         units = {"caustic": photons.caustic_unit, "global": photons.global_unit}
         clouds = {"caustic": photons.caustic, "global": photons.global_}
-        classes = {"caustic": plan.caustic_mask, "global": plan.global_classes}
+        classes = {"caustic": plan.caustic_classes, "global": plan.global_classes}
         nearest = estimate.lookup == "nearest"
+        eye["k"], eye["share"] = pass_neighbours(index, estimate)
 
         def build(name: str) -> Any:
             if not classes[name]:
                 return None
             chosen = of_classes(clouds[name], classes[name])
             if nearest:
-                return build_kdtree(chosen, units[name]), self._max_radius(self._brightest(name, chosen, units[name]))
+                brightest = self._brightest(name, chosen, units[name])
+                return build_kdtree(chosen, units[name]), self._max_radius(brightest, int(eye["k"]))
             return build_grid(chosen, radii[name], units[name]), radii[name]
 
         def cached(name: str) -> Any:
@@ -258,7 +261,7 @@ class LightStage:
             self.tally.map_bytes += structure.bytes
             self.tally.map_photons += structure.n
         if plan.radiance:
-            self.sites, eye["site_radius"] = self._timed("maps", lambda: self._build_sites(built[1], index, key))
+            self.sites, eye["site_radius"] = self._timed("maps", lambda: self._build_sites(eye, built[1], index, key))
             self.tally.map_bytes += self.sites.bytes
         if plan.guided_rays:
             self.guides = self._timed(
@@ -268,8 +271,10 @@ class LightStage:
             self.guide_radius = self.tally.radius["guides"] = self.guides.radius
             self.tally.map_bytes += self.guides.bytes
         if plan.corners:
-            eye["corner"] = self.settings.gather.secondary * self._typical_radius(photons, *built[1])
+            eye["corner"] = self.settings.gather.secondary * self._typical_radius(eye, photons, *built[1])
         eye["caustic_mask"], eye["global_mask"] = plan.caustic_mask, plan.global_mask
+        eye["direct_mask"], eye["global_caustics"] = plan.direct_mask, plan.global_caustics
+        eye["unfound"] = plan.unfound
         chooser = self._chooser(eye, photons, key, index)
         records.append(chooser.record)
         self._keep = built, chooser
@@ -280,13 +285,13 @@ class LightStage:
             return [self.pool.run([partial(cached, name)])[0] for name in ("caustic", "global")]
         return self.pool.run([partial(cached, name) for name in ("caustic", "global")])
 
-    def _build_sites(self, built: tuple[Any, float], index: int, key: tuple) -> tuple[RadianceMap, float]:
+    def _build_sites(self, eye: np.void, built: tuple[Any, float], index: int, key: tuple) -> tuple[RadianceMap, float]:
         """Radiance photons of the pass in the global map `built`, and their cut-off radius."""
         photons, (structure, radius), settings = self.photons, built, self.settings
         assert photons is not None
 
         def make() -> tuple[RadianceMap, float]:
-            return self.pool.run([lambda: sites_of(photons, structure, radius, settings)])[0]
+            return self.pool.run([lambda: sites_of(photons, structure, radius, settings, eye)])[0]
 
         if index >= CACHED_PASSES:
             return make()
@@ -307,10 +312,10 @@ class LightStage:
         guides_key = ("guides", key, self.plan.guide_mask, asked, self.guide_radius)
         return self.cache.get(guides_key, build, lambda grid: grid.bytes)
 
-    def _typical_radius(self, photons: PhotonMaps, structure: Any, radius: float) -> float:
+    def _typical_radius(self, eye: np.void, photons: PhotonMaps, structure: Any, radius: float) -> float:
         """Of look-ups in the global map: that of the pass, or the median of k-nearest ones."""
         if isinstance(structure, PhotonKdTree):
-            return median_radius(photons, structure, radius, self.settings.estimate)
+            return median_radius(photons, structure, radius, eye)
         return radius
 
     def _chooser(self, eye: np.void, photons: PhotonMaps, key: tuple, index: int) -> PhotonGrid:
@@ -360,11 +365,12 @@ class LightStage:
             return self.photons.deposited[name].largest_arrived
         return largest_power(photons, unit)
 
-    def _max_radius(self, brightest: float) -> float:
+    def _max_radius(self, brightest: float, k: int) -> float:
+        """Of a search for k photons, as many as the pass takes."""
         estimate, scene_radius = self.settings.estimate, self.scene.flat.radius
         if estimate.max_radius != "auto":
-            return float(estimate.max_radius) * scene_radius
-        automatic = automatic_radius(estimate.k, brightest, estimate.black_level)
+            return float(estimate.max_radius) * scene_radius * math.sqrt(k / estimate.k)
+        automatic = automatic_radius(k, brightest, estimate.black_level)
         return min(max(automatic, estimate.floor * scene_radius), 2 * scene_radius)
 
 

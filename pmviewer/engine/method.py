@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
@@ -15,13 +15,20 @@ MANY_LIGHTS = 8
 EXPONENTS = {"off": 0, "square": 2, "cube": 3}
 Deposit = Literal["all", "Keller-Wald", "density control", "constant density"]
 Emission = Literal["off", "Peter-Pietrek", "Christensen discard", "Christensen keep"]
+UNFOUND_BY_PATHS = (
+    "The path tracer finds no light that comes from a point, spot or directional light over a mirror or through glass: "
+    "no ray can meet such a light. The photon methods show it."
+)
 ALL = 1 << DIRECT | 1 << CAUSTIC | 1 << INDIRECT | 1 << INDIRECT_CAUSTIC
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Masks are bit sets of path classes (`1 << class`). `caustic_mask` and `global_mask` are shown directly,
-    `global_classes` are what the global map has to hold; 0 means that the map is not built. `choice` is how
+    """Masks are bit sets of path classes (`1 << class`). `caustic_mask` of the caustic map, `global_mask` as indirect
+    light, `direct_mask` as direct light and `global_caustics` as caustics of the global map are shown directly;
+    `caustic_classes` and `global_classes` are what the maps have to hold, 0 means that the map is not built. `direct`
+    is whether direct light is sampled at lobes that photons are stored for, `followed_direct` whether at those that are
+    followed; `unfound` whether these look up what no path finds (`pmviewer.render.reflect`). `choice` is how
     direct light chooses lights, `radiance` whether gather rays use radiance photons, `directions` how they look about:
     photons of the classes `guide_mask` guide `guided_rays` of them; `corners` is whether short ones gather again,
     `cache` whether diffuse surfaces gather through an irradiance cache, `shadows` whether shadow photons save shadow
@@ -31,6 +38,8 @@ class Plan:
 
     path: bool = False
     direct: bool = False
+    followed_direct: bool = False
+    unfound: bool = False
     gather: bool = False
     radiance: bool = False
     directions: Literal["BSDF", "photon cones", "hemisphere grid"] = "BSDF"
@@ -45,14 +54,20 @@ class Plan:
     convergence: int = 0
     caustic_mask: int = 0
     global_mask: int = 0
+    direct_mask: int = 0
+    global_caustics: int = 0
     global_classes: int = 0
     choice: str = "power"
     skipped: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()
 
     @property
+    def caustic_classes(self) -> int:
+        return self.caustic_mask | (1 << CAUSTIC if self.unfound else 0)
+
+    @property
     def photons(self) -> bool:
-        return bool(self.caustic_mask or self.global_classes)
+        return bool(self.caustic_classes or self.global_classes)
 
 
 def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
@@ -69,7 +84,7 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         plan = replace(plan, skipped=skipped, warnings=(*plan.warnings, warning))
     else:
         plan = replace(plan, deposition=how.deposition)
-        if "density" in how.deposition and plan.caustic_mask:
+        if "density" in how.deposition and plan.caustic_classes:
             plan = replace(plan, convergence=EXPONENTS[how.convergence])
     if how.emission == "off":
         plan = replace(plan, skipped=(*plan.skipped, ("guided emission", "importance.emission is off")))
@@ -86,7 +101,7 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
 
 def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
     """The plan without importance."""
-    method = settings.render.method
+    method, glossy = settings.render.method, settings.photons.glossy
     caustics = 1 << CAUSTIC
     diffuse = 1 << INDIRECT
     if settings.photons.indirect_caustics:
@@ -95,25 +110,50 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
         diffuse |= 1 << INDIRECT_CAUSTIC
     skipped: list[tuple[str, str]] = []
     if method == "path":
-        return Plan(path=True, skipped=(("light pass", "the path tracer uses no photons"),))
-    if not traits.has_diffuse:
-        skipped += [("light pass", "no surface can store photons"), ("direct light", "no diffuse surface")]
-        return Plan(skipped=tuple(skipped))
-    if not traits.follows(settings.photons.glossy):
+        warnings = (UNFOUND_BY_PATHS,) if traits.has_delta_lights and traits.has_delta else ()
+        return Plan(path=True, skipped=(("light pass", "the path tracer uses no photons"),), warnings=warnings)
+    if not traits.follows(glossy):
         caustics = 0
         skipped.append(("caustic map", "no mirror or glass, nor smooth gloss, in the scene"))
-    if method == "global map":
-        return Plan(global_mask=ALL, global_classes=ALL, skipped=(*skipped, ("direct light", "a map is shown alone")))
-    if method == "caustic map":
-        skipped += [("direct light", "a map is shown alone"), ("global map", "not shown")]
-        return Plan(caustic_mask=caustics, skipped=tuple(skipped))
+    if method in ("global map", "caustic map"):
+        if not traits.stores(glossy):
+            why = "no surface can store photons"
+            return Plan(skipped=(*skipped, ("light pass", why)), warnings=(f"Nothing to show: {why}.",))
+        skipped.append(("direct light", "a map is shown alone"))
+        if method == "global map":
+            return Plan(global_mask=ALL, global_classes=ALL, skipped=tuple(skipped))
+        return Plan(caustic_mask=caustics, skipped=(*skipped, ("global map", "not shown")))
+    unfound = traits.unfound(glossy)
+    if not traits.stores(glossy):
+        if not unfound:
+            skipped.append(("light pass", "no surface can store photons"))
+        skipped.append(("global map", "no surface can store photons"))
+        rough = traits.follows_rough(glossy)
+        if not rough:
+            skipped.append(("direct light", "all surfaces are smooth mirrors or glass"))
+        return Plan(followed_direct=rough, unfound=unfound, skipped=tuple(skipped))
     choice, why = _light_choice(settings, traits)
     if choice == "power":
         skipped.append(("light choice by photons", why))
+    how = _terms(settings)
     shadows = settings.direct.shadow_photons and traits.n_lights > 0
     if not shadows:
         skipped.append(("shadow photons", "direct.shadow_photons is off"))
-    if method == "gather":
+    shown = Plan(
+        direct=how.direct == "accurate",
+        followed_direct=True,
+        unfound=unfound,
+        direct_mask=1 << DIRECT if how.direct == "approximate" else 0,
+        caustic_mask=caustics if how.caustic == "accurate" else 0,
+        global_caustics=caustics if how.caustic == "approximate" else 0,
+        choice=choice,
+        shadows=shadows,
+    )
+    if how.direct == "approximate":
+        skipped.append(("light samples at surfaces that store photons", "render.direct is approximate"))
+    if how.caustic == "approximate" and caustics:
+        skipped.append(("caustic map", "render.caustic is approximate"))
+    if how.indirect == "accurate":
         radiance = settings.gather.radiance_photons != "off"
         if not radiance:
             skipped.append(("radiance photons", "off"))
@@ -126,8 +166,8 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
         cache = settings.gather.cache == "on"
         if not cache:
             skipped.append(("irradiance cache", "off"))
-        gathered = Plan(
-            direct=True,
+        return replace(
+            shown,
             gather=True,
             radiance=radiance,
             directions=settings.gather.directions if guided else "BSDF",
@@ -135,14 +175,28 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
             guide_mask=diffuse if guided else 0,
             corners=settings.gather.secondary > 0,
             cache=cache,
-            caustic_mask=caustics,
             global_classes=ALL,
-            choice=choice,
+            skipped=tuple(skipped),
         )
-        return replace(gathered, shadows=shadows, skipped=tuple(skipped))
-    skipped.append(("final gather", "the method shows the maps directly"))
-    shown = Plan(direct=True, caustic_mask=caustics, global_mask=diffuse, global_classes=diffuse, choice=choice)
-    return replace(shown, shadows=shadows, skipped=tuple(skipped))
+    skipped.append(("final gather", "the global map is shown directly"))
+    classes = diffuse | shown.direct_mask | shown.global_caustics
+    return replace(shown, global_mask=diffuse, global_classes=classes, skipped=tuple(skipped))
+
+
+class Terms(NamedTuple):
+    """How each term is evaluated: "accurate" or "approximate" (Jensen 1996, §4)."""
+
+    direct: str
+    caustic: str
+    indirect: str
+
+
+def _terms(settings: Settings) -> Terms:
+    """What the method says, and what the user says otherwise."""
+    render = settings.render
+    of_method = Terms("accurate", "accurate", "accurate" if render.method == "gather" else "approximate")
+    asked = Terms(render.direct, render.caustic, render.indirect)
+    return Terms(*(own if one == "by method" else one for one, own in zip(asked, of_method, strict=True)))
 
 
 def _guided_rays(settings: Settings) -> int:

@@ -19,7 +19,7 @@ def projection_for(scene: OpenScene, settings: Settings) -> Projection | None:
         return None
     if wanted == "auto" and len(scene.flat.light_names) > MOST_LIGHTS:
         return None
-    traced, filling, _ = trajectories(settings.photons, settings.photons.N, bool(plan.caustic_mask))
+    traced, filling, _ = trajectories(settings.photons, settings.photons.N, bool(plan.caustic_classes))
     key = (wanted, traced > filling)
     if key not in scene.projections:
         made = projection_of(scene.flat, wanted == "on", traced > filling)

@@ -7,15 +7,15 @@ import math
 import numpy as np
 
 from pmviewer.kernels.raycast import cast_closest
+from pmviewer.maps.nearest import shrunk
 from pmviewer.maps.radius import progressive_radius
 from pmviewer.render.camera import CameraPose
 from pmviewer.scene.flatten import FlatScene
 from pmviewer.settings import Estimate
 
-FOOTPRINTS = {"gather": 3.0}
-"""Radius in pixel footprints by method: maps shown directly need a calm estimate; gather rays average it anyway, so
-that theirs can be sharper and darken corners less."""
-DEFAULT_FOOTPRINTS = 4.0
+FOOTPRINTS, GATHER_FOOTPRINTS = 4.0, 3.0
+"""Radius in pixel footprints: maps shown directly need a calm estimate; gather rays average it anyway, so that theirs
+can be sharper and darken corners less."""
 PROBES = 24
 
 
@@ -36,17 +36,23 @@ def typical_distance(scene: FlatScene, camera: CameraPose) -> float:
     return float(np.median(hits)) if len(hits) else scene.radius
 
 
-def first_radius(scene: FlatScene, camera: CameraPose, estimate: Estimate, method: str) -> float:
-    """Radius of pass 0 in scene units.
+def first_radius(scene: FlatScene, camera: CameraPose, estimate: Estimate, gather: bool) -> float:
+    """Radius of pass 0 in scene units, with a final gather or without.
 
     The automatic one is rounded to steps of 2^¼, so that a small camera move keeps the maps of the previous view.
     """
     if estimate.radius != "auto":
         return float(estimate.radius) * scene.radius
     footprint = typical_distance(scene, camera) * camera.pixel_angle()
-    wanted = FOOTPRINTS.get(method, DEFAULT_FOOTPRINTS) * footprint / scene.radius
+    wanted = (GATHER_FOOTPRINTS if gather else FOOTPRINTS) * footprint / scene.radius
     wanted = min(max(wanted, 1e-4), 0.1)
     return 2.0 ** (round(4 * math.log2(wanted)) / 4) * scene.radius
+
+
+def pass_neighbours(index: int, estimate: Estimate) -> tuple[int, float]:
+    """Neighbours that a k-nearest look-up of pass `index` searches, and the share of their disc's area that it uses: in
+    all the share r²ᵢ/r²₁ of the area that `estimate.k` fill (`pmviewer.maps.nearest`)."""
+    return shrunk(estimate.k, progressive_radius(1.0, index + 1, estimate.alpha) ** 2)
 
 
 def pass_radius(first: float, index: int, estimate: Estimate, scene_radius: float) -> float:

@@ -22,7 +22,7 @@ from pmviewer.engine.frame import Frame, PhotonCloud, Statistics
 from pmviewer.engine.guides import gather_records
 from pmviewer.engine.importance import ImportanceStage
 from pmviewer.engine.inspection import Inspection, Wanted
-from pmviewer.engine.light_stage import LightStage
+from pmviewer.engine.light_stage import CACHED_PASSES, LightStage
 from pmviewer.engine.memory import check_memory
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
@@ -76,7 +76,7 @@ class Renderer:
         self.plan: Plan = plan_of(settings, scene.traits)
         self.film = Film(self.camera.width, self.camera.height)
         self.first_radius = (
-            first_radius(scene.flat, self.render_camera, settings.estimate, settings.render.method)
+            first_radius(scene.flat, self.render_camera, settings.estimate, self.plan.gather)
             if self.plan.photons
             else 0.0
         )
@@ -170,7 +170,7 @@ class Renderer:
         if self.light.traced is None:
             return None
         index, N = self.light.traced
-        settings, caustics = self.settings, bool(self.plan.caustic_mask)
+        settings, caustics = self.settings, bool(self.plan.caustic_classes)
         traced, _, _ = trajectories(settings.photons, N, caustics)
         guided = self.light.photons.guided if self.light.photons else None
         if guided is not None:
@@ -273,22 +273,25 @@ class Renderer:
         maps = self.light.run(eye[0], index, N, self.first_radius, self.importance)
         self._set_gather(eye[0])
         if self.plan.shadows:
-            self._shadows = self.tally.timed(self.pool, "shadow photons", self._shadow_map)
+            self._shadows = self.tally.timed(self.pool, "shadow photons", lambda: self._shadow_map(index))
         if self.plan.cache:
             self.tally.timed(self.pool, "irradiance cache", lambda: self._fill_cache(eye, maps, camera, index))
         self.tally.timed(self.pool, "eye pass", lambda: self._eye_pass(eye, maps, film))
         self._last = eye, maps
 
-    def _shadow_map(self) -> ShadowMap:
-        """The shadow photons that serve all passes."""
+    def _shadow_map(self, index: int) -> ShadowMap:
+        """The shadow photons of pass `index`; those of the first where one photon map serves all passes."""
+        if self.settings.photons.renew == "once":
+            if self._shadows is not None:
+                return self._shadows
+            index = 0
         direct, glossy, seed = self.settings.direct, self.settings.photons.glossy, self.settings.render.seed
-        key = ("shadows", self.scene.uid, seed, direct.shadow_N, direct.shadow_fewest, direct.shadow_radius, glossy)
-        if self._shadows is None:
-            make = partial(shadows_of, self.scene.flat, direct, glossy, seed, self.pool.run)
-            made = self.cache.get(key, make, lambda shadows: shadows.bytes)
-            self.tally.rays += made.rays
-            return made
-        return self._shadows
+        make = partial(shadows_of, self.scene.flat, direct, glossy, seed, index, self.pool.run)
+        shape = direct.shadow_N, direct.shadow_fewest, direct.shadow_radius
+        key = ("shadows", self.scene.uid, seed, index, *shape, glossy)
+        made = make() if index >= CACHED_PASSES else self.cache.get(key, make, lambda shadows: shadows.bytes)
+        self.tally.rays += made.rays
+        return made
 
     def _eye_records(self) -> tuple[NDArray[np.void], ...]:
         """What the eye pass looks up besides the pass's three maps."""
@@ -316,7 +319,8 @@ class Renderer:
         return rows[: self.pool.run([replay])[0]].copy()
 
     def _set_gather(self, eye: np.void) -> None:
-        eye["direct"] = self.plan.direct
+        eye["direct"], eye["followed_direct"] = self.plan.direct, self.plan.followed_direct
+        eye["indirect_caustics"] = self.settings.photons.indirect_caustics
         eye["gather_rays"] = self.settings.gather.rays if self.plan.gather else 0
         eye["gather_specular"] = not self.settings.photons.indirect_caustics
 

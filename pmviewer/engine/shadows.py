@@ -1,4 +1,4 @@
-"""The shadow photons of a scene: traced, in a grid, ready for the eye pass."""
+"""The shadow photons of a pass: traced, in a grid, ready for the eye pass."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class ShadowMap:
         return self.grid.bytes + self.photons.nbytes
 
 
-def shadows_of(flat: FlatScene, direct: Direct, glossy: float, seed: int, run: Runner) -> ShadowMap:
-    """Trace and sort the shadow photons that the settings ask for."""
-    traced = shadow_pass(flat, seed ^ SEED, direct.shadow_N, glossy, run)
+def shadows_of(flat: FlatScene, direct: Direct, glossy: float, seed: int, index: int, run: Runner) -> ShadowMap:
+    """Trace and sort the shadow photons that the settings ask for, those of pass `index`."""
+    traced = shadow_pass(flat, seed ^ SEED, index * direct.shadow_N, direct.shadow_N, glossy, run)
     radius = None if direct.shadow_radius == "auto" else float(direct.shadow_radius) * flat.radius
     photons = traced.photons
     grid = run([lambda: build_shadows(photons, direct.shadow_fewest, radius, flat.radius)])[0]

@@ -9,14 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.maps.estimate import irradiance_at_knn
-from pmviewer.maps.filters import FILTERS
 from pmviewer.maps.kdtree import PhotonKdTree
 from pmviewer.maps.radiance import RadianceMap, build_sites
 from pmviewer.maps.record import decode_directions
 from pmviewer.maps.stored import ALL_CLASSES
 from pmviewer.photons.lightpass import PhotonMaps
-from pmviewer.render.record import RIMS
-from pmviewer.settings import Estimate, Settings
+from pmviewer.settings import Settings
 
 AUTOMATIC_CUTOFF, AUTOMATIC_CUTOFF_NEAREST = 0.5, 1.0
 """In look-up radii. Half a radius keeps the mean exact (see `pmviewer.maps.radiance`). A disc of k photons holds sites
@@ -26,8 +24,11 @@ PROBES = 256
 """Photons at which the radius of k-nearest look-ups is measured."""
 
 
-def sites_of(photons: PhotonMaps, structure: Any, radius: float, settings: Settings) -> tuple[RadianceMap, float]:
-    """Radiance photons in a grid or kd-tree of all global photons whose look-ups have (at most) that radius.
+def sites_of(
+    photons: PhotonMaps, structure: Any, radius: float, settings: Settings, eye: np.void
+) -> tuple[RadianceMap, float]:
+    """Radiance photons in a grid or kd-tree of all global photons whose look-ups have (at most) that radius; `eye` as
+    for `median_radius`.
 
     Returns the map, its irradiances not yet computed, and the largest distance at which a radiance photon is used.
     """
@@ -35,7 +36,7 @@ def sites_of(photons: PhotonMaps, structure: Any, radius: float, settings: Setti
     assert share != "off"
     cutoff = AUTOMATIC_CUTOFF
     if isinstance(structure, PhotonKdTree):
-        radius = median_radius(photons, structure, radius, settings.estimate)
+        radius = median_radius(photons, structure, radius, eye)
         cutoff = AUTOMATIC_CUTOFF_NEAREST
     if settings.gather.cutoff != "auto":
         cutoff = float(settings.gather.cutoff)
@@ -44,8 +45,8 @@ def sites_of(photons: PhotonMaps, structure: Any, radius: float, settings: Setti
     return build_sites(photons.global_, photons.normals, share, cutoff, unit), cutoff
 
 
-def median_radius(photons: PhotonMaps, tree: PhotonKdTree, max_radius: float, estimate: Estimate) -> float:
-    """Median radius of the k-nearest look-ups at photons spread evenly over the map."""
+def median_radius(photons: PhotonMaps, tree: PhotonKdTree, max_radius: float, eye: np.void) -> float:
+    """Median radius of the pass's k-nearest look-ups at photons spread evenly over the map; eye: EYE_DTYPE record."""
     n = len(photons.global_)
     if n == 0:
         return max_radius
@@ -58,13 +59,14 @@ def median_radius(photons: PhotonMaps, tree: PhotonKdTree, max_radius: float, es
         tree.record,
         points,
         normals,
-        np.int32(estimate.k),
+        eye["k"],
         np.float32(max_radius),
-        np.float32(estimate.flatness),
+        eye["flatness"],
         np.int32(ALL_CLASSES),
-        np.int32(FILTERS.index(estimate.filter)),
-        np.float32(estimate.cone_k),
-        np.int32(RIMS.index(estimate.rim)),
+        eye["filter"],
+        eye["cone_k"],
+        eye["rim"],
+        eye["share"],
         0,
         m,
         E,

@@ -42,6 +42,7 @@ class Rule:
     corner: float
     glossy: float
     max_depth: int
+    unfound: bool = False
     pixel: tuple[int, int] | None = None
 
 
@@ -79,6 +80,7 @@ def trace(scene: FlatScene, eye: NDArray[np.void], rule: Rule, seed: int, first:
         rule.gather,
         rule.gather_specular,
         rule.corner,
+        rule.unfound,
         *part,
     )
     most = 2 * rule.max_depth + 2

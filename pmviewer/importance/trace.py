@@ -72,6 +72,7 @@ IMPORTON_PASS_DTYPE = np.dtype(
         ("gather", "i4"),  # whether the global map is looked up after a bounce, or at the first surface
         ("gather_specular", "i4"),  # whether gather rays follow mirrors and glass
         ("corner", "f4"),  # gather rays shorter than this gather again where they land
+        ("unfound", "i4"),  # whether followed lobes look the caustic map up (`pmviewer.render.reflect.unfound`)
         ("left", "f4"),  # part of the image that importons start through, in pixels
         ("top", "f4"),
         ("across", "f4"),
@@ -172,6 +173,14 @@ def trace_importons(scenes, eyes, passes, i0, i1, caustic_out, global_out, count
                     if pass_.global_ != 0 and pass_.gather == 0:
                         _store(global_out, counts[C_GLOBAL], p, ng, weight, of_pixel)
                         counts[C_GLOBAL] += 1
+            elif pass_.unfound != 0 and not bounced and b.groups & FOLLOWED != 0 and not is_delta(b):
+                of_pixel = footprint_importance(P)
+                if pass_.caustic != 0:
+                    _store(caustic_out, counts[C_CAUSTIC], p, ng, weight, of_pixel)
+                    counts[C_CAUSTIC] += 1
+                elif pass_.gather == 0:  # one importance serves both maps
+                    _store(global_out, counts[C_GLOBAL], p, ng, weight, of_pixel)
+                    counts[C_GLOBAL] += 1
             u_lobe, bu, bv, u_end = draw4(SOBOL, pass_.seed, _u4(i), _i8(1 + bounces))
             bounces += 1
             share, group = one, STORED
@@ -182,7 +191,7 @@ def trace_importons(scenes, eyes, passes, i0, i1, caustic_out, global_out, count
             if b.groups & group == 0 or not (may_store or may_follow):
                 break
             wi, f, pdf, compression = bsdf_sample(scene, b, group, wo, u_lobe, bu, bv)
-            if group == STORED and same_side(b, group, ng, wo, wi) == 0:
+            if same_side(b, group, ng, wo, wi) == 0:
                 break
             after = scale(mul(beta, f), share)
             survival = min(luminance(after) / before, one)

@@ -11,7 +11,6 @@ from pmviewer.kernels.scene import (
     CONDUCTOR,
     material_eta,
     material_kind,
-    material_two_sided,
     reflectance,
     transmittance,
 )
@@ -53,8 +52,6 @@ def scatter_specular(scene, material, n, d, u):
     cos_d = -dot(d, n)
     tint = reflectance(scene, material)
     if material_kind(scene, material) == CONDUCTOR:
-        if cos_d <= _f4(0.0) and not material_two_sided(scene, material):
-            return d, (_f4(0.0), _f4(0.0), _f4(0.0)), _f4(1.0)
         return reflect(d, n), tint, _f4(1.0)
     eta = material_eta(scene, material)
     entering = cos_d > _f4(0.0)

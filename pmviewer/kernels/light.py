@@ -1,8 +1,12 @@
 """Lights (T1): emission of photons, sampling towards a point, and the densities for multiple importance sampling.
 
-Area lights are one-sided: they emit where their normal points. Lights are picked with probability proportional to their
-power's luminance. Spots, directional lights and image environments have files of their own; scenes without them have
-another type of record (`pmviewer.kernels.scene`) and compile nothing of them.
+Area lights are one-sided: they emit where their normal points; a mesh with vertex normals where these point, as in
+Mitsuba 3. Photons leave it with the surface's own cosine in that half of all directions, whose integral is π whatever
+the vertex normals are: cosines and densities are always those of the surface.
+
+Lights are picked with probability proportional to their power's luminance. Spots, directional lights and image
+environments have files of their own; scenes without them have another type of record (`pmviewer.kernels.scene`) and
+compile nothing of them.
 """
 
 from __future__ import annotations
@@ -33,6 +37,7 @@ from pmviewer.kernels.scene import (
     L_LENGTH,
     L_RADIANCE,
     L_RADIUS,
+    MESH,
     PARALLELOGRAM,
     POINT,
     SPHERE,
@@ -42,9 +47,10 @@ from pmviewer.kernels.scene import (
     load3,
 )
 from pmviewer.kernels.spot import emit_spot, sample_spot
-from pmviewer.kernels.surface import gap_of, leave
+from pmviewer.kernels.surface import gap_of, interpolated_normal, leave
 from pmviewer.kernels.table import find_interval
 from pmviewer.kernels.textured_light import area_density, emission_at, radiance_from, spread
+from pmviewer.kernels.uv import barycentrics
 from pmviewer.kernels.vector import along, basis, cross, dot, from_basis, luminance, normalize, scale, sub
 from pmviewer.kernels.warp import (
     square_to_cone,
@@ -70,6 +76,13 @@ def pick_light(scene, u):
 
 
 @device
+def is_delta_light(scene, light):
+    """Whether no ray can meet the light, which has neither extent nor solid angle."""
+    kind = np.int32(light_number(scene, light, L_KIND))
+    return kind in (POINT, SPOT, DIRECTIONAL)
+
+
+@device
 def light_probability(scene, light):
     return load_f4(scene.light_cdf, light + 1) - load_f4(scene.light_cdf, light)
 
@@ -81,7 +94,7 @@ def _round_gap(n, center, reach):
 
 @device
 def light_point(scene, light, u, v):
-    """A point uniform on the area light, its unit normal (the emitting side), and the gap for `leave`."""
+    """A point uniform on the area light, its unit normal, the normal on whose side it emits, the gap for `leave`."""
     kind = np.int32(light_number(scene, light, L_KIND))
     a = light_vector(scene, light, L_A)
     b = light_vector(scene, light, L_B)
@@ -94,23 +107,25 @@ def light_point(scene, light, u, v):
             abs(a[1]) + abs(b[1]) + abs(c[1]),
             abs(a[2]) + abs(b[2]) + abs(c[2]),
         )
-        return p, n, gap_of(n, sizes[0], sizes[1], sizes[2])
+        return p, n, n, gap_of(n, sizes[0], sizes[1], sizes[2])
     flip = light_number(scene, light, L_FLIP)
     radius = light_number(scene, light, L_RADIUS)
     if kind == DISK:
         x, y = square_to_disk(u, v)
         s, t = basis(b)
-        return along(along(a, s, x * radius), t, y * radius), b, _round_gap(b, a, radius)
+        return along(along(a, s, x * radius), t, y * radius), b, b, _round_gap(b, a, radius)
     if kind == SPHERE:
         n = square_to_sphere(u, v)
-        return along(a, n, radius), scale(n, flip), _round_gap(n, a, radius)
+        facing = scale(n, flip)
+        return along(a, n, radius), facing, facing, _round_gap(n, a, radius)
     if kind == CYLINDER:
         phi = _f4(2.0) * _PI * u
         s, t = basis(b)
         x, y = _f4(math.cos(phi)), _f4(math.sin(phi))
         n = (s[0] * x + t[0] * y, s[1] * x + t[1] * y, s[2] * x + t[2] * y)
         length = light_number(scene, light, L_LENGTH)
-        return along(along(a, b, v * length), n, radius), scale(n, flip), _round_gap(n, a, radius + length)
+        facing = scale(n, flip)
+        return along(along(a, b, v * length), n, radius), facing, facing, _round_gap(n, a, radius + length)
     first = np.int64(light_number(scene, light, L_FIRST))
     count = np.int64(light_number(scene, light, L_COUNT))
     k = find_interval(scene.light_triangle_cdf, count, first, u)
@@ -130,7 +145,7 @@ def light_point(scene, light, u, v):
         abs(p0[1]) + abs(e1[1]) + abs(e2[1]),
         abs(p0[2]) + abs(e1[2]) + abs(e2[2]),
     )
-    return along(along(p0, e1, b1), e2, b2), n, gap
+    return along(along(p0, e1, b1), e2, b2), n, interpolated_normal(scene, base, b1, b2, n), gap
 
 
 @device
@@ -221,7 +236,7 @@ def _sample_plain(scene, light, x, u, v):
             L = radiance_from(scene, light, p, u, v)
             return wi, end, L, _f4(1.0) / (_f4(2.0) * _PI * cone), True
     u, v, density = spread(scene, light, u, v)
-    p, n, gap = light_point(scene, light, u, v)
+    p, n, front, gap = light_point(scene, light, u, v)
     L = radiance_from(scene, light, p, u, v)
     offset = sub(p, x)
     distance2 = dot(offset, offset)
@@ -229,8 +244,8 @@ def _sample_plain(scene, light, x, u, v):
         return n, p, L, _f4(0.0), True
     inv = _f4(1.0) / _f4(math.sqrt(distance2))
     wi = scale(offset, inv)
-    cos_light = -dot(wi, n)
-    if cos_light <= _f4(0.0):
+    cos_light = abs(dot(wi, n))
+    if dot(wi, front) >= _f4(0.0) or not cos_light > _f4(0.0):
         return wi, p, L, _f4(0.0), True
     pdf = density * (distance2 / (cos_light * light_number(scene, light, L_AREA)))
     return wi, leave(p, n, gap, -wi[0], -wi[1], -wi[2]), L, pdf, True
@@ -240,7 +255,11 @@ def _sample_plain(scene, light, x, u, v):
 def emitted(scene, light, prim, p, ng, d):
     """Radiance that leaves an area light at the point p of its primitive `prim`, with geometric normal ng, against the
     travelling direction d."""
-    if dot(ng, d) < _f4(0.0):
+    front = ng
+    if np.int32(light_number(scene, light, L_KIND)) == MESH and scene.normals != 0:
+        b1, b2 = barycentrics(scene, prim, p)
+        front = interpolated_normal(scene, np.int64(prim) * 9, b1, b2, ng)
+    if dot(front, d) < _f4(0.0):
         return emission_at(scene, light, prim, p)
     return _f4(0.0), _f4(0.0), _f4(0.0)
 
@@ -360,8 +379,10 @@ def _emit_plain(scene, light, position, direction):
         d = square_to_sphere(direction[0], direction[1])
         return behind_scene(scene, d, position[0], position[1]), d, beta
     u, v, density = spread(scene, light, position[0], position[1])
-    p, n, gap = light_point(scene, light, u, v)
+    p, n, front, gap = light_point(scene, light, u, v)
     beta = scale(radiance_from(scene, light, p, u, v), _f4(1.0) / (luminance(L) * density))
     local = square_to_cosine_hemisphere(direction[0], direction[1])
     d = from_basis(n, local[0], local[1], local[2])
+    if dot(front, d) < _f4(0.0):
+        d = scale(d, _f4(-1.0))
     return leave(p, n, gap, d[0], d[1], d[2]), d, beta

@@ -61,6 +61,7 @@ __all__ = [
     "bsdf_is_lambertian",
     "bsdf_pdf",
     "bsdf_sample",
+    "bsdf_transmits",
     "followed_share",
     "interior_attenuation",
     "material_params",
@@ -141,7 +142,8 @@ def bsdf_at(scene, material, p, ng, ns, tangent, wo, glossy):
     else:
         hidden = False
     # A lobe around a normal that looks away, or whose mirror direction is below the surface, would be black.
-    if opaque and p.kind != DIFFUSE:
+    # Not so those of maps, which Mitsuba leaves black as well.
+    if opaque and p.kind != DIFFUSE and not p.mapped:
         ns = reflecting_normal(ns, ng, wo)
     s, t = _frame(ns, tangent)
     cos = min(abs(dot(ns, wo)), _f4(1.0))
@@ -202,6 +204,12 @@ def bsdf_is_delta(b):
 
 
 @device
+def bsdf_transmits(b):
+    """Whether light may reach one side of the surface from the other."""
+    return _transparent(b.p.kind)
+
+
+@device
 def bsdf_is_lambertian(b):
     """Whether the STORED lobes reflect the same in all directions, so that irradiance says everything."""
     return b.p.kind == DIFFUSE
@@ -215,8 +223,13 @@ def bsdf_albedo(b, wo):
 
 @device
 def sees_side(b, group, ng, wo, wi):
-    """Whether light from wi can reach wo by this group, by the geometric normal: on one side, or through."""
-    return (group == FOLLOWED and _transparent(b.p.kind)) or dot(ng, wo) * dot(ng, wi) > _f4(0.0)
+    """Whether light from wi can reach wo by this group, by the geometric normal: on one side, or through.
+
+    Where a map tilts the normal of glass, the surface and its lobes must agree on wi's side, as in Mitsuba.
+    """
+    if group == FOLLOWED and _transparent(b.p.kind):
+        return not b.p.mapped or dot(ng, wi) * dot(b.n, wi) * dot(ng, wo) * dot(b.n, wo) > _f4(0.0)
+    return dot(ng, wo) * dot(ng, wi) > _f4(0.0)
 
 
 @device

@@ -20,6 +20,7 @@ from pmviewer.kernels.scene import (
     M_INNER,
     M_K_RGB,
     M_KIND,
+    M_MAPPED,
     M_NONLINEAR,
     M_REFLECTANCE,
     M_SPECULAR,
@@ -41,7 +42,8 @@ class MaterialParams(NamedTuple):
 
     kind int32; two_sided bool; reflectance, specular, transmittance, eta_rgb, k_rgb (red, green, blue); eta inside over
     outside; ax, ay GGX or Beckmann roughness (Schlick's α is its square); distribution int32; nonlinear bool; inner the
-    diffuse reflectance of a coat from below; table the address of the material's row in `bsdf_tables`.
+    diffuse reflectance of a coat from below; table the address of the material's row in `bsdf_tables`; mapped bool: a
+    normal or bump map tilts its normals.
     """
 
     kind: Any
@@ -58,6 +60,7 @@ class MaterialParams(NamedTuple):
     nonlinear: Any
     inner: Any
     table: Any
+    mapped: Any
 
 
 @device
@@ -80,6 +83,7 @@ def material_params(scene, material):
         load_f4(row, base + M_NONLINEAR) != _f4(0.0),
         load_f4(row, base + M_INNER),
         scene.bsdf_tables + np.int64(load_f4(row, base + M_TABLE)) * np.int64(4 * BSDF_TABLE_SIZE),
+        load_f4(row, base + M_MAPPED) != _f4(0.0),
     )
 
 

@@ -66,4 +66,5 @@ def texture_params(scene, material, prim, b1, b2, p):
         plain.nonlinear,
         plain.inner,
         plain.table,
+        plain.mapped,
     )

@@ -2,6 +2,9 @@
 
 A map may turn the shading normal so far that it points below the surface, where a BSDF is black on the lit side and
 bright on the other. `shading_frame` keeps it above; `reflecting_normal` keeps a mirror's reflection above as well.
+
+A mapped normal depends on where the surface is seen from: that is Mitsuba's picture, and not reciprocal. Photons see
+the surface from where they come, so methods differ a little where slopes face away from the camera or the light.
 """
 
 from __future__ import annotations
@@ -15,8 +18,10 @@ from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.scene import (
     M_BUMP_MAP,
     M_BUMP_SCALE,
+    M_MAPPED,
     M_NORMAL_MAP,
     MATERIAL_COLUMNS,
+    MIRRORED_MAPS,
 )
 from pmviewer.kernels.texture import texture_gradient, texture_rgb
 from pmviewer.kernels.uv import hit_tangents, hit_uv
@@ -67,17 +72,25 @@ def bumped(ns, dp_du, dp_dv, gradient):
 
 
 @device
-def shading_frame(scene, material, prim, b1, b2, p, ng, ns):
+def turned(n, axis):
+    """The unit vector n, turned by 180° about the unit vector `axis`."""
+    return along(scale(n, _f4(-1.0)), axis, _f4(2.0) * dot(n, axis))
+
+
+@device
+def shading_frame(scene, material, prim, b1, b2, p, ng, ns, wo):
     """Shading normal and unit tangent (along ∂p/∂u) at a hit, the material's normal and bump maps applied.
 
     ng, ns: the geometric and shading normals of `surface_at`, not yet turned towards anybody; b1, b2: the hit's
-    barycentric coordinates. The result is on ng's side. Without maps ns stays as it is.
+    barycentric coordinates; wo: where the surface is seen from. The result is on ng's side. Without maps ns stays as it
+    is; a mapped normal that would face away from wo leans the other way, as in Mitsuba.
     """
     dp_du, dp_dv = hit_tangents(scene, prim, p, ng)
     row = material * MATERIAL_COLUMNS
     normal_map = np.int64(load_f4(scene.materials, row + M_NORMAL_MAP))
     bump_map = np.int64(load_f4(scene.materials, row + M_BUMP_MAP))
     if normal_map >= 0 or bump_map >= 0:
+        smooth = ns
         u, v = hit_uv(scene, prim, b1, b2, p)
         if normal_map >= 0:
             c = texture_rgb(scene, normal_map, u, v)
@@ -91,6 +104,11 @@ def shading_frame(scene, material, prim, b1, b2, p, ng, ns):
             factor = load_f4(scene.materials, row + M_BUMP_SCALE)
             du, dv = texture_gradient(scene, bump_map, u, v)
             ns = bumped(ns, dp_du, dp_dv, (factor * du, factor * dv))
+        if dot(ng, wo) < _f4(0.0) and load_f4(scene.materials, row + M_MAPPED) == _f4(MIRRORED_MAPS):
+            # Whoever looks from behind turns the normal round: what it has along the surface is to stay.
+            ns = turned(ns, smooth)
+        if dot(smooth, wo) * dot(ns, wo) <= _f4(0.0):  # a slope that faces away
+            ns = turned(ns, smooth)
         ns = above(ns, ng)
     return ns, orthogonal(ns, dp_du)
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from pmviewer.kernels.bsdf import scatter_specular
 from pmviewer.kernels.jit import device
-from pmviewer.kernels.scene import DIFFUSE, material_kind, material_two_sided, reflectance
+from pmviewer.kernels.normal_map import reflecting_normal
+from pmviewer.kernels.scene import CONDUCTOR, DIFFUSE, material_kind, material_two_sided, reflectance
 from pmviewer.kernels.vector import dot, from_basis, scale
 from pmviewer.kernels.warp import square_to_cosine_hemisphere
 
@@ -37,14 +38,18 @@ class PlainBsdf(NamedTuple):
 def plain_bsdf(scene, material, ng, ns, wo):
     """The BSDF at a point with geometric and shading normals ng and ns, seen from wo."""
     albedo = reflectance(scene, material)
-    if material_kind(scene, material) != DIFFUSE:
+    kind = material_kind(scene, material)
+    if kind != DIFFUSE and kind != CONDUCTOR:
         return PlainBsdf(FOLLOWED, albedo, material, ns, ns)
     if dot(ng, wo) < _f4(0.0):
-        ns = (-ns[0], -ns[1], -ns[2])
+        ng, ns = scale(ng, _f4(-1.0)), scale(ns, _f4(-1.0))
         if not material_two_sided(scene, material):
             return PlainBsdf(NOTHING, albedo, material, ns, ns)
     if not albedo[0] + albedo[1] + albedo[2] > _f4(0.0):
         return PlainBsdf(NOTHING, albedo, material, ns, ns)
+    if kind == CONDUCTOR:
+        n = reflecting_normal(ns, ng, wo)
+        return PlainBsdf(FOLLOWED, albedo, material, n, n)
     return PlainBsdf(STORED, albedo, material, ns, ns)
 
 

@@ -52,6 +52,7 @@ __all__ = [
     "pick_group",
     "same_side",
     "shading_normal",
+    "transmits",
 ]
 
 
@@ -78,7 +79,7 @@ def _bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
 
         def textured(scene, prim, material, u, v, p, ng, ns, wo, glossy):
             numbers = texture_params(scene, material, prim, u, v, p)
-            ns, tangent = shading_frame(scene, material, prim, u, v, p, ng, ns)
+            ns, tangent = shading_frame(scene, material, prim, u, v, p, ng, ns, wo)
             return lobes.bsdf_at(scene, material, numbers, ng, ns, tangent, wo, glossy)
 
         return textured
@@ -187,6 +188,18 @@ def _pick_group(b, wo, u):
 
         return rich
     return lambda b, wo, u: (b.groups, _f4(1.0), u)
+
+
+def transmits(b):
+    """Whether the FOLLOWED lobes may transmit light."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(transmits)
+def _transmits(b):
+    if not is_plain(b):
+        return lambda b: lobes.bsdf_transmits(b)
+    return lambda b: False
 
 
 def compressed(b, wo, wi, f):

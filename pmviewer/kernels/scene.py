@@ -70,7 +70,7 @@ def scene_dtype(bsdfs: bool = False, lights: bool = False, instances: bool = Fal
         *(TEXTURE_FIELDS if textures else []),
         *(INSTANCE_FIELDS if instances else []),
     ]
-    # In front: numba takes code compiled for a record as good enough for longer ones that begin with the same fields.
+    # In front: to numba's types a longer record is also a shorter one that it begins with.
     return np.dtype([*extra, *_FIELDS], align=True)
 
 
@@ -86,10 +86,11 @@ GGX, BECKMANN = 0, 1
 MATERIAL_COLUMNS = 32
 M_KIND, M_TWO_SIDED, M_ETA, M_REFLECTANCE, M_TRANSMITTANCE = _columns[[0, 1, 2, 4, 8]]
 M_ALPHA_X, M_ALPHA_Y, M_ETA_RGB, M_NONLINEAR, M_K_RGB, M_DISTRIBUTION = _columns[[7, 11, 12, 15, 16, 19]]
-M_SPECULAR, M_TABLE, M_INNER = _columns[[20, 23, 31]]
+M_SPECULAR, M_TABLE, M_INNER, M_MAPPED = _columns[[20, 23, 31, 3]]
 """M_ETA_RGB, M_K_RGB: complex index of a conductor. M_SPECULAR: colour of a coat or of the glossy lobe; for a
 dielectric its absorption per unit length. M_TABLE: row of `bsdf_tables`. M_INNER: diffuse reflectance of a coat from
-below."""
+below. M_MAPPED: 0 without bump and normal maps, MIRRORED_MAPS with `Material.mirrored_maps`, else 1."""
+MIRRORED_MAPS = 2
 M_REFLECTANCE_MAP, M_SPECULAR_MAP, M_ALPHA_MAP, M_NORMAL_MAP, M_BUMP_MAP, M_BUMP_SCALE = _columns[24:30]
 M_TRANSMITTANCE_MAP = _columns[30]
 """The maps are texture numbers, -1 for none."""

@@ -34,7 +34,9 @@ QUADRIC_SIDE = 9
 STRAIGHT = _f4(0.9999)
 """Cosine between the normals from which a shading normal is the surface's own."""
 
-_LEAST_COSINES = _f4(1e-3)
+_LEAST_COSINES = _f4(1e-5)
+"""Bound on what a shading normal makes of one photon. It costs 6e-5 of the light on a surface whose shading normals are
+unlike its own all over; 1e-3 would cost 0.4 %."""
 
 OFFSET = _f4(2.0**-17)
 """Distance off the surface in units of the coordinates' size: 64 rounding errors of float32."""
@@ -108,20 +110,9 @@ def _stored_surface(scene, prim, u, v, ox, oy, oz, dx, dy, dz, t):
             max(abs(a[1]), max(abs(b[1]), abs(c[1]))),
             max(abs(a[2]), max(abs(b[2]), abs(c[2]))),
         )
-        ns = ng
-        if scene.normals != 0:
-            na = load3(scene.normals, base)
-            nb = load3(scene.normals, base + 3)
-            nc = load3(scene.normals, base + 6)
-            m = (
-                w * na[0] + u * nb[0] + v * nc[0],
-                w * na[1] + u * nb[1] + v * nc[1],
-                w * na[2] + u * nb[2] + v * nc[2],
-            )
-            if dot(m, m) > _f4(1e-12):
-                ns = normalize(m)
-                if dot(ns, ng) < _f4(0.0):
-                    ns = (-ns[0], -ns[1], -ns[2])
+        ns = interpolated_normal(scene, base, u, v, ng)
+        if dot(ns, ng) < _f4(0.0):
+            ns = (-ns[0], -ns[1], -ns[2])
         return p, ng, ns, gap
     j = np.int64(prim) - np.int64(scene.n_triangles)
     p = quadric_project(scene, j, ox + t * dx, oy + t * dy, oz + t * dz)
@@ -129,6 +120,19 @@ def _stored_surface(scene, prim, u, v, ox, oy, oz, dx, dy, dz, t):
     ng = quadric_normal(scene, j, p[0], p[1], p[2])
     ng = (side * ng[0], side * ng[1], side * ng[2])
     return p, ng, ng, gap_of(ng, abs(p[0]), abs(p[1]), abs(p[2]))
+
+
+@device
+def interpolated_normal(scene, base, u, v, ng):
+    """The vertex normals of the triangle whose numbers begin at `base`, interpolated; its normal ng if it has none."""
+    if scene.normals == 0:
+        return ng
+    a, b, c = load3(scene.normals, base), load3(scene.normals, base + 3), load3(scene.normals, base + 6)
+    w = _f4(1.0) - u - v
+    m = (w * a[0] + u * b[0] + v * c[0], w * a[1] + u * b[1] + v * c[1], w * a[2] + u * b[2] + v * c[2])
+    if dot(m, m) > _f4(1e-12):
+        return normalize(m)
+    return ng
 
 
 @device

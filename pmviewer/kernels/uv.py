@@ -165,11 +165,13 @@ def _triangle_tangents(scene, prim, ng):
     du1, dv1 = load_f4(scene.uvs, base + 2) - u0, load_f4(scene.uvs, base + 3) - v0
     du2, dv2 = load_f4(scene.uvs, base + 4) - u0, load_f4(scene.uvs, base + 5) - v0
     determinant = du1 * dv2 - dv1 * du2
-    if not abs(determinant) > _f4(0.0):  # also true of NaN: no coordinates
+    if determinant == _f4(0.0):
         return basis(ng)
     corner = np.int64(prim) * 9
     a = load3(scene.vertices, corner)
     e1, e2 = sub(load3(scene.vertices, corner + 3), a), sub(load3(scene.vertices, corner + 6), a)
+    if math.isnan(determinant):  # no coordinates: the barycentric ones
+        return e1, e2
     inv = _f4(1.0) / determinant
     return (
         sub(scale(e1, dv2 * inv), scale(e2, dv1 * inv)),

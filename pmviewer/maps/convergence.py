@@ -14,8 +14,7 @@ caustic, a coarser caustic does. The exponent m is 2 or 3. Three states come of 
 Radiances are compared as luminances of irradiance: the albedo of a diffuse surface cancels. L_c and D_c are those of
 the M nearest caustic photons. Other light is estimated from a sample of the photons that arrived, of all other path
 classes, for the maps need not have them (direct light is sampled, gather rays find the rest). D_r is the density at
-which density control stops storing, which the SETTLES of `pmviewer.maps.density_control` tell apart from that at which
-it comes to rest.
+which density control stops storing by the step.
 
 "All is converged" is said by light: when no more than UNFINISHED of the map's power lies at places that need MORE. A
 stray photon far from all others would otherwise keep the map from ever being finished.
@@ -33,7 +32,7 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.jit import kernel
 from pmviewer.kernels.vector import luminance
-from pmviewer.maps.density_control import FLATNESS, SPARSEST, M, needs_of
+from pmviewer.maps.density_control import FLATNESS, M, needs_of
 from pmviewer.maps.estimate import RIM_LEFT_OUT, irradiance_knn
 from pmviewer.maps.filters import CONSTANT
 from pmviewer.maps.kdtree import PhotonKdTree, build_kdtree
@@ -54,6 +53,8 @@ FEWEST = 200
 UNFINISHED = 0.01
 WIDEST = 0.25
 """Largest disc of the estimate of other light, relative to the scene's radius."""
+SPARSEST = 10.0
+"""Largest disc of the estimate of caustics, relative in area to that of M photons at the required density."""
 CHUNK = 1024
 
 Float = NDArray[np.float32]
@@ -67,12 +68,9 @@ _PI = _f8(np.pi)
 
 @dataclass(frozen=True)
 class Criterion:
-    """`exponent` m; `acceptance` rule and `farthest` of the density control (`pmviewer.maps.density_control`);
-    `scene_radius` in scene units; `classes`: bit set of the path classes that are caustics."""
+    """`exponent` m; `scene_radius` in scene units; `classes`: bit set of the path classes that are caustics."""
 
     exponent: int
-    acceptance: int
-    farthest: float
     scene_radius: float
     classes: int
 
@@ -98,13 +96,27 @@ def _classify(caustics, others, points, normals, needs, own, m, widest, i0, i1, 
     """States of points i0 … i1−1, (n, 3) with unit normals (n, 3) and needed densities (n,), into int8 (n,). own: 1
     where a photon of the map lies at each point, which says nothing about the density around it, else 0."""
     caustic, other = caustics[0], others[0]
-    k, cone = _i4(M) + _i4(own), _f4(1.0)
+    k, cone, whole = _i4(M) + _i4(own), _f4(1.0), _f4(1.0)
     for i in range(i0, i1):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
         reach = _f4(math.sqrt(_f8(SPARSEST * M) / (_PI * _f8(needs[i]))))
         r, g, b, count, radius = irradiance_knn(
-            caustic, x, y, z, nx, ny, nz, k, reach, FLATNESS, _i4(ALL_CLASSES), _i4(CONSTANT), cone, _i4(RIM_LEFT_OUT)
+            caustic,
+            x,
+            y,
+            z,
+            nx,
+            ny,
+            nz,
+            k,
+            reach,
+            FLATNESS,
+            _i4(ALL_CLASSES),
+            _i4(CONSTANT),
+            cone,
+            _i4(RIM_LEFT_OUT),
+            whole,
         )
         if count == 0:
             states[i] = NO_CAUSTIC
@@ -130,6 +142,7 @@ def _classify(caustics, others, points, normals, needs, own, m, widest, i0, i1, 
             _i4(CONSTANT),
             cone,
             _i4(RIM_LEFT_OUT),
+            whole,
         )
         of_all = of_caustic + _f8(luminance((r, g, b)))
         if rho * of_all**m >= of_caustic**m:  # also where the caustic photons have no power
@@ -149,7 +162,7 @@ class Convergence:
         photons per unit area; own: whether each is the place of a photon of the map."""
         how, n = self.criterion, len(points)
         points, normals = np.ascontiguousarray(points, np.float32), np.ascontiguousarray(normals, np.float32)
-        needs = needs_of(required, how.acceptance, how.farthest)
+        needs = needs_of(required)
         states, widest = np.empty(n, np.int8), np.float32(WIDEST * how.scene_radius)
         trees = self.tree.record, self.others.record
 

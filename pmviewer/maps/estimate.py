@@ -9,7 +9,8 @@ out before they count.
 With a fixed radius the sum is unbiased but for the blur. With the k nearest photons, r is the distance of the k-th, and
 the disc is known to end exactly at a photon: given r, the k−1 inner photons are independent and uniform in the disc, so
 that their sum alone is unbiased; stratified photons fill their disc more evenly and the rim photon counts half. Where
-fewer than k lie within the largest radius, that is the radius and nothing is corrected.
+fewer than k lie within the largest radius, that is the radius and nothing is corrected. How the disc shrinks from pass
+to pass is in `pmviewer.maps.nearest`.
 
 A pass may put millions of photons into one disc: float32 sums are short, and their sum is float64.
 """
@@ -30,7 +31,8 @@ from pmviewer.kernels.memory import (
 )
 from pmviewer.maps.filters import CONSTANT, filter_disc_mean, filter_weight
 from pmviewer.maps.grid import BLOCK_BYTES, ROW_BYTES, grid_ranges, lanes_between
-from pmviewer.maps.kdtree import KEYS, nearest
+from pmviewer.maps.kdtree import KEYS
+from pmviewer.maps.nearest import nearest_disc
 from pmviewer.maps.simd import WIDTH, add_power8, count_bits, facing8, within8
 from pmviewer.maps.stored import stored_power
 
@@ -41,7 +43,6 @@ RIM_LEFT_OUT, RIM_HALF, RIM_WHOLE = 0, 1, 2
 FLUSH = 64
 """Float32 sums take at most this many photons before they move to float64."""
 
-_FLATTEST = np.float32(1e-3)
 _f4 = np.float32
 _f8 = np.float64
 _i4 = np.int32
@@ -123,7 +124,7 @@ def irradiance_radius(grid, px, py, pz, nx, ny, nz, radius, flatness, class_mask
 
 
 @device
-def irradiance_knn(tree, px, py, pz, nx, ny, nz, k, max_radius, flatness, class_mask, filter_kind, cone_k, rim):
+def irradiance_knn(tree, px, py, pz, nx, ny, nz, k, max_radius, flatness, class_mask, filter_kind, cone_k, rim, share):
     """Irradiance from the k nearest photons, at most `max_radius` away.
 
     Parameters
@@ -132,33 +133,29 @@ def irradiance_knn(tree, px, py, pz, nx, ny, nz, k, max_radius, flatness, class_
     k: int32, 2 … MAX_K.
     max_radius: float32, finite.
     rim: int32, RIM_LEFT_OUT, RIM_HALF or RIM_WHOLE.
+    share: float32, the part of the disc's area in which photons count (`pmviewer.maps.nearest`), 1 for all of it.
     others: as for `irradiance_radius`. In a flattened disc the distance is max(d, |h|/flatness), which on the tangent
         plane is d.
 
     Returns
     -------
-    (E red, E green, E blue) float32, number of photons int32, radius float32.
+    (E red, E green, E blue) float32, number of photons int32, that on the rim included, radius float32.
     """
     keys = stack_i4(KEYS)
-    flatness = max(flatness, _FLATTEST)
-    steepness = _f4(1.0) / (flatness * flatness)
-    largest = max_radius * max_radius
-    count, r2 = nearest(tree, px, py, pz, k, largest, keys, True, nx, ny, nz, steepness, class_mask)
-    farthest = _i8(-1)
-    rim_factor = _f4(1.0)
-    if count == k:
-        for j in range(count):
-            farthest = max(farthest, stack_get_i8(keys, j))
-        rim_factor = _f4(rim) * _f4(0.5)
-    r2 = max(r2, tree.smallest_radius * tree.smallest_radius)
+    count, rim_place, r2 = nearest_disc(tree, px, py, pz, nx, ny, nz, k, max_radius, flatness, class_mask, share, keys)
     inverse_r2 = _f4(1.0) / r2
     red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
     for j in range(count):
         key = stack_get_i8(keys, j)
         r, g, b = stored_power(tree, key & _i8(0xFFFFFFFF))
         w = filter_weight(filter_kind, cone_k, float_of_bits(_u4(key >> 32)) * inverse_r2)
-        if key == farthest:
-            w *= rim_factor
+        red += w * r
+        green += w * g
+        blue += w * b
+    if rim_place >= 0:
+        count += 1
+        r, g, b = stored_power(tree, rim_place)
+        w = _f4(0.5) * _f4(rim) * filter_weight(filter_kind, cone_k, _f4(1.0))
         red += w * r
         green += w * g
         blue += w * b
@@ -206,6 +203,7 @@ def irradiance_at_knn(
     filter_kind,
     cone_k,
     rim,
+    share,
     i0,
     i1,
     irradiance,
@@ -234,6 +232,7 @@ def irradiance_at_knn(
             filter_kind,
             cone_k,
             rim,
+            share,
         )
         irradiance[i, 0], irradiance[i, 1], irradiance[i, 2] = red, green, blue
         counts[i] = count

@@ -21,11 +21,12 @@ from pmviewer.kernels.memory import (
     stack_get_i8,
     stack_i4,
 )
-from pmviewer.kernels.scattering import STORED, bsdf_f, shading_normal
+from pmviewer.kernels.scattering import FOLLOWED, bsdf_f, compressed, shading_normal
 from pmviewer.kernels.vector import dot, normalize
 from pmviewer.maps.filters import filter_disc_mean, filter_weight
 from pmviewer.maps.grid import BLOCK_BYTES, ROW_BYTES, grid_ranges, lanes_between
-from pmviewer.maps.kdtree import KEYS, nearest
+from pmviewer.maps.kdtree import KEYS
+from pmviewer.maps.nearest import nearest_disc
 from pmviewer.maps.record import decode_direction, decode_power
 from pmviewer.maps.simd import WIDTH, facing8, within8
 from pmviewer.maps.stored import stored_power
@@ -36,27 +37,33 @@ _i4 = np.int32
 _i8 = np.int64
 _u4 = np.uint32
 _PI = _f8(np.pi)
-_FLATTEST = _f4(1e-3)
-GRAZING = _f4(0.02)
+GRAZING = _f4(1e-3)
 """Least n_g·wi that the quotient of cosines divides by: a bound on what one photon can become."""
 
 
 @device
-def reflected_share(b, n, wo, wi):
-    """f times the quotient of cosines for light from wi, at a surface with geometric normal n towards wo."""
+def reflected_share(b, group, n, wo, wi):
+    """f of a group's lobes times the quotient of cosines for light from wi, at a surface with geometric normal n on the
+    side of wi."""
     shading = dot(shading_normal(b), wi)
+    f = bsdf_f(b, group, wo, wi)
+    if group == FOLLOWED:
+        shading = abs(shading)
+        f = compressed(b, wo, wi, f)
     if shading <= _f4(0.0):
         return _f4(0.0), _f4(0.0), _f4(0.0)
-    r, g, bl = bsdf_f(b, STORED, wo, wi)
+    r, g, bl = f
     s = shading / max(dot(n, wi), min(GRAZING, shading))
     return r * s, g * s, bl * s
 
 
 @device
-def radiance_radius(grid, p, n, radius, flatness, class_mask, filter_kind, cone_k, b, wo):
-    """Radiance towards wo reflected at p from all photons closer than `radius`; arguments as for `irradiance_radius`.
+def radiance_radius(grid, p, n, radius, flatness, class_mask, filter_kind, cone_k, b, group, flags, wo):
+    """Radiance towards wo scattered at p by a group of lobes from all photons closer than `radius`; arguments as for
+    `irradiance_radius`.
 
-    b is the BSDF of `pmviewer.kernels.scattering`; n the geometric normal on the side of wo.
+    b is the BSDF of `pmviewer.kernels.scattering`; n the geometric normal on the side where photons arrive. Only
+    photons that have all of the `flags` (`pmviewer.maps.record`) count.
     """
     radius = min(radius, grid.radius)
     r2 = radius * radius
@@ -74,7 +81,10 @@ def radiance_radius(grid, p, n, radius, flatness, class_mask, filter_kind, cone_
             while mask != 0:
                 lane = count_trailing_zeros(mask)
                 mask &= mask - _i4(1)
-                f = reflected_share(b, n, wo, normalize(decode_direction(load_u4(words, lane))))
+                word = load_u4(words, lane)
+                if _u4(word & flags) != flags:
+                    continue
+                f = reflected_share(b, group, n, wo, normalize(decode_direction(word)))
                 w = filter_weight(filter_kind, cone_k, stack_get_f4(squared, lane) * inverse_r2)
                 rg, last = load_u4(x + 4 * ROW_BYTES, lane), load_u4(x + 5 * ROW_BYTES, lane)
                 red += _f8(w * f[0] * decode_power(rg & _u4(0xFFFF)))
@@ -85,29 +95,36 @@ def radiance_radius(grid, p, n, radius, flatness, class_mask, filter_kind, cone_
 
 
 @device
-def radiance_knn(tree, p, n, k, max_radius, flatness, class_mask, filter_kind, cone_k, rim, b, wo):
-    """The same from the k nearest photons; arguments as for `irradiance_knn`."""
+def _scattered_power(tree, place, n, b, group, flags, wo):
+    """What the photon at a place adds, in units of the map's power; nothing without all of the flags."""
+    word = load_u4(tree.payload, 3 * place)
+    if _u4(word & flags) != flags:
+        return _f4(0.0), _f4(0.0), _f4(0.0)
+    power = stored_power(tree, place)
+    f = reflected_share(b, group, n, wo, normalize(decode_direction(word)))
+    return f[0] * power[0], f[1] * power[1], f[2] * power[2]
+
+
+@device
+def radiance_knn(tree, p, n, k, max_radius, flatness, class_mask, filter_kind, cone_k, rim, share, b, group, flags, wo):
+    """The same from the k nearest photons, whatever their flags; arguments as for `irradiance_knn`."""
     keys = stack_i4(KEYS)
-    flatness = max(flatness, _FLATTEST)
-    steepness = _f4(1.0) / (flatness * flatness)
-    largest = max_radius * max_radius
-    count, r2 = nearest(tree, p[0], p[1], p[2], k, largest, keys, True, n[0], n[1], n[2], steepness, class_mask)
-    farthest = _i8(-1)
-    if count == k:
-        for j in range(count):
-            farthest = max(farthest, stack_get_i8(keys, j))
-    r2 = max(r2, tree.smallest_radius * tree.smallest_radius)
+    count, rim_place, r2 = nearest_disc(
+        tree, p[0], p[1], p[2], n[0], n[1], n[2], k, max_radius, flatness, class_mask, share, keys
+    )
     red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
     for j in range(count):
         key = stack_get_i8(keys, j)
-        i = key & _i8(0xFFFFFFFF)
-        power = stored_power(tree, i)
-        f = reflected_share(b, n, wo, normalize(decode_direction(load_u4(tree.payload, 3 * i))))
         w = filter_weight(filter_kind, cone_k, float_of_bits(_u4(key >> 32)) / r2)
-        if key == farthest:
-            w *= _f4(rim) * _f4(0.5)
-        red += _f8(w * f[0] * power[0])
-        green += _f8(w * f[1] * power[1])
-        blue += _f8(w * f[2] * power[2])
+        r, g, bl = _scattered_power(tree, key & _i8(0xFFFFFFFF), n, b, group, flags, wo)
+        red += _f8(w * r)
+        green += _f8(w * g)
+        blue += _f8(w * bl)
+    if rim_place >= 0:
+        w = _f4(0.5) * _f4(rim) * filter_weight(filter_kind, cone_k, _f4(1.0))
+        r, g, bl = _scattered_power(tree, rim_place, n, b, group, flags, wo)
+        red += _f8(w * r)
+        green += _f8(w * g)
+        blue += _f8(w * bl)
     scale = _f8(tree.power_unit) / (_f8(filter_disc_mean(filter_kind, cone_k)) * _PI * _f8(r2))
     return _f4(red * scale), _f4(green * scale), _f4(blue * scale)

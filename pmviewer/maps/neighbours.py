@@ -24,19 +24,16 @@ from pmviewer.kernels.memory import (
     stack_get_i8,
     stack_put_f4,
     stack_put_i4,
-    stack_put_i8,
 )
 from pmviewer.maps.grid import BLOCK_BYTES, ROW_BYTES, grid_ranges, lanes_between
-from pmviewer.maps.kdtree import KEYS, nearest
+from pmviewer.maps.kdtree import KEYS
+from pmviewer.maps.nearest import nearest_disc
 from pmviewer.maps.record import decode_power
 from pmviewer.maps.simd import WIDTH, facing8, within8
 from pmviewer.maps.stored import stored_power
 
 FOUND_WORDS, SQUARED_WORDS, BATCH_WORDS = KEYS, WIDTH, 2 * WIDTH
 """int32 elements of the three pieces of scratch of a look-up: what was found, eight squared distances, the batch."""
-
-FLATTEST = np.float32(1e-3)
-"""The flattest disc: a flatness of nothing would leave out photons by rounding."""
 
 _f4 = np.float32
 _i4 = np.int32
@@ -50,13 +47,13 @@ def search(photons, eye, radius, p, n, class_mask, scratch):
     Parameters
     ----------
     photons: record of a grid (all photons within `radius`) or of a kd-tree (the k nearest within it).
-    eye: EYE_DTYPE record: `k` and `flatness`.
+    eye: EYE_DTYPE record: `k`, `share` and `flatness`.
     scratch: three pointers to FOUND_WORDS, SQUARED_WORDS and BATCH_WORDS words.
 
     Returns
     -------
     What `next_batch` needs to go on; the squared radius of the disc, float32; the place of the photon that ends it,
-    int64, −1 with a fixed radius or where there are fewer than k.
+    int64, −1 with a fixed radius, where there are fewer than k, and in a part of the disc.
     """
     raise NotImplementedError("only for kernels")
 
@@ -66,24 +63,22 @@ def _search(photons, eye, radius, p, n, class_mask, scratch):
     if "planes" in photons.fields:
 
         def k_nearest(photons, eye, radius, p, n, class_mask, scratch):
-            keys = scratch[0]
-            flatness = max(eye.flatness, FLATTEST)
-            steepness = _f4(1.0) / (flatness * flatness)
-            r2 = radius * radius
-            count, r2 = nearest(
-                photons, p[0], p[1], p[2], eye.k, r2, keys, True, n[0], n[1], n[2], steepness, class_mask
+            count, rim, r2 = nearest_disc(
+                photons,
+                p[0],
+                p[1],
+                p[2],
+                n[0],
+                n[1],
+                n[2],
+                eye.k,
+                radius,
+                eye.flatness,
+                class_mask,
+                eye.share,
+                scratch[0],
             )
-            rim = _i8(-1)
-            if count == eye.k:
-                last = _i8(0)
-                for j in range(1, count):
-                    if stack_get_i8(keys, j) > stack_get_i8(keys, last):
-                        last = _i8(j)
-                key = stack_get_i8(keys, last)
-                count -= 1
-                stack_put_i8(keys, last, stack_get_i8(keys, count))
-                rim = key & _i8(0xFFFFFFFF)
-            return count, max(r2, photons.smallest_radius * photons.smallest_radius), rim
+            return count, r2, rim
 
         return k_nearest
 

@@ -14,9 +14,10 @@ through its uint32 view:
 of mantissa: relative error 2⁻¹¹) in units of the map's `power_unit`; 1.0 is the power with which photons leave the
 lights, so that the range 2⁻⁴⁷ … 2¹⁷ fits any scene's scale.
 
-Flags: bit 7 the last scattering was specular; bit 6 there was a non-specular scattering before; bits 0–5 the number of
-scatterings so far (63 means 63 or more). They spell the path class: direct `LD` (neither bit), caustic `LS+D`
-(bit 7 alone), indirect (bit 6 alone), indirect caustic (both).
+Flags: bit 7 the last scattering was specular; bit 6 there was a non-specular scattering before. They spell the path
+class: direct `LD` (neither bit), caustic `LS+D` (bit 7 alone), indirect (bit 6 alone), indirect caustic (both). Bit 5:
+the photon came over mirrors and clear glass alone from a light that no ray can meet to a lobe that is followed, so that
+no path from the eye finds this light. Bits 0–4: the number of scatterings so far (31 means 31 or more).
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ BYTES_PER_PHOTON = 24
 
 LAST_SPECULAR = 0x80
 HAD_DIFFUSE = 0x40
-BOUNCES = 0x3F
+UNFOUND = 0x20
+BOUNCES = 0x1F
 
 DIRECT, CAUSTIC, INDIRECT, INDIRECT_CAUSTIC = 0, 2, 1, 3
 """Path classes as `flags >> 6`."""

@@ -157,7 +157,8 @@ def trace_pass(
     indirect_scale = direct_density / density if projection is not None else 1.0
     direct_scale = min(1.0, LARGEST_SCALE / indirect_scale)
     scales = indirect_scale * direct_scale, direct_scale
-    record = _record(settings, seed, first_index, filling, probability, has_specular, only_direct, scales)
+    unfound = scene.delta_lights and has_specular
+    record = _record(settings, seed, first_index, filling, probability, has_specular, only_direct, scales, unfound)
 
     last = traced if paths is None else min(traced, paths.n)
     normals = NORMALS if deposition is not None else GLOBAL_NORMALS if with_normals else NO_NORMALS
@@ -237,7 +238,8 @@ def guided_emission_of(
     passes; None where they are too few to test the lights."""
 
     def trace(table: NDArray[np.void], seed: int, i0: int, i1: int, n: int) -> Any:
-        record = _record(settings, seed, first_index, n, settings.q, has_specular, False, (1.0, 1.0))
+        unfound = scene.delta_lights and has_specular
+        record = _record(settings, seed, first_index, n, settings.q, has_specular, False, (1.0, 1.0), unfound)
         caustics, globals_, counts, ledger, *normals = _trace_batch(
             scene, record, table, i0, i1, n, has_specular, NORMALS, None
         )
@@ -270,6 +272,7 @@ def _record(
     has_specular: bool,
     only_direct: bool,
     scales: tuple[float, float],
+    unfound: bool = False,
 ) -> NDArray[np.void]:
     record = np.zeros(1, LIGHT_PASS_DTYPE)
     record[0] = (
@@ -285,6 +288,7 @@ def _record(
         settings.indirect_caustics,
         only_direct,
         *scales,
+        unfound,
     )
     return record
 

@@ -84,10 +84,10 @@ def concentric_from_polar(u, v):
 @device
 def _from_curved_light(scene, light, position, d, u):
     """A place on the light for a photon in direction d, kept with the cosine as probability."""
-    p, n, gap = light_point(scene, light, position[0], position[1])
+    p, n, front, gap = light_point(scene, light, position[0], position[1])
     L = light_vector(scene, light, L_RADIANCE)
     beta = scale(L, _f4(1.0) / luminance(L))
-    return leave(p, n, gap, d[0], d[1], d[2]), d, beta, u < dot(n, d)
+    return leave(p, n, gap, d[0], d[1], d[2]), d, beta, dot(front, d) > _f4(0.0) and u < abs(dot(n, d))
 
 
 def emission(scene, projection, i, sequence, seed, index, u_pick, position, direction):

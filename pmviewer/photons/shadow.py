@@ -5,7 +5,8 @@ later surface on its way that faces the light lies in shadow there. Mirrors and 
 does: what passes them is not direct light. Surfaces whose direct light nobody samples (smooth mirrors and glass) keep
 no photons.
 
-The photons tell nothing but visibility; they do not depend on the pass, so that one set serves them all.
+The photons tell nothing but visibility. Each pass has its own: what a set misses between its photons is another thing
+in the next, so that the mean over passes keeps the bias of a pass and loses the chance in it.
 """
 
 from __future__ import annotations
@@ -87,17 +88,18 @@ def trace_shadows(scenes, seed, glossy, i0, i1, out, counts):
             p = leave(q, face(ng, wi), gap, d[0], d[1], d[2])
 
 
-def shadow_pass(scene: FlatScene, seed: int, N: int, glossy: float, run: Runner) -> ShadowPhotons:
-    """Shadow photons of N photons from the lights, the same for any number of threads."""
+def shadow_pass(scene: FlatScene, seed: int, first: int, N: int, glossy: float, run: Runner) -> ShadowPhotons:
+    """Shadow photons of the N photons from the lights that begin with number `first`, the same for any number of
+    threads."""
 
     def batch(i0: int) -> Callable[[], Any]:
         def task() -> tuple[NDArray[np.float32], int]:
-            i1 = min(i0 + BATCH, N)
+            i1 = min(i0 + BATCH, first + N)
             out, counts = np.empty((MOST_HITS * (i1 - i0), 6), np.float32), np.zeros(2, np.int64)
             trace_shadows(scene.record, np.uint32(seed & 0xFFFFFFFF), np.float32(glossy), i0, i1, out, counts)
             return out[: counts[0]].copy(), int(counts[1])
 
         return task
 
-    results = run([batch(i0) for i0 in range(0, N, BATCH)])
+    results = run([batch(i0) for i0 in range(first, first + N, BATCH)])
     return ShadowPhotons(np.concatenate([photons for photons, _ in results]), sum(rays for _, rays in results))

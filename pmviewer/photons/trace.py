@@ -11,8 +11,10 @@ threads and any batch size (T2). Dimension set 0 is emission, set 1 + b the b-th
 from __future__ import annotations
 
 import numpy as np
+from numba.extending import overload
 
 from pmviewer.kernels.jit import device, kernel
+from pmviewer.kernels.light import is_delta_light
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.raycast import closest_hit
@@ -23,6 +25,7 @@ from pmviewer.kernels.scattering import (
     attenuation,
     bsdf_at,
     bsdf_sample,
+    is_delta,
     pick_group,
     same_side,
     shading_normal,
@@ -36,12 +39,13 @@ from pmviewer.maps.record import (
     HAD_DIFFUSE,
     INDIRECT_CAUSTIC,
     LAST_SPECULAR,
+    UNFOUND,
     encode_direction,
     encode_power,
 )
 from pmviewer.photons.paths import begin_path, extend_path
 from pmviewer.photons.projected import emission
-from pmviewer.photons.roulette import EQUAL, MOST_COPIES, copies, survival_probability
+from pmviewer.photons.roulette import BY_LUMINANCE, EQUAL, MOST_COPIES, copies, survival_probability
 
 _f4 = np.float32
 _f8 = np.float64
@@ -65,6 +69,7 @@ LIGHT_PASS_DTYPE = np.dtype(
         ("only_direct", "i4"),  # whether the trajectories that don't fill the global map end where they meet it
         ("indirect_scale", "f4"),  # factor for the power of indirect caustics in the units of the caustic map
         ("direct_scale", "f4"),  # the same for caustics straight from a light
+        ("unfound", "i4"),  # whether followed lobes store what no path from the eye finds (`pmviewer.maps.record`)
     ],
     align=True,
 )
@@ -93,6 +98,29 @@ def _store(out, row, p, wi, beta, flags, light):
     out[row, 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
 
 
+def _on_the_way(scene, material, ng, d, t, beta, worth, counts, ledgers, book):
+    """beta after the way to a surface (`attenuation`), what was lost on it booked; black when it is no number."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(_on_the_way)
+def _book_the_way(scene, material, ng, d, t, beta, worth, counts, ledgers, book):
+    if "bsdfs" not in scene.fields:
+        return lambda scene, material, ng, d, t, beta, worth, counts, ledgers, book: beta
+
+    def booked(scene, material, ng, d, t, beta, worth, counts, ledgers, book):
+        before = luminance(beta)
+        beta = attenuation(scene, material, ng, d, t, beta)
+        if not is_good(beta):
+            counts[C_DROPPED] += 1
+            ledgers[book, E_DROPPED] += _f8(before * worth)
+            return _f4(0.0), _f4(0.0), _f4(0.0)
+        ledgers[book, E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
+        return beta
+
+    return booked
+
+
 @kernel
 def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, caustic_out, counts, ledgers, paths):
     """Trace photons i0 … i1−1 of a pass.
@@ -114,7 +142,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
         if counts[C_GLOBAL] + most > len(global_out) or counts[C_CAUSTIC] + most > len(caustic_out):
             return i
         to_global = i < pass_.global_trajectories
-        ledger = ledgers[0 if to_global else 1]
+        book = 0 if to_global else 1
         place = np.int64(pass_.first_index) + np.int64(i)
         index, seed = _u4(place), pass_.seed
         if place >> 32 != 0:  # a Sobol set has 2³² points; the next photons use other sets
@@ -125,45 +153,43 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
         p, d, beta, light, kept, worth = emission(
             scene, projection, i, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1)
         )
-        ledger[E_EMITTED] += _f8(worth)  # its luminance is 1
+        ledgers[book, E_EMITTED] += _f8(worth)  # its luminance is 1
         if not is_good(beta):
             counts[C_DROPPED] += 1
-            ledger[E_DROPPED] += _f8(worth)
+            ledgers[book, E_DROPPED] += _f8(worth)
             continue
         if not kept:
-            ledger[E_ESCAPED] += _f8(worth)
+            ledgers[book, E_ESCAPED] += _f8(worth)
             continue
         begin_path(paths, i, p, d, scale(beta, worth), light)
         o = p
         flags = _u4(0)
         bounces = 0
+        deltas = pass_.unfound != 0 and is_delta_light(scene, light)  # and nothing but deltas since the light
         while True:
             t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), _INF)
             counts[C_RAYS] += 1
             if prim < 0:
                 extend_path(paths, i, prim, o, d, scale(beta, worth), _u4(flags | _u4(min(bounces, BOUNCES))), light)
-                ledger[E_ESCAPED] += _f8(luminance(beta) * worth)
+                ledgers[book, E_ESCAPED] += _f8(luminance(beta) * worth)
                 break
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
-            before = luminance(beta)
-            beta = attenuation(scene, material, ng, d, t, beta)
-            if not is_good(beta):
-                counts[C_DROPPED] += 1
-                ledger[E_DROPPED] += _f8(before * worth)
-                break
-            ledger[E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
+            beta = _on_the_way(scene, material, ng, d, t, beta, worth, counts, ledgers, book)
             extend_path(paths, i, prim, p, d, scale(beta, worth), _u4(flags | _u4(min(bounces, BOUNCES))), light)
             wi = (-d[0], -d[1], -d[2])
             b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
             if b.groups == NOTHING or not luminance(beta) > _f4(0.0):
-                ledger[E_ABSORBED] += _f8(luminance(beta) * worth)
+                ledgers[book, E_ABSORBED] += _f8(luminance(beta) * worth)
                 break
             ng = face(ng, wi)
             u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
-            if b.groups & STORED != 0:
+            unfound = deltas and bounces > 0 and b.groups & FOLLOWED != 0 and not is_delta(b)
+            if b.groups & STORED != 0 or unfound:
                 path_class = np.int32(flags >> _u4(6))
                 word = _u4(flags | _u4(min(bounces, BOUNCES)))
+                if unfound:
+                    word = _u4(word | _u4(UNFOUND))
                 is_caustic = path_class == CAUSTIC or (path_class == INDIRECT_CAUSTIC and pass_.indirect_caustics != 0)
                 times, stored = 1, beta
                 if pass_.roulette == EQUAL:
@@ -179,22 +205,27 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                         if len(normals_out[1]) > 0:
                             normals_out[1][counts[C_CAUSTIC]] = encode_direction(ng[0], ng[1], ng[2])
                         counts[C_CAUSTIC] += 1
-                if to_global and (
-                    pass_.store_probability >= _f4(1.0)
-                    or draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
+                if (
+                    to_global
+                    and b.groups & STORED != 0
+                    and (
+                        pass_.store_probability >= _f4(1.0)
+                        or draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
+                    )
                 ):
                     for _ in range(times):
                         _store(global_out, counts[C_GLOBAL], p, wi, stored, word, light)
                         if len(normals_out[0]) > 0:
                             normals_out[0][counts[C_GLOBAL]] = encode_direction(ng[0], ng[1], ng[2])
                         counts[C_GLOBAL] += 1
-                ledger[E_STORED] += _f8(luminance(beta) * worth)
+                ledgers[book, E_STORED] += _f8(luminance(beta) * worth)
             before = luminance(beta)
             group, share, u_lobe = pick_group(b, wi, u_lobe)
+            deltas = deltas and group == FOLLOWED and is_delta(b)
             if group == FOLLOWED:
                 flags = _u4(flags | _u4(LAST_SPECULAR))
             elif not to_global and pass_.only_direct != 0:
-                ledger[E_TERMINATED] += _f8(before * worth)
+                ledgers[book, E_TERMINATED] += _f8(before * worth)
                 break
             else:
                 flags = _u4(HAD_DIFFUSE)
@@ -206,17 +237,18 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
             after = scale(mul(beta, weight), share)
             if not is_good(after):
                 counts[C_DROPPED] += 1
-                ledger[E_DROPPED] += _f8(before * worth)
+                ledgers[book, E_DROPPED] += _f8(before * worth)
                 break
             survival = survival_probability(pass_.roulette, before, beta, after)
             if not u2 < survival:
-                ledger[E_ABSORBED] += _f8(before * worth)
+                ledgers[book, E_ABSORBED] += _f8(before * worth)
                 break
             beta = scale(after, _f4(1.0) / survival)
-            ledger[E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
+            if pass_.roulette != BY_LUMINANCE or not survival < _f4(1.0):  # else it stays
+                ledgers[book, E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
             bounces += 1
             if bounces >= max_bounces:
-                ledger[E_TERMINATED] += _f8(luminance(beta) * worth)
+                ledgers[book, E_TERMINATED] += _f8(luminance(beta) * worth)
                 break
             o = leave(p, ng, gap, d[0], d[1], d[2])
     return i1

@@ -23,6 +23,7 @@ from pmviewer.kernels.scattering import (
     bsdf_sample,
     chain_numbers,
     is_lambertian,
+    same_side,
     shading_normal,
 )
 from pmviewer.kernels.scene import material_of
@@ -92,6 +93,8 @@ def uncovered_hit(scene, eye, cache, pixel, counts):
             break
         u_lobe, bu, bv, u_end = chain_numbers(scene, eye.sequence, seed, index, CHAIN_SET + depth)
         d, weight, _, compression = bsdf_sample(scene, b, FOLLOWED, wo, u_lobe, bu, bv)
+        if same_side(b, FOLLOWED, ng, wo, d) == 0:
+            break
         beta = scale(mul(beta, weight), compression)
         if b.groups & STORED != 0 and depth >= FORKS:
             survival = min(largest(beta), _f4(1.0))

@@ -79,7 +79,7 @@ def stored_hit(scene, eye, pixel):
         if b.groups == NOTHING:
             break
         d, weight, _, _ = bsdf_sample(scene, b, FOLLOWED, wo, half, half, half)
-        if not largest(weight) > _f4(0.0):
+        if not largest(weight) > _f4(0.0) or same_side(b, FOLLOWED, face(ng, wo), wo, d) == 0:
             break
         o = leave(p, face(ng, wo), gap, d[0], d[1], d[2])
         near, far = _f4(0.0), _INF
@@ -151,6 +151,7 @@ def _looked_up(photons, eye, radius, p, n, class_mask):
                 eye.filter,
                 eye.cone_k,
                 eye.rim,
+                eye.share,
             )
             return r, _f4(count)
 

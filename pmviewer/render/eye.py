@@ -27,6 +27,7 @@ from pmviewer.kernels.scattering import (
     bsdf_sample,
     chain_numbers,
     is_delta,
+    same_side,
     shading_normal,
 )
 from pmviewer.kernels.scene import light_of, material_of
@@ -37,7 +38,7 @@ from pmviewer.render.choice import BY_POWER, LIST_WORDS, choose_by_power, choose
 from pmviewer.render.direct import BLACK, found_light, light_samples
 from pmviewer.render.guide import AIM_WORDS, aim
 from pmviewer.render.record import C_DROPPED, C_RAYS, C_SAVED, C_SHADOW_RAYS
-from pmviewer.render.reflect import reflected
+from pmviewer.render.reflect import reflected, unfound
 
 _f4 = np.float32
 _f8 = np.float64
@@ -228,9 +229,15 @@ def eye_pass(
                 if eye.caustic_mask != 0:
                     L = reflected(caustic_map, eye, eye.caustic_radius, p, ng, b, wo, eye.caustic_mask)
                     deposit(film, counts, pixel, CAUSTIC if whole else SPECULAR, mul(beta, L))
-                if eye.global_mask != 0:
-                    L = reflected(global_map, eye, eye.global_radius, p, ng, b, wo, eye.global_mask)
-                    deposit(film, counts, pixel, INDIRECT if whole else SPECULAR, mul(beta, L))
+                for k in range(3):  # a loop, so that the look-up is compiled once
+                    mask, term = eye.global_mask, INDIRECT
+                    if k == 1:
+                        mask, term = eye.direct_mask, DIRECT
+                    elif k == 2:
+                        mask, term = eye.global_caustics, CAUSTIC
+                    if mask != 0:
+                        L = reflected(global_map, eye, eye.global_radius, p, ng, b, wo, mask)
+                        deposit(film, counts, pixel, term if whole else SPECULAR, mul(beta, L))
                 n = gather
                 if eye.direct != 0:
                     n = max(n, n_bsdf)
@@ -274,7 +281,10 @@ def eye_pass(
             if b.groups & FOLLOWED == 0 or depth == eye.max_depth:
                 break
             u_lobe, bu, bv, u_end = chain_numbers(scene, eye.sequence, seed, index, CHAIN_SET + depth)
-            if not is_delta(b) and eye.direct != 0:
+            if not is_delta(b) and eye.unfound != 0:
+                L = unfound(caustic_map, eye, eye.caustic_radius, p, ng, b, wo)
+                deposit(film, counts, pixel, SPECULAR, mul(beta, L))
+            if not is_delta(b) and eye.followed_direct != 0:
                 choice = choose_by_power(lights, eye.light_samples)
                 u_pick, cu, cv, _ = draw4(eye.sequence, seed, index, CHAIN_LIGHT_SET + depth)
                 L, rays, saved = light_samples(
@@ -300,9 +310,11 @@ def eye_pass(
                 counts[C_SAVED] += saved
                 deposit(film, counts, pixel, SPECULAR, mul(beta, L))
             d, weight, pdf, compression = bsdf_sample(scene, b, FOLLOWED, wo, u_lobe, bu, bv)
-            if eye.direct == 0:
+            if eye.followed_direct == 0:
                 pdf = _f4(0.0)
             beta = scale(mul(beta, weight), compression)
+            if same_side(b, FOLLOWED, ng, wo, d) == 0:  # the lobe of a shading normal may dip below the surface
+                break
             if b.groups & STORED != 0 and depth >= FORKS:
                 survival = min(largest(beta), _f4(1.0))
                 if not u_end < survival:

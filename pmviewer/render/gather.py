@@ -18,6 +18,7 @@ from pmviewer.kernels.scattering import (
     bsdf_sample,
     chain_numbers,
     followed_share,
+    same_side,
 )
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face
@@ -84,6 +85,8 @@ def gather_light(scene, eye, photons, sites, corner, shadows, caustic_map, choic
             break
         u_lobe, bu, bv, u_end = chain_numbers(scene, eye.sequence, seed, index, GATHER_CHAIN_SET + depth)
         d, weight, _, compression = bsdf_sample(scene, b, FOLLOWED, wo, u_lobe, bu, bv)
+        if same_side(b, FOLLOWED, face(nq, wo), wo, d) == 0:
+            break
         beta = scale(mul(beta, weight), compression)
         if b.groups & STORED != 0:  # the chain forks: thin it out
             survival = min(followed_share(b, wo), _f4(1.0))

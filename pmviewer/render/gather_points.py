@@ -8,7 +8,16 @@ from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.raycast import closest_hit
-from pmviewer.kernels.scattering import FOLLOWED, NOTHING, STORED, attenuation, bsdf_at, bsdf_sample, chain_numbers
+from pmviewer.kernels.scattering import (
+    FOLLOWED,
+    NOTHING,
+    STORED,
+    attenuation,
+    bsdf_at,
+    bsdf_sample,
+    chain_numbers,
+    same_side,
+)
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.kernels.vector import dot, largest, mul, scale
@@ -144,6 +153,8 @@ def gather_points(
             break
         u_lobe, bu, bv, u_end = chain_numbers(scene, eye.sequence, seed, index, CHAIN_SET + depth)
         d, weight, _, compression = bsdf_sample(scene, b, FOLLOWED, wo, u_lobe, bu, bv)
+        if same_side(b, FOLLOWED, ng, wo, d) == 0:
+            break
         beta = scale(mul(beta, weight), compression)
         if b.groups & STORED != 0 and depth >= FORKS:
             survival = min(largest(beta), _f4(1.0))

@@ -59,6 +59,7 @@ def _irradiance(photons, eye, radius, p, n, class_mask):
                 eye.filter,
                 eye.cone_k,
                 eye.rim,
+                eye.share,
             )
             return r, g, b
 

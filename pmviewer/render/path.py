@@ -1,8 +1,8 @@
 """A plain path tracer, the yardstick (R12): next-event estimation with MIS, Russian roulette, no photons.
 
 Its samples are sorted into the same terms as the photon methods': a path is a caustic when it leaves the first diffuse
-surface and reaches the light over followed lobes alone (mirrors, glass, see `pmviewer.kernels.scattering`), indirect
-when it meets another diffuse surface.
+surface over followed lobes (mirrors, glass, see `pmviewer.kernels.scattering`) and reaches the light over these alone,
+or with `photons.indirect_caustics` whatever it meets after them; indirect when it meets another diffuse surface else.
 """
 
 from __future__ import annotations
@@ -52,13 +52,14 @@ FIRST_SET = np.int64(2)
 
 
 @device
-def term_of(mirrored, stored, since_stored):
-    """The term of light that arrives after the lobes that a path took."""
+def term_of(eye, mirrored, stored, by_chain):
+    """The term of light that arrives after the lobes that a path took: `stored` of those that photons are stored for,
+    with followed ones before (`mirrored`) and right after (`by_chain`) the first of them."""
     if mirrored:
         return SPECULAR
-    if stored == 1:
-        return DIRECT if since_stored == 0 else CAUSTIC
-    return INDIRECT
+    if by_chain and (stored == 1 or eye.indirect_caustics != 0):
+        return CAUSTIC
+    return DIRECT if stored == 1 else INDIRECT
 
 
 @kernel
@@ -75,7 +76,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
         beta = (_f4(1.0), _f4(1.0), _f4(1.0))
         stored = 0  # how often the path took lobes that photons are stored for
         mirrored = False  # whether it took a followed lobe before the first of these
-        since_stored = 0  # followed lobes since the last of these
+        by_chain = False  # whether it took one right after the first of these
         pdf = _f4(0.0)  # of the last direction, 0 if the lobe is a delta
         origin = o
         for depth in range(eye.max_depth + 1):
@@ -83,7 +84,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
             counts[C_RAYS] += 1
             term = EMISSION
             if depth > 0:
-                term = term_of(mirrored, stored, since_stored)
+                term = term_of(eye, mirrored, stored, by_chain)
             light = scene.environment if prim < 0 else light_of(scene, prim)
             p, ng, ns, gap = o, d, d, near
             if prim >= 0:
@@ -114,10 +115,9 @@ def path_pass(scenes, eyes, film, counts, first, last):
             beta = scale(beta, share)
             if group == FOLLOWED:
                 mirrored = mirrored or stored == 0
-                since_stored += 1
+                by_chain = by_chain or stored == 1
             else:
                 stored += 1
-                since_stored = 0
             if group == STORED or not is_delta(b):
                 u_pick, lu, lv, _ = draw4(eye.sequence, seed, index, FIRST_SET + 1 + 2 * depth)
                 L, rays, _ = light_samples(
@@ -125,7 +125,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 )
                 counts[C_RAYS] += rays
                 counts[C_SHADOW_RAYS] += rays
-                term = term_of(mirrored, stored, since_stored)
+                term = term_of(eye, mirrored, stored, by_chain)
                 deposit(film, counts, pixel, term, mul(beta, L))
             d, weight, pdf, compression = bsdf_sample(scene, b, group, wo, u_lobe, u0, u1)
             beta = scale(mul(beta, weight), compression)

@@ -23,7 +23,8 @@ EYE_DTYPE = np.dtype(
         ("max_depth", "i4"),
         ("glossy", "f4"),  # roughness from which glossy lobes are looked up
         ("outline_rays", "i4"),  # camera rays for emission in pixels on a light's outline
-        ("direct", "i4"),  # whether direct light is sampled
+        ("direct", "i4"),  # whether direct light is sampled at lobes that photons are stored for
+        ("followed_direct", "i4"),  # and at those that are followed
         ("light_samples", "i4"),
         ("mis", "i4"),
         ("choice", "i4"),  # of lights: index into `pmviewer.render.choice.CHOICES`
@@ -32,7 +33,11 @@ EYE_DTYPE = np.dtype(
         ("biased", "i4"),  # whether lights without photons near are left out
         ("choice_radius", "f4"),
         ("caustic_mask", "i4"),  # path classes shown from the caustic map, 0 for none
-        ("global_mask", "i4"),  # path classes shown directly from the global map
+        ("unfound", "i4"),  # whether followed lobes look up what no path finds (`pmviewer.render.reflect.unfound`)
+        ("global_mask", "i4"),  # path classes shown directly from the global map, as indirect light
+        ("direct_mask", "i4"),  # and as direct light
+        ("global_caustics", "i4"),  # and as caustics
+        ("indirect_caustics", "i4"),  # whether caustics after a diffuse bounce belong to the term "caustic"
         ("gather_rays", "i4"),  # final-gather rays, 0 for none
         ("gather_specular", "i4"),  # whether gather rays follow mirrors and glass
         ("guided_rays", "i4"),  # how many of them photons guide
@@ -41,7 +46,8 @@ EYE_DTYPE = np.dtype(
         ("corner", "f4"),  # gather rays shorter than this gather again where they land
         ("filter", "i4"),
         ("rim", "i4"),
-        ("k", "i4"),
+        ("k", "i4"),  # nearest photons that are looked up in this pass
+        ("share", "f4"),  # of their disc's area, in which they count
         ("cone_k", "f4"),
         ("flatness", "f4"),
         ("boundary", "f4"),  # what photons on a convex hull's boundary count

@@ -7,34 +7,73 @@ from numba.extending import overload
 
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.plain_bsdf import INV_PI
-from pmviewer.kernels.scattering import is_lambertian, is_plain, shading_normal
+from pmviewer.kernels.scattering import FOLLOWED, STORED, is_lambertian, is_plain, shading_normal, transmits
 from pmviewer.kernels.surface import STRAIGHT
-from pmviewer.kernels.vector import dot, mul, scale
+from pmviewer.kernels.vector import add, dot, mul, scale
 from pmviewer.maps.glossy import radiance_knn, radiance_radius
+from pmviewer.maps.record import CAUSTIC, UNFOUND
 from pmviewer.maps.stored import ALL_CLASSES
 from pmviewer.render.lookup import gathered_irradiance, irradiance
 
 _f4 = np.float32
 
 
-@device
-def _by_radius(photons, eye, radius, p, n, b, wo, class_mask):
-    return radiance_radius(photons, p, n, radius, eye.flatness, class_mask, eye.filter, eye.cone_k, b, wo)
+_u4 = np.uint32
+_BLACK = (_f4(0.0), _f4(0.0), _f4(0.0))
+_CAUSTICS = np.int32(1 << CAUSTIC)
 
 
 @device
-def _by_nearest(photons, eye, radius, p, n, b, wo, class_mask):
-    return radiance_knn(photons, p, n, eye.k, radius, eye.flatness, class_mask, eye.filter, eye.cone_k, eye.rim, b, wo)
+def _by_radius(photons, eye, radius, p, n, b, group, flags, wo, class_mask):
+    how = eye.filter, eye.cone_k
+    return radiance_radius(photons, p, n, radius, eye.flatness, class_mask, how[0], how[1], b, group, flags, wo)
+
+
+@device
+def _by_nearest(photons, eye, radius, p, n, b, group, flags, wo, class_mask):
+    how = eye.filter, eye.cone_k, eye.rim, eye.share
+    return radiance_knn(photons, p, n, eye.k, radius, eye.flatness, class_mask, *how, b, group, flags, wo)
+
+
+def _photon_by_photon(photons):
+    """The search for the kind of map that the type of its record says."""
+    return _by_nearest if "planes" in photons.fields else _by_radius
+
+
+def unfound(photons, eye, radius, p, n, b, wo):
+    """Radiance towards wo by the FOLLOWED lobes of the BSDF b, which are no deltas, from those photons of the caustic
+    map that stand for light which no path from the eye finds: from point, spot and directional lights over mirrors and
+    clear glass alone. Light samples at p see through neither, and no ray from p meets such a light.
+
+    Arguments as for `reflected`. Rough glass takes photons on both of its sides.
+    """
+    raise NotImplementedError("only for kernels")
+
+
+@overload(unfound)
+def _unfound(photons, eye, radius, p, n, b, wo):
+    if is_plain(b):
+        return lambda photons, eye, radius, p, n, b, wo: _BLACK
+    each = _photon_by_photon(photons)
+
+    def from_both_sides(photons, eye, radius, p, n, b, wo):
+        L = each(photons, eye, radius, p, n, b, FOLLOWED, _u4(UNFOUND), wo, _CAUSTICS)
+        if transmits(b):
+            behind = scale(n, _f4(-1.0))
+            L = add(L, each(photons, eye, radius, p, behind, b, FOLLOWED, _u4(UNFOUND), wo, _CAUSTICS))
+        return L
+
+    return from_both_sides
 
 
 def _rich(photons):
     """`reflected` for materials of all kinds, by the type of the map's record."""
-    each = _by_nearest if "planes" in photons.fields else _by_radius
+    each = _photon_by_photon(photons)
 
     def any_bsdf(photons, eye, radius, p, n, b, wo, class_mask):
         if is_lambertian(b) and dot(shading_normal(b), n) > STRAIGHT:
             return scale(mul(b.albedo, irradiance(photons, eye, radius, p, n, class_mask)), INV_PI)
-        return each(photons, eye, radius, p, n, b, wo, class_mask)
+        return each(photons, eye, radius, p, n, b, STORED, _u4(0), wo, class_mask)
 
     return any_bsdf
 

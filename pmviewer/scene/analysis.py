@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pmviewer.scene.description import Environment, Material, Scene
+from pmviewer.scene.description import DirectionalLight, Environment, Material, PointLight, Scene, SpotLight
 from pmviewer.scene.material_row import is_rich, used_materials
 
 
@@ -12,7 +12,8 @@ from pmviewer.scene.material_row import is_rich, used_materials
 class SceneTraits:
     """`has_specular`: a smooth or transparent surface that can make caustics; `has_diffuse`: a surface that photons can
     be stored on whatever the settings; `many_lights`: more than one light to choose from; `rich`: materials beyond
-    diffuse, mirrors that reflect the same at all angles, and clear smooth glass.
+    diffuse, mirrors that reflect the same at all angles, and clear smooth glass; `has_delta`: a smooth mirror, glass or
+    coat; `has_rough_glass`; `has_delta_lights`: point, spot or directional lights, which no ray can meet.
 
     `glossy_roughness`: the roughness of every glossy reflection, ascending; those below the setting `glossy` are
     followed like mirrors, the others store photons.
@@ -25,6 +26,9 @@ class SceneTraits:
     n_lights: int
     rich: bool = False
     glossy_roughness: tuple[float, ...] = ()
+    has_delta: bool = False
+    has_rough_glass: bool = False
+    has_delta_lights: bool = False
 
     @property
     def many_lights(self) -> bool:
@@ -37,6 +41,15 @@ class SceneTraits:
     def stores(self, glossy: float) -> bool:
         """Are photons stored for any lobe, when roughness from `glossy` on is stored?"""
         return self.has_diffuse or any(alpha >= glossy for alpha in self.glossy_roughness)
+
+    def unfound(self, glossy: float) -> bool:
+        """Is there light on followed lobes that no path from the eye finds: from lights that no ray can meet, over
+        smooth mirrors or glass alone, on a lobe that is followed but not smooth?"""
+        return self.has_delta_lights and self.has_delta and self.follows_rough(glossy)
+
+    def follows_rough(self, glossy: float) -> bool:
+        """Are lobes followed that are not smooth, when roughness from `glossy` on is stored?"""
+        return self.has_rough_glass or any(alpha < glossy for alpha in self.glossy_roughness)
 
 
 def glossy_roughness(material: Material) -> float | None:
@@ -56,6 +69,10 @@ def _always_followed(material: Material) -> bool:
     return material.transparent and max(*material.reflectance, *material.transmittance) > 0
 
 
+def _is_delta(material: Material) -> bool:
+    return _always_followed(material) and material.kind != "rough dielectric"
+
+
 def _has_diffuse_lobe(material: Material) -> bool:
     based = ("diffuse", "plastic", "rough plastic", "schlick", "ward")
     return material.kind in based and max(material.reflectance) > 0
@@ -71,5 +88,8 @@ def analyse(scene: Scene) -> SceneTraits:
         has_smooth_normals=any(getattr(s.geometry, "normals", None) is not None for s in scene.all_shapes),
         n_lights=len(scene.lights) + sum(s.radiance is not None and max(s.radiance) > 0 for s in scene.shapes),
         rich=is_rich(scene),
+        has_delta=any(_is_delta(m) for m in used),
+        has_rough_glass=any(_always_followed(m) and m.kind == "rough dielectric" for m in used),
+        has_delta_lights=any(isinstance(light, PointLight | SpotLight | DirectionalLight) for light in scene.lights),
         glossy_roughness=tuple(sorted({a for m in used if (a := glossy_roughness(m)) is not None})),
     )

@@ -134,6 +134,9 @@ class Material:
     """By slot (`pmviewer.scene.texture.SLOTS`). A texture replaces the number of its slot's name, which is its mean."""
     bump_scale: float = 1.0
     """Multiplies the heights of `textures["bump"]`."""
+    mirrored_maps: bool = False
+    """Seen from behind, do mapped normals turn round only across the surface, as if its picture were mirrored
+    (Mitsuba's `twosided` around a map), or as a whole, as those of a thin sheet with bumps do?"""
 
     @property
     def transparent(self) -> bool:

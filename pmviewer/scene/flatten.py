@@ -64,6 +64,11 @@ class FlatScene:
     """Of the instanced groups."""
 
     @property
+    def delta_lights(self) -> bool:
+        """Whether there are lights that no ray can meet."""
+        return bool(np.isin(self.lights[:, K.L_KIND], (K.POINT, K.SPOT, K.DIRECTIONAL)).any())
+
+    @property
     def total_luminance(self) -> float:
         """Luminance of the power of all lights, in watts: what photon powers are measured in while they travel."""
         return float((self.light_power @ LUMINANCE).sum())

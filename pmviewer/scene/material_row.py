@@ -90,6 +90,8 @@ def _row(m: Material, tables: list[Float] | None) -> list[float]:
     alpha_x, alpha_y = (max(float(SMOOTHEST), a) for a in m.alpha)
     row[K.M_ALPHA_X], row[K.M_ALPHA_Y] = alpha_x, alpha_y
     row[K.M_DISTRIBUTION], row[K.M_NONLINEAR] = _DISTRIBUTIONS[m.distribution], m.nonlinear
+    if "normal" in m.textures or "bump" in m.textures:
+        row[K.M_MAPPED] = K.MIRRORED_MAPS if m.mirrored_maps else 1
     eta, k = m.metal if m.metal is not None else _PERFECT_MIRROR
     row[K.M_ETA_RGB : K.M_ETA_RGB + 3], row[K.M_K_RGB : K.M_K_RGB + 3] = eta, k
     transparent = kind in (K.DIELECTRIC, K.ROUGH_DIELECTRIC, K.THIN_DIELECTRIC)

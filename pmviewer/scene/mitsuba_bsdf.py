@@ -15,6 +15,7 @@ from pmviewer.scene.optics import IOR, METALS, metal
 _LARGEST_ALPHA = 10.0
 _WRAPPERS = frozenset(("mask",))
 _MAPS = frozenset(("bumpmap", "normalmap"))
+_MAP_SLOTS = frozenset(("bump", "normal"))
 
 
 class Materials:
@@ -84,7 +85,10 @@ class Materials:
         if material.transparent:
             self.document.warn(f"{p.element} has no effect on a transparent BSDF.", p.element)
         p.warn_unused("bsdf")
-        return replace(material, two_sided=not material.transparent)
+        mapped_inside = not _MAP_SLOTS.isdisjoint(material.textures)
+        return replace(
+            material, two_sided=not material.transparent, mirrored_maps=mapped_inside and not material.transparent
+        )
 
     def _conductor(self, p: Properties, name: str) -> Material:
         scale = p.bounded_colour("specular_reflectance", 1.0, 1)

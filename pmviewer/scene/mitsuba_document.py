@@ -16,7 +16,7 @@ from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.mitsuba_spectrum import spectrum_object
 from pmviewer.scene.mitsuba_texture import TYPES as TEXTURE_TYPES
 from pmviewer.scene.mitsuba_texture import read_texture
-from pmviewer.scene.mitsuba_transform import Matrix, operation
+from pmviewer.scene.mitsuba_transform import Matrix, is_unit_rotation, operation
 from pmviewer.scene.mitsuba_values import (
     LARGEST,
     is_sampled,
@@ -315,6 +315,9 @@ class Properties:
                     matrix = operation(child) @ matrix
             except ValueError as error:
                 raise self.document.error(f"<{child.tag}> of {self.element}: {error}.", child) from None
+            if not is_unit_rotation(child):
+                what = "The axis of <rotate> is not of unit length: it stretches and shears, as it does in Mitsuba 3."
+                self.document.warn(what, child)
             if not np.abs(matrix).max() <= LARGEST:
                 what = f"'{name}' of {self.element} grows beyond {LARGEST:g}."
                 raise self.document.error(what, child, "Use smaller numbers.")

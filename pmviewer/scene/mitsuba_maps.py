@@ -55,7 +55,9 @@ def mapped(p: Properties, material: Material) -> Material:
         raise p.document.error(what, p.element)
     if len(found) > 1:
         p.document.warn(f"{p.element} has more than one texture: the first is used.", p.element)
-    p.known("flip_invalid_normals", "use_shadowing_function")
+    p.known("use_shadowing_function")
+    if not p.boolean("flip_invalid_normals", True):
+        p.document.warn(f"{p.element}: 'flip_invalid_normals' is always true here.", p.element)
     scale = p.number("scale", 1.0) if slot == "bump" else material.bump_scale
     if slot in material.textures:
         p.document.warn(f"{p.element} around another one replaces it.", p.element)

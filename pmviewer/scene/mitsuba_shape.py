@@ -103,7 +103,6 @@ def _cylinder(p: Properties, to_world: Matrix, flip: bool) -> Geometry:
     local = np.eye(4)
     local[:3, 0], local[:3, 1], local[:3, 2], local[:3, 3] = radius * u, radius * v, axis, p0
     m = to_world @ local
-    flip = flip != mirrors(to_world)
     world_radius = similar_columns(m, 2)
     upright = np.abs(m[:3, 2] @ m[:3, :2]).max() <= 1e-5 * np.linalg.norm(m[:3, 2]) * (world_radius or 0)
     if world_radius is not None and (upright or math.isclose(radius, 0)):
@@ -129,11 +128,11 @@ def _mesh_file(p: Properties, to_world: Matrix, flip: bool) -> Mesh:
         ) from None
     if flip_v and mesh.uv is not None:
         mesh = replace(mesh, uv=mesh.uv * [1, -1] + [0, 1])
-    if flat:
-        mesh = replace(mesh, normals=None)
-    elif mesh.normals is None:
-        mesh = primitives.with_smooth_normals(mesh)
-    return primitives.transformed(mesh, to_world, flip)
+    if mesh.normals is not None and not flat:
+        return primitives.wound_by_normals(primitives.transformed(mesh, to_world, flip))
+    # Faces keep the order of their corners, so that a mirrored mesh turns inside out.
+    mesh = primitives.transformed(replace(mesh, normals=None), to_world, flip != mirrors(to_world))
+    return mesh if flat else primitives.with_smooth_normals(mesh, seams=True)
 
 
 def _read_obj(path: Path) -> Mesh:

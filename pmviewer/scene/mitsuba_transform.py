@@ -13,6 +13,8 @@ from pmviewer.scene.mitsuba_xml import Element
 Matrix = NDArray[np.float64]
 OPERATIONS = ("translate", "rotate", "scale", "matrix", "lookat")
 _SIMILAR = 1e-5
+_NEARLY_UNIT = 0.01
+"""Axes are written with few digits."""
 
 
 def translation(x: float, y: float, z: float) -> Matrix:
@@ -26,16 +28,26 @@ def scaling(x: float, y: float, z: float) -> Matrix:
 
 
 def rotation(axis: tuple[float, float, float], degrees: float) -> Matrix:
-    """Right-handed rotation about an axis through the origin (Rodrigues). ValueError for a zero axis."""
-    length = math.hypot(*axis)
-    if length == 0:
+    """Right-handed rotation about a unit axis through the origin (Rodrigues). ValueError for a zero axis.
+
+    Mitsuba does not scale other axes to unit length: with them its formula stretches and shears, and so does this one.
+    """
+    if not any(axis):
         raise ValueError("expected a rotation axis other than zero")
-    x, y, z = (c / length for c in axis)
+    x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     angle = math.radians(degrees)
+    cos, sin = math.cos(angle), math.sin(angle)
     m = np.eye(4)
-    m[:3, :3] += math.sin(angle) * cross + (1 - math.cos(angle)) * (cross @ cross)
+    m[:3, :3] = cos * np.eye(3) + (1 - cos) * np.outer(axis, axis) + sin * cross
     return m
+
+
+def is_unit_rotation(element: Element) -> bool:
+    """Whether the element is anything but a <rotate> whose axis is not of unit length."""
+    if element.tag.lower() != "rotate":
+        return True
+    return abs(math.hypot(*_components(element.attributes, 0.0)) - 1) <= _NEARLY_UNIT
 
 
 def look_at(origin: tuple[float, ...], target: tuple[float, ...], up: tuple[float, ...]) -> Matrix:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,11 +111,24 @@ def unit(vectors: Float) -> Float:
         return scaled / np.where(length > 0, length, 1)
 
 
-def with_smooth_normals(mesh: Mesh) -> Mesh:
+def wound_by_normals(mesh: Mesh) -> Mesh:
+    """The mesh with its faces turned to the side that their vertex normals point to."""
+    assert mesh.normals is not None
+    corners = mesh.vertices[mesh.faces]
+    with np.errstate(invalid="ignore", over="ignore"):
+        face = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+        behind = (face * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0
+    faces = np.where(behind[:, None], mesh.faces[:, ::-1], mesh.faces)
+    return replace(mesh, faces=np.ascontiguousarray(faces))
+
+
+def with_smooth_normals(mesh: Mesh, seams: bool = False) -> Mesh:
     """The mesh with vertex normals averaged over the faces at each position, weighted by their angle there
-    (Thürmer and Wüthrich 1998)."""
-    _, position = np.unique(mesh.vertices, axis=0, return_inverse=True)
-    position = position.reshape(-1)
+    (Thürmer and Wüthrich 1998). With `seams` vertices stay apart that the mesh has several times at one position."""
+    position = np.arange(len(mesh.vertices))
+    if not seams:
+        _, position = np.unique(mesh.vertices, axis=0, return_inverse=True)
+        position = position.reshape(-1)
     corners = mesh.vertices[mesh.faces]
     with np.errstate(invalid="ignore", over="ignore"):
         face = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from pmviewer.scene.description import Cylinder, Disk, Geometry, Mesh, Parallelogram, Sphere
 
 Float = NDArray[np.float64]
+_STRAIGHT = 0.9999
+"""Cosine between a normal and the surface's own."""
 
 
 def orthonormal(n: Float) -> Float:
@@ -48,8 +50,9 @@ def corner_uv(g: Geometry) -> Float:
 
 
 def rectangle_of(mesh: Mesh) -> tuple[Parallelogram, Float] | None:
-    """A mesh of two triangles that is a parallelogram, and its coordinates as in `rectangle_uv`; None for others."""
-    if len(mesh.faces) != 2 or mesh.uv is None:
+    """A mesh of two triangles that is a parallelogram, and its coordinates as in `rectangle_uv`; None for others, and
+    where vertex normals lean over."""
+    if len(mesh.faces) != 2 or mesh.uv is None or _leans(mesh):
         return None
     shared = [i for i in range(3) if mesh.faces[0, i] in mesh.faces[1]]
     if len(shared) != 2:
@@ -64,6 +67,15 @@ def rectangle_of(mesh: Mesh) -> tuple[Parallelogram, Float] | None:
     points = [tuple(float(x) for x in p[:3]) for p in (a, b - a, c - a)]
     uv = np.stack([a[3:], (b - a)[3:], (c - a)[3:]], axis=1)
     return Parallelogram(*points), uv  # type: ignore[arg-type]
+
+
+def _leans(mesh: Mesh) -> bool:
+    if mesh.normals is None:
+        return False
+    corners = mesh.vertices[mesh.faces]
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-300)
+    return bool((np.abs((mesh.normals[mesh.faces] * face[:, None]).sum(axis=2)) < _STRAIGHT).any())
 
 
 def square_uv(g: Geometry, affine: Float | None, s: Float, t: Float) -> Float:

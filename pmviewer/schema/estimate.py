@@ -31,7 +31,8 @@ class Estimate(Group):
     )
     alpha: float = setting(
         2.0 / 3.0,
-        "How fast the radius shrinks from pass to pass, r²ᵢ₊₁ = r²ᵢ·(i+α)/(i+1). 1 keeps it (and its bias).",
+        "How fast look-ups shrink from pass to pass, r²ᵢ₊₁ = r²ᵢ·(i+α)/(i+1); with look-up 'nearest' it is k that "
+        "shrinks like r². 1 keeps them (and their bias).",
         stage="maps",
         scale="linear",
         ge=0.0,
@@ -53,7 +54,15 @@ class Estimate(Group):
         stage="maps",
         scale="choice",
     )
-    k: int = setting(50, "Photons in a k-nearest estimate.", stage="maps", scale="log", unit="photons", ge=1, le=1000)
+    k: int = setting(
+        50,
+        "Photons in a k-nearest estimate of the first pass; later ones take fewer, see alpha.",
+        stage="maps",
+        scale="log",
+        unit="photons",
+        ge=1,
+        le=1000,
+    )
     rim: Literal["left out", "half", "whole"] = setting(
         "left out",
         "How the k-th photon, which sets the radius, counts: leaving it out is exact for independently scattered "
@@ -63,8 +72,8 @@ class Estimate(Group):
     )
     max_radius: float | Auto = setting(
         "auto",
-        "Largest radius of a k-nearest search, relative to the scene. Automatic: where k of the brightest photons "
-        "would still be darker than the black level (course guide §5.2).",
+        "Largest radius of a k-nearest search, relative to the scene; it shrinks with k from pass to pass. Automatic: "
+        "where k of the brightest photons would still be darker than the black level (course guide §5.2).",
         stage="maps",
         scale="log",
         unit="× scene",

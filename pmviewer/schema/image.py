@@ -77,8 +77,9 @@ class Direct(Group):
         title="shadow photons",
     )
     shadow_N: int = setting(
-        100_000,
-        "Photons sent from the lights straight through the scene, once for all passes.",
+        50_000,
+        "Photons sent from the lights straight through the scene in each pass; with one photon map for all passes "
+        "(photons.renew), in the first.",
         stage="maps",
         scale="log",
         unit="photons",
@@ -277,6 +278,29 @@ class Render(Group):
     )
     time_limit: float = setting(
         0.0, "Refinement stops after this time; 0 is no limit.", stage="stop", scale="linear", unit="s", ge=0, le=1e6
+    )
+    direct: Literal["by method", "accurate", "approximate"] = setting(
+        "by method",
+        "Direct light. accurate: light samples. approximate: the global map's photons straight from the lights (Jensen "
+        "1996, §4).",
+        section="Terms",
+        stage="image",
+        scale="choice",
+        title="direct light",
+    )
+    caustic: Literal["by method", "accurate", "approximate"] = setting(
+        "by method",
+        "Caustics. accurate: the caustic map. approximate: the same photons as the global map has them, at its radius.",
+        stage="image",
+        scale="choice",
+        title="caustics",
+    )
+    indirect: Literal["by method", "accurate", "approximate"] = setting(
+        "by method",
+        "Indirect light. accurate: a final gather. approximate: the global map shown directly.",
+        stage="image",
+        scale="choice",
+        title="indirect light",
     )
 
 

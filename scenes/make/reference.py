@@ -1,11 +1,13 @@
-"""`python scenes/make/reference.py NAME [--spp N]`: render a scene's reference.exr.
+"""`python scenes/make/reference.py NAME… [--by mitsuba|path|gather]`: render a scene's reference.exr.
 
-By default it is path-traced by Mitsuba 3 (package `mitsuba`), a program of others. Caustics of small lights can't be
-path-traced in reasonable time, and Mitsuba lacks some materials: `--passes N` renders such scenes by pmviewer's own
-gather, whose look-up radius shrinks from pass to pass, so that it converges to the same picture.
+By default it is path-traced by Mitsuba 3 (package `mitsuba`), a program of others. What Mitsuba lacks is path-traced by
+pmviewer (`--by path`), where paths find the light. Caustics of small lights can't be path-traced in reasonable time:
+`--by gather` renders such scenes by pmviewer's final gather with look-ups a tenth as wide as the automatic ones, less
+than half a pixel, which is less than the noise.
 
-The file is half float: its rounding, 5e-4 of a pixel at most, is far below the noise. Its attribute `pmviewer.made`
-says how it was made and how noisy it is.
+The file is half float: its rounding, 5e-4 of a pixel at most, is far below the noise. Its attributes say how it was
+made: `pmviewer.made` in words, `pmviewer.command`, `pmviewer.seeds`, `pmviewer.samples` (per pixel, or passes), and
+`pmviewer.noise`, the relMSE that the difference of two independent halves amounts to.
 """
 
 from __future__ import annotations
@@ -20,12 +22,19 @@ from typing import Any
 
 import numpy as np
 
+from pmviewer.engine.cache import StageCache
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.renderer import Renderer
 from pmviewer.output.exr import read_exr, write_exr
+from pmviewer.settings import Settings, with_values
 
 CHUNK = 64
 """Samples per pixel at once."""
-PHOTONS = 300_000
-"""Trajectories of a pass of pmviewer."""
+PHOTONS, Q = 1_000_000, 0.1
+"""Trajectories of a pass of pmviewer, and the share of them that fills the global map."""
+NARROW = 0.1
+"""Look-up radius in units of the automatic one."""
 MANY = 8
 """With more lights than this, they are no longer chosen evenly."""
 
@@ -53,8 +62,8 @@ def _weigh_lights(mi: ModuleType, scene: Any) -> None:
     scene.parameters_changed()
 
 
-def path_traced(path: Path, spp: int, variant: str) -> list[np.ndarray]:
-    """Two independent images (h, w, 3) by Mitsuba 3, of half the samples each."""
+def by_mitsuba(path: Path, spp: int, variant: str) -> tuple[list[np.ndarray], dict[str, str]]:
+    """Two independent images (h, w, 3) by Mitsuba 3, of half the samples each, and what to say of them."""
     import mitsuba as mi
 
     mi.set_variant(variant)
@@ -65,44 +74,61 @@ def path_traced(path: Path, spp: int, variant: str) -> list[np.ndarray]:
     for half in range(2):
         seeds = range(half * rounds, (half + 1) * rounds)
         halves.append(sum(np.array(mi.render(scene, spp=CHUNK, seed=seed), np.float64) for seed in seeds) / rounds)
-    return halves
+    made = f"Mitsuba 3 ({mi.__version__}, {variant}), path, {2 * rounds * CHUNK} samples per pixel"
+    return halves, {"made": made, "seeds": f"0 to {2 * rounds - 1}", "samples": str(2 * rounds * CHUNK)}
 
 
-def gathered(path: Path, passes: int) -> list[np.ndarray]:
-    """Two independent images (h, w, 3) by pmviewer's gather, of that many passes each."""
+def by_pmviewer(path: Path, method: str, passes: int) -> tuple[list[np.ndarray], dict[str, str]]:
+    """The same by pmviewer's path tracer or final gather, of `passes` passes in all."""
+    settings = [f"render.method={method}"]
+    made = f"pmviewer, path, {2 * (passes // 2)} samples per pixel"
+    if method == "gather":
+        radius = _automatic_radius(path) * NARROW
+        settings += [f"photons.N={PHOTONS}", f"photons.q={Q}", f"estimate.radius={radius:.4g}", "estimate.alpha=1"]
+        made = f"pmviewer, gather, {2 * (passes // 2)} passes of {PHOTONS} photon trajectories, radius {NARROW} x auto"
     halves = []
     with tempfile.TemporaryDirectory() as folder:
         for seed in (1, 2):
             out = Path(folder) / f"{seed}.exr"
-            command = [sys.executable, "-m", "pmviewer", "render", str(path), "-o", str(out), "--passes", str(passes)]
-            for setting in ("render.method=gather", f"render.seed={seed}", f"photons.N={PHOTONS}"):
+            command = [sys.executable, "-m", "pmviewer", "render", str(path), "-o", str(out)]
+            command += ["--passes", str(passes // 2)]
+            for setting in (*settings, f"render.seed={seed}"):
                 command += ["--set", setting]
             subprocess.run(command, check=True)
             halves.append(read_exr(out)[0][""][..., :3].astype(np.float64))
-    return halves
+    return halves, {"made": made, "seeds": "1, 2", "samples": str(2 * (passes // 2))}
+
+
+def _automatic_radius(path: Path) -> float:
+    """Of look-ups in the first pass of a gather, relative to the scene."""
+    opened = open_scene(str(path), {})
+    pool = WorkPool(1)
+    settings = with_values(Settings(), {"render.method": "gather"})
+    radius = Renderer(opened, settings, pool, StageCache(0)).first_radius / opened.flat.radius
+    pool.close()
+    return radius
 
 
 def main() -> None:
-    """Render and write, and say how noisy the result is: the relMSE that the halves' difference amounts to."""
+    """Render and write, and say how noisy the result is."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="+", help="scenes")
-    parser.add_argument("--spp", type=int, default=4096, help="samples per pixel, rounded to a multiple of 128")
+    parser.add_argument("--by", choices=("mitsuba", "path", "gather"), default="mitsuba")
+    parser.add_argument("--samples", type=int, default=4096, help="per pixel (Mitsuba: a multiple of 128), or passes")
     parser.add_argument("--variant", default="llvm_ad_rgb", help="Mitsuba's; scalar_rgb needs no LLVM but is slower")
-    parser.add_argument("--passes", type=int, help="render by pmviewer's gather instead, twice this many passes")
     arguments = parser.parse_args()
     for name in arguments.names:
         folder = Path(__file__).resolve().parents[1] / name
-        if arguments.passes:
-            a, b = gathered(folder / "scene.xml", arguments.passes)
-            made = f"pmviewer, gather, 2 x {arguments.passes} passes of {PHOTONS} photon trajectories"
+        if arguments.by == "mitsuba":
+            (a, b), said = by_mitsuba(folder / "scene.xml", arguments.samples, arguments.variant)
         else:
-            a, b = path_traced(folder / "scene.xml", arguments.spp, arguments.variant)
-            made = f"Mitsuba 3, path, {max(1, arguments.spp // (2 * CHUNK)) * 2 * CHUNK} samples per pixel"
+            (a, b), said = by_pmviewer(folder / "scene.xml", arguments.by, arguments.samples)
         mean = (a + b) / 2
         noise = float((((a - b) / 2) ** 2 / (mean**2 + 0.01)).mean())
-        made += f"; noise relMSE {noise:.1e}"
-        write_exr(folder / "reference.exr", {"": mean.astype(np.float32)}, {"made": made}, half=True)
-        print(f"{name}: {made}, {(folder / 'reference.exr').stat().st_size / 1024:.0f} KiB")
+        command = f"python scenes/make/reference.py {name} --by {arguments.by} --samples {arguments.samples}"
+        said |= {"command": command, "noise": f"{noise:.2e}"}
+        write_exr(folder / "reference.exr", {"": mean.astype(np.float32)}, said, half=True)
+        print(f"{name}: {said['made']}; noise {noise:.1e}, {(folder / 'reference.exr').stat().st_size / 1024:.0f} KiB")
 
 
 if __name__ == "__main__":

@@ -168,13 +168,13 @@ def test_radius_follows_the_pixels_footprint():
     settings = settings_of()
     camera = resolve_camera(scene, settings.camera)
     assert 0.5 < typical_distance(flat, camera) < 2.0
-    automatic = first_radius(flat, camera, settings.estimate, "progressive")
+    automatic = first_radius(flat, camera, settings.estimate, False)
     footprint = typical_distance(flat, camera) * camera.pixel_angle()
     assert footprint < automatic < 8 * footprint
     wide = resolve_camera(scene, settings_of(camera={"width": 400, "height": 400}).camera)
-    assert first_radius(flat, wide, settings.estimate, "progressive") == pytest.approx(automatic / 4, rel=0.2)
+    assert first_radius(flat, wide, settings.estimate, False) == pytest.approx(automatic / 4, rel=0.2)
     chosen = settings_of(estimate={"radius": 0.03}).estimate
-    assert first_radius(flat, camera, chosen, "progressive") == pytest.approx(0.03 * flat.radius)
+    assert first_radius(flat, camera, chosen, False) == pytest.approx(0.03 * flat.radius)
     away = CameraPose((0, 0, 50), (0, 0, 100), (0, 1, 0), 40, 100, 100)
     assert typical_distance(flat, away) == flat.radius
 

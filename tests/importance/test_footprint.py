@@ -38,7 +38,7 @@ def rows_of(opened, eye, rule, i, dx=0.0, dy=0.0):
         moved[f"{axis}_corner"] += np.float32(dx) * eye[f"{axis}_right"] + np.float32(dy) * eye[f"{axis}_down"]
     whole = 0, 0, eye["width"][0], eye["height"][0]
     record = np.zeros(1, IMPORTON_PASS_DTYPE)
-    record[0] = (1 ^ SEED, rule.max_depth, 0.2, rule.caustic, rule.global_, rule.gather, False, 0.0, *whole)
+    record[0] = (1 ^ SEED, rule.max_depth, 0.2, rule.caustic, rule.global_, rule.gather, False, 0.0, False, *whole)
     out = np.zeros((2, 80, IMPORTON_COLUMNS), np.float32)
     counts = np.zeros(N_COUNTS, np.int64)
     trace_importons(opened.flat.record, moved, record, i, i + 1, out[0], out[1], counts)

@@ -9,6 +9,7 @@ import pytest
 
 from pmviewer.kernels.bsdf import fresnel_dielectric, scatter_specular
 from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.plain_bsdf import FOLLOWED, NOTHING, plain_bsdf
 from pmviewer.scene.description import Material
 from pmviewer.scene.flatten import flatten
 from tests.scenes_for_tests import GLASS, MIRROR, diffuse, diffuse_box
@@ -108,11 +109,49 @@ def test_mirror_reflects(flat):
     assert np.all(compression == 1.0)
 
 
+@kernel
+def _groups_seen_from(scenes, material, ng, ns, wo, groups, normals):
+    for i in range(len(wo)):
+        n, s, w = (ng[i, 0], ng[i, 1], ng[i, 2]), (ns[i, 0], ns[i, 1], ns[i, 2]), (wo[i, 0], wo[i, 1], wo[i, 2])
+        b = plain_bsdf(scenes[0], material, n, s, w)
+        groups[i] = b.groups
+        normals[i] = b.n
+
+
+def seen_from(flat, material, ng, ns, wo):
+    """Groups (n,) and normals (n, 3) of a material with those normals from directions wo (n, 3)."""
+    ng, ns, wo = (np.ascontiguousarray(v, np.float32) for v in np.broadcast_arrays(ng, ns, wo))
+    groups, normals = np.empty(len(wo), np.int32), np.empty((len(wo), 3), np.float32)
+    _groups_seen_from(flat.record, MATERIALS.index(material), ng, ns, wo, groups, normals)
+    return groups, normals.astype(float)
+
+
 def test_back_of_a_one_sided_mirror_absorbs(flat):
-    n = np.array([0.0, 0, 1])
-    front = unit(np.array([[0.3, 0.1, -1.0]]))
-    assert scatter(flat, ONE_SIDED, n, front, 0.5)[1][0] == pytest.approx((0.9, 0.8, 0.7))
-    assert np.all(scatter(flat, ONE_SIDED, n, -front, 0.5)[1] == 0.0)
+    """Which side that is the geometric normal says, however the shading normal leans."""
+    n, leaning = np.array([0.0, 0, 1]), unit(np.array([0.9, 0, 0.3]))
+    front = unit(np.array([[0.3, 0.1, 1.0], [-1.0, 0.0, 0.05]]))
+    for ns in (n, leaning):
+        assert list(seen_from(flat, ONE_SIDED, n, ns, front)[0]) == [FOLLOWED, FOLLOWED]
+        assert list(seen_from(flat, ONE_SIDED, n, ns, -front)[0]) == [NOTHING, NOTHING]
+        assert list(seen_from(flat, MIRROR, n, ns, -front)[0]) == [FOLLOWED, FOLLOWED]
+
+
+def test_mirrors_reflect_to_the_side_they_are_seen_from(flat):
+    generator = np.random.default_rng(2)
+    ng, wo = unit(generator.normal(size=(2000, 3))), unit(generator.normal(size=(2000, 3)))
+    ns = unit(ng + generator.normal(scale=0.7, size=(2000, 3)))
+    ns *= np.sign((ns * ng).sum(1))[:, None]
+    groups, n = seen_from(flat, MIRROR, ng, ns, wo)
+    assert np.all(groups == FOLLOWED)
+    wi, weights, _ = scatter(flat, MIRROR, n, -wo, 0.5)
+    assert np.all((wi * ng).sum(1) * (wo * ng).sum(1) > 0)
+    assert np.all(weights == 1)
+    # Where the shading normal's own mirror image is above the surface, it stays.
+    facing, towards = ng * np.sign((ng * wo).sum(1))[:, None], ns * np.sign((ng * wo).sum(1))[:, None]
+    image = 2 * (wo * towards).sum(1)[:, None] * towards - wo
+    clear = ((image * facing).sum(1) > 0.02) & ((wo * towards).sum(1) > 0.02)
+    assert 500 < clear.sum() < 2000
+    assert np.abs(wi - image)[clear].max() < 1e-5
 
 
 @pytest.mark.parametrize("material", [GLASS, TINTED, THIN_SIDE], ids=lambda m: m.name)

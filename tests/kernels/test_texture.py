@@ -59,7 +59,7 @@ def _look(scenes, origins, directions, hit, p, uv, du, dv, reflectance, alpha, n
             numbers = texture_params(scene, material, prim, b1, b2, q)
             reflectance[i] = numbers.reflectance
             alpha[i] = (numbers.ax, numbers.ay)
-            ns[i], tangent[i] = shading_frame(scene, material, prim, b1, b2, q, n, s)
+            ns[i], tangent[i] = shading_frame(scene, material, prim, b1, b2, q, n, s, n)
             c1, c2 = barycentrics(scene, prim, q)
             corners[i] = (c1 - b1, c2 - b2)
 

@@ -49,7 +49,7 @@ def _spread_many(scenes, u, v, out, density, again, radiance):
     for i in range(len(u)):
         s, t, density[i] = spread(scene, light, u[i], v[i])
         out[i] = (s, t)
-        p, _, _ = light_point(scene, light, s, t)
+        p, _, _, _ = light_point(scene, light, s, t)
         again[i] = area_density(scene, light, p)
         radiance[i] = radiance_from(scene, light, p, s, t)
 

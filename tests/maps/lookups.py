@@ -28,9 +28,16 @@ def estimate(
     structure, points, radius, estimator="disc", normals=UP, classes=ALL_CLASSES, kind="constant", **fields
 ) -> np.ndarray:
     """Irradiance (m, 3) at points (m, 3). `structure` is a PhotonGrid or a PhotonKdTree; `fields` go into the eye
-    record: k, rim, boundary, flatness (1), cone_k (1.1)."""
+    record: k, share (1), rim, boundary, flatness (1), cone_k (1.1)."""
     eye = np.zeros(1, EYE_DTYPE)
-    for name, value in {"flatness": 1, "cone_k": 1.1, "k": 50, "filter": FILTERS.index(kind), **fields}.items():
+    for name, value in {
+        "flatness": 1,
+        "cone_k": 1.1,
+        "k": 50,
+        "share": 1,
+        "filter": FILTERS.index(kind),
+        **fields,
+    }.items():
         eye[name] = value
     points = np.ascontiguousarray(points, np.float32)
     normals = np.ascontiguousarray(np.broadcast_to(normals, points.shape), np.float32)

@@ -15,6 +15,7 @@ from pmviewer.maps.stored import ALL_CLASSES
 from tests import naive_maps as naive
 
 f4, i4 = np.float32, np.int32
+ANY = np.uint32(0)
 ALBEDO = (f4(0.8), f4(0.5), f4(0.25))
 
 
@@ -25,7 +26,18 @@ def _by_radius(records, p, n, ns, radius, flatness, kind, out):
         b = PlainBsdf(STORED, ALBEDO, 0, facing, facing)
         normal = (n[i, 0], n[i, 1], n[i, 2])
         out[i] = radiance_radius(
-            records[0], (p[i, 0], p[i, 1], p[i, 2]), normal, radius, flatness, i4(ALL_CLASSES), kind, f4(1.1), b, normal
+            records[0],
+            (p[i, 0], p[i, 1], p[i, 2]),
+            normal,
+            radius,
+            flatness,
+            i4(ALL_CLASSES),
+            kind,
+            f4(1.1),
+            b,
+            STORED,
+            ANY,
+            normal,
         )
 
 
@@ -37,7 +49,21 @@ def _by_knn(records, p, n, ns, k, radius, flatness, kind, rim, out):
         normal = (n[i, 0], n[i, 1], n[i, 2])
         point = (p[i, 0], p[i, 1], p[i, 2])
         out[i] = radiance_knn(
-            records[0], point, normal, k, radius, flatness, i4(ALL_CLASSES), kind, f4(1.1), rim, b, normal
+            records[0],
+            point,
+            normal,
+            k,
+            radius,
+            flatness,
+            i4(ALL_CLASSES),
+            kind,
+            f4(1.1),
+            rim,
+            f4(1.0),
+            b,
+            STORED,
+            ANY,
+            normal,
         )
 
 
@@ -85,6 +111,7 @@ def test_lambertian_from_the_nearest_is_irradiance_times_albedo_over_pi(cloud):
         kind,
         f4(1.1),
         rim,
+        f4(1.0),
         0,
         40,
         E,

@@ -22,10 +22,12 @@ def by_radius(grid, points, normals, radius, flatness=1.0, classes=ALL_CLASSES, 
     return E, counts
 
 
-def by_knn(tree, points, normals, k, max_radius, flatness=1.0, classes=ALL_CLASSES, kind="constant", cone_k=1.1, rim=0):
+def by_knn(
+    tree, points, normals, k, max_radius, flatness=1.0, classes=ALL_CLASSES, kind="constant", cone_k=1.1, rim=0, share=1
+):
     m = len(points)
     E, counts, radii = np.full((m, 3), np.nan, f4), np.full(m, -1, i4), np.full(m, np.nan, f4)
-    arguments = f4(max_radius), f4(flatness), i4(classes), i4(FILTERS.index(kind)), f4(cone_k), i4(rim)
+    arguments = f4(max_radius), f4(flatness), i4(classes), i4(FILTERS.index(kind)), f4(cone_k), i4(rim), f4(share)
     irradiance_at_knn(tree.record, points, normals, i4(k), *arguments, 0, m, E, counts, radii)
     return E, counts, radii
 

@@ -65,8 +65,8 @@ def mean(squares, how, distribution, n, points, **settings):
     )
 
 
-def middle(rng):
-    return rng.uniform(0.1, 0.9, (2, 1000))
+def middle(rng, n=1000):
+    return rng.uniform(0.1, 0.9, (2, n))
 
 
 def along_edge(distance, n=800):
@@ -91,6 +91,50 @@ def test_E2_all_kernels_have_the_same_mean(squares, distribution):
         means = {kind: mean(squares, how, distribution, n, middle, kind=kind) for kind in FILTERS}
         print(f"E2 {distribution} {how} n = {n}:", {kind: round(float(m), 4) for kind, m in means.items()})
         assert all(m == pytest.approx(1, abs=0.005) for m in means.values())
+
+
+@pytest.mark.parametrize("estimator", ["disc", "hull", "differential"])
+def test_E6_any_part_of_the_disc_of_the_nearest_has_the_same_mean(squares, estimator):
+    """Independent photons, so exactly, whatever the kernel; a third of the photons or a fiftieth."""
+    kinds = FILTERS if estimator == "disc" else ("constant",)
+    for k, share in ((100, 0.3), (16, 0.3), (16, 0.02)):
+        for kind in kinds:
+            chosen = {"share": share, "kind": kind, "estimator": estimator, "rim": RIM_LEFT_OUT}
+            found = np.mean(
+                [
+                    estimate(
+                        m, on_square(*middle(np.random.default_rng(i), 20_000)), 1.0, normals=NORMAL, k=k, **chosen
+                    )
+                    for i, m in enumerate(squares["nearest"]["independent"])
+                ]
+            )
+            print(f"E6 {estimator} {kind} k = {k}, share {share}: mean {found:.4f}")
+            assert found == pytest.approx(1, abs=0.008 if share < 0.1 else 0.005)
+
+
+def test_E6_the_bias_of_a_part_is_that_of_its_size():
+    """Photons that get denser with the square of the distance from a place, c times by x = r²: a disc holds Λ = D·(x +
+    c·x²/2) on average and is too bright by c·x/2. With Λ of the 16th a gamma variate, the part s of its disc is too
+    bright by the mean of 15/Λ · s·c·x/2: the sixteen nearest much, a small part of their disc little."""
+    rng = np.random.default_rng(5)
+    D, c, k, trials = 20.0, 10.0, 16, 4000
+    shares = (1.0, 0.25, 0.05)
+
+    def area(mass):
+        return (np.sqrt(1 + 2 * c * mass / D) - 1) / c
+
+    of_disc = rng.gamma(k, size=200_000)
+    expected = np.mean((k - 1) / of_disc * c * area(of_disc) / 2)
+    found = np.empty((trials, len(shares)))
+    for i in range(trials):
+        n = rng.poisson(D * (1 + c / 2))
+        r, angle = np.sqrt(area(rng.uniform(0, D * (1 + c / 2), n))), rng.uniform(0, 2 * np.pi, n)
+        tree = build_kdtree(naive.pack(np.c_[r * np.cos(angle), r * np.sin(angle), np.zeros(n)]), np.pi / D)
+        found[i] = [estimate(tree, np.zeros((1, 3)), 1.0, k=k, share=share)[0, 0] - 1 for share in shares]
+    mean, error = found.mean(axis=0), found.std(axis=0) / np.sqrt(trials)
+    print(f"E6 too bright by {mean} ± {error}, expected {expected * np.array(shares)}")
+    assert expected > 1
+    np.testing.assert_array_less(np.abs(mean - expected * np.array(shares)), 4 * error)
 
 
 @pytest.mark.parametrize("how", ["nearest", "radius"])

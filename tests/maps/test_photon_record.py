@@ -73,6 +73,6 @@ def test_unpack_names_everything(directions):
     np.testing.assert_array_equal(unpacked["position"], position)
     np.testing.assert_allclose(unpacked["Phi"], 3 * power, rtol=2.0**-11 * 1.001)
     assert np.linalg.norm(np.cross(unpacked["wi"], directions), axis=1).max() < np.radians(WORST_ANGLE)
-    np.testing.assert_array_equal(unpacked["bounces"], flags & 0x3F)
+    np.testing.assert_array_equal(unpacked["bounces"], flags & 0x1F)
     np.testing.assert_array_equal(unpacked["path_class"], flags >> 6)
     np.testing.assert_array_equal(unpacked["light"], light)

@@ -23,12 +23,13 @@ from pmviewer.scene.description import Disk, Parallelogram, PointLight, Shape, S
 from pmviewer.scene.flatten import LUMINANCE, flatten
 from pmviewer.settings import Photons
 from tests.device import from_python
+from tests.kernels.test_leaning_light import LEANING
 from tests.kernels.test_light_sampling import emit
 from tests.kernels.test_more_lights import MORE
 from tests.scenes_for_tests import GLASS, LIGHTS, ball_mesh, diffuse_box, light_scene, settings_of
 
 BALL = Sphere((-0.2, 0.25, 0.15), 0.12)
-ALL = {**LIGHTS, **MORE}
+ALL = {**LIGHTS, **MORE, "leaning mesh": LEANING}
 
 
 def lit(name, ball=BALL):
@@ -37,7 +38,12 @@ def lit(name, ball=BALL):
     scene = light_scene()
     floor = Shape("floor", Parallelogram((-1.0, 0.0, -1.0), (0.0, 0.0, 2.0), (2.0, 0.0, 0.0)), 0)
     shapes, lights = [floor, Shape("ball", ball, 2)], ()
-    if isinstance(light, Disk | Sphere | Parallelogram) or name in ("cylinder", "cylinder inside", "mesh"):
+    if isinstance(light, Disk | Sphere | Parallelogram) or name in (
+        "cylinder",
+        "cylinder inside",
+        "mesh",
+        "leaning mesh",
+    ):
         shapes.append(Shape(name, light, 1, (2.0, 1.5, 1.0)))
     else:
         lights = (light,)

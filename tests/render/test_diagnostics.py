@@ -85,17 +85,20 @@ def test_count_and_radius_are_those_of_the_look_up(box, pool):
     assert compared > 150
 
 
-def test_the_radius_of_the_nearest_follows_the_density(box, pool):
+@pytest.mark.parametrize(("alpha", "k", "share"), [(1.0, 20, 1.0), (0.5, 18, 0.75 * 20 / 18)])
+def test_the_radius_of_the_nearest_follows_the_density(box, pool, alpha, k, share):
+    """In the second pass, whose look-ups have (1 + α)/2 of the first pass's area."""
     values = {"render.method": "global map", "estimate.lookup": "nearest", "estimate.k": 20, "estimate.flatness": 1.0}
-    renderer = stepped(box, pool, values | {"estimate.max_radius": 0.5})
+    renderer = stepped(box, pool, values | {"estimate.max_radius": 0.5, "estimate.alpha": alpha})
     frame = renderer.frame(1, Wanted("look-up", "global"))
     counts, radii = (frame.image(view).reshape(-1) for view in ("photon count", "look-up radius"))
     photons = frame.clouds["global"].photons
     for pixel, (p, n) in enumerate(zip(*hits(frame.camera), strict=True)):
         if not np.isnan(p[0]):
-            expected = np.sort(in_disc(photons, p, n, 1e9, 1.0))[19]
+            distances = np.sort(in_disc(photons, p, n, 1e9, 1.0))
+            expected = np.sqrt(share) * distances[k - 1]
             assert radii[pixel] == pytest.approx(expected, rel=1e-3)
-            assert counts[pixel] == 20
+            assert counts[pixel] == pytest.approx((distances <= expected).sum(), abs=0 if share == 1 else 1)
 
 
 @pytest.mark.parametrize("values", [{"estimate.area": "convex hull"}, {"estimate.differential": True}])
