@@ -58,7 +58,7 @@ def test_every_case_has_a_name_of_its_own():
 
 
 def row_of(outcome, nonsense=False):
-    return Row(Case("group", "name", "", lambda lab: outcome, nonsense), outcome, 1.0, 10.0)
+    return Row(Case("group", "name", "", lambda lab: outcome, nonsense), outcome, 1.0, 1.5, 10.0)
 
 
 def test_what_counts_as_wrong():

@@ -78,11 +78,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """A case that has been run: seconds, peak memory in MiB above what was held before."""
+    """A case that has been run: seconds by the clock and of all processors, peak memory in MiB above what was held
+    before."""
 
     case: Case
     outcome: Outcome
     seconds: float
+    cpu: float
     memory: float
 
     @property
@@ -177,7 +179,7 @@ def run_case(lab: Lab, case: Case) -> Row:
     """The case with its time and memory. Whatever it raises is its outcome."""
     lab.said.clear()
     before = _start_peak()
-    start = time.perf_counter()
+    start, cpu = time.perf_counter(), time.process_time()
     try:
         outcome = case.run(lab)
     except PmviewerError as error:
@@ -186,9 +188,9 @@ def run_case(lab: Lab, case: Case) -> Row:
         outcome = Outcome(problem="out of memory")
     except Exception as error:
         outcome = Outcome(problem=f"{type(error).__name__}: {error}"[:120])
-    seconds = time.perf_counter() - start
+    seconds, cpu = time.perf_counter() - start, time.process_time() - cpu
     outcome = replace(outcome, said=tuple(dict.fromkeys((*outcome.said, *lab.said))))
-    return Row(case, outcome, seconds, max(_peak() - before, 0.0))
+    return Row(case, outcome, seconds, cpu, max(_peak() - before, 0.0))
 
 
 def _start_peak() -> float:
