@@ -29,6 +29,14 @@ class Estimate(Group):
         ge=0.05,
         le=2.0,
     )
+    radius_rule: Literal["pass", "pixel"] = setting(
+        "pass",
+        "One radius for all look-ups of a pass, or each pixel's own at the surfaces that it sees, shrunk by the "
+        "photons found there (Hachisuka and others 2008): not at all in the dark. Gather rays keep that of the pass.",
+        stage="image",
+        scale="choice",
+        title="radius by",
+    )
     alpha: float = setting(
         2.0 / 3.0,
         "How fast look-ups shrink from pass to pass, r²ᵢ₊₁ = r²ᵢ·(i+α)/(i+1); with look-up 'nearest' it is k that "
