@@ -2,8 +2,8 @@
 
 By default it is path-traced by Mitsuba 3 (package `mitsuba`), a program of others. What Mitsuba lacks is path-traced by
 pmviewer (`--by path`), where paths find the light. Caustics of small lights can't be path-traced in reasonable time:
-`--by gather` renders such scenes by pmviewer's final gather with look-ups a tenth as wide as the automatic ones, less
-than half a pixel, which is less than the noise.
+`--by gather` renders such scenes by pmviewer's final gather with look-ups a tenth as wide as the automatic ones, a
+third of a pixel: what they blur is less than the noise.
 
 The file is half float: its rounding, 5e-4 of a pixel at most, is far below the noise. Its attributes say how it was
 made: `pmviewer.made` in words, `pmviewer.command`, `pmviewer.seeds`, `pmviewer.samples` (per pixel, or passes), and
@@ -31,7 +31,7 @@ from pmviewer.settings import Settings, with_values
 
 CHUNK = 64
 """Samples per pixel at once."""
-PHOTONS, Q = 1_000_000, 0.1
+PHOTONS, Q = 250_000, 0.2
 """Trajectories of a pass of pmviewer, and the share of them that fills the global map."""
 NARROW = 0.1
 """Look-up radius in units of the automatic one."""
@@ -85,6 +85,7 @@ def by_pmviewer(path: Path, method: str, passes: int) -> tuple[list[np.ndarray],
     if method == "gather":
         radius = _automatic_radius(path) * NARROW
         settings += [f"photons.N={PHOTONS}", f"photons.q={Q}", f"estimate.radius={radius:.4g}", "estimate.alpha=1"]
+        settings.append("estimate.caustic_radius=1")  # as wide; half as wide by default
         made = f"pmviewer, gather, {2 * (passes // 2)} passes of {PHOTONS} photon trajectories, radius {NARROW} x auto"
     halves = []
     with tempfile.TemporaryDirectory() as folder:
