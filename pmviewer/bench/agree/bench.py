@@ -90,11 +90,11 @@ def _explained(
     methods = tuple(dict.fromkeys(c.method for c in comparisons))
     unknown, known = [], []
     for comparison in comparisons:
-        deviation = explanation(scene, comparison, level, salt)
-        if deviation is None:
-            unknown.append(comparison)
+        why = explanation(scene, comparison, level, salt)
+        if why:
+            known.append(why)
         else:
-            known.append(deviation.name)
+            unknown.append(comparison)
     worst = max(unknown or comparisons, key=lambda c: (c.method == "path", abs(np.log(max(c.outcome.ratio, 1e-9)))))
     text = (
         f"{worst.method} against {worst.peer}, {worst.what}: ratio {worst.outcome.ratio:.4f}, p {worst.outcome.p:.1g}"
@@ -122,7 +122,7 @@ def report(
     comparisons = [c for verdict in verdicts.values() for c in verdict.comparisons]
     notes = [f"scene {d.index}: {d.text}{f'; known: {d.known}' if d.known else ''}{f'; {d.file}' if d.file else ''}"
              for d in found]  # fmt: skip
-    notes += [f"known deviation of Mitsuba, {d.name}: {d.reason}" for d in DEVIATIONS]
+    notes += [f"known deviation, {d.name}: {d.reason}" for d in DEVIATIONS]
     notes += _settings_notes()
     notes.append(
         f"{len(comparisons)} comparisons of {sum(c.outcome.tests for c in comparisons)} tests in {seconds:.0f} s"

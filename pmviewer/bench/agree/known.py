@@ -1,16 +1,20 @@
-"""Where Mitsuba deviates by itself, and how that was verified. Nothing else is on the list.
+"""Where the pictures differ for a reason that is known: by Mitsuba's own deviations, or by what is wanted here.
 
-A disagreement is put down to a deviation when the scene has what it takes and the same comparison of the scene without
-that agrees; otherwise it stands.
+Nothing else is on the list. A disagreement with Mitsuba is put down to an entry only when the scene has what it takes,
+and the same comparison of the scene without that agrees; otherwise it stands. How each was verified stands with it, and
+docs/scenes.md says the same to users.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from pmviewer.bench.agree.tree import Node, nodes
+from pmviewer.bench.agree.tree import MAPS, Node, nodes
+
+GREY = [0.5, 0.5, 0.5]
 
 
 @dataclass(frozen=True)
@@ -22,36 +26,91 @@ class Deviation:
     without: Callable[[Node], Node | None]
 
 
-def _even_lights(scene: Node) -> Node | None:
-    """Textured area lights on meshes shine evenly."""
-    found = copy.deepcopy(scene)
-    for shape in found["shapes"]:
-        if shape["type"] in ("cube", "obj", "ply") and isinstance(shape.get("emitter", {}).get("radiance"), dict):
-            shape["emitter"]["radiance"] = [0.5, 0.5, 0.5]
-    return found if found != scene else None
+def _changed(change: Callable[[Node], None]) -> Callable[[Node], Node | None]:
+    def without(scene: Node) -> Node | None:
+        found = copy.deepcopy(scene)
+        change(found)
+        return found if found != scene else None
+
+    return without
 
 
-def _upright_normals(scene: Node) -> Node | None:
-    """Meshes have the normals of their faces, and there are no bump or normal maps."""
-    found = copy.deepcopy(scene)
-    for node in nodes(found):
+def _lights(scene: Node, kinds: tuple[str, ...]) -> Iterator[Node]:
+    return (s for s in scene["shapes"] if "emitter" in s and s["type"] in kinds)
+
+
+def _even_lights(scene: Node) -> None:
+    for shape in _lights(scene, ("sphere", "cylinder", "cube", "obj", "ply")):
+        if isinstance(shape["emitter"]["radiance"], dict):
+            shape["emitter"]["radiance"] = GREY
+
+
+def _flat_lights(scene: Node) -> None:
+    for shape in _lights(scene, ("obj", "ply")):
+        shape["face_normals"] = True
+
+
+def _unmirrored_lights(scene: Node) -> None:
+    for shape in _lights(scene, ("cylinder",)):
+        shape["to_world"] = [s for s in shape["to_world"] if s[0] != "scale" or math.prod(s[1]) > 0]
+
+
+def _flat_meshes(scene: Node) -> None:
+    for node in nodes(scene):
         if "mesh" in node:
             node["face_normals"] = True
+
+
+def _unmapped(scene: Node) -> None:
+    for node in [scene, *nodes(scene)]:
         for name in ("bsdf", "inside"):
-            while name in node and node[name]["type"] in ("bumpmap", "normalmap"):
+            while name in node and node[name]["type"] in MAPS:
                 node[name] = node[name]["inside"]
-    return found if found != scene else None
+
+
+def _unit_axes(scene: Node) -> None:
+    for node in nodes(scene):
+        for step in node.get("to_world", []):
+            length = math.hypot(*step[1]) if step[0] == "rotate" else 1.0
+            if abs(length - 1) > 1e-6:
+                step[1] = [x / length for x in step[1]]
 
 
 DEVIATIONS = (
     Deviation(
-        "textured mesh light",
-        "light samples of textured area lights on meshes disagree with Mitsuba's own BSDF samples by 1–8 %",
-        _even_lights,
+        "textured light",
+        "Mitsuba's light samples of textured area lights disagree with its own BSDF samples: on a sphere by 2 % (path "
+        "against direct with emitter_samples 0), on a cube they choose one of the faces that share coordinates, even "
+        "when the texture is of one colour",
+        _changed(_even_lights),
     ),
     Deviation(
-        "light through surfaces",
-        "where normals are tilted Mitsuba lets light pass to or from below the surface itself; here it carries none",
-        _upright_normals,
+        "light with vertex normals",
+        "Mitsuba's light samples of a mesh count its area by the vertex normals, its BSDF samples by the surface: up to "
+        "a quarter in places on a tetrahedron (the same two integrators)",
+        _changed(_flat_lights),
+    ),
+    Deviation(
+        "mirrored cylinder light",
+        "Mitsuba's light samples of a mirrored cylinder shine from the other side than its BSDF samples",
+        _changed(_unmirrored_lights),
+    ),
+    Deviation(
+        "vertex normals",
+        "wanted: where vertex normals tilt the shading, directions below the surface itself carry no light here; "
+        "Mitsuba's BSDFs ask the shading normal alone, and light goes through",
+        _changed(_flat_meshes),
+    ),
+    Deviation(
+        "bump and normal maps",
+        "wanted: as with vertex normals; and under a bump map Mitsuba mixes coordinates of the surface and of the world "
+        "when it makes the tangent",
+        _changed(_unmapped),
+    ),
+    Deviation(
+        "axis of rotation",
+        "wanted: a rotation about an axis that is not of unit length moves shapes as in Mitsuba, but normals here are "
+        "those of the moved surface",
+        _changed(_unit_axes),
     ),
 )

@@ -42,10 +42,12 @@ def bare(draw: Draw, kind: str, above: float) -> Node:
 def area(draw: Draw, materials: Materials, above: float, textured: bool, kind: str = "") -> Node:
     """A shining shape that looks down, or goes through the ground or whatever is there. It is large: both path tracers
     find caustics of small lights too seldom."""
-    kind = kind or draw.pick(KINDS)
+    kind = kind or draw.pick(("rectangle", "disk", *KINDS) if textured else KINDS)
     node = shape(draw, kind, 0.4 if kind in ("sphere", "cube", "obj", "ply", "cylinder") else 0.6, uv=textured)
     if "mesh" in node and node["mesh"]["kind"] in ("sheet", "quad"):
         node["mesh"] |= {"kind": "blob", "detail": 1}
+    if "mesh" in node and draw.chance(0.7):
+        node["face_normals"] = True
     place: list[Any] = [draw.number(-0.8, 0.8), draw.number(-0.8, 0.8), draw.number(0.7 * above, above)]
     if draw.chance(0.25):  # crosses or touches what stands on the ground
         place[2] = draw.pick((0.0, 0.2, 0.4))

@@ -35,7 +35,8 @@ def shape(draw: Draw, kind: str, size: float, tilted: bool = False, uv: bool = F
         kinds = ("blob", "tetra") if closed else ("blob", "tetra", "sheet", "quad")
         tilt = draw.number(3, TILT) if tilted else 0.0
         node: Node = {"type": kind, "mesh": mesh(draw, kind, kinds, tilt, uv or draw.chance(0.3))}
-        if draw.chance(0.2) and not tilted:
+        coarse = node["mesh"]["kind"] == "tetra" or node["mesh"]["detail"] == 1
+        if draw.chance(0.7 if coarse else 0.2) and not tilted:
             node["face_normals"] = True
     elif kind == "sphere" and draw.chance(0.5):
         node = {"type": "sphere", "center": draw.within(0.2), "radius": draw.number(0.6, 1)}

@@ -4,8 +4,8 @@ Each run gives the means of the picture and of its blocks, channel by channel; r
 test asks nothing of pixels. Bright paths that are too rare to have come yet make a mean too dark by more than its
 standard error says. With a finite variance the density of bright paths falls faster than x⁻³; what lies beyond the
 brightest, m, of n is then at most twice the share of that one in the mean (in the limit of a tail index of 2:
-∫ₘ x·2m²x⁻³ dx / n = 2m/n). The darker side is granted this much, measured on the brightest run. It falls as 1/n, faster
-than the noise.
+∫ₘ x·2m²x⁻³ dx / n = 2m/n). The darker side is granted this much, measured on the brightest run, and one such path more
+or less is added to its standard error. Both fall as 1/n, faster than the noise.
 
 A difference counts when it shows again and again: `STAGES` of fresh seeds and more samples, and the last test alone
 gives the p-value, which is corrected for the number of comparisons of the whole run (Holm).
@@ -79,8 +79,8 @@ def compared(
     variance = np.maximum(var_a + var_b, 1e-60)
     freedom = variance**2 / np.maximum(var_a**2 / (n - 1) + var_b**2 / (m - 1), variance**2 / (n + m - 2))
     rounding = ROUNDING * (np.abs(mean_a) + np.abs(mean_b))
-    unseen = np.where(mean_a < mean_b, _unseen(ours), _unseen(theirs))
-    error = np.sqrt(variance + rounding**2)
+    unseen = np.where(mean_a < mean_b, _unseen(ours), _unseen(theirs)) * np.maximum(mean_a, mean_b)
+    error = np.sqrt(variance + rounding**2 + (unseen / TAIL) ** 2)
     beyond = np.maximum(np.abs(mean_a - mean_b) - unseen - tolerance * np.abs(mean_b) - rounding, 0.0)
     p = 2 * student.sf(beyond / error, np.maximum(freedom, 1.0))
     worst = int(p.argmin())
@@ -92,8 +92,13 @@ def compared(
 
 
 def _unseen(runs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What a mean may lack because the brightest paths have not come yet."""
-    return np.asarray(TAIL * (runs.max(axis=0) - np.median(runs, axis=0)) / len(runs))
+    """The share that a mean may lack because the brightest paths have not come yet. For a block it is the largest of
+    all blocks, since none at all of these paths may have come to this one."""
+    lack = TAIL * (runs.max(axis=0) - np.median(runs, axis=0)) / len(runs)
+    mean = runs.mean(axis=0)
+    share = np.divide(lack, mean, out=np.zeros_like(mean), where=mean > 0)
+    share[CHANNELS:] = share[CHANNELS:].max(initial=0.0)
+    return np.asarray(share)
 
 
 def rejected(p_values: list[float], level: float = LEVEL) -> list[bool]:

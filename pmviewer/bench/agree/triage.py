@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from pmviewer.bench.agree.known import DEVIATIONS, Deviation
+from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.shrink import shrunk
 from pmviewer.bench.agree.statistics import Outcome
 from pmviewer.bench.agree.tree import Node, to_json
@@ -41,17 +41,29 @@ def outcome_of(scene: Node, like: Comparison, stage: int, salt: tuple[int, ...])
             return None
 
 
-def explanation(scene: Node, found: Comparison, level: float, salt: tuple[int, ...]) -> Deviation | None:
-    """The deviation of Mitsuba that a disagreement comes from: without what it takes, there is none."""
+def explanation(scene: Node, found: Comparison, level: float, salt: tuple[int, ...]) -> str:
+    """The known deviations that a disagreement with Mitsuba comes from: without what they take, there is none.
+
+    One alone if that is enough, else all that the scene has; empty if it disagrees without all of them too.
+    """
     if not found.peer.startswith("Mitsuba"):
-        return None
+        return ""
+    has = [(d.name, without) for d in DEVIATIONS if (without := d.without(scene)) is not None]
+    everything = scene
     for deviation in DEVIATIONS:
-        without = deviation.without(scene)
-        if without is not None:
-            outcome = outcome_of(without, found, len(STAGES) - 1, (*salt, 1))
-            if outcome is not None and outcome.p > level:
-                return deviation
-    return None
+        everything = deviation.without(everything) or everything
+    if not has or not _agrees(everything, found, level, salt):
+        return ""
+    if len(has) > 1:
+        for name, without in has:
+            if _agrees(without, found, level, salt):
+                return name
+    return " + ".join(name for name, _ in has)
+
+
+def _agrees(scene: Node, like: Comparison, level: float, salt: tuple[int, ...]) -> bool:
+    outcome = outcome_of(scene, like, len(STAGES) - 1, (*salt, 1))
+    return outcome is not None and outcome.p > level
 
 
 def smallest(scene: Node, found: Comparison, salt: tuple[int, ...], most: int) -> Node:

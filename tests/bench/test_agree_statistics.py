@@ -1,0 +1,98 @@
+"""A planted error is found, equal pictures agree even when single paths are very bright."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pmviewer.bench.agree.statistics import compared, rejected, summaries
+
+PIXELS = (16, 16, 3)
+
+
+def runs(seed: int, count: int, samples: int, mean: float = 1.0, tail: float = 0.0) -> np.ndarray:
+    """(count, 16, 16, 3) means of `samples` exponential samples of a pixel; with `tail`, every one in so many of them
+    is drawn from a Pareto distribution of index 2.2 instead, of the same mean."""
+    rng = np.random.default_rng(seed)
+    drawn = rng.exponential(1, (samples, count, *PIXELS))
+    if tail:
+        rare = rng.uniform(size=drawn.shape) < 1 / tail
+        drawn[rare] = (rng.pareto(2.2, int(rare.sum())) + 1) * 1.2 / 2.2 * tail / 2
+        drawn[~rare] *= 0.5
+        drawn *= 1 / (0.5 + 0.5 * (1 - 1 / tail))
+    return mean * drawn.mean(axis=0)
+
+
+def p_of(ours: np.ndarray, theirs: np.ndarray, **more: float) -> float:
+    return compared(summaries(ours), summaries(theirs), **more).p
+
+
+def test_three_percent_are_found():
+    found = [p_of(runs(2 * i, 24, 64, 1.03), runs(2 * i + 1, 24, 64)) for i in range(10)]
+    assert max(found) < 1e-6
+
+
+def test_equal_pictures_agree():
+    p = np.array([p_of(runs(2 * i, 12, 16), runs(2 * i + 1, 12, 16)) for i in range(200)])
+    # The allowance for bright paths makes it a little shy; it must never be bold: 20 ± 4.2 below a tenth.
+    assert (p < 0.1).sum() <= 33
+
+
+def test_rare_bright_paths_are_no_disagreement():
+    """One side with a heavy tail: Welch's test alone rejects far too often."""
+    p = np.array([p_of(runs(2 * i, 12, 16, tail=3000.0), runs(2 * i + 1, 12, 64)) for i in range(100)])
+    assert (p < 1e-4).sum() == 0
+
+
+def test_tolerance_is_a_share_of_the_second():
+    ours, theirs = runs(1, 24, 64, 1.03), runs(2, 24, 64)
+    assert p_of(ours, theirs, tolerance=0.05) > 0.5
+    assert p_of(ours, theirs, tolerance=0.01) < 1e-3
+
+
+def test_black_against_light_is_found_and_black_agrees_with_black():
+    light, black = runs(1, 12, 16), np.zeros((12, *PIXELS))
+    assert p_of(black, light) < 1e-6
+    assert compared(summaries(black), summaries(light), sparse=True).p < 1e-6
+    assert p_of(black, black) == 1
+    assert p_of(np.full((4, *PIXELS), 7.0), np.full((4, *PIXELS), 7.0 * (1 + 1e-6))) > 0.5
+    assert p_of(np.full((4, *PIXELS), 7.0), np.full((4, *PIXELS), 7.01)) < 1e-6
+
+
+def test_blocks_that_no_photon_met_say_nothing_where_light_is_sparse():
+    theirs = np.zeros((12, *PIXELS))
+    theirs[:, 8:, 8:] = runs(1, 12, 16)[:, 8:, 8:]
+    ours = theirs + 0.01 * runs(2, 12, 16)
+    assert compared(summaries(ours), summaries(theirs)).tests == 3 + 12
+    assert compared(summaries(ours), summaries(theirs), sparse=True).tests == 3 + 3
+
+
+def test_pixels_that_are_not_seen_do_not_count():
+    ours, theirs = runs(1, 24, 64), runs(2, 24, 64)
+    ours[:, :8] *= 2
+    seen = np.zeros((16, 16), bool)
+    seen[8:] = True
+    assert p_of(ours, theirs) < 1e-6
+    lower = compared(summaries(ours, seen), summaries(theirs, seen))
+    assert lower.p > 1e-3
+    assert lower.tests == 3 + 6
+
+
+def test_not_a_number_never_agrees():
+    ours = runs(1, 12, 16)
+    ours[3, 2, 2, 1] = np.nan
+    assert p_of(ours, runs(2, 12, 16)) == 0
+
+
+def test_outcome_says_what_differs_most():
+    ours, theirs = runs(1, 24, 64), runs(2, 24, 64)
+    ours[:, :8, :8, 0] *= 1.5
+    found = compared(summaries(ours), summaries(theirs))
+    assert found.ratio == pytest.approx(1.5, abs=0.02)
+    assert 0 < found.noise < 0.02
+
+
+def test_holm_rejects_in_order():
+    assert rejected([0.5, 1e-6, 0.004, 0.0049], 0.01) == [False, True, False, False]
+    assert rejected([0.001, 0.004, 0.009], 0.01) == [True, True, True]
+    assert rejected([], 0.01) == []
