@@ -42,7 +42,7 @@ QUICK = quick([*scales(), *radii(), *counts(), *materials(), *overlaps(), *light
 @pytest.fixture(scope="module")
 def lab():
     pool = WorkPool(2)
-    yield Lab(pool)
+    yield Lab(pool, seeds=12)
     pool.close()
 
 
