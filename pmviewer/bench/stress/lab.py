@@ -23,12 +23,13 @@ from pmviewer.errors import PmviewerError
 from pmviewer.scene.description import Scene
 from pmviewer.settings import Settings, with_values
 
-SIGNIFICANCE = 1e-6
-"""Below this a mean is not the expected one. Of some two hundred means chance makes one fail in five thousand runs."""
+SIGNIFICANCE = 1e-5
+"""Below this a mean is not the expected one. Of some hundred and fifty means chance makes one fail in 700 seeds."""
 ROUNDING = 2e-4
 """Relative difference of means that float32 and 16-bit powers explain where nothing varies."""
-SEEDS = 16
-SMALL = {"photons.N": 4000, "photons.sequence": "independent", "camera.width": 16, "camera.height": 16}
+SEEDS = 48
+"""Of which means and standard errors are made."""
+SMALL = {"photons.N": 8000, "photons.sequence": "independent", "camera.width": 16, "camera.height": 16}
 """Settings of all cases unless they change them: independent photons have standard errors."""
 
 
@@ -106,9 +107,11 @@ class Row:
 
 @dataclass
 class Lab:
-    """Renders scenes on its own threads. `said` collects the sentences of the case that runs."""
+    """Renders scenes on its own threads, cases that don't say otherwise from so many seeds. `said` collects the
+    sentences of the case that runs."""
 
     pool: WorkPool
+    seeds: int = SEEDS
     said: list[str] = field(default_factory=list)
 
     def open(self, scene: Scene | OpenScene) -> OpenScene:
@@ -137,7 +140,7 @@ class Lab:
     def means(
         self,
         scene: Scene | OpenScene,
-        seeds: int = SEEDS,
+        seeds: int | None = None,
         passes: int = 1,
         terms: Sequence[str] = ("beauty",),
         where: NDArray[np.bool_] | None = None,
@@ -146,7 +149,7 @@ class Lab:
         """Mean over pixels (those of `where`) and channels of the sum of the terms, one for each seed; and whether
         every plane is finite."""
         opened, found, finite = self.open(scene), [], True
-        for seed in range(1, seeds + 1):
+        for seed in range(1, (seeds or self.seeds) + 1):
             frame = self.frame(self.renderer(opened, passes, render__seed=seed, **values))
             finite = finite and bool(np.isfinite(frame.planes).all())
             image = np.sum([frame.image(term).astype(np.float64) for term in terms], axis=0)
@@ -162,7 +165,7 @@ class Lab:
         error = float(found.std(ddof=1) / np.sqrt(len(found))) if len(found) > 1 else 0.0
         return Outcome(float(found.mean()), error, expected, samples=len(found), finite=finite, bias=bias)
 
-    def compare(self, scene: Scene | OpenScene, seeds: int = SEEDS, bias: str = "", **values: Any) -> Outcome:
+    def compare(self, scene: Scene | OpenScene, seeds: int | None = None, bias: str = "", **values: Any) -> Outcome:
         """The photon method that `values` describe against the path tracer with four samples as many a pixel."""
         opened = self.open(scene)
         one = self.measure(opened, None, bias, seeds=seeds, **values)

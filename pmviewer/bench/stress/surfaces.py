@@ -179,7 +179,7 @@ def _sunk(lab: Lab, method: str) -> Outcome:
     lamp = Shape("lamp", Sphere((0, -1, 0), 0.3), 1, (3.0,) * 3)
     scene = room(light=lamp, materials=(grey(0.0),))
     return lab.compare(
-        scene, 8, render__method=method, photons__N=20_000, estimate__radius=0.02, passes=2, gather__rays=8
+        scene, 24, render__method=method, photons__N=20_000, estimate__radius=0.02, passes=2, gather__rays=8
     )
 
 
@@ -187,7 +187,7 @@ def _cutting(lab: Lab, method: str) -> Outcome:
     lamp = Shape("lamp", Parallelogram((-1.4, 0.3, -0.4), (0.8, 0.1, 0), (0, 0, 0.8)), 0, (5.0,) * 3)
     scene = room(light=lamp)
     return lab.compare(
-        scene, 8, render__method=method, photons__N=20_000, estimate__radius=0.02, passes=2, gather__rays=8
+        scene, 24, render__method=method, photons__N=20_000, estimate__radius=0.02, passes=2, gather__rays=8
     )
 
 
