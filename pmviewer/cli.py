@@ -179,6 +179,11 @@ def bench(
     quick: Annotated[bool, typer.Option(help="Fewer rounds and smaller inputs.")] = False,
     csv: Annotated[Path | None, typer.Option(help="Also write the table as CSV.")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Also write the table as Markdown.")] = None,
+    scenes: Annotated[int | None, typer.Option(min=1, help="Of agree: how many random scenes.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of agree: which random scenes.")] = None,
+    keep: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Of agree: where scenes go that disagree.")
+    ] = None,
 ) -> None:
     """Measure: a table, then a line for each target."""
     from pmviewer.bench.registry import BENCHES, run_bench
@@ -187,7 +192,7 @@ def bench(
         for key, (description, _) in BENCHES.items():
             typer.echo(f"{key:10s} {description}")
         return
-    run_bench(name, quick, csv, markdown)
+    run_bench(name, quick, csv, markdown, {"scenes": scenes, "seed": seed, "keep": keep})
 
 
 @app.command()

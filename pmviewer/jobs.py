@@ -28,6 +28,7 @@ from pmviewer.scene.analysis import analyse
 from pmviewer.scene.describe import describe
 from pmviewer.scene.description import Scene
 from pmviewer.scene.load import load_scene, reference_of
+from pmviewer.scene.recentre import recentred
 from pmviewer.settings import Settings, with_values
 
 FORMATS = (".exr", ".png")
@@ -195,7 +196,7 @@ def statistics_report(s: Statistics) -> str:
 
 def scene_report(job: Job) -> str:
     """Text of `pmviewer info`: what is in the scene, what was ignored, which stages run."""
-    scene = load_scene(job.scene, job.parameters)
+    scene = recentred(load_scene(job.scene, job.parameters))
     plan = plan_of(job.settings, analyse(scene))
     rows = describe(scene)
     needed = [

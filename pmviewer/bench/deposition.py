@@ -11,9 +11,11 @@ pictures of other seeds: differences seed by seed are rare and strong there (pho
 normal, and such a test would find their skewness. Pixels of a block see the same photons, so that its variance is
 taken from its means over the seeds.
 
-Office, density control: one light pass serves all passes, and a look-up takes the k nearest (both as in the course
-guide, §3.7.2). Compared are pictures made of the same photons by the same gather rays; the difference is the mean over
-all pixels of |ΔY|, in percent of the picture's mean luminance.
+Office, density control: at the defaults, for both methods, and as in the course guide (§3.7.2): one light pass serves
+all passes, a look-up takes the k nearest. Compared are pictures made of the same photons by the same gather rays; the
+difference is the mean over all pixels of |ΔY|, in percent of the picture's mean luminance. It holds the noise of
+having fewer photons: beside it stands how much two pictures with all photons differ that have other seeds. Rules with
+'nearest' are the source's own form (`importance.around`).
 """
 
 from __future__ import annotations
@@ -50,23 +52,21 @@ RULES: dict[str, dict[str, Any]] = {
     "density control, step": CONTROL,
     "density control, cosine": CONTROL | {"importance.acceptance": "cosine"},
 }
+CONTROLS = {rule: how for rule, how in RULES.items() if "control" in rule}
+SOURCES = {f"{rule}, nearest": how | {"importance.around": "nearest"} for rule, how in CONTROLS.items()}
 CLAMP, DISCARD = list(RULES)[:2]
 Z_SEEDS, Z_SIZE = 32, 64
 
-OFFICE_N = 400_000
-OFFICE_M_R, COSINE_M_R = 8.0, 9.0
-"""Photons per pixel of the global map, with the step and with the cosine, which stores fewer for the same M_r. The
-default of 2 saves more, and differs by somewhat more than 1 %."""
 OFFICE_DENSITY = 40.0
 """Constant density in photons per m² that stores about as many photons as importance does."""
-OFFICE_VALUES = {
-    "render.method": "gather",
+CLASSICAL: dict[str, Any] = {
     "photons.renew": "once",
-    "photons.N": OFFICE_N,
+    "photons.N": 400_000,
     "estimate.lookup": "nearest",
     "estimate.k": 80,
-    "importance.M_r": OFFICE_M_R,
 }
+"""The course guide's way; with the M_r at which the picture differs little: the default of 2 saves more."""
+CLASSICAL_M_R = {"density control, step": 6.0, "density control, cosine": 4.0}
 COLUMNS = ["scene", "method", "rule", "N", "photons in maps", "of all", "relMSE", "relMSE, indirect", "difference %",
            "mean off %", "discarded %", "CPU light", "CPU all"]  # fmt: skip
 
@@ -202,25 +202,42 @@ def unbiased(method: str, pool: WorkPool) -> list[Target]:
     ]  # fmt: skip
 
 
+def said(values: dict[str, Any]) -> str:
+    """The settings that differ from the defaults, for a target's line."""
+    return ", ".join(f"{path}={value}" for path, value in values.items())
+
+
 def office(quick: bool, pool: WorkPool) -> tuple[list[list[Any]], list[Target]]:
     """Rows and targets of density control."""
     opened, target = open_scene(OFFICE), reference(OFFICE)
-    size, seeds, passes = (target.shape[1], target.shape[0]), range(1, 2), 2 if quick else 8
-    constant = {"importance.deposition": "constant density", "importance.density": OFFICE_DENSITY}
-    controls = {rule: how for rule, how in RULES.items() if "density" in rule} | {"constant density": constant}
-    controls["density control, cosine"] = controls["density control, cosine"] | {"importance.M_r": COSINE_M_R}
-    all_ = measure(opened, OFFICE_VALUES, seeds, passes, pool, size)
-    rows = [_row(OFFICE, "gather", "all", OFFICE_N, all_, all_, target)]
+    size, passes = (target.shape[1], target.shape[0]), 2 if quick else 8
+    rows: list[list[Any]] = []
     targets: list[Target] = []
-    for rule, how in controls.items():
-        made = measure(opened, OFFICE_VALUES | how, seeds, passes, pool, size)
-        row = _row(OFFICE, "gather", rule, OFFICE_N, made, all_, target)
-        rows.append(row)
-        if rule != "constant density":
-            fewer, differs = 1 / row[COLUMNS.index("of all")], row[COLUMNS.index("difference %")]
-            targets.append(Target("I5", fewer, 5.0, "×", True, f"{OFFICE}: fewer photons by {rule}"))
-            targets.append(Target("I5", differs, 1.0, "%", False, f"{OFFICE}: mean difference of pixels, {rule}"))
-        targets.append(Target("I5", 100 * made.power_off, 0.01, "%", False, f"{OFFICE}: power, {rule}"))
+
+    def compared(method: str, values: dict[str, Any], rules: dict[str, dict[str, Any]]) -> None:
+        base = {"render.method": method} | values
+        n = with_values(Settings(), base).photons.N
+        all_ = measure(opened, base, range(1, 2), passes, pool, size)
+        other = measure(opened, base, range(2, 3), passes, pool, size)
+        rows.append(_row(OFFICE, method, "all", n, all_, all_, target))
+        rows.append(_row(OFFICE, method, "all, other seed", n, other, all_, target))
+        noise = rows[-1][COLUMNS.index("difference %")]
+        for rule, how in rules.items():
+            made = measure(opened, base | how, range(1, 2), passes, pool, size)
+            rows.append(row := _row(OFFICE, method, rule, n, made, all_, target))
+            note = f"{OFFICE}, {said(base | how)}"
+            targets.append(Target("I5", 100 * made.power_off, 0.01, "% of the power", False, note))
+            if rule in CONTROLS:
+                fewer, differs = 1 / row[COLUMNS.index("of all")], row[COLUMNS.index("difference %")]
+                of_noise = f"; other seeds, all photons: {noise:.3g} %, {passes} passes"
+                targets.append(Target("I5", fewer, 5.0, "× fewer photons", True, note))
+                targets.append(Target("I5", differs, 1.0, "% difference of pixels", False, note + of_noise))
+
+    for method in METHODS:
+        compared(method, {}, CONTROLS | SOURCES)
+    constant = {"importance.deposition": "constant density", "importance.density": OFFICE_DENSITY}
+    rules = {rule: how | {"importance.M_r": CLASSICAL_M_R[rule]} for rule, how in CONTROLS.items()}
+    compared("gather", CLASSICAL, rules | {"constant density": constant})
     return rows, targets
 
 
@@ -240,7 +257,7 @@ def run(quick: bool = False) -> BenchResult:
         "relMSE, indirect: variance of the indirect term and caustics between seeds; discarding is biased, and its "
         "bias, mean off, is not part of that",
         "difference: mean |ΔY| of pixels over the mean Y of the picture with all photons of the same light pass",
-        f"{OFFICE}: k = 80 nearest, M_r = {OFFICE_M_R:g} (cosine {COSINE_M_R:g}), constant density {OFFICE_DENSITY:g} "
-        "photons/m²; 320 × 240",
+        f"{OFFICE}: 320 × 240; N = {CLASSICAL['photons.N']:,}: {said(CLASSICAL)}, importance.M_r="
+        f"{' and '.join(f'{m:g}' for m in CLASSICAL_M_R.values())}; nearest: the source's own form of density control",
     ]
     return BenchResult("Deposition rules", COLUMNS, rows + more[0], targets + more[1], notes)

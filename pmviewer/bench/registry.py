@@ -1,8 +1,10 @@
-"""The benches by name. A bench is a function `run(quick: bool) -> BenchResult`, imported when it is called."""
+"""The benches by name. A bench is a function `run(quick: bool, …) -> BenchResult`, imported when it is called."""
 
 from __future__ import annotations
 
 import importlib
+import inspect
+from collections.abc import Mapping
 from pathlib import Path
 
 from pmviewer.bench.report import BenchResult, print_result, to_csv, to_markdown
@@ -16,6 +18,7 @@ BENCHES: dict[str, tuple[str, str]] = {
     "photons": ("Photons per second and bytes per photon (P8, P13)", "pmviewer.bench.photons:run"),
     "error": ("Error against CPU time on the bundled scenes (P1–P5)", "pmviewer.bench.error:run"),
     "mitsuba": ("Agreement with Mitsuba 3 on the same files, block by block", "pmviewer.bench.mitsuba:run"),
+    "agree": ("Random scenes: every method against Mitsuba 3 and the others", "pmviewer.bench.agree.bench:run"),
     "coherence": ("Photons kept when one of three glasses moves (T2)", "pmviewer.bench.coherence:run"),
     "lights": ("Shadow rays by choice of lights (R2)", "pmviewer.bench.lights:run"),
     "shadows": ("Shadow rays saved by shadow photons (T8)", "pmviewer.bench.shadows:run"),
@@ -30,18 +33,24 @@ BENCHES: dict[str, tuple[str, str]] = {
     "importance": ("Importance against brute force, and its cost (I1)", "pmviewer.bench.importance:run"),
     "deposition": ("Deposition rules: photons at equal error, power, cost (I4, I5)", "pmviewer.bench.deposition:run"),
     "emission": ("Guided emission: photons traced for the same error (I6)", "pmviewer.bench.emission:run"),
+    "stress": ("Extremes of every kind: finite, unbiased or said so, bounded", "pmviewer.bench.stress.suite:run"),
     "projection": ("Caustic photons by projection maps (T7)", "pmviewer.bench.projection:run"),
 }
 """Name: what it measures, and where its function is."""
 
 
 def run_bench(
-    name: str, quick: bool = False, csv_path: Path | None = None, markdown_path: Path | None = None
+    name: str,
+    quick: bool = False,
+    csv_path: Path | None = None,
+    markdown_path: Path | None = None,
+    options: Mapping[str, object] | None = None,
 ) -> BenchResult:
     """Run a bench, print its table and targets, and write the table to the files asked for.
 
-    Raises SettingError for an unknown name and OutputError for a file that can't be written; a wrong file name is
-    found before the bench runs.
+    `options` are further arguments of the bench's function; those that are None were not given. Raises SettingError for
+    an unknown name and for options that the bench does not have, and OutputError for a file that can't be written; all
+    of this is found before the bench runs.
     """
     if name not in BENCHES:
         raise SettingError(f"There is no bench '{name}'. There are {', '.join(BENCHES)}.")
@@ -50,7 +59,12 @@ def run_bench(
         if path is not None:
             check_target(path, suffixes)
     module, _, function = BENCHES[name][1].partition(":")
-    result: BenchResult = getattr(importlib.import_module(module), function)(quick=quick)
+    run = getattr(importlib.import_module(module), function)
+    given = {key: value for key, value in (options or {}).items() if value is not None}
+    for key in given:
+        if key not in inspect.signature(run).parameters:
+            raise SettingError(f"The bench '{name}' has no option --{key}.")
+    result: BenchResult = run(quick=quick, **given)
     print_result(result)
     for path, text_of, suffixes in outputs:
         if path is not None:

@@ -21,8 +21,10 @@ def caveats(settings: Settings, tally: Tally, energy: Energy | None, scene_radiu
             "scatterings and left out, so the picture is too dark: raise photons.max_bounces, or lower what surfaces "
             "reflect below 1."
         )
-    if energy.watts[0] > 0 and energy.share("escaped") > 1 - 1e-9:
-        said.append("No photon met a surface: the lights shine past the scene.")
+    if tally.emitted and not tally.deposited and not any(tally.stored.values()):
+        said.append(
+            f"None of {tally.emitted:,} photons arrived on a surface that shows it: do the lights shine past it?"
+        )
     said += _too_few(settings, tally, scene_radius, pixels)
     return said
 
@@ -47,7 +49,7 @@ def _too_few(settings: Settings, tally: Tally, scene_radius: float, pixels: int)
     # Photons on surfaces of about the bounding sphere's area, (r/2R)² of them in a disc.
     found = photons * (radius / (2 * scene_radius)) ** 2
     looks = pixels * (settings.gather.rays if settings.render.method == "gather" else 1)
-    if found * looks >= 1:
+    if found * looks >= 0.1:  # in a whole pass
         return []
     seldom = 1 / max(found, 1e-300)
     return [

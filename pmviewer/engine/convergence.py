@@ -51,7 +51,7 @@ def convergence_plane(
 def prepare_convergence() -> None:
     """Compile, or load, what the criterion runs."""
     photons = np.zeros((1, 6), np.float32)
-    criterion = Criterion(2, 0, 1.0, 1.0, 0b1010)
+    criterion = Criterion(2, 1.0, 0b1010)
     judge = Convergence(criterion, photons, 1.0, other_light(criterion, photons, 1.0))
     normals, one = np.array([[0.0, 0.0, 1.0]], np.float32), np.ones(1, np.float32)
     judge.states(photons[:, :3], normals, one, True, lambda tasks: [task() for task in tasks])

@@ -12,9 +12,9 @@ from pmviewer.engine.importance import ImportanceMaps, ImportanceStage
 from pmviewer.engine.method import Plan
 from pmviewer.importance.importons import Rule as ImportonRule
 from pmviewer.importance.importons import trace
-from pmviewer.importance.rules import TESTS, automatic_f, density_of, probability_of
+from pmviewer.importance.rules import TESTS, automatic_f, density_beyond, density_of, probability_of
 from pmviewer.maps.convergence import Criterion
-from pmviewer.maps.density_control import ACCEPTANCE, M
+from pmviewer.maps.density_control import ACCEPTANCE, NEAREST, Around, M
 from pmviewer.maps.importance import ImportanceMap
 from pmviewer.maps.record import DIRECT
 from pmviewer.maps.stored import ALL_CLASSES
@@ -26,7 +26,6 @@ from pmviewer.photons.deposition import (
     Rule,
     constant,
     density_of_discs,
-    farthest_of,
 )
 from pmviewer.render.record import eye_record
 from pmviewer.settings import Settings
@@ -84,7 +83,7 @@ def rules_of(
         if how.f == "auto":
             f, notes = factors(settings, importance, maps)
     else:
-        key += (how.acceptance, how.M_r, how.caustic_M_r, how.density, growth)
+        key += (how.acceptance, how.around, how.contrast, how.reach, how.M_r, how.caustic_M_r, how.density, growth)
         key += tuple(radii.values()) if plan.deposition == "constant density" and how.density == "auto" else ()
     for name, mask in classes.items():
         if not mask:
@@ -97,20 +96,24 @@ def rules_of(
                 probability_of(chosen, factor), how.epsilon, how.cut_off == "discard", seed + (name == "global")
             )
             continue
+        around, beyond = NEAREST, None
+        if how.around == "guarded":
+            around = Around(True, how.contrast)
         if chosen is not None:
-            required[name] = density_of(chosen, growth * (how.M_r if name == "global" else how.caustic_M_r))
+            M_r = growth * (how.M_r if name == "global" else how.caustic_M_r)
+            required[name] = density_of(chosen, M_r)
+            if how.around == "guarded":
+                beyond = density_beyond(chosen, M_r, how.reach)
         else:
             automatic = constant_density(settings, radii[name])
             everywhere[name] = automatic if how.density == "auto" else growth * float(how.density)
             required[name] = constant(everywhere[name])
-        rules[name] = Density(
-            required[name], ACCEPTANCE.index(how.acceptance), farthest_of(scene_radius), seed + (name == "global")
-        )
+        acceptance = ACCEPTANCE.index(how.acceptance)
+        rules[name] = Density(required[name], acceptance, around, beyond, seed + (name == "global"))
     criterion = None
     sample = sampled_classes(plan)
     if plan.convergence:
-        acceptance, farthest = ACCEPTANCE.index(how.acceptance), farthest_of(scene_radius)
-        criterion = Criterion(plan.convergence, acceptance, farthest, scene_radius, plan.caustic_classes)
+        criterion = Criterion(plan.convergence, scene_radius, plan.caustic_classes)
         key += ("convergence", plan.convergence)
         sample |= ALL_CLASSES & ~plan.caustic_classes
     deposition = Deposition(rules["caustic"], rules["global"], classes["caustic"], classes["global"], sample, criterion)

@@ -15,9 +15,12 @@ _DISC_ONLY = ("estimate.filter", "estimate.cone_k", "estimate.rim", "estimate.di
 _RADIANCE_ONLY = ("gather.cutoff", "gather.similarity")
 _GUIDED_ONLY = ("gather.guided", "gather.guide_radius")
 _KELLER_WALD_ONLY = ("importance.f", "importance.epsilon", "importance.cut_off")
+_GUARDED_ONLY = ("importance.contrast", "importance.reach")
 _DEPOSITION = (
     "importance.deposition",
     "importance.acceptance",
+    "importance.around",
+    *_GUARDED_ONLY,
     "importance.density",
     "importance.convergence",
     *_KELLER_WALD_ONLY,
@@ -115,7 +118,10 @@ def _deposition(path: str, settings: Settings, plan: Plan) -> str | None:
         return None if active == "Keller-Wald" else "Only with the deposition rule 'Keller-Wald'."
     if path == "importance.density":
         return None if active == "constant density" else "Only with the deposition rule 'constant density'."
-    return "Only with density control." if active in ("all", "Keller-Wald") else None
+    if active in ("all", "Keller-Wald"):
+        return "Only with density control."
+    guards = path not in _GUARDED_ONLY or settings.importance.around == "guarded"
+    return None if guards else "Only with guarded neighbours (importance.around)."
 
 
 def _emission(path: str, settings: Settings, plan: Plan) -> str | None:

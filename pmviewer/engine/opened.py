@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from pmviewer.engine.hidden_lights import hidden_lights
 from pmviewer.engine.memory import check_scene_memory
 from pmviewer.photons.projection import Projection
 from pmviewer.scene.analysis import SceneTraits, analyse
 from pmviewer.scene.description import Scene
 from pmviewer.scene.flatten import FlatScene, flatten
 from pmviewer.scene.load import load_scene
+from pmviewer.scene.recentre import recentred
 
 _uids = itertools.count(1)
 
@@ -31,8 +33,13 @@ class OpenScene:
 
 
 def open_scene(source: str | Path | Scene, parameters: Mapping[str, str] | None = None) -> OpenScene:
-    """Load, check and flatten. Raises SceneError."""
+    """Load, check, move to the origin and flatten. Raises SceneError."""
     scene = source if isinstance(source, Scene) else load_scene(source, parameters or {})
     check_scene_memory(scene)
+    scene = recentred(scene)
     name = scene.name if isinstance(source, Scene) else str(source)
-    return OpenScene(scene, flatten(scene), analyse(scene), name)
+    flat = flatten(scene)
+    hidden = hidden_lights(scene, flat)
+    if hidden:
+        scene = replace(scene, warnings=(*scene.warnings, *hidden))
+    return OpenScene(scene, flat, analyse(scene), name)

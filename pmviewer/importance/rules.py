@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.maps.importance import ImportanceMap, importance_sums, importances, required_density
+from pmviewer.maps.density_control import M
+from pmviewer.maps.importance import ImportanceMap, importance_sums, importances, nearest_importances, required_density
 from pmviewer.maps.record import decode_directions
 
 Float = NDArray[np.float32]
@@ -55,6 +56,23 @@ def density_of(importance: ImportanceMap, M_r: float) -> Evaluate:
     def evaluate(positions: Float, normals: Codes) -> Float:
         gamma = _evaluated(importances, importance, positions, normals)
         return np.asarray(required_density(gamma, M_r), np.float32)
+
+    return evaluate
+
+
+def density_beyond(importance: ImportanceMap, M_r: float, reach: float) -> Callable[[Float], Float]:
+    """Density (n,) for positions (n, 3) where nothing is required, so that power that is shared out there does not come
+    near important places: M photons within `reach` times the distance of the nearest importon, or what that one asks
+    for, if that is less. 0 without importons."""
+
+    def evaluate(positions: Float) -> Float:
+        gamma, distances = np.zeros(len(positions), np.float32), np.full(len(positions), np.inf, np.float32)
+        if importance.n and len(positions):
+            points = np.ascontiguousarray(positions, np.float32)
+            nearest_importances(importance.record, points, gamma, distances, 0, len(points))
+        with np.errstate(divide="ignore"):
+            near = M / (np.pi * (np.float32(reach) * distances) ** 2)
+        return np.asarray(np.minimum(required_density(gamma, M_r), near), np.float32)
 
     return evaluate
 

@@ -1,10 +1,12 @@
 """Lights (T1): emission of photons, sampling towards a point, and the densities for multiple importance sampling.
 
 Area lights are one-sided: they emit where their normal points; a mesh with vertex normals where these point, as in
-Mitsuba 3. Photons leave it with the surface's own cosine in that half of all directions, which is π in all whatever the
-vertex normals are: cosines and densities are always those of the surface. Lights are picked with probability
-proportional to their power's luminance. Spots, directional lights and image environments have files of their own;
-scenes without them have another type of record (`pmviewer.kernels.scene`) and compile nothing of them.
+Mitsuba 3. Photons leave it with the surface's own cosine in that half of all directions, whose integral is π whatever
+the vertex normals are: cosines and densities are always those of the surface.
+
+Lights are picked with probability proportional to their power's luminance. Spots, directional lights and image
+environments have files of their own; scenes without them have another type of record (`pmviewer.kernels.scene`) and
+compile nothing of them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Intrinsics below numba's arrays: stack scratch, loads from raw addresses, bit casts.
 
-A kernel sees the scene as one record of addresses (DESIGN: kernels). `load_f4(address, i)` reads element i of a float32
-array that starts at `address`; Python keeps the array alive.
+A kernel sees the scene as one record of addresses (`pmviewer.kernels.scene`). `load_f4(address, i)` reads element i of
+a float32 array that starts at `address`; Python keeps the array alive.
 """
 
 from __future__ import annotations

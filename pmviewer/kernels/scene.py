@@ -70,7 +70,7 @@ def scene_dtype(bsdfs: bool = False, lights: bool = False, instances: bool = Fal
         *(TEXTURE_FIELDS if textures else []),
         *(INSTANCE_FIELDS if instances else []),
     ]
-    # In front: numba takes code compiled for a record as good enough for longer ones that begin with the same fields.
+    # In front: to numba's types a longer record is also a shorter one that it begins with.
     return np.dtype([*extra, *_FIELDS], align=True)
 
 

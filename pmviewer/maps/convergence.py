@@ -14,8 +14,7 @@ caustic, a coarser caustic does. The exponent m is 2 or 3. Three states come of 
 Radiances are compared as luminances of irradiance: the albedo of a diffuse surface cancels. L_c and D_c are those of
 the M nearest caustic photons. Other light is estimated from a sample of the photons that arrived, of all other path
 classes, for the maps need not have them (direct light is sampled, gather rays find the rest). D_r is the density at
-which density control stops storing, which the SETTLES of `pmviewer.maps.density_control` tell apart from that at which
-it comes to rest.
+which density control stops storing by the step.
 
 "All is converged" is said by light: when no more than UNFINISHED of the map's power lies at places that need MORE. A
 stray photon far from all others would otherwise keep the map from ever being finished.
@@ -33,7 +32,7 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.jit import kernel
 from pmviewer.kernels.vector import luminance
-from pmviewer.maps.density_control import FLATNESS, SPARSEST, M, needs_of
+from pmviewer.maps.density_control import FLATNESS, M, needs_of
 from pmviewer.maps.estimate import RIM_LEFT_OUT, irradiance_knn
 from pmviewer.maps.filters import CONSTANT
 from pmviewer.maps.kdtree import PhotonKdTree, build_kdtree
@@ -54,6 +53,8 @@ FEWEST = 200
 UNFINISHED = 0.01
 WIDEST = 0.25
 """Largest disc of the estimate of other light, relative to the scene's radius."""
+SPARSEST = 10.0
+"""Largest disc of the estimate of caustics, relative in area to that of M photons at the required density."""
 CHUNK = 1024
 
 Float = NDArray[np.float32]
@@ -67,12 +68,9 @@ _PI = _f8(np.pi)
 
 @dataclass(frozen=True)
 class Criterion:
-    """`exponent` m; `acceptance` rule and `farthest` of the density control (`pmviewer.maps.density_control`);
-    `scene_radius` in scene units; `classes`: bit set of the path classes that are caustics."""
+    """`exponent` m; `scene_radius` in scene units; `classes`: bit set of the path classes that are caustics."""
 
     exponent: int
-    acceptance: int
-    farthest: float
     scene_radius: float
     classes: int
 
@@ -164,7 +162,7 @@ class Convergence:
         photons per unit area; own: whether each is the place of a photon of the map."""
         how, n = self.criterion, len(points)
         points, normals = np.ascontiguousarray(points, np.float32), np.ascontiguousarray(normals, np.float32)
-        needs = needs_of(required, how.acceptance, how.farthest)
+        needs = needs_of(required)
         states, widest = np.empty(n, np.int8), np.float32(WIDEST * how.scene_radius)
         trees = self.tree.record, self.others.record
 

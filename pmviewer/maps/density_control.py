@@ -1,18 +1,23 @@
 """Density control: photons are stored up to a required density; the power of all others goes to their neighbours (I5;
-Suykens and Willems 2000; course guide §3.5.2).
+Suykens and Willems 2000, §3.1; course guide §3.5.2).
 
-A photon at x looks for the M nearest stored ones that a look-up there would count: those that arrived on its side of
-the surface, in a flattened disc. With r_M the distance of the farthest, the density is D_cur = M/(π·r_M²). By ρ =
-D_cur/D_r the photon is stored or not; if not, each of the M' ≤ M neighbours found gets Φ/M', and the sum of all powers
-stays. Without neighbours it is stored.
+A photon at x looks for the M nearest stored ones. With r_M the distance of the farthest, the density is
+D_cur = M/(π·r_M²); while fewer than M are stored, it is 0. By ρ = D_cur/D_r the photon is stored or not: by the step if
+ρ < 1, by the translated cosine with the probability ½(1 + cos(π·ρ/2)) below ρ = 2 and never beyond. If not, each of the
+M' ≤ M neighbours that arrived on its side of the surface gets Φ/M', and the sum of all powers stays; with M' = 0 the
+photon is stored after all.
 
-Neighbours that need more than CONTRAST times the density that x needs don't count at all: where important and
-unimportant surfaces meet, or a thin wall parts them, power would seep into the important ones.
+Which stored photons are neighbours is said by `Around`: the M nearest in space (NEAREST, the source's), or with guards
+against power that goes through thin walls or into places that matter more.
+
+The density comes to rest above D_r: photons that fall into a gap that chance left are still stored. Where 10 to 400
+arrive for one that is stored that is at about 1.3·D_r with the step and 2.2·D_r with the cosine.
 
 **Order and threads.** Photons come in rounds. All of a round are first compared with what was stored before it, on any
 number of threads: a photon that is not stored for these neighbours would not be stored with more of them either, so
-that this decides. The rest is decided in order, each seeing all before it. The stored set is thus exactly that of one
-photon after another, whatever the rounds; of rounds only the neighbours that share a rejected photon's power know.
+that this decides. The rest is decided in order, each seeing all before it. The stored set is thus that of one photon
+after another, whatever the rounds (but for a photon whose M nearest become such of the other side alone within its
+round); of rounds only the neighbours that share a rejected photon's power know.
 
 **The tree** is a kd-tree that grows: leaves of CAPACITY photons, split at the median of their longer side when full.
 Powers are float64 sums; they become 16-bit codes when everything is stored (`pmviewer.maps.power`).
@@ -37,17 +42,8 @@ Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 
 M = 20
 """Neighbours that measure the density and share the power of a rejected photon."""
-SETTLES = (1.33, 2.2)
-"""Where the densities of the two rules come to rest, relative to D_r in ρ: a photon is still stored where chance left a
-gap between others, with the cosine up to ρ = 2. Thresholds are lowered by as much, so that the density settles at D_r
-(measured where 10 to 400 photons arrive for one that is stored: within 4 % with the step, 10 % with the cosine)."""
 FLATNESS = np.float32(0.2)
-"""Half-thickness of the discs relative to their radius, that of look-ups."""
-CONTRAST = np.float32(4.0)
-"""Neighbours that need so many times the density needed here are of no concern."""
-SPARSEST = 10.0
-"""Area of the disc searched with the cosine, relative to that of M photons at the required density: of photons that
-come to a tenth of it, 98 % are stored."""
+"""Half-thickness of guarded discs relative to their radius, that of look-ups."""
 
 CAPACITY = 16
 CHUNK = 4096
@@ -67,6 +63,29 @@ _PI = _f8(np.pi)
 UNDECIDED = _i4(-1)
 
 
+@dataclass(frozen=True)
+class Around:
+    """Which stored photons are neighbours of a place.
+
+    guarded: only those that arrived on the place's side of the surface and lie in a disc along it, as look-ups count
+    them; otherwise all, in a sphere. `contrast`: none that need more than so many times the density needed at the
+    place: where important and unimportant surfaces meet, power would seep into the important ones.
+    """
+
+    guarded: bool = False
+    contrast: float = math.inf
+
+    @property
+    def arguments(self) -> tuple[np.float32, ...]:
+        """For kernels: weight of the squared height over the surface, what cosines exceed, and contrast."""
+        steepness, least = (1 / FLATNESS**2, 0.0) if self.guarded else (0.0, -math.inf)
+        return tuple(np.float32(x) for x in (steepness, least, self.contrast))
+
+
+NEAREST = Around()
+"""The source's: the M nearest in space."""
+
+
 # In kernels a tree is a tuple of arrays: of nodes, axes int8 (−1: a leaf), planes float32, children int32 (the left
 # one, the right one follows; of a leaf its number) and least float32 (no photon of the subtree needs less); of leaves,
 # counts int32, members int32 (leaves, CAPACITY) and places float32 (leaves, CAPACITY, 3); of photons, words uint32
@@ -74,12 +93,12 @@ UNDECIDED = _i4(-1)
 
 
 @device
-def _search(tree, p, n, need, r2, most, found, distances, stack_nodes, stack_bounds):
-    """Up to `most` nearest stored photons that count at p with normal n, closer than sqrt(r2); their numbers into
-    `found`, squared distances into `distances`. Returns their number and the squared distance of the farthest."""
+def _search(tree, p, n, need, around, r2, found, distances, stack_nodes, stack_bounds):
+    """Up to M nearest neighbours of p with normal n, closer than sqrt(r2); their numbers into `found`, squared
+    distances into `distances`. Returns their number and the squared distance of the farthest."""
     axes, planes, children, least, counts, members, places, words, needs = tree
-    steepness = _f4(1.0) / (FLATNESS * FLATNESS)
-    ceiling = CONTRAST * need
+    steepness, cosine, contrast = around
+    ceiling = contrast * need
     count = _i8(0)
     farthest = _i8(0)
     waiting = _i8(0)
@@ -102,8 +121,8 @@ def _search(tree, p, n, need, r2, most, found, distances, stack_nodes, stack_bou
             if d2 < r2:
                 i = members[leaf, j]
                 w = decode_direction(words[i])
-                if n[0] * w[0] + n[1] * w[1] + n[2] * w[2] > _f4(0.0) and needs[i] <= ceiling:
-                    if count < most:
+                if n[0] * w[0] + n[1] * w[1] + n[2] * w[2] > cosine and needs[i] <= ceiling:
+                    if count < M:
                         found[count], distances[count] = i, d2
                         if d2 > distances[farthest]:
                             farthest = count
@@ -113,7 +132,7 @@ def _search(tree, p, n, need, r2, most, found, distances, stack_nodes, stack_bou
                         for k in range(count):
                             if distances[k] > distances[farthest]:
                                 farthest = _i8(k)
-                    if count == most:
+                    if count == M:
                         r2 = distances[farthest]
         node = _i8(-1)
         while waiting > 0 and node < 0:
@@ -128,27 +147,32 @@ def _search(tree, p, n, need, r2, most, found, distances, stack_nodes, stack_bou
 
 
 @device
-def _rejected(count, r2, reach2, need, rule, u):
-    """Whether a photon with that many neighbours, the farthest at sqrt(r2), is not stored. More neighbours never turn a
-    rejected photon into a stored one."""
-    if count == 0:
-        return False
+def _rejected(density, need, rule, u):
+    """Whether a photon is not stored at D_cur, where `need` is D_r; u: a random number."""
+    rho = density / _f8(need)
     if rule == STEP:
-        return count == M  # M of them nearer than the disc of M at the required density
-    area = _PI * _f8(r2 if count == M else reach2)
-    rho = _f8(count) / (area * _f8(need))
-    if not rho < _f8(2.0):
-        return True
-    return not _f8(u) < _f8(0.5) * (_f8(1.0) + np.cos(_PI * rho * _f8(0.5)))
+        return not rho < _f8(1.0)
+    return not (rho < _f8(2.0) and _f8(u) < _f8(0.5) * (_f8(1.0) + np.cos(_PI * rho * _f8(0.5))))
 
 
 @device
-def _reach2(need, rule):
-    """Squared radius of the disc searched at a required density."""
-    wanted = _f8(M) / (_PI * _f8(need))
-    if rule == COSINE:
-        wanted *= _f8(SPARSEST)
-    return _f4(wanted)
+def _sharers(tree, p, n, need, around, rule, u, found, distances, stack_nodes, stack_bounds):
+    """How many stored photons share the power of a photon at p, in `found`; 0 where it is stored itself."""
+    r2 = _f4(np.inf)
+    if rule == STEP:  # M of them nearer than the disc of M at the required density
+        r2 = _f4(_f8(M) / (_PI * _f8(need)))
+    count, r2 = _search(tree, p, n, need, around, r2, found, distances, stack_nodes, stack_bounds)
+    if count < M:
+        return _i8(0)
+    if r2 > _f4(0.0) and not _rejected(_f8(M) / (_PI * _f8(r2)), need, rule, u):
+        return _i8(0)
+    sharing = _i8(0)
+    for j in range(count):
+        w = decode_direction(tree[7][found[j]])
+        if n[0] * w[0] + n[1] * w[1] + n[2] * w[2] > _f4(0.0):
+            found[sharing] = found[j]
+            sharing += 1
+    return sharing
 
 
 @device
@@ -157,7 +181,7 @@ def _random(seed, index):
 
 
 @kernel
-def _compare(tree, photons, words, normals, required, rule, seed, first, i0, i1, counts, neighbours):
+def _compare(tree, around, photons, normals, required, rule, seed, first, i0, i1, counts, neighbours):
     """Photons i0 … i1−1 against the tree as it is: counts[i] neighbours that share the power of photon i, which is not
     stored, or UNDECIDED."""
     found, distances = np.empty(M, np.int32), np.empty(M, np.float32)
@@ -165,13 +189,11 @@ def _compare(tree, photons, words, normals, required, rule, seed, first, i0, i1,
     for i in range(i0, i1):
         p = (photons[i, 0], photons[i, 1], photons[i, 2])
         n = normalize(decode_direction(normals[i]))
-        reach2 = _reach2(required[i], rule)
-        count, r2 = _search(tree, p, n, required[i], reach2, M, found, distances, stack_nodes, stack_bounds)
-        counts[i] = UNDECIDED
-        if _rejected(count, r2, reach2, required[i], rule, _random(seed, _i8(first) + _i8(i))):
-            counts[i] = count
-            for j in range(count):
-                neighbours[i, j] = found[j]
+        u = _random(seed, _i8(first) + _i8(i))
+        count = _sharers(tree, p, n, required[i], around, rule, u, found, distances, stack_nodes, stack_bounds)
+        counts[i] = count if count > 0 else UNDECIDED
+        for j in range(count):
+            neighbours[i, j] = found[j]
 
 
 @device
@@ -239,7 +261,9 @@ def _halve(tree, size, node):
 
 
 @kernel
-def _settle(tree, size, stored, powers, photons, words, normals, required, rule, seed, first, counts, neighbours, kept):
+def _settle(
+    tree, around, size, stored, powers, photons, words, normals, required, rule, seed, first, counts, neighbours, kept
+):
     """Decide the photons that `_compare` left open, in order, and hand out the power of the others.
 
     stored: (capacity, 6) uint32 rows of the photons stored, in order; powers: float64 (capacity, 3); size: int64 (3,),
@@ -260,9 +284,9 @@ def _settle(tree, size, stored, powers, photons, words, normals, required, rule,
         else:
             p = (photons[i, 0], photons[i, 1], photons[i, 2])
             n = normalize(decode_direction(normals[i]))
-            reach2 = _reach2(required[i], rule)
-            count, r2 = _search(tree, p, n, required[i], reach2, M, found, distances, stack_nodes, stack_bounds)
-            if not _rejected(count, r2, reach2, required[i], rule, _random(seed, _i8(first) + _i8(i))):
+            u = _random(seed, _i8(first) + _i8(i))
+            count = _sharers(tree, p, n, required[i], around, rule, u, found, distances, stack_nodes, stack_bounds)
+            if count == 0:
                 new = size[2]
                 for w in range(6):
                     stored[new, w] = words[i, w]
@@ -283,12 +307,9 @@ def _settle(tree, size, stored, powers, photons, words, normals, required, rule,
     return rejected
 
 
-def needs_of(required: NDArray[np.float32], rule: int, farthest: float) -> NDArray[np.float32]:
-    """Density (n,) at which storing stops where `required` (n,) are to be reached; `rule` and `farthest` as for
-    DensityControl."""
-    least = np.float32(M / (math.pi * farthest**2))
-    needs = np.where(np.isnan(required), np.float32(0), required) / np.float32(SETTLES[rule])
-    return np.clip(needs, least, np.float32(1e30), dtype=np.float32)
+def needs_of(required: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Required densities (n,) that can be divided by: what is not a number, or not positive, counts as next to none."""
+    return np.clip(np.nan_to_num(required, nan=0.0, posinf=1e30), 1e-30, 1e30, dtype=np.float32)
 
 
 # --- the map being filled -------------------------------------------------------------------------------------------
@@ -311,11 +332,10 @@ class DensityControl:
     """A map that is filled round by round. The result depends on the photons and their order, on the rounds hardly
     (see above), and not at all on threads."""
 
-    def __init__(self, rule: int, farthest: float, seed: int) -> None:
-        """rule: STEP or COSINE; farthest: no photon's power moves farther than this (sqrt(SPARSEST) times that with the
-        cosine), in scene units: where less than M photons in such a disc are required, so many are stored."""
+    def __init__(self, rule: int, around: Around, seed: int) -> None:
+        """rule: STEP or COSINE."""
         self.rule, self.seed = np.int32(rule), np.uint32(seed & 0xFFFFFFFF)
-        self.farthest = farthest
+        self.around = around.arguments
         self.size = np.array([1, 1, 0], np.int64)
         self.arrived = self.redistributed = 0
         self.kept = np.zeros(0, bool)
@@ -340,7 +360,7 @@ class DensityControl:
             return
         photons = np.ascontiguousarray(photons, np.float32)
         words = photons.view(np.uint32)
-        needs = needs_of(required, int(self.rule), self.farthest)
+        needs = needs_of(required)
         counts = np.full(n, UNDECIDED, np.int32)
         self._reserve(self.stored + n)
         neighbours = np.empty((n, M), np.int32)
@@ -348,9 +368,8 @@ class DensityControl:
 
         def compare(i0: int) -> Callable[[], None]:
             i1 = min(i0 + CHUNK, n)
-            return lambda: _compare(
-                self._tree, photons, words, normals, needs, self.rule, self.seed, first, i0, i1, counts, neighbours
-            )
+            how = self.rule, self.seed, first
+            return lambda: _compare(self._tree, self.around, photons, normals, needs, *how, i0, i1, counts, neighbours)
 
         if self.stored:
             run([compare(i0) for i0 in range(0, n, CHUNK)])
@@ -360,6 +379,7 @@ class DensityControl:
             [
                 lambda: _settle(
                     self._tree,
+                    self.around,
                     self.size,
                     *rows,
                     photons,
@@ -387,7 +407,7 @@ class DensityControl:
             photons=self._stored[:n].view(np.float32),
             normals=np.concatenate([np.empty(0, np.uint32), *self._normals]),
             powers=self._powers[:n],
-            required=(self._tree[8][:n] * np.float32(SETTLES[self.rule])) if n else np.empty(0, np.float32),
+            required=self._tree[8][:n] if n else np.empty(0, np.float32),
             redistributed=self.redistributed,
         )
 

@@ -280,6 +280,24 @@ def importances(maps, points, normals, out, i0, i1):
 
 
 @kernel
+def nearest_importances(maps, points, gamma, distances, i0, i1):
+    """Γ of the importons nearest to points[i0:i1] (m, 3) float32, whatever their side and reach, into gamma (m,)
+    float32, and how far they are into distances (m,) float32; 0 and infinite without any."""
+    importance = maps[0]
+    keys, zero = stack_i4(KEYS), _f4(0.0)
+    for i in range(i0, i1):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        count, _ = nearest(
+            importance, x, y, z, _i4(1), _f4(np.inf), keys, False, zero, zero, zero, zero, _i4(ALL_CLASSES)
+        )
+        gamma[i], distances[i] = zero, _f4(np.inf)
+        if count > 0:
+            key = stack_get_i8(keys, _i8(0))
+            gamma[i] = load_f4(importance.payload, 3 * (key & _i8(0xFFFFFFFF)) + 1)
+            distances[i] = _f4(math.sqrt(float_of_bits(_u4(key >> 32))))
+
+
+@kernel
 def importance_sums(maps, points, normals, k, out, i0, i1):
     """ΣW of `importance_sum` at points[i0:i1] (m, 3) float32 with unit normals (m, 3), into out (m,) float32."""
     importance = maps[0]

@@ -16,8 +16,7 @@ Estimator = Literal["disc", "hull", "differential"]
 def marked(record: NDArray[np.void], estimator: Estimator) -> NDArray[np.void]:
     """The record (1,) of a map, marked for that estimate by a field of its name; "disc" leaves it as it is.
 
-    The mark comes first: numba takes a record with further fields at its end for one without them, and would run what
-    it has compiled for the unmarked one.
+    The mark comes first: to numba's types a record with further fields at its end is also one without them.
     """
     if estimator == "disc":
         return record

@@ -29,7 +29,7 @@ from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.vector import luminance
 from pmviewer.maps.convergence import Converged, Convergence, Criterion
-from pmviewer.maps.density_control import Controlled, DensityControl
+from pmviewer.maps.density_control import NEAREST, Around, Controlled, DensityControl
 from pmviewer.maps.kdtree import PhotonKdTree
 from pmviewer.maps.power import encode_powers, luminances, write_power
 from pmviewer.maps.record import BYTES_PER_PHOTON, decode_power
@@ -67,13 +67,22 @@ class KellerWald:
 
 @dataclass(frozen=True)
 class Density:
-    """`required` gives D_r in photons per unit area; `acceptance` is STEP or COSINE; no power moves much farther than
-    `farthest`, in scene units."""
+    """`required` gives D_r in photons per unit area; `acceptance` is STEP or COSINE; `around` says who shares;
+    `beyond` gives the density at positions where nothing is required, 0 without it."""
 
     required: Evaluate
     acceptance: int
-    farthest: float
+    around: Around = NEAREST
+    beyond: Callable[[Float], Float] | None = None
     seed: int = 0
+
+    def wanted(self, photons: Float, normals: Codes) -> tuple[Float, int]:
+        """Densities (n,) for photons (n, 6), and at how many of them `required` is above 0."""
+        density = self.required(photons[:, :3], normals)
+        important = density > 0
+        if self.beyond is not None and not important.all():
+            density[~important] = self.beyond(photons[~important, :3])
+        return density, int(np.count_nonzero(important))
 
 
 @dataclass(frozen=True)
@@ -220,7 +229,7 @@ class Filling:
         self._normals: list[Codes] = []
         self._control = None
         if isinstance(rule, Density):
-            self._control = DensityControl(rule.acceptance, rule.farthest, rule.seed)
+            self._control = DensityControl(rule.acceptance, rule.around, rule.seed)
 
     def judge(self, photons: Float, normals: Codes, index: int) -> Prepared:
         """What can be said of a batch of photons (n, 6) alone; `index` is that of its first trajectory over all
@@ -230,8 +239,8 @@ class Filling:
         if rule is None:
             return photons, normals, n, np.append(_power_of(photons), n)
         if isinstance(rule, Density):
-            required = rule.required(photons[:, :3], normals) if n else np.empty(0, np.float32)
-            return photons, normals, n, np.append(_power_of(photons), np.count_nonzero(required > 0)), required
+            required, important = rule.wanted(photons, normals) if n else (np.empty(0, np.float32), 0)
+            return photons, normals, n, np.append(_power_of(photons), important), required
         p, epsilon, discard, seed = probabilities(rule, photons, normals, index)
         kept, kept_normals, books = np.empty((n, 6), np.uint32), np.empty(n, np.uint32), np.zeros(3)
         words = photons.view(np.uint32)
@@ -316,7 +325,7 @@ def _power_of(photons: Float) -> NDArray[np.float64]:
 def prepare_rules() -> None:
     """Compile, or load, what the rules run, by judging one photon."""
     photons, normals = np.zeros((1, 6), np.float32), np.zeros(1, np.uint32)
-    for rule in (KellerWald(constant(0.5), 0.5), Density(constant(0.0), 0, 1.0)):
+    for rule in (KellerWald(constant(0.5), 0.5), Density(constant(0.0), 0)):
         filling = Filling(rule)
         for _ in range(2):
             filling.take([filling.judge(photons, normals, 0)], lambda tasks: [task() for task in tasks])
@@ -333,11 +342,6 @@ def rounds(batches: int) -> Iterator[range]:
     while first < batches:
         yield range(first, min(first + size, batches))
         first, size = first + size, min(2 * size, LARGEST_ROUND)
-
-
-def farthest_of(scene_radius: float) -> float:
-    """How far density control moves power where nothing is required, in scene units."""
-    return scene_radius / 20.0
 
 
 def constant(value: float) -> Evaluate:

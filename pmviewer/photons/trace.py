@@ -11,6 +11,7 @@ threads and any batch size (T2). Dimension set 0 is emission, set 1 + b the b-th
 from __future__ import annotations
 
 import numpy as np
+from numba.extending import overload
 
 from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.light import is_delta_light
@@ -44,7 +45,7 @@ from pmviewer.maps.record import (
 )
 from pmviewer.photons.paths import begin_path, extend_path
 from pmviewer.photons.projected import emission
-from pmviewer.photons.roulette import EQUAL, MOST_COPIES, copies, survival_probability
+from pmviewer.photons.roulette import BY_LUMINANCE, EQUAL, MOST_COPIES, copies, survival_probability
 
 _f4 = np.float32
 _f8 = np.float64
@@ -97,6 +98,29 @@ def _store(out, row, p, wi, beta, flags, light):
     out[row, 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
 
 
+def _on_the_way(scene, material, ng, d, t, beta, worth, counts, ledgers, book):
+    """beta after the way to a surface (`attenuation`), what was lost on it booked; black when it is no number."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(_on_the_way)
+def _book_the_way(scene, material, ng, d, t, beta, worth, counts, ledgers, book):
+    if "bsdfs" not in scene.fields:
+        return lambda scene, material, ng, d, t, beta, worth, counts, ledgers, book: beta
+
+    def booked(scene, material, ng, d, t, beta, worth, counts, ledgers, book):
+        before = luminance(beta)
+        beta = attenuation(scene, material, ng, d, t, beta)
+        if not is_good(beta):
+            counts[C_DROPPED] += 1
+            ledgers[book, E_DROPPED] += _f8(before * worth)
+            return _f4(0.0), _f4(0.0), _f4(0.0)
+        ledgers[book, E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
+        return beta
+
+    return booked
+
+
 @kernel
 def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, caustic_out, counts, ledgers, paths):
     """Trace photons i0 … i1−1 of a pass.
@@ -118,7 +142,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
         if counts[C_GLOBAL] + most > len(global_out) or counts[C_CAUSTIC] + most > len(caustic_out):
             return i
         to_global = i < pass_.global_trajectories
-        ledger = ledgers[0 if to_global else 1]
+        book = 0 if to_global else 1
         place = np.int64(pass_.first_index) + np.int64(i)
         index, seed = _u4(place), pass_.seed
         if place >> 32 != 0:  # a Sobol set has 2³² points; the next photons use other sets
@@ -129,13 +153,13 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
         p, d, beta, light, kept, worth = emission(
             scene, projection, i, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1)
         )
-        ledger[E_EMITTED] += _f8(worth)  # its luminance is 1
+        ledgers[book, E_EMITTED] += _f8(worth)  # its luminance is 1
         if not is_good(beta):
             counts[C_DROPPED] += 1
-            ledger[E_DROPPED] += _f8(worth)
+            ledgers[book, E_DROPPED] += _f8(worth)
             continue
         if not kept:
-            ledger[E_ESCAPED] += _f8(worth)
+            ledgers[book, E_ESCAPED] += _f8(worth)
             continue
         begin_path(paths, i, p, d, scale(beta, worth), light)
         o = p
@@ -147,22 +171,16 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
             counts[C_RAYS] += 1
             if prim < 0:
                 extend_path(paths, i, prim, o, d, scale(beta, worth), _u4(flags | _u4(min(bounces, BOUNCES))), light)
-                ledger[E_ESCAPED] += _f8(luminance(beta) * worth)
+                ledgers[book, E_ESCAPED] += _f8(luminance(beta) * worth)
                 break
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
-            before = luminance(beta)
-            beta = attenuation(scene, material, ng, d, t, beta)
-            if not is_good(beta):
-                counts[C_DROPPED] += 1
-                ledger[E_DROPPED] += _f8(before * worth)
-                break
-            ledger[E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
+            beta = _on_the_way(scene, material, ng, d, t, beta, worth, counts, ledgers, book)
             extend_path(paths, i, prim, p, d, scale(beta, worth), _u4(flags | _u4(min(bounces, BOUNCES))), light)
             wi = (-d[0], -d[1], -d[2])
             b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
             if b.groups == NOTHING or not luminance(beta) > _f4(0.0):
-                ledger[E_ABSORBED] += _f8(luminance(beta) * worth)
+                ledgers[book, E_ABSORBED] += _f8(luminance(beta) * worth)
                 break
             ng = face(ng, wi)
             u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
@@ -200,14 +218,14 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                         if len(normals_out[0]) > 0:
                             normals_out[0][counts[C_GLOBAL]] = encode_direction(ng[0], ng[1], ng[2])
                         counts[C_GLOBAL] += 1
-                ledger[E_STORED] += _f8(luminance(beta) * worth)
+                ledgers[book, E_STORED] += _f8(luminance(beta) * worth)
             before = luminance(beta)
             group, share, u_lobe = pick_group(b, wi, u_lobe)
             deltas = deltas and group == FOLLOWED and is_delta(b)
             if group == FOLLOWED:
                 flags = _u4(flags | _u4(LAST_SPECULAR))
             elif not to_global and pass_.only_direct != 0:
-                ledger[E_TERMINATED] += _f8(before * worth)
+                ledgers[book, E_TERMINATED] += _f8(before * worth)
                 break
             else:
                 flags = _u4(HAD_DIFFUSE)
@@ -219,17 +237,18 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
             after = scale(mul(beta, weight), share)
             if not is_good(after):
                 counts[C_DROPPED] += 1
-                ledger[E_DROPPED] += _f8(before * worth)
+                ledgers[book, E_DROPPED] += _f8(before * worth)
                 break
             survival = survival_probability(pass_.roulette, before, beta, after)
             if not u2 < survival:
-                ledger[E_ABSORBED] += _f8(before * worth)
+                ledgers[book, E_ABSORBED] += _f8(before * worth)
                 break
             beta = scale(after, _f4(1.0) / survival)
-            ledger[E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
+            if pass_.roulette != BY_LUMINANCE or not survival < _f4(1.0):  # else it stays
+                ledgers[book, E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
             bounces += 1
             if bounces >= max_bounces:
-                ledger[E_TERMINATED] += _f8(luminance(beta) * worth)
+                ledgers[book, E_TERMINATED] += _f8(luminance(beta) * worth)
                 break
             o = leave(p, ng, gap, d[0], d[1], d[2])
     return i1

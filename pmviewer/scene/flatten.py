@@ -39,7 +39,8 @@ class FlatScene:
     """Arrays of a scene. `record` is the one-element record array for kernels; the other fields keep its memory alive.
 
     `light_power` is (n_lights, 3) float64 in watts, in the order of the light table; `light_names` and
-    the table's rows `lights` (n_lights, LIGHT_COLUMNS) likewise. `light_corners` (n, 3, 3) are the triangles of mesh
+    the table's rows `lights` (n_lights, LIGHT_COLUMNS) likewise; `prim_light` is each stored primitive's light, −1 for
+    none. `light_corners` (n, 3, 3) are the triangles of mesh
     lights.
     """
 
@@ -50,6 +51,7 @@ class FlatScene:
     light_names: tuple[str, ...]
     lights: Float
     light_corners: Float
+    prim_light: NDArray[np.int32]
     center: NDArray[np.float64]
     radius: float
     n_triangles: int
@@ -175,6 +177,7 @@ def flatten(scene: Scene) -> FlatScene:
         light_names=lights.names,
         lights=lights.rows,
         light_corners=vertices[lights.triangles],
+        prim_light=prim_light,
         center=center,
         radius=radius,
         n_triangles=len(vertices),

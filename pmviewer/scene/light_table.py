@@ -29,6 +29,8 @@ from pmviewer.scene.emission import emitted_power
 from pmviewer.scene.sky_table import sky_table
 
 Float = NDArray[np.float32]
+BRIGHTEST = 1e32
+"""Radiance or intensity, a factor of a million from the end of float32: squares of small distances divide it."""
 
 
 class LightTable:
@@ -81,6 +83,11 @@ class LightTable:
             names.append(light.name)
         if not rows or not any(p.max() > 0 for p in powers):
             raise SceneError("The scene has no light.", scene.path, hint="Add an emitter, or open it with one.")
+        for name, row in zip(names, rows, strict=True):
+            brightest = max(row[K.L_RADIANCE : K.L_RADIANCE + 3])
+            if not brightest < BRIGHTEST:
+                what = f"The light '{name}' is too bright: {brightest:g}, where {BRIGHTEST:g} is the most."
+                raise SceneError(what, scene.path, hint="Scale all lights down alike.")
         self.rows = np.array(rows, np.float32)
         self.power = np.array(powers)
         self.names = tuple(names)

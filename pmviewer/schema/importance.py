@@ -66,7 +66,8 @@ class Importance(Group):
     )
     M_r: float = setting(
         2.0,
-        "Photons of the global map wanted for each pixel: the required density is importance × M_r per pixel.",
+        "Photons of the global map wanted for each pixel: the required density is importance × M_r per pixel. Where "
+        "look-up radii shrink from pass to pass it grows with 1/r², so that a look-up finds as many photons as before.",
         stage="photons",
         scale="log",
         unit="photons/px",
@@ -123,10 +124,44 @@ class Importance(Group):
     )
     acceptance: Literal["step", "cosine"] = setting(
         "step",
-        "How density control decides by the density so far: store below the required one and never above, or with a "
-        "probability that falls smoothly, as a translated cosine (Suykens and Willems 2000).",
+        "How density control decides by ρ, the density so far over the required one. step: store below 1 and never "
+        "above. cosine: with the probability ½(1 + cos(π·ρ/2)), 0 from 2 on (Suykens and Willems 2000). Chance leaves "
+        "gaps that are filled, so that the density comes to rest at about 1.3 and 2.2 times the required one.",
         stage="photons",
         scale="choice",
+    )
+    around: Literal["nearest", "guarded"] = setting(
+        "guarded",
+        "Which stored photons tell the density and share a photon's power. nearest: the 20 nearest in space, of which "
+        "those that arrived on its side share (Suykens and Willems 2000). guarded: the 20 nearest that a look-up "
+        "there would count, on its side and in a disc along the surface, with the two limits below: no power seeps "
+        "through thin walls and across borders of importance. 'nearest' brightens what is seen of the hundred rooms "
+        "many times over, since most of their light ends where nothing is required.",
+        stage="photons",
+        scale="choice",
+        title="neighbours of a photon",
+    )
+    contrast: float = setting(
+        4.0,
+        "Guarded neighbours never need more than so many times the density required at the photon: where important "
+        "and unimportant surfaces meet, the power of many photons would end in few important ones.",
+        stage="photons",
+        scale="log",
+        title="guard: contrast",
+        ge=1.0,
+        le=1e6,
+    )
+    reach: float = setting(
+        1.0,
+        "Guarded: how far power moves at most where nothing is required, relative to the distance of the nearest "
+        "important place; at 1 it does not get there. Without that bound it would go any distance, and arrive in the "
+        "picture.",
+        stage="photons",
+        scale="log",
+        unit="× distance",
+        title="guard: reach",
+        ge=0.01,
+        le=1.0,
     )
     convergence: Literal["off", "square", "cube"] = setting(
         "off",

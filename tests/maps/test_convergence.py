@@ -20,7 +20,6 @@ from pmviewer.maps.convergence import (
     Criterion,
     other_light,
 )
-from pmviewer.maps.density_control import SETTLES, STEP
 from pmviewer.maps.record import DIRECT
 from pmviewer.output.diagnostic_views import CLASS_COLOURS, GREY, coloured
 from tests.maps.test_density_control import in_order, plane
@@ -33,7 +32,7 @@ CAUSTICS = 0b1010
 
 def judge(caustics, others, m=2, caustic_power=1.0, other_power=1.0):
     """So many photons of either kind on the unit square, evenly at random, of such powers in all."""
-    criterion = Criterion(m, STEP, 0.5, 1.0, CAUSTICS)
+    criterion = Criterion(m, 1.0, CAUSTICS)
     sample = plane(others, 2)
     sample.view(np.uint32)[:, 3] |= DIRECT << 6
     light = other_light(criterion, sample, other_power / max(others, 1))
@@ -48,7 +47,7 @@ def state(made, required, own=False):
 
 def test_three_states_by_density_and_other_light():
     """1000 photons per unit area where 10 000 are stored at most: converged if (L_g/L_c)^m is ten or more."""
-    required = 10_000.0 * SETTLES[STEP]
+    required = 10_000.0
     assert np.all(state(judge(20_000, 1000), required) == DENSE)
     assert np.all(state(judge(1000, 1000, other_power=0.2), required) == MORE)
     assert np.all(state(judge(1000, 1000, other_power=10.0), required) == CONVERGED)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pmviewer.importance.rules import density_beyond
 from pmviewer.kernels.jit import kernel
 from pmviewer.maps.importance import (
     NO_IMPORTANCE,
@@ -141,3 +142,19 @@ def test_cloud_and_required_density():
     np.testing.assert_allclose(photons["wi"], built.normals, atol=2e-3)
     assert required_density(40.0, 25.0) == 1000.0
     assert required_density(40.0, 2.0, pixel_area=4.0) == 20.0
+
+
+def test_density_beyond_keeps_power_from_important_places():
+    """Brute force: M photons within `reach` of the way to the nearest importon, or what is required there, if less."""
+    rng = np.random.default_rng(31)
+    places = rng.random((500, 3)).astype(np.float32)
+    made = build_importance(importons(places), "screen", 2.0, neighbours=50)
+    points = (3 * rng.random((300, 3)) - 1).astype(np.float32)
+    distances = np.linalg.norm(points[:, None] - made.positions, axis=2)
+    nearest = distances.argmin(axis=1)
+    far = 20 / (np.pi * (0.5 * distances.min(axis=1)) ** 2)
+    expected = np.minimum(7 * made.gamma[nearest], far)
+    np.testing.assert_allclose(density_beyond(made, 7.0, 0.5)(points), expected, rtol=1e-3)
+    assert 0 < np.count_nonzero(expected < far) < 300
+    none = build_importance(importons(places[:0]), "screen", 2.0)
+    assert np.all(density_beyond(none, 7.0, 0.5)(points) == 0)

@@ -64,7 +64,7 @@ def test_without_a_rule_everything_is_stored_as_ever():
 
 @pytest.mark.parametrize(
     "rule",
-    [KellerWald(by_place, 0.05), Density(constant(300.0), STEP, 0.2), Density(constant(300.0), COSINE, 0.2)],
+    [KellerWald(by_place, 0.05), Density(constant(300.0), STEP), Density(constant(300.0), COSINE)],
     ids=["Keller-Wald", "step", "cosine"],
 )
 def test_threads_do_not_matter(rule):
@@ -113,7 +113,7 @@ def test_discarding_is_biased_by_what_the_books_say():
 
 @pytest.mark.parametrize("acceptance", [STEP, COSINE])
 def test_density_control_keeps_the_power_to_a_ten_thousandth(acceptance):
-    made = light_pass(Density(constant(50.0), acceptance, 0.5), n=30_000)
+    made = light_pass(Density(constant(50.0), acceptance), n=30_000)
     books = made.deposited["global"]
     assert books.stored_power == pytest.approx(books.arrived_power, rel=1e-4)
     assert books.stored + books.redistributed == books.arrived

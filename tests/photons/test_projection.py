@@ -13,6 +13,7 @@ from pmviewer.engine.projection import projection_for
 from pmviewer.kernels.jit import kernel
 from pmviewer.kernels.random import INDEPENDENT
 from pmviewer.maps.record import CAUSTIC, INDIRECT_CAUSTIC, unpack
+from pmviewer.photons import lightpass
 from pmviewer.photons.bounds import MOST_SPHERES, enclosing, spheres_of
 from pmviewer.photons.lightpass import trace_pass
 from pmviewer.photons.projected import concentric_from_polar
@@ -22,12 +23,13 @@ from pmviewer.scene.description import Disk, Parallelogram, PointLight, Shape, S
 from pmviewer.scene.flatten import LUMINANCE, flatten
 from pmviewer.settings import Photons
 from tests.device import from_python
+from tests.kernels.test_leaning_light import LEANING
 from tests.kernels.test_light_sampling import emit
 from tests.kernels.test_more_lights import MORE
 from tests.scenes_for_tests import GLASS, LIGHTS, ball_mesh, diffuse_box, light_scene, settings_of
 
 BALL = Sphere((-0.2, 0.25, 0.15), 0.12)
-ALL = {**LIGHTS, **MORE}
+ALL = {**LIGHTS, **MORE, "leaning mesh": LEANING}
 
 
 def lit(name, ball=BALL):
@@ -36,7 +38,12 @@ def lit(name, ball=BALL):
     scene = light_scene()
     floor = Shape("floor", Parallelogram((-1.0, 0.0, -1.0), (0.0, 0.0, 2.0), (2.0, 0.0, 0.0)), 0)
     shapes, lights = [floor, Shape("ball", ball, 2)], ()
-    if isinstance(light, Disk | Sphere | Parallelogram) or name in ("cylinder", "cylinder inside", "mesh"):
+    if isinstance(light, Disk | Sphere | Parallelogram) or name in (
+        "cylinder",
+        "cylinder inside",
+        "mesh",
+        "leaning mesh",
+    ):
         shapes.append(Shape(name, light, 1, (2.0, 1.5, 1.0)))
     else:
         lights = (light,)
@@ -198,3 +205,19 @@ def test_points_in_a_sphere_see_everything():
     inside = replace(lit("point"), lights=(PointLight("inside", BALL.center, (1.0, 1.0, 1.0)),))
     (chart,) = projection_of(flatten(inside)).caustic
     assert chart.mode == "whole"
+
+
+def test_units_of_the_caustic_map_follow_the_strongest_photons(monkeypatch):
+    """Indirect caustics may weigh so much more than direct ones that no unit fits both but a small one: powers in watts
+    are the same for any."""
+    flat = flatten(lit("point", Sphere((-0.2, 0.4, 0.15), 0.3)))
+    projection, found = projection_of(flat), []
+    for largest in (2.0**12, 2.0**-5):
+        monkeypatch.setattr(lightpass, "LARGEST_SCALE", largest)
+        photons = trace(flat, projection, N=400_000, q=0.5)
+        found.append((photons.caustic_unit, unpack(photons.caustic, photons.caustic_unit)))
+    (unit, plain), (larger, scaled) = found
+    assert larger > 30 * unit
+    assert np.array_equal(plain["path_class"], scaled["path_class"])
+    assert {CAUSTIC, INDIRECT_CAUSTIC} <= set(plain["path_class"])
+    assert scaled["Phi"] == pytest.approx(plain["Phi"], rel=1e-3)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import struct
 from pathlib import Path
 
@@ -308,16 +309,43 @@ def test_mitsuba_smooths_meshes_without_normals_unless_told_not_to(tmp_path: Pat
     assert flat.normals is None
 
 
-def test_transformed_mesh_keeps_outside_outside(tmp_path: Path) -> None:
-    (tmp_path / "roof.obj").write_text(OBJ_ROOF)
+@pytest.mark.parametrize("flip", [False, True])
+@pytest.mark.parametrize("own_normals", [False, True])
+def test_mirrored_mesh_turns_inside_out_unless_it_has_normals_of_its_own(
+    tmp_path: Path, own_normals: bool, flip: bool
+) -> None:
+    roof = OBJ_ROOF
+    if own_normals:
+        roof = re.sub(r"^(f .*)$", lambda m: re.sub(r"(\d+)(?=\s|$)", r"\1//1", m[1]), roof, flags=re.MULTILINE)
+        roof = "vn 0 1 0\n" + roof
+    (tmp_path / "roof.obj").write_text(roof)
     mirror = '<transform name="to_world"><scale x="-1"/></transform>'
-    shape = f'<shape type="obj"><string name="filename" value="roof.obj"/>{mirror}{{}}</shape>'
-    for more, sign in (("", 1), ('<boolean name="flip_normals" value="true"/>', -1)):
-        mesh = load(tmp_path, shape.format(more)).shapes[0].geometry
-        c = mesh.vertices[mesh.faces]
-        geometric = np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0])
-        assert (sign * geometric[:, 1] > 0).all()
-        assert (sign * mesh.normals[:, 1] > 0).all()
+    more = '<boolean name="flip_normals" value="true"/>' if flip else ""
+    text = f'<shape type="obj"><string name="filename" value="roof.obj"/>{mirror}{more}</shape>'
+    mesh = load(tmp_path, text).shapes[0].geometry
+    sign = (1 if own_normals else -1) * (-1 if flip else 1)
+    c = mesh.vertices[mesh.faces]
+    geometric = np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0])
+    assert (sign * geometric[:, 1] > 0).all()
+    assert (sign * mesh.normals[:, 1] > 0).all()
+
+
+def test_normals_in_the_file_tell_the_outside_whatever_the_order_of_corners(tmp_path: Path) -> None:
+    for face in ("f 1//1 2//1 3//1", "f 3//1 2//1 1//1"):
+        (tmp_path / "one.obj").write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n{face}\n")
+        text = '<shape type="obj"><string name="filename" value="one.obj"/></shape>'
+        c = load(tmp_path, text).shapes[0].geometry
+        a, b, d = c.vertices[c.faces[0]]
+        assert np.cross(b - a, d - a)[2] > 0
+
+
+def test_computed_normals_stop_at_vertices_that_are_there_twice(tmp_path: Path) -> None:
+    """As in Mitsuba: faces share a normal where they share a vertex, not where they only touch."""
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv 0 1 0\nv 0 0 1\n"
+    text = '<shape type="obj"><string name="filename" value="edge.obj"/></shape>'
+    (tmp_path / "edge.obj").write_text(corners + "f 1 2 3\nf 4 5 6\n")
+    mesh = load(tmp_path, text).shapes[0].geometry
+    assert sorted(map(tuple, np.abs(mesh.normals).round(6).tolist())) == [(0, 0, 1)] * 3 + [(1, 0, 0)] * 3
 
 
 def test_folder_and_parameters_of_other_formats(tmp_path: Path) -> None:

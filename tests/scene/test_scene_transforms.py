@@ -31,8 +31,18 @@ def outward(mesh: Mesh, center: tuple[float, float, float] = (0, 0, 0)) -> np.nd
 
 
 def test_rotation_is_right_handed_and_about_any_axis() -> None:
-    assert apply(rotation((0, 0, 2), 90), (1, 0, 0)) == pytest.approx((0, 1, 0))
-    assert apply(rotation((1, 1, 1), 120), (1, 0, 0)) == pytest.approx((0, 1, 0))
+    assert apply(rotation((0, 0, 1), 90), (1, 0, 0)) == pytest.approx((0, 1, 0))
+    assert apply(rotation((3**-0.5,) * 3, 120), (1, 0, 0)) == pytest.approx((0, 1, 0))
+
+
+def test_axis_that_is_not_of_unit_length_shears_as_in_mitsuba(tmp_path: Path) -> None:
+    # mi.ScalarTransform4f().rotate([1, 1, 0], 60).matrix of Mitsuba 3.9.1
+    mitsuba = [[1, 0.5, 0.866025], [0.5, 1, -0.866025], [-0.866025, 0.866025, 0.5]]
+    assert rotation((1, 1, 0), 60)[:3, :3] == pytest.approx(np.array(mitsuba), abs=1e-6)
+    _, scene = shape(tmp_path, "cube", '<rotate x="1" y="1" angle="60"/>')
+    assert [w for w in scene.warnings if "not of unit length" in w]
+    _, scene = shape(tmp_path, "cube", '<rotate x="0.71" y="0.71" angle="60"/>')
+    assert scene.warnings == ()
 
 
 def test_lookat_has_its_x_axis_to_the_left() -> None:
@@ -59,7 +69,7 @@ def test_matrix_of_nine_and_sixteen_numbers(tmp_path: Path) -> None:
 
 
 def test_similarity() -> None:
-    assert similar_columns(rotation((1, 2, 3), 40) * 2) == pytest.approx(2)
+    assert similar_columns(rotation((0.6, 0, 0.8), 40) * 2) == pytest.approx(2)
     assert similar_columns(np.diag([1.0, 1, 1.001, 1])) is None
 
 
@@ -113,9 +123,11 @@ def test_cylinder_by_its_points_and_by_transformation(tmp_path: Path) -> None:
     assert scene.warnings == ()
 
 
-def test_mirrored_sphere_turns_inside_out(tmp_path: Path) -> None:
+def test_mirrored_sphere_turns_inside_out_and_a_cylinder_does_not(tmp_path: Path) -> None:
     assert shape(tmp_path, "sphere", '<scale x="-1"/>')[0].flip_normals
     assert not shape(tmp_path, "sphere", '<scale x="-1" y="-1"/>')[0].flip_normals
+    assert not shape(tmp_path, "cylinder", '<scale x="-1"/>')[0].flip_normals
+    assert not shape(tmp_path, "cylinder", '<scale z="-1"/>')[0].flip_normals
 
 
 @pytest.mark.parametrize(("kind", "area"), [("sphere", 0), ("cylinder", 0), ("disk", 2 * math.pi)])

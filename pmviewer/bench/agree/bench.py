@@ -1,0 +1,167 @@
+"""`pmviewer bench agree`: random scenes by every method and by Mitsuba 3, and what does not agree."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pmviewer.bench import peer
+from pmviewer.bench.agree.features import GROUPS, features
+from pmviewer.bench.agree.generate import scene_of
+from pmviewer.bench.agree.known import DEVIATIONS
+from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH
+from pmviewer.bench.agree.statistics import LEVEL, rejected
+from pmviewer.bench.agree.triage import explanation, save, smallest
+from pmviewer.bench.agree.trial import FORGIVEN, STAGES, Comparison, Verdict
+from pmviewer.bench.agree.workers import try_scenes
+from pmviewer.bench.agree.xml import MAX_DEPTH, SIZE
+from pmviewer.bench.report import BenchResult, Cell, Target
+from pmviewer.errors import PmviewerError, SettingError
+
+SCENES, QUICK_SCENES, SEED = 500, 24, 1
+SHRINK_TRIES, MOST_SHRUNK = 120, 20
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """What disagrees in a scene: its largest rejected comparison and all methods that take part; why, if that is known,
+    and the file of the smallest scene that shows it."""
+
+    index: int
+    worst: Comparison | None
+    methods: tuple[str, ...]
+    text: str
+    known: str = ""
+    file: str = ""
+
+
+def run(quick: bool = False, scenes: int | None = None, seed: int = SEED, keep: Path | None = None) -> BenchResult:
+    """Try the scenes 0 … `scenes` − 1 of `seed` and save what disagrees into `keep`, a temporary folder if not given.
+
+    Raises PmviewerError without Mitsuba.
+    """
+    count = (QUICK_SCENES if quick else SCENES) if scenes is None else scenes
+    if count < 1 or seed < 0:
+        raise SettingError(f"agree needs at least one scene and a seed from 0 on, found {count} and {seed}.")
+    if not peer.installed():
+        raise PmviewerError(peer.MISSING)
+    started = time.perf_counter()
+    folder = keep or Path(tempfile.mkdtemp(prefix=f"agree-{seed}-"))
+    folder.mkdir(parents=True, exist_ok=True)
+    verdicts: dict[int, Verdict] = {}
+    for index, verdict in try_scenes(seed, count):
+        verdicts[index] = verdict
+        _tell(seed, index, verdict, len(verdicts), count, time.perf_counter() - started)
+    found = judged(seed, verdicts, folder)
+    return report(seed, verdicts, found, folder, time.perf_counter() - started)
+
+
+def _tell(seed: int, index: int, verdict: Verdict, done: int, count: int, seconds: float) -> None:
+    doubts = [f"{c.method} {c.what} {c.outcome.ratio:.3f}" for c in verdict.comparisons if c.final]
+    said = verdict.refused or ("in doubt: " + ", ".join(doubts) if doubts else "agrees")
+    profile = scene_of(seed, index)["profile"]
+    print(f"[{done}/{count}, {seconds:.0f} s] scene {index} ({profile}): {said}", file=sys.stderr, flush=True)
+
+
+def judged(seed: int, verdicts: dict[int, Verdict], folder: Path) -> list[Disagreement]:
+    """The disagreements of a run, explained or shrunk and saved; a scene that was refused is one too."""
+    pairs = [(index, c) for index, verdict in sorted(verdicts.items()) for c in verdict.comparisons]
+    fallen = rejected([c.p for _, c in pairs])
+    by_scene: dict[int, list[Comparison]] = {}
+    for (index, comparison), is_rejected in zip(pairs, fallen, strict=True):
+        if is_rejected:
+            by_scene.setdefault(index, []).append(comparison)
+    found = [Disagreement(i, None, tuple(METHODS), v.refused) for i, v in sorted(verdicts.items()) if v.refused]
+    level = LEVEL / max(len(pairs), 1)
+    for index, comparisons in by_scene.items():
+        found.append(_explained(seed, index, comparisons, level, folder, len(found)))
+    return found
+
+
+def _explained(
+    seed: int, index: int, comparisons: list[Comparison], level: float, folder: Path, shrunk_before: int
+) -> Disagreement:
+    scene, salt = scene_of(seed, index), (seed, index)
+    methods = tuple(dict.fromkeys(c.method for c in comparisons))
+    unknown, known = [], []
+    for comparison in comparisons:
+        deviation = explanation(scene, comparison, level, salt)
+        if deviation is None:
+            unknown.append(comparison)
+        else:
+            known.append(deviation.name)
+    worst = max(unknown or comparisons, key=lambda c: (c.method == "path", abs(np.log(max(c.outcome.ratio, 1e-9)))))
+    text = (
+        f"{worst.method} against {worst.peer}, {worst.what}: ratio {worst.outcome.ratio:.4f}, p {worst.outcome.p:.1g}"
+    )
+    if not unknown:
+        return Disagreement(index, worst, methods, text, known[0])
+    print(f"scene {index} disagrees: {text}; shrinking", file=sys.stderr, flush=True)
+    if shrunk_before < MOST_SHRUNK:
+        scene = smallest(scene, worst, salt, SHRINK_TRIES)
+    return Disagreement(index, worst, methods, text, file=str(save(scene, worst, folder, f"scene_{seed}_{index}")))
+
+
+def report(
+    seed: int, verdicts: dict[int, Verdict], found: list[Disagreement], folder: Path, seconds: float
+) -> BenchResult:
+    """The table by feature and method, disagreements, known deviations, targets."""
+    open_ = [d for d in found if not d.known]
+    by_feature: dict[str, set[int]] = {}
+    for index in verdicts:
+        for name in features(scene_of(seed, index)):
+            by_feature.setdefault(name, set()).add(index)
+    order = sorted(by_feature, key=lambda name: (GROUPS.index(name.partition(":")[0]), name))
+    rows: list[list[Cell]] = [_row("all", set(verdicts), verdicts, found)]
+    rows += [_row(name, by_feature[name], verdicts, found) for name in order]
+    comparisons = [c for verdict in verdicts.values() for c in verdict.comparisons]
+    notes = [f"scene {d.index}: {d.text}{f'; known: {d.known}' if d.known else ''}{f'; {d.file}' if d.file else ''}"
+             for d in found]  # fmt: skip
+    notes += [f"known deviation of Mitsuba, {d.name}: {d.reason}" for d in DEVIATIONS]
+    notes += _settings_notes()
+    notes.append(
+        f"{len(comparisons)} comparisons of {sum(c.outcome.tests for c in comparisons)} tests in {seconds:.0f} s"
+    )
+    target = Target(
+        "agreement", len(open_), 0, "scenes", False,
+        f"scenes of seed {seed} that disagree, of {len(verdicts)}; {len(found) - len(open_)} more by known deviations; "
+        f"at radius {STAGES[0].radius:g}–{STAGES[-1].radius:g} of the scene, N = {STAGES[0].photons:,}–"
+        f"{STAGES[-1].photons:,}, max_depth {MAX_DEPTH}",
+    )  # fmt: skip
+    return BenchResult("Agreement on random scenes", COLUMNS, rows, [target], notes)
+
+
+COLUMNS = ("feature", "scenes", "lit", *(f"{m} differs" for m in METHODS), "by known", "noise", "in doubt")
+
+
+def _row(name: str, indices: set[int], verdicts: dict[int, Verdict], found: list[Disagreement]) -> list[Cell]:
+    """Scenes with the feature, how many of them show light, those that disagree by method, the median standard error of
+    a test, and the share of comparisons that needed another stage."""
+    mine = [d for d in found if d.index in indices]
+    comparisons = [c for i in indices for c in verdicts[i].comparisons]
+    noise = float(np.median([c.outcome.noise for c in comparisons])) if comparisons else 0.0
+    doubt = sum(c.stage > 1 for c in comparisons) / max(len(comparisons), 1)
+    by_method = [sum(m in d.methods for d in mine if not d.known) for m in METHODS]
+    lit = sum(verdicts[i].lit > 0 for i in indices)
+    return [name, len(indices), lit, *by_method, sum(bool(d.known) for d in mine), noise, doubt]
+
+
+def _settings_notes() -> list[str]:
+    stages = "; ".join(
+        f"{e.runs} runs of {e.spp} samples a pixel, photons {e.passes} passes of {e.photons:,} at radius {e.radius:g}"
+        for e in STAGES
+    )
+    return [
+        f"{SIZE}² pixels; stages, each with fresh seeds, as long as there is doubt: {stages}",
+        f"photon methods may be off by {FORGIVEN:g} × this radius, {FORGIVEN * STAGES[-1].radius:.0%} of a block in "
+        "the last stage: look-ups lose light at edges, in proportion to the radius",
+        f"nearest: estimate.lookup=nearest with k = 10 within {NEAREST_REACH:g} of these radii",
+        f"a disagreement is one by Holm's correction at {LEVEL:g} over all comparisons of the run",
+        "where point, spot or directional lights meet smooth mirrors, glass or coats, photon methods are compared with "
+        "Mitsuba's particle tracer in the pixels that see none of these, or with each other if there are none",
+    ]

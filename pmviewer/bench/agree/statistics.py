@@ -1,0 +1,107 @@
+"""Do two programs render the same picture, when single paths may be very bright?
+
+Each run gives the means of the picture and of its blocks, channel by channel; runs are independent, so that Welch's
+test asks nothing of pixels. Bright paths that are too rare to have come yet make a mean too dark by more than its
+standard error says. With a finite variance the density of bright paths falls faster than x⁻³; what lies beyond the
+brightest, m, of n is then at most twice the share of that one in the mean (in the limit of a tail index of 2:
+∫ₘ x·2m²x⁻³ dx / n = 2m/n). The darker side is granted this much, measured on the brightest run. It falls as 1/n, faster
+than the noise.
+
+A difference counts when it shows again and again: `STAGES` of fresh seeds and more samples, and the last test alone
+gives the p-value, which is corrected for the number of comparisons of the whole run (Holm).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from pmviewer.output.metric import block_means
+
+BLOCK = 8
+CHANNELS = 3
+ROUNDING = 1e-5
+"""Relative difference that is no error: single precision, some additions and products deep."""
+TAIL = 2.0
+LEVEL = 0.01
+"""Probability that a run in which all agree shows any disagreement."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """p: chance of so large a difference where there is none (Šidák over the tests). ratio: ours to theirs where the
+    difference shows most. noise: the median standard error of a test relative to its value. tests: how many."""
+
+    p: float
+    ratio: float
+    noise: float
+    tests: int
+
+
+def summaries(images: NDArray[Any], seen: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
+    """(runs, tests): of (runs, h, w, c), the means of each channel over the picture, then over blocks.
+
+    With `seen` (h, w), over these pixels alone; blocks without any are left out.
+    """
+    weight = np.ones(images.shape[1:3]) if seen is None else seen.astype(np.float64)
+    share = block_means(weight, BLOCK)
+    kept = share > 0
+    rows = []
+    for image in np.asarray(images, np.float64):
+        weighed = image * weight[..., None]
+        blocks = block_means(weighed, BLOCK)[kept] / share[kept][:, None]
+        rows.append(np.concatenate([weighed.mean(axis=(0, 1)) / weight.mean(), blocks.ravel()]))
+    return np.array(rows)
+
+
+def compared(
+    ours: NDArray[np.float64], theirs: NDArray[np.float64], tolerance: float = 0.0, sparse: bool = False
+) -> Outcome:
+    """Test that (n, k) and (m, k) runs have the same k expectations, but for `tolerance` times the second's.
+
+    `sparse`: light may come as single photons, so that a block that none has met in any run says nothing about its
+    mean. Such blocks are left to the test of the whole picture.
+    """
+    if not (np.isfinite(ours).all() and np.isfinite(theirs).all()):
+        return Outcome(0.0, math.nan, math.nan, ours.shape[1])
+    if sparse:
+        met = np.logical_and((ours > 0).any(axis=0), (theirs > 0).any(axis=0))
+        met |= np.arange(len(met)) < CHANNELS
+        ours, theirs = ours[:, met], theirs[:, met]
+    n, m = len(ours), len(theirs)
+    mean_a, mean_b = ours.mean(axis=0), theirs.mean(axis=0)
+    var_a, var_b = ours.var(axis=0, ddof=1) / n, theirs.var(axis=0, ddof=1) / m
+    variance = np.maximum(var_a + var_b, 1e-60)
+    freedom = variance**2 / np.maximum(var_a**2 / (n - 1) + var_b**2 / (m - 1), variance**2 / (n + m - 2))
+    rounding = ROUNDING * (np.abs(mean_a) + np.abs(mean_b))
+    unseen = np.where(mean_a < mean_b, _unseen(ours), _unseen(theirs))
+    error = np.sqrt(variance + rounding**2)
+    beyond = np.maximum(np.abs(mean_a - mean_b) - unseen - tolerance * np.abs(mean_b) - rounding, 0.0)
+    p = 2 * student.sf(beyond / error, np.maximum(freedom, 1.0))
+    worst = int(p.argmin())
+    sidak = -math.expm1(p.size * math.log1p(-min(float(p[worst]), 1 - 1e-16)))
+    lit = mean_b > 0
+    noise = float(np.median(error[lit] / mean_b[lit])) if lit.any() else 0.0
+    ratio = float(mean_a[worst] / mean_b[worst]) if mean_b[worst] else (math.inf if mean_a[worst] else 1.0)
+    return Outcome(sidak, ratio, noise, p.size)
+
+
+def _unseen(runs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What a mean may lack because the brightest paths have not come yet."""
+    return np.asarray(TAIL * (runs.max(axis=0) - np.median(runs, axis=0)) / len(runs))
+
+
+def rejected(p_values: list[float], level: float = LEVEL) -> list[bool]:
+    """Holm: which hypotheses fall when any false fall among all of them shall have probability `level`."""
+    order = np.argsort(p_values)
+    fallen = [False] * len(p_values)
+    for rank, index in enumerate(order):
+        if p_values[index] > level / (len(p_values) - rank):
+            break
+        fallen[index] = True
+    return fallen

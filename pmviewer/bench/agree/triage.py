@@ -1,0 +1,79 @@
+"""What becomes of a disagreement: put down to a known deviation of Mitsuba, or shrunk and saved."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from pmviewer.bench.agree.known import DEVIATIONS, Deviation
+from pmviewer.bench.agree.shrink import shrunk
+from pmviewer.bench.agree.statistics import Outcome
+from pmviewer.bench.agree.tree import Node, to_json
+from pmviewer.bench.agree.trial import STAGES, Comparison, Question, Runs, questions
+from pmviewer.bench.agree.workers import tools
+from pmviewer.bench.agree.xml import write_scene
+from pmviewer.errors import PmviewerError
+
+CLEAR = 1e-4
+"""p at which a simpler scene still shows the disagreement: some hundred tries shall not end at a chance."""
+LIKE = 0.3
+"""Least share of the deviation in a simpler scene: another, smaller difference is not the one that is looked for."""
+
+
+def _shows(outcome: Outcome | None) -> bool:
+    return outcome is not None and outcome.p <= CLEAR
+
+
+def _question(runs: Runs, like: Comparison) -> Question | None:
+    return next((q for q in questions(runs) if (q.method, q.peer, q.what) == (like.method, like.peer, like.what)), None)
+
+
+def outcome_of(scene: Node, like: Comparison, stage: int, salt: tuple[int, ...]) -> Outcome | None:
+    """The same comparison of another scene at a stage; None where it makes no sense or a program refuses the scene."""
+    folder, mitsuba, pool = tools()
+    with tempfile.TemporaryDirectory(dir=folder) as place:
+        try:
+            question = _question(Runs(scene, Path(place), mitsuba, pool, salt), like)
+            if question is None:
+                return None
+            return question.answer(stage)
+        except PmviewerError:
+            return None
+
+
+def explanation(scene: Node, found: Comparison, level: float, salt: tuple[int, ...]) -> Deviation | None:
+    """The deviation of Mitsuba that a disagreement comes from: without what it takes, there is none."""
+    if not found.peer.startswith("Mitsuba"):
+        return None
+    for deviation in DEVIATIONS:
+        without = deviation.without(scene)
+        if without is not None:
+            outcome = outcome_of(without, found, len(STAGES) - 1, (*salt, 1))
+            if outcome is not None and outcome.p > level:
+                return deviation
+    return None
+
+
+def smallest(scene: Node, found: Comparison, salt: tuple[int, ...], most: int) -> Node:
+    """The smallest scene that shows the same disagreement."""
+    brighter, size = found.outcome.ratio > 1, abs(found.outcome.ratio - 1)
+    stage = 0  # the cheapest that shows it
+    while stage < len(STAGES) - 1 and not _shows(outcome_of(scene, found, stage, (*salt, 3))):
+        stage += 1
+
+    def still(simpler: Node) -> bool:
+        outcome = outcome_of(simpler, found, stage, (*salt, 2))
+        if outcome is None or not _shows(outcome):
+            return False
+        return (outcome.ratio > 1) == brighter and abs(outcome.ratio - 1) >= LIKE * size
+
+    return shrunk(scene, still, most)
+
+
+def save(scene: Node, found: Comparison, folder: Path, name: str) -> Path:
+    """Write the scene as XML and as the tree that it is, with what disagrees in it."""
+    path, _ = write_scene(scene, folder, name)
+    said = {"method": found.method, "peer": found.peer, "what": found.what, "p": found.outcome.p,
+            "ratio": found.outcome.ratio}  # fmt: skip
+    (folder / f"{name}.json").write_text(to_json({"scene": scene, "shows": said}) + "\n", encoding="utf-8")
+    return path

@@ -1,0 +1,217 @@
+"""One scene, every method: what is compared with what, and how often again before it counts as a disagreement.
+
+* `path` with Mitsuba's path tracer: the picture, and what paths of one scattering bring (emission and direct light).
+* The photon methods with Mitsuba's path tracer. Where lights of one point or direction shine on smooth mirrors, glass
+  or coats, no path tracer finds the caustics. There they are compared with Mitsuba's particle tracer instead, in the
+  pixels that see nothing of the kind; and where no such pixel is left, with each other.
+* The photon methods with our `path`, term by term: with such caustics only what the camera sees without them.
+
+Photon methods are consistent: what their look-ups blur or lose at edges goes with the radius r. A disc over a straight
+edge loses on average a fifth of its light in a strip r wide; of a surface as wide as the scene's radius R, with two
+edges, that is some 0.4 r/R, of one a tenth as wide 4 r/R, which is forgiven. The radius is halved from stage to stage,
+so that a true error stays and what is forgiven goes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.bench.agree.generate import needs_particles
+from pmviewer.bench.agree.mitsuba_client import Mitsuba, MitsubaError
+from pmviewer.bench.agree.ours import METHODS, PHOTON_METHODS, Effort, our_runs, picture, term
+from pmviewer.bench.agree.statistics import Outcome, compared, summaries
+from pmviewer.bench.agree.tree import Node
+from pmviewer.bench.agree.xml import write_scene
+from pmviewer.engine.opened import OpenScene, open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.errors import PmviewerError
+
+STAGES = (
+    Effort(runs=12, spp=64, passes=12, photons=20_000, radius=0.01),
+    Effort(runs=16, spp=256, passes=16, photons=60_000, radius=0.005),
+    Effort(runs=24, spp=512, passes=24, photons=120_000, radius=0.0025),
+)
+SUSPICIOUS = (0.01, 0.01)
+"""Below this p the next stage decides."""
+FORGIVEN = 4.0
+"""Share of a block that photon methods may be off, over the radius relative to the scene: 1 % in the last stage."""
+LEAST_SEEN = 0.05
+"""Least share of pixels that are enough for a comparison."""
+HARMLESS = "axis of <rotate> is not of unit length"
+"""The one warning that is wanted: both programs stretch by such an axis."""
+TERMS = {"emission": ("emission",), "direct": ("direct",), "specular": ("specular",),
+         "caustic + indirect": ("caustic", "indirect")}  # fmt: skip
+SAFE_TERMS = ("emission", "direct")
+"""Those that hold no caustics."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """`method` against `peer` in `what`; the outcome of the last stage that was needed, counted from 1."""
+
+    method: str
+    peer: str
+    what: str
+    outcome: Outcome
+    stage: int
+
+    @property
+    def final(self) -> bool:
+        """Whether all stages were suspicious; only then can it be a disagreement."""
+        return self.stage == len(STAGES)
+
+    @property
+    def p(self) -> float:
+        return self.outcome.p if self.final else 1.0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Comparisons of a scene. `refused`: why a program could not open it."""
+
+    comparisons: list[Comparison] = field(default_factory=list)
+    refused: str = ""
+    lit: float = 0.0
+
+
+class Runs:
+    """Independent pictures of a scene by whoever is asked, rendered once a stage. `salt` gives other seeds."""
+
+    def __init__(self, scene: Node, folder: Path, mitsuba: Mitsuba, pool: WorkPool, salt: tuple[int, ...]) -> None:
+        """Raises PmviewerError when our loader refuses the scene."""
+        self.scene, self.mitsuba, self.pool, self.salt = scene, mitsuba, pool, salt
+        self.path, self.flat_path = write_scene(scene, folder, "scene")
+        self.opened: OpenScene = open_scene(self.path)
+        self._ours: dict[tuple[str, int, int], NDArray[np.float32]] = {}
+        self._theirs: dict[tuple[str, int, int], NDArray[np.float64]] = {}
+
+    def _seeds(self, who: str, stage: int, runs: int) -> list[int]:
+        entropy = [*self.salt, stage, *who.encode()]
+        return [int(s) >> 1 for s in np.random.SeedSequence(entropy).generate_state(runs)]
+
+    def ours(self, method: str, stage: int, max_depth: int = 0) -> NDArray[np.float32]:
+        """(runs, h, w, 15) terms; `max_depth` 0 for whole paths."""
+        key = (method, stage, max_depth)
+        if key not in self._ours:
+            effort = STAGES[stage]
+            seeds = self._seeds(f"{method} {max_depth}", stage, effort.runs)
+            more = {"max_depth": max_depth} if max_depth else {}
+            self._ours[key] = our_runs(self.opened, method, effort, seeds, self.pool, **more)
+        return self._ours[key]
+
+    def theirs(self, mode: str, stage: int, max_depth: int = 0) -> NDArray[np.float64]:
+        """(runs, h, w, 3)"""
+        key = (mode, stage, max_depth)
+        if key not in self._theirs:
+            effort = STAGES[stage]
+            seeds = self._seeds(f"Mitsuba {mode} {max_depth}", stage, effort.runs)
+            more = {"max_depth": max_depth} if max_depth else {}
+            self._theirs[key] = self.mitsuba.images(self.flat_path, mode, seeds, effort.spp, **more)
+        return self._theirs[key]
+
+    @cached_property
+    def seen_plainly(self) -> NDArray[np.bool_]:
+        return self.mitsuba.seen_plainly(self.flat_path)
+
+
+Pair = Callable[[int], tuple[NDArray[np.float64], NDArray[np.float64]]]
+"""Summaries of both sides at a stage."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """What may agree or not: `method` against `peer` in `what`."""
+
+    method: str
+    peer: str
+    what: str
+    pair: Pair
+
+    def answer(self, stage: int) -> Outcome:
+        """The outcome of one stage."""
+        if self.method == "path":
+            return compared(*self.pair(stage))
+        return compared(*self.pair(stage), FORGIVEN * STAGES[stage].radius, sparse=True)
+
+    def asked(self, stages: int) -> Comparison:
+        """Stage after stage while the answer is suspicious, at most `stages` of them."""
+        for stage in range(stages):
+            outcome = self.answer(stage)
+            if stage == len(SUSPICIOUS) or outcome.p >= SUSPICIOUS[stage]:
+                break
+        return Comparison(self.method, self.peer, self.what, outcome, stage + 1)
+
+
+def questions(runs: Runs) -> Iterator[Question]:
+    """All that is compared for a scene."""
+
+    def whole(method: str, stage: int, seen: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
+        return summaries(picture(runs.ours(method, stage)), seen)
+
+    def part(method: str, name: str, stage: int) -> NDArray[np.float64]:
+        return summaries(term(runs.ours(method, stage), *TERMS[name]))
+
+    def paths(stage: int) -> NDArray[np.float64]:
+        return summaries(runs.theirs("path", stage))
+
+    def one_scattering(stage: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return summaries(picture(runs.ours("path", stage, 1))), summaries(runs.theirs("path", stage, 2))
+
+    yield Question("path", "Mitsuba path", "picture", lambda s: (whole("path", s), paths(s)))
+    yield Question("path", "Mitsuba path", "one scattering", one_scattering)
+    particles = needs_particles(runs.scene)
+    for method in PHOTON_METHODS:
+
+        def by_particles(stage: int, method: str = method) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            seen = runs.seen_plainly
+            return whole(method, stage, seen), summaries(runs.theirs("ptracer", stage), seen)
+
+        def by_paths(stage: int, method: str = method) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            return whole(method, stage), paths(stage)
+
+        def by_other(stage: int, method: str = method) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            return whole(method, stage), whole("progressive", stage)
+
+        if not particles:
+            yield Question(method, "Mitsuba path", "picture", by_paths)
+        elif runs.seen_plainly.mean() >= LEAST_SEEN:
+            yield Question(method, "Mitsuba particles", "plain pixels", by_particles)
+        elif method != "progressive":
+            yield Question(method, "progressive", "picture", by_other)
+        for name in SAFE_TERMS if particles else TERMS:
+
+            def by_term(
+                stage: int, method: str = method, name: str = name
+            ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+                return part(method, name, stage), part("path", name, stage)
+
+            yield Question(method, "our path", name, by_term)
+
+
+def tried(
+    scene: Node, folder: Path, mitsuba: Mitsuba, pool: WorkPool, salt: tuple[int, ...], stages: int = len(STAGES)
+) -> Verdict:
+    """Ask all questions about a scene; its files go into `folder`."""
+    try:
+        runs = Runs(scene, folder, mitsuba, pool, salt)
+        for warning in runs.opened.scene.warnings:
+            if HARMLESS not in warning:
+                return Verdict(refused=f"pmviewer warns: {warning}")
+        comparisons = [question.asked(stages) for question in questions(runs)]
+    except MitsubaError as error:
+        return Verdict(refused=str(error))
+    except PmviewerError as error:
+        return Verdict(refused=f"pmviewer: {error}")
+    lit = float((runs.theirs("path", 0).mean(axis=0).sum(axis=-1) > 0).mean())
+    return Verdict(comparisons, lit=lit)
+
+
+def methods_of(verdict: Verdict) -> set[str]:
+    """The methods that were compared with anything; all of them, or something is wrong here."""
+    return {c.method for c in verdict.comparisons} | {c.peer for c in verdict.comparisons if c.peer in METHODS}

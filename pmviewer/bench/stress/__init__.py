@@ -1,0 +1,1 @@
+"""Stress suite: the extremes that nobody's scene has until somebody's has. `pmviewer.bench.stress.suite` runs it."""

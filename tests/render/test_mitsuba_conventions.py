@@ -1,0 +1,82 @@
+"""Corners of Mitsuba's conventions: which side of a surface is its outside, and which way mapped normals lean.
+
+The expectation was rendered by Mitsuba 3 (tests/scene/mitsuba_conventions/record.py) and is recorded as block means
+with their standard errors; each picture is tested against it by Welch's t-test, as `pmviewer bench mitsuba` does.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+from pmviewer.engine.cache import StageCache
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.renderer import Renderer
+from tests.scenes_for_tests import settings_of
+
+FOLDER = Path(__file__).parents[1] / "scene" / "mitsuba_conventions"
+EXPECTED = json.loads((FOLDER / "expected.json").read_text("utf-8"))
+SCENES = EXPECTED["scenes"]
+RUNS = 8
+SIGNIFICANCE = 1e-4
+ROUNDING = 1e-5
+"""Relative: six digits are recorded."""
+RADIUS = 0.01
+"""Of the scene's: what a look-up blurs must be less than the noise."""
+
+
+def block_runs(name, method, passes):
+    """(RUNS, blocks) means over blocks and channels of pictures with different seeds."""
+    opened = open_scene(str(FOLDER / f"{name}.xml"))
+    pool = WorkPool()
+    rows = []
+    try:
+        for seed in range(1, RUNS + 1):
+            values = {"render": {"method": method, "seed": seed}, "estimate": {"radius": RADIUS}}
+            renderer = Renderer(opened, settings_of(**values), pool, StageCache(0))
+            for _ in range(passes):
+                renderer.step()
+            image = renderer.frame(0).image().astype(np.float64)
+            h, w, _ = image.shape
+            b = EXPECTED["block"]
+            rows.append(image.reshape(h // b, b, w // b, b, 3).mean(axis=(1, 3, 4)).reshape(-1))
+    finally:
+        pool.close()
+    return np.array(rows)
+
+
+def p_value(ours, mean, error, runs, tolerance=0.0):
+    """Probability of the largest difference beyond that share of a block, by chance (Šidák over blocks)."""
+    mean, error = np.array(mean), np.array(error)
+    a, b = ours.var(axis=0, ddof=1) / len(ours), error**2
+    variance = np.maximum(a + b, 1e-60)
+    freedom = np.maximum(variance**2 / np.maximum(a**2 / (len(ours) - 1) + b**2 / (runs - 1), 1e-130), 1.0)
+    beyond = np.maximum(np.abs(ours.mean(axis=0) - mean) - tolerance * mean, 0.0)
+    t = beyond / np.sqrt(variance + (ROUNDING * mean) ** 2)
+    smallest = float(2 * student.sf(t, freedom).min())
+    print(f"mean ratio {ours.mean() / mean.mean():.4f}, largest t {t.max():.2f}")
+    return -np.expm1(len(t) * np.log1p(-min(smallest, 1 - 1e-16)))
+
+
+def test_every_scene_has_an_expectation():
+    assert {path.stem for path in FOLDER.glob("*.xml")} == set(SCENES)
+
+
+@pytest.mark.parametrize("name", list(SCENES))
+def test_path_tracer_shows_mitsubas_picture(name):
+    expected = SCENES[name]
+    assert p_value(block_runs(name, "path", 64), expected["mean"], expected["error"], EXPECTED["runs"]) > SIGNIFICANCE
+
+
+@pytest.mark.parametrize("method", ["progressive", "gather"])
+@pytest.mark.parametrize("name", ["bumpmap_on_metal", "smooth_mesh_light"])
+def test_photon_methods_show_it_too(name, method):
+    """Within one percent of a block, for what a look-up blurs."""
+    expected = SCENES[name]
+    found = p_value(block_runs(name, method, 4), expected["mean"], expected["error"], EXPECTED["runs"], tolerance=0.01)
+    assert found > SIGNIFICANCE

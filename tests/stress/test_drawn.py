@@ -1,0 +1,84 @@
+"""Settings and scenes at random: one film for any number of threads, finite views, a ledger that balances."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from pmviewer.bench.stress import drawn
+from pmviewer.bench.stress.drawn import PLAIN, STRUCTURAL, STRUCTURES, Spec, check, drawable, scene_of, value_of
+from pmviewer.settings import SETTINGS
+
+UNIT = st.floats(0, 1)
+VALUES = st.fixed_dictionaries({info.path: UNIT.map(lambda u, info=info: value_of(info, u)) for info in drawable()})
+PLACE = st.floats(-0.6, 0.6)
+SPECS = st.builds(
+    Spec,
+    kind=st.integers(0, 2),
+    size=st.floats(-6, 6),
+    brightness=st.floats(-20, 20),
+    albedo=st.sampled_from([0.0, 0.01, 0.5, 0.99, 1.0]),
+    balls=st.lists(st.tuples(PLACE, PLACE, PLACE, st.floats(1e-4, 0.4), st.integers(0, 2)), max_size=4).map(tuple),
+    eta=st.sampled_from([0.3, 0.999, 1.0, 1.5, 3.0]),
+    points=st.sampled_from([1, 2, 20]),
+    fov=st.floats(1, 170),
+    width=st.integers(1, 12),
+    height=st.integers(1, 12),
+)
+
+
+@pytest.mark.parametrize("structure", PLAIN)
+@settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+@given(values=VALUES, spec=SPECS)
+def test_anything_the_schema_allows(structure, values, spec):
+    assert check(scene_of(spec), drawn.settings_of(PLAIN[structure], values, spec), views=structure != "nearest") == ""
+
+
+def test_every_setting_is_drawn_or_structural():
+    """A new setting of photons, maps or image is drawn by itself, or named."""
+    paths = {info.path for info in drawable()} | STRUCTURAL
+    missing = [
+        path
+        for path, info in SETTINGS.items()
+        if info.stage in ("photons", "maps", "image")
+        and path not in paths
+        and not path.startswith(("camera.", "free_camera."))
+    ]
+    assert missing == []
+    assert set(SETTINGS) >= STRUCTURAL
+    assert {path for values in STRUCTURES.values() for path in values} <= set(SETTINGS)
+
+
+@pytest.mark.parametrize("u", [0.0, 0.1, 0.5, 1.0])
+def test_drawn_values_are_allowed(u):
+    values = {info.path: value_of(info, u) for info in drawable()}
+    assert drawn.settings_of({}, values, Spec()).photons.N in (1, 2, 45, 2000)
+
+
+def test_check_finds_what_is_wrong(monkeypatch):
+    """Each promise, broken on purpose."""
+    import numpy as np
+
+    from pmviewer.engine.renderer import Renderer
+
+    spec = Spec(kind=1)
+    chosen = drawn.settings_of({}, {"photons.N": 100}, spec)
+    assert check(scene_of(spec), chosen, views=False) == ""
+    original = Renderer.step
+
+    def poisoned(self):
+        original(self)
+        self.film.sums[0, 3] = np.nan
+
+    def depends_on_threads(self):
+        original(self)
+        self.film.sums[0, 3] += self.pool.threads
+
+    def leaks(self):
+        original(self)
+        self.tally.energy.sums[1] *= 0.9
+
+    for step, said in ((poisoned, "not finite"), (depends_on_threads, "different films"), (leaks, "ledger misses")):
+        monkeypatch.setattr(Renderer, "step", step)
+        assert said in check(scene_of(spec), chosen, views=False)
