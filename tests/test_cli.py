@@ -42,6 +42,17 @@ def test_scenes_info_settings_and_bench_list(capsys):
     assert "latency" in capsys.readouterr().out
 
 
+def test_render_tells_where_the_light_went(tmp_path, capsys):
+    """Nothing leaves the closed box, and the shares add up."""
+    assert call("render", "cornell_diffuse", "-o", str(tmp_path / "a.png"), "--stats", *QUICK) == 0
+    told = dict(line.split("  ", 1) for line in capsys.readouterr().out.splitlines() if "  " in line)
+    told = {name.strip(): text.strip() for name, text in told.items()}
+    assert told["photons emitted"] == "4,000"
+    shares = [float(told[f"energy {name}"].split("%")[0]) for name in ("absorbed", "escaped", "terminated", "dropped")]
+    assert sum(shares) == pytest.approx(100, abs=0.01)
+    assert "±" in told["energy absorbed"]
+
+
 def test_render_writes_both_formats_and_the_same_for_any_threads(tmp_path, capsys):
     files = [tmp_path / f"{threads}.exr" for threads in (1, 2)]
     for threads, path in zip("12", files, strict=True):

@@ -30,7 +30,7 @@ BENCHES: dict[str, tuple[str, str]] = {
     "corners": ("Secondary gathering: error at edges and elsewhere (R5)", "pmviewer.bench.corners:run"),
     "cache": ("Irradiance cache against the plain final gather (R6)", "pmviewer.bench.irradiance_cache:run"),
     "gather": ("Radiance photons against the plain final gather (R3)", "pmviewer.bench.gather:run"),
-    "importance": ("Importance against brute force, and its cost (I1)", "pmviewer.bench.importance:run"),
+    "importance": ("Importance against the path tracer, and its cost (I1)", "pmviewer.bench.importance:run"),
     "deposition": ("Deposition rules: photons at equal error, power, cost (I4, I5)", "pmviewer.bench.deposition:run"),
     "emission": ("Guided emission: photons traced for the same error (I6)", "pmviewer.bench.emission:run"),
     "stress": ("Extremes of every kind: finite, unbiased or said so, bounded", "pmviewer.bench.stress.suite:run"),

@@ -32,6 +32,7 @@ from pmviewer.photons.deposition import SMALLEST_EPSILON
 from pmviewer.photons.lightpass import PhotonMaps
 from pmviewer.render.density import WIDEST, counting_eye, counting_tree, density_view
 from pmviewer.render.diagnostics import FAMILY_CHANNELS, lookup_view, shadow_view, site_view
+from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL
 from pmviewer.settings import Importance, Settings
 
 TILE = 2048
@@ -64,6 +65,8 @@ class Looked:
     stored: Callable[[str], NDArray[np.float32]] = lambda name: np.empty((0, 6), np.float32)
     """The photons of the map of that name."""
     scene_radius: float = 1.0
+    radii: NDArray[np.float32] | None = None
+    """Look-up radii of the pixels, where they have their own."""
 
     def required(self, name: str) -> tuple[np.float32, np.float32]:
         """Photons wanted per pixel in the map of that name, and the density wanted everywhere instead, −1 for none."""
@@ -213,4 +216,7 @@ def _kernel(wanted: Wanted, looked: Looked, plan: Plan, out: NDArray[np.float32]
     radius = looked.eye[0]["caustic_radius" if by_caustic else "global_radius"]
     mask = np.int32((plan.caustic_classes if by_caustic else plan.global_classes) & ALL_CLASSES)
     photons = looked.caustic if by_caustic else looked.global_
-    return partial(lookup_view, looked.scene, looked.eye, photons, radius, mask, out)
+    radii, which = looked.radii, OF_CAUSTIC if by_caustic else OF_GLOBAL
+    if not (by_caustic or plan.shown_directly):
+        radii = None  # gather rays look the map up, with the radius of the pass
+    return partial(lookup_view, looked.scene, looked.eye, photons, radii, which, radius, mask, out)

@@ -62,7 +62,7 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
     if group == "photons":
         return _photons(path, settings, traits, plan)
     if group == "estimate":
-        return _estimate(path, settings, plan.caustic_classes)
+        return _estimate(path, settings, plan)
     if group == "gather" and not plan.gather:
         return f"Only a final gather casts gather rays, not the method '{method}' (render.indirect)."
     if path in ("gather.directions", *_GUIDED_ONLY) and settings.gather.rays < 2:
@@ -221,21 +221,28 @@ def _photons(path: str, settings: Settings, traits: SceneTraits, plan: Plan) -> 
     return None
 
 
-def _estimate(path: str, settings: Settings, caustic_mask: int) -> str | None:
+def _estimate(path: str, settings: Settings, plan: Plan) -> str | None:
     estimate = settings.estimate
     if path in _KDTREE_ONLY and estimate.lookup != "nearest":
         return "Only with look-up 'nearest'."
     if path in _GRID_ONLY and estimate.lookup == "nearest":
         return "Not with look-up 'nearest': the k nearest photons set the radius."
+    if path == "estimate.radius_rule":
+        if estimate.lookup == "nearest":
+            return "Not with look-up 'nearest': the k nearest photons set the radius."
+        if settings.photons.renew == "once" or estimate.alpha == 1.0:
+            return "The radius does not shrink (photons.renew, estimate.alpha)."
+        if not (plan.caustic_classes or plan.shown_directly):
+            return "Gather rays alone look photons up, with the radius of the pass."
     if path == "estimate.black_level" and estimate.max_radius != "auto":
         return "Only with an automatic maximum radius."
-    if path == "estimate.caustic_radius" and not caustic_mask:
+    if path == "estimate.caustic_radius" and not plan.caustic_classes:
         return "No caustic map in this scene or with this method."
     hull = estimate.area == "convex hull"
     if hull and path in _DISC_ONLY:
         return "The convex hull weighs all photons alike and has no dark edges to check for."
-    if path == "estimate.boundary" and not hull:
-        return "Only with the area 'convex hull'."
+    if path == "estimate.boundary" and not (hull or estimate.differential):
+        return "Only with the area 'convex hull' or differential checking."
     if path == "estimate.cone_k" and estimate.filter != "cone":
         return "Only with the cone filter."
     if path in ("estimate.alpha", "estimate.floor") and settings.photons.renew == "once":

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -75,10 +76,17 @@ class LightStage:
         self._before: Known | None = None
 
     def run(
-        self, eye: np.void, index: int, N: int, first_radius: float, importance: ImportanceStage
+        self,
+        eye: np.void,
+        index: int,
+        N: int,
+        first_radius: float,
+        importance: ImportanceStage,
+        widest: Mapping[str, float] = MappingProxyType({}),
     ) -> tuple[NDArray[np.void], ...]:
         """Trace the photons of pass `index` and build its maps; fills masks and radii into the eye record. `importance`
-        has run for this pass.
+        has run for this pass; `widest` are the largest radii in use by map, where they may be more than that of the
+        pass.
 
         Returns the records of caustic map, global map and the map that chooses lights.
         """
@@ -87,7 +95,7 @@ class LightStage:
             return record, record, self._no_map(nearest=False).record
         # Photons that are kept are those of the first pass, at its radius.
         kept = self.settings.photons.renew == "once"
-        maps = self._maps(eye, 0 if kept else index, N, first_radius, importance)
+        maps = self._maps(eye, 0 if kept else index, N, first_radius, importance, widest)
         if not (kept and index > 0):
             assert self.photons is not None
             self.tally.add_photons(self.photons, self.scene.flat.total_luminance)
@@ -208,12 +216,19 @@ class LightStage:
         return self.cache.get(key, make, lambda photons: photons.bytes), key
 
     def _maps(
-        self, eye: np.void, index: int, N: int, first_radius: float, importance: ImportanceStage
+        self,
+        eye: np.void,
+        index: int,
+        N: int,
+        first_radius: float,
+        importance: ImportanceStage,
+        widest: Mapping[str, float],
     ) -> tuple[NDArray[np.void], ...]:
         plan, estimate = self.plan, self.settings.estimate
         scene_radius = self.scene.flat.radius
         radius = pass_radius(first_radius, index, estimate, scene_radius)
         radii = {"caustic": radius * estimate.caustic_radius, "global": radius}
+        reach = {name: max(r, widest.get(name, 0.0)) for name, r in radii.items()}
         if plan.deposition != "all":
             self.rules = rules_of(self.settings, plan, importance, index, radii, first_radius)
         photons, key = self._timed("light pass", lambda: self._photons_of(index, N, importance))
@@ -239,10 +254,17 @@ class LightStage:
             if nearest:
                 brightest = self._brightest(name, chosen, units[name])
                 return build_kdtree(chosen, units[name]), self._max_radius(brightest, int(eye["k"]))
-            return build_grid(chosen, radii[name], units[name]), radii[name]
+            return build_grid(chosen, reach[name], units[name]), radii[name]
 
         def cached(name: str) -> Any:
-            map_key = ("map", key, name, classes[name], nearest, estimate if nearest else radii[name])
+            map_key = (
+                "map",
+                key,
+                name,
+                classes[name],
+                nearest,
+                *((estimate,) if nearest else (radii[name], reach[name])),
+            )
             if index >= CACHED_PASSES:
                 return build(name)
             return self.cache.get(map_key, lambda: build(name), lambda m: m[0].bytes if m else 0)

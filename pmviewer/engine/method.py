@@ -66,6 +66,11 @@ class Plan:
         return self.caustic_mask | (1 << CAUSTIC if self.unfound else 0)
 
     @property
+    def shown_directly(self) -> int:
+        """Path classes that are looked up in the global map where a pixel sees it."""
+        return self.global_mask | self.direct_mask | self.global_caustics
+
+    @property
     def photons(self) -> bool:
         return bool(self.caustic_classes or self.global_classes)
 

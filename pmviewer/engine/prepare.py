@@ -14,6 +14,7 @@ from pmviewer.engine.method import estimator_of, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.projection import projection_for
+from pmviewer.engine.radius import radii_of_pixels
 from pmviewer.kernels.raycast import cast_closest
 from pmviewer.maps.grid import build_grid
 from pmviewer.maps.irradiance_cache import NO_CACHE
@@ -30,6 +31,7 @@ from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
 from pmviewer.render.lookup import NO_SITES
 from pmviewer.render.path import path_pass
+from pmviewer.render.pixel_radius import first_radii
 from pmviewer.render.record import EYE_DTYPE
 from pmviewer.render.record import N_COUNTS as N_EYE_COUNTS
 from pmviewer.render.shadow import NO_SHADOWS
@@ -57,6 +59,7 @@ def prepare(scene: OpenScene, settings: Settings, pool: WorkPool, tell: Tell) ->
         plan.directions,
         plan.corners,
         plan.shadows,
+        radii_of_pixels(settings, plan),
         plan.cache,
         plan.importance,
         plan.deposition != "all",
@@ -138,7 +141,8 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
                 beyond = extra[1], shadows, record, grid.record
                 cache = prepare_cache(flat.record, eye, record, sites, beyond, how).record
             maps = record, record, grid.record, sites, cache, shadows, *extra
-            eye_pass(flat.record, eye, *maps, np.zeros(0, np.uint8), film, eye_counts, 0, 0)
+            radii = first_radii(1, 0.0, 0.0) if radii_of_pixels(settings, plan) else None
+            eye_pass(flat.record, eye, *maps, np.zeros(0, np.uint8), radii, film, eye_counts, 0, 0)
 
         steps.append(("eye pass", compile_eye))
     return steps

@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
+from pmviewer.engine.method import Plan
 from pmviewer.kernels.raycast import cast_closest
 from pmviewer.maps.nearest import shrunk
 from pmviewer.maps.radius import progressive_radius
 from pmviewer.render.camera import CameraPose
 from pmviewer.scene.flatten import FlatScene
-from pmviewer.settings import Estimate
+from pmviewer.settings import Estimate, Settings
 
 FOOTPRINTS, GATHER_FOOTPRINTS = 4.0, 3.0
 """Radius in pixel footprints: maps shown directly need a calm estimate; gather rays average it anyway, so that theirs
@@ -53,6 +54,13 @@ def pass_neighbours(index: int, estimate: Estimate) -> tuple[int, float]:
     """Neighbours that a k-nearest look-up of pass `index` searches, and the share of their disc's area that it uses: in
     all the share r²ᵢ/r²₁ of the area that `estimate.k` fill (`pmviewer.maps.nearest`)."""
     return shrunk(estimate.k, progressive_radius(1.0, index + 1, estimate.alpha) ** 2)
+
+
+def radii_of_pixels(settings: Settings, plan: Plan) -> bool:
+    """Whether each pixel has radii of its own (`pmviewer.render.pixel_radius`)."""
+    estimate = settings.estimate
+    shrinking = settings.photons.renew == "each pass" and estimate.lookup == "radius"
+    return shrinking and estimate.radius_rule == "pixel" and bool(plan.caustic_classes or plan.shown_directly)
 
 
 def pass_radius(first: float, index: int, estimate: Estimate, scene_radius: float) -> float:

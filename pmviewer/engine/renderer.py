@@ -27,7 +27,7 @@ from pmviewer.engine.memory import check_memory
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.radius import first_radius
+from pmviewer.engine.radius import first_radius, radii_of_pixels
 from pmviewer.engine.shadows import ShadowMap, shadows_of
 from pmviewer.engine.tally import Tally
 from pmviewer.maps.importance import NO_IMPORTANCE
@@ -43,6 +43,7 @@ from pmviewer.render.gather_points import POINT_COLUMNS, gather_points
 from pmviewer.render.lookup import NO_SITES
 from pmviewer.render.outline import outline_pixels
 from pmviewer.render.path import path_pass
+from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, RADIUS, first_radii, shrink
 from pmviewer.render.record import (
     N_COUNTS,
     eye_record,
@@ -157,6 +158,7 @@ class Renderer:
             self.light.photons,
             self.light.stored,
             self.scene.flat.radius,
+            film.radii,
         )
         planes = diagnostic_planes(wanted, looked, self.plan, self.pool)
         paths = self._paths(wanted.paths) if wanted.paths else None
@@ -270,7 +272,8 @@ class Renderer:
     def _pass(self, film: Film, camera: CameraPose, index: int, N: int) -> None:
         eye = eye_record(camera, self.settings, index)
         self.importance.run(0 if self.settings.photons.renew == "once" else index)
-        maps = self.light.run(eye[0], index, N, self.first_radius, self.importance)
+        widest = self._radii_of_pixels(film, index)
+        maps = self.light.run(eye[0], index, N, self.first_radius, self.importance, widest)
         self._set_gather(eye[0])
         if self.plan.shadows:
             self._shadows = self.tally.timed(self.pool, "shadow photons", lambda: self._shadow_map(index))
@@ -278,6 +281,18 @@ class Renderer:
             self.tally.timed(self.pool, "irradiance cache", lambda: self._fill_cache(eye, maps, camera, index))
         self.tally.timed(self.pool, "eye pass", lambda: self._eye_pass(eye, maps, film))
         self._last = eye, maps
+
+    def _radii_of_pixels(self, film: Film, index: int) -> dict[str, float]:
+        """Gives the pixels the radii of pass `index`; returns the largest by map. None without the rule."""
+        if not radii_of_pixels(self.settings, self.plan):
+            return {}
+        estimate = self.settings.estimate
+        if film.radii is None:
+            film.radii = first_radii(len(film.sums), estimate.caustic_radius * self.first_radius, self.first_radius)
+        else:
+            shrink(film.radii, estimate.alpha, estimate.floor * self.scene.flat.radius)
+        caustic, global_ = (float(film.radii[:, RADIUS + which].max()) for which in (OF_CAUSTIC, OF_GLOBAL))
+        return {"caustic": caustic, "global": global_ if self.plan.shown_directly else 0.0}
 
     def _shadow_map(self, index: int) -> ShadowMap:
         """The shadow photons of pass `index`; those of the first where one photon map serves all passes."""
@@ -351,7 +366,7 @@ class Renderer:
                 if plan.path:
                     path_pass(scene, eye, film.sums, counts, first, last)
                 else:
-                    eye_pass(scene, eye, *records, outline, film.sums, counts, first, last)
+                    eye_pass(scene, eye, *records, outline, film.radii, film.sums, counts, first, last)
                 return counts
 
             return run

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.errors import SettingError
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
 from pmviewer.maps.convergence import other_light
 from pmviewer.maps.record import in_classes
@@ -35,6 +36,7 @@ from pmviewer.photons.trace import (
     empty_ledger,
     trace_photons,
 )
+from pmviewer.resources import available_memory
 from pmviewer.scene.flatten import FlatScene
 from pmviewer.settings import Photons
 
@@ -203,7 +205,8 @@ def trace_pass(
         many = last, must
         made = _deposited(deposition, batches, many, first_index, run, caustic_unit, global_unit, N, energy, fates)
         return made if guided is None else _with_tests(made, guided)
-    results = run([task for _, task in batches])
+    most = settings.max_bounces * (MOST_COPIES if settings.roulette == "equal" else 1)
+    results = _bounded([task for _, task in batches], BATCH * most, run)
     counts = sum((r[2] for r in results), np.zeros(N_COUNTS, np.int64))
     made = PhotonMaps(
         caustic=_join([part for r in results for part in r[0]]),
@@ -440,6 +443,28 @@ def _trace_batch(
         caustic_parts.append(caustic_out[: counts[C_CAUSTIC]].copy())
         total += counts
     return caustic_parts, global_parts, total, ledger, normal_parts, caustic_normal_parts
+
+
+PROBED = 16
+"""Batches that tell how much memory all of them need, where they might need more than there is."""
+BYTES_PER_STORED = 60
+"""A photon as it arrived, joined to the others, and in its map."""
+
+
+def _bounded(tasks: list[Callable[[], _Batch]], most: int, run: Runner) -> list[_Batch]:
+    """The batches, of at most so many photons each. Raises SettingError before they fill the memory."""
+    available = available_memory()
+    if available is None or len(tasks) <= PROBED or len(tasks) * most * BYTES_PER_STORED < available:
+        return run(tasks)
+    first = run(tasks[:PROBED])
+    stored = sum(len(part) for batch in first for part in (*batch[0], *batch[1])) * len(tasks) / PROBED
+    if stored * BYTES_PER_STORED > available:
+        need, free = stored * BYTES_PER_STORED / 1e9, available / 1e9
+        raise SettingError(
+            f"A pass stores about {stored:,.0f} photons here, which need {need:.1f} GB of memory, and {free:.1f} GB "
+            "are free. Lower photons.N, photons.q or photons.max_bounces."
+        )
+    return first + run(tasks[PROBED:])
 
 
 def _join(parts: list[Float]) -> Float:

@@ -8,7 +8,6 @@ maps of the latest pass. Nothing is changed by it: not the film, and no radiance
 from __future__ import annotations
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.light import sample_one_light
@@ -28,15 +27,13 @@ from pmviewer.kernels.scattering import (
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.kernels.vector import dot, largest
-from pmviewer.maps.differential import reach
-from pmviewer.maps.estimate import irradiance_knn, irradiance_radius
-from pmviewer.maps.neighbours import BATCH_WORDS, FOUND_WORDS, SQUARED_WORDS, next_batch, search
 from pmviewer.maps.radiance import nearest_site, site_place
 from pmviewer.maps.record import encode_direction
 from pmviewer.maps.stored import ALL_CLASSES
 from pmviewer.render.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near, chosen_light
 from pmviewer.render.eye import BSDF_SET, PIXEL_SET, camera_ray, pixel_seed
-from pmviewer.render.lookup import irradiance
+from pmviewer.render.lookup import irradiance, looked_up
+from pmviewer.render.pixel_radius import own_radius
 from pmviewer.render.shadow import UNKNOWN, known_visibility
 
 FEWEST_SAMPLES = 8
@@ -98,98 +95,21 @@ def seen_places(scenes, eyes, points, normals, found, first, last):
         normals[pixel] = encode_direction(ng[0], ng[1], ng[2]) if prim >= 0 else _u4(0)
 
 
-def looked_up(photons, eye, radius, p, n, class_mask):
-    """Radius of a look-up as `pmviewer.render.lookup.irradiance` makes it, and photons in it.
-
-    Of a convex hull, the disc in which its photons were searched. With differential checking the mean of the folds'
-    discs (of their areas), and the photons summed.
-    """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(looked_up)
-def _looked_up(photons, eye, radius, p, n, class_mask):
-    if "hull" in photons.fields:
-
-        def searched(photons, eye, radius, p, n, class_mask):
-            scratch = (stack_i4(FOUND_WORDS), stack_i4(SQUARED_WORDS), stack_i4(BATCH_WORDS))
-            found, r2, rim = search(photons, eye, radius, p, n, class_mask, scratch)
-            run, at, total = _i8(0), _i8(0), _i8(0)
-            while True:
-                run, at, some = next_batch(photons, found, run, at, scratch)
-                if some == 0:
-                    break
-                total += some
-            if rim >= 0:
-                total += 1
-            return np.sqrt(r2), _f4(total)
-
-        return searched
-
-    if "differential" in photons.fields:
-
-        def checked(photons, eye, radius, p, n, class_mask):
-            return reach(photons, eye, radius, p, n, class_mask)
-
-        return checked
-
-    if "planes" in photons.fields:
-
-        def nearest(photons, eye, radius, p, n, class_mask):
-            _, _, _, count, r = irradiance_knn(
-                photons,
-                p[0],
-                p[1],
-                p[2],
-                n[0],
-                n[1],
-                n[2],
-                eye.k,
-                radius,
-                eye.flatness,
-                class_mask,
-                eye.filter,
-                eye.cone_k,
-                eye.rim,
-                eye.share,
-            )
-            return r, _f4(count)
-
-        return nearest
-
-    def within(photons, eye, radius, p, n, class_mask):
-        _, _, _, count = irradiance_radius(
-            photons,
-            p[0],
-            p[1],
-            p[2],
-            n[0],
-            n[1],
-            n[2],
-            radius,
-            eye.flatness,
-            class_mask,
-            eye.filter,
-            eye.cone_k,
-        )
-        return min(radius, photons.radius), _f4(count)
-
-    return within
-
-
 @kernel
-def lookup_view(scenes, eyes, maps, radius, class_mask, out, first, last):
+def lookup_view(scenes, eyes, maps, radii, which, radius, class_mask, out, first, last):
     """Radius (scene units) and photons of the look-up in pixels first … last−1; −1 where nothing is looked up.
 
-    scenes: SCENE_DTYPE (1,); eyes: EYE_DTYPE (1,); maps: record (1,) of a grid or kd-tree; radius: float32, of the
-    pass or the largest; class_mask: int32; out: float32 (pixels, 2).
+    scenes: SCENE_DTYPE (1,); eyes: EYE_DTYPE (1,); maps: record (1,) of a grid or kd-tree; radii and which: as
+    for `pmviewer.render.pixel_radius.own_radius`; radius: float32, of the pass or the largest; class_mask: int32; out:
+    float32 (pixels, 2).
     """
     scene, eye, photons = scenes[0], eyes[0], maps[0]
     for pixel in range(first, last):
         prim, _, _, p, ng, _, _, _ = stored_hit(scene, eye, pixel)
         out[pixel, 0] = out[pixel, 1] = _NONE
         if prim >= 0:
-            out[pixel, 0], out[pixel, 1] = looked_up(photons, eye, radius, p, ng, class_mask)
+            r = own_radius(radii, which, pixel, radius)
+            out[pixel, 0], out[pixel, 1] = looked_up(photons, eye, r, p, ng, class_mask)
 
 
 @device

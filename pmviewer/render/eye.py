@@ -33,10 +33,12 @@ from pmviewer.kernels.scattering import (
 from pmviewer.kernels.scene import light_of, material_of
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.kernels.vector import add, dot, is_good, largest, mul, normalize, scale
+from pmviewer.maps.record import CAUSTIC as CAUSTIC_CLASS
 from pmviewer.render.cached import cached, surface_rays
 from pmviewer.render.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near
 from pmviewer.render.direct import BLACK, found_light, light_samples
 from pmviewer.render.guide import AIM_WORDS, aim
+from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius
 from pmviewer.render.record import C_DROPPED, C_RAYS, C_SAVED, C_SHADOW_RAYS
 from pmviewer.render.reflect import reflected, unfound
 
@@ -44,6 +46,7 @@ _f4 = np.float32
 _f8 = np.float64
 _u4 = np.uint32
 _INF = _f4(np.inf)
+_CAUSTICS = np.int32(1 << CAUSTIC_CLASS)
 
 EMISSION, DIRECT, SPECULAR, CAUSTIC, INDIRECT = 0, 3, 6, 9, 12
 ALBEDO, NORMAL, DEPTH = 15, 18, 21
@@ -129,6 +132,7 @@ def eye_pass(
     guide_maps,
     corners,
     outline,
+    radii,
     film,
     counts,
     first,
@@ -142,6 +146,7 @@ def eye_pass(
     shadow_maps: of the shadow photons, or NO_SHADOWS;
     guide_maps: record (1,) of the photons that guide gather rays, or NO_GUIDES; corners: CORNERS or NO_CORNERS;
     outline: uint8 (pixels,), 1 where emission gets camera rays of its own (`pmviewer.render.outline`), or (0,);
+    radii: float32 (pixels, COLUMNS), look-up radii of the pixels (`pmviewer.render.pixel_radius`), or None;
     film: float64 (pixels, CHANNELS), see `pmviewer.render.planes`; counts: int64 (N_COUNTS,).
     """
     scene, eye = scenes[0], eyes[0]
@@ -227,7 +232,9 @@ def eye_pass(
                     counts[C_SAVED] += saved
                     deposit(film, counts, pixel, DIRECT if whole else SPECULAR, mul(beta, L))
                 if eye.caustic_mask != 0:
-                    L = reflected(caustic_map, eye, eye.caustic_radius, p, ng, b, wo, eye.caustic_mask)
+                    r = own_radius(radii, OF_CAUSTIC, pixel, eye.caustic_radius)
+                    L = reflected(caustic_map, eye, r, p, ng, b, wo, eye.caustic_mask)
+                    count_found(radii, OF_CAUSTIC, pixel, caustic_map, eye, r, p, ng, eye.caustic_mask)
                     deposit(film, counts, pixel, CAUSTIC if whole else SPECULAR, mul(beta, L))
                 for k in range(3):  # a loop, so that the look-up is compiled once
                     mask, term = eye.global_mask, INDIRECT
@@ -236,7 +243,9 @@ def eye_pass(
                     elif k == 2:
                         mask, term = eye.global_caustics, CAUSTIC
                     if mask != 0:
-                        L = reflected(global_map, eye, eye.global_radius, p, ng, b, wo, mask)
+                        r = own_radius(radii, OF_GLOBAL, pixel, eye.global_radius)
+                        L = reflected(global_map, eye, r, p, ng, b, wo, mask)
+                        count_found(radii, OF_GLOBAL, pixel, global_map, eye, r, p, ng, mask)
                         deposit(film, counts, pixel, term if whole else SPECULAR, mul(beta, L))
                 n = gather
                 if eye.direct != 0:
@@ -282,7 +291,10 @@ def eye_pass(
                 break
             u_lobe, bu, bv, u_end = chain_numbers(scene, eye.sequence, seed, index, CHAIN_SET + depth)
             if not is_delta(b) and eye.unfound != 0:
-                L = unfound(caustic_map, eye, eye.caustic_radius, p, ng, b, wo)
+                r = own_radius(radii, OF_CAUSTIC, pixel, eye.caustic_radius)
+                L = unfound(caustic_map, eye, r, p, ng, b, wo)
+                if b.groups & STORED == 0:
+                    count_found(radii, OF_CAUSTIC, pixel, caustic_map, eye, r, p, ng, _CAUSTICS)
                 deposit(film, counts, pixel, SPECULAR, mul(beta, L))
             if not is_delta(b) and eye.followed_direct != 0:
                 choice = choose_by_power(lights, eye.light_samples)

@@ -19,11 +19,13 @@ def resolve(sums, passes, out, first, last):
 
 
 class Film:
-    """Sums of `passes` samples per pixel: `sums` (height·width, CHANNELS) float64."""
+    """Sums of `passes` samples per pixel: `sums` (height·width, CHANNELS) float64; `radii` of the pixels' look-ups in
+    the latest pass (`pmviewer.render.pixel_radius`), None where all have that of the pass."""
 
     def __init__(self, width: int, height: int) -> None:
         self.width, self.height = width, height
         self.sums: NDArray[np.float64] = np.zeros((width * height, CHANNELS), np.float64)
+        self.radii: NDArray[np.float32] | None = None
         self.passes = 0
 
     def planes(self) -> NDArray[np.float32]:

@@ -9,11 +9,16 @@ from __future__ import annotations
 import numpy as np
 from numba.extending import overload
 
-from pmviewer.maps.differential import checked_irradiance
+from pmviewer.kernels.memory import stack_i4
+from pmviewer.maps.differential import checked_irradiance, reach
 from pmviewer.maps.estimate import irradiance_knn, irradiance_radius
 from pmviewer.maps.hull import hull_irradiance
+from pmviewer.maps.neighbours import BATCH_WORDS, FOUND_WORDS, SQUARED_WORDS, next_batch, search
 from pmviewer.maps.radiance import UNKNOWN, nearest_site, site_irradiance, site_place, site_slot, store_irradiance
 from pmviewer.maps.stored import ALL_CLASSES
+
+_f4 = np.float32
+_i8 = np.int64
 
 
 def irradiance(photons, eye, radius, p, n, class_mask):
@@ -81,6 +86,85 @@ def _irradiance(photons, eye, radius, p, n, class_mask):
             eye.cone_k,
         )
         return r, g, b
+
+    return within
+
+
+def looked_up(photons, eye, radius, p, n, class_mask):
+    """Radius of a look-up as `irradiance` makes it, and photons in it.
+
+    Of a convex hull, the disc in which its photons were searched. With differential checking the mean of the folds'
+    discs (of their areas), and the photons summed.
+    """
+    raise NotImplementedError("only for kernels")
+
+
+@overload(looked_up)
+def _looked_up(photons, eye, radius, p, n, class_mask):
+    if "hull" in photons.fields:
+
+        def searched(photons, eye, radius, p, n, class_mask):
+            scratch = (stack_i4(FOUND_WORDS), stack_i4(SQUARED_WORDS), stack_i4(BATCH_WORDS))
+            found, r2, rim = search(photons, eye, radius, p, n, class_mask, scratch)
+            run, at, total = _i8(0), _i8(0), _i8(0)
+            while True:
+                run, at, some = next_batch(photons, found, run, at, scratch)
+                if some == 0:
+                    break
+                total += some
+            if rim >= 0:
+                total += 1
+            return np.sqrt(r2), _f4(total)
+
+        return searched
+
+    if "differential" in photons.fields:
+
+        def checked(photons, eye, radius, p, n, class_mask):
+            return reach(photons, eye, radius, p, n, class_mask)
+
+        return checked
+
+    if "planes" in photons.fields:
+
+        def nearest(photons, eye, radius, p, n, class_mask):
+            _, _, _, count, r = irradiance_knn(
+                photons,
+                p[0],
+                p[1],
+                p[2],
+                n[0],
+                n[1],
+                n[2],
+                eye.k,
+                radius,
+                eye.flatness,
+                class_mask,
+                eye.filter,
+                eye.cone_k,
+                eye.rim,
+                eye.share,
+            )
+            return r, _f4(count)
+
+        return nearest
+
+    def within(photons, eye, radius, p, n, class_mask):
+        _, _, _, count = irradiance_radius(
+            photons,
+            p[0],
+            p[1],
+            p[2],
+            n[0],
+            n[1],
+            n[2],
+            radius,
+            eye.flatness,
+            class_mask,
+            eye.filter,
+            eye.cone_k,
+        )
+        return min(radius, photons.radius), _f4(count)
 
     return within
 

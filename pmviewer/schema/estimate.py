@@ -29,6 +29,14 @@ class Estimate(Group):
         ge=0.05,
         le=2.0,
     )
+    radius_rule: Literal["pass", "pixel"] = setting(
+        "pass",
+        "One radius for all look-ups of a pass, or each pixel's own at the surfaces that it sees, shrunk by the "
+        "photons found there (Hachisuka and others 2008): not at all in the dark. Gather rays keep that of the pass.",
+        stage="image",
+        scale="choice",
+        title="radius by",
+    )
     alpha: float = setting(
         2.0 / 3.0,
         "How fast look-ups shrink from pass to pass, r²ᵢ₊₁ = r²ᵢ·(i+α)/(i+1); with look-up 'nearest' it is k that "
@@ -128,8 +136,9 @@ class Estimate(Group):
     )
     differential: bool = setting(
         False,
-        "Differential checking: a disc that would get darker and darker (or brighter) as it grows stops growing. Edges "
-        "of surfaces and caustics stay sharp and get noisier.",
+        "Differential checking: a disc that would get darker and darker (or brighter) as it grows stops growing, and "
+        "one over an edge has the area that its photons span. Edges of surfaces aren't dark; those of caustics stay "
+        "sharp and get noisier.",
         stage="image",
         scale="switch",
         title="differential checking",

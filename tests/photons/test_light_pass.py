@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.pool import WorkPool
+from pmviewer.errors import SettingError
 from pmviewer.maps.record import BYTES_PER_PHOTON, unpack
 from pmviewer.photons import lightpass
 from pmviewer.photons.lightpass import trace_pass, trajectories
@@ -246,3 +247,25 @@ def test_one_sided_surfaces_hold_no_photons_on_their_back():
     above_panel = (np.abs(p[:, 1] - 0.9) < 1e-3) & (np.abs(p[:, :2:2]).max(1) < 0.39) & (np.abs(p[:, 2]) < 0.39)
     assert above_panel.sum() > 0
     assert np.all(wi[above_panel, 1] < 0)
+
+
+def test_photons_that_do_not_fit_are_refused_before_they_are_traced(monkeypatch):
+    """Albedo 1 stores 64 photons a trajectory, 60 bytes each by the time they are in their map: 400 000 trajectories
+    need 1.5 GB."""
+    asked = []
+
+    def counted(tasks):
+        asked.append(len(tasks))
+        return serially(tasks)
+
+    monkeypatch.setattr(lightpass, "PROBED", 1)
+    monkeypatch.setattr(lightpass, "BATCH", 1000)
+    monkeypatch.setattr(lightpass, "available_memory", lambda: 10**9)
+    with pytest.raises(SettingError, match=r"about 25,600,000 photons .* need 1\.5 GB .* 1\.0 GB are free"):
+        trace(diffuse_box(albedo=1.0), N=400_000, run=counted)
+    assert asked == [1]
+    monkeypatch.setattr(lightpass, "available_memory", lambda: 10**7)
+    part = trace(diffuse_box(albedo=0.2), N=20_000, run=counted)
+    assert asked[1:] == [1, 19]
+    monkeypatch.setattr(lightpass, "available_memory", lambda: None)
+    assert same(trace(diffuse_box(albedo=0.2), N=20_000), part)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pmviewer.engine.energy import Energy
 from pmviewer.engine.frame import Frame, Message, PhotonCloud, Statistics, Status
 from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.planes import CHANNELS, PLANES
@@ -139,6 +140,7 @@ class FakeSession:
             map_bytes=24 * sum(stored.values()),
             bytes_per_photon=25.6,
             dropped={"film": 0},
+            energy=Energy(serial, (12.0, 9.0, 2.5, 0.5, 0.0), (0.0, 0.06, 0.06, 0.01, 0.0)),
             skipped=(("volume photons", "no participating media in the scene"),),
         )
         self.frame = Frame(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import threading
 
 import numpy as np
 import pytest
 
+from pmviewer.engine.energy import Energy
 from pmviewer.errors import OutputError
 from pmviewer.maps.record import unpack
 from pmviewer.photons import deposition as photons
@@ -19,6 +21,7 @@ from pmviewer.viewer.jobs import Jobs
 from pmviewer.viewer.overlays import FATES, brightest_channel, even_thinning
 from pmviewer.viewer.recent import LENGTH, RecentFiles
 from pmviewer.viewer.session_link import SessionLink
+from pmviewer.viewer.statistics_panel import energy_rows
 from pmviewer.viewer.theme import drawable
 from pmviewer.viewer.viewport_hud import projected, tick_text
 from tests.scenes_for_tests import diffuse_box
@@ -193,3 +196,15 @@ def test_points_are_projected_where_the_camera_sees_them():
     assert projected(camera, np.asarray(camera.origin) - d) is None
     assert projected(camera, np.asarray(camera.origin) + corner - 5 * right) is None
     assert projected(camera, np.full(3, np.nan)) is None
+
+
+def test_energy_rows_are_shares_with_errors():
+    rows = dict(energy_rows(Energy(4, (12.0, 9.0, 2.4, 0.6, 0.0), (0.0, 0.06, 0.06, 0.012, 0.0), uncounted=3.0)))
+    assert rows["Emitted"] == "12 W"
+    assert rows["Absorbed"] == "75.00 ± 0.5 %"
+    assert rows["Escaped from the scene"] == "20.00 ± 0.5 %"
+    assert rows["On its way after the last scattering"] == "5.00 ± 0.1 %"
+    assert rows["Dropped, not finite"] == "0.00 %"
+    assert rows["With test photons, not in these books"] == "3 W"
+    one = dict(energy_rows(Energy(1, (12.0, 12.0, 0.0, 0.0, 0.0), (math.nan,) * 5)))
+    assert one["Absorbed"] == "100.00 %"

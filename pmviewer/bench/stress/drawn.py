@@ -232,7 +232,7 @@ def random_spec(rng: np.random.Generator) -> Spec:
 def drawn() -> list[Case]:
     """For each structure settings and scenes at random."""
     return [
-        Case("drawn", f"{name}, 12 scenes", "1 and 3 threads, ledger", partial(_drawn, name=name, count=12))
+        Case("drawn", f"{name}, 60 scenes", "1 and 3 threads, ledger", partial(_drawn, name=name, count=60))
         for name in STRUCTURES
     ]
 

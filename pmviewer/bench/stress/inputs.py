@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pmviewer.bench.stress.lab import Case, Lab, Outcome
+from pmviewer.errors import SceneError
 from pmviewer.output.exr import write_exr
 from pmviewer.scene.load import load_scene
 
@@ -107,5 +108,8 @@ def _file(lab: Lab, body: str) -> Outcome:
             pixels = np.full((4, 8, 3), 0.5, np.float32)
             pixels[1, 2], pixels[2, 5], pixels[0, 0], pixels[3, 3] = np.nan, np.inf, -3.0, -np.inf
             write_exr(place / "picture.exr", {"": pixels})
-        scene = load_scene(place / "scene.xml")
+        try:
+            scene = load_scene(place / "scene.xml")
+        except SceneError as error:  # without the name of a folder that is gone
+            raise SceneError(error.what, "scene.xml", error.line, error.hint) from None
         return lab.measure(scene, None, seeds=2, photons__N=2000)

@@ -23,12 +23,13 @@ from pmviewer.errors import PmviewerError
 from pmviewer.scene.description import Scene
 from pmviewer.settings import Settings, with_values
 
-SIGNIFICANCE = 1e-6
-"""Below this a mean is not the expected one. Of some two hundred means chance makes one fail in five thousand runs."""
+SIGNIFICANCE = 1e-5
+"""Below this a mean is not the expected one. Of some hundred and fifty means chance makes one fail in 700 seeds."""
 ROUNDING = 2e-4
 """Relative difference of means that float32 and 16-bit powers explain where nothing varies."""
-SEEDS = 16
-SMALL = {"photons.N": 4000, "photons.sequence": "independent", "camera.width": 16, "camera.height": 16}
+SEEDS = 48
+"""Of which means and standard errors are made."""
+SMALL = {"photons.N": 8000, "photons.sequence": "independent", "camera.width": 16, "camera.height": 16}
 """Settings of all cases unless they change them: independent photons have standard errors."""
 
 
@@ -78,11 +79,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """A case that has been run: seconds, peak memory in MiB above what was held before."""
+    """A case that has been run: seconds by the clock and of all processors, peak memory in MiB above what was held
+    before."""
 
     case: Case
     outcome: Outcome
     seconds: float
+    cpu: float
     memory: float
 
     @property
@@ -104,9 +107,11 @@ class Row:
 
 @dataclass
 class Lab:
-    """Renders scenes on its own threads. `said` collects the sentences of the case that runs."""
+    """Renders scenes on its own threads, cases that don't say otherwise from so many seeds. `said` collects the
+    sentences of the case that runs."""
 
     pool: WorkPool
+    seeds: int = SEEDS
     said: list[str] = field(default_factory=list)
 
     def open(self, scene: Scene | OpenScene) -> OpenScene:
@@ -135,7 +140,7 @@ class Lab:
     def means(
         self,
         scene: Scene | OpenScene,
-        seeds: int = SEEDS,
+        seeds: int | None = None,
         passes: int = 1,
         terms: Sequence[str] = ("beauty",),
         where: NDArray[np.bool_] | None = None,
@@ -144,7 +149,7 @@ class Lab:
         """Mean over pixels (those of `where`) and channels of the sum of the terms, one for each seed; and whether
         every plane is finite."""
         opened, found, finite = self.open(scene), [], True
-        for seed in range(1, seeds + 1):
+        for seed in range(1, (seeds or self.seeds) + 1):
             frame = self.frame(self.renderer(opened, passes, render__seed=seed, **values))
             finite = finite and bool(np.isfinite(frame.planes).all())
             image = np.sum([frame.image(term).astype(np.float64) for term in terms], axis=0)
@@ -160,7 +165,7 @@ class Lab:
         error = float(found.std(ddof=1) / np.sqrt(len(found))) if len(found) > 1 else 0.0
         return Outcome(float(found.mean()), error, expected, samples=len(found), finite=finite, bias=bias)
 
-    def compare(self, scene: Scene | OpenScene, seeds: int = SEEDS, bias: str = "", **values: Any) -> Outcome:
+    def compare(self, scene: Scene | OpenScene, seeds: int | None = None, bias: str = "", **values: Any) -> Outcome:
         """The photon method that `values` describe against the path tracer with four samples as many a pixel."""
         opened = self.open(scene)
         one = self.measure(opened, None, bias, seeds=seeds, **values)
@@ -177,7 +182,7 @@ def run_case(lab: Lab, case: Case) -> Row:
     """The case with its time and memory. Whatever it raises is its outcome."""
     lab.said.clear()
     before = _start_peak()
-    start = time.perf_counter()
+    start, cpu = time.perf_counter(), time.process_time()
     try:
         outcome = case.run(lab)
     except PmviewerError as error:
@@ -186,9 +191,9 @@ def run_case(lab: Lab, case: Case) -> Row:
         outcome = Outcome(problem="out of memory")
     except Exception as error:
         outcome = Outcome(problem=f"{type(error).__name__}: {error}"[:120])
-    seconds = time.perf_counter() - start
+    seconds, cpu = time.perf_counter() - start, time.process_time() - cpu
     outcome = replace(outcome, said=tuple(dict.fromkeys((*outcome.said, *lab.said))))
-    return Row(case, outcome, seconds, max(_peak() - before, 0.0))
+    return Row(case, outcome, seconds, cpu, max(_peak() - before, 0.0))
 
 
 def _start_peak() -> float:

@@ -21,7 +21,7 @@ BOUND = 3**0.5
 def _furnace(lab: Lab, size: float, at: float, **values: Any) -> Outcome:
     place = (at * size, -at * size, 0.5 * at * size)
     scene = furnace(size, place, extra=(ball(1, size, place),), materials=(GLASS,))
-    return lab.measure(scene, 1.0, **values)
+    return lab.measure(scene, 1.0, **{"estimate__radius": 0.03, **values})
 
 
 def scales() -> list[Case]:
@@ -70,6 +70,7 @@ def _radius(lab: Lab, radius: float) -> Outcome:
         furnace(),
         0.25 * kept(r),
         bias,
+        seeds=8 if radius < 1e-4 else None,
         terms=("indirect",),
         estimate__radius=radius,
         estimate__floor=1e-7,
@@ -100,9 +101,8 @@ def counts() -> list[Case]:
     for N, seeds in ((1, 400), (10, 100), (100, 32), (100_000, 8), (2_000_000, 3), (20_000_000, 2)):
         size = 16 if N < 100_000 else 8
         values: dict[str, Any] = {"photons__N": N, "seeds": seeds, "camera__width": size, "camera__height": size}
-        cases.append(
-            Case("N", f"{N:,} photons", FURNACE, partial(_shown, expected=expected, bias="", **shown, **values))
-        )
+        run = partial(_shown, expected=expected, bias="", **shown, **values)
+        cases.append(Case("N", f"{N:,} photons", FURNACE, run, long=N > 1_000_000))
     for k in (1, 2, 50, 1000):
         for N in (300, 20_000):
             knn = {"estimate__lookup": "nearest", "estimate__k": k, "photons__N": N, "estimate__max_radius": 0.1}
@@ -156,7 +156,7 @@ def meshes() -> list[Case]:
         Case("meshes", "floor of 100,000 slivers", "same room of squares", partial(_floor, kind="slivers")),
         Case("meshes", "floor with coincident vertices", "same room of squares", partial(_floor, kind="coincident")),
         Case("meshes", "every wall twice", "same room of squares", partial(_floor, kind="twice")),
-        Case("meshes", "floor of 5,000,000 triangles", "same room of squares", partial(_floor, kind="many")),
+        Case("meshes", "floor of 5,000,000 triangles", "same room of squares", partial(_floor, kind="many"), long=True),
         Case("meshes", "all triangles degenerate", "", partial(_floor, kind="degenerate"), nonsense=True),
     ]
 
@@ -208,7 +208,7 @@ def pictures() -> list[Case]:
     return [
         Case("picture", "1 × 1", FURNACE, partial(_picture, width=1, height=1, seeds=64)),
         Case("picture", "1 × 16384", FURNACE, partial(_picture, width=1, height=16384, seeds=2)),
-        Case("picture", "8K: 7680 × 4320", "furnace: direct and emission 3/4", _eight_k),
+        Case("picture", "8K: 7680 × 4320", "furnace: direct and emission 3/4", _eight_k, long=True),
         Case("picture", "16384 × 16384", "", partial(_picture, width=16384, height=16384, seeds=2), nonsense=True),
         Case("picture", "170° wide", FURNACE, partial(_picture, width=16, height=16, seeds=8, camera__fov=170.0)),
         Case("picture", "1° wide", FURNACE, partial(_picture, width=16, height=16, seeds=8, camera__fov=1.0)),

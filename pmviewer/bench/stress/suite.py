@@ -62,6 +62,7 @@ def cells(row: Row) -> list[Cell]:
         measured,
         row.verdict,
         row.seconds,
+        row.cpu,
         round(row.memory),
     ]
 
@@ -73,11 +74,13 @@ def table(rows: list[Row]) -> BenchResult:
     notes += [f"{r.case.group}, {r.case.name}: says “{said}”" for r in rows for said in r.outcome.said[:1]]
     notes += [f"{r.case.group}, {r.case.name}: WRONG, {r.wrong}" for r in wrong]
     total = sum(row.seconds for row in rows)
+    cpu = sum(row.cpu for row in rows)
+    notes.append(f"{total:.0f} s by the clock, {cpu:.0f} s of processor time, on two threads")
     largest = max(rows, key=lambda row: row.memory)
     targets = [
         Target("stress", len(wrong), 0, "cases wrong", False, f"of {len(rows)} cases"),
         Target("stress time", total, LONGEST, "s", False, "all cases on two threads"),
         Target("stress memory", largest.memory / 1024, 16.0, "GiB", False, f"most: {largest.case.name}"),
     ]
-    columns = ["group", "case", "truth", "expected", "measured", "verdict", "s", "MiB"]
+    columns = ["group", "case", "truth", "expected", "measured", "verdict", "s", "CPU s", "MiB"]
     return BenchResult("Stress", columns, [cells(row) for row in rows], targets, notes)

@@ -1,5 +1,7 @@
-"""k-nearest look-ups converge as look-ups of a fixed radius do (E6): on a floor under a lamp, whose light is known, and
-in the box. Figures with -s."""
+"""Look-ups of the k nearest converge as those of a fixed radius do, and radii by pixel as radii by pass (E6).
+
+On a floor under a lamp, whose light is known, and in the box. Figures with -s.
+"""
 
 import numpy as np
 import pytest
@@ -81,6 +83,13 @@ def floor_errors(pool, **estimate):
 def test_every_estimate_of_the_nearest_converges(pool, estimate):
     """What a curved field adds falls as r⁴: with the default α, with the passes to the power of −2/3."""
     found, slope = floor_errors(pool, **NEAREST | estimate)
+    assert slope == pytest.approx(-2 / 3, abs=0.1)
+    assert found[-1].relmse_all < 6e-4
+
+
+@pytest.mark.parametrize("rule", ["pass", "pixel"])
+def test_radii_converge_by_pass_and_by_pixel(pool, rule):
+    found, slope = floor_errors(pool, radius=0.08, radius_rule=rule)
     assert slope == pytest.approx(-2 / 3, abs=0.1)
     assert found[-1].relmse_all < 6e-4
 
