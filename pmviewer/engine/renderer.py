@@ -236,7 +236,7 @@ class Renderer:
             importons=self.importance.latest.traced if self.importance.latest else 0,
             warnings=(
                 *self._warnings(),
-                *caveats(self.settings, self.tally, energy, self.scene.flat.radius, len(film.sums)),
+                *caveats(self.settings, self.tally, energy, self.scene.flat.radius, len(film.sums), film.passes),
             ),
             deposited=dict(self.tally.deposited),
         )
