@@ -241,8 +241,8 @@ def _estimate(path: str, settings: Settings, plan: Plan) -> str | None:
     hull = estimate.area == "convex hull"
     if hull and path in _DISC_ONLY:
         return "The convex hull weighs all photons alike and has no dark edges to check for."
-    if path == "estimate.boundary" and not hull:
-        return "Only with the area 'convex hull'."
+    if path == "estimate.boundary" and not (hull or estimate.differential):
+        return "Only with the area 'convex hull' or differential checking."
     if path == "estimate.cone_k" and estimate.filter != "cone":
         return "Only with the cone filter."
     if path in ("estimate.alpha", "estimate.floor") and settings.photons.renew == "once":

@@ -15,8 +15,10 @@ hash of their position, and the disc in which a fold is summed is decided by all
 photons the estimate then is one of a fixed radius, exact in the mean under even light whatever the rule. Where nothing
 stops them, the folds add up to the plain disc estimate.
 
-At the edge itself half of every disc is off the surface, and no radius helps: a rim as wide as the disc of FEWEST
-photons stays dark, where the convex hull (`pmviewer.maps.hull`) has none.
+At the edge itself half of every disc is off the surface, and no radius helps. So where there is a trend it is first
+asked whether the photons fill their convex hull evenly (`pmviewer.maps.evenness`). If so the place is at an edge and
+the light is even: what the photons span is the right area, and the estimate that of `pmviewer.maps.hull`, of all
+photons.
 
 Counts are compared, not powers: roulette keeps powers equal, and counts are colour-blind only where lights of the same
 luminance meet.
@@ -32,7 +34,9 @@ from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import bits_of_float, stack_get_f4, stack_get_i4, stack_i4, stack_put_f4, stack_put_i4
 from pmviewer.kernels.random import hash3
 from pmviewer.kernels.vector import basis, dot, scale, sub
+from pmviewer.maps.evenness import evenly_filled_hull
 from pmviewer.maps.filters import filter_disc_mean, filter_weight
+from pmviewer.maps.hull import HULL_WORDS, sum_inside
 from pmviewer.maps.neighbours import (
     BATCH_WORDS,
     FOUND_WORDS,
@@ -131,9 +135,9 @@ def _trusted(counts, fold):
 
 
 @device
-def _discs(photons, eye, radius, p, n, class_mask, scratch, areas):
+def _discs(photons, eye, radius, p, n, class_mask, scratch, areas, hull):
     """Search, and decide the disc of each fold: `areas` (FOLDS words) receives their areas relative to the largest.
-    Returns what `search` does."""
+    Returns what `search` does, and corners and area of the photons' hull where that explains the trends."""
     counts, moments = stack_i4(_COUNT_WORDS), stack_i4(_MOMENT_WORDS)
     for j in range(_MOMENT_WORDS):
         stack_put_f4(moments, j, _f4(0.0))
@@ -159,20 +163,29 @@ def _discs(photons, eye, radius, p, n, class_mask, scratch, areas):
             ring = LEVELS * fold + level
             stack_put_i4(counts, ring, stack_get_i4(counts, ring) + _i4(1))
             stack_put_i4(counts, _SUM + level, stack_get_i4(counts, _SUM + level) + _i4(1))
+    trends = _i8(0)
     for fold in range(FOLDS):
         level = _i8(LEVELS - 1)
         if _trend(moments, counts, fold):
+            trends += 1
             level = _trusted(counts, fold)
         stack_put_f4(areas, fold, _area_share(level))
-    return found, r2, rim
+    corners, area = _i8(0), _f4(0.0)
+    if trends > 0:
+        corners, area = evenly_filled_hull(photons, p, n, found, r2, scratch, hull)
+    return found, r2, rim, corners, area
 
 
 @device
 def checked_irradiance(photons, eye, radius, p, n, class_mask):
     """Irradiance (red, green, blue) in W per unit area at p with normal n, see `pmviewer.render.lookup.irradiance`."""
     scratch = (stack_i4(FOUND_WORDS), stack_i4(SQUARED_WORDS), stack_i4(BATCH_WORDS))
-    areas = stack_i4(FOLDS)
-    found, r2, rim = _discs(photons, eye, radius, p, n, class_mask, scratch, areas)
+    areas, hull = stack_i4(FOLDS), stack_i4(HULL_WORDS)
+    found, r2, rim, corners, spanned = _discs(photons, eye, radius, p, n, class_mask, scratch, areas, hull)
+    if corners > 0:
+        red, green, blue = sum_inside(photons, p, n, found, r2, scratch, hull, corners, eye.boundary)
+        unit = _f8(photons.power_unit) / _f8(spanned)
+        return _f4(red * unit), _f4(green * unit), _f4(blue * unit)
     inverse_r2 = _f4(1.0) / r2
     red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
     run, at = _i8(0), _i8(0)
@@ -205,11 +218,13 @@ def checked_irradiance(photons, eye, radius, p, n, class_mask):
 def reach(photons, eye, radius, p, n, class_mask):
     """Radius of the disc with the mean area of all folds' discs, and photons that are summed; both float32."""
     scratch = (stack_i4(FOUND_WORDS), stack_i4(SQUARED_WORDS), stack_i4(BATCH_WORDS))
-    areas = stack_i4(FOLDS)
-    found, r2, rim = _discs(photons, eye, radius, p, n, class_mask, scratch, areas)
+    areas, hull = stack_i4(FOLDS), stack_i4(HULL_WORDS)
+    found, r2, rim, corners, _ = _discs(photons, eye, radius, p, n, class_mask, scratch, areas, hull)
     inverse_r2 = _f4(1.0) / r2
     mean = _f4(0.0)
     for fold in range(FOLDS):
+        if corners > 0:  # all photons of the disc
+            stack_put_f4(areas, fold, _f4(1.0))
         mean += stack_get_f4(areas, fold) * _f4(1.0 / FOLDS)
     total = _i8(0)
     run, at = _i8(0), _i8(0)

@@ -121,6 +121,71 @@ def area_of(hull, corners):
 
 
 @device
+def moments_of(hull, corners):
+    """Centroid (u, v) and covariance (uu, uv, vv) of the hull."""
+    u0, v0 = stack_get_f4(hull, _U), stack_get_f4(hull, _V)
+    area, mu, mv, uu, uv, vv = _f4(0.0), _f4(0.0), _f4(0.0), _f4(0.0), _f4(0.0), _f4(0.0)
+    for j in range(1, corners - 1):
+        bu, bv = stack_get_f4(hull, _U + j) - u0, stack_get_f4(hull, _V + j) - v0
+        cu, cv = stack_get_f4(hull, _U + j + 1) - u0, stack_get_f4(hull, _V + j + 1) - v0
+        T = _f4(0.5) * (bu * cv - bv * cu)
+        area += T
+        mu += T * (bu + cu)
+        mv += T * (bv + cv)
+        uu += T * (bu * bu + cu * cu + bu * cu)
+        uv += T * (bu * bv + cu * cv + _f4(0.5) * (bu * cv + cu * bv))
+        vv += T * (bv * bv + cv * cv + bv * cv)
+    third, sixth = _f4(1.0 / 3.0) / area, _f4(1.0 / 6.0) / area
+    mu, mv = mu * third, mv * third
+    return u0 + mu, v0 + mv, uu * sixth - mu * mu, uv * sixth - mu * mv, vv * sixth - mv * mv
+
+
+@device
+def no_hull(farthest):
+    """Begin a hull."""
+    for j in range(DIRECTIONS):
+        stack_put_f4(farthest, j, LOWEST)
+
+
+@device
+def outside_by(hull, corners):
+    """How far the origin of u and v lies outside the edge that it is farthest outside of; negative inside."""
+    farthest = LOWEST
+    for j in range(corners):
+        u, v, du, dv = _edge(hull, corners, _i8(j))
+        length = np.sqrt(du * du + dv * dv)
+        if length > _f4(0.0):
+            farthest = max(farthest, (du * v - dv * u) / length)
+    return farthest
+
+
+@device
+def sum_inside(photons, p, n, found, r2, scratch, hull, corners, boundary):
+    """Power (red, green, blue) of the photons found inside the hull, `boundary` of that at its corners, in units of the
+    map's; without corners that of all photons."""
+    s, t = basis(n)
+    margin = EDGE * np.sqrt(r2)
+    red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
+    run, at = _i8(0), _i8(0)
+    while True:
+        run, at, some = next_batch(photons, found, run, at, scratch)
+        if some == 0:
+            break
+        for j in range(some):
+            place = _i8(stack_get_i4(scratch[2], j))
+            weight = _f4(1.0)
+            if corners > 0:
+                u, v = in_plane(photons, place, p, s, t)
+                weight = share_of(hull, corners, _i4(place), u, v, margin, boundary)
+            if weight > _f4(0.0):
+                r, g, b = power_of(photons, place)
+                red += _f8(weight * r)
+                green += _f8(weight * g)
+                blue += _f8(weight * b)
+    return red, green, blue
+
+
+@device
 def share_of(hull, corners, place, u, v, margin, boundary):
     """What the photon at (u, v) counts: 1 inside, `boundary` at a corner, nothing outside."""
     weight = _f4(1.0)
@@ -138,8 +203,7 @@ def hull_irradiance(photons, eye, radius, p, n, class_mask):
     """Irradiance (red, green, blue) in W per unit area at p with normal n, see `pmviewer.render.lookup.irradiance`."""
     scratch = (stack_i4(FOUND_WORDS), stack_i4(SQUARED_WORDS), stack_i4(BATCH_WORDS))
     farthest, hull = stack_i4(DIRECTIONS), stack_i4(HULL_WORDS)
-    for j in range(DIRECTIONS):
-        stack_put_f4(farthest, j, LOWEST)
+    no_hull(farthest)
     s, t = basis(n)
     found, r2, _ = search(photons, eye, radius, p, n, class_mask, scratch)
     run, at, total = _i8(0), _i8(0), _i8(0)
@@ -158,24 +222,7 @@ def hull_irradiance(photons, eye, radius, p, n, class_mask):
         area = area_of(hull, corners)
         if not area > SMALLEST_AREA * r2:
             corners, area = _i8(0), _f4(0.0)
-    margin = EDGE * np.sqrt(r2)
-    red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
-    run, at = _i8(0), _i8(0)
-    while True:
-        run, at, some = next_batch(photons, found, run, at, scratch)
-        if some == 0:
-            break
-        for j in range(some):
-            place = _i8(stack_get_i4(scratch[2], j))
-            weight = _f4(1.0)
-            if corners > 0:
-                u, v = in_plane(photons, place, p, s, t)
-                weight = share_of(hull, corners, _i4(place), u, v, margin, eye.boundary)
-            if weight > _f4(0.0):
-                r, g, b = power_of(photons, place)
-                red += _f8(weight * r)
-                green += _f8(weight * g)
-                blue += _f8(weight * b)
+    red, green, blue = sum_inside(photons, p, n, found, r2, scratch, hull, corners, eye.boundary)
     if corners == 0:
         area = _f4(math.pi) * r2
     unit = _f8(photons.power_unit) / _f8(area)

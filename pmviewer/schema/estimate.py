@@ -136,8 +136,9 @@ class Estimate(Group):
     )
     differential: bool = setting(
         False,
-        "Differential checking: a disc that would get darker and darker (or brighter) as it grows stops growing. Edges "
-        "of surfaces and caustics stay sharp and get noisier.",
+        "Differential checking: a disc that would get darker and darker (or brighter) as it grows stops growing, and "
+        "one over an edge has the area that its photons span. Edges of surfaces aren't dark; those of caustics stay "
+        "sharp and get noisier.",
         stage="image",
         scale="switch",
         title="differential checking",

@@ -31,8 +31,6 @@ from pmviewer.settings import Settings, with_values
 
 CHUNK = 64
 """Samples per pixel at once."""
-PHOTONS, Q = 250_000, 0.2
-"""Trajectories of a pass of pmviewer, and the share of them that fills the global map."""
 NARROW = 0.1
 """Look-up radius in units of the automatic one."""
 MANY = 8
@@ -78,15 +76,16 @@ def by_mitsuba(path: Path, spp: int, variant: str) -> tuple[list[np.ndarray], di
     return halves, {"made": made, "seeds": f"0 to {2 * rounds - 1}", "samples": str(2 * rounds * CHUNK)}
 
 
-def by_pmviewer(path: Path, method: str, passes: int) -> tuple[list[np.ndarray], dict[str, str]]:
-    """The same by pmviewer's path tracer or final gather, of `passes` passes in all."""
+def by_pmviewer(path: Path, how: argparse.Namespace) -> tuple[list[np.ndarray], dict[str, str]]:
+    """The same by pmviewer's path tracer or final gather, of `how.samples` passes in all."""
+    method, passes = how.by, how.samples
     settings = [f"render.method={method}"]
     made = f"pmviewer, path, {2 * (passes // 2)} samples per pixel"
     if method == "gather":
         radius = _automatic_radius(path) * NARROW
-        settings += [f"photons.N={PHOTONS}", f"photons.q={Q}", f"estimate.radius={radius:.4g}", "estimate.alpha=1"]
-        settings.append("estimate.caustic_radius=1")  # as wide; half as wide by default
-        made = f"pmviewer, gather, {2 * (passes // 2)} passes of {PHOTONS} photon trajectories, radius {NARROW} x auto"
+        settings += [f"photons.N={how.photons}", f"photons.q={how.q}", f"estimate.radius={radius:.4g}"]
+        settings += ["estimate.alpha=1", f"estimate.caustic_radius={how.caustic_radius}"]
+        made = f"pmviewer, gather, {2 * (passes // 2)} passes of {how.photons} trajectories, radius {NARROW} x auto"
     halves = []
     with tempfile.TemporaryDirectory() as folder:
         for seed in (1, 2):
@@ -116,6 +115,9 @@ def main() -> None:
     parser.add_argument("names", nargs="+", help="scenes")
     parser.add_argument("--by", choices=("mitsuba", "path", "gather"), default="mitsuba")
     parser.add_argument("--samples", type=int, default=4096, help="per pixel (Mitsuba: a multiple of 128), or passes")
+    parser.add_argument("--photons", type=int, default=250_000, help="trajectories of a pass of the gather")
+    parser.add_argument("--q", type=float, default=0.2, help="share of them that fills the global map")
+    parser.add_argument("--caustic-radius", type=float, default=1.0, help="in units of the gather's radius")
     parser.add_argument("--variant", default="llvm_ad_rgb", help="Mitsuba's; scalar_rgb needs no LLVM but is slower")
     arguments = parser.parse_args()
     for name in arguments.names:
@@ -123,10 +125,13 @@ def main() -> None:
         if arguments.by == "mitsuba":
             (a, b), said = by_mitsuba(folder / "scene.xml", arguments.samples, arguments.variant)
         else:
-            (a, b), said = by_pmviewer(folder / "scene.xml", arguments.by, arguments.samples)
+            (a, b), said = by_pmviewer(folder / "scene.xml", arguments)
         mean = (a + b) / 2
         noise = float((((a - b) / 2) ** 2 / (mean**2 + 0.01)).mean())
         command = f"python scenes/make/reference.py {name} --by {arguments.by} --samples {arguments.samples}"
+        if arguments.by == "gather":
+            how = f"--photons {arguments.photons} --q {arguments.q} --caustic-radius {arguments.caustic_radius}"
+            command += f" {how}"
         said |= {"command": command, "noise": f"{noise:.2e}"}
         write_exr(folder / "reference.exr", {"": mean.astype(np.float32)}, said, half=True)
         print(f"{name}: {said['made']}; noise {noise:.1e}, {(folder / 'reference.exr').stat().st_size / 1024:.0f} KiB")

@@ -129,5 +129,4 @@ def test_a_camera_that_sees_mirrors_alone(method):
     renderer = rendered(scene, settings(method), 1)
     assert np.isfinite(renderer.frame(1).image()).all()
     assert renderer.importance.latest.n == 0
-    (warning,) = renderer.frame(1).statistics.warnings
-    assert "importons" in warning
+    assert any("importons" in warning for warning in renderer.frame(1).statistics.warnings)

@@ -18,6 +18,7 @@ N = SIDE * SIDE
 SQUARES = 8
 DISTRIBUTIONS = ("independent", "stratified")
 SPHERE, FLAT = 1.0, 0.2
+BOUNDARY = {"independent": 0.0, "stratified": 0.2}
 WIDEST = 0.0631
 """Radius of a disc of 500 photons."""
 
@@ -139,17 +140,29 @@ def test_E6_the_bias_of_a_part_is_that_of_its_size():
 
 @pytest.mark.parametrize("how", ["nearest", "radius"])
 @pytest.mark.parametrize("distribution", DISTRIBUTIONS)
-def test_E3_differential_checking_brightens_the_edge(squares, distribution, how):
-    """The dark rim of a disc of 500 photons is a quarter of its radius wide where it can tell a trend, not all of it;
-    stratified photons of different folds know of each other, which costs some of it."""
+def test_E3_differential_checking_has_no_dark_edge(squares, distribution, how):
+    """From the very edge to the middle, with the boundary's share that suits the photons (E4)."""
     r = radius_of(500)
-    inside = mean(squares, how, distribution, 500, middle, estimator="differential")
-    plain = mean(squares, how, distribution, 500, along_edge((0.2 * r, 0.6 * r)))
-    checked = mean(squares, how, distribution, 500, along_edge((0.2 * r, 0.6 * r)), estimator="differential")
-    print(f"E3 {distribution} {how}: middle {inside:.4f}, rim (0.2 … 0.6) r {checked:.4f}, without {plain:.4f}")
-    assert inside == pytest.approx(1, abs=0.005)
-    assert plain < 0.78
-    assert checked == pytest.approx(1, abs=0.05 if distribution == "independent" else 0.12)
+    settings = {"estimator": "differential", "boundary": BOUNDARY[distribution]}
+    assert mean(squares, how, distribution, 500, middle, **settings) == pytest.approx(1, abs=0.005)
+    for low, high, dark in ((0, 0.05, 0.55), (0.05, 0.2, 0.62), (0.2, 0.6, 0.78), (0.6, 1, 0.97)):
+        rim = along_edge((low * r, high * r), 2000)
+        plain = mean(squares, how, distribution, 500, rim)
+        checked = mean(squares, how, distribution, 500, rim, **settings)
+        print(f"E3 {distribution} {how}: rim ({low} … {high}) r {checked:.4f}, without {plain:.4f}")
+        assert plain < dark
+        assert checked == pytest.approx(1, abs=0.02)
+
+
+@pytest.mark.parametrize("how", ["nearest", "radius"])
+def test_E3_light_ends_at_the_edge(squares, how):
+    """Beyond the square nothing is lit: what spans the photons does not span the place."""
+    r = radius_of(500)
+    beyond = along_edge((-0.5 * r, -0.25 * r))
+    plain = mean(squares, how, "independent", 500, beyond)
+    checked = mean(squares, how, "independent", 500, beyond, estimator="differential")
+    print(f"E3 {how}: beyond the edge {checked:.3f}, without {plain:.3f}")
+    assert checked < 0.1 < 0.25 < plain
 
 
 def test_E3_nothing_happens_without_a_trend(squares):
@@ -167,9 +180,6 @@ def test_E3_nothing_happens_without_a_trend(squares):
 def test_E3_with_any_kernel(squares, kind):
     found = mean(squares, "radius", "independent", 100, middle, estimator="differential", kind=kind)
     assert found == pytest.approx(1, abs=0.005)
-
-
-BOUNDARY = {"independent": 0.0, "stratified": 0.2}
 
 
 @pytest.mark.parametrize("how", ["nearest", "radius"])

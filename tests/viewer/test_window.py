@@ -103,14 +103,14 @@ def test_a_refused_value_is_reported_and_changes_nothing(app, session):
     def script(c):
         c.item_double_click(item("photons.N"))
         c.yield_(3)
-        c.key_chars_replace_enter("7")
+        c.key_chars_replace_enter("0")
         c.yield_(2)
 
     drive(app, script)
     assert session.settings.photons.N == Settings().photons.N
     errors = [m.text for m in app.state.log if m.level == "error"]
     assert len(errors) == 1
-    assert errors[0].startswith("photons.N = 7 is not allowed: expected a whole number from 100 to ")
+    assert errors[0].startswith("photons.N = 0 is not allowed: expected a whole number from 1 to ")
 
 
 def test_dragging_an_automatic_radius_fixes_it_and_auto_returns(app, session):

@@ -16,7 +16,7 @@ from pmviewer.bench.agree.generate import scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH
 from pmviewer.bench.agree.statistics import LEVEL, rejected
-from pmviewer.bench.agree.triage import explanation, save, smallest
+from pmviewer.bench.agree.triage import explanation, save, smallest, without_all
 from pmviewer.bench.agree.trial import FORGIVEN, STAGES, Comparison, Verdict
 from pmviewer.bench.agree.workers import try_scenes
 from pmviewer.bench.agree.xml import MAX_DEPTH, SIZE
@@ -103,6 +103,8 @@ def _explained(
         return Disagreement(index, worst, methods, text, known[0])
     print(f"scene {index} disagrees: {text}; shrinking", file=sys.stderr, flush=True)
     if shrunk_before < MOST_SHRUNK:
+        if worst.peer.startswith("Mitsuba"):
+            scene = without_all(scene)  # or a known deviation might be what is left in the end
         scene = smallest(scene, worst, salt, SHRINK_TRIES)
     return Disagreement(index, worst, methods, text, file=str(save(scene, worst, folder, f"scene_{seed}_{index}")))
 

@@ -86,8 +86,8 @@ DEVIATIONS = (
     ),
     Deviation(
         "light with vertex normals",
-        "Mitsuba's light samples of a mesh count its area by the vertex normals, its BSDF samples by the surface: up to "
-        "a quarter in places on a tetrahedron (the same two integrators)",
+        "Mitsuba's light samples of a mesh count its area by the vertex normals, its BSDF samples by the surface: up "
+        "to a quarter in places on a tetrahedron (the same two integrators)",
         _changed(_flat_lights),
     ),
     Deviation(
@@ -103,8 +103,8 @@ DEVIATIONS = (
     ),
     Deviation(
         "bump and normal maps",
-        "wanted: as with vertex normals; and under a bump map Mitsuba mixes coordinates of the surface and of the world "
-        "when it makes the tangent",
+        "wanted: as with vertex normals; and under a bump map Mitsuba mixes coordinates of the surface and of the "
+        "world when it makes the tangent",
         _changed(_unmapped),
     ),
     Deviation(

@@ -12,7 +12,7 @@ GREY = [0.5, 0.5, 0.5]
 _COLOURS = ("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance", "radiance",
             "intensity", "irradiance", "color0", "color1")  # fmt: skip
 _NEEDED = frozenset(("type", "inside", "mesh", "picture", "group", "to_world", "emitter", "height", "normalmap",
-                     "use_shadowing_function", "raw", "bsdf", *_COLOURS))  # fmt: skip
+                     "use_shadowing_function", "raw", "bsdf", "alpha_u", "alpha_v", *_COLOURS))  # fmt: skip
 """What a node can't do without, or what is simplified in another way."""
 Path = tuple[Any, ...]
 
@@ -87,6 +87,9 @@ def _simpler_node(scene: Node, path: Path, node: Node) -> Iterator[Node]:
         yield _with(
             scene, path, {k: v for k, v in node.items() if k not in ("mesh", "face_normals")} | {"type": "cube"}
         )
+    if "alpha_u" in node:
+        rest = {name: value for name, value in node.items() if name not in ("alpha_u", "alpha_v")}
+        yield _with(scene, path, rest | {"alpha": node["alpha_u"]})
     for name, value in node.items():
         if name in _COLOURS and isinstance(value, list) and value != GREY:
             yield _with(scene, (*path, name), GREY)

@@ -49,16 +49,20 @@ def explanation(scene: Node, found: Comparison, level: float, salt: tuple[int, .
     if not found.peer.startswith("Mitsuba"):
         return ""
     has = [(d.name, without) for d in DEVIATIONS if (without := d.without(scene)) is not None]
-    everything = scene
-    for deviation in DEVIATIONS:
-        everything = deviation.without(everything) or everything
-    if not has or not _agrees(everything, found, level, salt):
+    if not has or not _agrees(without_all(scene), found, level, salt):
         return ""
     if len(has) > 1:
         for name, without in has:
             if _agrees(without, found, level, salt):
                 return name
     return " + ".join(name for name, _ in has)
+
+
+def without_all(scene: Node) -> Node:
+    """The scene without what known deviations take; itself where it has nothing of the kind."""
+    for deviation in DEVIATIONS:
+        scene = deviation.without(scene) or scene
+    return scene
 
 
 def _agrees(scene: Node, like: Comparison, level: float, salt: tuple[int, ...]) -> bool:

@@ -1,0 +1,187 @@
+"""What is compared, how often, what counts as a disagreement; the command's options. Without Mitsuba."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+
+import numpy as np
+import pytest
+
+from pmviewer.bench import peer
+from pmviewer.bench.agree import bench, triage, trial
+from pmviewer.bench.agree.generate import needs_particles, scene_of
+from pmviewer.bench.agree.known import DEVIATIONS
+from pmviewer.bench.agree.statistics import Outcome
+from pmviewer.bench.agree.tree import from_json
+from pmviewer.bench.agree.trial import STAGES, Comparison, Question, Verdict, methods_of, questions
+from pmviewer.bench.agree.workers import try_scenes
+from pmviewer.bench.registry import run_bench
+from pmviewer.errors import PmviewerError, SettingError
+from pmviewer.scene.load import load_scene
+
+
+def noisy(seed: int, runs: int, mean: float) -> np.ndarray:
+    return mean * (1 + 0.005 * np.random.default_rng(seed).normal(0, 1, (runs, 51)))
+
+
+def question(ratios: list[float], asked: list[int], method: str = "path") -> Question:
+    """Ours differ by another ratio at each stage; the stages asked for go into `asked`."""
+
+    def pair(stage: int) -> tuple[np.ndarray, np.ndarray]:
+        asked.append(stage)
+        runs = STAGES[stage].runs
+        return noisy(2 * stage, runs, ratios[stage]), noisy(2 * stage + 1, runs, 1.0)
+
+    return Question(method, "Mitsuba path", "picture", pair)
+
+
+def test_more_is_rendered_only_while_there_is_doubt():
+    for ratios, stages in (([1.0, 1.0, 1.0], 1), ([1.3, 1.0, 1.0], 2), ([1.3, 1.3, 1.0], 3), ([1.3, 1.3, 1.3], 3)):
+        asked: list[int] = []
+        found = question(ratios, asked).asked(len(STAGES))
+        assert asked == list(range(stages))
+        assert found.final == (stages == 3)
+        assert (found.p < 1e-6) == (ratios == [1.3] * 3)
+
+
+def test_photon_methods_are_forgiven_what_goes_with_the_radius():
+    least = [stage.radius for stage in STAGES]
+    assert least == sorted(least, reverse=True)
+    off = 1 + 0.8 * trial.FORGIVEN * least[0]
+    assert question([off] * 3, [], "gather").asked(3).stage == 1
+    assert question([off] * 3, [], "path").asked(3).stage == 3
+    assert question([1.3] * 3, [], "gather").asked(3).p < 1e-6
+
+
+class FakeRuns:
+    """Pictures that are one everywhere, but for ours of a method: that is what `wrong` says."""
+
+    def __init__(self, scene: dict, wrong: str = "", plain: float = 1.0) -> None:
+        self.scene, self.wrong = scene, wrong
+        self.seen_plainly = np.zeros((32, 32), bool)
+        self.seen_plainly[: round(32 * plain)] = True
+        self.modes: set[str] = set()
+
+    def ours(self, method: str, stage: int, max_depth: int = 0) -> np.ndarray:
+        return np.full((STAGES[stage].runs, 32, 32, 15), 0.25 if method == self.wrong else 0.2, np.float32)
+
+    def theirs(self, mode: str, stage: int, max_depth: int = 0) -> np.ndarray:
+        self.modes.add(mode)
+        return np.ones((STAGES[stage].runs, 32, 32, 3))
+
+
+@pytest.mark.parametrize("particles", [False, True])
+@pytest.mark.parametrize("plain", [1.0, 0.0])
+def test_every_method_is_compared_in_every_scene_and_a_wrong_one_is_found(particles, plain):
+    scene = next(s for i in range(100) if needs_particles(s := scene_of(1, i)) == particles)
+    runs = FakeRuns(scene, plain=plain)
+    found = [q.asked(3) for q in questions(runs)]
+    assert methods_of(Verdict(found)) == {"path", "gather", "progressive", "nearest"}
+    assert all(c.outcome.p > 0.5 for c in found)
+    assert ("ptracer" in runs.modes) == (particles and plain > 0)
+    for wrong in ("path", "gather", "progressive", "nearest"):
+        found = [q.asked(3) for q in questions(FakeRuns(scene, wrong, plain))]
+        assert any(c.p == pytest.approx(0) and wrong in (c.method, c.peer) for c in found)
+
+
+def comparison(method: str, p: float, ratio: float = 1.2, peer_name: str = "Mitsuba path") -> Comparison:
+    return Comparison(method, peer_name, "picture", Outcome(p, ratio, 0.01, 51), len(STAGES))
+
+
+def test_a_disagreement_is_saved_and_reported_and_chance_is_not(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        bench, "explanation", lambda scene, found, level, salt: "textured light" * (found.method == "gather")
+    )
+    monkeypatch.setattr(bench, "smallest", lambda scene, found, salt, most: scene)
+    verdicts = {
+        0: Verdict([comparison("path", 0.009), comparison("gather", 0.5)], lit=1),
+        1: Verdict([comparison("path", 1e-9), comparison("nearest", 1e-9)], lit=1),
+        2: Verdict([comparison("gather", 1e-9)], lit=1),
+        3: Verdict(refused="Mitsuba 3: no"),
+    }
+    found = bench.judged(7, verdicts, tmp_path)
+    assert {d.index: (d.known, d.methods[:1]) for d in found} == {
+        1: ("", ("path",)),
+        2: ("textured light", ("gather",)),
+        3: ("", ("path",)),
+    }
+    file = next(d.file for d in found if d.index == 1)
+    assert load_scene(file).shapes
+    saved = json.loads((tmp_path / "scene_7_1.json").read_text())
+    assert saved["shows"]["method"] == "path"
+    assert from_json(json.dumps(saved["scene"])) == triage.without_all(scene_of(7, 1))
+    result = bench.report(7, verdicts, found, tmp_path, 12.0)
+    target = result.targets[0]
+    assert (target.value, target.ok) == (2, False)
+    rows = {row[0]: row for row in result.rows}
+    assert rows["all"][1] == 4
+    assert rows["all"][3:8] == [2, 1, 1, 2, 1]
+    assert any(file in note for note in result.notes)
+    assert all(any(d.name in note for note in result.notes) for d in DEVIATIONS)
+    agreed = bench.report(7, {0: verdicts[0]}, [], tmp_path, 1.0)
+    assert agreed.targets[0].ok
+
+
+def test_known_deviations_explain_only_what_agrees_without_them(monkeypatch):
+    scene = next(
+        s for i in range(300) if len([d for d in DEVIATIONS if d.without(s := scene_of(1, i)) is not None]) >= 2
+    )
+    names = [d.name for d in DEVIATIONS if d.without(scene) is not None]
+    found = comparison("path", 1e-9)
+
+    def answers(agreeing: set[str]):
+        """A scene agrees when it lacks all that is named."""
+
+        def outcome_of(simpler, like, stage, salt):
+            lacks = {d.name for d in DEVIATIONS if d.without(simpler) is None}
+            return Outcome(0.5 if agreeing <= lacks else 1e-12, 1.0, 0.01, 51)
+
+        return outcome_of
+
+    monkeypatch.setattr(triage, "outcome_of", answers({names[1]}))
+    assert triage.explanation(scene, found, 1e-5, (1,)) == names[1]
+    monkeypatch.setattr(triage, "outcome_of", answers(set(names[:2])))
+    assert triage.explanation(scene, found, 1e-5, (1,)) == " + ".join(names)
+    monkeypatch.setattr(triage, "outcome_of", lambda *a: Outcome(1e-12, 1.3, 0.01, 51))
+    assert triage.explanation(scene, found, 1e-5, (1,)) == ""
+    own = comparison("gather", 1e-9, peer_name="our path")
+    monkeypatch.setattr(triage, "outcome_of", answers(set()))
+    assert triage.explanation(scene, own, 1e-5, (1,)) == ""
+
+
+WORK = """
+import os
+from pmviewer.bench.agree.trial import Verdict
+
+def work(seed, index):
+    if index == 2:
+        os._exit(3)
+    return Verdict(lit=seed + index)
+"""
+
+
+def test_a_scene_that_kills_its_process_is_named_and_the_others_are_done(tmp_path, monkeypatch):
+    (tmp_path / "agree_work_for_tests.py").write_text(WORK)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *(p for p in sys.path if p)]))
+    from agree_work_for_tests import work
+
+    found = dict(try_scenes(10, 5, work, processes=2))
+    assert sorted(found) == [0, 1, 2, 3, 4]
+    assert found[2].refused == "the process died"
+    assert [found[i].lit for i in (0, 1, 3, 4)] == [10, 11, 13, 14]
+
+
+def test_missing_mitsuba_and_senseless_numbers_are_one_clear_error(monkeypatch):
+    monkeypatch.setattr(peer, "installed", lambda: False)
+    with pytest.raises(PmviewerError, match="pip install"):
+        run_bench("agree", options={"scenes": 1})
+    with pytest.raises(SettingError, match="at least one scene"):
+        run_bench("agree", options={"scenes": 0})
+
+
+def test_options_reach_the_bench_that_has_them_alone(monkeypatch):
+    with pytest.raises(SettingError, match="'rays' has no option --seed"):
+        run_bench("rays", options={"seed": 3, "scenes": None})
