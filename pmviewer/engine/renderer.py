@@ -211,7 +211,7 @@ class Renderer:
             clouds["cache"] = PhotonCloud(*cache_cloud(self._cache), self._cache.rows[:, REACH].copy())
             stored_in_pass["cache"] = self._cache.n
         samples = max(len(film.sums) * film.passes, 1)
-        energy = self.tally.energy.close(self.plan.emission != "off")
+        energy = self.tally.energy.close(self.plan.emission.startswith("Christensen"))
         statistics = Statistics(
             passes=film.passes,
             emitted=self.tally.emitted,
