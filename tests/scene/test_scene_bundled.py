@@ -7,6 +7,7 @@ import pytest
 
 from pmviewer import resources
 from pmviewer.errors import PmviewerError
+from pmviewer.output.exr import read_exr
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.describe import describe, description_text
 from pmviewer.scene.description import Cylinder, Mesh, Parallelogram, Sphere
@@ -46,8 +47,19 @@ def test_bundled_scene_opens_without_a_word(name: str) -> None:
     assert scene.name == name
     assert scene.warnings == ()
     assert scene.dropped == {}
-    if reference_of(scene) is not None:
-        assert reference(name).shape == (scene.height, scene.width, 3)
+
+
+@pytest.mark.parametrize("name", [s.name for s in bundled_scenes()])
+def test_every_bundled_scene_has_a_reference_that_tells_how_it_was_made(name: str) -> None:
+    scene = load_scene(name)
+    path = reference_of(scene)
+    assert path is not None
+    layers, attributes = read_exr(path)
+    assert layers[""].shape[:2] == (scene.height, scene.width)
+    assert np.isfinite(layers[""]).all()
+    assert layers[""].mean() > 0
+    assert all(str(attributes[key]) for key in ("made", "command", "seeds", "samples"))
+    assert 0 < float(attributes["noise"]) < 0.02
 
 
 def test_contents() -> None:
