@@ -33,7 +33,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.errors import PmviewerError
 
 STAGES = (
-    Effort(runs=12, spp=64, passes=12, photons=20_000, radius=0.01),
+    Effort(runs=12, spp=64, passes=8, photons=20_000, radius=0.01),
     Effort(runs=16, spp=256, passes=16, photons=60_000, radius=0.005),
     Effort(runs=24, spp=512, passes=24, photons=120_000, radius=0.0025),
 )
