@@ -177,7 +177,8 @@ def rooms(quick: bool, pool: WorkPool) -> tuple[list[list[Any]], list[Target]]:
                 errors, held = [error(some, target) for some in curve], [some.held for some in curve]
                 share = thinned.held / held_for(error(thinned, target), errors, held)
                 if rule == CLAMP:
-                    note = f"{ROOMS}, {method}: photons held at the same error of the {what}, over storing all"
+                    how_made = f"{said(values | how)}, {size[0]} × {size[1]} pixels"
+                    note = f"{ROOMS}, {how_made}: photons held at the same error of the {what}, over storing all"
                     targets.append(Target("I4", share, 0.25, "×", False, note))
     return rows, targets
 
@@ -194,7 +195,8 @@ def unbiased(method: str, pool: WorkPool) -> list[Target]:
     a, b = (np.array([block_means(image) for image in images]) for images in (thinned, others))
     variances = a.var(axis=0, ddof=1) / Z_SEEDS, b.var(axis=0, ddof=1) / Z_SEEDS
     blocks = z_test(a.mean(axis=0), variances[0], b.mean(axis=0), variances[1], block=1)
-    note = f"{ROOMS}, {method}, {Z_SEEDS} seeds: Keller-Wald, clamp, against storing all"
+    how_made = f"{said({'render.method': method} | KELLER_WALD)}, {Z_SIZE} × {Z_SIZE} pixels"
+    note = f"{ROOMS}, {how_made}, {Z_SEEDS} seeds: against storing all"
     return [
         Target("I4", abs(z), 3.0, "σ", False, f"{note}, mean luminance"),
         Target("I4", blocks.p_value, 0.01, "", True, f"{note}, p-value of {blocks.blocks} blocks, max z "

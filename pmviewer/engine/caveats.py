@@ -6,13 +6,23 @@ from pmviewer.engine.energy import Energy
 from pmviewer.engine.tally import Tally
 from pmviewer.settings import Settings
 
+CUT_PATHS = 1e-3
+"""Share of the paths from the camera that may end at the depth allowed before a sentence says so."""
 CUT_OFF = 0.01
 """Share of the light that may still be on its way after the last scattering before a sentence says so."""
 
 
-def caveats(settings: Settings, tally: Tally, energy: Energy | None, scene_radius: float, pixels: int) -> list[str]:
+def caveats(
+    settings: Settings, tally: Tally, energy: Energy | None, scene_radius: float, pixels: int, passes: int
+) -> list[str]:
     """What to know about the passes so far. scene_radius: of the bounding sphere; pixels: of the picture."""
     said = [_dropped(place, count) for place, count in tally.dropped.items() if count]
+    cut = tally.cut / max(pixels * passes, 1)
+    if cut > CUT_PATHS:
+        said.append(
+            f"{cut:.1%} of the paths from the camera end on their way at render.max_depth = "
+            f"{settings.render.max_depth}: the light that they would have found is missing. Raise it."
+        )
     if energy is None:
         return said
     if energy.share("terminated") > CUT_OFF:

@@ -53,8 +53,8 @@ class EnergyBooks:
         self.squares += (energy / lights) ** 2 if lights > 0 else 0.0
         self.lights = lights
 
-    def close(self, guided: bool) -> Energy | None:
-        """The books so far; None before the first pass."""
+    def close(self, with_tests: bool) -> Energy | None:
+        """The books so far, `with_tests` if test photons carry power, too; None before the first pass."""
         n = self.passes
         if n == 0:
             return None
@@ -62,5 +62,5 @@ class EnergyBooks:
         if n > 1 and self.lights > 0:
             variance = np.maximum(self.squares - n * (mean / self.lights) ** 2, 0.0) / (n - 1)
             errors = np.sqrt(variance / n) * self.lights
-        uncounted = max(self.lights - float(mean[0]), 0.0) if guided else 0.0
+        uncounted = max(self.lights - float(mean[0]), 0.0) if with_tests else 0.0
         return Energy(n, tuple(map(float, mean)), tuple(map(float, errors)), uncounted)

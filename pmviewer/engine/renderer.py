@@ -211,7 +211,7 @@ class Renderer:
             clouds["cache"] = PhotonCloud(*cache_cloud(self._cache), self._cache.rows[:, REACH].copy())
             stored_in_pass["cache"] = self._cache.n
         samples = max(len(film.sums) * film.passes, 1)
-        energy = self.tally.energy.close(self.plan.emission != "off")
+        energy = self.tally.energy.close(self.plan.emission.startswith("Christensen"))
         statistics = Statistics(
             passes=film.passes,
             emitted=self.tally.emitted,
@@ -236,7 +236,7 @@ class Renderer:
             importons=self.importance.latest.traced if self.importance.latest else 0,
             warnings=(
                 *self._warnings(),
-                *caveats(self.settings, self.tally, energy, self.scene.flat.radius, len(film.sums)),
+                *caveats(self.settings, self.tally, energy, self.scene.flat.radius, len(film.sums), film.passes),
             ),
             deposited=dict(self.tally.deposited),
         )

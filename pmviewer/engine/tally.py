@@ -13,7 +13,7 @@ from pmviewer.engine.energy import EnergyBooks
 from pmviewer.engine.pool import WorkPool
 from pmviewer.photons.deposition import Deposited
 from pmviewer.photons.lightpass import PhotonMaps
-from pmviewer.render.record import C_CACHED, C_DROPPED, C_GATHERED, C_RAYS, C_SAVED, C_SHADOW_RAYS
+from pmviewer.render.record import C_CACHED, C_CUT, C_DROPPED, C_GATHERED, C_RAYS, C_SAVED, C_SHADOW_RAYS
 
 
 @dataclass
@@ -26,6 +26,7 @@ class Tally:
     shadow_rays: int = 0
     saved_rays: int = 0
     cached: int = 0
+    cut: int = 0
     gathered: int = 0
     records: int = 0
     seconds: float = 0.0
@@ -65,6 +66,7 @@ class Tally:
         self.rays += int(counts[C_RAYS])
         self.shadow_rays += int(counts[C_SHADOW_RAYS])
         self.cached += int(counts[C_CACHED])
+        self.cut += int(counts[C_CUT])
         self.gathered += int(counts[C_GATHERED])
         self.saved_rays += int(counts[C_SAVED])
         self.dropped["samples"] += int(counts[C_DROPPED])

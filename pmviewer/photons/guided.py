@@ -17,8 +17,9 @@ important keep them as their photons, unless I_s asks for more than there are. O
 and n photons emitted, p_s ∝ q_s·√I_s but ENOUGH times as many as test photons, with the power q_s·N/(n·p_s).
 
 **Christensen keep.** No test photon is dropped. There are two sets, A and B, of h photons a stratum. Set A says how
-many photons the stratum should have, M_s^A ≥ 2h, and a photon of set B gets the power q_s·N/M_s^A, and the other way
-round. What is missing, W_s = q_s·(1 − h/M_s^A − h/M_s^B), is topped up by n photons, p_s ∝ W_s·√I_s, of power
+many photons the stratum should have, and a photon of set B gets the power q_s·N/M_s^A, and the other way round. M_s ∝
+q_s·√I_s, but never less than q_s·N/MOST_WEIGHT and 2h: no photon has more than MOST_WEIGHT times the power of an
+unguided one. What is missing, W_s = q_s·(1 − h/M_s^A − h/M_s^B), is topped up by n photons, p_s ∝ W_s·M_s/q_s, of power
 W_s·N/(n·p_s).
 
 In both no photon has more power than test photons do, those of refined strata have less the more they matter, and what
@@ -54,6 +55,9 @@ DEFENSIVE = 0.1
 """δ."""
 ENOUGH = 2.0
 """Photons at least, relative to its test photons, that replace them in a stratum."""
+MOST_WEIGHT = 4.0
+"""Most power of a photon of Christensen keep, relative to that of an unguided one. A fourth of the photons at most go
+where nothing is known to matter for that; the test photons alone, an eighth, would have 8."""
 SCALES = (4, 1)
 """Blurs of growing sharpness in which importance is estimated, between the whole light and the stratum itself."""
 PRIOR = 4.0
@@ -202,15 +206,28 @@ def discard(strata: Strata, known: Known, h: int, n: int, N: int) -> Decision:
 def keep(strata: Strata, a: Known, b: Known, h: int, n: int, N: int) -> Decision:
     """Test photons of set A by what is known without them, `b`, and the other way round; n photons on top."""
     q, asked = strata.power, []
+    least = np.maximum(q * N / MOST_WEIGHT, 2 * h)
     for known in (a, b):
-        wanted = q * _root(estimated(strata, known))
-        asked.append(np.maximum((n + 2 * h) * wanted / wanted.sum(), 2 * h))
+        asked.append(_at_least(q * _root(estimated(strata, known)), least, n + 2 * h * strata.n))
     missing = np.maximum(q * (1 - h / asked[0] - h / asked[1]), 0.0)
     missing[missing < 1e-9 * q] = 0.0
-    share = missing * np.maximum(_root(estimated(strata, a + b)), 1e-6)
+    share = missing / (q * (1 / asked[0] + 1 / asked[1]))
     if share.any():
         share /= share.sum()
     return share, _powers(missing, share, n, N), (q * N / asked[1], q * N / asked[0])
+
+
+def _at_least(wanted: Float, least: Float, total: float) -> Float:
+    """Numbers ∝ `wanted`, but not below `least`, that sum to `total`, or all `least` where those do not fit."""
+    numbers, free = least.copy(), wanted > 0
+    while free.any():
+        rest = total - least[~free].sum()
+        numbers = np.where(free, wanted * (rest / wanted[free].sum()), least)
+        short = free & (numbers < least)
+        if not short.any():
+            break
+        free &= ~short
+    return np.maximum(numbers, least)
 
 
 def _root(value: Float) -> Float:

@@ -21,6 +21,7 @@ from pmviewer.photons.projected import NO_PROJECTION
 from pmviewer.photons.projection import Projection
 from pmviewer.photons.roulette import EQUAL, MOST_COPIES, RULES
 from pmviewer.photons.scattered import scattered_record
+from pmviewer.photons.tested import TraceBatch
 from pmviewer.photons.trace import (
     C_CAUSTIC,
     C_DROPPED,
@@ -237,6 +238,13 @@ def guided_emission_of(
     """The guided emission of a pass of N trajectories for `trace_pass`, with what is known `before` from earlier
     passes; None where they are too few to test the lights."""
 
+    trace = testing(scene, settings, first_index, has_specular)
+    return guided_emission(scene, how, seed, N, BATCH, trace, run, before)
+
+
+def testing(scene: FlatScene, settings: Photons, first_index: int, has_specular: bool) -> TraceBatch:
+    """Traces batches of test photons for `pmviewer.photons.tested`."""
+
     def trace(table: NDArray[np.void], seed: int, i0: int, i1: int, n: int) -> Any:
         unfound = scene.delta_lights and has_specular
         record = _record(settings, seed, first_index, n, settings.q, has_specular, False, (1.0, 1.0), unfound)
@@ -245,7 +253,7 @@ def guided_emission_of(
         )
         return _join(caustics), _join(globals_), counts, ledger, *(_joined(part) for part in normals)
 
-    return guided_emission(scene, how, seed, N, BATCH, trace, run, before)
+    return trace
 
 
 def scattered_photons(

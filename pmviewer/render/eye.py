@@ -39,7 +39,7 @@ from pmviewer.render.choice import BY_POWER, LIST_WORDS, choose_by_power, choose
 from pmviewer.render.direct import BLACK, found_light, light_samples
 from pmviewer.render.guide import AIM_WORDS, aim
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius
-from pmviewer.render.record import C_DROPPED, C_RAYS, C_SAVED, C_SHADOW_RAYS
+from pmviewer.render.record import C_CUT, C_DROPPED, C_RAYS, C_SAVED, C_SHADOW_RAYS
 from pmviewer.render.reflect import reflected, unfound
 
 _f4 = np.float32
@@ -287,7 +287,10 @@ def eye_pass(
                     deposit(film, counts, pixel, DIRECT if whole else SPECULAR, mul(share, direct))
                     if eye.gather_rays > 0:
                         deposit(film, counts, pixel, INDIRECT if whole else SPECULAR, mul(share, indirect))
-            if b.groups & FOLLOWED == 0 or depth == eye.max_depth:
+            if b.groups & FOLLOWED == 0:
+                break
+            if depth == eye.max_depth:
+                counts[C_CUT] += 1
                 break
             u_lobe, bu, bv, u_end = chain_numbers(scene, eye.sequence, seed, index, CHAIN_SET + depth)
             if not is_delta(b) and eye.unfound != 0:

@@ -43,7 +43,7 @@ from pmviewer.render.eye import (
     pixel_seed,
     properties,
 )
-from pmviewer.render.record import C_RAYS, C_SHADOW_RAYS
+from pmviewer.render.record import C_CUT, C_RAYS, C_SHADOW_RAYS
 
 _f4 = np.float32
 _INF = _f4(np.inf)
@@ -107,7 +107,10 @@ def path_pass(scenes, eyes, film, counts, first, last):
             b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, eye.glossy)
             if depth == 0:
                 properties(scene, film, eye, pixel, b.albedo, face(shading_normal(b), wo), p)
-            if depth == eye.max_depth or b.groups == NOTHING:
+            if b.groups == NOTHING:
+                break
+            if depth == eye.max_depth:
+                counts[C_CUT] += 1
                 break
             ng = face(ng, wo)
             u0, u1, u_lobe, u3 = draw4(eye.sequence, seed, index, FIRST_SET + 2 * depth)

@@ -61,11 +61,11 @@ EYE_DTYPE = np.dtype(
 
 RIMS = ("left out", "half", "whole")
 
-N_COUNTS = 6
-C_RAYS, C_SHADOW_RAYS, C_DROPPED, C_SAVED, C_CACHED, C_GATHERED = range(N_COUNTS)
+N_COUNTS = 7
+C_RAYS, C_SHADOW_RAYS, C_DROPPED, C_SAVED, C_CACHED, C_GATHERED, C_CUT = range(N_COUNTS)
 """All rays, those of them that test visibility towards a light sample, samples dropped, and shadow rays not cast,
 because shadow photons know; with an irradiance cache, surface points that it served and those that gathered
-themselves."""
+themselves; paths from the camera that `max_depth` ended."""
 
 
 def eye_record(camera: CameraPose, settings: Settings, index: int) -> NDArray[np.void]:

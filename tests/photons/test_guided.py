@@ -9,9 +9,9 @@ import pytest
 from pmviewer.engine.pool import WorkPool
 from pmviewer.maps.record import unpack
 from pmviewer.photons.deposition import Deposition, Homogeneous
-from pmviewer.photons.guided import ENOUGH, Guidance, Known, beside, discard, estimated, keep, peter_pietrek
+from pmviewer.photons.guided import ENOUGH, Guidance, Known, _at_least, beside, discard, estimated, keep, peter_pietrek
 from pmviewer.photons.lightpass import guided_emission_of, trace_pass
-from pmviewer.photons.strata import strata_of
+from pmviewer.photons.strata import Strata, strata_of
 from pmviewer.photons.tested import Sought
 from pmviewer.scene.description import DirectionalLight, PointLight, SpotLight
 from pmviewer.scene.flatten import LUMINANCE, flatten
@@ -184,3 +184,29 @@ def test_estimates():
     assert spread[strata.light == 0].sum() == 0
     assert (spread > 0).sum() == 9
     assert spread.max() == spread[strata.first[1] + 20] == 1.0
+
+
+def test_keep_bounds_every_power_and_spends_all_photons():
+    """However little was met where: no photon has more than MOST_WEIGHT, and the mean emitted power is right."""
+    n_strata, h, N = 40, 4, 40 * 64
+    strata = Strata(
+        np.zeros(n_strata, np.int32),
+        np.zeros(1, np.int32),
+        np.array([[1, 1, 8, 5]], np.int32),
+        np.full(n_strata, 1 / n_strata),
+    )
+    rng = np.random.default_rng(4)
+    met = np.where(rng.random((2, n_strata)) < 0.1, 100 * rng.random((2, n_strata)), 0.0)
+    a, b = (Known(m, np.full(n_strata, float(h)), (m > 0).astype(float)) for m in met)
+    n = N - 2 * h * n_strata
+    share, weight, powers = keep(strata, a, b, h, n, N)
+    assert max(weight.max(), powers[0].max(), powers[1].max()) <= 4.0 + 1e-9
+    emitted = n * (share * weight) + h * (powers[0] + powers[1])
+    np.testing.assert_allclose(emitted, N / n_strata, rtol=1e-9)
+    assert weight.min() < 0.5
+
+
+def test_numbers_that_may_not_be_small_sum_to_the_total():
+    numbers = _at_least(np.array([0.0, 1.0, 2.0, 100.0]), np.array([5.0, 5.0, 5.0, 5.0]), 60.0)
+    np.testing.assert_allclose(numbers, [5, 5, 5, 45])
+    np.testing.assert_allclose(_at_least(np.zeros(3), np.ones(3), 9.0), 1)

@@ -27,7 +27,7 @@ SLOW = (
     "1e-05 of",
     "1e-07 of",
 )
-OTHER_KERNELS = ("rough", "spot", "texture", "normal map", "roughness", "all shine", "10,000")
+OTHER_KERNELS = ("rough", "spot", "sky with", "texture", "normal map", "roughness", "all shine", "10,000")
 
 
 def quick(cases):
@@ -116,3 +116,23 @@ def test_pictures_of_nonsense_are_answered_when_read(tmp_path, name):
     write_exr(tmp_path / "picture.exr", {"": pixels})
     (tmp_path / "scene.xml").write_text(f'<scene version="3.0.0">{NONSENSE[name]}</scene>', "utf-8")
     assert any("finite" in sentence for sentence in load_scene(tmp_path / "scene.xml").warnings)
+
+
+def test_paths_that_end_on_their_way_are_told_of():
+    """A mirror room: what the camera follows never ends, whatever the depth."""
+    from pmviewer.bench.stress.scenes import MIRROR, furnace
+    from pmviewer.scene.description import Shape, Sphere
+
+    inner = Shape("mirror", Sphere((0, 0, 0), 0.9, True), 1)
+    scene = furnace(extra=(inner,), materials=(replace(MIRROR, reflectance=(0.9, 0.9, 0.9)),))
+    pool = WorkPool(1)
+    try:
+        for method in ("progressive", "path"):
+            lab = Lab(pool)
+            lab.measure(scene, None, seeds=1, render__method=method, render__max_depth=5)
+            assert any("100.0% of the paths from the camera end on their way" in said for said in lab.said)
+            lab = Lab(pool)
+            lab.measure(furnace(), None, seeds=1, render__method=method)
+            assert not any("end on their way" in said for said in lab.said)
+    finally:
+        pool.close()
