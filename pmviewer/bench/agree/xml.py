@@ -122,8 +122,8 @@ def scene_text(scene: Node, folder: Path, size: int = SIZE) -> str:
 
 
 def write_scene(scene: Node, folder: Path, name: str, size: int = SIZE) -> tuple[Path, Path]:
-    """Write the scene as `name`.xml. The second path is that of the file for Mitsuba, mostly the same one: without groups
-    in groups, which it does not know, and at scale 1, since its rays leave surfaces by 9e-5 of a unit at least."""
+    """Write the scene as `name`.xml. The second path is the file for Mitsuba, mostly the same one: without groups in
+    groups, which it does not know, and at scale 1, since its rays leave surfaces by 9e-5 of a unit at least."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.xml"
     path.write_text(scene_text(scene, folder, size), encoding="utf-8")
