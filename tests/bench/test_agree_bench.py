@@ -40,10 +40,19 @@ def question(ratios: list[float], asked: list[int], method: str = "path") -> Que
 def test_more_is_rendered_only_while_there_is_doubt():
     for ratios, stages in (([1.0, 1.0, 1.0], 1), ([1.3, 1.0, 1.0], 2), ([1.3, 1.3, 1.0], 3), ([1.3, 1.3, 1.3], 3)):
         asked: list[int] = []
-        found = question(ratios, asked).asked(len(STAGES))
+        found = question(ratios, asked, "gather").asked(len(STAGES))
         assert asked == list(range(stages))
         assert found.final == (stages == 3)
         assert (found.p < 1e-6) == (ratios == [1.3] * 3)
+
+
+def test_path_tracers_that_differ_beyond_doubt_are_not_asked_a_third_time():
+    found = question([1.3] * 3, []).asked(3)
+    assert found.stage == 2
+    assert found.final
+    assert found.p < 1e-10
+    slight = question([1.01, 1.01, 1.01], []).asked(3)
+    assert slight.stage == 3
 
 
 def test_photon_methods_are_forgiven_what_goes_with_the_radius():
@@ -51,7 +60,7 @@ def test_photon_methods_are_forgiven_what_goes_with_the_radius():
     assert least == sorted(least, reverse=True)
     off = 1 + 0.8 * trial.FORGIVEN * least[0]
     assert question([off] * 3, [], "gather").asked(3).stage == 1
-    assert question([off] * 3, [], "path").asked(3).stage == 3
+    assert question([off] * 3, [], "path").asked(3).final
     assert question([1.3] * 3, [], "gather").asked(3).p < 1e-6
 
 
@@ -87,7 +96,7 @@ def test_every_method_is_compared_in_every_scene_and_a_wrong_one_is_found(partic
 
 
 def comparison(method: str, p: float, ratio: float = 1.2, peer_name: str = "Mitsuba path") -> Comparison:
-    return Comparison(method, peer_name, "picture", Outcome(p, ratio, 0.01, 51), len(STAGES))
+    return Comparison(method, peer_name, "picture", Outcome(p, ratio, 0.01, 51), len(STAGES), True)
 
 
 def test_a_disagreement_is_saved_and_reported_and_chance_is_not(tmp_path, monkeypatch):

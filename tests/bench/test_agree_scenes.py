@@ -95,7 +95,7 @@ def test_groups_written_out_place_the_same_copies(tmp_path):
     nested = [s for i in range(300) if "transform: groups in groups" in features(s := scene_of(1, i))]
     assert nested
     for i, scene in enumerate(nested[:5]):
-        ours, theirs = write_scene(scene, tmp_path, f"nested{i}")
+        ours, theirs = write_scene({**scene, "scale": 1.0}, tmp_path, f"nested{i}")
         assert ours != theirs
         both = [load_scene(path).instances for path in (ours, theirs)]
         assert len(both[0]) == len(both[1]) > 0
@@ -128,6 +128,8 @@ def test_a_scaled_scene_has_all_its_lengths_scaled(tmp_path):
     assert np.allclose(np.array(one.lights[0].position) * 10, ten.lights[0].position)
     assert np.allclose(np.array(one.lights[0].intensity) * 100, ten.lights[0].intensity)
     assert np.allclose(np.array(one.camera.origin) * 10, ten.camera.origin)
+    small, for_mitsuba = write_scene({**scene, "scale": 0.001}, tmp_path, "small")
+    assert load_scene(for_mitsuba).camera.origin == one.camera.origin != load_scene(small).camera.origin
 
 
 def test_numbers_are_written_as_every_reader_takes_them(tmp_path):

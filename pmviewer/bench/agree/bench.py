@@ -162,6 +162,7 @@ def _settings_notes() -> list[str]:
         f"{SIZE}² pixels; stages, each with fresh seeds, as long as there is doubt: {stages}",
         f"photon methods may be off by {FORGIVEN:g} × this radius, {FORGIVEN * STAGES[-1].radius:.0%} of a block in "
         "the last stage: look-ups lose light at edges, in proportion to the radius",
+        "Mitsuba renders every scene at scale 1: its rays leave surfaces by 9e-5 of a unit at least",
         f"nearest: estimate.lookup=nearest with k = 10 within {NEAREST_REACH:g} of these radii",
         f"a disagreement is one by Holm's correction at {LEVEL:g} over all comparisons of the run",
         "where point, spot or directional lights meet smooth mirrors, glass or coats, photon methods are compared with "

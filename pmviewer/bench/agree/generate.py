@@ -2,7 +2,8 @@
 
 Each scene follows a profile, by i in turn. A profile decides for which record of scenes kernels are compiled (rich
 materials, more lights, textures, instances: `pmviewer.kernels.scene.scene_dtype`), so that a run needs few variants
-however many scenes it has, and no feature is left out.
+however many scenes it has, and no feature is left out. What is known to differ is taken out of most scenes, lest it
+hide the rest.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 
 from pmviewer.bench.agree import lights, materials, shapes
 from pmviewer.bench.agree.draw import Draw
+from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.materials import METALLIC, TRANSPARENT, Materials
 from pmviewer.bench.agree.tree import Node, bsdfs_of
 
@@ -77,6 +79,9 @@ def scene_of(seed: int, index: int) -> Node:
     _light(draw, made, profile, closed, scene)
     _require(draw, made, profile, scene)
     scene["camera"] = _camera(draw, closed, scene)
+    for deviation in DEVIATIONS:
+        if deviation.rare and profile.name != "tilted normals" and draw.chance(0.7):
+            scene = deviation.without(scene) or scene
     if needs_particles(scene):
         for shape in scene["shapes"]:
             if "mesh" in shape and "emitter" in shape:

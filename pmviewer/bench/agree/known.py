@@ -19,11 +19,15 @@ GREY = [0.5, 0.5, 0.5]
 
 @dataclass(frozen=True)
 class Deviation:
-    """`without` gives the scene with what the deviation takes replaced by its like, None where there is nothing."""
+    """`without` gives the scene with what the deviation takes replaced by its like, None where there is nothing.
+
+    `rare`: random scenes seldom have it, since it shows nearly always.
+    """
 
     name: str
     reason: str
     without: Callable[[Node], Node | None]
+    rare: bool = True
 
 
 def _changed(change: Callable[[Node], None]) -> Callable[[Node], Node | None]:
@@ -106,6 +110,7 @@ DEVIATIONS = (
         "wanted: as with vertex normals; and under a bump map Mitsuba mixes coordinates of the surface and of the "
         "world when it makes the tangent",
         _changed(_unmapped),
+        rare=False,
     ),
     Deviation(
         "axis of rotation",

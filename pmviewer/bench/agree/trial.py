@@ -33,12 +33,14 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.errors import PmviewerError
 
 STAGES = (
-    Effort(runs=12, spp=64, passes=12, photons=20_000, radius=0.01),
+    Effort(runs=12, spp=64, passes=8, photons=20_000, radius=0.01),
     Effort(runs=16, spp=256, passes=16, photons=60_000, radius=0.005),
     Effort(runs=24, spp=512, passes=24, photons=120_000, radius=0.0025),
 )
 SUSPICIOUS = (0.01, 0.01)
 """Below this p the next stage decides."""
+BEYOND_DOUBT = 1e-10
+"""p of the second stage that spares the third for path tracers, which have no radius to shrink."""
 FORGIVEN = 4.0
 """Share of a block that photon methods may be off, over the radius relative to the scene: 1 % in the last stage."""
 LEAST_SEEN = 0.05
@@ -53,21 +55,19 @@ SAFE_TERMS = ("emission", "direct")
 
 @dataclass(frozen=True)
 class Comparison:
-    """`method` against `peer` in `what`; the outcome of the last stage that was needed, counted from 1."""
+    """`method` against `peer` in `what`; the outcome of the last stage that was needed, counted from 1. `final`:
+    whether it may be a disagreement, because all stages were suspicious or path tracers differ beyond doubt."""
 
     method: str
     peer: str
     what: str
     outcome: Outcome
     stage: int
-
-    @property
-    def final(self) -> bool:
-        """Whether all stages were suspicious; only then can it be a disagreement."""
-        return self.stage == len(STAGES)
+    final: bool
 
     @property
     def p(self) -> float:
+        """Chance of the difference where there is none; 1 where it is gone after another look."""
         return self.outcome.p if self.final else 1.0
 
 
@@ -143,9 +143,10 @@ class Question:
         """Stage after stage while the answer is suspicious, at most `stages` of them."""
         for stage in range(stages):
             outcome = self.answer(stage)
-            if stage == len(SUSPICIOUS) or outcome.p >= SUSPICIOUS[stage]:
+            final = stage == len(STAGES) - 1 or (self.method == "path" and stage > 0 and outcome.p < BEYOND_DOUBT)
+            if final or outcome.p >= SUSPICIOUS[stage]:
                 break
-        return Comparison(self.method, self.peer, self.what, outcome, stage + 1)
+        return Comparison(self.method, self.peer, self.what, outcome, stage + 1, final)
 
 
 def questions(runs: Runs) -> Iterator[Question]:

@@ -122,14 +122,14 @@ def scene_text(scene: Node, folder: Path, size: int = SIZE) -> str:
 
 
 def write_scene(scene: Node, folder: Path, name: str, size: int = SIZE) -> tuple[Path, Path]:
-    """Write the scene as `name`.xml. The second path is that of the file for programs that know no groups in groups,
-    mostly the same one."""
+    """Write the scene as `name`.xml. The second path is the file for Mitsuba, mostly the same one: without groups in
+    groups, which it does not know, and at scale 1, since its rays leave surfaces by 9e-5 of a unit at least."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.xml"
     path.write_text(scene_text(scene, folder, size), encoding="utf-8")
     nested = any(shape["type"] == "instance" for group in scene["groups"].values() for shape in group)
-    if not nested:
+    if not nested and scene["scale"] == 1:
         return path, path
-    flat = folder / f"{name}_flat.xml"
-    flat.write_text(scene_text(written_out(scene), folder, size), encoding="utf-8")
+    flat = folder / f"{name}_for_mitsuba.xml"
+    flat.write_text(scene_text({**written_out(scene), "scale": 1.0}, folder, size), encoding="utf-8")
     return path, flat
