@@ -13,6 +13,8 @@ PLAIN = ("point", "constant")
 MORE = ("spot", "directional", "envmap", *PLAIN)
 DELTA = frozenset(("point", "spot", "directional"))
 """Lights that no path meets by chance."""
+DISTANT = frozenset(("directional", "constant", "envmap"))
+"""Lights at infinity."""
 
 
 def bare(draw: Draw, kind: str, above: float) -> Node:

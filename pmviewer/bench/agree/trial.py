@@ -3,7 +3,8 @@
 * `path` with Mitsuba's path tracer: the picture, and what paths of one scattering bring (emission and direct light).
 * The photon methods with Mitsuba's path tracer. Where lights of one point or direction shine on smooth mirrors, glass
   or coats, no path tracer finds the caustics. There they are compared with Mitsuba's particle tracer instead, in the
-  pixels that see nothing of the kind; and where no such pixel is left, with each other.
+  pixels that see nothing of the kind; and where no such pixel is left, or lights at infinity shine, which Mitsuba's
+  particles show wrong, with each other.
 * The photon methods with our `path`, term by term: with such caustics only what the camera sees without them.
 
 Photon methods are consistent: what their look-ups blur or lose at edges goes with the radius r. A disc over a straight
@@ -22,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.bench.agree.generate import needs_particles
+from pmviewer.bench.agree.generate import has_distant_lights, needs_particles
 from pmviewer.bench.agree.mitsuba_client import Mitsuba, MitsubaError
 from pmviewer.bench.agree.ours import METHODS, PHOTON_METHODS, Effort, our_runs, picture, term
 from pmviewer.bench.agree.statistics import Outcome, compared, summaries
@@ -181,7 +182,7 @@ def questions(runs: Runs) -> Iterator[Question]:
 
         if not particles:
             yield Question(method, "Mitsuba path", "picture", by_paths)
-        elif runs.seen_plainly.mean() >= LEAST_SEEN:
+        elif not has_distant_lights(runs.scene) and runs.seen_plainly.mean() >= LEAST_SEEN:
             yield Question(method, "Mitsuba particles", "plain pixels", by_particles)
         elif method != "progressive":
             yield Question(method, "progressive", "picture", by_other)
