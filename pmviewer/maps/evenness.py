@@ -15,21 +15,15 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.jit import device
-from pmviewer.kernels.memory import stack_get_i4, stack_i4
+from pmviewer.kernels.memory import stack_get_i4
 from pmviewer.kernels.vector import basis
 from pmviewer.maps.hull import (
-    DIRECTIONS,
     EDGE,
-    FEWEST,
-    SMALLEST_AREA,
-    area_of,
-    corners_of,
     in_plane,
-    keep_farthest,
     moments_of,
-    no_hull,
     outside_by,
     share_of,
+    spanned_hull,
 )
 from pmviewer.maps.neighbours import next_batch
 
@@ -54,25 +48,10 @@ def evenly_filled_hull(photons, p, n, found, r2, scratch, hull):
 
     hull: HULL_WORDS words, which receive it; scratch: as for `search`.
     """
-    farthest = stack_i4(DIRECTIONS)
-    no_hull(farthest)
+    corners, area = spanned_hull(photons, p, n, found, r2, scratch, hull)
+    if corners == 0:
+        return _i8(0), _ZERO
     s, t = basis(n)
-    run, at, total = _i8(0), _i8(0), _i8(0)
-    while True:
-        run, at, some = next_batch(photons, found, run, at, scratch)
-        if some == 0:
-            break
-        total += some
-        for j in range(some):
-            place = _i8(stack_get_i4(scratch[2], j))
-            u, v = in_plane(photons, place, p, s, t)
-            keep_farthest(farthest, hull, place, u, v)
-    if total < FEWEST:
-        return _i8(0), _ZERO
-    corners = corners_of(hull)
-    area = area_of(hull, corners)
-    if not area > SMALLEST_AREA * r2:
-        return _i8(0), _ZERO
     mu, mv, uu, uv, vv = moments_of(hull, corners)
     det = uu * vv - uv * uv
     if not det > _ZERO:

@@ -199,13 +199,12 @@ def share_of(hull, corners, place, u, v, margin, boundary):
 
 
 @device
-def hull_irradiance(photons, eye, radius, p, n, class_mask):
-    """Irradiance (red, green, blue) in W per unit area at p with normal n, see `pmviewer.render.lookup.irradiance`."""
-    scratch = (stack_i4(FOUND_WORDS), stack_i4(SQUARED_WORDS), stack_i4(BATCH_WORDS))
-    farthest, hull = stack_i4(DIRECTIONS), stack_i4(HULL_WORDS)
+def spanned_hull(photons, p, n, found, r2, scratch, hull):
+    """Corners and area of the hull of the photons found, which goes into `hull` (HULL_WORDS words); 0 and 0 of too few
+    photons or next to no area. scratch: as for `search`."""
+    farthest = stack_i4(DIRECTIONS)
     no_hull(farthest)
     s, t = basis(n)
-    found, r2, _ = search(photons, eye, radius, p, n, class_mask, scratch)
     run, at, total = _i8(0), _i8(0), _i8(0)
     while True:
         run, at, some = next_batch(photons, found, run, at, scratch)
@@ -216,12 +215,22 @@ def hull_irradiance(photons, eye, radius, p, n, class_mask):
             place = _i8(stack_get_i4(scratch[2], j))
             u, v = in_plane(photons, place, p, s, t)
             keep_farthest(farthest, hull, place, u, v)
-    corners, area = _i8(0), _f4(0.0)
-    if total >= FEWEST:
-        corners = corners_of(hull)
-        area = area_of(hull, corners)
-        if not area > SMALLEST_AREA * r2:
-            corners, area = _i8(0), _f4(0.0)
+    if total < FEWEST:
+        return _i8(0), _f4(0.0)
+    corners = corners_of(hull)
+    area = area_of(hull, corners)
+    if not area > SMALLEST_AREA * r2:
+        return _i8(0), _f4(0.0)
+    return corners, area
+
+
+@device
+def hull_irradiance(photons, eye, radius, p, n, class_mask):
+    """Irradiance (red, green, blue) in W per unit area at p with normal n, see `pmviewer.render.lookup.irradiance`."""
+    scratch = (stack_i4(FOUND_WORDS), stack_i4(SQUARED_WORDS), stack_i4(BATCH_WORDS))
+    hull = stack_i4(HULL_WORDS)
+    found, r2, _ = search(photons, eye, radius, p, n, class_mask, scratch)
+    corners, area = spanned_hull(photons, p, n, found, r2, scratch, hull)
     red, green, blue = sum_inside(photons, p, n, found, r2, scratch, hull, corners, eye.boundary)
     if corners == 0:
         area = _f4(math.pi) * r2
