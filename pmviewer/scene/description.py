@@ -30,12 +30,13 @@ BLACK: RGB = (0.0, 0.0, 0.0)
 class Mesh:
     """Triangles. `vertices` (V, 3) float64 in world space, `faces` (F, 3) int32 counter-clockwise seen from the front,
     `normals` (V, 3) float64 unit shading normals or None for flat shading, `uv` (V, 2) float64 texture coordinates or
-    None."""
+    None, `colours` (V, 3) float64 linear RGB at vertices or None."""
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
     normals: NDArray[np.float64] | None = None
     uv: NDArray[np.float64] | None = None
+    colours: NDArray[np.float64] | None = None
 
 
 Frame = tuple[Vec3, Vec3, Vec3]
@@ -102,7 +103,26 @@ MaterialKind = Literal[
     "rough plastic",
     "schlick",
     "ward",
+    "principled",
+    "blend",
 ]
+
+
+@dataclass(frozen=True)
+class Principled:
+    """What a principled material has beyond the numbers of others; names and ranges are Mitsuba 3's, all from 0 to 1.
+
+    `spec_trans` is the share that transmits. `clearcoat_gloss` goes from a rough coat (0) to a smooth one (1).
+    """
+
+    metallic: float = 0.0
+    spec_trans: float = 0.0
+    spec_tint: float = 0.0
+    sheen: float = 0.0
+    sheen_tint: float = 0.0
+    flatness: float = 0.0
+    clearcoat: float = 0.0
+    clearcoat_gloss: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -116,6 +136,11 @@ class Material:
     complex index of a conductor, real and imaginary part per channel; without it it reflects the same at all angles.
     `nonlinear`: colours of a coated base shift by what the coat sends back to it. `absorption` is that of a
     dielectric's inside, per channel and scene unit (Beer–Lambert).
+
+    A "principled" material is Disney's (Burley 2012, 2015) as Mitsuba 3's `principled` has it: `reflectance` is its
+    base colour, `alpha` its roughness squared (with the aspect of anisotropy), `eta` the index that its specular
+    reflection comes from; see `Principled` for the rest. A "blend" is `parts[0]` and `parts[1]` in the shares 1 −
+    `weight` and `weight`; all else of its own that counts is `opacity`.
     """
 
     name: str
@@ -134,6 +159,13 @@ class Material:
     """By slot (`pmviewer.scene.texture.SLOTS`). A texture replaces the number of its slot's name, which is its mean."""
     bump_scale: float = 1.0
     """Multiplies the heights of `textures["bump"]`."""
+    opacity: float = 1.0
+    """Share of rays that meet the surface; the others pass straight through it."""
+    vertex_colours: bool = False
+    """Are `reflectance` and its texture multiplied by the colours at a mesh's vertices?"""
+    principled: Principled | None = None
+    parts: tuple[Material, ...] = ()
+    weight: float = 0.5
     mirrored_maps: bool = False
     """Seen from behind, do mapped normals turn round only across the surface, as if its picture were mirrored
     (Mitsuba's `twosided` around a map), or as a whole, as those of a thin sheet with bumps do?"""
@@ -230,8 +262,13 @@ Light = PointLight | SpotLight | DirectionalLight | Environment
 
 @dataclass(frozen=True)
 class Camera:
-    """Perspective camera. `up` need not be orthogonal to the view direction. `fov` in degrees, measured along
-    `fov_axis`. The image's x axis runs to the viewer's right, its y axis down."""
+    """Perspective or orthographic camera. `up` need not be orthogonal to the view direction. `fov` in degrees,
+    measured along `fov_axis`. The image's x axis runs to the viewer's right, its y axis down.
+
+    An orthographic camera's picture is `width` scene units wide and `fov` does not count. `shift` moves the picture's
+    middle off the view direction, in widths and heights of the picture: (0.1, 0) shows more of what is on the left, as
+    Mitsuba's `principal_point_offset_x` does.
+    """
 
     origin: Vec3
     target: Vec3
@@ -240,6 +277,9 @@ class Camera:
     fov_axis: Literal["x", "y", "diagonal", "smaller", "larger"] = "x"
     near: float = 0.0
     far: float = math.inf
+    projection: Literal["perspective", "orthographic"] = "perspective"
+    width: float = 1.0
+    shift: tuple[float, float] = (0.0, 0.0)
     mirrored: bool = False
     """True when the file's camera frame has the other handedness: the image is then flipped left to right."""
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from pmviewer.errors import SceneError
 from pmviewer.resources import data_folder
 from pmviewer.scene.description import Scene
-from pmviewer.scene.mitsuba import load_mitsuba
+from pmviewer.scene.formats.mitsuba.load import load_mitsuba
 
 MESH_ENDINGS = (".glb", ".gltf", ".obj", ".ply", ".stl")
 ENDINGS = (".xml", *MESH_ENDINGS)
@@ -60,7 +60,7 @@ def load_scene(path_or_name: str | Path, parameters: Mapping[str, str] | None = 
             else "A file without an ending can't be opened."
         )
         raise SceneError(what, path, hint=f"Known endings: {', '.join(ENDINGS)}.")
-    from pmviewer.scene.meshes import load_mesh_scene
+    from pmviewer.scene.formats.meshes import load_mesh_scene
 
     scene = load_mesh_scene(path)
     ignored = tuple(f"Parameter '{name}' was given, but {ending} files have none." for name in parameters or {})

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.scene.description import Mesh
-from pmviewer.scene.mitsuba_transform import Matrix, cofactor, mirrors
+from pmviewer.scene.formats.mitsuba.transform import Matrix, cofactor, mirrors
 
 Float = NDArray[np.float64]
 

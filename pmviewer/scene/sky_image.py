@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
 from pmviewer.output.exr import BEAUTY, read_exr
-from pmviewer.scene.hdr import read_hdr
+from pmviewer.scene.formats.hdr import read_hdr
 
 LEAST_WIDTH, LEAST_HEIGHT = 2, 3
 MOST_PIXELS = 1 << 27

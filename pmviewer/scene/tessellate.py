@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pmviewer.scene.description import Cylinder, Disk, Group, Mesh, Parallelogram, Scene, Shape, Sphere
 from pmviewer.scene.flatten import bounding_sphere
-from pmviewer.scene.mitsuba_transform import cofactor, mirrors
+from pmviewer.scene.formats.mitsuba.transform import cofactor, mirrors
 from pmviewer.scene.primitives import unit
 
 Float = NDArray[np.float64]

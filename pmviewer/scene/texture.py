@@ -60,9 +60,11 @@ class Checkerboard:
 
 Texture = Bitmap | Checkerboard
 
-SLOTS = ("reflectance", "specular_reflectance", "alpha", "transmittance", "normal", "bump")
-"""What a material's texture can give: colours, roughness (its luminance), a tangent-space normal as (n + 1) / 2, or a
-height in scene units (its luminance)."""
+SLOTS = (
+    "reflectance", "specular_reflectance", "alpha", "transmittance", "normal", "bump", "opacity", "weight", "metallic",
+)  # fmt: skip
+"""What a material's texture can give: colours, roughness (its luminance), a tangent-space normal as (n + 1) / 2, a
+height in scene units (its luminance), or one of the numbers of that name (its luminance)."""
 
 
 def scaled(texture: Texture, factor: RGB) -> Texture:

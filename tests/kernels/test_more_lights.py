@@ -15,7 +15,7 @@ from pmviewer.kernels.random import INDEPENDENT
 from pmviewer.scene.description import DirectionalLight, ImageEnvironment, SpotLight
 from pmviewer.scene.emission import emitted_power
 from pmviewer.scene.flatten import LUMINANCE, flatten
-from pmviewer.scene.mitsuba_transform import rotation
+from pmviewer.scene.formats.mitsuba.transform import rotation
 from tests.kernels.test_light_sampling import axes_of, emit, p_uniform, sample, turn
 from tests.scenes_for_tests import LIGHTS, light_scene
 

@@ -14,7 +14,7 @@ from pmviewer.output.exr import write_exr
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.describe import describe
 from pmviewer.scene.description import DirectionalLight, ImageEnvironment, PointLight, SpotLight
-from pmviewer.scene.hdr import read_hdr
+from pmviewer.scene.formats.hdr import read_hdr
 from pmviewer.scene.load import load_scene
 from pmviewer.scene.sky_image import read_sky
 from tests.scene.helpers import load

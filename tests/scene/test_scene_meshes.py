@@ -13,9 +13,9 @@ from pmviewer.errors import SceneError
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.description import BLACK, Mesh, Parallelogram, PointLight, Scene
 from pmviewer.scene.flatten import flatten
+from pmviewer.scene.formats.ply import read_ply
 from pmviewer.scene.framing import bounds
 from pmviewer.scene.load import load_scene
-from pmviewer.scene.ply import read_ply
 from pmviewer.settings import CameraSettings
 from tests.scene.helpers import load
 
@@ -84,7 +84,7 @@ def test_gltf_mesh_used_twice_and_matrix(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("emits", [False, True])
 def test_gltf_shared_meshes_become_instances_where_that_saves_memory(tmp_path: Path, monkeypatch, emits: bool) -> None:
-    monkeypatch.setattr("pmviewer.scene.gltf_shared.FEWEST_SAVED", 2)
+    monkeypatch.setattr("pmviewer.scene.formats.gltf.shared.FEWEST_SAVED", 2)
     material = {"emissiveFactor": [1, 1, 1]} if emits else {}
     nodes = [{"mesh": 0, "translation": [3 * i, 0, 0], "name": f"tri {i}"} for i in range(3)]
     flat = {"mesh": 0, "scale": [1, 1, 0]}  # a flat node can't be an instance
@@ -99,7 +99,7 @@ def test_gltf_shared_meshes_become_instances_where_that_saves_memory(tmp_path: P
     assert len(scene.groups) == len(written_out) == 1
     assert [i.to_world[0, 3] for i in scene.instances] == [0, 3, 6]
     assert flatten(scene).n_elements == 4 + 2 + 1  # with the studio's light and floor
-    monkeypatch.setattr("pmviewer.scene.gltf_shared.FEWEST_SAVED", 4)
+    monkeypatch.setattr("pmviewer.scene.formats.gltf.shared.FEWEST_SAVED", 4)
     alone = load_scene(path)
     assert alone.instances == ()
     assert alone.camera == scene.camera

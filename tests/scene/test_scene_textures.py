@@ -11,11 +11,11 @@ from PIL import Image
 
 from pmviewer.errors import SceneError
 from pmviewer.output.exr import write_exr
-from pmviewer.scene import texture_file
 from pmviewer.scene.description import Mesh, Scene
+from pmviewer.scene.formats import texture_file
+from pmviewer.scene.formats.texture_file import linear, read_picture
 from pmviewer.scene.load import load_scene
 from pmviewer.scene.texture import Bitmap, Checkerboard
-from pmviewer.scene.texture_file import linear, read_picture
 from tests.scene.helpers import load
 from tests.scene.test_scene_meshes import gltf, only_mesh
 

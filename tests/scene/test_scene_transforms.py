@@ -8,7 +8,7 @@ import pytest
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.description import Cylinder, Disk, Mesh, Parallelogram, Sphere
-from pmviewer.scene.mitsuba_transform import apply, look_at, rotation, similar_columns
+from pmviewer.scene.formats.mitsuba.transform import apply, look_at, rotation, similar_columns
 from tests.scene.helpers import load
 
 

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pmviewer.errors import SceneError
-from pmviewer.scene import mitsuba_values as values
-from pmviewer.scene.mitsuba_transform import OPERATIONS, operation
-from pmviewer.scene.mitsuba_xml import Element, parse_xml, substitute
+from pmviewer.scene.formats.mitsuba import values as values
+from pmviewer.scene.formats.mitsuba.transform import OPERATIONS, operation
+from pmviewer.scene.formats.mitsuba.xml import Element, parse_xml, substitute
 
 PARSERS = [
     values.parse_float,

@@ -6,7 +6,7 @@ import pytest
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.description import Sphere
-from pmviewer.scene.mitsuba_xml import parse_xml, substitute
+from pmviewer.scene.formats.mitsuba.xml import parse_xml, substitute
 from tests.scene.helpers import load
 
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pmviewer.scene.description import Group, Instance, Mesh, Shape
-from pmviewer.scene.gltf_material import GltfMaterials
+from pmviewer.scene.formats.gltf.material import GltfMaterials
+from pmviewer.scene.formats.meshfile import DEFAULT_MATERIAL, MeshFile
+from pmviewer.scene.formats.mitsuba.transform import Matrix
 from pmviewer.scene.instances import first_singular
-from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
-from pmviewer.scene.mitsuba_transform import Matrix
 
 Json = dict[str, Any]
 FEWEST_SAVED = 20_000

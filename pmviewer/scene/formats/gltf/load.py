@@ -18,10 +18,10 @@ import numpy as np
 
 from pmviewer.scene.description import Camera, DirectionalLight, Mesh, PointLight, Shape, SpotLight
 from pmviewer.scene.diagnostics import Diagnostics
-from pmviewer.scene.gltf_material import GltfMaterials
-from pmviewer.scene.gltf_shared import SharedMeshes
-from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
-from pmviewer.scene.mitsuba_transform import Matrix, mirrors, scaling, translation
+from pmviewer.scene.formats.gltf.material import GltfMaterials
+from pmviewer.scene.formats.gltf.shared import SharedMeshes
+from pmviewer.scene.formats.meshfile import DEFAULT_MATERIAL, MeshFile
+from pmviewer.scene.formats.mitsuba.transform import Matrix, mirrors, scaling, translation
 from pmviewer.scene.primitives import transformed
 
 Json = dict[str, Any]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pmviewer.scene.description import Geometry
 from pmviewer.scene.displacement import Fractal, Height, Waves, displaced
-from pmviewer.scene.mitsuba_document import Properties
+from pmviewer.scene.formats.mitsuba.document import Properties
 
 FINEST = 4096
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.formats.texture_file import read_picture
 from pmviewer.scene.texture import Affine, Bitmap
-from pmviewer.scene.texture_file import read_picture
 
 _KEYS = {"map_kd": "kd", "map_ks": "ks", "map_ke": "ke", "bump": "bump", "map_bump": "bump", "norm": "norm"}
 _COLOURS = ("kd", "ks", "ke")

@@ -13,15 +13,15 @@ import numpy as np
 from pmviewer.scene.clean import clean_lights, clean_shapes, on_a_surface
 from pmviewer.scene.description import RGB, Light, Scene, Shape
 from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.formats.mitsuba.bsdf import Materials
+from pmviewer.scene.formats.mitsuba.camera import DEFAULT_SIZE, View, film_size, view
+from pmviewer.scene.formats.mitsuba.document import SILENT_TAGS, Document, Properties
+from pmviewer.scene.formats.mitsuba.emitter import read_light
+from pmviewer.scene.formats.mitsuba.group import GROUP, INSTANCE, Groups
+from pmviewer.scene.formats.mitsuba.shape import SUPPORTED, geometry
+from pmviewer.scene.formats.mitsuba.xml import Element, read_xml, substitute
 from pmviewer.scene.framing import framed
 from pmviewer.scene.instances import joint_bounds
-from pmviewer.scene.mitsuba_bsdf import Materials
-from pmviewer.scene.mitsuba_camera import DEFAULT_SIZE, View, film_size, view
-from pmviewer.scene.mitsuba_document import SILENT_TAGS, Document, Properties
-from pmviewer.scene.mitsuba_emitter import read_light
-from pmviewer.scene.mitsuba_group import GROUP, INSTANCE, Groups
-from pmviewer.scene.mitsuba_shape import SUPPORTED, geometry
-from pmviewer.scene.mitsuba_xml import Element, read_xml, substitute
 from pmviewer.scene.texture import Texture
 
 # Definitions that other objects refer to change nothing where they stand.

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pmviewer.scene.description import RGB
-from pmviewer.scene.mitsuba_values import average_spectrum, parse_float
+from pmviewer.scene.formats.mitsuba.values import average_spectrum, parse_float
 
 if TYPE_CHECKING:
-    from pmviewer.scene.mitsuba_document import Properties
+    from pmviewer.scene.formats.mitsuba.document import Properties
 
 WHITE: RGB = (1.0, 1.0, 1.0)
 

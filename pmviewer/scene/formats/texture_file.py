@@ -84,7 +84,7 @@ def _exr(source: Path | bytes, data: bytes, name: str) -> NDArray[np.float32]:
 
 
 def _hdr(path: Path, name: str) -> NDArray[np.float32]:
-    from pmviewer.scene.hdr import read_hdr
+    from pmviewer.scene.formats.hdr import read_hdr
 
     try:
         return read_hdr(path)

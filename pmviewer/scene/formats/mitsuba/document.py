@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError
 from pmviewer.scene.description import RGB, Vec3
 from pmviewer.scene.diagnostics import Diagnostics
-from pmviewer.scene.mitsuba_spectrum import spectrum_object
-from pmviewer.scene.mitsuba_texture import TYPES as TEXTURE_TYPES
-from pmviewer.scene.mitsuba_texture import read_texture
-from pmviewer.scene.mitsuba_transform import Matrix, is_unit_rotation, operation
-from pmviewer.scene.mitsuba_values import (
+from pmviewer.scene.formats.mitsuba.spectrum import spectrum_object
+from pmviewer.scene.formats.mitsuba.texture import TYPES as TEXTURE_TYPES
+from pmviewer.scene.formats.mitsuba.texture import read_texture
+from pmviewer.scene.formats.mitsuba.transform import Matrix, is_unit_rotation, operation
+from pmviewer.scene.formats.mitsuba.values import (
     LARGEST,
     is_sampled,
     parse_boolean,
@@ -28,7 +28,7 @@ from pmviewer.scene.mitsuba_values import (
     parse_srgb,
     parse_vector,
 )
-from pmviewer.scene.mitsuba_xml import Element
+from pmviewer.scene.formats.mitsuba.xml import Element
 from pmviewer.scene.texture import LUMINANCE, Texture, limited
 
 T = TypeVar("T")

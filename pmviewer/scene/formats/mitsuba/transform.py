@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.scene.mitsuba_values import parse_float, parse_numbers, parse_vector
-from pmviewer.scene.mitsuba_xml import Element
+from pmviewer.scene.formats.mitsuba.values import parse_float, parse_numbers, parse_vector
+from pmviewer.scene.formats.mitsuba.xml import Element
 
 Matrix = NDArray[np.float64]
 OPERATIONS = ("translate", "rotate", "scale", "matrix", "lookat")

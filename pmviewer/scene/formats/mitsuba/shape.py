@@ -12,10 +12,10 @@ from pmviewer.errors import SceneError
 from pmviewer.scene import primitives
 from pmviewer.scene.clean import check_faces
 from pmviewer.scene.description import Cylinder, Disk, Frame, Geometry, Mesh, Parallelogram, Sphere, Vec3
-from pmviewer.scene.mitsuba_displacement import displacement
-from pmviewer.scene.mitsuba_document import Properties
-from pmviewer.scene.mitsuba_transform import Matrix, apply, mirrors, similar_columns
-from pmviewer.scene.ply import read_ply
+from pmviewer.scene.formats.mitsuba.displacement import displacement
+from pmviewer.scene.formats.mitsuba.document import Properties
+from pmviewer.scene.formats.mitsuba.transform import Matrix, apply, mirrors, similar_columns
+from pmviewer.scene.formats.ply import read_ply
 from pmviewer.scene.texture_coordinates import orthonormal
 
 SUPPORTED = ("obj", "ply", "rectangle", "cube", "sphere", "disk", "cylinder")
@@ -136,6 +136,6 @@ def _mesh_file(p: Properties, to_world: Matrix, flip: bool) -> Mesh:
 
 
 def _read_obj(path: Path) -> Mesh:
-    from pmviewer.scene.meshes import read_single
+    from pmviewer.scene.formats.meshes import read_single
 
     return read_single(path)

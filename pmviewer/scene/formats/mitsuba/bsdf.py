@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Literal
 
 from pmviewer.scene.description import BLACK, RGB, Material
-from pmviewer.scene.mitsuba_document import Document, Properties
-from pmviewer.scene.mitsuba_maps import mapped, with_textures
-from pmviewer.scene.mitsuba_xml import Element
+from pmviewer.scene.formats.mitsuba.document import Document, Properties
+from pmviewer.scene.formats.mitsuba.maps import mapped, with_textures
+from pmviewer.scene.formats.mitsuba.xml import Element
 from pmviewer.scene.optics import IOR, METALS, metal
 
 _LARGEST_ALPHA = 10.0

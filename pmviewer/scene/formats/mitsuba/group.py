@@ -8,10 +8,10 @@ import numpy as np
 
 from pmviewer.scene.clean import clean_shapes
 from pmviewer.scene.description import Group, Instance, Shape
+from pmviewer.scene.formats.mitsuba.document import Document, Properties
+from pmviewer.scene.formats.mitsuba.transform import Matrix
+from pmviewer.scene.formats.mitsuba.xml import Element
 from pmviewer.scene.instances import first_singular
-from pmviewer.scene.mitsuba_document import Document, Properties
-from pmviewer.scene.mitsuba_transform import Matrix
-from pmviewer.scene.mitsuba_xml import Element
 
 GROUP, INSTANCE = "shapegroup", "instance"
 MOST_INSTANCES = 1 << 22

@@ -17,8 +17,8 @@ from pmviewer.scene.description import (
     SpotLight,
     Vec3,
 )
-from pmviewer.scene.mitsuba_document import Properties
-from pmviewer.scene.mitsuba_transform import Matrix, similar_columns
+from pmviewer.scene.formats.mitsuba.document import Properties
+from pmviewer.scene.formats.mitsuba.transform import Matrix, similar_columns
 from pmviewer.scene.sky_image import read_sky
 
 CUTOFF = 20.0

@@ -13,8 +13,8 @@ import numpy as np
 from pmviewer.errors import SceneError
 from pmviewer.scene.description import RGB, Material, Mesh, Shape
 from pmviewer.scene.diagnostics import Diagnostics
-from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
-from pmviewer.scene.mtl_maps import load_maps, read_maps
+from pmviewer.scene.formats.meshfile import DEFAULT_MATERIAL, MeshFile
+from pmviewer.scene.formats.mtl_maps import load_maps, read_maps
 from pmviewer.scene.primitives import fans
 from pmviewer.scene.texture import Bitmap, Texture, limited, scaled
 

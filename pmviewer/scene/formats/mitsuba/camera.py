@@ -10,10 +10,10 @@ import numpy as np
 
 from pmviewer.scene.clean import check_camera, check_size
 from pmviewer.scene.description import Camera, Vec3
-from pmviewer.scene.mitsuba_document import Document, Properties
-from pmviewer.scene.mitsuba_transform import mirrors
-from pmviewer.scene.mitsuba_values import parse_float, parse_numbers
-from pmviewer.scene.mitsuba_xml import Element
+from pmviewer.scene.formats.mitsuba.document import Document, Properties
+from pmviewer.scene.formats.mitsuba.transform import mirrors
+from pmviewer.scene.formats.mitsuba.values import parse_float, parse_numbers
+from pmviewer.scene.formats.mitsuba.xml import Element
 
 Axis = Literal["x", "y", "diagonal", "smaller", "larger"]
 DEFAULT_SIZE = (768, 576)

@@ -11,7 +11,7 @@ import numpy as np
 
 from pmviewer.scene.description import BLACK, RGB, Material, MaterialKind
 from pmviewer.scene.diagnostics import Diagnostics
-from pmviewer.scene.gltf_texture import GltfTextures
+from pmviewer.scene.formats.gltf.texture import GltfTextures
 from pmviewer.scene.texture import Bitmap, Texture, limited
 
 Json = dict[str, Any]

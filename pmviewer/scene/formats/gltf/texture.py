@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.formats.texture_file import read_picture
 from pmviewer.scene.texture import RGB, Affine, Bitmap
-from pmviewer.scene.texture_file import read_picture
 
 Json = dict[str, Any]
 _NEAREST = 9728

@@ -20,12 +20,12 @@ from pmviewer.scene.description import (
     Shape,
 )
 from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.formats.gltf.load import read_gltf
+from pmviewer.scene.formats.meshfile import DEFAULT_MATERIAL, MeshFile
+from pmviewer.scene.formats.obj import as_utf8, joined, obj_parts, read_obj
+from pmviewer.scene.formats.ply import read_ply
 from pmviewer.scene.framing import framed
-from pmviewer.scene.gltf import read_gltf
 from pmviewer.scene.instances import clean_instances, joint_bounds
-from pmviewer.scene.meshfile import DEFAULT_MATERIAL, MeshFile
-from pmviewer.scene.obj import as_utf8, joined, obj_parts, read_obj
-from pmviewer.scene.ply import read_ply
 from pmviewer.scene.studio import studio_of
 
 T = TypeVar("T")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from pmviewer.scene.description import Material
-from pmviewer.scene.mitsuba_document import Properties
+from pmviewer.scene.formats.mitsuba.document import Properties
 from pmviewer.scene.texture import Texture, scaled
 
 _ALPHAS = ("alpha", "alpha_u", "alpha_v")

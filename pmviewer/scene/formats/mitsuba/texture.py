@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pmviewer.errors import SceneError
+from pmviewer.scene.formats.texture_file import read_picture
 from pmviewer.scene.texture import Affine, Bitmap, Checkerboard, Texture
-from pmviewer.scene.texture_file import read_picture
 
 if TYPE_CHECKING:
-    from pmviewer.scene.mitsuba_document import Properties
+    from pmviewer.scene.formats.mitsuba.document import Properties
 
 TYPES = ("bitmap", "checkerboard")
 

@@ -1,0 +1,1 @@
+"""Readers of scene files, one folder or file a format."""

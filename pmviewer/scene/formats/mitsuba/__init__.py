@@ -1,0 +1,1 @@
+"""Mitsuba's XML scenes."""
