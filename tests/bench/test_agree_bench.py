@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import signal
+import subprocess
 import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -95,19 +99,18 @@ def test_every_method_is_compared_in_every_scene_and_a_wrong_one_is_found(partic
         assert any(c.p == pytest.approx(0) and wrong in (c.method, c.peer) for c in found)
 
 
-def comparison(method: str, p: float, ratio: float = 1.2, peer_name: str = "Mitsuba path") -> Comparison:
-    return Comparison(method, peer_name, "picture", Outcome(p, ratio, 0.01, 51), len(STAGES), True)
+def comparison(
+    method: str, p: float, ratio: float = 1.2, peer_name: str = "Mitsuba path", known: str = ""
+) -> Comparison:
+    return Comparison(method, peer_name, "picture", Outcome(p, ratio, 0.01, 51), len(STAGES), True, known)
 
 
 def test_a_disagreement_is_saved_and_reported_and_chance_is_not(tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        bench, "explanation", lambda scene, found, level, salt: "textured light" * (found.method == "gather")
-    )
     monkeypatch.setattr(bench, "smallest", lambda scene, found, salt, most: scene)
     verdicts = {
         0: Verdict([comparison("path", 0.009), comparison("gather", 0.5)], lit=1),
         1: Verdict([comparison("path", 1e-9), comparison("nearest", 1e-9)], lit=1),
-        2: Verdict([comparison("gather", 1e-9)], lit=1),
+        2: Verdict([comparison("gather", 1e-9, known="textured light")], lit=1),
         3: Verdict(refused="Mitsuba 3: no"),
     }
     found = bench.judged(7, verdicts, tmp_path)
@@ -157,7 +160,12 @@ def test_known_deviations_explain_only_what_agrees_without_them(monkeypatch):
     assert triage.explanation(scene, found, 1e-5, (1,)) == ""
     own = comparison("gather", 1e-9, peer_name="our path")
     monkeypatch.setattr(triage, "outcome_of", answers(set()))
-    assert triage.explanation(scene, own, 1e-5, (1,)) == ""
+    among_ours = [d.name for d in DEVIATIONS if d.among_ours and d.name in names]
+    assert triage.explanation(scene, own, 1e-5, (1,)) in ("", *among_ours)
+    assert bool(triage.explanation(scene, own, 1e-5, (1,))) == bool(among_ours)
+    monkeypatch.setattr(triage, "outcome_of", answers({names[1]}))
+    assert triage.explained(scene, found, (1,)).known == names[1]
+    assert triage.explained(scene, comparison("path", 1e-3), (1,)).known == ""
 
 
 WORK = """
@@ -194,3 +202,35 @@ def test_missing_mitsuba_and_senseless_numbers_are_one_clear_error(monkeypatch):
 def test_options_reach_the_bench_that_has_them_alone(monkeypatch):
     with pytest.raises(SettingError, match="'rays' has no option --seed"):
         run_bench("rays", options={"seed": 3, "scenes": None})
+
+
+ORPHAN = """
+import os, sys, time
+from multiprocessing import get_context
+from pmviewer.bench.agree.process import end_with
+
+def child(parent):
+    end_with(parent)
+    print(os.getpid(), flush=True)
+    time.sleep(60)
+
+if __name__ == "__main__":
+    get_context("spawn").Process(target=child, args=(os.getpid(),)).start()
+"""
+
+
+def test_workers_end_with_a_bench_that_was_killed(tmp_path):
+    script = tmp_path / "orphan.py"
+    script.write_text(ORPHAN)
+    bench_process = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True)
+    assert bench_process.stdout is not None
+    worker = int(bench_process.stdout.readline())
+    bench_process.kill()
+    bench_process.wait()
+    for _ in range(100):
+        status = Path(f"/proc/{worker}/stat")
+        if not status.exists() or status.read_text().rpartition(")")[2].split()[0] == "Z":
+            return
+        time.sleep(0.1)
+    os.kill(worker, signal.SIGKILL)
+    pytest.fail("the worker outlived its bench by ten seconds")

@@ -16,7 +16,7 @@ from pmviewer.bench.agree.generate import scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH
 from pmviewer.bench.agree.statistics import LEVEL, rejected
-from pmviewer.bench.agree.triage import explanation, save, smallest, without_all
+from pmviewer.bench.agree.triage import save, smallest, without_all
 from pmviewer.bench.agree.trial import FORGIVEN, STAGES, Comparison, Verdict
 from pmviewer.bench.agree.workers import try_scenes
 from pmviewer.bench.agree.xml import MAX_DEPTH, SIZE
@@ -62,7 +62,11 @@ def run(quick: bool = False, scenes: int | None = None, seed: int = SEED, keep: 
 
 
 def _tell(seed: int, index: int, verdict: Verdict, done: int, count: int, seconds: float) -> None:
-    doubts = [f"{c.method} {c.what} {c.outcome.ratio:.3f}" for c in verdict.comparisons if c.final]
+    doubts = [
+        f"{c.method} {c.what} {c.outcome.ratio:.3f} (p {c.p:.0e}{', ' * bool(c.known)}{c.known})"
+        for c in verdict.comparisons
+        if c.final
+    ]
     said = verdict.refused or ("in doubt: " + ", ".join(doubts) if doubts else "agrees")
     profile = scene_of(seed, index)["profile"]
     print(f"[{done}/{count}, {seconds:.0f} s] scene {index} ({profile}): {said}", file=sys.stderr, flush=True)
@@ -77,24 +81,15 @@ def judged(seed: int, verdicts: dict[int, Verdict], folder: Path) -> list[Disagr
         if is_rejected:
             by_scene.setdefault(index, []).append(comparison)
     found = [Disagreement(i, None, tuple(METHODS), v.refused) for i, v in sorted(verdicts.items()) if v.refused]
-    level = LEVEL / max(len(pairs), 1)
     for index, comparisons in by_scene.items():
-        found.append(_explained(seed, index, comparisons, level, folder, len(found)))
+        found.append(_judged(seed, index, comparisons, folder, len(found)))
     return found
 
 
-def _explained(
-    seed: int, index: int, comparisons: list[Comparison], level: float, folder: Path, shrunk_before: int
-) -> Disagreement:
+def _judged(seed: int, index: int, comparisons: list[Comparison], folder: Path, shrunk_before: int) -> Disagreement:
     scene, salt = scene_of(seed, index), (seed, index)
     methods = tuple(dict.fromkeys(c.method for c in comparisons))
-    unknown, known = [], []
-    for comparison in comparisons:
-        why = explanation(scene, comparison, level, salt)
-        if why:
-            known.append(why)
-        else:
-            unknown.append(comparison)
+    unknown, known = [c for c in comparisons if not c.known], [c.known for c in comparisons if c.known]
     worst = max(unknown or comparisons, key=lambda c: (c.method == "path", abs(np.log(max(c.outcome.ratio, 1e-9)))))
     text = (
         f"{worst.method} against {worst.peer}, {worst.what}: ratio {worst.outcome.ratio:.4f}, p {worst.outcome.p:.1g}"

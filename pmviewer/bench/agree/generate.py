@@ -80,7 +80,7 @@ def scene_of(seed: int, index: int) -> Node:
     _require(draw, made, profile, scene)
     scene["camera"] = _camera(draw, closed, scene)
     for deviation in DEVIATIONS:
-        if deviation.rare and profile.name != "tilted normals" and draw.chance(0.7):
+        if deviation.rare and profile.name != "tilted normals" and draw.chance(0.85):
             scene = deviation.without(scene) or scene
     if needs_particles(scene) and draw.chance(0.8):
         _near_lights_alone(scene)
@@ -88,6 +88,8 @@ def scene_of(seed: int, index: int) -> Node:
         for shape in scene["shapes"]:
             if "mesh" in shape and "emitter" in shape:
                 shape["face_normals"] = True
+            if _checkered(shape):  # which Mitsuba's particle tracer can't start from
+                shape["emitter"]["radiance"] = shape["emitter"]["radiance"]["color1"]
     return scene
 
 
@@ -102,6 +104,11 @@ def _choose(draw: Draw, profile: Profile, closed: bool) -> Profile:
         ground = tuple(k for k in profile.ground if not materials.is_delta({"type": k}))
         return replace(profile, bsdfs=rough or profile.bsdfs, ground=ground)
     return profile
+
+
+def _checkered(shape: Node) -> bool:
+    radiance = shape.get("emitter", {}).get("radiance")
+    return isinstance(radiance, dict) and radiance["type"] == "checkerboard"
 
 
 def needs_particles(scene: Node) -> bool:

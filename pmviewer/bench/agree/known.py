@@ -1,7 +1,8 @@
 """Where the pictures differ for a reason that is known: by Mitsuba's own deviations, or by what is wanted here.
 
-Nothing else is on the list. A disagreement with Mitsuba is put down to an entry only when the scene has what it takes,
-and the same comparison of the scene without that agrees; otherwise it stands. How each was verified stands with it, and
+Nothing else is on the list. A disagreement with Mitsuba, or for entries marked so among our own methods, is put down to
+an entry only when the scene has what it takes, and the same comparison of the scene without that agrees; otherwise it
+stands. How each was verified stands with it, and
 docs/scenes.md says the same to users.
 """
 
@@ -21,13 +22,14 @@ GREY = [0.5, 0.5, 0.5]
 class Deviation:
     """`without` gives the scene with what the deviation takes replaced by its like, None where there is nothing.
 
-    `rare`: random scenes seldom have it, since it shows nearly always.
+    `rare`: random scenes seldom have it, since it shows nearly always. `among_ours`: our own methods differ by it too.
     """
 
     name: str
     reason: str
     without: Callable[[Node], Node | None]
     rare: bool = True
+    among_ours: bool = False
 
 
 def _changed(change: Callable[[Node], None]) -> Callable[[Node], Node | None]:
@@ -102,15 +104,17 @@ DEVIATIONS = (
     Deviation(
         "vertex normals",
         "wanted: where vertex normals tilt the shading, directions below the surface itself carry no light here; "
-        "Mitsuba's BSDFs ask the shading normal alone, and light goes through",
+        "Mitsuba's BSDFs ask the shading normal alone, and light goes through. Normals of mirrors and gloss "
+        "lean towards whoever looks, lest reflections go below the surface: photons look from elsewhere than paths",
         _changed(_flat_meshes),
+        among_ours=True,
     ),
     Deviation(
         "bump and normal maps",
         "wanted: as with vertex normals; and under a bump map Mitsuba mixes coordinates of the surface and of the "
-        "world when it makes the tangent",
+        "world when it makes the tangent. Mapped normals that face away lean towards whoever looks, as in Mitsuba",
         _changed(_unmapped),
-        rare=False,
+        among_ours=True,
     ),
     Deviation(
         "axis of rotation",

@@ -59,7 +59,8 @@ SAFE_TERMS = ("emission", "direct")
 @dataclass(frozen=True)
 class Comparison:
     """`method` against `peer` in `what`; the outcome of the last stage that was needed, counted from 1. `final`:
-    whether it may be a disagreement, because all stages were suspicious or path tracers differ beyond doubt."""
+    whether it may be a disagreement, because all stages were suspicious or path tracers differ beyond doubt. `known`:
+    the known deviation that it comes from, if it does."""
 
     method: str
     peer: str
@@ -67,6 +68,7 @@ class Comparison:
     outcome: Outcome
     stage: int
     final: bool
+    known: str = ""
 
     @property
     def p(self) -> float:

@@ -6,44 +6,29 @@ dies, the scenes it may have died of are tried again alone, and the one that kil
 
 from __future__ import annotations
 
-import atexit
 import multiprocessing
+import os
 import tempfile
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from pmviewer.bench.agree.generate import scene_of
-from pmviewer.bench.agree.mitsuba_client import Mitsuba
+from pmviewer.bench.agree.process import end_with, tools
+from pmviewer.bench.agree.triage import explained
 from pmviewer.bench.agree.trial import Verdict, tried
-from pmviewer.engine.pool import WorkPool, available_threads
-
-_own: dict[str, Any] = {}
-"""What a worker process keeps: its folder, its Mitsuba, its pool of one thread."""
-
-
-def tools() -> tuple[Path, Mitsuba, WorkPool]:
-    """This process's own folder, Mitsuba and pool, made with the first call and closed with the process."""
-    if not _own:
-        folder = tempfile.TemporaryDirectory(prefix="pmviewer-agree-")
-        _own.update(folder=folder, mitsuba=Mitsuba(Path(folder.name)), pool=WorkPool(1))
-        atexit.register(_close)
-    return Path(_own["folder"].name), _own["mitsuba"], _own["pool"]
-
-
-def _close() -> None:
-    _own["mitsuba"].close()
-    _own["pool"].close()
-    _own["folder"].cleanup()
+from pmviewer.engine.pool import available_threads
 
 
 def try_scene(seed: int, index: int) -> Verdict:
-    """All comparisons of a scene, in this process."""
+    """All comparisons of a scene, in this process, and what those that may be disagreements come from."""
     folder, mitsuba, pool = tools()
+    scene, salt = scene_of(seed, index), (seed, index)
     with tempfile.TemporaryDirectory(dir=folder) as place:
-        return tried(scene_of(seed, index), Path(place), mitsuba, pool, (seed, index))
+        verdict = tried(scene, Path(place), mitsuba, pool, salt)
+    return replace(verdict, comparisons=[explained(scene, c, salt) for c in verdict.comparisons])
 
 
 def try_scenes(
@@ -68,7 +53,7 @@ def _side_by_side(
 ) -> Generator[tuple[int, Verdict], None, list[int]]:
     """Try the scenes that wait, taking those off the list that are done; the scenes at work when a process died."""
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context) as executor:
+    with ProcessPoolExecutor(processes, context, end_with, (os.getpid(),)) as executor:
         running: dict[Future[Verdict], int] = {}
         following = iter(list(waiting))
         try:
