@@ -11,6 +11,7 @@ from pmviewer.errors import SceneError
 from pmviewer.resources import data_folder
 from pmviewer.scene.description import Scene
 from pmviewer.scene.formats.mitsuba.load import load_mitsuba
+from pmviewer.scene.tilt import leaning_mirrors
 
 MESH_ENDINGS = (".glb", ".gltf", ".obj", ".ply", ".stl")
 ENDINGS = (".xml", *MESH_ENDINGS)
@@ -49,7 +50,12 @@ def load_scene(path_or_name: str | Path, parameters: Mapping[str, str] | None = 
 
     Raises SceneError for anything wrong with the input, and nothing else.
     """
-    path = _find(path_or_name)
+    scene = _read(_find(path_or_name), parameters)
+    leaning = leaning_mirrors(scene)
+    return replace(scene, warnings=(*scene.warnings, leaning)) if leaning else scene
+
+
+def _read(path: Path, parameters: Mapping[str, str] | None) -> Scene:
     ending = path.suffix.lower()
     if ending == ".xml":
         return load_mitsuba(path, parameters or {})

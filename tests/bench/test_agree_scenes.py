@@ -71,7 +71,7 @@ def test_every_scene_is_read_without_a_warning_and_few_variants_of_kernels_are_n
     for i in range(72):
         path, _ = write_scene(scene_of(2, i), tmp_path, f"scene{i}")
         scene = load_scene(path)
-        assert [w for w in scene.warnings if HARMLESS not in w] == [], (i, scene_of(2, i)["profile"])
+        assert [w for w in scene.warnings if not any(h in w for h in HARMLESS)] == [], (i, scene_of(2, i)["profile"])
         kinds.add(flatten(scene).record.dtype)
     assert len(kinds) <= 5
 
