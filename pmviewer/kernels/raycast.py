@@ -1,5 +1,7 @@
 """Casting rays: the nearest hit, and whether anything is in between.
 
+Where surfaces let rays pass (`pmviewer.kernels.opacity`) a hit counts that the ray does not pass.
+
 `scene` is a record with the fields of `bvh.BVH_FIELDS`, and with those of `instance` if there are instances: their
 leaves start a second traversal, of the group's tree by the ray in the group's coordinates.
 
@@ -14,6 +16,8 @@ from numba.extending import overload
 
 from pmviewer.kernels.instance import (
     G_BLOCKS,
+    G_FIRST_QUADRIC,
+    G_FIRST_TRIANGLE,
     G_N_BLOCKS,
     G_N_TRIANGLES,
     G_NODES,
@@ -37,6 +41,15 @@ from pmviewer.kernels.memory import (
     stack_put_i4,
     stack_put_i8,
 )
+from pmviewer.kernels.opacity import (
+    Veil,
+    VeiledInstances,
+    hit_counts,
+    is_a,
+    lets_pass,
+    ray_key,
+    triangle_counts,
+)
 from pmviewer.kernels.quadric import QUADRIC_FLOATS, intersect_quadric
 from pmviewer.kernels.simd import (
     BLOCK_BYTES,
@@ -52,6 +65,7 @@ from pmviewer.kernels.simd import (
 QUADRIC_BYTES = 4 * QUADRIC_FLOATS
 STACK_INTS = 1024  # 512 keys; a level pushes at most 7, and the build keeps trees below 72 levels
 SCRATCH_INTS = 3 * LANES
+_0 = np.int64(0)
 
 
 @device
@@ -99,6 +113,66 @@ def _occluded_in_leaf(scene, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
     return _occluded_in_tree(leaves, nodes, blocks, n_blocks, px, py, pz, vx, vy, vz, tmin - start, tmax - start)
 
 
+@device
+def _closest_quadric(scene, key, address, ident, stored, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    """The nearest hit with a quadric that the ray does not pass: it may pass the near side and meet the far one."""
+    zero = np.float32(0)
+    while True:
+        t = intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax)
+        if not t < tmax:
+            return tmax
+        if hit_counts(scene, key, ident, stored, zero, zero, ox + t * dx, oy + t * dy, oz + t * dz):
+            return t
+        tmin, key = t, np.uint32(key ^ np.uint32(0x9E3779B9))
+
+
+@device
+def _closest_veiled_quadric(veil, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    ident, stored = veil.base + veil.n_triangles + leaf, veil.scene.n_triangles + veil.first_quadric + leaf
+    address = veil.quadrics + leaf * QUADRIC_BYTES
+    return _closest_quadric(veil.scene, veil.key, address, ident, stored, ox, oy, oz, dx, dy, dz, tmin, tmax)
+
+
+@device
+def _closest_in_veiled_leaf(veiled, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    scene, key = veiled.scene, veiled.key
+    if leaf < scene.n_own_quadrics:
+        address, stored = scene.bvh_quadrics + leaf * QUADRIC_BYTES, scene.n_triangles + leaf
+        t = _closest_quadric(scene, key, address, stored, stored, ox, oy, oz, dx, dy, dz, tmin, tmax)
+        return t, np.int32(stored), np.float32(0), np.float32(0)
+    i = leaf - scene.n_own_quadrics
+    group, base = group_of(scene, i), np.int64(instance_number(scene, i, I_BASE))
+    px, py, pz, vx, vy, vz, start = local_ray(scene, i, ox, oy, oz, dx, dy, dz)
+    veil = Veil(
+        group_number(scene, group, G_QUADRICS), group_number(scene, group, G_N_TRIANGLES), scene, key,
+        group_number(scene, group, G_FIRST_TRIANGLE), group_number(scene, group, G_FIRST_QUADRIC), base,
+    )  # fmt: skip
+    nodes, blocks = group_number(scene, group, G_NODES), group_number(scene, group, G_BLOCKS)
+    n_blocks = group_number(scene, group, G_N_BLOCKS)
+    t, prim, u, v = _closest_in_tree(veil, nodes, blocks, n_blocks, px, py, pz, vx, vy, vz, tmin - start, tmax - start)
+    if prim < 0:
+        return tmax, prim, u, v
+    return start + t, np.int32(base) + prim, u, v
+
+
+@device
+def _occluded_in_veiled_leaf(veiled, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    scene, key = veiled.scene, veiled.key
+    if leaf < scene.n_own_quadrics:
+        address, stored = scene.bvh_quadrics + leaf * QUADRIC_BYTES, scene.n_triangles + leaf
+        return _closest_quadric(scene, key, address, stored, stored, ox, oy, oz, dx, dy, dz, tmin, tmax) < tmax
+    i = leaf - scene.n_own_quadrics
+    group, base = group_of(scene, i), np.int64(instance_number(scene, i, I_BASE))
+    px, py, pz, vx, vy, vz, start = local_ray(scene, i, ox, oy, oz, dx, dy, dz)
+    veil = Veil(
+        group_number(scene, group, G_QUADRICS), group_number(scene, group, G_N_TRIANGLES), scene, key,
+        group_number(scene, group, G_FIRST_TRIANGLE), group_number(scene, group, G_FIRST_QUADRIC), base,
+    )  # fmt: skip
+    nodes, blocks = group_number(scene, group, G_NODES), group_number(scene, group, G_BLOCKS)
+    n_blocks = group_number(scene, group, G_N_BLOCKS)
+    return _occluded_in_tree(veil, nodes, blocks, n_blocks, px, py, pz, vx, vy, vz, tmin - start, tmax - start)
+
+
 def meet_leaf(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
     """(t, primitive, u, v) of the nearest hit with what is no block; t = tmax without one."""
     raise NotImplementedError("only for kernels")
@@ -106,6 +180,17 @@ def meet_leaf(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
 
 @overload(meet_leaf)
 def _meet_leaf(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    if is_a(VeiledInstances, leaves):
+        return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: _closest_in_veiled_leaf(
+            leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax
+        )
+    if is_a(Veil, leaves):
+        return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: (
+            _closest_veiled_quadric(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax),
+            np.int32(leaves.n_triangles + leaf),
+            np.float32(0),
+            np.float32(0),
+        )
     if has_instances(leaves):
         return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: _closest_in_leaf(
             leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax
@@ -125,6 +210,14 @@ def leaf_occludes(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
 
 @overload(leaf_occludes)
 def _leaf_occludes(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    if is_a(VeiledInstances, leaves):
+        return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: _occluded_in_veiled_leaf(
+            leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax
+        )
+    if is_a(Veil, leaves):
+        return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: (
+            _closest_veiled_quadric(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax) < tmax
+        )
     if has_instances(leaves):
         return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: _occluded_in_leaf(
             leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax
@@ -134,10 +227,32 @@ def _leaf_occludes(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
     )
 
 
+def block_occludes(leaves, block, mask, scratch):
+    """Whether one of the triangles that `hit_triangles` found in a block stops the ray."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(block_occludes)
+def _block_occludes(leaves, block, mask, scratch):
+    if not (is_a(Veil, leaves) or is_a(VeiledInstances, leaves)):
+        return lambda leaves, block, mask, scratch: mask != 0
+
+    def veiled(leaves, block, mask, scratch):
+        while mask != 0:
+            lane = count_trailing_zeros(mask)
+            mask &= mask - 1
+            u, v = stack_get_f4(scratch, LANES + lane), stack_get_f4(scratch, 2 * LANES + lane)
+            if triangle_counts(leaves, load_i4(block + ID_OFFSET, lane), u, v):
+                return True
+        return False
+
+    return veiled
+
+
 def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     """(t, primitive, u, v) of the nearest hit; (tmax, -1, 0, 0) without one.
 
-    u and v are the barycentrics of a triangle's second and third vertex, 0 for quadrics. Negative tmin counts as 0. A
+    Surfaces that let the ray pass (`pmviewer.kernels.opacity`) are not hit. u and v are the barycentrics of a triangle's second and third vertex, 0 for quadrics. Negative tmin counts as 0. A
     ray with a non-finite number hits nothing.
     """
     raise NotImplementedError("only for kernels")
@@ -145,6 +260,16 @@ def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
 
 @overload(closest_hit)
 def _closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    if lets_pass(scene) and has_instances(scene):
+        return lambda scene, ox, oy, oz, dx, dy, dz, tmin, tmax: _closest_in_scene(
+            VeiledInstances(scene, ray_key(ox, oy, oz, dx, dy, dz)), scene.bvh_nodes, scene.bvh_blocks,
+            scene.bvh_n_blocks, ox, oy, oz, dx, dy, dz, tmin, tmax,
+        )  # fmt: skip
+    if lets_pass(scene):
+        return lambda scene, ox, oy, oz, dx, dy, dz, tmin, tmax: _closest_in_tree(
+            Veil(scene.bvh_quadrics, scene.n_triangles, scene, ray_key(ox, oy, oz, dx, dy, dz), _0, _0, _0),
+            scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks, ox, oy, oz, dx, dy, dz, tmin, tmax,
+        )  # fmt: skip
     if has_instances(scene):
         return lambda scene, ox, oy, oz, dx, dy, dz, tmin, tmax: _closest_in_scene(
             scene, scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks, ox, oy, oz, dx, dy, dz, tmin, tmax
@@ -220,8 +345,10 @@ def _closest(leaves, nodes, blocks, n_blocks, ox, oy, oz, dx, dy, dz, tmin, tmax
                 mask &= mask - 1
                 t = stack_get_f4(scratch, lane)
                 if t < tmax:
-                    tmax, hit = t, load_i4(block + ID_OFFSET, lane)
-                    u, v = stack_get_f4(scratch, LANES + lane), stack_get_f4(scratch, 2 * LANES + lane)
+                    prim = load_i4(block + ID_OFFSET, lane)
+                    tu, tv = stack_get_f4(scratch, LANES + lane), stack_get_f4(scratch, 2 * LANES + lane)
+                    if triangle_counts(leaves, prim, tu, tv):
+                        tmax, hit, u, v = t, prim, tu, tv
         if other < 0:
             return tmax, hit, u, v
         t, prim, tu, tv = meet_leaf(leaves, other, ox, oy, oz, dx, dy, dz, tmin, tmax)
@@ -240,6 +367,16 @@ def occluded(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
 
 @overload(occluded)
 def _any_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
+    if lets_pass(scene) and has_instances(scene):
+        return lambda scene, ox, oy, oz, dx, dy, dz, tmin, tmax: _occluded_in_scene(
+            VeiledInstances(scene, ray_key(ox, oy, oz, dx, dy, dz)), scene.bvh_nodes, scene.bvh_blocks,
+            scene.bvh_n_blocks, ox, oy, oz, dx, dy, dz, tmin, tmax,
+        )  # fmt: skip
+    if lets_pass(scene):
+        return lambda scene, ox, oy, oz, dx, dy, dz, tmin, tmax: _occluded_in_tree(
+            Veil(scene.bvh_quadrics, scene.n_triangles, scene, ray_key(ox, oy, oz, dx, dy, dz), _0, _0, _0),
+            scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks, ox, oy, oz, dx, dy, dz, tmin, tmax,
+        )  # fmt: skip
     if has_instances(scene):
         return lambda scene, ox, oy, oz, dx, dy, dz, tmin, tmax: _occluded_in_scene(
             scene, scene.bvh_nodes, scene.bvh_blocks, scene.bvh_n_blocks, ox, oy, oz, dx, dy, dz, tmin, tmax
@@ -286,7 +423,9 @@ def _occluded(leaves, nodes, blocks, n_blocks, ox, oy, oz, dx, dy, dz, tmin, tma
             if leaf >= n_blocks:
                 other = leaf - n_blocks
                 break
-            if hit_triangles(blocks + leaf * BLOCK_BYTES, ox, oy, oz, dx, dy, dz, tmin, tmax, scratch) != 0:
+            block = blocks + leaf * BLOCK_BYTES
+            mask = hit_triangles(block, ox, oy, oz, dx, dy, dz, tmin, tmax, scratch)
+            if block_occludes(leaves, block, mask, scratch):
                 return True
         if other < 0:
             return False

@@ -57,9 +57,23 @@ TEXTURE_FIELDS: list[tuple[str, str]] = [
     ("light_tables", "i8"),  # float32: distributions over textured lights
 ]
 """Of scenes with textures, or with materials that have a direction."""
+COLOUR_FIELDS: list[tuple[str, str]] = [
+    ("colours", "i8"),  # float32 (n_triangles, 9): RGB at the corners
+]
+"""Of scenes with colours at vertices; they have TEXTURE_FIELDS and BSDF_FIELDS, too."""
+OPACITY_FIELDS: list[tuple[str, str]] = [
+    ("passable", "i8"),  # 1; its presence says that rays pass some surfaces, see `pmviewer.kernels.opacity`
+]
 
 
-def scene_dtype(bsdfs: bool = False, lights: bool = False, instances: bool = False, textures: bool = False) -> np.dtype:
+def scene_dtype(
+    bsdfs: bool = False,
+    lights: bool = False,
+    instances: bool = False,
+    textures: bool = False,
+    colours: bool = False,
+    opacity: bool = False,
+) -> np.dtype:
     """The record of a scene with or without these features.
 
     Kernels are compiled for the record's type, so that simple scenes neither run nor compile what they don't use.
@@ -69,6 +83,8 @@ def scene_dtype(bsdfs: bool = False, lights: bool = False, instances: bool = Fal
         *(LIGHT_FIELDS if lights else []),
         *(TEXTURE_FIELDS if textures else []),
         *(INSTANCE_FIELDS if instances else []),
+        *(COLOUR_FIELDS if colours else []),
+        *(OPACITY_FIELDS if opacity else []),
     ]
     # In front: to numba's types a longer record is also a shorter one that it begins with.
     return np.dtype([*extra, *_FIELDS], align=True)
@@ -78,12 +94,12 @@ SCENE_DTYPE = scene_dtype()
 """Of a scene of diffuse surfaces, mirrors and smooth glass under uniform area, point and environment lights."""
 
 # Columns are numpy integers: numba would compile an accessor anew for each literal one.
-_columns = np.arange(32, dtype=np.int64)
+_columns = np.arange(48, dtype=np.int64)
 
 DIFFUSE, CONDUCTOR, DIELECTRIC = 0, 1, 2
 ROUGH_CONDUCTOR, ROUGH_DIELECTRIC, THIN_DIELECTRIC, PLASTIC, ROUGH_PLASTIC, SCHLICK, WARD = range(3, 10)
 GGX, BECKMANN = 0, 1
-MATERIAL_COLUMNS = 32
+MATERIAL_COLUMNS = 48
 M_KIND, M_TWO_SIDED, M_ETA, M_REFLECTANCE, M_TRANSMITTANCE = _columns[[0, 1, 2, 4, 8]]
 M_ALPHA_X, M_ALPHA_Y, M_ETA_RGB, M_NONLINEAR, M_K_RGB, M_DISTRIBUTION = _columns[[7, 11, 12, 15, 16, 19]]
 M_SPECULAR, M_TABLE, M_INNER, M_MAPPED = _columns[[20, 23, 31, 3]]
@@ -94,6 +110,8 @@ MIRRORED_MAPS = 2
 M_REFLECTANCE_MAP, M_SPECULAR_MAP, M_ALPHA_MAP, M_NORMAL_MAP, M_BUMP_MAP, M_BUMP_SCALE = _columns[24:30]
 M_TRANSMITTANCE_MAP = _columns[30]
 """The maps are texture numbers, -1 for none."""
+M_OPACITY, M_OPACITY_MAP, M_ALPHA_CUTOFF, M_COLOURED = _columns[44:48]
+"""M_ALPHA_CUTOFF: −1 for none. M_COLOURED: whether colours at vertices multiply the reflectance."""
 BSDF_TABLE_SIZE = 64
 
 PARALLELOGRAM, DISK, SPHERE, CYLINDER, MESH, POINT, ENVIRONMENT, SPOT, DIRECTIONAL, IMAGE = range(10)

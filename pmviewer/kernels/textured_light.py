@@ -18,6 +18,7 @@ from numba.extending import overload
 
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4, load_i4, load_i8
+from pmviewer.kernels.opacity import lets_pass, opacity_of
 from pmviewer.kernels.scene import (
     DISK,
     L_A,
@@ -39,15 +40,18 @@ from pmviewer.kernels.scene import (
     SPHERE,
     light_number,
     light_vector,
+    material_of,
 )
 from pmviewer.kernels.table import find_interval
 from pmviewer.kernels.texture import texture_rgb
 from pmviewer.kernels.uv import azimuth, barycentrics, disk_uv, hit_uv, in_frame, sphere_uv
-from pmviewer.kernels.vector import basis, cross, dot, sub
+from pmviewer.kernels.vector import basis, cross, dot, scale, sub
 from pmviewer.kernels.warp import square_to_triangle
 
 _f4 = np.float32
 _BELOW_ONE = _f4(0.99999994)
+_LEAST_OPACITY = _f4(1e-3)
+"""Of a light where it is hit: one ray in a thousand and fewer would otherwise be as bright as that makes up for."""
 
 
 @device
@@ -95,15 +99,29 @@ def _radiance_from(scene, light, p, u, v):
 
 
 def emission_at(scene, light, prim, p):
-    """The same where a ray has hit the light's primitive `prim` at p."""
+    """The radiance of what a ray has hit there, on the light's primitive `prim`: where the surface lets rays pass, the
+    same over its opacity, because that many are stopped."""
     raise NotImplementedError("only for kernels")
 
 
 @overload(emission_at)
 def _emission_at(scene, light, prim, p):
+    if lets_pass(scene) and "light_textures" not in scene.fields:
+        return lambda scene, light, prim, p: _uncovered(scene, prim, p, light_vector(scene, light, L_RADIANCE))
+    if lets_pass(scene):
+        return lambda scene, light, prim, p: _uncovered(scene, prim, p, _textured_at(scene, light, prim, p))
     if "light_textures" not in scene.fields:
         return lambda scene, light, prim, p: light_vector(scene, light, L_RADIANCE)
     return lambda scene, light, prim, p: _textured_at(scene, light, prim, p)
+
+
+@device
+def _uncovered(scene, prim, p, radiance):
+    """The radiance over the opacity of the light's primitive at p."""
+    stored = np.int64(prim)
+    b1, b2 = barycentrics(scene, stored, p)
+    opacity = opacity_of(scene, material_of(scene, prim), stored, b1, b2, p)
+    return scale(radiance, _f4(1.0) / max(opacity, _LEAST_OPACITY))
 
 
 @device

@@ -73,20 +73,21 @@ def hit_uv(scene, prim, b1, b2, p):
 @overload(hit_uv)
 def _hit_uv(scene, prim, b1, b2, p):
     if not has_instances(scene):
-        return lambda scene, prim, b1, b2, p: _stored_uv(scene, prim, b1, b2, p)
+        return lambda scene, prim, b1, b2, p: stored_uv(scene, prim, b1, b2, p)
 
     def through(scene, prim, b1, b2, p):
         if prim < scene.n_stored:
-            return _stored_uv(scene, prim, b1, b2, p)
+            return stored_uv(scene, prim, b1, b2, p)
         i = find_instance(scene, prim)
         x, y, z = transform_point(scene, i, I_TO_LOCAL, np.float64(p[0]), np.float64(p[1]), np.float64(p[2]))
-        return _stored_uv(scene, stored_of(scene, i, prim), b1, b2, (_f4(x), _f4(y), _f4(z)))
+        return stored_uv(scene, stored_of(scene, i, prim), b1, b2, (_f4(x), _f4(y), _f4(z)))
 
     return through
 
 
 @device
-def _stored_uv(scene, prim, b1, b2, p):
+def stored_uv(scene, prim, b1, b2, p):
+    """`hit_uv` of a stored primitive, p in the coordinates that it is stored in."""
     if prim < scene.n_triangles:
         base = np.int64(prim) * 6
         u0, v0 = load_f4(scene.uvs, base), load_f4(scene.uvs, base + 1)

@@ -161,6 +161,8 @@ class Material:
     """Multiplies the heights of `textures["bump"]`."""
     opacity: float = 1.0
     """Share of rays that meet the surface; the others pass straight through it."""
+    alpha_cutoff: float | None = None
+    """With it the surface is opaque where `opacity` or its filtered texture is at least that, and a hole elsewhere."""
     vertex_colours: bool = False
     """Are `reflectance` and its texture multiplied by the colours at a mesh's vertices?"""
     principled: Principled | None = None
@@ -171,8 +173,16 @@ class Material:
     (Mitsuba's `twosided` around a map), or as a whole, as those of a thin sheet with bumps do?"""
 
     @property
+    def passable(self) -> bool:
+        """Do some rays pass straight through it? None do where its inside absorbs light, for then a ray would have to
+        know where it entered."""
+        least = 1.0 if self.alpha_cutoff is None else self.alpha_cutoff
+        absorbs = self.kind in ("dielectric", "rough dielectric") and any(self.absorption)
+        return ("opacity" in self.textures or self.opacity < least) and not absorbs
+
+    @property
     def transparent(self) -> bool:
-        """Does light pass through?"""
+        """Does it refract light?"""
         return self.kind in ("dielectric", "rough dielectric", "thin dielectric")
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError
 from pmviewer.kernels import scene as K
 from pmviewer.kernels.bvh import Bvh, build
+from pmviewer.scene.covered_emission import with_covered_emission
 from pmviewer.scene.description import (
     LUMINANCE,
     Cylinder,
@@ -23,10 +24,10 @@ from pmviewer.scene.description import (
     Shape,
     Sphere,
 )
-from pmviewer.scene.flatten_textures import TextureTable, coordinates, light_arrays, needs_tangents
+from pmviewer.scene.flatten_textures import TextureTable, coordinates, corner_colours, light_arrays, needs_tangents
 from pmviewer.scene.instances import build_instanced, instance_bounds, normalised
 from pmviewer.scene.light_table import LightTable, axis_of, side_of
-from pmviewer.scene.material_row import is_rich, material_table
+from pmviewer.scene.material_row import is_rich, material_table, used_materials
 from pmviewer.scene.textured_emission import textured_lights
 
 Float = NDArray[np.float32]
@@ -126,12 +127,19 @@ def flatten(scene: Scene) -> FlatScene:
     prim_material = np.array([shapes[i].material for i in shape_of_prim], np.int32)
 
     center, radius = bounding_sphere(scene)
-    lit, emissions = textured_lights(scene)
+    lit, emissions = textured_lights(with_covered_emission(scene))
     lights = LightTable(lit, vertices, shape_of_prim, radius)
     of_shape = np.concatenate([lights.of_shape, np.full(len(shapes) - len(scene.shapes), -1)])
     prim_light = of_shape[shape_of_prim].astype(np.int32)
     textured = bool(emissions) or (rich and needs_tangents(scene))
-    record = np.zeros(1, K.scene_dtype(bsdfs=rich, lights=lights.more, instances=bool(groups), textures=textured))
+    used = used_materials(scene)
+    coloured, passable = any(m.vertex_colours for m in used), any(m.passable for m in used)
+    record = np.zeros(
+        1,
+        K.scene_dtype(
+            bsdfs=rich, lights=lights.more, instances=bool(groups), textures=textured, colours=coloured, opacity=passable
+        ),
+    )
     r = record[0]
     if groups:
         bvh, shown = build_instanced(scene, groups, vertices, quadrics, shape_of_prim, r)
@@ -151,6 +159,10 @@ def flatten(scene: Scene) -> FlatScene:
     }
     if normals is not None:
         arrays["normals"] = normals
+    if passable:
+        r["passable"] = 1
+    if coloured:
+        arrays["colours"] = corner_colours([shapes[i].geometry for i, _ in meshes])
     textures = TextureTable()
     if rich:
         r["bsdfs"] = 1

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError
 from pmviewer.kernels import scene as K
 from pmviewer.resources import available_memory
-from pmviewer.scene.description import Geometry, Material, Scene
+from pmviewer.scene.description import Geometry, Material, Mesh, Scene
 from pmviewer.scene.texture import Checkerboard, Texture
 from pmviewer.scene.texture_coordinates import corner_uv, frame_of
 from pmviewer.scene.textured_emission import Emission
@@ -23,13 +23,14 @@ _COLUMN = {
     "transmittance": K.M_TRANSMITTANCE_MAP,
     "normal": K.M_NORMAL_MAP,
     "bump": K.M_BUMP_MAP,
+    "opacity": K.M_OPACITY_MAP,
 }
 
 
 def needs_tangents(scene: Scene) -> bool:
-    """Does any surface's material have a texture, or a direction of its own?"""
+    """Does any surface's material have a texture, colours at vertices, or a direction of its own?"""
     used = [scene.materials[i] for i in {s.material for s in scene.all_shapes}]
-    return any(m.textures or m.alpha[0] != m.alpha[1] for m in used)
+    return any(m.textures or m.vertex_colours or m.alpha[0] != m.alpha[1] for m in used)
 
 
 class TextureTable:
@@ -66,6 +67,8 @@ class TextureTable:
         rows[:, list(_COLUMN.values())] = -1
         for row, material in zip(rows, materials):
             for slot, texture in material.textures.items():
+                if slot == "opacity" and not material.passable:
+                    continue
                 row[_COLUMN[slot]] = self.add(texture)
             row[K.M_BUMP_SCALE] = material.bump_scale
 
@@ -107,6 +110,16 @@ def coordinates(triangles: list[Geometry], quadrics: list) -> dict[str, NDArray]
         "uvs": np.concatenate(corners).astype(np.float32).reshape(-1, 6),
         "quadric_frames": np.stack(frames).astype(np.float32).reshape(-1, 9) if quadrics else np.zeros(9, np.float32),
     }
+
+
+def corner_colours(triangles: list[Geometry]) -> NDArray[np.float32]:
+    """`colours` of shapes in the order of the primitives: white where there are none."""
+    parts = [np.zeros((0, 3, 3))]
+    for g in triangles:
+        colours = g.colours if isinstance(g, Mesh) else None
+        count = len(g.faces) if isinstance(g, Mesh) else 2
+        parts.append(np.ones((count, 3, 3)) if colours is None else colours[g.faces])
+    return np.concatenate(parts).astype(np.float32).reshape(-1, 9)
 
 
 def light_arrays(

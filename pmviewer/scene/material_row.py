@@ -43,8 +43,8 @@ class MaterialTable:
 
 def is_plain(m: Material) -> bool:
     """Can the kernels of simple scenes show it? Diffuse, mirrors the same at all angles, clear smooth glass, each
-    without textures."""
-    if m.textures:
+    without textures and colours at vertices."""
+    if m.textures or m.vertex_colours:
         return False
     if m.kind == "conductor":
         return m.metal is None
@@ -85,6 +85,7 @@ def _row(m: Material, tables: list[Float] | None) -> list[float]:
     row[K.M_KIND], row[K.M_TWO_SIDED], row[K.M_ETA] = kind, m.two_sided, m.eta
     row[K.M_REFLECTANCE : K.M_REFLECTANCE + 3] = m.reflectance
     row[K.M_TRANSMITTANCE : K.M_TRANSMITTANCE + 3] = m.transmittance
+    row[K.M_OPACITY : K.M_COLOURED + 1] = [*opacity_numbers(m), m.vertex_colours]
     if is_plain(m) and kind != K.CONDUCTOR:
         return row
     alpha_x, alpha_y = (max(float(SMOOTHEST), a) for a in m.alpha)
@@ -106,6 +107,15 @@ def _row(m: Material, tables: list[Float] | None) -> list[float]:
         row[K.M_TABLE] = len(tables)
         tables.append(_schlick(alpha_x * alpha_y))
     return row
+
+
+def opacity_numbers(m: Material) -> tuple[float, float, float]:
+    """Opacity, no texture yet, and the cut-off or −1."""
+    if not m.passable:
+        return 1.0, -1.0, -1.0
+    if m.alpha_cutoff is None:
+        return min(max(m.opacity, 0.0), 1.0), -1.0, -1.0
+    return 0.0, -1.0, max(m.alpha_cutoff, 0.0)
 
 
 @lru_cache(maxsize=64)
