@@ -12,7 +12,7 @@ out vec3 surface;
 
 void main() {
     vec4 eye = view * vec4(position, 1.0);
-    eye_position = eye.xyz;
+    eye_position = projection[3][3] == 0.0 ? eye.xyz : vec3(0.0, 0.0, -1.0); // parallel rays: the light is far away
     eye_normal = mat3(view) * normal;
     surface = albedo;
     gl_Position = projection * eye;

@@ -50,7 +50,7 @@ def recipe(gather: Gather, camera: CameraPose, index: int) -> NDArray[np.void]:
     shrink = (index + 1.0) ** -SHRINK
     record["error"] = gather.cache_error * shrink
     record["least"], record["most"] = gather.cache_min * shrink, gather.cache_max * shrink
-    record["pixel_angle"] = camera.pixel_angle()
+    record["pixel_angle"], record["pixel_size"] = camera.pixel_angle(), camera.pixel_size()
     record["rings"], record["sectors"] = strata(gather.cache_samples)
     return record
 

@@ -87,6 +87,14 @@ def inactive_reason(path: str, settings: Settings, traits: SceneTraits | None) -
         return "Nothing is cut open (free_camera.cut)."
     if path == "free_camera.length" and not settings.free_camera.frustum:
         return "The frustum is not drawn."
+    if path == "camera.fov" and settings.camera.projection == "orthographic":
+        return "An orthographic camera has none: see camera.view_width."
+    if path == "camera.view_width" and settings.camera.projection == "perspective":
+        return "Only of an orthographic camera (camera.projection)."
+    if path == "camera.fov" and settings.camera.projection == "auto" and traits.orthographic:
+        return "The scene's camera is orthographic: see camera.view_width."
+    if path == "camera.view_width" and settings.camera.projection == "auto" and not traits.orthographic:
+        return "The scene's camera is perspective (camera.projection)."
     if path == "render.outline_rays" and plan.path:
         return "The path tracer treats all pixels alike."
     if path in ("render.direct", "render.caustic", "render.indirect"):

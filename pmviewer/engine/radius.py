@@ -22,14 +22,10 @@ PROBES = 24
 
 def typical_distance(scene: FlatScene, camera: CameraPose) -> float:
     """Median distance from the eye to what it sees; the scene's radius where it sees nothing."""
-    frame = camera.ray_frame()
     u = (np.arange(PROBES) + 0.5) / PROBES
-    x, y = (g.reshape(-1, 1) for g in np.meshgrid(u * camera.width, u * camera.height))
-    directions = frame[1] + x * frame[2] + y * frame[3]
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    directions = np.ascontiguousarray(directions, np.float32)
+    x, y = (g.reshape(-1) for g in np.meshgrid(u * camera.width, u * camera.height))
+    origins, directions = (np.ascontiguousarray(part, np.float32) for part in camera.rays(x, y))
     n = len(directions)
-    origins = np.broadcast_to(frame[0].astype(np.float32), (n, 3)).copy()
     tmin, tmax = np.zeros(n, np.float32), np.full(n, np.inf, np.float32)
     t, prim, uv = np.empty(n, np.float32), np.empty(n, np.int32), np.empty((n, 2), np.float32)
     cast_closest(scene.record[0], origins, directions, tmin, tmax, t, prim, uv)
@@ -44,7 +40,7 @@ def first_radius(scene: FlatScene, camera: CameraPose, estimate: Estimate, gathe
     """
     if estimate.radius != "auto":
         return float(estimate.radius) * scene.radius
-    footprint = typical_distance(scene, camera) * camera.pixel_angle()
+    footprint = camera.pixel_size() or typical_distance(scene, camera) * camera.pixel_angle()
     wanted = (GATHER_FOOTPRINTS if gather else FOOTPRINTS) * footprint / scene.radius
     wanted = min(max(wanted, 1e-4), 0.1)
     return 2.0 ** (round(4 * math.log2(wanted)) / 4) * scene.radius

@@ -47,9 +47,10 @@ _RADIUS = 7
 
 
 @device
-def start(dx, dy):
-    """Changes of place and direction of a ray from the eye whose direction changes by dx and dy a pixel."""
-    return (_ZERO, _ZERO, _ZERO, _ZERO), (dx, dy, _ZERO, _ZERO)
+def start(px, py, dx, dy):
+    """Changes of place and direction of a ray from the camera whose place changes by px and py a pixel and whose
+    direction by dx and dy."""
+    return (px, py, _ZERO, _ZERO), (dx, dy, _ZERO, _ZERO)
 
 
 @device

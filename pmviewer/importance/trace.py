@@ -54,7 +54,7 @@ from pmviewer.kernels.scattering import (
 )
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face, leave, surface_at
-from pmviewer.kernels.vector import along, dot, luminance, mul, scale
+from pmviewer.kernels.vector import add, along, dot, luminance, mul, scale
 from pmviewer.maps.record import encode_direction
 
 _f4 = np.float32
@@ -89,16 +89,22 @@ C_CAUSTIC, C_GLOBAL, C_RAYS, C_DROPPED = range(N_COUNTS)
 
 @device
 def image_ray(eye, x, y):
-    """Through the place (x, y) of the image, in pixels: unit direction, its change a pixel right and down, and the
-    distances at which near and far planes are met."""
+    """Through the place (x, y) of the image, in pixels: origin and unit direction, their changes with the image's
+    coordinates (`pmviewer.importance.footprint.start`), and the distances at which near and far planes are met."""
+    o = (eye.x_eye, eye.y_eye, eye.z_eye)
     right = (eye.x_right, eye.y_right, eye.z_right)
     down = (eye.x_down, eye.y_down, eye.z_down)
     raw = along(along((eye.x_corner, eye.y_corner, eye.z_corner), right, x), down, y)
+    zero = (_f4(0.0), _f4(0.0), _f4(0.0))
+    if eye.orthographic != 0:
+        P, D = start(right, down, zero, zero)
+        return add(o, raw), (eye.x_forward, eye.y_forward, eye.z_forward), P, D, eye.near, eye.far
     inv = _f4(1.0) / _f4(math.sqrt(dot(raw, raw)))
     d = scale(raw, inv)
     dx, dy = scale(along(right, d, -dot(right, d)), inv), scale(along(down, d, -dot(down, d)), inv)
     per_depth = _f4(1.0) / dot(d, (eye.x_forward, eye.y_forward, eye.z_forward))
-    return d, dx, dy, eye.near * per_depth, eye.far * per_depth
+    P, D = start(zero, zero, dx, dy)
+    return o, d, P, D, eye.near * per_depth, eye.far * per_depth
 
 
 @device
@@ -125,9 +131,7 @@ def trace_importons(scenes, eyes, passes, i0, i1, caustic_out, global_out, count
         if counts[C_CAUSTIC] + most > len(caustic_out) or counts[C_GLOBAL] + most > len(global_out):
             return i
         x, y, _, _ = draw4(SOBOL, pass_.seed, _u4(i), _i8(0))
-        d, dx, dy, near, far = image_ray(eye, pass_.left + x * pass_.across, pass_.top + y * pass_.down)
-        P, D = start(dx, dy)
-        o = (eye.x_eye, eye.y_eye, eye.z_eye)
+        o, d, P, D, near, far = image_ray(eye, pass_.left + x * pass_.across, pass_.top + y * pass_.down)
         beta, compressed = (one, one, one), one
         bounced, again, length = False, False, _f4(0.0)
         left = pass_.max_depth + 1

@@ -51,7 +51,8 @@ RECORD = np.dtype(
         ("error", "f4"),  # a
         ("least", "f4"),  # least and largest ρ in pixel footprints
         ("most", "f4"),
-        ("pixel_angle", "f4"),  # footprint at distance 1
+        ("pixel_angle", "f4"),  # what a pixel's footprint grows by at distance 1
+        ("pixel_size", "f4"),  # its footprint at distance 0
         ("rings", "i4"),  # strata of a gathered hemisphere
         ("sectors", "i4"),
     ],

@@ -57,6 +57,12 @@ class Pose(Protocol):
     def up(self) -> tuple[float, float, float]: ...
     @property
     def fov(self) -> float: ...
+    @property
+    def projection(self) -> str: ...
+    @property
+    def view_width(self) -> float: ...
+    @property
+    def shift(self) -> tuple[float, float]: ...
 
 
 class Exportable(Protocol):
@@ -106,8 +112,14 @@ def frame_metadata(frame: Exportable) -> dict[str, Value]:
         "view.origin": _text(camera.origin),
         "view.target": _text(camera.target),
         "view.up": _text(camera.up),
-        "view.fov": float(camera.fov),
+        "view.projection": camera.projection,
     }
+    if camera.projection == "orthographic":
+        about["view.width"] = float(camera.view_width)
+    else:
+        about["view.fov"] = float(camera.fov)
+    if any(camera.shift):
+        about["view.shift"] = f"{camera.shift[0]:.9g} {camera.shift[1]:.9g}"
     about |= {f"photons_stored.{name}": count for name, count in counts.stored.items()}
     about |= {f"radius.{name}": float(radius) for name, radius in counts.radius.items()}
     about |= {f"dropped.{place}": count for place, count in counts.dropped.items()}

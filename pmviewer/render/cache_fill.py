@@ -66,8 +66,7 @@ def uncovered_hit(scene, eye, cache, pixel, counts):
     """
     seed, index = pixel_seed(eye, pixel), eye.index
     ux, uy, _, _ = draw4(eye.sequence, seed, index, PIXEL_SET)
-    d, near, far = camera_ray(eye, pixel, ux, uy)
-    o = (eye.x_eye, eye.y_eye, eye.z_eye)
+    o, d, near, far = camera_ray(eye, pixel, ux, uy)
     beta = (_f4(1.0), _f4(1.0), _f4(1.0))
     travelled = _f4(0.0)
     for depth in range(eye.max_depth + 1):
@@ -88,7 +87,7 @@ def uncovered_hit(scene, eye, cache, pixel, counts):
             n = shading_normal(b)
             _, weight = interpolate(cache, p, n)
             if weight < ENOUGH:
-                return True, p, ng, n, gap, travelled * cache.pixel_angle
+                return True, p, ng, n, gap, cache.pixel_size + travelled * cache.pixel_angle
         if b.groups & FOLLOWED == 0 or depth == eye.max_depth:
             break
         u_lobe, bu, bv, u_end = chain_numbers(scene, eye.sequence, seed, index, CHAIN_SET + depth)

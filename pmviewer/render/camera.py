@@ -1,9 +1,10 @@
-"""The perspective camera: from scene and settings to rays, and to the matrices by which OpenGL draws the same view."""
+"""The camera: from scene and settings to rays, and to the matrices by which OpenGL draws the same view."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,11 @@ def _fov_x(camera: Camera, width: int, height: int) -> float:
 
 @dataclass(frozen=True)
 class CameraPose:
-    """A camera with nothing left open. `fov` is horizontal, in degrees; `width` and `height` in pixels."""
+    """A camera with nothing left open. `fov` is horizontal, in degrees; `width` and `height` in pixels.
+
+    An orthographic one sees what is before the plane through `origin`, `view_width` scene units wide. `shift` is that
+    of `pmviewer.scene.description.Camera`.
+    """
 
     origin: Vec3
     target: Vec3
@@ -46,6 +51,25 @@ class CameraPose:
     mirrored: bool = False
     near_normal: Vec3 | None = None
     """Unit normal of the near plane, at the distance `near` along it from the eye; None: along the view."""
+    projection: Literal["perspective", "orthographic"] = "perspective"
+    view_width: float = 1.0
+    shift: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def orthographic(self) -> bool:
+        return self.projection == "orthographic"
+
+    @property
+    def shift_x(self) -> float:
+        return self.shift[0]
+
+    @property
+    def shift_y(self) -> float:
+        return self.shift[1]
+
+    def half_width(self) -> float:
+        """Half of what the picture's width spans: at distance 1, or at any of an orthographic camera."""
+        return self.view_width / 2 if self.orthographic else math.tan(math.radians(self.fov) / 2)
 
     def axes(self) -> tuple[Matrix, Matrix, Matrix]:
         """Unit vectors to the right of the image, to its top, and into the view.
@@ -66,25 +90,46 @@ class CameraPose:
         return (-right if self.mirrored else right), top, forward
 
     def ray_frame(self) -> NDArray[np.float64]:
-        """(4, 3): eye, direction through the image's top left corner, and its change per pixel right and down."""
+        """(4, 3): the eye, the image's top left corner from there, and the change per pixel right and down.
+
+        Corner and changes are directions, or places on the plane through the eye of an orthographic camera, whose rays
+        all have the direction of the view.
+        """
         right, top, forward = self.axes()
-        half = math.tan(math.radians(self.fov) / 2)
+        half = self.half_width()
         step = 2 * half / self.width
-        corner = forward - right * half + top * (step * self.height / 2)
-        return np.array([self.origin, corner, right * step, -top * step], dtype=np.float64)
+        corner = (0.0 if self.orthographic else 1.0) * forward - right * half + top * (step * self.height / 2)
+        across, along = right * step, -top * step
+        corner += across * (self.shift[0] * self.width) + along * (self.shift[1] * self.height)
+        return np.array([self.origin, corner, across, along], dtype=np.float64)
+
+    def rays(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> tuple[Matrix, Matrix]:
+        """Origins and unit directions (n, 3) of the rays through places (n,) of the image, in pixels."""
+        eye, corner, right, down = self.ray_frame()
+        places = corner + np.asarray(x, float)[:, None] * right + np.asarray(y, float)[:, None] * down
+        if self.orthographic:
+            return eye + places, np.broadcast_to(self.axes()[2], places.shape).copy()
+        return np.broadcast_to(eye, places.shape).copy(), places / np.linalg.norm(places, axis=1, keepdims=True)
 
     def sees_like(self, other: CameraPose) -> bool:
         """Whether every pixel looks at the same point as the other's. A target farther away changes nothing."""
-        if (self.width, self.height) != (other.width, other.height):
+        if (self.width, self.height, self.projection) != (other.width, other.height, other.projection):
             return False
         mine, theirs = self.ray_frame(), other.ray_frame()
         length = float(np.linalg.norm(np.subtract(other.target, other.origin)))
         near = np.abs(mine - theirs)
+        if self.orthographic:
+            turned = np.abs(self.axes()[2] - other.axes()[2]).max()
+            return bool(near.max() <= 1e-6 * max(other.view_width, 1e-300) and turned <= 1e-6)
         return bool(near[0].max() <= 1e-6 * length and near[1:].max() <= 1e-6)
 
     def pixel_angle(self) -> float:
-        """Width of a pixel in the image's centre divided by its distance."""
-        return 2 * math.tan(math.radians(self.fov) / 2) / self.width
+        """Width of a pixel in the image's centre divided by its distance; 0 for an orthographic camera."""
+        return 0.0 if self.orthographic else 2 * self.half_width() / self.width
+
+    def pixel_size(self) -> float:
+        """Width of a pixel at distance 0: an orthographic camera's at any distance."""
+        return self.view_width / self.width if self.orthographic else 0.0
 
     def view_matrix(self) -> Matrix:
         """World to eye space (OpenGL: the camera looks along −z), row-major (4, 4)."""
@@ -97,10 +142,16 @@ class CameraPose:
 
     def projection_matrix(self, near: float, far: float) -> Matrix:
         """Eye to clip space (OpenGL), row-major (4, 4)."""
-        half_x = math.tan(math.radians(self.fov) / 2)
+        half_x = self.half_width()
         half_y = half_x * self.height / self.width
         projection = np.zeros((4, 4))
         projection[0, 0], projection[1, 1] = 1 / half_x, 1 / half_y
+        if self.orthographic:
+            projection[0, 3], projection[1, 3] = -2 * self.shift[0], 2 * self.shift[1]
+            projection[2, 2], projection[2, 3] = -2 / (far - near), -(far + near) / (far - near)
+            projection[3, 3] = 1
+            return projection
+        projection[0, 2], projection[1, 2] = 2 * self.shift[0], -2 * self.shift[1]
         projection[2, 2], projection[2, 3] = -(far + near) / (far - near), -2 * far * near / (far - near)
         projection[3, 2] = -1
         return projection
@@ -129,9 +180,10 @@ class CameraPose:
         right, top, forward = self.axes()
         offset = np.asarray(points, float) - np.asarray(self.origin, float)
         depth = offset @ forward
-        scale = self.width / (2 * math.tan(math.radians(self.fov) / 2))
-        x = self.width / 2 + scale * (offset @ right) / depth
-        y = self.height / 2 - scale * (offset @ top) / depth
+        scale = self.width / (2 * self.half_width())
+        away = np.ones_like(depth) if self.orthographic else depth
+        x = self.width * (0.5 - self.shift[0]) + scale * (offset @ right) / away
+        y = self.height * (0.5 - self.shift[1]) - scale * (offset @ top) / away
         return np.stack([x, y, depth], axis=1)
 
 
@@ -145,9 +197,15 @@ def resolve_camera(scene: Scene, settings: CameraSettings) -> CameraPose:
     width = scene.width if settings.width == "auto" else int(settings.width)
     height = scene.height if settings.height == "auto" else int(settings.height)
     camera = scene.camera
+    origin = camera.origin if settings.origin == "auto" else settings.origin
+    target = camera.target if settings.target == "auto" else settings.target
+    shift_x, shift_y = (
+        given if asked == "auto" else float(asked)
+        for given, asked in zip(camera.shift, (settings.shift_x, settings.shift_y), strict=True)
+    )
     return CameraPose(
-        origin=camera.origin if settings.origin == "auto" else settings.origin,
-        target=camera.target if settings.target == "auto" else settings.target,
+        origin=origin,
+        target=target,
         up=camera.up if settings.up == "auto" else settings.up,
         fov=_fov_x(camera, width, height) if settings.fov == "auto" else float(settings.fov),
         width=width,
@@ -155,4 +213,17 @@ def resolve_camera(scene: Scene, settings: CameraSettings) -> CameraPose:
         near=camera.near,
         far=camera.far,
         mirrored=camera.mirrored,
+        projection=camera.projection if settings.projection == "auto" else settings.projection,
+        view_width=_view_width(camera, settings, width, height),
+        shift=(shift_x, shift_y),
     )
+
+
+def _view_width(camera: Camera, settings: CameraSettings, width: int, height: int) -> float:
+    """Of an orthographic picture; for a perspective camera what it sees at its target."""
+    if settings.view_width != "auto":
+        return float(settings.view_width)
+    if camera.projection == "orthographic":
+        return camera.width
+    half = math.tan(math.radians(_fov_x(camera, width, height)) / 2)
+    return 2 * half * max(math.dist(camera.origin, camera.target), 1e-15)

@@ -62,8 +62,7 @@ def stored_hit(scene, eye, pixel):
     viewer's side), gap and wo.
     """
     half = _f4(0.5)
-    d, near, far = camera_ray(eye, pixel, half, half)
-    o = (eye.x_eye, eye.y_eye, eye.z_eye)
+    o, d, near, far = camera_ray(eye, pixel, half, half)
     for _ in range(eye.max_depth + 1):
         t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], near, far)
         if prim < 0:

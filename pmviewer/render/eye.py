@@ -62,22 +62,25 @@ def pixel_seed(eye, pixel):
 
 @device
 def camera_ray(eye, pixel, u, v):
-    """Unit direction through the pixel at (u, v) in [0, 1)², and the distances at which near and far planes are met."""
+    """Origin and unit direction of the ray through the pixel at (u, v) in [0, 1)², and the distances at which near and
+    far planes are met."""
     x = _f4(pixel % eye.width) + u
     y = _f4(pixel // eye.width) + v
-    d = normalize(
-        (
-            eye.x_corner + x * eye.x_right + y * eye.x_down,
-            eye.y_corner + x * eye.y_right + y * eye.y_down,
-            eye.z_corner + x * eye.z_right + y * eye.z_down,
-        )
+    o = (eye.x_eye, eye.y_eye, eye.z_eye)
+    d = (
+        eye.x_corner + x * eye.x_right + y * eye.x_down,
+        eye.y_corner + x * eye.y_right + y * eye.y_down,
+        eye.z_corner + x * eye.z_right + y * eye.z_down,
     )
+    if eye.orthographic != 0:
+        return add(o, d), (eye.x_forward, eye.y_forward, eye.z_forward), eye.near, eye.far
+    d = normalize(d)
     far = eye.far / dot(d, (eye.x_forward, eye.y_forward, eye.z_forward))
     near = _f4(0.0)
     if eye.near > near:
         towards = dot(d, (eye.x_near, eye.y_near, eye.z_near))
         near = eye.near / towards if towards > near else _INF
-    return d, near, far
+    return o, d, near, far
 
 
 @device
@@ -107,8 +110,7 @@ def outline_emission(scene, eye, pixel, seed):
     total = BLACK
     for j in range(eye.outline_rays):
         ux, uy, _, _ = draw4(eye.sequence, seed, _u4(eye.index * _u4(eye.outline_rays) + _u4(j)), OUTLINE_SET)
-        d, near, far = camera_ray(eye, pixel, ux, uy)
-        o = (eye.x_eye, eye.y_eye, eye.z_eye)
+        o, d, near, far = camera_ray(eye, pixel, ux, uy)
         t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], near, far)
         if prim < 0:
             if scene.environment >= 0:
@@ -158,8 +160,7 @@ def eye_pass(
     for pixel in range(first, last):
         seed = pixel_seed(eye, pixel)
         ux, uy, lu, lv = draw4(eye.sequence, seed, index, PIXEL_SET)
-        d, near, far = camera_ray(eye, pixel, ux, uy)
-        o = (eye.x_eye, eye.y_eye, eye.z_eye)
+        o, d, near, far = camera_ray(eye, pixel, ux, uy)
         beta = (_f4(1.0), _f4(1.0), _f4(1.0))
         outlined = len(outline) > 0 and outline[pixel] != 0
         if outlined:

@@ -53,6 +53,16 @@ def free_pose(render: CameraPose, free: FreeCamera, center: NDArray[np.floating]
     return with_cut(pose, render, free, radius)
 
 
+def as_perspective(pose: CameraPose) -> CameraPose:
+    """A perspective camera without a shift for what the pose sees: its own, or one as far before an orthographic
+    camera's target as spans its width there."""
+    if not pose.orthographic:
+        return replace(pose, shift=(0.0, 0.0))
+    distance = pose.view_width / (2 * math.tan(math.radians(FOV) / 2))
+    origin = np.asarray(pose.target, float) - pose.axes()[2] * distance
+    return replace(pose, origin=_vec3(origin), fov=FOV, projection="perspective", shift=(0.0, 0.0))
+
+
 def plan_pose(render: CameraPose, center: NDArray[np.floating], radius: float) -> CameraPose:
     """Straight from above, so far that scene and render camera fit, with what is ahead of the latter on top."""
     middle, reach = enclosing(np.asarray(center, float), radius, np.asarray(render.origin, float))
@@ -108,14 +118,20 @@ def _level(render: CameraPose) -> tuple[Float, Float]:
 
 def frustum_lines(camera: CameraPose, length: float) -> Float:
     """Line ends (2n, 3) of a camera's frustum with its image plane at `length` along the view: four edges from the eye,
-    the near end, the image's border, and a triangle on its upper edge that says where up is."""
+    the near end, the image's border, and a triangle on its upper edge that says where up is. An orthographic camera's
+    is a box whose edges start at the plane through its eye."""
     eye, corner, right, down = camera.ray_frame()
     across, along = right * camera.width, down * camera.height
     image = np.array([corner, corner + across, corner + across + along, corner + along])
-    far, near = eye + image * length, eye + image * (length * NEAR_END)
     middle = corner + across / 2
-    roof = eye + length * np.array([middle - across * 0.15, middle - along * 0.2, middle + across * 0.15])
-    edges = [(eye, end) for end in far]
+    mark = np.array([middle - across * 0.15, middle - along * 0.2, middle + across * 0.15])
+    if camera.orthographic:
+        ahead = camera.axes()[2] * length
+        starts, near, far, roof = eye + image, eye + image + ahead * NEAR_END, eye + image + ahead, eye + mark + ahead
+    else:
+        starts = np.broadcast_to(eye, (4, 3))
+        far, near, roof = eye + image * length, eye + image * (length * NEAR_END), eye + length * mark
+    edges = list(zip(starts, far, strict=True))
     edges += [(ring[i], ring[(i + 1) % 4]) for ring in (near, far) for i in range(4)]
     edges += [(roof[0], roof[1]), (roof[1], roof[2])]
     return np.array(edges).reshape(-1, 3)

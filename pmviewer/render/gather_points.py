@@ -111,8 +111,7 @@ def gather_points(
     sites, shadows, guides, corner = site_maps[0], shadow_maps[0], guide_maps[0], corners[0]
     index, seed = eye.index, pixel_seed(eye, pixel)
     ux, uy, _, _ = draw4(eye.sequence, seed, index, PIXEL_SET)
-    d, near, far = camera_ray(eye, pixel, ux, uy)
-    o = (eye.x_eye, eye.y_eye, eye.z_eye)
+    o, d, near, far = camera_ray(eye, pixel, ux, uy)
     beta = (_f4(1.0), _f4(1.0), _f4(1.0))
     row = _i8(0)
     for depth in range(eye.max_depth + 1):

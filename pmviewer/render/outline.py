@@ -19,6 +19,8 @@ SEGMENTS = 256
 """Straight pieces of a circle."""
 STEP, REACH = 0.25, 0.15
 """Points along an outline lie this far apart, and mark all pixels this near; in pixels."""
+FAR = 1e6
+"""Distance in picture widths from which an orthographic camera is taken to see outlines."""
 NEAREST = 1e-6
 """Outlines are cut off in front of the eye at this depth, relative to the scene's size seen from it."""
 
@@ -26,6 +28,8 @@ NEAREST = 1e-6
 def outline_pixels(scene: Scene, camera: CameraPose) -> NDArray[np.uint8]:
     """(width · height,) uint8, 1 for pixels that the outline of an emitting shape crosses; (0,) when there is none."""
     eye = np.array(camera.origin, float)
+    if camera.orthographic:  # from so far that all rays are parallel
+        eye = eye - camera.axes()[2] * (FAR * max(camera.view_width, 1e-300))
     pieces = [
         _outline(shape.geometry, eye)
         for shape in scene.shapes
@@ -33,7 +37,7 @@ def outline_pixels(scene: Scene, camera: CameraPose) -> NDArray[np.uint8]:
     ]
     segments = np.concatenate([np.zeros((0, 2, 3)), *pieces])
     marked = np.zeros(camera.width * camera.height, np.uint8)
-    points = _points(segments, eye, camera)
+    points = _points(segments, camera)
     for dx in (-REACH, REACH):
         for dy in (-REACH, REACH):
             x, y = np.floor(points[:, 0] + dx), np.floor(points[:, 1] + dy)
@@ -98,18 +102,22 @@ def _circle(center: Float, normal: Float, radius: float) -> Float:
     return _closed(center + radius * (np.cos(phi) * s + np.sin(phi) * t))
 
 
-def _points(segments: Float, eye: Float, camera: CameraPose) -> Float:
+def _points(segments: Float, camera: CameraPose) -> Float:
     """Points (m, 2) in pixels along the visible parts of the segments."""
-    _, corner, right, down = camera.ray_frame()
-    inverse = np.linalg.inv(np.stack([right, down, corner], axis=1))
-    ends = (segments - eye) @ inverse.T  # (m, 2, 3): x·depth, y·depth, depth
+    eye, corner, right, down = camera.ray_frame()
+    if camera.orthographic:
+        inverse = np.linalg.inv(np.stack([right, down, camera.axes()[2]], axis=1))
+        ends = (segments - eye - corner) @ inverse.T  # (m, 2, 3): x, y, depth
+    else:
+        inverse = np.linalg.inv(np.stack([right, down, corner], axis=1))
+        ends = (segments - eye) @ inverse.T  # (m, 2, 3): x·depth, y·depth, depth
     nearest = NEAREST * max(float(np.abs(ends[..., 2]).max(initial=0.0)), 1e-300)
     ends = ends[(ends[..., 2] > nearest).any(axis=1)]
     behind = ends[..., 2] < nearest
     t = (nearest - ends[:, 0, 2]) / np.where(behind.any(axis=1), ends[:, 1, 2] - ends[:, 0, 2], 1.0)
     cut = ends[:, 0] + t[:, None] * (ends[:, 1] - ends[:, 0])
     ends = np.where(behind[..., None], cut[:, None], ends)
-    screen = ends[..., :2] / ends[..., 2:]
+    screen = ends[..., :2] if camera.orthographic else ends[..., :2] / ends[..., 2:]
     first, last = _clipped(screen, camera.width, camera.height)
     seen = last > first
     start, step = screen[seen, 0], screen[seen, 1] - screen[seen, 0]

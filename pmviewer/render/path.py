@@ -71,8 +71,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
     for pixel in range(first, last):
         seed = pixel_seed(eye, pixel)
         ux, uy, _, _ = draw4(eye.sequence, seed, index, PIXEL_SET)
-        d, near, far = camera_ray(eye, pixel, ux, uy)
-        o = (eye.x_eye, eye.y_eye, eye.z_eye)
+        o, d, near, far = camera_ray(eye, pixel, ux, uy)
         beta = (_f4(1.0), _f4(1.0), _f4(1.0))
         stored = 0  # how often the path took lobes that photons are stored for
         mirrored = False  # whether it took a followed lobe before the first of these

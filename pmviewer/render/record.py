@@ -17,6 +17,7 @@ EYE_DTYPE = np.dtype(
         ("far", "f4"),
         ("width", "i4"),
         ("height", "i4"),
+        ("orthographic", "i4"),
         ("sequence", "i4"),
         ("seed", "u4"),
         ("index", "u4"),  # the pass: the sample index of every pixel's sequences
@@ -79,7 +80,7 @@ def eye_record(camera: CameraPose, settings: Settings, index: int) -> NDArray[np
         for axis, value in zip("xyz", vector, strict=True):
             r[f"{axis}_{part}"] = value
     r["near"], r["far"] = camera.near, camera.far
-    r["width"], r["height"] = camera.width, camera.height
+    r["width"], r["height"], r["orthographic"] = camera.width, camera.height, camera.orthographic
     r["sequence"], r["seed"], r["index"] = SOBOL, settings.render.seed & 0xFFFFFFFF, index & 0xFFFFFFFF
     r["max_depth"] = settings.render.max_depth
     r["outline_rays"] = settings.render.outline_rays

@@ -13,7 +13,8 @@ class SceneTraits:
     """`has_specular`: a smooth or transparent surface that can make caustics; `has_diffuse`: a surface that photons can
     be stored on whatever the settings; `many_lights`: more than one light to choose from; `rich`: materials beyond
     diffuse, mirrors that reflect the same at all angles, and clear smooth glass; `has_delta`: a smooth mirror, glass or
-    coat; `has_rough_glass`; `has_delta_lights`: point, spot or directional lights, which no ray can meet.
+    coat; `has_rough_glass`; `has_delta_lights`: point, spot or directional lights, which no ray can meet;
+    `orthographic`: the scene's own camera.
 
     `glossy_roughness`: the roughness of every glossy reflection, ascending; those below the setting `glossy` are
     followed like mirrors, the others store photons.
@@ -29,6 +30,7 @@ class SceneTraits:
     has_delta: bool = False
     has_rough_glass: bool = False
     has_delta_lights: bool = False
+    orthographic: bool = False
 
     @property
     def many_lights(self) -> bool:
@@ -91,5 +93,6 @@ def analyse(scene: Scene) -> SceneTraits:
         has_delta=any(_is_delta(m) for m in used),
         has_rough_glass=any(_always_followed(m) and m.kind == "rough dielectric" for m in used),
         has_delta_lights=any(isinstance(light, PointLight | SpotLight | DirectionalLight) for light in scene.lights),
+        orthographic=scene.camera.projection == "orthographic",
         glossy_roughness=tuple(sorted({a for m in used if (a := glossy_roughness(m)) is not None})),
     )

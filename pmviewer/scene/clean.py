@@ -27,6 +27,8 @@ from pmviewer.scene.emission import emitted_power
 
 LARGEST_SIDE = 16384
 """Pixels; the camera's settings have the same bound."""
+LARGEST_SHIFT = 1000.0
+"""Of a camera's picture, in its widths and heights; the camera's settings have the same bound."""
 LARGEST_COORDINATE = 1e15
 """Beyond this, squares of distances leave float32."""
 _FLATTEST = 1e-9
@@ -46,6 +48,8 @@ def clean_shapes(shapes: list[Shape], diagnostics: Diagnostics) -> tuple[Shape, 
     """The usable shapes. What is left out is counted in `diagnostics.dropped`."""
     kept = []
     for shape in shapes:
+        if isinstance(shape.geometry, Mesh) and shape.geometry.colours is not None:
+            _judge_colours(shape.name, shape.geometry.colours, diagnostics)
         geometry = _clean(shape.geometry, diagnostics.dropped)
         if geometry is None:
             reason = "zero-area light" if shape.radiance is not None else f"empty {_kind(shape.geometry)}"
@@ -58,6 +62,15 @@ def clean_shapes(shapes: list[Shape], diagnostics: Diagnostics) -> tuple[Shape, 
         emission = None if radiance is None else shape.emission
         kept.append(replace(shape, geometry=geometry, radiance=radiance, emission=emission))
     return tuple(kept)
+
+
+def _judge_colours(name: str, colours: NDArray[np.float64], diagnostics: Diagnostics) -> None:
+    """Warn of colours at vertices that are no share of light. `clean_mesh` cuts them."""
+    if not np.isfinite(colours).all():
+        diagnostics.warn(f"Colours at vertices of '{name}' are not numbers: they count as black.", kind="vertex NaN")
+    elif colours.size and (colours.max() > 1.0 + 1e-6 or colours.min() < 0.0):
+        sentence = f"Colours at vertices of '{name}' beyond 0 to 1 were cut: they would create energy."
+        diagnostics.warn(sentence, kind="vertex colours")
 
 
 def _kind(geometry: Geometry) -> str:
@@ -106,7 +119,7 @@ def clean_mesh(mesh: Mesh, dropped: Counter[str]) -> Mesh | None:
     """The mesh without triangles that have unusable vertices or no area; None when nothing is left.
 
     Triangles are judged as float32 sees them, since that is how they are traced. Broken vertex normals are replaced by
-    those of the neighbouring faces.
+    those of the neighbouring faces; colours are cut to 0 … 1.
     """
     with np.errstate(invalid="ignore"):
         usable = np.all(np.abs(mesh.vertices) <= LARGEST_COORDINATE, axis=1)
@@ -127,7 +140,8 @@ def clean_mesh(mesh: Mesh, dropped: Counter[str]) -> Mesh | None:
     if normals is not None:
         normals = _mended(Mesh(vertices, faces, normals))[used]
     uv = None if mesh.uv is None else np.nan_to_num(mesh.uv[used], posinf=0.0, neginf=0.0)
-    return Mesh(np.ascontiguousarray(vertices[used]), index.reshape(-1, 3).astype(np.int32), normals, uv)
+    colours = None if mesh.colours is None else np.clip(np.nan_to_num(mesh.colours[used], posinf=0.0), 0.0, 1.0)
+    return Mesh(np.ascontiguousarray(vertices[used]), index.reshape(-1, 3).astype(np.int32), normals, uv, colours)
 
 
 def _flat(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -158,6 +172,14 @@ def check_camera(camera: Camera, path: Path | None, line: int | None = None) -> 
     if not _usable(numbers) or camera.origin == camera.target:
         hint = "Check its to_world transformation."
         raise SceneError("The camera's position or direction is not usable (NaN, infinite or zero).", path, line, hint)
+    if not all(math.isfinite(s) and abs(s) <= LARGEST_SHIFT for s in camera.shift):
+        what = f"The camera's picture is shifted by {camera.shift[0]:g} widths and {camera.shift[1]:g} heights."
+        raise SceneError(what, path, line, f"Correct its offset: at most {LARGEST_SHIFT:g}.")
+    if camera.projection == "orthographic":
+        if not (math.isfinite(camera.width) and 1e-15 < camera.width <= LARGEST_COORDINATE):
+            what = f"The orthographic camera's picture is {camera.width:g} units wide: that can't be shown."
+            raise SceneError(what, path, line, "Check the scale of its to_world transformation.")
+        return
     if not 0 < camera.fov < 180:
         what = f"The camera's field of view must lie between 0 and 180 degrees, found {camera.fov:g}."
         raise SceneError(what, path, line)

@@ -153,4 +153,8 @@ def _power(emitted: RGB, factor: float) -> np.ndarray:
 def _camera(scene: Scene) -> str:
     c = scene.camera
     mirrored = ", mirrored" if c.mirrored else ""
-    return f"at {_numbers(c.origin)} looking at {_numbers(c.target)}, fov {c.fov:.4g}° ({c.fov_axis}){mirrored}"
+    lens = f"fov {c.fov:.4g}° ({c.fov_axis})"
+    if c.projection == "orthographic":
+        lens = f"orthographic, {c.width:.4g} wide"
+    shift = f", shifted by {_numbers(c.shift)}" if any(c.shift) else ""
+    return f"at {_numbers(c.origin)} looking at {_numbers(c.target)}, {lens}{shift}{mirrored}"

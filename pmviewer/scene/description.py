@@ -275,9 +275,10 @@ class Camera:
     """Perspective or orthographic camera. `up` need not be orthogonal to the view direction. `fov` in degrees,
     measured along `fov_axis`. The image's x axis runs to the viewer's right, its y axis down.
 
-    An orthographic camera's picture is `width` scene units wide and `fov` does not count. `shift` moves the picture's
-    middle off the view direction, in widths and heights of the picture: (0.1, 0) shows more of what is on the left, as
-    Mitsuba's `principal_point_offset_x` does.
+    An orthographic camera's picture is `width` scene units wide and `fov` does not count; what lies behind the plane
+    through `origin` is not seen. `shift` moves the picture without turning the camera, in widths and heights of the
+    picture: (0.1, 0) shows more of what is on the right, (0, 0.1) more of what is below, as Mitsuba's
+    `principal_point_offset_x` and `_y` do.
     """
 
     origin: Vec3

@@ -118,12 +118,13 @@ def displaced(geometry: Geometry, height: Height, scale: float, offset: float, c
     faces_now = len(geometry.faces) if isinstance(geometry, Mesh) else 64 if isinstance(geometry, Sphere) else 2
     if faces_now * cuts * cuts > MOST_TRIANGLES:
         raise ValueError(f"subdivision {cuts} would make {faces_now * cuts * cuts:,} triangles of it")
+    colours: Float | None = None
     if isinstance(geometry, Parallelogram):
         vertices, places, faces = _grid(geometry, cuts)
         directions = np.broadcast_to(unit(np.cross(geometry.edge_u, geometry.edge_v)[None]), vertices.shape)
     elif isinstance(geometry, Mesh | Sphere):
         mesh = geometry if isinstance(geometry, Mesh) else _ball(geometry, cuts)
-        vertices, directions, faces = _cut(mesh, cuts if isinstance(geometry, Mesh) else 1)
+        vertices, directions, colours, faces = _cut(mesh, cuts if isinstance(geometry, Mesh) else 1)
         low, size = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
         grain = max(1e-9 * size, 1e-300)  # points nearer than this are one place
         _, place = np.unique(np.round((vertices - low) / grain), axis=0, return_inverse=True)
@@ -131,12 +132,14 @@ def displaced(geometry: Geometry, height: Height, scale: float, offset: float, c
         normal = unit(np.stack([np.bincount(place, directions[:, k]) for k in range(3)], axis=1))
         first = np.zeros(len(normal), np.int64)
         first[place] = np.arange(len(place))
+        colours = None if colours is None else colours[first]
         vertices, directions, faces = vertices[first], normal, place[faces].astype(np.int32)
         faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
         places = (vertices - low) / max(size, 1e-300)
     else:
         raise ValueError("only rectangles, cubes, spheres and meshes can be displaced")
-    return with_smooth_normals(Mesh(vertices + scale * (height(places) + offset)[:, None] * directions, faces))
+    moved = vertices + scale * (height(places) + offset)[:, None] * directions
+    return with_smooth_normals(Mesh(moved, faces, colours=colours))
 
 
 def _ball(g: Sphere, cuts: int) -> Mesh:
@@ -161,8 +164,8 @@ def _grid(g: Parallelogram, cuts: int) -> tuple[Float, Float, NDArray[np.int32]]
     return vertices, np.stack([u, v, 0 * u], 1), np.concatenate([first, second]).astype(np.int32)
 
 
-def _cut(mesh: Mesh, cuts: int) -> tuple[Float, Float, NDArray[np.int32]]:
-    """Every triangle cut into cuts²: vertices, unit normals, faces; the parts share no vertex."""
+def _cut(mesh: Mesh, cuts: int) -> tuple[Float, Float, Float | None, NDArray[np.int32]]:
+    """Every triangle cut into cuts²: vertices, unit normals, colours, faces; the parts share no vertex."""
     normals = mesh.normals if mesh.normals is not None else with_smooth_normals(mesh).normals
     assert normals is not None
     steps = [(i, j) for i in range(cuts + 1) for j in range(cuts + 1 - i)]
@@ -177,9 +180,10 @@ def _cut(mesh: Mesh, cuts: int) -> tuple[Float, Float, NDArray[np.int32]]:
     order = np.argsort(mesh.faces, axis=1)
     swapped = np.linalg.det(np.eye(3)[order]) < 0
     faces = np.take_along_axis(mesh.faces, order, axis=1)
-    parts = [(weights @ values[faces]).reshape(-1, 3) for values in (mesh.vertices, normals)]
+    given = [mesh.vertices, normals] if mesh.colours is None else [mesh.vertices, normals, mesh.colours]
+    parts = [(weights @ values[faces]).reshape(-1, 3) for values in given]
     own = (
         np.where(swapped[:, None, None], pattern[:, ::-1], pattern)
         + (np.arange(len(faces)) * len(steps))[:, None, None]
     )
-    return parts[0], unit(parts[1]), own.reshape(-1, 3).astype(np.int32)
+    return parts[0], unit(parts[1]), parts[2] if len(parts) > 2 else None, own.reshape(-1, 3).astype(np.int32)

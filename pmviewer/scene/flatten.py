@@ -137,7 +137,12 @@ def flatten(scene: Scene) -> FlatScene:
     record = np.zeros(
         1,
         K.scene_dtype(
-            bsdfs=rich, lights=lights.more, instances=bool(groups), textures=textured, colours=coloured, opacity=passable
+            bsdfs=rich,
+            lights=lights.more,
+            instances=bool(groups),
+            textures=textured,
+            colours=coloured,
+            opacity=passable,
         ),
     )
     r = record[0]

@@ -98,7 +98,7 @@ def transformed(mesh: Mesh, m: Matrix, flip: bool = False) -> Mesh:
         if normals is not None:
             normals = unit(normals @ cofactor(m).T) * (-1.0 if mirrored != flip else 1.0)
     faces = mesh.faces[:, ::-1] if mirrored != flip else mesh.faces
-    return Mesh(vertices, np.ascontiguousarray(faces), normals, mesh.uv)
+    return replace(mesh, vertices=vertices, faces=np.ascontiguousarray(faces), normals=normals)
 
 
 def unit(vectors: Float) -> Float:
@@ -141,4 +141,4 @@ def with_smooth_normals(mesh: Mesh, seams: bool = False) -> Mesh:
             index = position[mesh.faces[:, i]]
             for axis in range(3):
                 total[:, axis] += np.bincount(index, weighted[:, axis], minlength=len(total))
-    return Mesh(mesh.vertices, mesh.faces, unit(total)[position], mesh.uv)
+    return replace(mesh, normals=unit(total)[position])

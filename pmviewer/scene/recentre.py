@@ -67,9 +67,12 @@ def _with_camera_warning(scene: Scene, center: NDArray[np.float64], radius: floa
     distance = float(np.linalg.norm(np.subtract(scene.camera.origin, center))) / radius
     if not distance > FAR_CAMERA:
         return scene
+    nearer = "Bring it nearer and widen its field of view."
+    if scene.camera.projection == "orthographic":
+        nearer = "Bring it nearer: that does not change an orthographic picture."
     sentence = (
         f"The camera is {distance:.1e} scene radii away: its rays are some {distance * 2**-23:.1e} of the scene apart "
-        "at best, and the picture is as coarse. Bring it nearer and widen its field of view."
+        f"at best, and the picture is as coarse. {nearer}"
     )
     return replace(scene, warnings=(*scene.warnings, sentence))
 

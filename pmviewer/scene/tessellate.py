@@ -59,11 +59,14 @@ def _drawn(scene: Scene, shape: Shape) -> Drawn:
     corners, corner_normals = _triangles(shape.geometry)
     material = scene.materials[shape.material]
     colour = np.array(material.reflectance)
+    tint: Float = np.ones(3)
+    if material.vertex_colours and isinstance(shape.geometry, Mesh) and shape.geometry.colours is not None:
+        tint = shape.geometry.colours[shape.geometry.faces].reshape(-1, 3)
     if shape.radiance is not None and max(shape.radiance) > 0:
-        colour = np.array(shape.radiance) / max(shape.radiance)
+        colour, tint = np.array(shape.radiance) / max(shape.radiance), np.ones(3)
     elif material.transparent:
         colour = 0.5 + 0.5 * np.array(material.transmittance) * np.array([0.8, 0.9, 1.0])
-    albedo = np.broadcast_to(colour, (corners.shape[0] * 3, 3))
+    albedo = np.broadcast_to(colour * tint, (corners.shape[0] * 3, 3))
     return corners.reshape(-1, 3), corner_normals.reshape(-1, 3), albedo
 
 

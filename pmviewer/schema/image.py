@@ -313,6 +313,44 @@ class CameraSettings(Group):
     fov: float | Auto = setting(
         "auto", "Horizontal field of view.", stage="image", scale="linear", unit="°", ge=1.0, le=170.0, title="FOV"
     )
+    projection: Literal["auto", "perspective", "orthographic"] = setting(
+        "auto",
+        "perspective: things look smaller the farther away they are. orthographic: rays are parallel, sizes and angles "
+        "stay true. auto is the scene file's.",
+        stage="image",
+        scale="choice",
+    )
+    view_width: float | Auto = setting(
+        "auto",
+        "What the width of an orthographic picture spans. Automatic: the scene file's, or what its perspective camera "
+        "sees at its target.",
+        stage="image",
+        scale="log",
+        unit="units",
+        ge=1e-12,
+        le=1e15,
+        title="view width",
+    )
+    shift_x: float | Auto = setting(
+        "auto",
+        "Moves the picture to the right by that share of its width without turning the camera, as a shift lens does.",
+        stage="image",
+        scale="linear",
+        unit="× width",
+        ge=-1000.0,
+        le=1000.0,
+        title="shift right",
+    )
+    shift_y: float | Auto = setting(
+        "auto",
+        "Moves the picture down by that share of its height.",
+        stage="image",
+        scale="linear",
+        unit="× height",
+        ge=-1000.0,
+        le=1000.0,
+        title="shift down",
+    )
     width: int | Auto = setting(
         "auto", "Image width; auto is the scene file's.", stage="image", scale="integer", unit="px", ge=1, le=16384
     )

@@ -10,7 +10,7 @@ import numpy as np
 from imgui_bundle import hello_imgui
 
 from pmviewer.render.camera import CameraPose
-from pmviewer.render.free_camera import plan_pose
+from pmviewer.render.free_camera import as_perspective, plan_pose
 from pmviewer.settings import SETTINGS, get
 from pmviewer.viewer import controls
 from pmviewer.viewer.dialogs import FileDialogs
@@ -145,7 +145,10 @@ class Commands:
     def _reset_camera(self) -> None:
         """The scene file's camera; the automatic overview while the free camera is on."""
         group = "free_camera" if self.state.settings.free_camera.on else "camera"
-        self.state.change({f"{group}.{name}": "auto" for name in ("origin", "target", "up", "fov")})
+        names = ["origin", "target", "up", "fov"]
+        if group == "camera":
+            names += ["projection", "view_width", "shift_x", "shift_y"]
+        self.state.change({f"{group}.{name}": "auto" for name in names})
 
     def _free_from_above(self) -> None:
         """The free camera straight above scene and render camera, with what is ahead of the latter on top."""
@@ -153,7 +156,7 @@ class Commands:
 
     def _free_to_render(self) -> None:
         """The free camera where the render camera is."""
-        self._place_free(lambda render, center, radius: controls.with_pivot(render, center, radius))
+        self._place_free(lambda render, center, radius: as_perspective(controls.with_pivot(render, center, radius)))
 
     def _place_free(self, place: Callable[[CameraPose, np.ndarray, float], CameraPose]) -> None:
         render, geometry = self.state.render_camera(), self.state.session.geometry
@@ -171,6 +174,9 @@ class Commands:
             self.state.say("warning", "The free camera is off: the picture is the render camera's already.")
             return
         values: dict[str, Any] = dict(controls.camera_values(pose))
+        render = self.state.render_camera()
+        if render is not None and (render.orthographic or any(render.shift)):
+            values |= {"camera.projection": "perspective", "camera.shift_x": 0.0, "camera.shift_y": 0.0}
         self.state.change({**values, "camera.fov": pose.fov, "free_camera.on": False})
 
     def _toggle_fly(self) -> None:

@@ -83,8 +83,8 @@ def look(pose: CameraPose, dx: float, dy: float) -> CameraPose:
 
 def _height_at_target(pose: CameraPose) -> float:
     """What the picture's height spans at the target's distance."""
-    distance = float(np.linalg.norm(np.subtract(pose.target, pose.origin)))
-    return 2 * distance * math.tan(math.radians(pose.fov) / 2) * pose.height / pose.width
+    distance = 1.0 if pose.orthographic else float(np.linalg.norm(np.subtract(pose.target, pose.origin)))
+    return 2 * distance * pose.half_width() * pose.height / pose.width
 
 
 def pan(pose: CameraPose, dx: float, dy: float) -> CameraPose:
@@ -96,7 +96,10 @@ def pan(pose: CameraPose, dx: float, dy: float) -> CameraPose:
 
 def zoom(pose: CameraPose, steps: float, radius: float) -> CameraPose:
     """Move the eye towards the target; one step (a notch of the wheel) is a tenth of the way. Close to the target the
-    eye goes on at a steady pace and pushes the target ahead, so that zooming never gets stuck."""
+    eye goes on at a steady pace and pushes the target ahead, so that zooming never gets stuck. An orthographic picture
+    spans a tenth less instead."""
+    if pose.orthographic:
+        return replace(pose, view_width=min(max(pose.view_width * 0.9**steps, 1e-6 * radius), 1e3 * radius))
     origin, target = np.asarray(pose.origin, float), np.asarray(pose.target, float)
     forward = _unit(target - origin)
     distance = float(np.linalg.norm(target - origin))
@@ -116,14 +119,29 @@ def fly(pose: CameraPose, right: float, up: float, forward: float, step: float) 
 
 
 def frame_all(pose: CameraPose, center: Vector, radius: float) -> CameraPose:
-    """Back off along the view direction until the bounding sphere fits."""
-    _, _, forward = pose.axes()
-    half_x = math.tan(math.radians(pose.fov) / 2)
-    half = math.atan(min(half_x, half_x * pose.height / pose.width))
-    distance = radius / max(math.sin(half), 1e-3) * 1.02
-    return replace(pose, origin=_vec3(center - forward * distance), target=_vec3(np.asarray(center, float)))
+    """Back off along the view direction until the bounding sphere fits; an orthographic picture gets as wide."""
+    right, top, forward = pose.axes()
+    half_x = pose.half_width()
+    if pose.orthographic:
+        distance, half_x = 2 * radius, 1.02 * radius * max(1.0, pose.width / pose.height)
+        pose = replace(pose, view_width=2 * half_x)
+    else:
+        half = math.atan(min(half_x, half_x * pose.height / pose.width))
+        distance = radius / max(math.sin(half), 1e-3) * 1.02
+    half_y = half_x * pose.height / pose.width
+    aside = right * (2 * half_x * pose.shift[0]) - top * (2 * half_y * pose.shift[1])
+    eye = np.asarray(center, float) - forward * distance - aside * (1.0 if pose.orthographic else distance)
+    return replace(pose, origin=_vec3(eye), target=_vec3(eye + forward * distance))
 
 
-def camera_values(pose: CameraPose, group: str = "camera") -> dict[str, Vec3]:
-    """The pose as settings of that group, "camera" or "free_camera"."""
-    return {f"{group}.origin": pose.origin, f"{group}.target": pose.target, f"{group}.up": pose.up}
+def camera_values(pose: CameraPose, group: str = "camera") -> dict[str, Vec3 | float]:
+    """The place, view and, of an orthographic camera, width of the pose as settings of that group, "camera" or
+    "free_camera"."""
+    values: dict[str, Vec3 | float] = {
+        f"{group}.origin": pose.origin,
+        f"{group}.target": pose.target,
+        f"{group}.up": pose.up,
+    }
+    if pose.orthographic and group == "camera":
+        values["camera.view_width"] = pose.view_width
+    return values

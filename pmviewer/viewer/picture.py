@@ -70,6 +70,10 @@ class Target:
 
 def clip_planes(camera: CameraPose, center: NDArray[np.floating], radius: float) -> tuple[float, float]:
     """Near and far distance that enclose a bounding sphere as tightly as the depth buffer needs."""
+    if camera.orthographic:
+        depth = float((center - np.asarray(camera.origin, float)) @ camera.axes()[2])
+        far = max(depth + radius, 1e-3 * radius) * 1.01
+        return max(depth - radius, 0.0) * 0.99, far
     distance = float(np.linalg.norm(np.asarray(camera.origin, float) - center))
     far = (distance + radius) * 1.01
     return max((distance - radius) * 0.99, far * 1e-3), far

@@ -105,9 +105,10 @@ def projected(camera: CameraPose, point: NDArray[np.floating]) -> tuple[float, f
     """Where a point is in the picture, from (0, 0) top left to (1, 1); None where the camera doesn't see it."""
     if not np.isfinite(point).all():
         return None
-    clip = camera.projection_matrix(1e-3, 1.0) @ camera.view_matrix() @ np.append(point, 1.0)
-    if not clip[3] > 0:
+    seen = camera.view_matrix() @ np.append(point, 1.0)
+    if not seen[2] < 0:
         return None
+    clip = camera.projection_matrix(1e-3, 1.0) @ seen
     x, y = 0.5 + 0.5 * clip[0] / clip[3], 0.5 - 0.5 * clip[1] / clip[3]
     return (float(x), float(y)) if 0 <= x <= 1 and 0 <= y <= 1 else None
 
