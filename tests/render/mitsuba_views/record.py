@@ -1,0 +1,42 @@
+"""Render the scenes of this folder with Mitsuba 3 and record block means with their standard errors.
+
+    python -m tests.render.mitsuba_views.record
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from tests.render.mitsuba_views.scenes import VIEWS, for_mitsuba
+
+RUNS, SAMPLES, BLOCK = 8, 2048, 8
+
+
+def main() -> None:
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_rgb")
+    recorded = {}
+    for name in VIEWS:
+        scene = mi.load_dict(for_mitsuba(name, mi))
+        rows = []
+        for seed in range(RUNS):
+            image = np.array(mi.render(scene, spp=SAMPLES, seed=seed))[..., :3]
+            h, w, _ = image.shape
+            rows.append(image.reshape(h // BLOCK, BLOCK, w // BLOCK, BLOCK, 3).mean(axis=(1, 3)).reshape(-1))
+        mean, error = np.mean(rows, axis=0), np.std(rows, axis=0, ddof=1) / np.sqrt(RUNS)
+        recorded[name] = {
+            "mean": [float(f"{x:.6g}") for x in mean],
+            "error": [float(f"{x:.3g}") for x in error],
+        }
+        print(name, mean.mean(), (error / mean).max())
+    about = f"Mitsuba {mi.__version__}, path, {SAMPLES} samples a pixel, {RUNS} runs"
+    out = {"made": about, "runs": RUNS, "block": BLOCK, "scenes": recorded}
+    Path(__file__).with_name("expected.json").write_text(json.dumps(out) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,69 @@
+"""Surfaces that rays pass, colours at vertices, orthographic and shifted cameras: Mitsuba 3's pictures are ours.
+
+The expectation was rendered by Mitsuba 3 (tests/render/mitsuba_views/record.py): means over blocks of pixels and their
+standard errors; each picture is tested against it by Welch's t-test.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+from pmviewer.engine.cache import StageCache
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.renderer import Renderer
+from tests.render.mitsuba_views.scenes import VIEWS, description
+from tests.scenes_for_tests import settings_of
+
+EXPECTED = json.loads((Path(__file__).parent / "mitsuba_views" / "expected.json").read_text("utf-8"))
+RUNS = 6
+SIGNIFICANCE = 1e-4
+
+
+def block_runs(name, method, passes):
+    """(RUNS, blocks · 3) means over blocks of pictures with different seeds."""
+    opened, pool, rows, b = open_scene(description(name)), WorkPool(), [], EXPECTED["block"]
+    try:
+        for seed in range(1, RUNS + 1):
+            values = {"render": {"method": method, "seed": seed}, "estimate": {"radius": 0.01}}
+            renderer = Renderer(opened, settings_of(photons={"N": 30_000}, **values), pool, StageCache(0))
+            for _ in range(passes):
+                renderer.step()
+            image = renderer.frame(0).image().astype(np.float64)
+            h, w, _ = image.shape
+            rows.append(image.reshape(h // b, b, w // b, b, 3).mean(axis=(1, 3)).reshape(-1))
+    finally:
+        pool.close()
+    return np.array(rows)
+
+
+def check(name, method, passes, tolerance):
+    """All blocks agree within their noise and that share of a block, and the whole picture within one percent."""
+    ours = block_runs(name, method, passes)
+    mean, error = (np.array(EXPECTED["scenes"][name][key]) for key in ("mean", "error"))
+    a, b = ours.var(axis=0, ddof=1) / RUNS, error**2
+    freedom = (a + b) ** 2 / (a**2 / (RUNS - 1) + b**2 / (EXPECTED["runs"] - 1))
+    beyond = np.maximum(np.abs(ours.mean(axis=0) - mean) - tolerance * mean, 0.0)
+    smallest = float(2 * student.sf(beyond / np.sqrt(a + b), freedom).min())
+    ratio = ours.mean() / mean.mean()
+    noise = np.sqrt((a + b).sum()) / mean.sum()
+    print(f"{name} {method}: ratio {ratio:.4f} ± {noise:.4f}, p {smallest:.2g}")
+    assert -np.expm1(len(mean) * np.log1p(-smallest)) > SIGNIFICANCE
+    assert ratio == pytest.approx(1.0, abs=max(0.01, 3 * noise))
+
+
+@pytest.mark.parametrize("name", list(VIEWS))
+def test_path_tracer(name):
+    check(name, "path", 64, 0.0)
+
+
+@pytest.mark.parametrize("name", ["veils_area", "veils_sky", "orthographic", "vertex_colours"])
+@pytest.mark.parametrize("method", ["progressive", "gather"])
+def test_photon_methods(name, method):
+    """Within two percent of a block, for what look-ups blur along edges."""
+    check(name, method, 24, 0.02)
