@@ -118,9 +118,7 @@ def textured(texture, cutoff=None):
 
 
 def test_texture_is_looked_up_where_rays_meet_the_surface():
-    flat, first = scene_of(
-        sheet(0.0, 1), veil=textured(Checkerboard((0.25,) * 3, (1.0,) * 3, (1, 0, 0, 0, 1, 0)))
-    )
+    flat, first = scene_of(sheet(0.0, 1), veil=textured(Checkerboard((0.25,) * 3, (1.0,) * 3, (1, 0, 0, 0, 1, 0))))
     origins, directions = down()
     _, prim, _ = cast(flat, origins, directions)
     same = (origins[:, 0] > 0) == (origins[:, 1] > 0)

@@ -1,6 +1,6 @@
 """Render the scenes of this folder with Mitsuba 3 and record block means with their standard errors.
 
-    python -m tests.render.mitsuba_views.record
+python -m tests.render.mitsuba_views.record
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 from tests.render.mitsuba_views.scenes import VIEWS, for_mitsuba
 
-RUNS, SAMPLES, BLOCK = 8, 2048, 8
+RUNS, SAMPLES, BLOCK = 8, 1024, 8
 
 
 def main() -> None:
@@ -33,7 +33,7 @@ def main() -> None:
             "error": [float(f"{x:.3g}") for x in error],
         }
         print(name, mean.mean(), (error / mean).max())
-    about = f"Mitsuba {mi.__version__}, path, {SAMPLES} samples a pixel, {RUNS} runs"
+    about = f"Mitsuba {mi.__version__}, volpath, {SAMPLES} samples a pixel, {RUNS} runs"
     out = {"made": about, "runs": RUNS, "block": BLOCK, "scenes": recorded}
     Path(__file__).with_name("expected.json").write_text(json.dumps(out) + "\n", "utf-8")
 

@@ -102,7 +102,9 @@ def for_mitsuba(name: str, mi: Any) -> dict[str, Any]:
         sensor = {"type": "orthographic", "to_world": view @ transform().scale([half, half, 1]), "film": film}
     if any(camera.shift):
         sensor |= {"principal_point_offset_x": camera.shift[0], "principal_point_offset_y": camera.shift[1]}
-    found: dict[str, Any] = {"type": "scene", "integrator": {"type": "path", "max_depth": -1}, "sensor": sensor}
+    # Mitsuba's `path` multiplies light samples on masked surfaces by the opacity twice (3.9.1); its `volpath` does not.
+    integrator = {"type": "volpath", "max_depth": -1, "rr_depth": 12}
+    found: dict[str, Any] = {"type": "scene", "integrator": integrator, "sensor": sensor}
 
     def matte_of(material: Material) -> dict[str, Any]:
         inside = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(material.reflectance)}}
@@ -112,10 +114,11 @@ def for_mitsuba(name: str, mi: Any) -> dict[str, Any]:
         opacity: Any = material.opacity
         if "opacity" in material.textures:
             texture = material.textures["opacity"]
+            # As a number, unlike as a colour, Mitsuba's checkerboard has its fields the other way round (3.9.1).
             opacity = {
                 "type": "checkerboard",
-                "color0": {"type": "rgb", "value": list(texture.color0)},
-                "color1": {"type": "rgb", "value": list(texture.color1)},
+                "color0": {"type": "rgb", "value": list(texture.color1)},
+                "color1": {"type": "rgb", "value": list(texture.color0)},
                 "to_uv": transform().scale([texture.to_uv[0], texture.to_uv[4], 1]),
             }
         return {"type": "mask", "opacity": opacity, "inside": bsdf}
