@@ -11,6 +11,7 @@ from pmviewer.engine.hidden_lights import hidden_lights
 from pmviewer.engine.memory import check_scene_memory
 from pmviewer.photons.projection import Projection
 from pmviewer.scene.analysis import SceneTraits, analyse
+from pmviewer.scene.covered_emission import ignored_opacity, without_unseen_lights
 from pmviewer.scene.description import Scene
 from pmviewer.scene.flatten import FlatScene, flatten
 from pmviewer.scene.load import load_scene
@@ -36,10 +37,10 @@ def open_scene(source: str | Path | Scene, parameters: Mapping[str, str] | None 
     """Load, check, move to the origin and flatten. Raises SceneError."""
     scene = source if isinstance(source, Scene) else load_scene(source, parameters or {})
     check_scene_memory(scene)
-    scene = recentred(scene)
+    scene = without_unseen_lights(recentred(scene))
     name = scene.name if isinstance(source, Scene) else str(source)
     flat = flatten(scene)
-    hidden = hidden_lights(scene, flat)
-    if hidden:
-        scene = replace(scene, warnings=(*scene.warnings, *hidden))
+    said = (*hidden_lights(scene, flat), *ignored_opacity(scene))
+    if said:
+        scene = replace(scene, warnings=(*scene.warnings, *said))
     return OpenScene(scene, flat, analyse(scene), name)

@@ -17,12 +17,14 @@ import numpy as np
 from numba.core import types
 from numba.extending import overload
 
+from pmviewer.kernels.instance import I_TO_LOCAL, find_instance, has_instances, stored_of, transform_point
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import bits_of_float, load_f4, load_i4
 from pmviewer.kernels.random import hash3, unit_float
-from pmviewer.kernels.scene import M_ALPHA_CUTOFF, M_OPACITY, M_OPACITY_MAP, MATERIAL_COLUMNS
+from pmviewer.kernels.scene import M_ALPHA_CUTOFF, M_OPACITY, M_OPACITY_MAP, MATERIAL_COLUMNS, material_of
 from pmviewer.kernels.texture import texture_value
 from pmviewer.kernels.uv import stored_uv
+from pmviewer.kernels.vector import scale
 
 _f4 = np.float32
 _u4 = np.uint32
@@ -30,6 +32,10 @@ _i8 = np.int64
 
 NEARLY_ONE = _f4(1.0 - 1e-6)
 """What a white texture's luminance may round to: from here on nothing passes."""
+
+
+LEAST = _f4(1e-3)
+"""Opacity by which a ray that is stopped counts at most: fewer would be as bright as that makes up for."""
 
 
 class Veil(NamedTuple):
@@ -99,6 +105,45 @@ def _opacity_of(scene, material, stored, b1, b2, p):
         return value
 
     return textured
+
+
+def over_opacity(scene, prim, b1, b2, p, value):
+    """A colour over the opacity of the primitive that was hit at p: of a ray's radiance or power, where as many rays
+    as the opacity says stop, so that the mean is that of all."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(over_opacity)
+def _over_opacity(scene, prim, b1, b2, p, value):
+    if not lets_pass(scene):
+        return lambda scene, prim, b1, b2, p, value: value
+
+    def divided(scene, prim, b1, b2, p, value):
+        stored, q = as_stored(scene, prim, p)
+        opacity = opacity_of(scene, material_of(scene, prim), stored, b1, b2, q)
+        return scale(value, _f4(1.0) / max(opacity, LEAST))
+
+    return divided
+
+
+def as_stored(scene, prim, p):
+    """The stored primitive of a hit, and its point in the coordinates that this is stored in."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(as_stored)
+def _as_stored(scene, prim, p):
+    if not has_instances(scene):
+        return lambda scene, prim, p: (_i8(prim), p)
+
+    def through(scene, prim, p):
+        if prim < scene.n_stored:
+            return _i8(prim), p
+        i = find_instance(scene, prim)
+        x, y, z = transform_point(scene, i, I_TO_LOCAL, np.float64(p[0]), np.float64(p[1]), np.float64(p[2]))
+        return stored_of(scene, i, prim), (_f4(x), _f4(y), _f4(z))
+
+    return through
 
 
 @device

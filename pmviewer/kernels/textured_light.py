@@ -18,7 +18,7 @@ from numba.extending import overload
 
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4, load_i4, load_i8
-from pmviewer.kernels.opacity import lets_pass, opacity_of
+from pmviewer.kernels.opacity import lets_pass, over_opacity
 from pmviewer.kernels.scene import (
     DISK,
     L_A,
@@ -40,18 +40,15 @@ from pmviewer.kernels.scene import (
     SPHERE,
     light_number,
     light_vector,
-    material_of,
 )
 from pmviewer.kernels.table import find_interval
 from pmviewer.kernels.texture import texture_rgb
 from pmviewer.kernels.uv import azimuth, barycentrics, disk_uv, hit_uv, in_frame, sphere_uv
-from pmviewer.kernels.vector import basis, cross, dot, scale, sub
+from pmviewer.kernels.vector import basis, cross, dot, sub
 from pmviewer.kernels.warp import square_to_triangle
 
 _f4 = np.float32
 _BELOW_ONE = _f4(0.99999994)
-_LEAST_OPACITY = _f4(1e-3)
-"""Of a light where it is hit: one ray in a thousand and fewer would otherwise be as bright as that makes up for."""
 
 
 @device
@@ -117,11 +114,8 @@ def _emission_at(scene, light, prim, p):
 
 @device
 def _uncovered(scene, prim, p, radiance):
-    """The radiance over the opacity of the light's primitive at p."""
-    stored = np.int64(prim)
-    b1, b2 = barycentrics(scene, stored, p)
-    opacity = opacity_of(scene, material_of(scene, prim), stored, b1, b2, p)
-    return scale(radiance, _f4(1.0) / max(opacity, _LEAST_OPACITY))
+    b1, b2 = barycentrics(scene, prim, p)
+    return over_opacity(scene, prim, b1, b2, p, radiance)
 
 
 @device

@@ -16,6 +16,7 @@ from numba.extending import overload
 from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.light import is_delta_light
 from pmviewer.kernels.memory import float_of_bits
+from pmviewer.kernels.opacity import over_opacity
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.raycast import closest_hit
 from pmviewer.kernels.scattering import (
@@ -195,7 +196,8 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                 if pass_.roulette == EQUAL:
                     times, factor = copies(beta, draw1(pass_.sequence, seed, index, COPIES_SET + bounces))
                     stored = scale(beta, factor)
-                stored = scale(stored, worth)
+                # As many photons as the opacity says meet the surface; looked up, it is taken to be there.
+                stored = over_opacity(scene, prim, u, v, p, scale(stored, worth))
                 if is_caustic and pass_.caustics != 0:
                     in_caustic = scale(stored, pass_.direct_scale)
                     if path_class == INDIRECT_CAUSTIC:

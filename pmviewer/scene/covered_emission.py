@@ -7,12 +7,14 @@ to everything else, photons and light samples.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.scene.description import RGB, Material, Mesh, Scene, Shape
+from pmviewer.scene.material_row import used_materials
 from pmviewer.scene.texture import LUMINANCE, Bitmap, Checkerboard, Texture, evaluate, scaled
 
 Float = NDArray[np.float64]
@@ -25,14 +27,39 @@ _BETWEEN = 2
 def with_covered_emission(scene: Scene) -> Scene:
     """The scene with each light's emission multiplied by the opacity of its material; a light that is nowhere opaque
     is none."""
-    shapes = list(scene.shapes)
-    changed = False
-    for i, shape in enumerate(shapes):
-        if shape.radiance is not None and shape.material < len(scene.materials):
-            material = scene.materials[shape.material]
-            if material.passable:
-                shapes[i], changed = _covered(shape, material), True
-    return replace(scene, shapes=tuple(shapes)) if changed else scene
+    return _with_lights(scene, _covered)
+
+
+def without_unseen_lights(scene: Scene) -> Scene:
+    """The scene without the emission of surfaces that are nowhere opaque."""
+
+    def seen(shape: Shape, material: Material) -> Shape:
+        return shape if _covered(shape, material).radiance is not None else replace(shape, radiance=None, emission=None)
+
+    return _with_lights(scene, seen)
+
+
+def _with_lights(scene: Scene, change: Callable[[Shape, Material], Shape]) -> Scene:
+    """The scene with each light on a surface that rays pass changed."""
+    shapes = [
+        change(s, scene.materials[s.material])
+        if s.radiance is not None and scene.materials[s.material].passable
+        else s
+        for s in scene.shapes
+    ]
+    return scene if all(a is b for a, b in zip(shapes, scene.shapes)) else replace(scene, shapes=tuple(shapes))
+
+
+def ignored_opacity(scene: Scene) -> tuple[str, ...]:
+    """A sentence for glass that lets rays pass beside refracting them and absorbs light: it never does here."""
+    names = [m.name for m in used_materials(scene) if m.veiled and not m.passable]
+    if not names:
+        return ()
+    more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+    return (
+        f"The opacity of '{names[0]}'{more} is ignored: glass that absorbs light shows all over. Without its absorption "
+        "it lets light pass.",
+    )
 
 
 def _covered(shape: Shape, material: Material) -> Shape:

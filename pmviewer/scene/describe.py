@@ -128,6 +128,10 @@ def _materials(scene: Scene) -> str:
     for kind, members in groups.items():
         names = ", ".join(m.name for m in members[:_LISTED]) + (" …" if len(members) > _LISTED else "")
         texts.append(f"{len(members)} {kind} ({names})")
+    passed = [m.name for m in used if m.passable]
+    if passed:
+        names = ", ".join(passed[:_LISTED]) + (" …" if len(passed) > _LISTED else "")
+        texts.append(f"{len(passed)} of them let light pass in part ({names})")
     return ", ".join(texts)
 
 

@@ -173,12 +173,15 @@ class Material:
     (Mitsuba's `twosided` around a map), or as a whole, as those of a thin sheet with bumps do?"""
 
     @property
+    def veiled(self) -> bool:
+        """Is it less than opaque somewhere?"""
+        return "opacity" in self.textures or self.opacity < (1.0 if self.alpha_cutoff is None else self.alpha_cutoff)
+
+    @property
     def passable(self) -> bool:
         """Do some rays pass straight through it? None do where its inside absorbs light, for then a ray would have to
         know where it entered."""
-        least = 1.0 if self.alpha_cutoff is None else self.alpha_cutoff
-        absorbs = self.kind in ("dielectric", "rough dielectric") and any(self.absorption)
-        return ("opacity" in self.textures or self.opacity < least) and not absorbs
+        return self.veiled and not (self.kind in ("dielectric", "rough dielectric") and any(self.absorption))
 
     @property
     def transparent(self) -> bool:

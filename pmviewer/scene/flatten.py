@@ -27,7 +27,7 @@ from pmviewer.scene.description import (
 from pmviewer.scene.flatten_textures import TextureTable, coordinates, corner_colours, light_arrays, needs_tangents
 from pmviewer.scene.instances import build_instanced, instance_bounds, normalised
 from pmviewer.scene.light_table import LightTable, axis_of, side_of
-from pmviewer.scene.material_row import is_rich, material_table, used_materials
+from pmviewer.scene.material_row import is_rich, material_table, used_materials, with_parts
 from pmviewer.scene.textured_emission import textured_lights
 
 Float = NDArray[np.float32]
@@ -133,7 +133,7 @@ def flatten(scene: Scene) -> FlatScene:
     prim_light = of_shape[shape_of_prim].astype(np.int32)
     textured = bool(emissions) or (rich and needs_tangents(scene))
     used = used_materials(scene)
-    coloured, passable = any(m.vertex_colours for m in used), any(m.passable for m in used)
+    coloured, passable = any(m.vertex_colours for m in with_parts(used)), any(m.passable for m in used)
     record = np.zeros(
         1,
         K.scene_dtype(

@@ -11,6 +11,7 @@ from pmviewer.errors import SceneError
 from pmviewer.kernels import scene as K
 from pmviewer.resources import available_memory
 from pmviewer.scene.description import Geometry, Material, Mesh, Scene
+from pmviewer.scene.material_row import with_parts
 from pmviewer.scene.texture import Checkerboard, Texture
 from pmviewer.scene.texture_coordinates import corner_uv, frame_of
 from pmviewer.scene.textured_emission import Emission
@@ -29,7 +30,7 @@ _COLUMN = {
 
 def needs_tangents(scene: Scene) -> bool:
     """Does any surface's material have a texture, colours at vertices, or a direction of its own?"""
-    used = [scene.materials[i] for i in {s.material for s in scene.all_shapes}]
+    used = with_parts([scene.materials[i] for i in {s.material for s in scene.all_shapes}])
     return any(m.textures or m.vertex_colours or m.alpha[0] != m.alpha[1] for m in used)
 
 
@@ -116,9 +117,10 @@ def corner_colours(triangles: list[Geometry]) -> NDArray[np.float32]:
     """`colours` of shapes in the order of the primitives: white where there are none."""
     parts = [np.zeros((0, 3, 3))]
     for g in triangles:
-        colours = g.colours if isinstance(g, Mesh) else None
-        count = len(g.faces) if isinstance(g, Mesh) else 2
-        parts.append(np.ones((count, 3, 3)) if colours is None else colours[g.faces])
+        if isinstance(g, Mesh):
+            parts.append(np.ones((len(g.faces), 3, 3)) if g.colours is None else g.colours[g.faces])
+        else:
+            parts.append(np.ones((2, 3, 3)))
     return np.concatenate(parts).astype(np.float32).reshape(-1, 9)
 
 

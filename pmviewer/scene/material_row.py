@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -56,6 +57,14 @@ def is_plain(m: Material) -> bool:
 def used_materials(scene: Scene) -> list[Material]:
     """Materials that some shape has, instanced ones included, in the order of the scene's list."""
     return [scene.materials[i] for i in sorted({s.material for s in scene.all_shapes}) if i < len(scene.materials)]
+
+
+def with_parts(materials: Iterable[Material]) -> list[Material]:
+    """The materials and all that they are blended from."""
+    found = list(materials)
+    for material in found:
+        found.extend(material.parts)
+    return found
 
 
 def is_rich(scene: Scene) -> bool:
