@@ -42,9 +42,7 @@ def without_unseen_lights(scene: Scene) -> Scene:
 def _with_lights(scene: Scene, change: Callable[[Shape, Material], Shape]) -> Scene:
     """The scene with each light on a surface that rays pass changed."""
     shapes = [
-        change(s, scene.materials[s.material])
-        if s.radiance is not None and scene.materials[s.material].passable
-        else s
+        change(s, scene.materials[s.material]) if s.radiance is not None and scene.materials[s.material].passable else s
         for s in scene.shapes
     ]
     return scene if all(a is b for a, b in zip(shapes, scene.shapes)) else replace(scene, shapes=tuple(shapes))
