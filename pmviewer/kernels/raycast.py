@@ -252,8 +252,9 @@ def _block_occludes(leaves, block, mask, scratch):
 def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     """(t, primitive, u, v) of the nearest hit; (tmax, -1, 0, 0) without one.
 
-    Surfaces that let the ray pass (`pmviewer.kernels.opacity`) are not hit. u and v are the barycentrics of a triangle's second and third vertex, 0 for quadrics. Negative tmin counts as 0. A
-    ray with a non-finite number hits nothing.
+    Surfaces that let the ray pass (`pmviewer.kernels.opacity`) are not hit. u and v are the barycentrics of a
+    triangle's second and third vertex, 0 for quadrics. Negative tmin counts as 0. A ray with a non-finite number hits
+    nothing.
     """
     raise NotImplementedError("only for kernels")
 

@@ -55,8 +55,8 @@ def ignored_opacity(scene: Scene) -> tuple[str, ...]:
         return ()
     more = f" and {len(names) - 1} more" if len(names) > 1 else ""
     return (
-        f"The opacity of '{names[0]}'{more} is ignored: glass that absorbs light shows all over. Without its absorption "
-        "it lets light pass.",
+        f"The opacity of '{names[0]}'{more} is ignored: glass that absorbs light shows all over. Without its "
+        "absorption it lets light pass.",
     )
 
 

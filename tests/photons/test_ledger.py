@@ -67,6 +67,17 @@ def agrees(value, error, expected):
     return abs(value - expected) <= 4.5 * error + 1e-5
 
 
+@pytest.mark.parametrize("albedo", [0.0, 0.6])
+def test_light_within_a_ball_that_lets_it_pass(albedo):
+    """Of opacity a and albedo ρ: each flight to the ball ends with a, and ρ of those go on, all of them inside."""
+    veil = replace(diffuse(albedo=(albedo,) * 3), opacity=0.3)
+    ball = (Shape("ball", Sphere((0, 0, 0), 0.5), 0),)
+    lamp = (PointLight("lamp", (0, 0, 0), (1.0, 1.0, 1.0)),)
+    mean, error = shares(Scene("ball", None, ball, (veil,), lamp, box_camera(), 8, 8), max_bounces=100)
+    assert agrees(mean[ABSORBED], error[ABSORBED], 0.3 * (1 - albedo) / (1 - 0.3 * albedo))
+    assert agrees(mean[ESCAPED], error[ESCAPED], 0.7 / (1 - 0.3 * albedo))
+
+
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("albedo", [0.0, 0.3, 0.9])
 def test_closed_box_after_b_scatterings(rule, albedo):
