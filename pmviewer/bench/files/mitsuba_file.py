@@ -1,0 +1,147 @@
+"""Mitsuba 3 renders a file that somebody wrote: small, to a given depth, and with as little as possible changed.
+
+Runs inside `pmviewer.bench.agree.mitsuba_server`. The file's film gets another size, and its integrator is replaced by
+the path tracer; a file that Mitsuba refuses then is tried again with properties that nothing reads ignored, and with
+0.6's texture filters by their nearest equivalents. What was changed beyond size and integrator is told.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+CHUNK = 16
+"""Samples per pixel between two looks at the noise: chunks are the independent pictures that the noise is taken of."""
+LEAST_CHUNKS = 8
+RR_DEPTH = 8
+PROJECTIVE = ("perspective", "thinlens", "orthographic")
+FILTERS = {"trilinear": "bilinear", "ewa": "bilinear", "isotropic": "bilinear", "none": "nearest"}
+"""Mitsuba 0.6's texture filters in Mitsuba 3."""
+
+
+def answer(mi: Any, request: dict[str, Any]) -> dict[str, Any]:
+    """{"size", "file_size", "means": (n, 3) of chunks of `CHUNK` samples, "adapted": what was changed}, or {"error"}.
+
+    `request`: "path", "longest" (pixels of the longer side), "max_depth" (Mitsuba's way of counting), "noise" (relative
+    standard error of the mean that is enough), "cpu" (seconds after which it must do).
+    """
+    import drjit
+
+    drjit.set_thread_count(1)  # several of these work side by side
+    adapted = ""
+    try:
+        scene, about = _scene(mi, request, lenient=False)
+    except (RuntimeError, TypeError, ValueError) as refused:
+        try:
+            scene, about = _scene(mi, request, lenient=True)
+        except (RuntimeError, TypeError, ValueError) as error:
+            return {"error": _one_line(error)}
+        adapted = _one_line(refused)
+    if about["camera"] not in PROJECTIVE:
+        return {"error": f"the camera '{about['camera']}' takes no picture to compare"}
+    integrator = mi.load_dict(
+        {"type": "path", "max_depth": request["max_depth"], "rr_depth": RR_DEPTH, "hide_emitters": about["hidden"]}
+    )
+    return {**about, "adapted": adapted, "means": _means(mi, scene, integrator, request)}
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())[:400]
+
+
+def _means(mi: Any, scene: Any, integrator: Any, request: dict[str, Any]) -> list[list[float]]:
+    means: list[list[float]] = []
+    started = time.process_time()
+    while True:
+        image = np.array(mi.render(scene, integrator=integrator, spp=CHUNK, seed=len(means) + 1), np.float64)
+        means.append([float(v) for v in image[..., :3].mean(axis=(0, 1))])
+        if len(means) < 2:
+            continue
+        spent = time.process_time() - started
+        if spent > request["cpu"] or (len(means) >= LEAST_CHUNKS and noise(np.array(means)) < request["noise"]):
+            return means
+
+
+def noise(means: Any) -> float:
+    """Largest relative standard error of the channels' means, (n, 3), of channels that say something."""
+    mean = means.mean(axis=0)
+    said = mean > 0.01 * mean.max()
+    if not said.any() or not np.isfinite(mean).all():
+        return 0.0
+    return float((means.std(axis=0, ddof=1)[said] / math.sqrt(len(means)) / mean[said]).max())
+
+
+def _scene(mi: Any, request: dict[str, Any], lenient: bool) -> tuple[Any, dict[str, Any]]:
+    path = Path(request["path"])
+    known = mi.file_resolver()
+    mine = mi.FileResolver(known)
+    mine.prepend(str(path.parent))
+    mi.set_file_resolver(mine)
+    try:
+        config = mi.parser.ParserConfig(mi.variant())
+        config.parallel = False
+        if lenient:
+            config.unused_properties = config.unused_parameters = mi.LogLevel.Debug
+        state = mi.parser.parse_file(config, str(path))
+        if lenient:
+            mi.parser.transform_upgrade(config, state)
+        about = _adapt(mi, state, request["longest"], lenient)
+        mi.parser.transform_all(config, state)
+        made = mi.parser.instantiate(config, state)
+        scene = made[0] if isinstance(made, list) else made
+        if not scene.sensors():
+            raise RuntimeError("the file has no camera")
+        return scene, about
+    finally:
+        mi.set_file_resolver(known)
+
+
+def _adapt(mi: Any, state: Any, longest: int, lenient: bool) -> dict[str, Any]:
+    """Change the parsed file; what kind of camera it has, its size, and whether its integrator hides emitters."""
+    about: dict[str, Any] = {"camera": "", "size": [longest, longest], "file_size": None, "hidden": False}
+    for node in state.nodes:
+        props = node.props
+        if node.type == mi.ObjectType.Sensor and not about["camera"]:
+            about["camera"] = props.plugin_name()
+        elif node.type == mi.ObjectType.Film:
+            about |= _resized(mi, node, longest)
+        elif node.type == mi.ObjectType.Integrator:
+            hidden = next((props[k] for k in ("hide_emitters", "hideEmitters") if k in props), False)
+            about["hidden"] = about["hidden"] or bool(hidden)
+            node.props = mi.Properties("path")
+        elif node.type == mi.ObjectType.Sampler:
+            node.props = mi.Properties("independent")
+        elif lenient and node.type == mi.ObjectType.Texture:
+            for key in ("filter_type", "filterType"):
+                if key in props and props[key] in FILTERS:
+                    props[key] = FILTERS[props[key]]
+    return about
+
+
+def _resized(mi: Any, node: Any, longest: int) -> dict[str, Any]:
+    width, height = (int(node.props[key]) if key in node.props else default for key, default in
+                     (("width", 768), ("height", 576)))  # fmt: skip
+    size = small_size(width, height, longest)
+    film = mi.Properties("hdrfilm")
+    film["width"], film["height"] = size
+    # The filter stays: it is the node's child, which the new properties have to name again.
+    node.props = film
+    return {"size": list(size), "file_size": [width, height]}
+
+
+def small_size(width: int, height: int, longest: int) -> tuple[int, int]:
+    """The size nearest in proportion to (width, height) among those whose longer side has 2/3 of `longest` to
+    `longest` pixels: the picture's edges are then where the file has them."""
+    small, large = sorted((max(width, 1), max(height, 1)))
+
+    def off(side: int) -> float:
+        other = side * small / large
+        return abs(max(round(other), 1) - other) / other
+
+    side = min(range(longest, 2 * longest // 3, -1), key=lambda s: (round(off(s), 6), -s))
+    other = max(round(side * small / large), 1)
+    return (side, other) if width >= height else (other, side)
