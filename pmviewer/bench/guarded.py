@@ -27,15 +27,19 @@ LAST_WORDS = 2000
 
 @dataclass(frozen=True)
 class Limits:
-    """Of one request: CPU seconds, seconds by the clock, bytes of resident memory of the whole process."""
+    """Of one request: CPU seconds, seconds in which no thread works or waits for a processor, bytes of resident memory
+    of the whole process. `wall`: seconds by the clock, which a busy machine stretches; the only one that holds where
+    the system doesn't tell the others."""
 
     cpu: float = 60.0
-    wall: float = 300.0
+    idle: float = 20.0
+    wall: float = 3600.0
     memory: int = 4 << 30
 
 
 class Ended(Exception):
-    """The process did not answer. `kind` is "time" (by the clock), "cpu", "memory" or "died"; the text is a sentence."""
+    """The process did not answer. `kind` is "time" (it waits for what never comes, or by the clock), "cpu", "memory" or
+    "died"; the text is a sentence."""
 
     def __init__(self, kind: str, text: str) -> None:
         self.kind = kind
@@ -69,6 +73,7 @@ class Guarded:
             process.stdin.flush()
         except OSError:
             raise self._death() from None
+        at_work = started
         while True:
             try:
                 line = self._lines.get(timeout=LOOK)
@@ -79,8 +84,13 @@ class Guarded:
             if line is not None:
                 answer: dict[str, Any] = json.loads(line)
                 return answer
-            if time.monotonic() - started > limits.wall:
+            now = time.monotonic()
+            if works(process.pid):
+                at_work = now
+            if now - started > limits.wall:
                 raise self._kill("time", f"no answer after {limits.wall:g} s")
+            if now - at_work > limits.idle:
+                raise self._kill("time", f"no answer, and no work for {limits.idle:g} s")
             if cpu_seconds(process.pid) - cpu_before > limits.cpu:
                 raise self._kill("cpu", f"no answer after {limits.cpu:g} s of CPU time")
             if resident_bytes(process.pid) > limits.memory:
@@ -148,6 +158,15 @@ def cpu_seconds(pid: int) -> float:
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
     except (OSError, IndexError, ValueError, AttributeError):
         return 0.0
+
+
+def works(pid: int) -> bool:
+    """Whether a thread of a process runs, waits for a processor or for a disk; true where the system doesn't tell."""
+    try:
+        stats = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/stat")]
+        return not stats or any(text.rsplit(")", 1)[1].split()[0] in "RD" for text in stats)
+    except (OSError, IndexError):
+        return True
 
 
 def resident_bytes(pid: int | str = "self", peak: bool = False) -> int:

@@ -20,7 +20,10 @@ BENCHES: dict[str, tuple[str, str]] = {
     "mitsuba": ("Agreement with Mitsuba 3 on the same files, block by block", "pmviewer.bench.mitsuba:run"),
     "agree": ("Random scenes: every method against Mitsuba 3 and the others", "pmviewer.bench.agree.bench:run"),
     "files": ("Real files of a folder: which open, and against Mitsuba 3", "pmviewer.bench.files.bench:run"),
-    "hostile": ("Broken files by the thousand: errors in words, bounded time and memory", "pmviewer.bench.hostile.bench:run"),
+    "hostile": (
+        "Broken files by the thousand: errors in words, bounded time and memory",
+        "pmviewer.bench.hostile.bench:run",
+    ),
     "coherence": ("Photons kept when one of three glasses moves (T2)", "pmviewer.bench.coherence:run"),
     "lights": ("Shadow rays by choice of lights (R2)", "pmviewer.bench.lights:run"),
     "shadows": ("Shadow rays saved by shadow photons (T8)", "pmviewer.bench.shadows:run"),

@@ -36,7 +36,7 @@ NOISE = 0.003
 """Relative standard error of a side's mean that is enough: together less than half of `NOISE_BOUND`."""
 EFFORT, QUICK_EFFORT = 8.0, 2.0
 """CPU seconds of a path tracer after which the noise is what it is."""
-LIMITS = Limits(cpu=120, wall=900, memory=6 << 30)
+LIMITS = Limits(cpu=120, idle=60, memory=6 << 30)
 OPENS, RIGHT = 0.95, 1.0
 QUICK_FILES = 40
 NICE = 10
@@ -202,7 +202,8 @@ def _picture(row: Row, path: Path, effort: float, helpers: _Helpers) -> None:
 def report(folder: Path, rows: list[Row], found: dict[Path, Survey], seconds: float) -> BenchResult:
     """The table, what was said how often, and the targets."""
     opened = [row for row in rows if row.opens]
-    compared = [row for row in rows if row.compared]
+    both = [row for row in rows if row.compared]
+    compared = [row for row in both if row.judgement != "noisy"]
     right = [row for row in compared if row.judgement in ("agrees", "said")]
     refused = sum(bool(row.refused) for row in opened)
     targets = [
@@ -213,12 +214,12 @@ def report(folder: Path, rows: list[Row], found: dict[Path, Survey], seconds: fl
         agree = sum(row.judgement == "agrees" for row in compared)
         note = f"{agree} within 2 % of Mitsuba 3, {len(right) - agree} with a warning that says what is missing, "
         targets.append(Target("files right", len(right) / len(compared), RIGHT, "", True,
-                              note + f"of {len(compared)} that both render"))  # fmt: skip
+                              note + f"of {len(compared)} that both render; {len(both) - len(compared)} too noisy to tell"))  # fmt: skip
     targets.append(
         Target("files crash", sum(bool(row.crash) for row in rows), 0, "", False, "tracebacks, hangs, memory")
     )
     return BenchResult(f"Files below {folder}", COLUMNS, [_cells(row) for row in rows], targets,
-                       [*_notes(rows, found), f"Mitsuba 3 renders {len(compared)} of the XML files that open, refuses "
+                       [*_notes(rows, found), f"Mitsuba 3 renders {len(both)} of the XML files that open, refuses "
                         f"{refused}; {LONGEST} pixels, {MAX_DEPTH} scatterings; {seconds:.0f} s in all"])  # fmt: skip
 
 

@@ -24,7 +24,8 @@ HARMLESS = re.compile(
 )
 """Warnings about what does not change the compared picture: they excuse no difference."""
 JUDGEMENTS = {
-    "agrees": "every channel's mean within 2 % (and twice the noise) of Mitsuba's",
+    "agrees": "every channel's mean within 2 % (and twice the noise, at most 2 %) of Mitsuba's",
+    "noisy": "within twice the noise, which is more than 1 %: more samples would be needed to tell",
     "said": "differs, and a warning of ours says what is missing",
     "differs": "differs, and no warning says why",
     "not compared": "no XML, or Mitsuba 3 does not render it",
@@ -101,7 +102,7 @@ class Row:
         if not self.compared:
             return "not compared"
         if self._within():
-            return "agrees"
+            return "agrees" if self.noise <= NOISE_BOUND else "noisy"
         return "said" if any(not HARMLESS.search(text) for text in self.warnings) else "differs"
 
     def _within(self) -> bool:

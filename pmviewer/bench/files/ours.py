@@ -37,7 +37,7 @@ def main() -> None:
         try:
             answer = _WORK[request["do"]](request)
         except PmviewerError as error:
-            answer = {"error": str(error)}
+            answer = {"error": str(error).removeprefix(f"{request['path']}: ").removeprefix(request["path"])}
         except Exception:  # exactly what this process is there to find
             answer = {"crash": traceback.format_exc(limit=-4)}
         print(json.dumps(answer), file=answers, flush=True)

@@ -99,9 +99,11 @@ def _mitsuba(path: Path, found: Survey) -> None:
         raise _Odd("foreign", "its <scene> has no version")
     folders, values = [path.parent], dict[str, str]()
     waiting, seen = [root], 0
+    has_shape = False
     while waiting and seen <= MOST_INCLUDES:
         tree = waiting.pop(0)
         seen += 1
+        has_shape = has_shape or tree.tag == "shape" or next(tree.iter("shape"), None) is not None
         for element in tree.iter("default"):
             values.setdefault(element.get("name", ""), element.get("value", ""))
         for element in tree.iter("path"):
@@ -110,6 +112,8 @@ def _mitsuba(path: Path, found: Survey) -> None:
             place = _name(found, _substituted(text, values, found), folders)
             if is_include and place is not None:
                 waiting.append(ElementTree.parse(place).getroot())
+    if not has_shape and not found.missing:
+        raise _Odd("foreign", "has no <shape>")
 
 
 def _texts(tree: ElementTree.Element) -> list[tuple[str, bool]]:
@@ -193,7 +197,16 @@ def _library(found: Survey, text: str, folder: Path) -> Path | None:
 def _mtl(path: Path, found: Survey) -> None:
     for line in path.read_bytes()[:MOST_TEXT].decode("utf-8", "replace").splitlines():
         words = line.split()
-        if words and words[0].lower() in ("map_kd", "map_ka", "map_ks", "map_ke", "map_d", "map_bump", "bump", "map_ns"):
+        if words and words[0].lower() in (
+            "map_kd",
+            "map_ka",
+            "map_ks",
+            "map_ke",
+            "map_d",
+            "map_bump",
+            "bump",
+            "map_ns",
+        ):
             rest = line.split(None, 1)[1].strip() if len(words) > 1 else ""
             # Options before the name ("-bm 0.2 file name.png") are of single words.
             name = rest if not rest.startswith("-") else words[-1]
