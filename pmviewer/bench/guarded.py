@@ -6,6 +6,7 @@ clock, and where the system tells (Linux) at CPU time and resident memory, every
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import queue
@@ -103,7 +104,8 @@ class Guarded:
                 errors="replace",
             )  # fmt: skip
             if self._nice and hasattr(os, "setpriority"):
-                os.setpriority(os.PRIO_PROCESS, self._process.pid, self._nice)
+                nice = max(self._nice, os.getpriority(os.PRIO_PROCESS, 0))
+                os.setpriority(os.PRIO_PROCESS, self._process.pid, nice)
             self._lines, self._words = queue.SimpleQueue(), []
             self._readers = [
                 threading.Thread(target=_forward, args=(self._process.stdout, self._lines), daemon=True),
@@ -182,7 +184,5 @@ def resident_bytes(pid: int | str = "self", peak: bool = False) -> int:
 
 def forget_peak() -> None:
     """Let the peak of this process' memory count from now on, where the system can."""
-    try:
+    with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
-    except OSError:
-        pass

@@ -1,4 +1,4 @@
-"""Threads for kernels: serial `nogil` functions on small tiles, in a pool of lower priority than the window."""
+"""Threads for kernels: serial `nogil` functions on small tiles, in a pool that can give way to the window."""
 
 from __future__ import annotations
 
@@ -11,6 +11,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 Task = Callable[[], Any]
+
+
+BEHIND_WINDOW = 10
+"""Niceness of threads that work beside a window."""
 
 
 class Cancelled(Exception):
@@ -26,20 +30,26 @@ def available_threads() -> int:
 
 def lower_priority() -> None:
     """Let the window's thread go first (measured: steady 60 frames a second beside full load). Where the system has
-    no priority per thread, nothing changes."""
+    no priority per thread, or the thread has a lower one already, nothing changes."""
     with contextlib.suppress(OSError, AttributeError):
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 10)
+        thread = threading.get_native_id()
+        os.setpriority(os.PRIO_PROCESS, thread, max(BEHIND_WINDOW, os.getpriority(os.PRIO_PROCESS, thread)))
 
 
 class WorkPool:
-    """Runs tasks on `threads` threads. `cpu_seconds` adds up the time that threads spent in tasks."""
+    """Runs tasks on `threads` threads. `cpu_seconds` adds up the time that threads spent in tasks.
 
-    def __init__(self, threads: int | None = None) -> None:
+    `behind_window` lowers the threads' priority; without a window nobody waits, and they keep the process's own.
+    """
+
+    def __init__(self, threads: int | None = None, *, behind_window: bool = False) -> None:
         self.threads = threads or available_threads()
         self.cancel = threading.Event()
         self.cpu_seconds = 0.0
         self._lock = threading.Lock()
-        self._executor = ThreadPoolExecutor(self.threads, "pmviewer", initializer=lower_priority)
+        self._executor = ThreadPoolExecutor(
+            self.threads, "pmviewer", initializer=lower_priority if behind_window else None
+        )
 
     def run(self, tasks: list[Task], on_done: Callable[[int], None] | None = None) -> list[Any]:
         """Results in the order of the tasks; `on_done` hears how many have finished.

@@ -56,7 +56,7 @@ class Session:
         self._messages: list[Message] = []
         self._warned: set[str] = set()
         self._changed = threading.Condition()
-        self._pool = WorkPool(threads)
+        self._pool = WorkPool(threads, behind_window=True)
         self._cache = StageCache()
         self._renderer: Renderer | None = None
         self._worker = threading.Thread(target=self._work, name="pmviewer session", daemon=True)

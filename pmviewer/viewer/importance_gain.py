@@ -63,7 +63,7 @@ class GainRun:
         from pmviewer.engine.pool import WorkPool
 
         self._ticket += 1
-        self._pool = WorkPool(self._session.threads)
+        self._pool = WorkPool(self._session.threads, behind_window=True)
         self.progress = "starting", None
         arguments = self._ticket, self._session.opened_scene, self._session.settings, self._pool, truth
         self._thread = threading.Thread(target=self._run, args=arguments, name="pmviewer comparison", daemon=True)

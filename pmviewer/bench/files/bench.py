@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import queue
 import random
 import re
 import sys
@@ -107,33 +108,40 @@ def _tell(row: Row, done: int, count: int, seconds: float) -> None:
 
 def tried(paths: Sequence[Path], folder: Path, store: Store, effort: float) -> Iterator[Row]:
     """A row for each file in the order in which they are through, several at a time."""
-    workers = max(min(available_threads(), len(paths)), 1)
-    helpers = _Helpers()
-    with ThreadPoolExecutor(workers) as pool:
+    helpers = [_Helpers() for _ in range(max(min(available_threads(), len(paths)), 1))]
+    idle: queue.SimpleQueue[_Helpers] = queue.SimpleQueue()
+    for one in helpers:
+        idle.put(one)
+
+    def work(path: Path) -> Row:
+        mine = idle.get()
         try:
-            futures = [pool.submit(_one, path, str(path.relative_to(folder)), store, effort, helpers) for path in paths]
+            return _one(path, path.relative_to(folder).as_posix(), store, effort, mine)
+        finally:
+            idle.put(mine)
+
+    with ThreadPoolExecutor(len(helpers)) as pool:
+        futures = [pool.submit(work, path) for path in paths]
+        try:
             for future in as_completed(futures):
                 yield future.result()
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
-            helpers.close()
+            for one in helpers:
+                one.close()
 
 
-class _Helpers(threading.local):
-    """Each thread's two processes."""
-
-    _all: list[Guarded] = []
+class _Helpers:
+    """A worker's two processes."""
 
     def __init__(self) -> None:
         self.ours = Guarded("pmviewer.bench.files.ours", nice=NICE)
         self.mitsuba = Guarded("pmviewer.bench.agree.mitsuba_server", nice=NICE)
-        self._all += [self.ours, self.mitsuba]
 
     def close(self) -> None:
-        """Those of all threads."""
-        for helper in self._all:
-            helper.close()
-        self._all.clear()
+        """End both."""
+        self.ours.close()
+        self.mitsuba.close()
 
 
 _keeping = threading.Lock()
@@ -246,6 +254,8 @@ def _notes(rows: list[Row], found: dict[Path, Survey]) -> list[str]:
     notes += [f"{judged[name]} {name}: {about}" for name, about in JUDGEMENTS.items() if judged[name]]
     errors = Counter(_kind(row.error) for row in rows if row.error)
     notes += [f"error, {count} × {text}" for text, count in errors.most_common(20)]
+    refused = Counter(_kind(row.refused.partition("): ")[2] or row.refused) for row in rows if row.refused)
+    notes += [f"Mitsuba 3 refuses, {count} × {text}" for text, count in refused.most_common(20)]
     warnings = Counter(kind for row in rows for kind in {_kind(text) for text in row.warnings})
     notes += [f"warning, in {count} files: {text}" for text, count in warnings.most_common(30)]
     for row in rows:
@@ -267,6 +277,7 @@ def _notes(rows: list[Row], found: dict[Path, Survey]) -> list[str]:
 def _kind(text: str) -> str:
     """A sentence without its place, lines and what is quoted, so that equal ones are counted together."""
     text = re.sub(r"^(?:/|\w:\\)\S.*?\.\w{3,4}(?::\d+)?: ", "", text)
+    text = re.sub(r"^:\d+: ", "", text).partition(" Left out:")[0]
     text = re.sub(r"^lines? [\d, ]+(?:and \d+ more)?: ", "", text)
     text = re.sub(r"/\S+/", "…/", text)
     return _short(re.sub(r"'[^']{12,}'", "'…'", text), 150)

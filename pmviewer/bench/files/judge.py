@@ -18,9 +18,9 @@ FAINT = 1e-3
 """Part of the brightest channel's mean below which a difference between channels is none: a ratio of two nearly black
 channels says nothing."""
 HARMLESS = re.compile(
-    r"integrator|sampler|rfilter|reconstruction filter|film|max_depth|maxDepth|not of unit length|trilinear|ewa"
-    r"|bilinear interpolation|lens|aperture|never used|is unused|Parameter '",
-    re.IGNORECASE,
+    r"<(?:integrator|sampler|rfilter|film|mode)\b|of <(?:integrator|sampler|rfilter|film)\b|max_depth|maxDepth"
+    r"|'(?:shutter|focus|near|far)\w*' of <sensor|not of unit length|trilinear|\bewa\b|never used|is unused|^Parameter '"
+    r"|is cut into triangles|is moved there",
 )
 """Warnings about what does not change the compared picture: they excuse no difference."""
 JUDGEMENTS = {

@@ -1,13 +1,14 @@
 """Mitsuba 3 renders a file that somebody wrote: small, to a given depth, and with as little as possible changed.
 
 Runs inside `pmviewer.bench.agree.mitsuba_server`. The file's film gets another size, and its integrator is replaced by
-the path tracer; a file that Mitsuba refuses then is tried again with properties that nothing reads ignored, and with
-0.6's texture filters by their nearest equivalents. What was changed beyond size and integrator is told.
+the path tracer; a file that Mitsuba refuses then is tried again with properties that nothing reads ignored, with
+<lookAt>, as it was written before 0.5, and with 0.6's texture filters by their nearest equivalents. What was changed beyond size and integrator is told.
 """
 
 from __future__ import annotations
 
 import math
+import re
 import time
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,8 @@ def answer(mi: Any, request: dict[str, Any]) -> dict[str, Any]:
     """
     import drjit
 
-    drjit.set_thread_count(1)  # several of these work side by side
+    # Several of these work side by side. One thread would not do: Mitsuba waits for ever for some textures then.
+    drjit.set_thread_count(2)
     adapted = ""
     try:
         scene, about = _scene(mi, request, lenient=False)
@@ -86,9 +88,7 @@ def _scene(mi: Any, request: dict[str, Any], lenient: bool) -> tuple[Any, dict[s
         config.parallel = False
         if lenient:
             config.unused_properties = config.unused_parameters = mi.LogLevel.Debug
-        state = mi.parser.parse_file(config, str(path))
-        if lenient:
-            mi.parser.transform_upgrade(config, state)
+        state = _parsed(mi, config, path, lenient)
         about = _adapt(mi, state, request["longest"], lenient)
         mi.parser.transform_all(config, state)
         made = mi.parser.instantiate(config, state)
@@ -98,6 +98,15 @@ def _scene(mi: Any, request: dict[str, Any], lenient: bool) -> tuple[Any, dict[s
         return scene, about
     finally:
         mi.set_file_resolver(known)
+
+
+def _parsed(mi: Any, config: Any, path: Path, lenient: bool) -> Any:
+    if not lenient:
+        return mi.parser.parse_file(config, str(path))
+    text = path.read_text("utf-8-sig", errors="replace")
+    state = mi.parser.parse_string(config, re.sub(r"<(/?)lookAt\b", r"<\1lookat", text))
+    mi.parser.transform_upgrade(config, state)
+    return state
 
 
 def _adapt(mi: Any, state: Any, longest: int, lenient: bool) -> dict[str, Any]:

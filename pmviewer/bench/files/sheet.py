@@ -15,7 +15,7 @@ from pmviewer.output.files import write_file
 
 CELL, CAPTION, GAP = 160, 30, 8
 PAPER, INK, FAINT_INK = (24, 24, 26), (235, 235, 235), (160, 160, 165)
-CHARACTERS = 27
+CHARACTERS = 24
 """Of a caption line that fit."""
 
 

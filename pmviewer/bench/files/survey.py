@@ -191,7 +191,8 @@ def _obj(path: Path, found: Survey) -> None:
 def _library(found: Survey, text: str, folder: Path) -> Path | None:
     whole = (folder / text.replace("\\", "/")).is_file()
     names = [text] if whole or " " not in text else text.split()
-    return [_name(found, name, [folder]) for name in names][0]
+    places = [_name(found, name, [folder]) for name in names]
+    return places[0]
 
 
 def _mtl(path: Path, found: Survey) -> None:
@@ -231,6 +232,7 @@ def _stl(path: Path, found: Survey) -> None:
     size = path.stat().st_size
     with path.open("rb") as stream:
         head = stream.read(84)
+        begin = head + stream.read(1 << 16)
     if len(head) == 84 and 84 + 50 * struct.unpack("<I", head[80:])[0] == size:
         if size == 84:
             raise _Odd("foreign", "has no faces")
@@ -238,6 +240,8 @@ def _stl(path: Path, found: Survey) -> None:
     if not head.lstrip().lower().startswith(b"solid"):
         if len(head) < 84 or struct.unpack("<I", head[80:])[0] * 50 + 84 > size:
             raise _Odd("broken", "is shorter than its header says")
+    elif b"facet" not in begin.lower():
+        raise _Odd("foreign", "has no faces")
 
 
 _BY_ENDING = {".xml": _mitsuba, ".gltf": _gltf, ".glb": _glb, ".obj": _obj, ".ply": _ply, ".stl": _stl}

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import queue
+import shutil
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -23,7 +25,7 @@ LIMITS = Limits(cpu=1.5 * CPU_SECONDS, idle=10.0, memory=3 << 30)
 """Ended beyond these: longer than the bound, so that what is only a little too slow is told by its time."""
 START = Limits(cpu=300.0, idle=60.0)
 """Of honest files: the first one compiles."""
-KINDS = ("traceback", "time", "memory", "died", "internals", "long")
+KINDS = ("honest", "traceback", "time", "memory", "died", "internals", "long")
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,8 @@ def run(quick: bool = False, scenes: int | None = None, seed: int = SEED, keep: 
     worst = smallest(trials)
     if keep is not None:
         for (finding, format_), trial in worst.items():
+            if trial.index < 0:
+                continue
             name = f"{format_}-{finding.kind}-{trial.index}".replace(" ", "_").replace(",", "")
             case(seed, trial.index, not quick).write(keep / name)
     return report(seed, trials, worst, time.perf_counter() - started)
@@ -64,60 +68,69 @@ def run(quick: bool = False, scenes: int | None = None, seed: int = SEED, keep: 
 
 def tried(seed: int, indices: Sequence[int], every_special: bool, workers: int | None = None) -> Iterator[Trial]:
     """Trials in the order in which they end: one process a worker for many files, started anew when it had to be
-    ended."""
-    workers = max(min(workers or available_threads(), len(indices)), 1)
-    tools = _Tools()
-    with tempfile.TemporaryDirectory(prefix="pmviewer-hostile-") as folder, ThreadPoolExecutor(workers) as pool:
-        try:
-            futures = [pool.submit(_one, seed, i, every_special, Path(folder) / str(i), tools) for i in indices]
-            for future in as_completed(futures):
-                yield future.result()
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
-            tools.close()
+    ended. Honest files that don't open come first, with negative numbers: nothing is learnt from their mutations."""
+    count = max(min(workers or available_threads(), len(indices)), 1)
+    idle: queue.SimpleQueue[_Worker] = queue.SimpleQueue()
+    with tempfile.TemporaryDirectory(prefix="pmviewer-hostile-") as name, contextlib.ExitStack() as stack:
+        folder = Path(name)
+        all_workers = [_Worker(stack.enter_context(Guarded("pmviewer.bench.hostile.server"))) for _ in range(count)]
+        yield from all_workers[0].warm_up(folder)
+        memory = all_workers[0].memory
+        for worker in all_workers:
+            worker.memory = memory
+            idle.put(worker)
+
+        def one(index: int) -> Trial:
+            worker = idle.get()
+            try:
+                made = case(seed, index, every_special)
+                return worker.tried(index, made, made.write(folder / str(index)))
+            finally:
+                shutil.rmtree(folder / str(index), ignore_errors=True)
+                idle.put(worker)
+
+        with ThreadPoolExecutor(count) as pool:
+            futures = [pool.submit(one, index) for index in indices]
+            try:
+                for future in as_completed(futures):
+                    yield future.result()
+            finally:
+                pool.shutdown(wait=True, cancel_futures=True)
 
 
-class _Tools(threading.local):
-    """Each worker's process, and what honest files take in it."""
+class _Worker:
+    """A process that opens files. `memory`: what honest ones take, by name."""
 
-    _all: list[Guarded] = []
-
-    def __init__(self) -> None:
-        self.server = Guarded("pmviewer.bench.hostile.server")
+    def __init__(self, server: Guarded) -> None:
+        self._server, self._warm = server, False
         self.memory: dict[str, int] = {}
-        self.warm = False
-        self._all.append(self.server)
 
-    def close(self) -> None:
-        """Those of all workers."""
-        for server in self._all:
-            server.close()
-        self._all.clear()
+    def warm_up(self, folder: Path) -> list[Trial]:
+        """Open all honest files twice, so that all is imported and compiled. Those that are refused."""
+        refused = []
+        for number, one in enumerate(honest(), start=1):
+            path = one.write(folder / f"honest {number}")
+            first, again = (self._server.ask({"path": str(path)}, START) for _ in range(2))
+            self.memory[one.name] = min(first["memory"], again["memory"])
+            if again["outcome"] != "scene":
+                found = [Finding("honest", again["said"][0][:200])]
+                refused.append(_trial(-number, one, again["outcome"], 0.0, 0, found))
+        self._warm = True
+        return refused
 
-
-def _warm_up(tools: _Tools, folder: Path) -> None:
-    """Open all honest files: everything is imported and compiled then, and we know what they take."""
-    for number, one in enumerate(honest()):
-        path = one.write(folder / f"honest {number}")
-        first = tools.server.ask({"path": str(path)}, START)
-        again = tools.server.ask({"path": str(path)}, START)
-        tools.memory[one.name] = min(first["memory"], again["memory"])
-    tools.warm = True
-
-
-def _one(seed: int, index: int, every_special: bool, folder: Path, tools: _Tools) -> Trial:
-    if not tools.warm:
-        _warm_up(tools, folder)
-    made = case(seed, index, every_special)
-    path = made.write(folder / "case")
-    try:
-        answer = tools.server.ask({"path": str(path)}, LIMITS)
-    except Ended as ended:
-        kind = {"cpu": "time"}.get(ended.kind, ended.kind)
-        tools.warm = False
-        return _trial(index, made, kind, LIMITS.cpu if kind == "time" else 0.0, 0, [Finding(kind, str(ended))])
-    found = findings(answer, tools.memory.get(made.seed, 0))
-    return _trial(index, made, answer["outcome"], answer["cpu"], answer["memory"], found)
+    def tried(self, index: int, made: Case, path: Path) -> Trial:
+        """Open one hostile file."""
+        if not self._warm:
+            with tempfile.TemporaryDirectory(prefix="pmviewer-hostile-") as folder:
+                self.warm_up(Path(folder))
+        try:
+            answer = self._server.ask({"path": str(path)}, LIMITS)
+        except Ended as ended:
+            self._warm = False
+            kind = {"cpu": "time"}.get(ended.kind, ended.kind)
+            return _trial(index, made, kind, LIMITS.cpu if ended.kind == "cpu" else 0.0, 0, [Finding(kind, str(ended))])
+        found = findings(answer, self.memory.get(made.seed, 0))
+        return _trial(index, made, answer["outcome"], answer["cpu"], answer["memory"], found)
 
 
 def _trial(index: int, made: Case, outcome: str, cpu: float, memory: int, found: list[Finding]) -> Trial:
@@ -146,7 +159,8 @@ def report(seed: int, trials: Sequence[Trial], worst: dict[tuple[Finding, str], 
     ]
     notes.append(f"{len(trials)} files of seed {seed}, {seconds:.0f} s")
     bad = [sum(any(f.kind == kind for f in t.findings) for t in trials) for kind in KINDS]
-    about = ("files that end in a traceback", f"files above {CPU_SECONDS:g} CPU seconds or without an answer",
+    about = (
+        "honest files that do not open","files that end in a traceback", f"files above {CPU_SECONDS:g} CPU seconds or without an answer",
              f"files above {EXTRA_MEMORY >> 30} GiB beyond the honest one", "files that end the process",
              "files whose messages show internals", "files with messages that nobody can read")  # fmt: skip
     targets = [Target(f"hostile {kind}", number, 0, "files", False, note)

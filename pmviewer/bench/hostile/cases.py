@@ -65,7 +65,7 @@ def case(seed: int, index: int, every_special: bool = True) -> Case:
     listed = specials() if every_special else specials()[::4]
     if index < len(listed):
         made = listed[index][1]()
-        return Case(listed[index][0], made.format, made.main, made.files, made.fifos, made.links)
+        return Case(listed[index][0], made.format, made.main, made.files, made.fifos, dict(made.links))
     of = _seeds()[(index - len(listed)) % len(_seeds())]
     chance = random.Random(f"{seed} {index - len(listed)} {of.name}")
     victim = chance.choice(of.victims)

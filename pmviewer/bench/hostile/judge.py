@@ -13,7 +13,7 @@ EXTRA_MEMORY = 1 << 30
 LONGEST_MESSAGE = 1500
 """Characters of a sentence that somebody may still read."""
 
-_QUOTED = re.compile(r"'[^'\n]{0,300}'|\"[^\"\n]{0,300}\"|‘[^’\n]*’|“[^”\n]*”")
+_QUOTED = re.compile(r"(?<!\w)'[^'\n]{0,300}'(?!\w)|\"[^\"\n]{0,300}\"|‘[^’\n]*’|“[^”\n]*”")
 INTERNALS = re.compile(
     r"object at 0x|\b0x[0-9a-f]{6,}|<(?:class|function|module|bound method|built-in)|Traceback|\bself\.\w"
     r"|\b(?!SceneError)[A-Z]\w*(?:Error|Exception|Warning)\b|\b(?:struct|zlib|np|numpy|json|zipfile)\.\w+"
@@ -65,4 +65,4 @@ def _words(sentences: Sequence[str]) -> list[Finding]:
 
 def _plain(sentence: str) -> str:
     """Without what differs from file to file."""
-    return re.sub(r"\d+", "#", _QUOTED.sub("'…'", sentence))[:200]
+    return re.sub(r"0x[0-9a-f]+|\d+", "#", _QUOTED.sub("'…'", sentence))[:200]

@@ -16,7 +16,7 @@ INTEGERS = (0, 1, 0x7F, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF
 FLOATS = (float("nan"), float("inf"), -float("inf"), 3.4e38, -3.4e38, 1e-45, 0.0, -1.0)
 
 
-def _some(data: bytes, chance: random.Random) -> int:
+def _some(data: bytes | bytearray, chance: random.Random) -> int:
     return chance.randrange(len(data)) if data else 0
 
 

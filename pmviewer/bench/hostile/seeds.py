@@ -124,7 +124,8 @@ def stl(binary: bool) -> bytes:
     return (text + "endsolid honest\n").encode()
 
 
-def _buffer() -> bytes:
+def buffer() -> bytes:
+    """What the document's buffer holds: corners, texture coordinates, faces."""
     data = b"".join(struct.pack("<3f", *c) for c in CORNERS) + b"".join(struct.pack("<2f", *c) for c in UVS)
     return data + b"".join(struct.pack("<3H", *f) for f in FACES)
 
@@ -177,7 +178,7 @@ def glb(document: object | None = None, tail: bytes | None = None) -> bytes:
     """A GLB of any JSON document and binary chunk."""
     text = json.dumps(gltf_document(None) if document is None else document).encode()
     text += b" " * (-len(text) % 4)
-    data = _buffer() if tail is None else tail
+    data = buffer() if tail is None else tail
     data += b"\0" * (-len(data) % 4)
     chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
@@ -200,11 +201,19 @@ _LAMP = """    <shape type="rectangle">
     </shape>
 </scene>
 """
-_PLAIN = """    <bsdf type="twosided" id="paint"><bsdf type="diffuse"><rgb name="reflectance" value="0.6 0.5 0.4"/></bsdf></bsdf>
-    <bsdf type="roughconductor" id="metal"><string name="material" value="Au"/><float name="alpha" value="0.2"/></bsdf>
+_PLAIN = """    <bsdf type="twosided" id="paint">
+        <bsdf type="diffuse"><rgb name="reflectance" value="0.6 0.5 0.4"/></bsdf>
+    </bsdf>
+    <bsdf type="roughconductor" id="metal">
+        <string name="material" value="Au"/><float name="alpha" value="0.2"/>
+    </bsdf>
     <bsdf type="dielectric" id="glass"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/></bsdf>
-    <shape type="sphere"><point name="center" x="0" y="0" z="0.5"/><float name="radius" value="0.5"/><ref id="glass"/></shape>
-    <shape type="cube"><transform name="to_world"><scale value="0.3"/><translate x="1"/></transform><ref id="metal"/></shape>
+    <shape type="sphere">
+        <point name="center" x="0" y="0" z="0.5"/><float name="radius" value="0.5"/><ref id="glass"/>
+    </shape>
+    <shape type="cube">
+        <transform name="to_world"><scale value="0.3"/><translate x="1"/></transform><ref id="metal"/>
+    </shape>
     <shape type="disk"><transform name="to_world"><scale x="3" y="3"/></transform><ref id="paint"/></shape>
     <shape type="cylinder"><point name="p0" x="-1" y="0" z="0"/><point name="p1" x="-1" y="0" z="1"/>
         <float name="radius" value="0.2"/><bsdf type="plastic"><spectrum name="diffuse_reflectance" value="0.4"/></bsdf></shape>
@@ -213,7 +222,7 @@ _PLAIN = """    <bsdf type="twosided" id="paint"><bsdf type="diffuse"><rgb name=
         <rgb name="intensity" value="5"/><float name="cutoff_angle" value="30"/></emitter>
     <emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>
 """
-_TEXTURED = """    <bsdf type="diffuse" id="paint"><texture name="reflectance" type="bitmap">
+TEXTURED = """    <bsdf type="diffuse" id="paint"><texture name="reflectance" type="bitmap">
         <string name="filename" value="tex.png"/><transform name="to_uv"><scale x="2" y="2"/></transform></texture></bsdf>
     <bsdf type="diffuse" id="squares"><texture name="reflectance" type="checkerboard"><rgb name="color0" value="0.2"/>
         <rgb name="color1" value="0.8"/></texture></bsdf>
@@ -221,7 +230,7 @@ _TEXTURED = """    <bsdf type="diffuse" id="paint"><texture name="reflectance" t
     <shape type="sphere"><float name="radius" value="0.4"/><ref id="squares"/></shape>
     <emitter type="envmap"><string name="filename" value="{sky}"/><float name="scale" value="0.5"/></emitter>
 """
-_MESHES = """    <bsdf type="diffuse" id="paint"/>
+MESHES = """    <bsdf type="diffuse" id="paint"/>
     <shape type="{kind}"><string name="filename" value="{file}"/>{more}
         <transform name="to_world"><scale value="0.8"/></transform><ref id="paint"/></shape>
 """
@@ -241,22 +250,23 @@ _PART = """<?xml version="1.0" encoding="utf-8"?>
 """
 
 
-def _scene(middle: str) -> bytes:
+def scene(middle: str) -> bytes:
+    """A Mitsuba scene with a camera and a lamp, and `middle` between."""
     return (_HEAD + middle + _LAMP).encode()
 
 
 def seeds() -> list[Seed]:
     """All of them."""
     texture = {"tex.png": png(), "sky.hdr": hdr()}
-    made = [Seed("xml", "Mitsuba XML", "scene.xml", {"scene.xml": _scene(_PLAIN)}, ("scene.xml",))]
-    for kind, content in (("hdr", hdr), ("exr", exr)):
-        files = {"scene.xml": _scene(_TEXTURED.format(sky=f"sky.{kind}")), "tex.png": png(), f"sky.{kind}": content()}
+    made = [Seed("xml", "Mitsuba XML", "scene.xml", {"scene.xml": scene(_PLAIN)}, ("scene.xml",))]
+    for kind, sky in (("hdr", hdr()), ("exr", exr())):
+        files = {"scene.xml": scene(TEXTURED.format(sky=f"sky.{kind}")), "tex.png": png(), f"sky.{kind}": sky}
         made.append(Seed(f"xml {kind}", f"{kind.upper()} image", "scene.xml", files, (f"sky.{kind}",)))
     made.append(Seed("xml textures", "Mitsuba XML", "scene.xml",
-                     {"scene.xml": _scene(_TEXTURED.format(sky="sky.hdr")), **texture}, ("scene.xml",)))  # fmt: skip
+                     {"scene.xml": scene(TEXTURED.format(sky="sky.hdr")), **texture}, ("scene.xml",)))  # fmt: skip
     made.append(Seed("png", "PNG image", "scene.xml", made[-1].files, ("tex.png",)))
-    made.append(Seed("xml groups", "Mitsuba XML", "scene.xml", {"scene.xml": _scene(_GROUPS)}, ("scene.xml",)))
-    include = {"scene.xml": _scene('    <include filename="part.xml"/>\n'), "part.xml": _PART.encode()}
+    made.append(Seed("xml groups", "Mitsuba XML", "scene.xml", {"scene.xml": scene(_GROUPS)}, ("scene.xml",)))
+    include = {"scene.xml": scene('    <include filename="part.xml"/>\n'), "part.xml": _PART.encode()}
     made.append(Seed("include", "Mitsuba XML, include", "scene.xml", include, ("scene.xml", "part.xml")))
     meshes: list[tuple[str, str, bytes, str]] = [
         ("obj", "mesh.obj", OBJ.replace("mtllib mesh.mtl\n", "").encode(), ""),
@@ -264,9 +274,9 @@ def seeds() -> list[Seed]:
         ("serialized", "mesh.serialized", serialized(), '<integer name="shape_index" value="1"/>'),
     ]
     for kind, name, content, more in meshes:
-        files = {"scene.xml": _scene(_MESHES.format(kind=kind, file=name, more=more)), name: content}
+        files = {"scene.xml": scene(MESHES.format(kind=kind, file=name, more=more)), name: content}
         made.append(Seed(f"xml with {kind}", f"Mitsuba XML with {kind}", "scene.xml", files, (name, name, "scene.xml")))
-    gltf = {"scene.gltf": json.dumps(gltf_document("data.bin")).encode(), "data.bin": _buffer(), "tex.png": png()}
+    gltf = {"scene.gltf": json.dumps(gltf_document("data.bin")).encode(), "data.bin": buffer(), "tex.png": png()}
     made.append(Seed("gltf", "glTF", "scene.gltf", gltf, ("scene.gltf", "scene.gltf", "scene.gltf", "data.bin")))
     made.append(Seed("glb", "GLB", "scene.glb", {"scene.glb": glb(), "tex.png": png()}, ("scene.glb",)))
     obj = {"mesh.obj": OBJ.encode(), "mesh.mtl": MTL.encode(), "tex.png": png()}

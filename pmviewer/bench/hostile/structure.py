@@ -22,10 +22,16 @@ TYPES = ("sphere", "rectangle", "cube", "obj", "ply", "serialized", "shapegroup"
          "bumpmap", "normalmap", "null", "plastic", "area", "point", "spot", "envmap", "constant", "directional",
          "projector", "sunsky", "sky", "sun", "bitmap", "checkerboard", "mesh_attribute", "scale", "perspective",
          "orthographic", "thinlens", "distant", "batch", "path", "hdrfilm", "", "nothing of the kind")  # fmt: skip
-BOMB = """<?xml version="1.0"?><!DOCTYPE scene [<!ENTITY a "ha">%s]><scene version="3.0.0"><string name="x" value="&z;"/></scene>"""
+BOMB = (
+    '<?xml version="1.0"?><!DOCTYPE scene [<!ENTITY a "ha">%s]>'
+    '<scene version="3.0.0"><string name="x" value="&z;"/></scene>'
+)
 DEEP = 3000
-VALUES: tuple[Any, ...] = (None, True, -1, 0, 1, 1e308, 100_000_000, 2**31, 2**53, 2**63, 1.5, "", "x" * 100_000, [], {},
-                           [[]], [None], {"a": {}}, "0", -0.0, [0] * 1000, float("nan"), float("inf"))  # fmt: skip
+TELLING = {"count", "byteLength", "byteOffset", "bufferView", "indices", "mesh", "children", "componentType", "type",
+           "uri"}  # fmt: skip
+"""Keys of glTF that say how much there is, or where."""
+VALUES: tuple[Any, ...] = (None, True, -1, 0, 1, 1e308, 100_000_000, 2**31, 2**53, 2**63, 1.5, "", "x" * 100_000, [],
+                           {}, [[]], [None], {"a": {}}, "0", -0.0, [0] * 1000, float("nan"), float("inf"))  # fmt: skip
 
 
 def mutate_xml(data: bytes, chance: random.Random) -> bytes:
@@ -156,8 +162,7 @@ def _change_value(document: Any, chance: random.Random) -> None:
                 copy.deepcopy(chance.choice((0, [0], [0, 0, 0], {}, "data:;base64,AAAA", *VALUES[:12])))
             )
         case _:
-            named = [(h, k) for h, k in places if k in ("count", "byteLength", "byteOffset", "bufferView", "indices",
-                                                        "mesh", "children", "componentType", "type", "uri")]  # fmt: skip
+            named = [(h, k) for h, k in places if k in TELLING]
             h, k = chance.choice(named or places)
             h[k] = copy.deepcopy(chance.choice(VALUES))
 
