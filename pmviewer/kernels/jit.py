@@ -8,12 +8,11 @@ common, wherever they lie.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
-import shutil
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,16 +22,11 @@ from numba import njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
 
+from pmviewer.kernels.cache_folder import claim
 from pmviewer.kernels.sources import PACKAGE, stamp
 
 FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
 """Never `nnan`/`ninf`: they delete the checks for non-finite numbers."""
-
-KEPT_CACHES = 3
-"""Of different versions of Python and numba."""
-
-KEPT_DAYS = 14
-"""Compiled code that nobody has asked for in so many days is removed."""
 
 
 def _versions() -> str:
@@ -70,16 +64,7 @@ def _choose_cache() -> Path:
         root = Path(tempfile.gettempdir()) / f"pmviewer-kernels-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
         if not _writable(root):
             root = Path(tempfile.mkdtemp(prefix="pmviewer-kernels-"))
-    folder = root / name
-    folder.mkdir(parents=True, exist_ok=True)
-    others = [p for p in root.iterdir() if p.is_dir() and p != folder]
-    for stale in sorted(others, key=lambda p: p.stat().st_mtime, reverse=True)[KEPT_CACHES - 1 :]:
-        shutil.rmtree(stale, ignore_errors=True)
-    oldest = time.time() - KEPT_DAYS * 86400
-    for unused in (p for p in folder.iterdir() if p.is_dir() and p.stat().st_mtime < oldest):
-        shutil.rmtree(unused, ignore_errors=True)
-    os.utime(folder)
-    return folder
+    return claim(root, name)
 
 
 CACHE_FOLDER = _choose_cache()
@@ -121,7 +106,10 @@ class _OneFileEach(IndexDataCacheFile):
             file.unlink(missing_ok=True)
 
     def save(self, key: Any, data: Any) -> None:
-        self._save_data(self._name(key), (key, data))
+        # Not kept is no error: the code runs all the same where the disk is full or somebody emptied the cache.
+        with contextlib.suppress(OSError):
+            Path(self._cache_path).mkdir(parents=True, exist_ok=True)
+            self._save_data(self._name(key), (key, data))
 
     def load(self, key: Any) -> Any:
         try:
