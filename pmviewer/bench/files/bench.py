@@ -221,8 +221,8 @@ def report(folder: Path, rows: list[Row], found: dict[Path, Survey], seconds: fl
     if compared:
         agree = sum(row.judgement == "agrees" for row in compared)
         note = f"{agree} within 2 % of Mitsuba 3, {len(right) - agree} with a warning that says what is missing, "
-        targets.append(Target("files right", len(right) / len(compared), RIGHT, "", True,
-                              note + f"of {len(compared)} that both render; {len(both) - len(compared)} too noisy to tell"))  # fmt: skip
+        note += f"of {len(compared)} that both render; {len(both) - len(compared)} too noisy to tell"
+        targets.append(Target("files right", len(right) / len(compared), RIGHT, "", True, note))
     targets.append(
         Target("files crash", sum(bool(row.crash) for row in rows), 0, "", False, "tracebacks, hangs, memory")
     )

@@ -19,8 +19,8 @@ FAINT = 1e-3
 channels says nothing."""
 HARMLESS = re.compile(
     r"<(?:integrator|sampler|rfilter|film|mode)\b|of <(?:integrator|sampler|rfilter|film)\b|max_depth|maxDepth"
-    r"|'(?:shutter|focus|near|far)\w*' of <sensor|not of unit length|trilinear|\bewa\b|never used|is unused|^Parameter '"
-    r"|is cut into triangles|is moved there",
+    r"|'(?:shutter|focus|near|far)\w*' of <sensor|not of unit length|trilinear|\bewa\b|never used|is unused"
+    r"|^Parameter '|is cut into triangles|is moved there",
 )
 """Warnings about what does not change the compared picture: they excuse no difference."""
 JUDGEMENTS = {

@@ -2,7 +2,8 @@
 
 Runs inside `pmviewer.bench.agree.mitsuba_server`. The file's film gets another size, and its integrator is replaced by
 the path tracer; a file that Mitsuba refuses then is tried again with properties that nothing reads ignored, with
-<lookAt>, as it was written before 0.5, and with 0.6's texture filters by their nearest equivalents. What was changed beyond size and integrator is told.
+<lookAt>, as it was written before 0.5, and with 0.6's texture filters by their nearest equivalents. What was
+changed beyond size and integrator is told.
 """
 
 from __future__ import annotations

@@ -159,8 +159,8 @@ def report(seed: int, trials: Sequence[Trial], worst: dict[tuple[Finding, str], 
     ]
     notes.append(f"{len(trials)} files of seed {seed}, {seconds:.0f} s")
     bad = [sum(any(f.kind == kind for f in t.findings) for t in trials) for kind in KINDS]
-    about = (
-        "honest files that do not open","files that end in a traceback", f"files above {CPU_SECONDS:g} CPU seconds or without an answer",
+    about = ("honest files that do not open", "files that end in a traceback",
+             f"files above {CPU_SECONDS:g} CPU seconds or without an answer",
              f"files above {EXTRA_MEMORY >> 30} GiB beyond the honest one", "files that end the process",
              "files whose messages show internals", "files with messages that nobody can read")  # fmt: skip
     targets = [Target(f"hostile {kind}", number, 0, "files", False, note)

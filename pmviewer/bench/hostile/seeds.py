@@ -149,9 +149,11 @@ def gltf_document(uri: str | None) -> dict[str, object]:
             {"translation": [0, 3, 3], "extensions": {"KHR_lights_punctual": {"light": 0}}},
         ],
         "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1, "aspectRatio": 1.3}}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 0, "mode": 4}]}],
+        "meshes": [{"primitives": [
+            {"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 0, "mode": 4}]}],
         "materials": [{
-            "name": "paint", "doubleSided": True, "emissiveFactor": [0.1, 0, 0], "alphaMode": "MASK", "alphaCutoff": 0.5,
+            "name": "paint", "doubleSided": True, "emissiveFactor": [0.1, 0, 0], "alphaMode": "MASK",
+            "alphaCutoff": 0.5,
             "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0.2, "roughnessFactor": 0.6,
                                      "baseColorFactor": [1, 0.9, 0.8, 1]},
             "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 2.0}},
@@ -216,14 +218,16 @@ _PLAIN = """    <bsdf type="twosided" id="paint">
     </shape>
     <shape type="disk"><transform name="to_world"><scale x="3" y="3"/></transform><ref id="paint"/></shape>
     <shape type="cylinder"><point name="p0" x="-1" y="0" z="0"/><point name="p1" x="-1" y="0" z="1"/>
-        <float name="radius" value="0.2"/><bsdf type="plastic"><spectrum name="diffuse_reflectance" value="0.4"/></bsdf></shape>
+        <float name="radius" value="0.2"/>
+        <bsdf type="plastic"><spectrum name="diffuse_reflectance" value="0.4"/></bsdf></shape>
     <emitter type="point"><point name="position" x="0" y="-2" z="2"/><rgb name="intensity" value="3"/></emitter>
     <emitter type="spot"><transform name="to_world"><lookat origin="2,0,3" target="0,0,0" up="0,1,0"/></transform>
         <rgb name="intensity" value="5"/><float name="cutoff_angle" value="30"/></emitter>
     <emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>
 """
 TEXTURED = """    <bsdf type="diffuse" id="paint"><texture name="reflectance" type="bitmap">
-        <string name="filename" value="tex.png"/><transform name="to_uv"><scale x="2" y="2"/></transform></texture></bsdf>
+        <string name="filename" value="tex.png"/>
+        <transform name="to_uv"><scale x="2" y="2"/></transform></texture></bsdf>
     <bsdf type="diffuse" id="squares"><texture name="reflectance" type="checkerboard"><rgb name="color0" value="0.2"/>
         <rgb name="color1" value="0.8"/></texture></bsdf>
     <shape type="rectangle"><ref id="paint"/></shape>

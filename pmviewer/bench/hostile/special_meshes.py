@@ -44,12 +44,12 @@ def specials() -> list[tuple[str, Maker]]:
         ("PLY of negative vertices", "PLY", partial(_ply, b"vertex 5", b"vertex -5")),
         ("PLY of 200 000 properties", "PLY", partial(_ply, b"property float x\n", b"property float x\n" * 200_000)),
         ("PLY list of 2^32", "PLY", _ply_list),
-        ("PLY without end of header", "PLY", lambda: {"mesh.ply": b"ply\nformat ascii 1.0\n" + b"comment x\n" * 500_000}),
+        ("PLY without end of header", "PLY", _ply_endless),
         ("STL of 2^32 facets", "STL", lambda: {"mesh.stl": stl(True)[:80] + b"\xff" * 4 + stl(True)[84:]}),
         ("STL solid and binary", "STL", lambda: {"mesh.stl": b"solid" + stl(True)[5:]}),
         ("OBJ with a face of 10^6 corners", "OBJ", lambda: _obj(b"f" + b" 1 2 3 4" * 250_000 + b"\n")),
         ("OBJ with far indices", "OBJ", lambda: _obj(b"f 999999999999999999999 2 3\nf -1 -2 -999999999\nf 0 0 0\n")),
-        ("OBJ with 100 000 groups", "OBJ", lambda: _obj(b"".join(b"g %d\nusemtl %d\nf 1 2 3\n" % (i, i) for i in range(100_000)))),
+        ("OBJ with 100 000 groups", "OBJ", _obj_groups),
         ("OBJ with a line of 20 MB", "OBJ", lambda: _obj(b"#" + b"x" * 20_000_000)),
         ("OBJ that is a picture", "OBJ", lambda: {"mesh.obj": png(64, 64)}),
         ("MTL its own library", "MTL", lambda: {"mesh.obj": OBJ.encode().replace(b"mesh.mtl", b"mesh.obj")}),
@@ -109,6 +109,14 @@ def _ply(what: bytes, instead: bytes) -> Files:
 def _ply_list() -> Files:
     content = ply(True).replace(b"list uchar int", b"list uint int")
     return {"mesh.ply": content[:-78] + b"\xff" * 78}
+
+
+def _ply_endless() -> Files:
+    return {"mesh.ply": b"ply\nformat ascii 1.0\n" + b"comment x\n" * 500_000}
+
+
+def _obj_groups() -> Files:
+    return _obj(b"".join(b"g %d\nusemtl %d\nf 1 2 3\n" % (i, i) for i in range(100_000)))
 
 
 def _obj(more: bytes) -> Files:

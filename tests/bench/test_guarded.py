@@ -1,0 +1,58 @@
+"""The watchdog: a process that hangs, computes for ever, grows or dies is ended, and the next request is answered."""
+
+import sys
+
+import pytest
+
+from pmviewer.bench.guarded import Ended, Guarded, Limits, forget_peak, resident_bytes
+
+LIMITS = Limits(cpu=1.0, idle=1.0, wall=120.0, memory=400 << 20)
+linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux tells CPU time and memory")
+
+
+@pytest.fixture
+def server():
+    with Guarded("tests.bench.odd_server") as running:
+        yield running
+
+
+def test_answers_come_from_one_process(server):
+    first = server.ask({"do": "answer", "say": "ä\n1"}, LIMITS)
+    assert first["said"] == "ä\n1"
+    assert server.ask({"do": "answer"}, LIMITS)["pid"] == first["pid"]
+
+
+@linux
+@pytest.mark.parametrize(
+    ("do", "kind", "said"),
+    [
+        ("wait", "time", "no work for 1 s"),
+        ("compute", "cpu", "1 s of CPU time"),
+        ("grow", "memory", "more than 400 MiB"),
+        ("die", "died", "status 3: what a pity"),
+    ],
+)
+def test_a_process_without_an_answer_is_ended_and_started_again(server, do, kind, said):
+    before = server.ask({"do": "answer"}, LIMITS)["pid"]
+    with pytest.raises(Ended, match=said) as ended:
+        server.ask({"do": do}, LIMITS)
+    assert ended.value.kind == kind
+    assert server.ask({"do": "answer"}, LIMITS)["pid"] != before
+
+
+def test_the_clock_ends_what_the_system_does_not_watch(server, monkeypatch):
+    monkeypatch.setattr("pmviewer.bench.guarded.works", lambda pid: True)
+    monkeypatch.setattr("pmviewer.bench.guarded.cpu_seconds", lambda pid: 0.0)
+    with pytest.raises(Ended, match=r"after 0\.5 s"):
+        server.ask({"do": "wait"}, Limits(wall=0.5))
+
+
+@linux
+def test_the_peak_of_memory_counts_from_where_it_was_forgotten():
+    forget_peak()
+    before = resident_bytes()
+    held = b"x" * (64 << 20)
+    assert resident_bytes(peak=True) - before >= len(held)
+    del held
+    forget_peak()
+    assert resident_bytes(peak=True) - before < 32 << 20
