@@ -92,7 +92,8 @@ Ns 20
 Ni 1.5
 d 1
 illum 2
-map_Kd -s 1 1 1 tex.png
+map_Kd tex.png
+map_Bump -bm 0.2 tex.png
 newmtl lamp
 Kd 0 0 0
 Ke 4 4 3
