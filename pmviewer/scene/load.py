@@ -46,7 +46,8 @@ def load_scene(path_or_name: str | Path, parameters: Mapping[str, str] | None = 
     Parameters
     ----------
     path_or_name: "cornell_caustic", "my/folder", "my/scene.xml", "chair.glb" …
-    parameters: values for the `<default>` names of a Mitsuba file; other formats have none.
+    parameters: values for the `<default>` names of a Mitsuba file; which "scene", "camera" and "variant" of a glTF
+        file to show; other formats have none.
 
     Raises SceneError for anything wrong with the input, and nothing else.
     """
@@ -66,10 +67,14 @@ def _read(path: Path, parameters: Mapping[str, str] | None) -> Scene:
             else "A file without an ending can't be opened."
         )
         raise SceneError(what, path, hint=f"Known endings: {', '.join(ENDINGS)}.")
+    from pmviewer.scene.formats.gltf.load import CHOICES
     from pmviewer.scene.formats.meshes import load_mesh_scene
 
-    scene = load_mesh_scene(path)
-    ignored = tuple(f"Parameter '{name}' was given, but {ending} files have none." for name in parameters or {})
+    known = CHOICES if ending in (".glb", ".gltf") else ()
+    given = parameters or {}
+    scene = load_mesh_scene(path, {name: value for name, value in given.items() if name in known})
+    has = f"have only {', '.join(known)}" if known else "have none"
+    ignored = tuple(f"Parameter '{name}' was given, but {ending} files {has}." for name in given if name not in known)
     return replace(scene, warnings=scene.warnings + ignored)
 
 

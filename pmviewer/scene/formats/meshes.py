@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -32,11 +32,12 @@ T = TypeVar("T")
 SIDE = 512
 
 
-def load_mesh_scene(path: Path) -> Scene:
-    """The file as a scene. Raises SceneError."""
+def load_mesh_scene(path: Path, choices: Mapping[str, str] | None = None) -> Scene:
+    """The file as a scene. `choices` are what the user wants of a glTF file that offers several scenes, cameras or
+    looks. Raises SceneError."""
     ending = path.suffix.lower()
     diagnostics = Diagnostics(path)
-    content = _guarded(lambda: _read(path, ending, diagnostics), path)
+    content = _guarded(lambda: _read(path, ending, diagnostics, choices or {}), path)
     groups = dict.fromkeys(instance.group for instance in content.instances)
     for shape in (*content.shapes, *(shape for group in groups for shape in group.shapes)):
         if isinstance(shape.geometry, Mesh):
@@ -104,9 +105,9 @@ def _guarded(read: Callable[[], T], path: Path) -> T:
         raise SceneError(f"The {kind} file can't be decoded ({reason}).", path, hint=hint) from None
 
 
-def _read(path: Path, ending: str, diagnostics: Diagnostics) -> MeshFile:
+def _read(path: Path, ending: str, diagnostics: Diagnostics, choices: Mapping[str, str]) -> MeshFile:
     if ending in (".glb", ".gltf"):
-        return read_gltf(path, diagnostics)
+        return read_gltf(path, diagnostics, choices)
     if ending == ".obj":
         return read_obj(path, diagnostics)
     meshes = [read_ply(path)] if ending == ".ply" else _stl_meshes(path)

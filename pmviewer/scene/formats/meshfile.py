@@ -10,14 +10,25 @@ DEFAULT_MATERIAL = Material("default", "diffuse", (0.7, 0.7, 0.7), two_sided=Tru
 """For triangles whose file says nothing about their material."""
 
 
+@dataclass(frozen=True)
+class NamedCamera:
+    """A camera of the file; `aspect` is the width over the height of its picture."""
+
+    name: str
+    camera: Camera
+    aspect: float
+
+
 @dataclass
 class MeshFile:
-    """Shapes index into `materials`. `aspect` is the camera's width over height."""
+    """Shapes index into `materials`. `aspect` is the camera's width over height; `cameras` are all that the file has, of
+    which `camera` is one."""
 
     shapes: list[Shape] = field(default_factory=list)
     materials: list[Material] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     instances: list[Instance] = field(default_factory=list)
+    cameras: list[NamedCamera] = field(default_factory=list)
     camera: Camera | None = None
     aspect: float = 1.0
 

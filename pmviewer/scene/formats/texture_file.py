@@ -110,6 +110,30 @@ def _encoded(data: bytes, name: str, raw: bool) -> NDArray[np.float32]:
     return values if raw else linear(values)
 
 
+def read_alpha(data: bytes, name: str) -> NDArray[np.float32] | None:
+    """The picture's alpha (h, w, 1) from 0 to 1, or None where it has none. Raises SceneError as `read_picture`."""
+    from PIL import Image
+
+    try:
+        with Image.open(BytesIO(data)) as picture:
+            if "A" not in picture.getbands() and "transparency" not in picture.info:
+                return None
+            width, height = picture.size
+            if max(width, height) > _MOST_SIDE:
+                raise ValueError(f"{width} × {height} pixels are too many")
+            _check_memory(width, height, name)
+            values = np.asarray(picture.convert("RGBA").getchannel("A"), np.float32)[..., None] / np.float32(255)
+    except SceneError:
+        raise
+    except Exception as error:  # damaged pictures make the decoders raise anything
+        reason = f"{type(error).__name__}: {error}".splitlines()[0][:120]
+        raise SceneError(f"The texture {name!r} can't be read ({reason}).", hint=_READABLE) from None
+    factor = 1
+    while (width // factor) * (height // factor) > MOST_PIXELS:
+        factor += 1
+    return np.ascontiguousarray(_reduced(values, factor) if factor > 1 else values)
+
+
 def _samples(picture: Any) -> NDArray[np.float32]:
     """(h, w, 1 or 3) in [0, 1]; alpha is dropped, palettes are looked up."""
     if picture.mode.startswith("I"):  # 16 bits of grey, which Pillow widens to 32

@@ -1,259 +1,260 @@
-"""glTF 2.0: nodes, cameras, lights and materials from its JSON; trimesh decodes the buffers.
-
-The JSON is read here because trimesh keeps colours in 8 bits and knows neither lights nor material extensions.
-"""
+"""glTF 2.0 files as scenes: the default scene at the start of its first animation, or what the user chose."""
 
 from __future__ import annotations
 
-import json
-import math
-import struct
-from collections.abc import Iterator
-from io import BytesIO
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 
-from pmviewer.scene.description import Camera, DirectionalLight, Mesh, PointLight, Shape, SpotLight
+from pmviewer.errors import SceneError
+from pmviewer.scene.description import Mesh, Shape
 from pmviewer.scene.diagnostics import Diagnostics
-from pmviewer.scene.formats.gltf.material import GltfMaterials
+from pmviewer.scene.formats.gltf.accessors import Accessors
+from pmviewer.scene.formats.gltf.buffers import Buffers
+from pmviewer.scene.formats.gltf.cameras import camera_at
+from pmviewer.scene.formats.gltf.document import Document, Json, extension, is_index, name_of, read_document
+from pmviewer.scene.formats.gltf.extensions import warn_of_others
+from pmviewer.scene.formats.gltf.lights import image_based, punctual
+from pmviewer.scene.formats.gltf.material import GltfMaterials, Look, Usage
+from pmviewer.scene.formats.gltf.nodes import Nodes, Placed, chosen
+from pmviewer.scene.formats.gltf.pose import Pose, joint_matrices, pose_at_start, skinned
+from pmviewer.scene.formats.gltf.primitive import Decoded, Primitives, numbers_of
 from pmviewer.scene.formats.gltf.shared import SharedMeshes
-from pmviewer.scene.formats.meshfile import DEFAULT_MATERIAL, MeshFile
-from pmviewer.scene.formats.mitsuba.transform import Matrix, mirrors, scaling, translation
+from pmviewer.scene.formats.meshfile import MeshFile
 from pmviewer.scene.primitives import transformed
 
-Json = dict[str, Any]
-_LUMENS_PER_WATT = 683.0
-_MOST_NODES = 1_000_000
-_MOST_ITEMS = 1 << 28
-_HARMLESS = ("KHR_materials_", "KHR_lights_punctual", "KHR_texture_", "EXT_texture_")
-_UV = "_UV"
-_GLB_JSON, _GLB_BIN = 0x4E4F534A, 0x004E4942
+CHOICES = ("scene", "camera", "variant")
+"""What a user can choose in a glTF file, by name or number from 0 on."""
+_LIGHTS, _VARIANTS = "KHR_lights_punctual", "KHR_materials_variants"
+_SPARE_TRIANGLES, _TRIANGLES_PER_BYTE = 1 << 22, 16
+"""Triangles that a file may be written out to: so many, and more by its size (compressed ones take less than a byte)."""
 
 
-def read_gltf(path: Path, diagnostics: Diagnostics) -> MeshFile:
-    """The default scene of a .gltf or .glb file. Damaged files raise SceneError or whatever their damage causes."""
-    header, binary = _container(path.read_bytes(), diagnostics)
-    for extension in header.get("extensionsRequired", []):
-        if not str(extension).startswith(_HARMLESS):
-            hint = "Export it without compression or quantization."
-            raise diagnostics.error(
-                f"The file needs the glTF extension {extension}, which is not supported.", hint=hint
-            )
-    for index, accessor in enumerate(header.get("accessors", [])):
-        if not 0 <= int(accessor["count"]) <= _MOST_ITEMS:
-            raise diagnostics.error(f"Accessor {index} claims {accessor['count']} items.", hint="The file is damaged.")
-    for buffer in header.get("buffers", []):
-        uri = str(buffer.get("uri", "data:"))
-        if not uri.startswith("data:") and not (path.parent / unquote(uri)).is_file():
-            hint = "Copy it beside the .gltf file, or export a .glb, which holds everything."
-            raise diagnostics.error(f"The file's buffer {uri[:200]!r} does not exist.", hint=hint)
-    for kind in ("skins", "animations"):
-        if header.get(kind):
-            diagnostics.warn(f"The file's {kind} are ignored.")
-    meshes = _decode(header, binary, path)
-    result = MeshFile()
-    materials = GltfMaterials(header, binary, path, diagnostics)
-    nodes = list(_nodes(header, diagnostics))
-    shared = SharedMeshes(header, meshes, nodes)
-    for node, matrix in nodes:
-        instance = shared.instance(node, matrix, result, materials)
-        if instance is not None:
-            result.instances.append(instance)
-        elif "mesh" in node:
-            source = header["meshes"][node["mesh"]]
-            for j, primitive in enumerate(source.get("primitives", [])):
-                mesh = meshes.get(f"{node['mesh']}.{j}")
-                if mesh is None:
-                    diagnostics.warn("Points, lines and other primitives without triangles are ignored.")
-                    continue
-                index = primitive.get("material")
-                material, radiance, emission = (DEFAULT_MATERIAL, None, None) if index is None else materials.of(index)
-                name = str(node.get("name") or source.get("name") or f"mesh {node['mesh']}")
-                shape = Shape(name, transformed(mesh, matrix), result.material(material), radiance, emission)
-                result.shapes.append(shape)
-        if "camera" in node and result.camera is None:
-            _camera(header["cameras"][node["camera"]], matrix, result, diagnostics)
-        light = node.get("extensions", {}).get("KHR_lights_punctual")
-        if light is not None:
-            lights = header["extensions"]["KHR_lights_punctual"]["lights"]
-            _light(lights[light["light"]], matrix, result, diagnostics)
-    return result
+def read_gltf(path: Path, diagnostics: Diagnostics, choices: Mapping[str, str] | None = None) -> MeshFile:
+    """A .gltf or .glb file. Damaged files raise SceneError, or whatever their damage causes.
+
+    Parameters
+    ----------
+    choices: which scene, camera and variant to show (`CHOICES`); without a choice it is the file's own scene and look,
+        and its first camera.
+    """
+    return _Reader(read_document(path, diagnostics), choices or {}).read()
 
 
-def _container(data: bytes, diagnostics: Diagnostics) -> tuple[Json, bytes]:
-    """JSON header and binary chunk of either kind of file."""
-    binary = b""
-    text = data
-    if data[:4] == b"glTF":
-        if len(data) < 20:
-            raise diagnostics.error("The GLB file is cut off.", hint="Export it again.")
-        version, length = struct.unpack_from("<II", data, 4)
-        if version != 2:
-            raise diagnostics.error(f"This is glTF version {version}, expected 2.", hint="Convert it to glTF 2.0.")
-        if length > len(data):
-            what = f"The GLB file is cut off: {len(data)} of {length} bytes are there."
-            raise diagnostics.error(what, hint="Copy or export it again.")
-        offset = 12
-        text = b""
-        while offset + 8 <= length:
-            size, kind = struct.unpack_from("<II", data, offset)
-            chunk = data[offset + 8 : offset + 8 + size]
-            if kind == _GLB_JSON:
-                text = chunk
-            elif kind == _GLB_BIN and not binary:
-                binary = chunk
-            offset += 8 + size
-    try:
-        header = json.loads(text)
-    except (ValueError, RecursionError):
-        raise diagnostics.error("This is not a glTF file (no readable JSON in it).", hint="Export it again.") from None
-    if not isinstance(header, dict) or not str(header.get("asset", {}).get("version", "")).startswith("2"):
-        raise diagnostics.error("This is not a glTF 2.0 file.", hint="Convert it to glTF 2.0.")
-    return header, binary
+class _Reader:
+    def __init__(self, document: Document, choices: Mapping[str, str]) -> None:
+        self._document, self._choices = document, choices
+        self._buffers = Buffers(document)
+        self._accessors = Accessors(document, self._buffers)
+        self._primitives = Primitives(document, self._buffers, self._accessors)
+        self._materials = GltfMaterials(document, self._buffers)
+        self._variant = self._chosen_variant()
+        self._pose: Pose = {}
+        self._result = MeshFile()
+        self._numbers: dict[int, int] = {}
+        self._decoded: dict[int, list[tuple[Decoded, Json]]] = {}
 
+    def read(self) -> MeshFile:
+        document, result = self._document, self._result
+        warn_of_others(document)
+        scenes = document.rows("scenes")
+        scene = chosen(document, "scenes", self._choices.get("scene"))
+        self._pose = pose_at_start(document, self._accessors)
+        nodes = Nodes(document, self._accessors, self._pose)
+        placed = nodes.walk(scene)
+        uses = self._uses(placed)
+        triangles = {index: self._triangles(index) for index in {p.node["mesh"] for p in placed if "mesh" in p.node}}
+        shared = SharedMeshes(uses, triangles, self._own_shapes)
+        self._check_size(placed, shared, triangles)
+        for place in placed:
+            self._add_mesh(place, nodes, shared)
+            self._add_camera(place)
+            self._add_light(place)
+        if scenes:
+            row = scenes[scene if scene is not None else document.header.get("scene", 0)]
+            sky = image_based(document, self._buffers, row)
+            result.lights += [] if sky is None else [sky]
+            if len(scenes) > 1 and scene is None:
+                document.warn(f"The file has {len(scenes)} scenes; its own choice is shown (-D scene=… shows another).")
+        self._choose_camera()
+        return result
 
-def _decode(header: Json, binary: bytes, path: Path) -> dict[str, Mesh]:
-    """Meshes by "mesh.primitive", in their own coordinates."""
-    from trimesh.exchange.gltf import load_glb, load_gltf
-    from trimesh.resolvers import FilePathResolver
+    def _uses(self, placed: list[Placed]) -> Counter[int]:
+        """How often each mesh is shown without a skin and in its own shape, so that copies look the same."""
+        uses: Counter[int] = Counter()
+        for place in placed:
+            if "mesh" in place.node:
+                self._document.row("meshes", place.node["mesh"], place.name)
+                if self._is_own(place):
+                    uses[place.node["mesh"]] += len(place.matrices)
+        return uses
 
-    # Each primitive becomes a mesh of a known name, and the rest of the file is kept from trimesh.
-    alone: Json = {key: header[key] for key in ("asset", "accessors", "bufferViews", "buffers") if key in header}
-    alone["meshes"] = [
-        {"name": f"{i}.{j}", "primitives": [_with_uv({k: v for k, v in primitive.items() if k != "material"})]}
-        for i, mesh in enumerate(header.get("meshes", []))
-        for j, primitive in enumerate(mesh.get("primitives", []))
-    ]
-    alone["nodes"], alone["scenes"], alone["scene"] = [], [{"nodes": []}], 0
-    text = json.dumps(alone).encode()
-    resolver = FilePathResolver(str(path))
-    if binary:
-        text += b" " * (-len(text) % 4)
-        total = 12 + 8 + len(text) + 8 + len(binary)
-        chunks = struct.pack("<4sIIII", b"glTF", 2, total, len(text), _GLB_JSON) + text
-        chunks += struct.pack("<II", len(binary), _GLB_BIN) + binary
-        loaded = load_glb(BytesIO(chunks), resolver=resolver, skip_materials=True)
-    else:
-        loaded = load_gltf(BytesIO(text), resolver=resolver, skip_materials=True)
-    meshes = {}
-    for name, kwargs in loaded["geometry"].items():
-        if kwargs.get("faces") is None:
-            continue
-        vertices = np.asarray(kwargs["vertices"], np.float64)
-        faces = np.asarray(kwargs["faces"]).reshape(-1, 3).astype(np.int32)
-        normals = kwargs.get("vertex_normals")
-        whole = normals is not None and np.shape(normals) == vertices.shape
-        uv = kwargs.get("vertex_attributes", {}).get(_UV)
-        meshes[name] = Mesh(
-            vertices, faces, np.asarray(normals, np.float64) if whole else None, _coordinates(uv, len(vertices))
+    def _is_own(self, place: Placed) -> bool:
+        """Does the node show its mesh as the mesh alone says?"""
+        return "skin" not in place.node and "weights" not in place.node and not self._pose.get(place.index, {}).get("weights")
+
+    def _triangles(self, index: int) -> int:
+        name = f"mesh {index}"
+        return sum(self._primitives.triangles(p, name) for p in _primitives_of(self._document.rows("meshes")[index]))
+
+    def _check_size(self, placed: list[Placed], shared: SharedMeshes, triangles: dict[int, int]) -> None:
+        """Raises SceneError for more triangles than a file of this size can mean."""
+        written = sum(
+            triangles[p.node["mesh"]] * (1 if self._is_own(p) and p.node["mesh"] in shared.worth else len(p.matrices))
+            for p in placed
+            if "mesh" in p.node
         )
-    return meshes
+        lengths = (row.get("byteLength", 0) for row in self._document.rows("buffers"))
+        size = self._document.path.stat().st_size + sum(n for n in lengths if is_index(n))
+        if written > _SPARE_TRIANGLES + _TRIANGLES_PER_BYTE * size:
+            what = f"The file's nodes repeat its meshes to {written} triangles, more than are taken from a file of its size."
+            raise self._document.error(what, hint="Use fewer copies.")
+
+    def _own_shapes(self, index: int) -> tuple[str, list[Shape]]:
+        """A mesh's name and its shapes in its own coordinates, at its default morph weights."""
+        row = self._document.rows("meshes")[index]
+        name = name_of(row, f"mesh {index}")
+        if index not in self._decoded:
+            self._decoded[index] = list(self._parts(row, index, numbers_of(row.get("weights"))))
+        return name, [self._shape(name, d, d.mesh, p) for d, p in self._decoded[index]]
+
+    def _parts(self, row: Json, index: int, weights: list[float]) -> list[tuple[Decoded, Json]]:
+        parts = []
+        for primitive in _primitives_of(row):
+            uv_set = self._materials.uv_set(self._material_of(primitive))
+            decoded = self._primitives.decode(primitive, f"mesh {index}", uv_set, weights)
+            if decoded is not None:
+                parts.append((decoded, primitive))
+        return parts
+
+    def _shape(self, name: str, decoded: Decoded, mesh: Mesh, primitive: Json) -> Shape:
+        look = self._look(decoded, primitive)
+        return Shape(name, mesh, self._number(look), look.radiance, look.emission)
+
+    def _look(self, decoded: Decoded, primitive: Json) -> Look:
+        colours, alpha = decoded.mesh.colours, decoded.alpha
+        r, g, b = (1.0, 1.0, 1.0) if colours is None else (float(c) for c in colours.mean(axis=0))
+        mean = 1.0
+        if alpha is not None and len(alpha):
+            mean = float(alpha.mean())
+            if float(np.ptp(alpha)) > 0.01:
+                self._document.warn("Alpha that differs from vertex to vertex counts by its mean over the mesh.")
+        return self._materials.of(self._material_of(primitive), Usage(colours is not None, (r, g, b), mean))
+
+    def _number(self, look: Look) -> int:
+        """Index of the look's material in the result."""
+        key = id(look.material)
+        if key not in self._numbers:
+            self._numbers[key] = len(self._result.materials)
+            self._result.materials.append(look.material)
+        return self._numbers[key]
+
+    def _material_of(self, primitive: Json) -> Any:
+        """Index of the primitive's material, in the variant that is shown; None for none."""
+        mappings = extension(primitive, _VARIANTS).get("mappings")
+        if self._variant is not None and isinstance(mappings, list):
+            for mapping in mappings:
+                if isinstance(mapping, dict) and self._variant in (mapping.get("variants") or ()):
+                    return mapping.get("material")
+        return primitive.get("material")
+
+    def _chosen_variant(self) -> int | None:
+        wanted = self._choices.get("variant")
+        variants = self._document.extension(_VARIANTS).get("variants", [])
+        names = [str(v.get("name", i)) for i, v in enumerate(variants) if isinstance(v, dict)]
+        if wanted is None:
+            if len(names) > 1:
+                listed = ", ".join(names[:20])
+                self._document.warn(f"The file has other looks (-D variant=…): {listed}; its own one is shown.")
+            return None
+        if wanted in names:
+            return names.index(wanted)
+        if wanted.isdecimal() and int(wanted) < len(names):
+            return int(wanted)
+        hint = f"It has {', '.join(names[:20])}." if names else "It has none."
+        raise SceneError(f"The file has no variant {wanted[:80]!r}.", self._document.path, hint=hint)
+
+    def _add_mesh(self, place: Placed, nodes: Nodes, shared: SharedMeshes) -> None:
+        if "mesh" not in place.node:
+            return
+        index, result = place.node["mesh"], self._result
+        row = self._document.rows("meshes")[index]
+        name = str(place.node.get("name") or name_of(row, f"mesh {index}"))[:80]
+        if "skin" in place.node:
+            self._add_skinned(place, name, row, nodes)
+            return
+        if not self._is_own(place):
+            weights = self._weights(place, row)
+            shapes = [self._shape(name, d, d.mesh, p) for d, p in self._parts(row, index, weights)]
+            result.shapes += [_moved(shape, name, m) for m in place.matrices for shape in shapes]
+            return
+        for matrix in place.matrices:
+            instance = shared.instance(index, name, matrix)
+            if instance is not None:
+                result.instances.append(instance)
+            else:
+                result.shapes += [_moved(shape, name, matrix) for shape in self._own_shapes(index)[1]]
+
+    def _weights(self, place: Placed, row: Json) -> list[float]:
+        """Weights of the morph targets: the animation's, the node's, or the mesh's."""
+        animated = self._pose.get(place.index, {}).get("weights")
+        return animated if animated else numbers_of(place.node.get("weights", row.get("weights")))
+
+    def _add_skinned(self, place: Placed, name: str, row: Json, nodes: Nodes) -> None:
+        """A skin moves its mesh by its joints alone, wherever the node stands."""
+        matrices = joint_matrices(
+            self._document, self._accessors, place.node["skin"], place.name, nodes.all_world()
+        )
+        for decoded, primitive in self._parts(row, place.node["mesh"], self._weights(place, row)):
+            if decoded.joints is None or decoded.weights is None:
+                mesh = transformed(decoded.mesh, place.matrix)
+            else:
+                mesh = skinned(decoded.mesh, decoded.joints, decoded.weights, matrices)
+            self._result.shapes.append(self._shape(name, decoded, mesh, primitive))
+
+    def _add_camera(self, place: Placed) -> None:
+        if "camera" in place.node:
+            row = self._document.row("cameras", place.node["camera"], place.name)
+            camera = camera_at(row, place.matrix, place.name, self._document.diagnostics)
+            self._result.cameras += [] if camera is None else [camera]
+
+    def _choose_camera(self) -> None:
+        """The first camera, or the one that the user wants."""
+        cameras, wanted = self._result.cameras, self._choices.get("camera")
+        index = 0
+        if wanted is not None:
+            names = [camera.name for camera in cameras]
+            if wanted not in names and not (wanted.isdecimal() and int(wanted) < len(cameras)):
+                listed = ", ".join(f"{i} ({name})" for i, name in enumerate(names[:20]))
+                hint = f"It has {listed}." if names else "It has none."
+                raise SceneError(f"The scene has no camera {wanted[:80]!r}.", self._document.path, hint=hint)
+            index = names.index(wanted) if wanted in names else int(wanted)
+        elif len(cameras) > 1:
+            listed = ", ".join(f"{i} ({camera.name})" for i, camera in enumerate(cameras[:20]))
+            self._document.warn(f"The file has several cameras (-D camera=…): {listed}; the first is used.")
+        if cameras:
+            self._result.camera, self._result.aspect = cameras[index].camera, cameras[index].aspect
+
+    def _add_light(self, place: Placed) -> None:
+        number = extension(place.node, _LIGHTS).get("light")
+        if number is None:
+            return
+        lights = self._document.extension(_LIGHTS).get("lights", [])
+        if not is_index(number) or number >= len(lights) or not isinstance(lights[number], dict):
+            self._document.warn(f"{place.name} refers to a light that is not in the file.")
+            return
+        light = punctual(lights[number], place.matrix, self._document.diagnostics)
+        self._result.lights += [] if light is None else [light]
 
 
-def _with_uv(primitive: Json) -> Json:
-    """The primitive with its texture coordinates under a name that trimesh hands through without materials."""
-    attributes = dict(primitive.get("attributes", {}))
-    if "TEXCOORD_0" in attributes:
-        attributes[_UV] = attributes.pop("TEXCOORD_0")
-    return {**primitive, "attributes": attributes}
+def _primitives_of(row: Json) -> list[Json]:
+    found = row.get("primitives", [])
+    return [p for p in found if isinstance(p, dict)] if isinstance(found, list) else []
 
 
-def _coordinates(uv: Any, count: int) -> np.ndarray | None:
-    """Texture coordinates (count, 2); whole numbers stand for fractions of their type's range."""
-    if uv is None or np.shape(uv) != (count, 2):
-        return None
-    array = np.asarray(uv)
-    if array.dtype.kind == "u":
-        return array.astype(np.float64) / np.iinfo(array.dtype).max
-    return array.astype(np.float64)
-
-
-def _nodes(header: Json, diagnostics: Diagnostics) -> Iterator[tuple[Json, Matrix]]:
-    """Every node of the default scene with its world matrix."""
-    nodes = header.get("nodes", [])
-    scenes = header.get("scenes")
-    roots = scenes[header.get("scene", 0)].get("nodes", []) if scenes else range(len(nodes))
-    stack: list[tuple[int, Matrix, frozenset[int]]] = [(i, np.eye(4), frozenset()) for i in reversed(roots)]
-    count = 0
-    while stack:
-        index, parent, above = stack.pop()
-        count += 1
-        if index in above or count > _MOST_NODES:
-            raise diagnostics.error("The file's nodes contain each other in a circle.", hint="The file is damaged.")
-        node = nodes[index]
-        matrix = parent @ _local(node)
-        yield node, matrix
-        inside = above | {index}
-        stack += [(child, matrix, inside) for child in reversed(node.get("children", []))]
-
-
-def _local(node: Json) -> Matrix:
-    if "matrix" in node:
-        return np.reshape(np.array(node["matrix"], np.float64), (4, 4)).T
-    x, y, z, w = node.get("rotation", (0, 0, 0, 1))
-    length = math.sqrt(x * x + y * y + z * z + w * w)
-    x, y, z, w = (c / length for c in (x, y, z, w))
-    turn = np.eye(4)
-    turn[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return translation(*node.get("translation", (0, 0, 0))) @ turn @ scaling(*node.get("scale", (1, 1, 1)))
-
-
-def _camera(camera: Json, matrix: Matrix, result: MeshFile, diagnostics: Diagnostics) -> None:
-    """A glTF camera looks along its −z axis; the field of view is vertical."""
-    if camera.get("type") != "perspective":
-        diagnostics.warn(f"A camera of type '{camera.get('type')}' is ignored.")
-        return
-    lens = camera["perspective"]
-    eye, up, forward = matrix[:3, 3], matrix[:3, 1], -matrix[:3, 2]
-    target = eye + forward / np.linalg.norm(forward)
-    result.aspect = float(lens.get("aspectRatio", 1.0))
-    result.camera = Camera(
-        origin=(float(eye[0]), float(eye[1]), float(eye[2])),
-        target=(float(target[0]), float(target[1]), float(target[2])),
-        up=(float(up[0]), float(up[1]), float(up[2])),
-        fov=math.degrees(float(lens["yfov"])),
-        fov_axis="y",
-        near=float(lens.get("znear", 0.0)),
-        far=float(lens.get("zfar", math.inf)),
-        mirrored=mirrors(matrix),
-    )
-
-
-def _light(light: Json, matrix: Matrix, result: MeshFile, diagnostics: Diagnostics) -> None:
-    """KHR_lights_punctual: candela become W/sr, and lux W/m², at the luminous efficacy that exporters use. Spots and
-    directional lights shine along −z."""
-    kind = light.get("type")
-    if kind not in ("point", "spot", "directional"):
-        diagnostics.warn(f"A light of type '{kind}' is not supported and was ignored.")
-        return
-    intensity = float(light.get("intensity", 1.0)) / _LUMENS_PER_WATT
-    r, g, b = (float(c) * intensity for c in light.get("color", (1, 1, 1)))
-    name = str(light.get("name") or f"{kind} light")
-    x, y, z = (float(c) for c in matrix[:3, 3])
-    if kind == "point":
-        result.lights.append(PointLight(name, (x, y, z), (r, g, b)))
-        return
-    forward = -matrix[:3, 2]
-    length = float(np.linalg.norm(forward))
-    if not 0 < length < math.inf:
-        diagnostics.warn(f"The {kind} light '{name}' has no direction and was ignored.")
-        return
-    dx, dy, dz = (float(c) for c in forward / length)
-    if kind == "directional":
-        result.lights.append(DirectionalLight(name, (dx, dy, dz), (r, g, b)))
-        return
-    cone = light.get("spot", {})
-    inner = math.degrees(float(cone.get("innerConeAngle", 0.0)))
-    outer = math.degrees(float(cone.get("outerConeAngle", math.pi / 4)))
-    if not 0 <= inner < outer <= 90 * (1 + 1e-6):
-        what = f"The spot light '{name}' has an inner angle of {inner:g}° and an outer one of {outer:g}°."
-        raise diagnostics.error(what, hint="0 ≤ inner < outer ≤ 90 is what glTF allows.")
-    diagnostics.warn("The intensity of spot lights falls linearly between their inner and outer angle.")
-    result.lights.append(SpotLight(name, (x, y, z), (dx, dy, dz), (r, g, b), outer, inner))
+def _moved(shape: Shape, name: str, matrix: np.ndarray) -> Shape:
+    assert isinstance(shape.geometry, Mesh)
+    return Shape(name, transformed(shape.geometry, matrix), shape.material, shape.radiance, shape.emission)

@@ -1,105 +1,178 @@
-"""glTF's metallic-roughness materials as the nearest supported one: metal, coated base or glass, smooth or rough."""
+"""glTF materials as the program's: plain kinds where they say the same, "principled" for the rest, blends of glass."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from pmviewer.scene.description import BLACK, RGB, Material, MaterialKind
-from pmviewer.scene.diagnostics import Diagnostics
-from pmviewer.scene.formats.gltf.texture import GltfTextures
-from pmviewer.scene.texture import Bitmap, Texture, limited
+from pmviewer.scene.description import BLACK, RGB, Material, Principled
+from pmviewer.scene.formats.gltf.buffers import Buffers
+from pmviewer.scene.formats.gltf.document import Document, Json, name_of
+from pmviewer.scene.formats.gltf.fields import Fields
+from pmviewer.scene.formats.gltf.lobes import coat_of, directions_of, eta_of, sheen_of, specular_of
+from pmviewer.scene.formats.gltf.opacity import with_opacity
+from pmviewer.scene.formats.gltf.specular_glossiness import SPECULAR_GLOSSINESS
+from pmviewer.scene.formats.gltf.surface import Surface, surface_of
+from pmviewer.scene.formats.gltf.texture import GltfTextures, uv_set
+from pmviewer.scene.formats.gltf.transmission import with_transmission
+from pmviewer.scene.formats.meshfile import DEFAULT_MATERIAL
+from pmviewer.scene.texture import Texture, limited
 
-Json = dict[str, Any]
-_METALLIC, _SMOOTH, _TRANSMISSIVE = 0.9, 0.1, 0.5
-_DULL = 0.9
-"""Coats of this roughness or more are left out: they hardly show."""
-_ROUGHNESS, _METAL = 1, 2
-"""Channels of the metallic-roughness texture."""
+UNLIT = "KHR_materials_unlit"
+_METAL, _SMOOTH, _DULL = 0.02, 0.1, 0.9
+"""Metallic shares this near to 0 or 1 count as that; roughness below which a surface is smooth, and from which on the
+coat of a plain dielectric is left out, since it hardly shows."""
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What a mesh adds to its material: colours at its vertices, their mean, and the mean of their alpha."""
+
+    colours: bool = False
+    tint: RGB = (1.0, 1.0, 1.0)
+    alpha: float = 1.0
+
+
+@dataclass(frozen=True)
+class Look:
+    """A material and what its surfaces emit: mean radiance (None if dark) and its texture. `uv_set` is the set of
+    texture coordinates that the textures lie on."""
+
+    material: Material
+    radiance: RGB | None = None
+    emission: Texture | None = None
+    uv_set: int = 0
+
+    @property
+    def shines(self) -> bool:
+        """Does it emit?"""
+        return self.radiance is not None and max(self.radiance) > 0
 
 
 class GltfMaterials:
-    """Materials of one file by index, each with the radiance that its surfaces emit (None if dark) and its texture."""
+    """Materials of one file, each built once for each way that meshes use it."""
 
-    def __init__(self, header: Json, binary: bytes, path: Path, diagnostics: Diagnostics) -> None:
-        self._header, self._diagnostics = header, diagnostics
-        self._textures = GltfTextures(header, binary, path, diagnostics)
-        self._known: dict[int, tuple[Material, RGB | None, Texture | None]] = {}
+    def __init__(self, document: Document, buffers: Buffers) -> None:
+        self._document = document
+        self._textures = GltfTextures(document, buffers)
+        self._known: dict[tuple[int, Usage], Look] = {}
+        self._sets: dict[int, int] = {}
 
-    def of(self, index: int) -> tuple[Material, RGB | None, Texture | None]:
-        """Material `index` and its emission."""
-        if index not in self._known:
-            self._known[index] = self._build(self._header["materials"][index], index)
-        return self._known[index]
+    def uv_set(self, index: Any) -> int:
+        """The set of texture coordinates that most of the material's textures lie on."""
+        if index is None:
+            return 0
+        row = self._document.row("materials", index, "a mesh")
+        if index not in self._sets:
+            counted = [uv_set(info) for info in _textures_of(row)]
+            self._sets[index] = max(counted, key=lambda n: (counted.count(n), -n)) if counted else 0
+            if len(set(counted)) > 1:
+                what = "Textures of one material lie on different sets of texture coordinates: those that are not on "
+                self._document.warn(f"{what}the set of most are left out, or count by their means.")
+        return self._sets[index]
 
-    def _build(self, m: Json, index: int) -> tuple[Material, RGB | None, Texture | None]:
-        name = str(m.get("name") or f"material {index}")
-        pbr, extensions = m.get("pbrMetallicRoughness", {}), m.get("extensions", {})
-        colour, base = self._colour(pbr.get("baseColorFactor", (1, 1, 1))[:3], pbr.get("baseColorTexture"), 1.0)
-        textures: dict[str, Texture] = {} if base is None else {"reflectance": base}
-        if "occlusionTexture" in m:
-            self._diagnostics.warn("Occlusion textures are ignored: light finds its way by itself.")
-        transmission = float(extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0))
-        metallic, roughness = float(pbr.get("metallicFactor", 1)), float(pbr.get("roughnessFactor", 1))
-        both = self._textures.bitmap(pbr.get("metallicRoughnessTexture"), raw=True)
-        rough_map = None
-        if both is not None:
-            metallic *= both.mean[_METAL]
-            rough_map = _alpha(both, roughness)
-            roughness *= both.mean[_ROUGHNESS]
-        alpha = (roughness**2, roughness**2)
-        if transmission > _TRANSMISSIVE:
-            ior = float(extensions.get("KHR_materials_ior", {}).get("ior", 1.5))
-            textures = {} if base is None else {"transmittance": base}
-            material = Material(name, "dielectric", (1.0, 1.0, 1.0), colour, eta=max(1.0, ior))
-            material = replace(material, absorption=_absorption(extensions.get("KHR_materials_volume", {})))
-            if roughness >= _SMOOTH:
-                material = replace(material, kind="rough dielectric", alpha=alpha)
-        elif metallic > _METALLIC:
-            smooth = Material(name, "conductor", colour, two_sided=True)
-            material = smooth if roughness < _SMOOTH else replace(smooth, kind="rough conductor", alpha=alpha)
+    def of(self, index: Any, usage: Usage) -> Look:
+        """Material `index` (None: no material) of a mesh that is so used. Raises SceneError if there is none."""
+        if index is None:
+            return _tinted(Look(DEFAULT_MATERIAL), usage)
+        row = self._document.row("materials", index, "a mesh")
+        key = (index, usage)
+        if key not in self._known:
+            self._known[key] = self._build(row, index, usage)
+        return self._known[key]
+
+    def _build(self, row: Json, index: int, usage: Usage) -> Look:
+        name = name_of(row, f"material {index}")
+        chosen_set = self.uv_set(index)
+        fields = Fields(_on_one_set(row, chosen_set), f"the material '{name}'", self._document.diagnostics)
+        surface = surface_of(fields, self._textures)
+        if fields.has(UNLIT):
+            look = self._unlit(name, surface, usage)
         else:
-            if m.get("alphaMode", "OPAQUE") != "OPAQUE":
-                self._diagnostics.warn("Transparency by alpha is ignored: such surfaces are opaque.")
-            material = Material(name, "diffuse", colour, two_sided=True)
-            if roughness < _DULL:
-                ior = float(extensions.get("KHR_materials_ior", {}).get("ior", 1.5))
-                kind: MaterialKind = "plastic" if roughness < _SMOOTH else "rough plastic"
-                if ior > 1:
-                    material = replace(material, kind=kind, eta=ior, alpha=alpha)
-        if rough_map is not None:
-            if material.kind.startswith("rough"):
-                textures["alpha"] = rough_map
-            else:
-                self._diagnostics.warn("Metallic-roughness textures count by their means on smooth surfaces.")
-        normal = self._normal(m.get("normalTexture"))
-        if normal is not None:
-            textures["normal"] = normal
-        strength = float(extensions.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1))
-        emission, glow = self._colour(m.get("emissiveFactor", (0, 0, 0)), m.get("emissiveTexture"), None, strength)
-        material = replace(material, textures=textures)
-        return (material, emission, glow) if max(emission) > 0 else (material, None, None)
+            look = self._lit(name, fields, surface)
+        if look.shines and row.get("doubleSided"):
+            self._document.warn("Surfaces that shine do so from their front only, where the file wants both sides.")
+        material = with_opacity(look.material, fields, surface, usage.alpha, self._document.diagnostics)
+        look = Look(material, look.radiance, look.emission, chosen_set)
+        return look if fields.has(UNLIT) else _tinted(look, usage)
 
-    def _colour(
-        self, factor: Any, info: Json | None, most: float | None, scale: float = 1.0
-    ) -> tuple[RGB, Texture | None]:
-        """Factor (times the texture's mean), not negative and at most `most`, and the texture times the factor."""
-        r, g, b = (max(0.0, float(f) * scale) for f in factor)
-        texture: Texture | None = self._textures.bitmap(info, False, (r, g, b)) if max(r, g, b) > 0 else None
-        if texture is None:
-            return ((r, g, b) if most is None else (min(r, most), min(g, most), min(b, most))), None
-        texture, changed = limited(texture, most)
-        if changed:
-            self._diagnostics.warn(f"Texture '{texture.name}': {changed}")
-        return texture.mean, texture
+    def _unlit(self, name: str, surface: Surface, usage: Usage) -> Look:
+        """The base colour as radiance: what viewers that don't light it show."""
+        r, g, b = (c * t for c, t in zip(surface.colour, usage.tint))
+        texture = surface.colour_map
+        if texture is not None:
+            sr, sg, sb = (c * t for c, t in zip(texture.scale, usage.tint))
+            texture = replace(texture, scale=(sr, sg, sb))
+        if usage.colours:
+            self._document.warn("Colours at the vertices of unlit surfaces count by their mean.")
+        return Look(Material(name, "diffuse", BLACK, two_sided=True), (r, g, b), texture)
+
+    def _lit(self, name: str, fields: Fields, surface: Surface) -> Look:
+        if "occlusionTexture" in fields.row:
+            self._document.warn("Occlusion textures are ignored: light finds its way by itself.")
+        colour_map: Texture | None = surface.colour_map
+        colour = surface.colour
+        if colour_map is not None:
+            colour_map, changed = limited(colour_map, 1.0)
+            colour = colour_map.mean
+            if changed:
+                self._document.warn(f"Texture '{colour_map.name}': {changed}")
+        surface = replace(surface, colour=colour, colour_map=colour_map)
+        material = self._opaque(name, fields, surface)
+        material = with_transmission(material, fields, surface, self._textures, self._document.diagnostics)
+        normal = self._normal(fields.texture("normalTexture"))
+        if normal is not None:
+            material = _with_normal(material, normal)
+        radiance, emission = self._emission(fields)
+        return Look(material, radiance, emission) if max(radiance) > 0 else Look(material)
+
+    def _opaque(self, name: str, fields: Fields, surface: Surface) -> Material:
+        """The surface as if nothing passed through it."""
+        textures: dict[str, Texture] = {}
+        if surface.colour_map is not None:
+            textures["reflectance"] = surface.colour_map
+        if surface.alpha_map is not None:
+            textures["alpha"] = surface.alpha_map
+        along, across = directions_of(fields, surface, self._textures, self._document.diagnostics)
+        eta, specular = specular_of(fields, self._textures)
+        coat, gloss = coat_of(fields, self._textures, self._document.diagnostics)
+        sheen, tint = sheen_of(fields, self._textures, self._document.diagnostics)
+        material = Material(name, "diffuse", surface.colour, two_sided=True, alpha=(along, across), eta=eta)
+        smooth = surface.roughness < _SMOOTH and surface.alpha_map is None
+        plain = surface.metallic_map is None and not coat and not sheen
+        if plain and surface.metallic > 1 - _METAL:
+            if smooth:
+                textures.pop("alpha", None)
+            return replace(material, kind="conductor" if smooth else "rough conductor", eta=1.5, textures=textures)
+        if plain and surface.metallic < _METAL and along == across:
+            coated = eta > 1 and max(specular) > 0
+            if not coated or (surface.roughness >= _DULL and not fields.has(SPECULAR_GLOSSINESS)):
+                textures.pop("alpha", None)
+                return replace(material, eta=1.5, textures=textures)
+            return replace(material, kind="plastic" if smooth else "rough plastic", specular=specular, textures=textures)
+        if surface.metallic_map is not None:
+            textures["metallic"] = surface.metallic_map
+        details = Principled(
+            metallic=surface.metallic, sheen=sheen, sheen_tint=tint, clearcoat=coat, clearcoat_gloss=gloss
+        )
+        eta = max(1.001, eta_of(_mean(specular) * ((eta - 1) / (eta + 1)) ** 2))
+        if max(specular) - min(specular) > 0.05:
+            self._document.warn("Coloured highlights of surfaces that are partly metal, coated or of cloth are white.")
+        return replace(material, kind="principled", eta=eta, principled=details, textures=textures)
+
+    def _emission(self, fields: Fields) -> tuple[RGB, Texture | None]:
+        """Mean radiance, and its texture."""
+        strength = fields.extension("KHR_materials_emissive_strength").number("emissiveStrength", 1.0, 0.0)
+        r, g, b = (c * strength for c in fields.vector("emissiveFactor", (0.0, 0.0, 0.0), 0.0))
+        texture = self._textures.colour(fields.texture("emissiveTexture"), (r, g, b)) if max(r, g, b) > 0 else None
+        return ((r, g, b), None) if texture is None else (texture.mean, texture)
 
     def _normal(self, info: Json | None) -> Texture | None:
-        bitmap = self._textures.bitmap(info, raw=True)
-        strength = float((info or {}).get("scale", 1))
+        bitmap = self._textures.numbers(info)
+        strength = Fields(info or {}, "a normal texture", self._document.diagnostics).number("scale", 1.0)
         if bitmap is None or strength == 1:
             return bitmap
         pixels = np.broadcast_to(bitmap.pixels, (*bitmap.pixels.shape[:2], 3)).copy()
@@ -107,17 +180,47 @@ class GltfMaterials:
         return replace(bitmap, pixels=pixels)
 
 
-def _absorption(volume: Json) -> RGB:
-    """σ per metre of KHR_materials_volume: what leaves the attenuation colour after the attenuation distance."""
-    distance = float(volume.get("attenuationDistance", math.inf))
-    if not 0 < distance < math.inf:
-        return BLACK
-    r, g, b = (-math.log(min(1.0, max(1e-4, float(c)))) / distance for c in volume.get("attenuationColor", (1, 1, 1)))
-    return (r, g, b)
+def _with_normal(material: Material, normal: Texture) -> Material:
+    if material.parts:
+        return replace(material, parts=tuple(_with_normal(part, normal) for part in material.parts))
+    return replace(material, textures={**material.textures, "normal": normal})
 
 
-def _alpha(both: Bitmap, factor: float) -> Bitmap:
-    """Microfacet roughness: the square of what the texture says."""
-    channel = _ROUGHNESS if both.pixels.shape[2] == 3 else 0
-    rough = np.float32(factor) * both.pixels[..., channel : channel + 1]
-    return replace(both, pixels=np.ascontiguousarray(rough * rough))
+def _tinted(look: Look, usage: Usage) -> Look:
+    """The look with colours at vertices, if the mesh has them."""
+    if not usage.colours:
+        return look
+
+    def coloured(material: Material) -> Material:
+        return replace(material, vertex_colours=True, parts=tuple(coloured(part) for part in material.parts))
+
+    return replace(look, material=coloured(look.material))
+
+
+def _textures_of(row: Json) -> list[Json]:
+    """All references to textures in a material that count; that to the occlusion doesn't."""
+    found: list[Json] = []
+    for key, value in row.items():
+        if key.endswith("Texture") and isinstance(value, dict):
+            found += [value] if key != "occlusionTexture" else []
+        elif isinstance(value, dict) and key not in ("extras", "KHR_texture_transform"):
+            found += _textures_of(value)
+    return found
+
+
+def _on_one_set(row: Json, chosen: int) -> Json:
+    """The material without its textures on other sets of texture coordinates."""
+    kept: Json = {}
+    for key, value in row.items():
+        if key.endswith("Texture") and isinstance(value, dict):
+            if uv_set(value) == chosen or key == "occlusionTexture":
+                kept[key] = value
+        elif isinstance(value, dict) and key != "extras":
+            kept[key] = _on_one_set(value, chosen)
+        else:
+            kept[key] = value
+    return kept
+
+
+def _mean(colour: RGB) -> float:
+    return math.fsum(colour) / 3

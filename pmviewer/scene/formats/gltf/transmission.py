@@ -1,0 +1,63 @@
+"""KHR_materials_transmission: glass, solid or thin, alone or in part."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from pmviewer.scene.description import BLACK, RGB, Material
+from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.formats.gltf.fields import Fields
+from pmviewer.scene.formats.gltf.surface import Surface, even
+from pmviewer.scene.formats.gltf.texture import GltfTextures
+from pmviewer.scene.texture import Texture
+
+_SMOOTH, _ALL, _NONE = 0.1, 0.98, 0.01
+
+
+def with_transmission(
+    opaque: Material, material: Fields, surface: Surface, textures: GltfTextures, diagnostics: Diagnostics
+) -> Material:
+    """The opaque material, glass in its place where all light is transmitted, or a blend of both."""
+    extension = material.extension("KHR_materials_transmission")
+    share = extension.number("transmissionFactor", 0.0, 0.0, 1.0)
+    picture = textures.channel(extension.texture("transmissionTexture"), 0) if share > 0 else None
+    share, weight = even(share * (1 - surface.metallic), picture)
+    if weight is None and share < _NONE:
+        return opaque
+    glass = _glass(opaque.name, material, surface, diagnostics)
+    if weight is None and share > _ALL:
+        return glass
+    return Material(
+        opaque.name, "blend", parts=(opaque, glass), weight=share, textures={} if weight is None else {"weight": weight}
+    )
+
+
+def _glass(name: str, material: Fields, surface: Surface, diagnostics: Diagnostics) -> Material:
+    textures: dict[str, Texture] = {}
+    if surface.colour_map is not None:
+        textures["transmittance"] = surface.colour_map
+    ior = max(1.0, material.extension("KHR_materials_ior").number("ior", 1.5, 0.0))
+    volume = material.extension("KHR_materials_volume")
+    rough = surface.roughness >= _SMOOTH or surface.alpha_map is not None
+    glass = Material(name, "dielectric", (1.0, 1.0, 1.0), surface.colour, eta=ior, textures=textures)
+    if volume.number("thicknessFactor", 0.0, 0.0) <= 0:
+        if rough:
+            diagnostics.warn("Thin sheets of rough glass are shown smooth: what is behind them is too sharp.")
+        return replace(glass, kind="thin dielectric")
+    glass = replace(glass, absorption=absorption(volume))
+    if rough:
+        if surface.alpha_map is not None:
+            textures["alpha"] = surface.alpha_map
+        glass = replace(glass, kind="rough dielectric", alpha=(surface.alpha, surface.alpha))
+    return glass
+
+
+def absorption(volume: Fields) -> RGB:
+    """σ per metre of KHR_materials_volume: what leaves the attenuation colour after the attenuation distance."""
+    distance = volume.number("attenuationDistance", math.inf, 0.0)
+    if not 0 < distance < math.inf:
+        return BLACK
+    colour = volume.vector("attenuationColor", (1.0, 1.0, 1.0), 0.0, 1.0)
+    r, g, b = (max(0.0, -math.log(max(1e-4, c)) / distance) for c in colour)
+    return (r, g, b)
