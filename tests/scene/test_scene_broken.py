@@ -14,7 +14,7 @@ BROKEN = Path(__file__).resolve().parent.parent / "broken"
 # What the error says: the line (None where the format has none), then words that must be in it.
 ERRORS: dict[str, tuple[int | None, tuple[str, ...]]] = {
     "broken_number.xml": (4, ("'radius'", "sphere", "expected a number", "1.2.3")),
-    "compressed.gltf": (None, ("KHR_draco_mesh_compression", "without compression")),
+    "compressed.gltf": (None, ("compressed",)),
     "cyclic_default.xml": (2, ("$b", "not defined", "before this line")),
     "deep_nesting.xml": (1, ("nested deeper than 64",)),
     "duplicate_id.xml": (5, ("'wall'", "already taken in line 4")),
@@ -43,7 +43,7 @@ ERRORS: dict[str, tuple[int | None, tuple[str, ...]]] = {
     "no_light.xml": (None, ("no light", "Add an <emitter>")),
     "no_surface.xml": (None, ("no surface", "Add a <shape>")),
     "no_triangles.stl": (None, ("no triangle",)),
-    "node_circle.gltf": (None, ("nodes contain each other",)),
+    "node_circle.gltf": (None, ("nodes contain each other in a circle",)),
     "not_a_scene.xml": (1, ("<html>", "expected <scene>")),
     "only_nan_vertices.ply": (None, ("no triangle", "3 × triangle with a NaN")),
     "only_unknown_shapes.xml": (None, ("no surface", "line 4", "sdfgrid")),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +12,10 @@ from pmviewer.errors import SceneError
 from pmviewer.output.exr import write_exr
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.describe import describe
-from pmviewer.scene.description import DirectionalLight, ImageEnvironment, PointLight, SpotLight
+from pmviewer.scene.description import DirectionalLight, ImageEnvironment, SpotLight
 from pmviewer.scene.formats.hdr import read_hdr
-from pmviewer.scene.load import load_scene
 from pmviewer.scene.sky_image import read_sky
 from tests.scene.helpers import load
-from tests.scene.test_scene_meshes import gltf
 
 SHAPE = '<shape type="sphere"/>'
 
@@ -162,30 +159,3 @@ def test_broken_pictures_are_one_error(tmp_path: Path, name: str, data: bytes | 
     assert caught.value.line == 3
 
 
-def test_gltf_spots_and_suns(tmp_path: Path) -> None:
-    cone = {"innerConeAngle": math.radians(10), "outerConeAngle": math.radians(30)}
-    lights = [{"type": "spot", "intensity": 683, "spot": cone}, {"type": "directional", "intensity": 1366}]
-    down = [-math.sqrt(0.5), 0, 0, math.sqrt(0.5)]
-    nodes = [
-        {"mesh": 0},
-        {"extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": [0, 4, 0], "rotation": down},
-        {"extensions": {"KHR_lights_punctual": {"light": 1}}},
-        {"extensions": {"KHR_lights_punctual": {"light": 1}}, "scale": [0, 0, 0]},
-    ]
-    extensions = {"KHR_lights_punctual": {"lights": lights}}
-    scene = load_scene(gltf(tmp_path, nodes=nodes, scenes=[{"nodes": [0, 1, 2, 3]}], extensions=extensions))
-    spot, sun = scene.lights
-    assert isinstance(spot, SpotLight)
-    assert spot.position == (0, 4, 0)
-    assert spot.axis == pytest.approx((0, -1, 0), abs=1e-12)
-    assert spot.intensity == pytest.approx((1, 1, 1))
-    assert (spot.beam, spot.cutoff) == pytest.approx((10, 30))
-    assert isinstance(sun, DirectionalLight)
-    assert sun.direction == (0, 0, -1)
-    assert sun.irradiance == pytest.approx((2, 2, 2))
-    assert not any(isinstance(light, PointLight) for light in scene.lights)
-    assert any("linearly" in w for w in scene.warnings)
-    assert any("no direction" in w for w in scene.warnings)
-    lights[0]["spot"] = {"innerConeAngle": 2.0, "outerConeAngle": 1.0}
-    with pytest.raises(SceneError, match="inner angle"):
-        load_scene(gltf(tmp_path, nodes=nodes, scenes=[{"nodes": [0, 1]}], extensions=extensions))

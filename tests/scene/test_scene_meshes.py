@@ -1,7 +1,5 @@
 """glTF, OBJ, PLY and STL, from files made here."""
 
-import json
-import math
 import re
 import struct
 from pathlib import Path
@@ -11,8 +9,7 @@ import pytest
 
 from pmviewer.errors import SceneError
 from pmviewer.render.camera import resolve_camera
-from pmviewer.scene.description import BLACK, Mesh, Parallelogram, PointLight, Scene
-from pmviewer.scene.flatten import flatten
+from pmviewer.scene.description import BLACK, Mesh, Parallelogram, Scene
 from pmviewer.scene.formats.ply import read_ply
 from pmviewer.scene.framing import bounds
 from pmviewer.scene.load import load_scene
@@ -22,37 +19,6 @@ from tests.scene.helpers import load
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
 
 
-def gltf(folder: Path, binary: bool = True, **parts) -> Path:
-    """A glTF file with one triangle (positions, normals along +z) and whatever else is given."""
-    data = TRIANGLE.tobytes() + np.tile(np.array([0, 0, 1], np.float32), 3).tobytes()
-    header = {
-        "asset": {"version": "2.0"},
-        "buffers": [{"byteLength": len(data)}],
-        "bufferViews": [
-            {"buffer": 0, "byteLength": 36},
-            {"buffer": 0, "byteOffset": 36, "byteLength": 36},
-        ],
-        "accessors": [{"bufferView": i, "componentType": 5126, "count": 3, "type": "VEC3"} for i in (0, 1)],
-        "meshes": [{"name": "tri", "primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1}, "material": 0}]}],
-        "materials": [{}],
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
-        **parts,
-    }
-    if not binary:
-        header["buffers"][0]["uri"] = "tri.bin"
-        (folder / "tri.bin").write_bytes(data)
-        path = folder / "tri.gltf"
-        path.write_text(json.dumps(header))
-        return path
-    text = json.dumps(header).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
-    path = folder / "tri.glb"
-    path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks)
-    return path
-
-
 def only_mesh(scene: Scene) -> Mesh:
     (mesh,) = (s.geometry for s in scene.shapes if isinstance(s.geometry, Mesh))
     return mesh
@@ -60,142 +26,6 @@ def only_mesh(scene: Scene) -> Mesh:
 
 def corners(mesh: Mesh) -> list[list[float]]:
     return sorted(np.round(mesh.vertices[mesh.faces].reshape(-1, 3), 6).tolist())
-
-
-@pytest.mark.parametrize("binary", [True, False])
-def test_gltf_geometry_with_its_node_transformations(tmp_path: Path, binary: bool) -> None:
-    half = 0.5**0.5
-    nodes = [
-        {"children": [1], "translation": [0, 0, 5]},
-        {"mesh": 0, "rotation": [0, 0, half, half], "scale": [2, 2, 2]},
-    ]
-    mesh = only_mesh(load_scene(gltf(tmp_path, binary, nodes=nodes)))
-    # Scaled by two, turned by 90° about z, moved along z.
-    assert corners(mesh) == [[-2, 0, 5], [0, 0, 5], [0, 2, 5]]
-    assert mesh.normals == pytest.approx(np.tile([0, 0, 1], (3, 1)))
-
-
-def test_gltf_mesh_used_twice_and_matrix(tmp_path: Path) -> None:
-    matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 7, 8, 9, 1]
-    scene = load_scene(gltf(tmp_path, scenes=[{"nodes": [0, 1]}], nodes=[{"mesh": 0}, {"mesh": 0, "matrix": matrix}]))
-    meshes = [s.geometry for s in scene.shapes if isinstance(s.geometry, Mesh)]
-    assert np.ptp([m.vertices.min(axis=0) for m in meshes], axis=0) == pytest.approx([7, 8, 9])
-
-
-@pytest.mark.parametrize("emits", [False, True])
-def test_gltf_shared_meshes_become_instances_where_that_saves_memory(tmp_path: Path, monkeypatch, emits: bool) -> None:
-    monkeypatch.setattr("pmviewer.scene.formats.gltf.shared.FEWEST_SAVED", 2)
-    material = {"emissiveFactor": [1, 1, 1]} if emits else {}
-    nodes = [{"mesh": 0, "translation": [3 * i, 0, 0], "name": f"tri {i}"} for i in range(3)]
-    flat = {"mesh": 0, "scale": [1, 1, 0]}  # a flat node can't be an instance
-    path = gltf(tmp_path, scenes=[{"nodes": [0, 1, 2, 3]}], nodes=[*nodes, flat], materials=[material])
-    scene = load_scene(path)
-    written_out = [shape for shape in scene.shapes if isinstance(shape.geometry, Mesh)]
-    if emits:  # nor can a light
-        assert scene.instances == ()
-        assert len(written_out) == 4
-        return
-    assert [i.name for i in scene.instances] == ["tri 0", "tri 1", "tri 2"]
-    assert len(scene.groups) == len(written_out) == 1
-    assert [i.to_world[0, 3] for i in scene.instances] == [0, 3, 6]
-    assert flatten(scene).n_elements == 4 + 2 + 1  # with the studio's light and floor
-    monkeypatch.setattr("pmviewer.scene.formats.gltf.shared.FEWEST_SAVED", 4)
-    alone = load_scene(path)
-    assert alone.instances == ()
-    assert alone.camera == scene.camera
-
-
-@pytest.mark.parametrize(
-    ("source", "kind", "reflectance", "transmittance"),
-    [
-        (
-            {"pbrMetallicRoughness": {"baseColorFactor": [0.123, 0.2, 0.3, 1], "metallicFactor": 0}},
-            "diffuse",
-            (0.123, 0.2, 0.3),
-            (1,) * 3,
-        ),
-        ({"pbrMetallicRoughness": {"roughnessFactor": 0.5}}, "rough conductor", (1,) * 3, (1,) * 3),
-        ({"pbrMetallicRoughness": {"roughnessFactor": 0.5, "metallicFactor": 0}}, "rough plastic", (1,) * 3, (1,) * 3),
-        (
-            {"pbrMetallicRoughness": {"baseColorFactor": [0.9, 0.8, 0.7, 1], "roughnessFactor": 0.05}},
-            "conductor",
-            (0.9, 0.8, 0.7),
-            (1,) * 3,
-        ),
-        (
-            {
-                "pbrMetallicRoughness": {"baseColorFactor": [0.9, 1, 1, 1], "roughnessFactor": 0},
-                "extensions": {
-                    "KHR_materials_transmission": {"transmissionFactor": 1},
-                    "KHR_materials_ior": {"ior": 1.33},
-                    "KHR_materials_volume": {"attenuationDistance": 2, "attenuationColor": [1, 0.5, 0.25]},
-                },
-            },
-            "dielectric",
-            (1,) * 3,
-            (0.9, 1, 1),
-        ),
-    ],
-)
-def test_gltf_materials(tmp_path: Path, source, kind, reflectance, transmittance) -> None:
-    scene = load_scene(gltf(tmp_path, materials=[source]))
-    material = scene.materials[scene.shapes[0].material]
-    assert material.kind == kind
-    assert material.reflectance == reflectance
-    assert material.transmittance == transmittance
-    if kind == "dielectric":
-        assert material.eta == 1.33
-        assert material.absorption == pytest.approx((0, math.log(2) / 2, math.log(4) / 2))
-    if kind.startswith("rough"):
-        assert material.alpha == (0.25, 0.25)
-
-
-def test_gltf_texture_gives_its_mean(tmp_path: Path) -> None:
-    from PIL import Image
-
-    Image.new("RGB", (4, 4), (255, 0, 0)).save(tmp_path / "red.png")
-    pbr = {"baseColorFactor": [0.5, 1, 1, 1], "baseColorTexture": {"index": 0}}
-    path = gltf(
-        tmp_path,
-        materials=[{"pbrMetallicRoughness": pbr}],
-        textures=[{"source": 0}],
-        images=[{"uri": "red.png"}],
-    )
-    scene = load_scene(path)
-    assert scene.materials[0].reflectance == pytest.approx((0.5, 0, 0))
-    assert scene.materials[0].textures["reflectance"].scale == (0.5, 1, 1)
-    assert not any("exture" in w for w in scene.warnings)
-
-
-def test_gltf_camera_light_and_emission(tmp_path: Path) -> None:
-    lights = {"lights": [{"type": "point", "intensity": 683, "color": [1, 0.5, 0]}, {"type": "tube"}]}
-    nodes = [
-        {"mesh": 0},
-        {"camera": 0, "translation": [0, 0, 3]},
-        {"extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": [0, 4, 0]},
-        {"extensions": {"KHR_lights_punctual": {"light": 1}}},
-    ]
-    scene = load_scene(
-        gltf(
-            tmp_path,
-            nodes=nodes,
-            scenes=[{"nodes": [0, 1, 2, 3]}],
-            cameras=[{"type": "perspective", "perspective": {"yfov": np.pi / 2, "aspectRatio": 2, "znear": 0.1}}],
-            materials=[{"emissiveFactor": [1, 0.5, 0.25],
-                        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}}}],
-            extensions={"KHR_lights_punctual": lights},
-        )
-    )  # fmt: skip
-    assert scene.shapes[0].radiance == (4, 2, 1)
-    (light,) = scene.lights
-    assert isinstance(light, PointLight)
-    assert light.position == (0, 4, 0)
-    assert light.intensity == pytest.approx((1, 0.5, 0))
-    assert (scene.width, scene.height) == (1024, 512)
-    # 90° vertically from z = 3: the point (0, 3, 0) is on the upper edge, +x to the right.
-    projected = resolve_camera(scene, CameraSettings()).project(np.array([[0, 3, 0], [3, 0, 0]], float))
-    assert projected[:, :2] == pytest.approx(np.array([[512, 0], [768, 256]]), abs=1e-6)
-    assert any("'tube'" in w for w in scene.warnings)
 
 
 def test_obj_with_materials_polygons_and_old_encoding(tmp_path: Path) -> None:

@@ -17,7 +17,6 @@ from pmviewer.scene.formats.texture_file import linear, read_picture
 from pmviewer.scene.load import load_scene
 from pmviewer.scene.texture import Bitmap, Checkerboard
 from tests.scene.helpers import load
-from tests.scene.test_scene_meshes import gltf, only_mesh
 
 RED = ((188 / 255 + 0.055) / 1.055) ** 2.4
 
@@ -231,57 +230,6 @@ def test_obj_with_texture_coordinates_and_maps(tmp_path: Path) -> None:
     assert isinstance(lamp.emission, Bitmap)
     assert lamp.radiance == pytest.approx((2 * RED, 0, 2), rel=1e-5)
     assert any("'gone.png' does not exist" in w and "line 9" in w for w in scene.warnings)
-
-
-def test_gltf_with_all_its_textures(tmp_path: Path) -> None:
-    picture(tmp_path)
-    data = np.array([[0, 0], [1, 0], [0, 65535]], np.uint16)
-    (tmp_path / "uv.bin").write_bytes(data.tobytes())
-    info = {"index": 0, "extensions": {"KHR_texture_transform": {"offset": [0.5, 0.25], "scale": [2, 4]}}}
-    material = {
-        "pbrMetallicRoughness": {
-            "baseColorTexture": info,
-            "metallicRoughnessTexture": {"index": 0},
-            "roughnessFactor": 0.01,
-        },
-        "normalTexture": {"index": 0, "scale": 0.5},
-        "emissiveTexture": {"index": 0},
-        "emissiveFactor": [1, 1, 1],
-    }
-    path = gltf(tmp_path, binary=False, materials=[material], textures=[{"source": 0, "sampler": 0}],
-                samplers=[{"wrapS": 33648, "wrapT": 33648, "magFilter": 9728}], images=[{"uri": "a.png"}])  # fmt: skip
-    import json
-
-    header = json.loads(path.read_text())
-    header["buffers"].append({"uri": "uv.bin", "byteLength": 12})
-    header["bufferViews"].append({"buffer": 1, "byteLength": 12})
-    header["accessors"].append({"bufferView": 2, "componentType": 5123, "normalized": True, "count": 3, "type": "VEC2"})
-    header["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = 2
-    path.write_text(json.dumps(header))
-    scene = load_scene(path)
-    shape = scene.shapes[0]
-    found = scene.materials[shape.material].textures
-    assert found.keys() >= {"reflectance", "normal"}
-    base, normal = found["reflectance"], found["normal"]
-    assert isinstance(base, Bitmap)
-    assert isinstance(normal, Bitmap)
-    assert (base.wrap, base.filter) == ("mirror", "nearest")
-    assert base.to_uv == pytest.approx((2, 0, 0.5, 0, 4, 0.25))
-    assert normal.pixels[0, 0] == pytest.approx([0.5 + 0.5 * (188 / 255 - 0.5), 0.25, 1])
-    assert isinstance(shape.emission, Bitmap)
-    uv = only_mesh(scene).uv
-    assert uv is not None
-    assert uv == pytest.approx(np.array([[0, 0], [1 / 65535, 0], [0, 1]]))
-
-
-def test_gltf_without_its_picture_opens(tmp_path: Path) -> None:
-    pbr = {"baseColorTexture": {"index": 0}}
-    path = gltf(
-        tmp_path, materials=[{"pbrMetallicRoughness": pbr}], textures=[{"source": 0}], images=[{"uri": "gone.png"}]
-    )
-    scene = load_scene(path)
-    assert not scene.materials[0].textures
-    assert any("'gone.png' does not exist. It is left out." in w for w in scene.warnings)
 
 
 def test_a_map_takes_a_texture_without_a_name(tmp_path: Path) -> None:

@@ -101,13 +101,13 @@ def _encoded(data: bytes, name: str, raw: bool) -> NDArray[np.float32]:
             if max(width, height) > _MOST_SIDE:
                 raise ValueError(f"{width} × {height} pixels are too many")
             _check_memory(width, height, name)
-            values = _samples(picture)
+            values = _samples(picture, raw)
     except SceneError:
         raise
     except Exception as error:  # damaged pictures make the decoders raise anything
         reason = f"{type(error).__name__}: {error}".splitlines()[0][:120]
         raise SceneError(f"The texture {name!r} can't be read ({reason}).", hint=_READABLE) from None
-    return values if raw else linear(values)
+    return values
 
 
 def read_alpha(data: bytes, name: str) -> NDArray[np.float32] | None:
@@ -134,14 +134,17 @@ def read_alpha(data: bytes, name: str) -> NDArray[np.float32] | None:
     return np.ascontiguousarray(_reduced(values, factor) if factor > 1 else values)
 
 
-def _samples(picture: Any) -> NDArray[np.float32]:
-    """(h, w, 1 or 3) in [0, 1]; alpha is dropped, palettes are looked up."""
+def _samples(picture: Any, raw: bool) -> NDArray[np.float32]:
+    """(h, w, 1 or 3) in [0, 1], decoded from sRGB unless `raw`; alpha is dropped, palettes are looked up."""
     if picture.mode.startswith("I"):  # 16 bits of grey, which Pillow widens to 32
-        return np.asarray(picture, np.float32)[..., None] / np.float32(65535)
+        values = np.asarray(picture, np.float32)[..., None] / np.float32(65535)
+        return values if raw else linear(values)
     if picture.mode == "F":
-        return np.asarray(picture, np.float32)[..., None]
+        values = np.asarray(picture, np.float32)[..., None]
+        return values if raw else linear(values)
     grey = picture.mode in ("1", "L", "LA")
-    eight_bits = np.asarray(picture.convert("L" if grey else "RGB"), np.float32) / np.float32(255)
+    steps = np.arange(256, dtype=np.float32) / np.float32(255)
+    eight_bits = (steps if raw else linear(steps))[np.asarray(picture.convert("L" if grey else "RGB"))]
     return eight_bits[..., None] if grey else eight_bits
 
 

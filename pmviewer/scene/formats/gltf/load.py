@@ -110,8 +110,8 @@ class _Reader:
         lengths = (row.get("byteLength", 0) for row in self._document.rows("buffers"))
         size = self._document.path.stat().st_size + sum(n for n in lengths if is_index(n))
         if written > _SPARE_TRIANGLES + _TRIANGLES_PER_BYTE * size:
-            what = f"The file's nodes repeat its meshes to {written} triangles, more than are taken from a file of its size."
-            raise self._document.error(what, hint="Use fewer copies.")
+            what = f"The file shows {written} triangles, more than are taken from one of {size} bytes."
+            raise self._document.error(what, hint="It is damaged, or has too many copies of its meshes.")
 
     def _own_shapes(self, index: int) -> tuple[str, list[Shape]]:
         """A mesh's name and its shapes in its own coordinates, at its default morph weights."""

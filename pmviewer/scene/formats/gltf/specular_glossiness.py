@@ -18,7 +18,7 @@ from pmviewer.scene.texture import Bitmap
 
 SPECULAR_GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 _DIELECTRIC = 0.04
-_BRIGHTNESS = np.array([0.299, 0.587, 0.114])
+_BRIGHTNESS = np.array([0.299, 0.587, 0.114], np.float32)
 Array = NDArray[np.float32]
 
 
