@@ -157,5 +157,3 @@ def test_broken_pictures_are_one_error(tmp_path: Path, name: str, data: bytes | 
         load(tmp_path, SHAPE, envmap(name=name), sky="")
     assert name in str(caught.value)
     assert caught.value.line == 3
-
-

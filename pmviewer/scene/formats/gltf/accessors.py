@@ -89,7 +89,9 @@ class Accessors:
     def _sizes(self) -> int:
         """Bytes that files beside the scene's hold."""
         names = {row["uri"] for row in self._document.rows("buffers") if isinstance(row.get("uri"), str)}
-        files = (self._document.path.parent / name for name in names if not name.startswith("data:") and "\0" not in name)
+        files = (
+            self._document.path.parent / name for name in names if not name.startswith("data:") and "\0" not in name
+        )
         return self._document.path.stat().st_size + sum(f.stat().st_size for f in files if f.is_file())
 
     def _strided(self, view: Any, offset: Any, count: int, dtype: np.dtype, width: int, index: int) -> NDArray:
@@ -97,7 +99,9 @@ class Accessors:
         size = dtype.itemsize * width
         step = stride or size
         if not is_index(offset) or step < size or (count and offset + (count - 1) * step + size > len(data)):
-            what = f"Accessor {index} claims {count} items of {size} bytes, {step} apart from byte {str(offset)[:20]} on,"
+            what = (
+                f"Accessor {index} claims {count} items of {size} bytes, {step} apart from byte {str(offset)[:20]} on,"
+            )
             raise self._document.error(f"{what} but its buffer view has {len(data)} bytes.")
         if not count:
             return np.zeros((0, width), dtype)
@@ -113,9 +117,13 @@ class Accessors:
         step = np.dtype(kind).newbyteorder("<")
         where = self._strided(places.get("bufferView"), places.get("byteOffset", 0), count or 0, step, 1, index)[:, 0]
         width = values.shape[1]
-        what = self._strided(changed.get("bufferView"), changed.get("byteOffset", 0), count or 0, values.dtype, width, index)
+        what = self._strided(
+            changed.get("bufferView"), changed.get("byteOffset", 0), count or 0, values.dtype, width, index
+        )
         if len(where) and int(where.max()) >= len(values):
-            raise self._document.error(f"Accessor {index} is sparse, and changes item {int(where.max())}, which it lacks.")
+            raise self._document.error(
+                f"Accessor {index} is sparse, and changes item {int(where.max())}, which it lacks."
+            )
         values = values.copy()
         values[where] = what
         return values

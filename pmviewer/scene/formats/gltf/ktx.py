@@ -28,5 +28,7 @@ def png_from_ktx2(data: bytes, name: str) -> bytes:
     try:
         png, _ = alktx2.decode_ktx2_to_bytes(data, format="png")
     except (RuntimeError, ValueError, MemoryError):
-        raise SceneError(f"The texture {name!r} can't be read: its KTX 2 data are damaged or of an unknown kind.") from None
+        raise SceneError(
+            f"The texture {name!r} can't be read: its KTX 2 data are damaged or of an unknown kind."
+        ) from None
     return bytes(png)

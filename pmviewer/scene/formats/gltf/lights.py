@@ -115,5 +115,3 @@ def latlong(faces: NDArray[np.float32]) -> NDArray[np.float32]:
     column = np.clip(((1 + across) / 2 * n).astype(int), 0, n - 1)
     row = np.clip(((1 - down) / 2 * n).astype(int), 0, n - 1)
     return np.ascontiguousarray(faces[face, row, column])
-
-

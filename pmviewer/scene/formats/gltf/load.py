@@ -94,7 +94,11 @@ class _Reader:
 
     def _is_own(self, place: Placed) -> bool:
         """Does the node show its mesh as the mesh alone says?"""
-        return "skin" not in place.node and "weights" not in place.node and not self._pose.get(place.index, {}).get("weights")
+        return (
+            "skin" not in place.node
+            and "weights" not in place.node
+            and not self._pose.get(place.index, {}).get("weights")
+        )
 
     def _triangles(self, index: int) -> int:
         name = f"mesh {index}"
@@ -205,9 +209,7 @@ class _Reader:
 
     def _add_skinned(self, place: Placed, name: str, row: Json, nodes: Nodes) -> None:
         """A skin moves its mesh by its joints alone, wherever the node stands."""
-        matrices = joint_matrices(
-            self._document, self._accessors, place.node["skin"], place.name, nodes.all_world()
-        )
+        matrices = joint_matrices(self._document, self._accessors, place.node["skin"], place.name, nodes.all_world())
         for decoded, primitive in self._parts(row, place.node["mesh"], self._weights(place, row)):
             if decoded.joints is None or decoded.weights is None:
                 mesh = transformed(decoded.mesh, place.matrix)

@@ -78,7 +78,9 @@ def sheen_of(material: Fields, textures: GltfTextures, diagnostics: Diagnostics)
     strongest = max(colour)
     if strongest < _SHOWS:
         return 0.0, 0.0
-    diagnostics.warn("The sheen of cloth is the same all over, its hue is the surface's own and its roughness does not count.")
+    diagnostics.warn(
+        "The sheen of cloth is the same all over, its hue is the surface's own and its roughness does not count."
+    )
     return strongest, 1 - min(colour) / strongest
 
 

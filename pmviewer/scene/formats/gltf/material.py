@@ -152,7 +152,9 @@ class GltfMaterials:
             if not coated or (surface.roughness >= _DULL and not fields.has(SPECULAR_GLOSSINESS)):
                 textures.pop("alpha", None)
                 return replace(material, eta=1.5, textures=textures)
-            return replace(material, kind="plastic" if smooth else "rough plastic", specular=specular, textures=textures)
+            return replace(
+                material, kind="plastic" if smooth else "rough plastic", specular=specular, textures=textures
+            )
         if surface.metallic_map is not None:
             textures["metallic"] = surface.metallic_map
         details = Principled(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -137,7 +136,9 @@ class Nodes:
                     inside.add(index)
                     for child in children:
                         if child in inside:
-                            raise self._document.error(f"The file's nodes contain each other in a circle (node {child}).")
+                            raise self._document.error(
+                                f"The file's nodes contain each other in a circle (node {child})."
+                            )
                     stack += [child for child in children if child not in shown]
         total = sum(shown[root] for root in roots)
         if total > len(self._rows) + _MOST_REPEATED:
@@ -179,7 +180,9 @@ class Nodes:
             return None
         (count,) = counts
         if count > MOST_NODES:
-            raise self._document.error(f"Node {index} asks for {count} copies of its mesh; {MOST_NODES} is the most.", "")
+            raise self._document.error(
+                f"Node {index} asks for {count} copies of its mesh; {MOST_NODES} is the most.", ""
+            )
         matrices = trs(*(np.broadcast_to(a, (count, a.shape[1])) for a in found))
         good = np.isfinite(matrices).all(axis=(1, 2))
         return tuple(matrices[good])
@@ -204,7 +207,8 @@ def trs(translation: Float, rotation: Float, scale: Float) -> Float:
         ]
     )
     matrices = np.zeros((len(translation), 4, 4))
-    matrices[:, :3, :3] = turn.transpose(2, 0, 1) * scale[:, None, :]
+    with np.errstate(invalid="ignore"):  # whoever calls looks for what is not finite
+        matrices[:, :3, :3] = turn.transpose(2, 0, 1) * scale[:, None, :]
     matrices[:, :3, 3], matrices[:, 3, 3] = translation, 1.0
     return matrices
 

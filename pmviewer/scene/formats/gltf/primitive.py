@@ -123,9 +123,7 @@ def _attributes(primitive: Json) -> Json:
 class _Source:
     """Attributes and indices of one primitive, from accessors or from Draco's data."""
 
-    def __init__(
-        self, document: Document, buffers: Buffers, accessors: Accessors, primitive: Json, who: str
-    ) -> None:
+    def __init__(self, document: Document, buffers: Buffers, accessors: Accessors, primitive: Json, who: str) -> None:
         self._document, self._accessors, self._who = document, accessors, who
         self._primitive, self._attributes = primitive, _attributes(primitive)
         self._draco: DracoMesh | None = None
