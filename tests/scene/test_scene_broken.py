@@ -27,7 +27,7 @@ ERRORS: dict[str, tuple[int | None, tuple[str, ...]]] = {
     "garbage.ply": (None, ("not a PLY file",)),
     "garbage.stl": (None, ("neither a binary nor a text STL",)),
     "garbage.xml": (1, ("not well-formed XML",)),
-    "huge_accessor.gltf": (None, ("Accessor 0", "1000000000000000")),
+    "huge_accessor.gltf": (None, ("shows 333333333333333 triangles", "damaged")),
     "huge_number.xml": (4, ("'radius'", "between -1e+30 and 1e+30", "1e300")),
     "huge_size.xml": (2, ("1 to 16384 pixels", "2000000000", "width and height")),
     "include.xml": (4, ("<include> is refused", "Copy")),

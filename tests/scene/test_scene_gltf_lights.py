@@ -79,7 +79,7 @@ def surroundings(folder: Path, faces: list[np.ndarray], **light) -> Scene:
 
 
 def radiance(sky: ImageEnvironment, direction: tuple) -> np.ndarray:
-    """What the picture shows in a direction of the world: its middle is (0, 0, 1), the middle of its left half (1, 0, 0)."""
+    """What the picture shows in a direction of the world: (0, 0, 1) is its middle, (1, 0, 0) that of its left half."""
     x, y, z = sky.to_world.T @ np.array(direction, float)
     height, width = sky.pixels.shape[:2]
     column = int((0.5 - math.atan2(x, z) / (2 * math.pi)) * width) % width

@@ -332,7 +332,7 @@ def test_variants(tmp_path: Path) -> None:
     assert any("(-D variant=…): day, night" in w for w in scene.warnings)
     assert first(load_scene(path, {"variant": "night"})).reflectance[0] == 0.75
     assert first(load_scene(path, {"variant": "0"})).reflectance[0] == 0.5
-    with pytest.raises(SceneError, match="no variant 'dawn'. It has day, night"):
+    with pytest.raises(SceneError, match=r"no variant 'dawn'. It has day, night"):
         load_scene(path, {"variant": "dawn"})
 
 

@@ -21,8 +21,8 @@ class NamedCamera:
 
 @dataclass
 class MeshFile:
-    """Shapes index into `materials`. `aspect` is the camera's width over height; `cameras` are all that the file has, of
-    which `camera` is one."""
+    """Shapes index into `materials`. `aspect` is the camera's width over height; `cameras` are all that the file has,
+    of which `camera` is one."""
 
     shapes: list[Shape] = field(default_factory=list)
     materials: list[Material] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Accessors as arrays: typed, strided, sparse, normalised. Every size is checked against real bytes before it is used."""
+"""Accessors as arrays: strided, sparse, normalised. Sizes are checked against real bytes before memory is taken."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Accessors:
         return self._document.row("accessors", index, who)
 
     def _raw(self, row: Json, index: int, who: str, components: tuple[int, ...]) -> NDArray:
-        kind, width = _TYPES.get(_key(row.get("componentType"))), _COMPONENTS.get(str(row.get("type")))
+        kind, width = _TYPES.get(_key(row.get("componentType"))), _COMPONENTS.get(str(row.get("type")), 0)
         if kind is None or width not in components:
             what = f"Accessor {index} has items of type {str(row.get('type'))[:20]} and component type "
             raise self._document.error(f"{what}{str(row.get('componentType'))[:20]}, which {who} can't use.")
@@ -80,18 +80,14 @@ class Accessors:
 
     def _check_spare(self, index: int, count: int) -> None:
         """Items without bytes of their own are zeros: no more than the file could give some."""
-        lengths = (row.get("byteLength", 0) for row in self._document.rows("buffers"))
-        held = sum(n for n in lengths if is_index(n))
-        real = self._document.path.stat().st_size + min(held, self._sizes())
-        if count > real + _SPARE:
+        if count > self._sizes() + _SPARE:
             raise self._document.error(f"Accessor {index} claims {count} items and has no data for them.")
 
     def _sizes(self) -> int:
-        """Bytes that files beside the scene's hold."""
+        """Bytes that the file and those beside it hold."""
         names = {row["uri"] for row in self._document.rows("buffers") if isinstance(row.get("uri"), str)}
-        files = (
-            self._document.path.parent / name for name in names if not name.startswith("data:") and "\0" not in name
-        )
+        names = {unquote(name) for name in names if not name.startswith("data:")}
+        files = (self._document.path.parent / name for name in names if "\0" not in name)
         return self._document.path.stat().st_size + sum(f.stat().st_size for f in files if f.is_file())
 
     def _strided(self, view: Any, offset: Any, count: int, dtype: np.dtype, width: int, index: int) -> NDArray:

@@ -18,8 +18,8 @@ from pmviewer.scene.formats.gltf.document import Json, is_index
 _MODES = ("ATTRIBUTES", "TRIANGLES", "INDICES")
 _FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR")
 _GROWTH = {0xA0: 80, 0xA1: 1100}
-"""Bytes that one byte of a vertex stream can become at most, by version: 256 rows of a column of equal bytes take 4 bytes
-in version 0; in version 1 four such columns take one."""
+"""Bytes that one byte of a vertex stream can become at most, by version: 256 rows of a column of equal bytes take 4
+bytes in version 0; in version 1 four such columns take one."""
 
 
 def library(name: str, needed_for: str) -> Any:
@@ -41,7 +41,6 @@ def decode_meshopt(data: NDArray[np.uint8], packed: Json) -> NDArray[np.uint8]:
     method = packed.get("filter", "NONE")
     if not is_index(count) or not is_index(size) or mode not in _MODES or method not in _FILTERS or not len(data):
         raise SceneError("its compression is not described as it should be.")
-    assert count is not None and size is not None
     if mode == "ATTRIBUTES":
         most = len(data) * _GROWTH.get(int(data[0]), 0)
         usable = 0 < size <= 256 and size % 4 == 0

@@ -6,7 +6,7 @@ import json
 import struct
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.diagnostics import Diagnostics
@@ -57,7 +57,7 @@ class Document:
         self.diagnostics.warn(sentence, kind=kind)
 
 
-def is_index(value: Any) -> bool:
+def is_index(value: Any) -> TypeGuard[int]:
     """A whole number from 0 on?"""
     return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 

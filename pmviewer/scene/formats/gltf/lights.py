@@ -88,10 +88,10 @@ def _face(document: Document, buffers: Buffers, index: Any) -> NDArray[np.float3
         data = content(document, image["uri"], "The picture of the surroundings")
     pixels, _ = read_picture(data, f"image {index}", False)
     alpha = read_alpha(data, f"image {index}") if data[:4] == b"\x89PNG" else None
-    pixels = np.broadcast_to(pixels, (*pixels.shape[:2], 3))
+    pixels = np.broadcast_to(pixels, (*pixels.shape[:2], 3)).astype(np.float32)
     if max(pixels.shape) > _MOST_SIDE:
         raise ValueError("too large")
-    return pixels if alpha is None else pixels / np.maximum(alpha, np.float32(1 / 255))
+    return pixels if alpha is None else (pixels / np.maximum(alpha, np.float32(1 / 255))).astype(np.float32)
 
 
 def latlong(faces: NDArray[np.float32]) -> NDArray[np.float32]:

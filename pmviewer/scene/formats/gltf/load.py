@@ -30,7 +30,7 @@ CHOICES = ("scene", "camera", "variant")
 """What a user can choose in a glTF file, by name or number from 0 on."""
 _LIGHTS, _VARIANTS = "KHR_lights_punctual", "KHR_materials_variants"
 _SPARE_TRIANGLES, _TRIANGLES_PER_BYTE = 1 << 22, 16
-"""Triangles that a file may be written out to: so many, and more by its size (compressed ones take less than a byte)."""
+"""Triangles that a file may be written out to: so many, and more by its size (compressed ones take under a byte)."""
 
 
 def read_gltf(path: Path, diagnostics: Diagnostics, choices: Mapping[str, str] | None = None) -> MeshFile:

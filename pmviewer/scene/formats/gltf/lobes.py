@@ -25,8 +25,8 @@ def eta_of(f0: float) -> float:
 
 
 def specular_of(material: Fields, textures: GltfTextures) -> tuple[float, RGB]:
-    """Index and colour of a dielectric's reflection, by KHR_materials_ior and KHR_materials_specular; the colour is 1 in
-    its strongest channel, and black where nothing is reflected. An index of 0 means total reflection there."""
+    """Index and colour of a dielectric's reflection, by KHR_materials_ior and KHR_materials_specular; the colour is 1
+    in its strongest channel, and black where nothing is reflected. An index of 0 means total reflection there."""
     ior = material.extension("KHR_materials_ior").number("ior", 1.5, 0.0)
     f0 = ((ior - 1) / (ior + 1)) ** 2 if ior >= 1 else 1.0 if ior == 0 else 0.0
     if not material.has("KHR_materials_specular"):
@@ -87,8 +87,8 @@ def sheen_of(material: Fields, textures: GltfTextures, diagnostics: Diagnostics)
 def directions_of(
     material: Fields, surface: Surface, textures: GltfTextures, diagnostics: Diagnostics
 ) -> tuple[float, float]:
-    """Microfacet roughness along the tangent and across it, by KHR_materials_anisotropy (which stretches highlights along
-    its direction)."""
+    """Microfacet roughness along the tangent and across it, by KHR_materials_anisotropy (which stretches highlights
+    along its direction)."""
     alpha = surface.alpha
     extension = material.extension("KHR_materials_anisotropy")
     strength = extension.number("anisotropyStrength", 0.0, 0.0, 1.0)

@@ -19,7 +19,7 @@ from pmviewer.scene.formats.gltf.surface import Surface, surface_of
 from pmviewer.scene.formats.gltf.texture import GltfTextures, uv_set
 from pmviewer.scene.formats.gltf.transmission import with_transmission
 from pmviewer.scene.formats.meshfile import DEFAULT_MATERIAL
-from pmviewer.scene.texture import Texture, limited
+from pmviewer.scene.texture import Texture
 
 UNLIT = "KHR_materials_unlit"
 _METAL, _SMOOTH, _DULL = 0.02, 0.1, 0.9
@@ -113,14 +113,6 @@ class GltfMaterials:
     def _lit(self, name: str, fields: Fields, surface: Surface) -> Look:
         if "occlusionTexture" in fields.row:
             self._document.warn("Occlusion textures are ignored: light finds its way by itself.")
-        colour_map: Texture | None = surface.colour_map
-        colour = surface.colour
-        if colour_map is not None:
-            colour_map, changed = limited(colour_map, 1.0)
-            colour = colour_map.mean
-            if changed:
-                self._document.warn(f"Texture '{colour_map.name}': {changed}")
-        surface = replace(surface, colour=colour, colour_map=colour_map)
         material = self._opaque(name, fields, surface)
         material = with_transmission(material, fields, surface, self._textures, self._document.diagnostics)
         normal = self._normal(fields.texture("normalTexture"))

@@ -142,7 +142,8 @@ class Nodes:
                     stack += [child for child in children if child not in shown]
         total = sum(shown[root] for root in roots)
         if total > len(self._rows) + _MOST_REPEATED:
-            what = f"The file's {len(self._rows)} nodes contain each other {total if total < 10**15 else 'countless'} times."
+            times = total if total < 10**15 else "countless"
+            what = f"The file's {len(self._rows)} nodes contain each other {times} times."
             raise self._document.error(what, hint="In glTF a node has one parent at most: export the file again.")
 
     def _local(self, node: Json, index: int) -> Matrix | None:
@@ -192,8 +193,8 @@ _TRS = (("translation", (0, 0, 0)), ("rotation", (0, 0, 0, 1)), ("scale", (1, 1,
 
 
 def trs(translation: Float, rotation: Float, scale: Float) -> Float:
-    """(n, 4, 4) matrices from translations (n, 3), unit quaternions x, y, z, w (n, 4) and scales (n, 3). A quaternion of
-    other length is scaled to one; one of zeros turns nothing. ValueError for other shapes."""
+    """(n, 4, 4) matrices from translations (n, 3), unit quaternions x, y, z, w (n, 4) and scales (n, 3). A quaternion
+    of other length is scaled to one; one of zeros turns nothing. ValueError for other shapes."""
     if translation.shape[1:] != (3,) or rotation.shape[1:] != (4,) or scale.shape[1:] != (3,):
         raise ValueError("a translation and a scale have three numbers, a rotation has four")
     length = np.sqrt((rotation * rotation).sum(axis=1, keepdims=True))
@@ -214,7 +215,7 @@ def trs(translation: Float, rotation: Float, scale: Float) -> Float:
 
 
 def chosen(document: Document, kind: str, wanted: str | None) -> int | None:
-    """Which of the file's scenes, cameras, … a user names, by number or name; None if none is named. Raises SceneError."""
+    """Which of the file's scenes, … a user names, by number or name; None if none is named. Raises SceneError."""
     if wanted is None:
         return None
     names = [name_of(row, f"{i}") for i, row in enumerate(document.rows(kind))]

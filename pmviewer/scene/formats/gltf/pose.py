@@ -26,7 +26,8 @@ def pose_at_start(document: Document, accessors: Accessors) -> Pose:
         return {}
     document.warn("The file is animated: its first animation is shown at its beginning.")
     pose: Pose = {}
-    samplers, channels = animations[0].get("samplers"), animations[0].get("channels")
+    samplers: Any = animations[0].get("samplers")
+    channels = animations[0].get("channels")
     for channel in channels if isinstance(channels, list) else []:
         try:
             target = channel["target"]

@@ -74,7 +74,8 @@ class Primitives:
             raise self._document.error(f"The attributes of {who} are not of one length.")
         if used is not None:
             vertices = vertices[used]
-            normals, uv, colours, joints, shares = (a if a is None else a[used] for a in arrays)
+            normals, uv, colours, shares = (a if a is None else a[used] for a in (normals, uv, colours, shares))
+            joints = None if joints is None else joints[used]
         alpha = None
         if colours is not None:
             colours = np.clip(np.nan_to_num(colours), 0.0, None)

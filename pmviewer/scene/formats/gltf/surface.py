@@ -98,5 +98,7 @@ def _even(parts: Parts) -> Surface:
         rough_map = replace(rough_map, pixels=squared)
     if opacity_map is not None and float(opacity_map.pixels.min()) >= 1:
         opacity_map = None
+    if colour_map is not None and float(colour_map.pixels.max()) > 1:  # pictures of floats
+        colour_map = replace(colour_map, pixels=np.minimum(colour_map.pixels, np.float32(1)))
     mean = colour if colour_map is None else colour_map.mean
     return Surface(mean, colour_map, opacity, opacity_map, metallic, metallic_map, roughness, rough_map)

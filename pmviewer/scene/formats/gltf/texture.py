@@ -85,7 +85,7 @@ class GltfTextures:
     def _first(self, texture: Json, use: str) -> tuple[Pixels | None, int]:
         """The texture's picture, or that of an extension where it has none of its own that can be read."""
         candidates = [texture.get("source"), *(extension(texture, name).get("source") for name in _SOURCES)]
-        images = [i for i in candidates if is_index(i)]
+        images: list[int] = [i for i in candidates if is_index(i)]
         for image in images:
             pixels = self._picture(image, use)
             if pixels is not None:
