@@ -32,7 +32,13 @@ SetOption = Annotated[
 ]
 ThreadsOption = Annotated[int | None, typer.Option(min=1, max=1024, help="Threads; all processors if not given.")]
 ParameterOption = Annotated[
-    list[str] | None, typer.Option("--define", "-D", metavar="NAME=VALUE", help="A scene file's <default> parameter.")
+    list[str] | None,
+    typer.Option(
+        "--define",
+        "-D",
+        metavar="NAME=VALUE",
+        help="A scene file's <default> parameter; scene, camera or variant of a glTF file.",
+    ),
 ]
 
 
