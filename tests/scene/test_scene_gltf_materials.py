@@ -1,6 +1,7 @@
 """Materials and textures of glTF files."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from PIL import Image
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.description import BLACK, Material, Scene
+from pmviewer.scene.formats.gltf.extensions import HONOURED
 from pmviewer.scene.load import load_scene
 from pmviewer.scene.texture import Bitmap
 from tests.scene.gltf_files import Gltf, meshes
@@ -343,3 +345,10 @@ def test_extensions_that_are_not_honoured_are_named_once(tmp_path: Path) -> None
     assert len(named) == 2
     assert "KHR_materials_iridescence is not supported: thin films" in named[0]
     assert "ACME_thing" in named[1]
+
+
+def test_the_documentation_names_the_extensions_that_are_honoured() -> None:
+    text = (Path(__file__).resolve().parents[2] / "docs/scenes.md").read_text("utf-8")
+    section = text.partition("\n## glTF\n")[2].partition("\n## ")[0]
+    named = set(re.findall(r"`((?:EXT|KHR|MSFT)_\w+)`", section))
+    assert named - {"KHR_animation_pointer"} == HONOURED

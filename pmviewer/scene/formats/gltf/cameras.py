@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from pmviewer.scene.clean import LARGEST_COORDINATE
 from pmviewer.scene.description import Camera
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.gltf.document import Json, name_of
@@ -23,8 +24,11 @@ def camera_at(row: Json, matrix: Matrix, node_name: str, diagnostics: Diagnostic
     kind = row.get("type")
     eye, up, backward = matrix[:3, 3], matrix[:3, 1], matrix[:3, 2]
     length = float(np.linalg.norm(backward))
-    if kind not in ("perspective", "orthographic") or not 0 < length < math.inf or not np.any(np.cross(up, backward)):
-        diagnostics.warn(f"The camera '{name}' is left out: its type is unknown, or its node has no direction.")
+    usable = bool(np.all(np.abs(matrix) <= LARGEST_COORDINATE)) and bool(np.any(np.cross(up, backward)))
+    if kind not in ("perspective", "orthographic") or not usable:
+        diagnostics.warn(
+            f"The camera '{name}' is left out: its type is unknown, or its node has no place or direction."
+        )
         return None
     target = eye - backward / length
     lens = Fields(row, f"the camera '{name}'", diagnostics).table(kind)

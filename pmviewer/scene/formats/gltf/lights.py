@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
+from pmviewer.scene.clean import LARGEST_COORDINATE
 from pmviewer.scene.description import DirectionalLight, ImageEnvironment, Light, PointLight, SpotLight
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.gltf.buffers import Buffers, content
@@ -39,6 +40,9 @@ def punctual(row: Json, matrix: Matrix, diagnostics: Diagnostics) -> Light | Non
     intensity = fields.number("intensity", 1.0, 0.0) / LUMENS_PER_WATT
     r, g, b = (c * intensity for c in fields.vector("color", (1.0, 1.0, 1.0), 0.0))
     x, y, z = (float(c) for c in matrix[:3, 3])
+    if not np.all(np.abs(matrix) <= LARGEST_COORDINATE):
+        diagnostics.warn(f"The {kind} light '{name}' stands at no usable place and was ignored.")
+        return None
     if kind == "point":
         return PointLight(name, (x, y, z), (r, g, b))
     forward = -matrix[:3, 2]

@@ -41,7 +41,8 @@ def read_gltf(path: Path, diagnostics: Diagnostics, choices: Mapping[str, str] |
     choices: which scene, camera and variant to show (`CHOICES`); without a choice it is the file's own scene and look,
         and its first camera.
     """
-    return _Reader(read_document(path, diagnostics), choices or {}).read()
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite in the end is left out
+        return _Reader(read_document(path, diagnostics), choices or {}).read()
 
 
 class _Reader:

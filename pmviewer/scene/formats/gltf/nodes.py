@@ -198,7 +198,7 @@ def trs(translation: Float, rotation: Float, scale: Float) -> Float:
     if translation.shape[1:] != (3,) or rotation.shape[1:] != (4,) or scale.shape[1:] != (3,):
         raise ValueError("a translation and a scale have three numbers, a rotation has four")
     length = np.sqrt((rotation * rotation).sum(axis=1, keepdims=True))
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(divide="ignore"):
         x, y, z, w = np.where(length > 0, rotation / length, (0.0, 0.0, 0.0, 1.0)).T
     turn = np.array(
         [
@@ -208,8 +208,7 @@ def trs(translation: Float, rotation: Float, scale: Float) -> Float:
         ]
     )
     matrices = np.zeros((len(translation), 4, 4))
-    with np.errstate(invalid="ignore"):  # whoever calls looks for what is not finite
-        matrices[:, :3, :3] = turn.transpose(2, 0, 1) * scale[:, None, :]
+    matrices[:, :3, :3] = turn.transpose(2, 0, 1) * scale[:, None, :]
     matrices[:, :3, 3], matrices[:, 3, 3] = translation, 1.0
     return matrices
 

@@ -79,13 +79,12 @@ def skinned(mesh: Mesh, joints: NDArray[np.int64], weights: Float, matrices: Flo
     blend = np.zeros((len(joints), 3, 4))
     for k in range(joints.shape[1]):
         blend += weights[:, k, None, None] * matrices[joints[:, k], :3]
-    with np.errstate(invalid="ignore", over="ignore"):  # broken vertices are dropped later
-        vertices = np.einsum("nij,nj->ni", blend[:, :, :3], mesh.vertices) + blend[:, :, 3]
-        a, b, c = blend[:, :, 0], blend[:, :, 1], blend[:, :, 2]
-        cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
-        mirrored = bool(np.median((a * cofactors[:, :, 0]).sum(axis=1)) < 0) if len(joints) else False
-        normals = mesh.normals
-        if normals is not None:
-            normals = unit(np.einsum("nij,nj->ni", cofactors, normals)) * (-1.0 if mirrored else 1.0)
+    vertices = np.einsum("nij,nj->ni", blend[:, :, :3], mesh.vertices) + blend[:, :, 3]
+    a, b, c = blend[:, :, 0], blend[:, :, 1], blend[:, :, 2]
+    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
+    mirrored = bool(np.median((a * cofactors[:, :, 0]).sum(axis=1)) < 0) if len(joints) else False
+    normals = mesh.normals
+    if normals is not None:
+        normals = unit(np.einsum("nij,nj->ni", cofactors, normals)) * (-1.0 if mirrored else 1.0)
     faces = np.ascontiguousarray(mesh.faces[:, ::-1]) if mirrored else mesh.faces
     return Mesh(vertices, faces, normals, mesh.uv, mesh.colours)
