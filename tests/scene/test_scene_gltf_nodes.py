@@ -8,6 +8,7 @@ import pytest
 
 from pmviewer.errors import SceneError
 from pmviewer.render.camera import resolve_camera
+from pmviewer.scene.formats.gltf.shared import _condition
 from pmviewer.scene.load import load_scene
 from pmviewer.settings import CameraSettings
 from tests.scene.gltf_files import TRIANGLE, Gltf, corners, meshes
@@ -258,3 +259,15 @@ def test_joints_outside_of_the_scene_and_damaged_skins(tmp_path: Path) -> None:
     for skin, words in (({"joints": [9]}, "node 9"), ({}, "no joints"), ({"joints": []}, "no joints")):
         with pytest.raises(SceneError, match=words):
             load_scene(f.write(tmp_path, nodes=nodes, scenes=[{"nodes": [0]}], skins=[skin]))
+
+
+@pytest.mark.timeout(60)
+def test_instances_are_judged_as_the_scene_judges_them() -> None:
+    rng = np.random.default_rng(3)
+    matrices = np.tile(np.eye(4), (200, 1, 1))
+    matrices[:, :3, :3] = rng.normal(size=(200, 3, 3)) * 10.0 ** rng.uniform(-8, 8, (200, 3, 1))
+    for matrix in matrices:
+        linear = matrix[:3, :3]
+        expected = np.linalg.norm(linear) * np.linalg.norm(np.linalg.inv(linear))
+        assert _condition(matrix) == pytest.approx(expected, rel=1e-4)
+    assert _condition(np.diag([1.0, 1.0, 0.0, 1.0])) == math.inf

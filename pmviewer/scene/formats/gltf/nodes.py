@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.formats.gltf.accessors import Accessors, Float
@@ -17,6 +19,7 @@ from pmviewer.scene.formats.mitsuba.transform import Matrix
 MOST_NODES = 1_000_000
 _MOST_REPEATED = 100_000
 """Nodes that may be shown beyond those in the file, which glTF does not foresee: each has one parent at most."""
+_LARGEST = 1e30
 _INSTANCING = "EXT_mesh_gpu_instancing"
 
 
@@ -55,6 +58,7 @@ class Nodes:
             what = f"The file has {len(self._rows)} nodes; {MOST_NODES} is the most that can be opened."
             raise document.error(what, hint="Join objects, or use EXT_mesh_gpu_instancing for copies.")
         self.world: dict[int, Matrix] = {}
+        self._parts: tuple[Float, NDArray[np.bool_]] | None = None
 
     def walk(self, scene: int | None) -> list[Placed]:
         """The nodes of a scene (of the whole file where it has no scenes), parents before children; hidden ones and
@@ -147,22 +151,37 @@ class Nodes:
             raise self._document.error(what, hint="In glTF a node has one parent at most: export the file again.")
 
     def _local(self, node: Json, index: int) -> Matrix | None:
-        """The node's own matrix; None for none."""
-        moved = self._pose.get(index, {})
-        if "matrix" not in node and not moved and not any(k in node for k in ("translation", "rotation", "scale")):
+        """The node's own matrix; None for none. Raises SceneError for one of unusable numbers."""
+        moved = self._pose.get(index, _STILL)
+        if "matrix" not in node and not moved and not any(key in node for key, _ in _TRS):
             return None
-        try:
-            if "matrix" in node and not moved.keys() & {"translation", "rotation", "scale"}:
+        if "matrix" in node and not any(key in moved for key, _ in _TRS):
+            try:
                 matrix = np.array(node["matrix"], np.float64).reshape(4, 4).T
-            else:
-                t, r, s = (moved.get(k, node.get(k, default)) for k, default in _TRS)
-                matrix = trs(np.array([t], np.float64), np.array([r], np.float64), np.array([s], np.float64))[0]
-        except (TypeError, ValueError, OverflowError):
-            matrix = np.full((4, 4), np.nan)
-        if not np.isfinite(matrix).all() or np.abs(matrix).max() > 1e30:
+            except (TypeError, ValueError, OverflowError):
+                matrix = np.full((4, 4), np.nan)
+            good = bool((np.abs(matrix) <= _LARGEST).all())
+        else:
+            if self._parts is None:
+                self._parts = self._all_parts()
+            matrix, good = self._parts[0][index], bool(self._parts[1][index])
+        if not good:
             what = f"The place of {name_of(node, f'node {index}')!r} is not given by usable numbers."
             raise self._document.error(what)
         return matrix
+
+    def _all_parts(self) -> tuple[Float, NDArray[np.bool_]]:
+        """(n, 4, 4) matrices of all nodes' translations, rotations and scales, and which of them can be used: at once,
+        since arrays of few numbers take long."""
+        columns: list[Float] = []
+        for key, default in _TRS:
+            values = [self._pose.get(i, _STILL).get(key, row.get(key, default)) for i, row in enumerate(self._rows)]
+            try:
+                columns.append(np.array(values, np.float64).reshape(len(values), len(default)))
+            except (TypeError, ValueError, OverflowError):
+                columns.append(np.array([_numbers(value, len(default)) for value in values]))
+        matrices = trs(*columns)
+        return matrices, np.all(np.abs(matrices) <= _LARGEST, axis=(1, 2))
 
     def _copies(self, node: Json, index: int) -> tuple[Matrix, ...] | None:
         """Places of EXT_mesh_gpu_instancing in the node."""
@@ -190,6 +209,16 @@ class Nodes:
 
 
 _TRS = (("translation", (0, 0, 0)), ("rotation", (0, 0, 0, 1)), ("scale", (1, 1, 1)))
+_STILL: dict[str, list[float]] = {}
+
+
+def _numbers(value: Any, count: int) -> list[float]:
+    """As many numbers, or NaN where it is something else."""
+    try:
+        numbers = [float(v) for v in value]
+    except (TypeError, ValueError, OverflowError):
+        numbers = []
+    return numbers if len(numbers) == count else [math.nan] * count
 
 
 def trs(translation: Float, rotation: Float, scale: Float) -> Float:

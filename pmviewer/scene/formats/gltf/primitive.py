@@ -118,7 +118,7 @@ def _compact(faces: Faces, n_vertices: int) -> tuple[Faces, NDArray[np.int64] | 
 
 def _attributes(primitive: Json) -> Json:
     found = primitive.get("attributes")
-    return found if isinstance(found, dict) else {}
+    return {key: value for key, value in found.items() if value is not None} if isinstance(found, dict) else {}
 
 
 class _Source:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 
 from pmviewer.scene.description import Group, Instance, Shape
 from pmviewer.scene.formats.mitsuba.transform import Matrix
-from pmviewer.scene.instances import first_singular
+from pmviewer.scene.instances import LARGEST_CONDITION
 
 FEWEST_SAVED = 20_000
 """Triangles that instances must save: below that, written out, they take few megabytes."""
@@ -45,5 +46,15 @@ class SharedMeshes:
         group = self._groups[index]
         if group is None:
             return None
-        instance = Instance(name, group, matrix)
-        return instance if first_singular([instance]) is None else None
+        return Instance(name, group, matrix) if _condition(matrix) < LARGEST_CONDITION else None
+
+
+def _condition(matrix: Matrix) -> float:
+    """The product of the Frobenius norms of a transformation's linear part and of its inverse; infinite for flat ones.
+    In plain numbers: there may be a million of them, and arrays of nine take long."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix[:3, :3].tolist()
+    adjugate = (e * i - f * h, c * h - b * i, b * f - c * e)
+    rest = (f * g - d * i, a * i - c * g, c * d - a * f, d * h - e * g, b * g - a * h, a * e - b * d)
+    determinant = abs(a * adjugate[0] + d * adjugate[1] + g * adjugate[2])
+    product = math.hypot(a, b, c, d, e, f, g, h, i) * math.hypot(*adjugate, *rest)
+    return product / determinant if determinant > 0 else math.inf
