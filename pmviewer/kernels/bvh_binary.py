@@ -1,0 +1,379 @@
+"""The binary tree that the wide one is made of: binned surface-area heuristic (Wald, "On fast construction of SAH-based
+bounding volume hierarchies", 2007), large nodes split one by one, small ones on several threads at the same time.
+
+A box is eight float32 in one row of 32 bytes: lower corner, a number, the upper corner negated, a number. The union of
+two boxes is then the smaller of each of the eight; the numbers are integers in the same memory and of no account there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from pmviewer.kernels.jit import device, kernel
+from pmviewer.kernels.memory import F32, I32, aligned_empty
+from pmviewer.kernels.simd import LANES, ROW_BYTES, V8, V8I
+from pmviewer.progress import check, grown
+
+BINS = 16
+MAX_SAH_DEPTH = 40
+"""Below this depth nodes are halved by count, which bounds the depth and with it the traversal's stack."""
+
+LEAF_COST = np.float32(1.2)
+"""Of testing a block, relative to a wide node; it steers the collapse."""
+
+ALONE = 1 << 16
+"""Boxes up to which a subtree is one thread's work."""
+
+_SIDE, _OWN, _SIDES, _LOW, _SCALE, _COSTS, _SCRATCH_ROWS = np.cumsum([3 * BINS, 1, 1, 2, 1, 1, 2]).tolist()
+"""Rows of a thread's scratch memory, behind the bins of three axes."""
+
+F4 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Binary:
+    """`nodes` (k, 8) float32: boxes with (first box, count) for a leaf or (index of the first of two adjacent children,
+    0) for an inner node; node 0 is the root. Rows that belong to no node are unused. `plan` (k, 8) int8 says how to
+    collapse them, see `_plan`. `n_inner` nodes have children, `n_blocks` leaves hold triangles."""
+
+    nodes: F4
+    plan: NDArray[np.int8]
+    n_inner: int
+    n_blocks: int
+
+
+def build_binary(boxes: F4, n_triangles: int) -> Binary:
+    """The tree over boxes (n, 8), which it reorders; those from `n_triangles` on are quadrics or instances.
+
+    It is the same for any number of threads. Raises Cancelled.
+    """
+    n = len(boxes)
+    nodes = aligned_empty((2 * n + 2, 8), np.float32)
+    node_ints = nodes.view(np.int32)
+    plan, costs = np.empty((len(nodes), LANES), np.int8), np.empty((len(nodes), LANES), np.float32)
+    centers = aligned_empty((1, 8), np.float32)
+    bound(boxes, 0, n, nodes, centers)
+    node_ints[0, 3], node_ints[0, 7] = 0, n
+    inner: list[int] = []
+    counted = [0, 0]
+
+    def work(node: int, first: int, depth: int, centers: F4) -> Callable[[], tuple]:
+        """Split the node, or build all of its subtree; descendants get the rows from `first` on, two a box."""
+
+        def task() -> tuple:
+            scratch = aligned_empty((_SCRATCH_ROWS, 8), np.float32)
+            spare = aligned_empty((int(node_ints[node, 7]), 8), np.float32)
+            if node_ints[node, 7] <= ALONE:
+                used, blocks = subtree(boxes, n_triangles, nodes, node_ints, node, first, depth, centers, scratch, spare)
+                plan_range(nodes, node_ints, costs, plan, first, first + used)
+                plan_range(nodes, node_ints, costs, plan, node, node + 1)
+                return used, blocks, ()
+            sides = aligned_empty((2, 8), np.float32)
+            begin = int(node_ints[node, 3])
+            middle = divide(boxes, n_triangles, nodes, node_ints, node, first, depth, centers, sides, scratch, spare)
+            inner.append(node)
+            below = first + 2
+            left = work(first, below, depth + 1, sides[:1])
+            return 0, 0, (left, work(first + 1, below + 2 * (middle - begin) - 2, depth + 1, sides[1:]))
+
+        return task
+
+    def more(result: tuple) -> tuple:
+        counted[0] += result[0] // 2
+        counted[1] += result[1]
+        return result[2]
+
+    if n <= ALONE:
+        check()
+        more(work(0, 1, 0, centers)())
+    else:
+        grown([work(0, 1, 0, centers)], more)
+        for node in sorted(inner, reverse=True):
+            plan_range(nodes, node_ints, costs, plan, node, node + 1)
+    return Binary(nodes, plan, counted[0] + len(inner), counted[1])
+
+
+def _row(builder, address):
+    value = builder.load(builder.inttoptr(address, V8.as_pointer()))
+    value.align = ROW_BYTES
+    return value
+
+
+def _shrink(builder, address, other):
+    """Keep the smaller of what is at the address and `other`, lane by lane."""
+    old = _row(builder, address)
+    smaller = builder.select(builder.fcmp_ordered("<", other, old), other, old)
+    builder.store(smaller, builder.inttoptr(address, V8.as_pointer())).align = ROW_BYTES
+
+
+@intrinsic
+def _grow(typingctx, box, other):
+    """The box at one address grows by that at the other."""
+    signature = types.void(types.int64, types.int64)
+
+    def codegen(context, builder, sig, args):
+        _shrink(builder, args[0], _row(builder, args[1]))
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@intrinsic
+def _grow_by_center(typingctx, box, other):
+    """The box at one address grows by twice the centre of that at the other."""
+    signature = types.void(types.int64, types.int64)
+
+    def codegen(context, builder, sig, args):
+        row = _row(builder, args[1])
+        undefined = ir.Constant(V8, ir.Undefined)
+        turned = builder.shuffle_vector(row, undefined, ir.Constant(V8I, [4, 5, 6, 7, 0, 1, 2, 3]))
+        # lower - (-upper) in the first four lanes, its negative in the others
+        _shrink(builder, args[0], builder.fsub(row, turned))
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@intrinsic
+def _copy(typingctx, box, to):
+    """Copy the row at one address to the other."""
+    signature = types.void(types.int64, types.int64)
+
+    def codegen(context, builder, sig, args):
+        row = _row(builder, args[0])
+        builder.store(row, builder.inttoptr(args[1], V8.as_pointer())).align = ROW_BYTES
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@intrinsic
+def _clear(typingctx, box):
+    """The row at the address becomes a box around nothing."""
+    signature = types.void(types.int64)
+
+    def codegen(context, builder, sig, args):
+        nothing = ir.Constant(V8, [float("inf")] * LANES)
+        builder.store(nothing, builder.inttoptr(args[0], V8.as_pointer())).align = ROW_BYTES
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@device
+def _empty(address, rows):
+    for i in range(rows):
+        _clear(address + ROW_BYTES * i)
+
+
+@device
+def _half_area(box):
+    dx, dy, dz = -(box[0] + box[4]), -(box[1] + box[5]), -(box[2] + box[6])
+    return dx * dy + dy * dz + dz * dx
+
+
+@device
+def _bin(value, low, scale):
+    # Clamped in floating point: the conversion of a huge number or a NaN to an integer is anything.
+    position = (value - low) * scale
+    return np.int64(position) if position > np.float32(0) and position < np.float32(BINS) else (
+        BINS - 1 if position > np.float32(0) else 0
+    )  # fmt: skip
+
+
+@kernel
+def bound(boxes, begin, end, box, centers):
+    """Into the first rows of `box` and `centers`, the box around boxes [begin, end) and that around their centres,
+    twice as far out."""
+    at, to, around = boxes.ctypes.data, box.ctypes.data, centers.ctypes.data
+    _clear(to)
+    _clear(around)
+    for i in range(begin, end):
+        _grow(to, at + ROW_BYTES * i)
+        _grow_by_center(around, at + ROW_BYTES * i)
+
+
+@device
+def _split(boxes, begin, end, lanes, sah, centers, children, sides, scratch, spare, counts):
+    """Partition boxes [begin, end), whose centres lie in `centers`, at the cheapest border of bins; returns the middle
+    (begin < middle < end). `children` (2, 8) become the boxes around both sides, `sides` (2, 8) those of their centres.
+
+    The cost of a side is its area times the number of blocks of `lanes` primitives it fills.
+    """
+    shift = 3 if lanes == LANES else 0
+    best, best_axis, best_bin = np.float32(np.inf), -1, -1
+    low, scale, costs = scratch[_LOW], scratch[_SCALE], scratch[_COSTS : _COSTS + 2].reshape(16)
+    at, bins = boxes.ctypes.data, scratch.ctypes.data
+    if sah:
+        for k in range(3):
+            low[k] = centers[k]
+            extent = -centers[4 + k] - centers[k]
+            scale[k] = np.float32(BINS * 0.9999) / extent if extent > np.float32(0) else np.float32(0)
+        _empty(bins, 3 * BINS)
+        counts[:] = 0
+        l0, l1, l2, s0, s1, s2 = low[0], low[1], low[2], scale[0], scale[1], scale[2]
+        for i in range(begin, end):
+            b0 = _bin(boxes[i, 0] - boxes[i, 4], l0, s0)
+            b1 = BINS + _bin(boxes[i, 1] - boxes[i, 5], l1, s1)
+            b2 = 2 * BINS + _bin(boxes[i, 2] - boxes[i, 6], l2, s2)
+            counts[b0] += 1
+            counts[b1] += 1
+            counts[b2] += 1
+            row = at + ROW_BYTES * i
+            _grow(bins + ROW_BYTES * b0, row)
+            _grow(bins + ROW_BYTES * b1, row)
+            _grow(bins + ROW_BYTES * b2, row)
+        side, side_at = scratch[_SIDE], bins + ROW_BYTES * _SIDE
+        for k in range(3):
+            if scale[k] == np.float32(0):
+                continue
+            count = 0
+            _clear(side_at)
+            for b in range(BINS - 1, 0, -1):
+                _grow(side_at, bins + ROW_BYTES * (k * BINS + b))
+                count += counts[k * BINS + b]
+                full = np.float32((count + lanes - 1) >> shift)
+                costs[b] = _half_area(side) * full if count > 0 else np.float32(np.inf)
+            count = 0
+            _clear(side_at)
+            for b in range(BINS - 1):
+                _grow(side_at, bins + ROW_BYTES * (k * BINS + b))
+                count += counts[k * BINS + b]
+                if count == 0:
+                    continue
+                full = np.float32((count + lanes - 1) >> shift)
+                cost = _half_area(side) * full + costs[b + 1]
+                if cost < best:
+                    best, best_axis, best_bin = cost, k, b
+    if best_axis >= 0:
+        left = sides.ctypes.data
+        _empty(left, 2)
+        k, lk, sk = best_axis, low[best_axis], scale[best_axis]
+        border = np.float32(best_bin + 1)
+        i, j, apart = at + ROW_BYTES * begin, np.int64(0), spare.ctypes.data
+        for row in range(at + ROW_BYTES * begin, at + ROW_BYTES * end, ROW_BYTES):
+            # Without a branch, which the processor would guess wrong half the time: to both places, one of which stays.
+            box = (row - at) >> 5
+            behind = np.int64((boxes[box, k] - boxes[box, 4 + k] - lk) * sk >= border)
+            _grow_by_center(left + ROW_BYTES * behind, row)
+            _copy(row, apart + j)
+            _copy(row, i)
+            i += ROW_BYTES * (1 - behind)
+            j += ROW_BYTES * behind
+        for moved in range(0, j, ROW_BYTES):
+            _copy(apart + moved, i + moved)
+        i = (i - at) >> 5
+        if begin < i < end:
+            first = children.ctypes.data
+            _empty(first, 2)
+            for b in range(BINS):
+                _grow(first if b <= best_bin else first + 32, bins + ROW_BYTES * (k * BINS + b))
+            return i
+    middle = (begin + end) // 2
+    _halve(boxes, begin, middle, end, children, sides)
+    return middle
+
+
+@device
+def _halve(boxes, begin, middle, end, children, sides):
+    at, first, left = boxes.ctypes.data, children.ctypes.data, sides.ctypes.data
+    _empty(first, 2)
+    _empty(left, 2)
+    for i in range(begin, end):
+        side = 0 if i < middle else 32
+        _grow(first + side, at + ROW_BYTES * i)
+        _grow_by_center(left + side, at + ROW_BYTES * i)
+
+
+@device
+def _divide(boxes, n_triangles, nodes, node_ints, node, first, depth, centers, sides, scratch, spare, counts):
+    """Give an inner node its children, rows `first` and `first` + 1; returns where their boxes part."""
+    begin = np.int64(node_ints[node, 3])
+    end = begin + node_ints[node, 7]
+    children = nodes[first : first + 2]
+    if begin < n_triangles < end:
+        middle = np.int64(n_triangles)
+        _halve(boxes, begin, middle, end, children, sides)
+    else:
+        lanes = LANES if begin < n_triangles else 1
+        sah = depth < MAX_SAH_DEPTH
+        middle = _split(boxes, begin, end, lanes, sah, centers, children, sides, scratch, spare, counts)
+    node_ints[first, 3], node_ints[first, 7] = begin, middle - begin
+    node_ints[first + 1, 3], node_ints[first + 1, 7] = middle, end - middle
+    node_ints[node, 3], node_ints[node, 7] = first, 0
+    return middle
+
+
+@kernel
+def divide(boxes, n_triangles, nodes, node_ints, node, first, depth, centers, sides, scratch, spare):
+    """See `_divide`; `centers` (1, 8) and `sides` (2, 8) hold the boxes around the centres of the node's and of its
+    children's boxes."""
+    counts = np.empty(3 * BINS, np.int32)
+    return _divide(
+        boxes, n_triangles, nodes, node_ints, node, first, depth, centers[0], sides, scratch, spare, counts
+    )  # fmt: skip
+
+
+@kernel
+def subtree(boxes, n_triangles, nodes, node_ints, node, first, depth, centers, scratch, spare):
+    """All descendants of a node, in the rows from `first` on, children behind their parents; returns the numbers of
+    descendants and of blocks."""
+    counts = np.empty(3 * BINS, np.int32)
+    stack = np.empty((256, 2), np.int64)
+    waiting = np.empty((256, 8), np.float32)
+    own, sides = scratch[_OWN], scratch[_SIDES : _SIDES + 2]
+    stack[0, 0], stack[0, 1] = node, depth
+    waiting[0] = centers[0]
+    size, used, n_blocks = 1, np.int64(0), np.int64(0)
+    while size > 0:
+        size -= 1
+        index, depth = stack[size, 0], stack[size, 1]
+        begin = np.int64(node_ints[index, 3])
+        end = begin + node_ints[index, 7]
+        if end - begin <= (LANES if begin < n_triangles else 1) and not begin < n_triangles < end:
+            n_blocks += 1 if begin < n_triangles and end > begin else 0
+            continue
+        own[:] = waiting[size]
+        _divide(boxes, n_triangles, nodes, node_ints, index, first + used, depth, own, sides, scratch, spare, counts)
+        for child in range(2):
+            stack[size, 0], stack[size, 1] = first + used + child, depth + 1
+            waiting[size] = sides[child]
+            size += 1
+        used += 2
+    return used, n_blocks
+
+
+@kernel
+def plan_range(binary, binary_ints, costs, plan, first, end):
+    """For the nodes [first, end), last to first: which descendants of each become children of a wide node, at least
+    expected cost (Ylitie, Karras and Laine 2017, section 3.3).
+
+    costs[c, k - 1] is the cost of the subtree c as at most k children of a wide node above it, plan[c, k - 1] how many
+    of the k its left half gets; 0: c stays whole, as one child. plan[c, 0] is the left half's share of the eight when c
+    is a wide node itself.
+    """
+    for c in range(end - 1, first - 1, -1):
+        area = _half_area(binary[c])
+        if binary_ints[c, 7] > 0:
+            costs[c], plan[c] = area * LEAF_COST, 0
+            continue
+        left = np.int64(binary_ints[c, 3])
+        for k in range(LANES, 0, -1):
+            wanted = k if k > 1 else LANES
+            best, share = np.float32(np.inf), 1
+            for i in range(1, wanted):
+                cost = costs[left, i - 1] + costs[left + 1, wanted - i - 1]
+                if cost < best:
+                    best, share = cost, i
+            costs[c, k - 1], plan[c, k - 1] = best, share
+        costs[c, 0] += area
+        for k in range(1, LANES):
+            if costs[c, 0] <= costs[c, k]:
+                costs[c, k], plan[c, k] = costs[c, 0], 0
