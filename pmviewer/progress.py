@@ -1,7 +1,7 @@
 """What long work says while it goes on, and how it learns that nobody wants it any more.
 
-Whoever starts the work listens (`watched`); the work itself, however deep down, calls `stage` and `check`, and `parallel`
-for what runs on several threads. Nobody needs to listen.
+Whoever starts the work listens (`watched`); the work itself, however deep down, calls `stage` and `check`, and
+`parallel` for what runs on several threads. Nobody needs to listen.
 """
 
 from __future__ import annotations

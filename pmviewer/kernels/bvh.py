@@ -104,7 +104,7 @@ def build(triangles: F4, quadrics: F4, boxed: tuple[F4, F4] | None = None) -> Bv
     boxes.view(np.int32)[n_kept:, 3] = kept
 
     binary = build_binary(boxes, n_kept)
-    nodes = aligned_empty((binary.n_inner + 1, NODE_ROWS, LANES), np.float32)
+    nodes = aligned_empty((len(binary.nodes) // 2 + 1, NODE_ROWS, LANES), np.float32)
     # An unused lane refers to block 0, which therefore always exists.
     blocks = aligned_empty((max(binary.n_blocks, 1), BLOCK_ROWS, LANES), np.float32)
     blocks[0] = 0.0

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from llvmlite import ir
@@ -17,7 +18,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from pmviewer.kernels.jit import device, kernel
-from pmviewer.kernels.memory import F32, I32, aligned_empty
+from pmviewer.kernels.memory import aligned_empty
 from pmviewer.kernels.simd import LANES, ROW_BYTES, V8, V8I
 from pmviewer.progress import check, grown
 
@@ -40,13 +41,27 @@ F4 = NDArray[np.float32]
 @dataclass(frozen=True)
 class Binary:
     """`nodes` (k, 8) float32: boxes with (first box, count) for a leaf or (index of the first of two adjacent children,
-    0) for an inner node; node 0 is the root. Rows that belong to no node are unused. `plan` (k, 8) int8 says how to
-    collapse them, see `_plan`. `n_inner` nodes have children, `n_blocks` leaves hold triangles."""
+    0) for an inner node; node 0 is the root. `plan` (k, 8) int8 says how to collapse them, see `plan_range`. `n_blocks`
+    leaves hold triangles."""
 
     nodes: F4
     plan: NDArray[np.int8]
-    n_inner: int
     n_blocks: int
+
+
+@dataclass
+class _Part:
+    """A node and what is below it: two more parts, or a whole subtree (its nodes, itself the first, their plan and its
+    own costs). `box` (1, 8) has (first box, count) as a leaf would."""
+
+    box: F4
+    centers: F4
+    depth: int
+    children: tuple[_Part, ...] = ()
+    nodes: F4 | None = None
+    plan: NDArray[np.int8] | None = None
+    costs: F4 | None = None
+    n_blocks: int = 0
 
 
 def build_binary(boxes: F4, n_triangles: int) -> Binary:
@@ -54,50 +69,68 @@ def build_binary(boxes: F4, n_triangles: int) -> Binary:
 
     It is the same for any number of threads. Raises Cancelled.
     """
-    n = len(boxes)
-    nodes = aligned_empty((2 * n + 2, 8), np.float32)
-    node_ints = nodes.view(np.int32)
-    plan, costs = np.empty((len(nodes), LANES), np.int8), np.empty((len(nodes), LANES), np.float32)
-    centers = aligned_empty((1, 8), np.float32)
-    bound(boxes, 0, n, nodes, centers)
-    node_ints[0, 3], node_ints[0, 7] = 0, n
-    inner: list[int] = []
-    counted = [0, 0]
+    root = _Part(aligned_empty((1, 8), np.float32), aligned_empty((1, 8), np.float32), 0)
+    bound(boxes, 0, len(boxes), root.box, root.centers)
+    root.box.view(np.int32)[0, [3, 7]] = 0, len(boxes)
 
-    def work(node: int, first: int, depth: int, centers: F4) -> Callable[[], tuple]:
-        """Split the node, or build all of its subtree; descendants get the rows from `first` on, two a box."""
+    def task(part: _Part) -> Callable[[], _Part]:
+        return partial(_advance, boxes, n_triangles, part)
 
-        def task() -> tuple:
-            scratch = aligned_empty((_SCRATCH_ROWS, 8), np.float32)
-            spare = aligned_empty((int(node_ints[node, 7]), 8), np.float32)
-            if node_ints[node, 7] <= ALONE:
-                used, blocks = subtree(boxes, n_triangles, nodes, node_ints, node, first, depth, centers, scratch, spare)
-                plan_range(nodes, node_ints, costs, plan, first, first + used)
-                plan_range(nodes, node_ints, costs, plan, node, node + 1)
-                return used, blocks, ()
-            sides = aligned_empty((2, 8), np.float32)
-            begin = int(node_ints[node, 3])
-            middle = divide(boxes, n_triangles, nodes, node_ints, node, first, depth, centers, sides, scratch, spare)
-            inner.append(node)
-            below = first + 2
-            left = work(first, below, depth + 1, sides[:1])
-            return 0, 0, (left, work(first + 1, below + 2 * (middle - begin) - 2, depth + 1, sides[1:]))
-
-        return task
-
-    def more(result: tuple) -> tuple:
-        counted[0] += result[0] // 2
-        counted[1] += result[1]
-        return result[2]
-
-    if n <= ALONE:
+    if len(boxes) <= ALONE:
         check()
-        more(work(0, 1, 0, centers)())
+        _advance(boxes, n_triangles, root)
     else:
-        grown([work(0, 1, 0, centers)], more)
-        for node in sorted(inner, reverse=True):
-            plan_range(nodes, node_ints, costs, plan, node, node + 1)
-    return Binary(nodes, plan, counted[0] + len(inner), counted[1])
+        grown([task(root)], lambda part: [task(child) for child in part.children])
+    return _joined(root)
+
+
+def _advance(boxes: F4, n_triangles: int, part: _Part) -> _Part:
+    """Split the part in two, or build all of it."""
+    count = int(part.box.view(np.int32)[0, 7])
+    scratch = aligned_empty((_SCRATCH_ROWS, 8), np.float32)
+    spare = aligned_empty((max(count, 1), 8), np.float32)
+    if count > ALONE:
+        nodes, sides = aligned_empty((3, 8), np.float32), aligned_empty((2, 8), np.float32)
+        nodes[0] = part.box[0]
+        divide(boxes, n_triangles, nodes, nodes.view(np.int32), part.depth, part.centers, sides, scratch, spare)
+        part.children = tuple(_Part(nodes[i + 1 : i + 2], sides[i : i + 1], part.depth + 1) for i in range(2))
+        return part
+    nodes = aligned_empty((2 * count + 2, 8), np.float32)
+    nodes[0] = part.box[0]
+    ints = nodes.view(np.int32)
+    used, part.n_blocks = subtree(boxes, n_triangles, nodes, ints, part.depth, part.centers, scratch, spare)
+    plan, costs = np.empty((used, LANES), np.int8), np.zeros((used + 2, LANES), np.float32)
+    plan_range(nodes, ints, costs, plan, 0, used)
+    part.nodes, part.plan, part.costs = nodes[:used].copy(), plan, costs[:1].copy()
+    return part
+
+
+def _joined(root: _Part) -> Binary:
+    """The parts as one tree, whose collapse is planned above them too."""
+    upper = [root]
+    for part in upper:
+        upper += part.children
+    place = {id(part): i for i, part in enumerate(upper)}
+    size = len(upper) + sum(len(part.nodes) - 1 for part in upper if part.nodes is not None)
+    nodes, plan = aligned_empty((size, 8), np.float32), np.empty((size, LANES), np.int8)
+    ints, costs = nodes.view(np.int32), np.empty((len(upper), LANES), np.float32)
+    end = len(upper)
+    for i, part in enumerate(upper):
+        if part.nodes is None or part.plan is None or part.costs is None:
+            nodes[i] = part.box[0]
+            ints[i, 3], ints[i, 7] = place[id(part.children[0])], 0
+            continue
+        below = slice(end, end + len(part.nodes) - 1)
+        nodes[i], nodes[below], plan[i], plan[below] = part.nodes[0], part.nodes[1:], part.plan[0], part.plan[1:]
+        costs[i] = part.costs[0]
+        for rows in (slice(i, i + 1), below):
+            ints[rows, 3] += np.where(ints[rows, 7] == 0, np.int32(end - 1), np.int32(0))
+        end = below.stop
+        part.nodes = None
+    for i in reversed(range(len(upper))):
+        if upper[i].children:
+            plan_range(nodes, ints, costs, plan, i, i + 1)
+    return Binary(nodes, plan, sum(part.n_blocks for part in upper))
 
 
 def _row(builder, address):
@@ -312,26 +345,24 @@ def _divide(boxes, n_triangles, nodes, node_ints, node, first, depth, centers, s
 
 
 @kernel
-def divide(boxes, n_triangles, nodes, node_ints, node, first, depth, centers, sides, scratch, spare):
-    """See `_divide`; `centers` (1, 8) and `sides` (2, 8) hold the boxes around the centres of the node's and of its
-    children's boxes."""
+def divide(boxes, n_triangles, nodes, node_ints, depth, centers, sides, scratch, spare):
+    """Give node 0 of nodes (3, 8) the children 1 and 2, with their boxes as leaves would have them; `centers` (1, 8)
+    and `sides` (2, 8) hold the boxes around the centres of its and of their boxes."""
     counts = np.empty(3 * BINS, np.int32)
-    return _divide(
-        boxes, n_triangles, nodes, node_ints, node, first, depth, centers[0], sides, scratch, spare, counts
-    )  # fmt: skip
+    _divide(boxes, n_triangles, nodes, node_ints, 0, 1, depth, centers[0], sides, scratch, spare, counts)
 
 
 @kernel
-def subtree(boxes, n_triangles, nodes, node_ints, node, first, depth, centers, scratch, spare):
-    """All descendants of a node, in the rows from `first` on, children behind their parents; returns the numbers of
-    descendants and of blocks."""
+def subtree(boxes, n_triangles, nodes, node_ints, depth, centers, scratch, spare):
+    """All descendants of node 0, behind it in `nodes`, children behind their parents; returns the numbers of nodes and
+    of blocks."""
     counts = np.empty(3 * BINS, np.int32)
     stack = np.empty((256, 2), np.int64)
     waiting = np.empty((256, 8), np.float32)
     own, sides = scratch[_OWN], scratch[_SIDES : _SIDES + 2]
-    stack[0, 0], stack[0, 1] = node, depth
+    stack[0, 0], stack[0, 1] = 0, depth
     waiting[0] = centers[0]
-    size, used, n_blocks = 1, np.int64(0), np.int64(0)
+    size, used, n_blocks = 1, np.int64(1), np.int64(0)
     while size > 0:
         size -= 1
         index, depth = stack[size, 0], stack[size, 1]
@@ -341,9 +372,9 @@ def subtree(boxes, n_triangles, nodes, node_ints, node, first, depth, centers, s
             n_blocks += 1 if begin < n_triangles and end > begin else 0
             continue
         own[:] = waiting[size]
-        _divide(boxes, n_triangles, nodes, node_ints, index, first + used, depth, own, sides, scratch, spare, counts)
+        _divide(boxes, n_triangles, nodes, node_ints, index, used, depth, own, sides, scratch, spare, counts)
         for child in range(2):
-            stack[size, 0], stack[size, 1] = first + used + child, depth + 1
+            stack[size, 0], stack[size, 1] = used + child, depth + 1
             waiting[size] = sides[child]
             size += 1
         used += 2

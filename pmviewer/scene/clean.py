@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
+from pmviewer.kernels.mesh import FLAT, NOT_FINITE, WHOLE, judge, number_used
+from pmviewer.progress import parallel
 from pmviewer.scene.description import (
     Camera,
     Cylinder,
@@ -34,6 +37,8 @@ LARGEST_COORDINATE = 1e15
 _FLATTEST = 1e-9
 """A triangle's height over its longest edge below which it has no normal."""
 _ON_SURFACE = 1e-6
+_AT_ONCE = 1 << 18
+"""Triangles that one thread looks at at a time."""
 
 
 def check_faces(mesh: Mesh, path: Path | None) -> None:
@@ -121,27 +126,47 @@ def clean_mesh(mesh: Mesh, dropped: Counter[str]) -> Mesh | None:
     Triangles are judged as float32 sees them, since that is how they are traced. Broken vertex normals are replaced by
     those of the neighbouring faces; colours are cut to 0 … 1.
     """
-    with np.errstate(invalid="ignore"):
-        usable = np.all(np.abs(mesh.vertices) <= LARGEST_COORDINATE, axis=1)
-    whole = np.all(usable[mesh.faces], axis=1)
-    dropped["triangle with a NaN, infinite or huge vertex"] += int((~whole).sum())
-    faces = mesh.faces[whole]
-    vertices = np.where(usable[:, None], mesh.vertices, 0.0)
-    degenerate = _flat(vertices.astype(np.float32).astype(np.float64)[faces])
-    dropped["degenerate triangle"] += int(degenerate.sum())
-    faces = faces[~degenerate]
-    for reason in ("triangle with a NaN, infinite or huge vertex", "degenerate triangle"):
-        if not dropped[reason]:
-            del dropped[reason]
+    vertices, faces = np.ascontiguousarray(mesh.vertices, np.float64), np.ascontiguousarray(mesh.faces, np.int32)
+    verdict = np.empty(len(faces), np.uint8)
+    starts = range(0, len(faces), _AT_ONCE)
+    sizes = LARGEST_COORDINATE, _FLATTEST
+    ends = [min(start + _AT_ONCE, len(faces)) for start in starts]
+    bad = parallel([partial(judge, vertices, faces, i, j, *sizes, verdict) for i, j in zip(starts, ends)])
+    if sum(bad):
+        for reason, number in (
+            ("triangle with a NaN, infinite or huge vertex", NOT_FINITE),
+            ("degenerate triangle", FLAT),
+        ):
+            count = int((verdict == number).sum())
+            if count:
+                dropped[reason] += count
+        faces = faces[verdict == WHOLE]
     if not len(faces):
         return None
-    used, index = np.unique(faces, return_inverse=True)
+    number = np.empty(len(vertices), np.int32)
+    n_used = number_used(faces, number)
+    if n_used == len(vertices):
+        normals = None if mesh.normals is None else _mended(Mesh(vertices, faces, mesh.normals))
+        return Mesh(vertices, faces, normals, _finite(mesh.uv), _colours(mesh.colours))
+    used = np.flatnonzero(number >= 0)
     normals = mesh.normals
     if normals is not None:
-        normals = _mended(Mesh(vertices, faces, normals))[used]
-    uv = None if mesh.uv is None else np.nan_to_num(mesh.uv[used], posinf=0.0, neginf=0.0)
-    colours = None if mesh.colours is None else np.clip(np.nan_to_num(mesh.colours[used], posinf=0.0), 0.0, 1.0)
-    return Mesh(np.ascontiguousarray(vertices[used]), index.reshape(-1, 3).astype(np.int32), normals, uv, colours)
+        whole = np.where(np.isfinite(vertices), vertices, 0.0)
+        normals = _mended(Mesh(whole, faces, normals))[used]
+    uv = None if mesh.uv is None else _finite(mesh.uv[used])
+    colours = None if mesh.colours is None else _colours(mesh.colours[used])
+    return Mesh(vertices[used], number[faces], normals, uv, colours)
+
+
+def _finite(uv: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+    return uv if uv is None or np.isfinite(uv).all() else np.nan_to_num(uv, posinf=0.0, neginf=0.0)
+
+
+def _colours(colours: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+    """Finite colours between 0 and 1: they multiply what a surface reflects."""
+    if colours is None or (np.isfinite(colours).all() and 0 <= colours.min(initial=0.0) <= colours.max(initial=0.0) <= 1):
+        return colours
+    return np.clip(np.nan_to_num(colours, posinf=0.0, neginf=0.0), 0.0, 1.0)
 
 
 def _flat(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -157,8 +182,9 @@ def _mended(mesh: Mesh) -> NDArray[np.float64]:
     from pmviewer.scene.primitives import unit, with_smooth_normals
 
     assert mesh.normals is not None
-    normals = unit(np.where(np.isfinite(mesh.normals), mesh.normals, 0.0))
-    broken = np.logical_not(np.all(np.isfinite(mesh.normals), axis=1) & np.any(normals, axis=1))
+    finite = np.isfinite(mesh.normals)
+    normals = unit(mesh.normals if finite.all() else np.where(finite, mesh.normals, 0.0))
+    broken = np.logical_not(finite.all(axis=1) & np.any(normals, axis=1))
     if broken.any():
         smooth = with_smooth_normals(Mesh(mesh.vertices, mesh.faces)).normals
         assert smooth is not None

@@ -14,6 +14,7 @@ from pmviewer.errors import SceneError
 from pmviewer.kernels import scene as K
 from pmviewer.kernels.bvh import Bvh, build
 from pmviewer.scene.covered_emission import with_covered_emission
+from pmviewer.kernels.mesh import face_normals
 from pmviewer.scene.description import (
     LUMINANCE,
     Cylinder,
@@ -28,6 +29,7 @@ from pmviewer.scene.flatten_textures import TextureTable, coordinates, corner_co
 from pmviewer.scene.instances import build_instanced, instance_bounds, normalised
 from pmviewer.scene.light_table import LightTable, axis_of, side_of
 from pmviewer.scene.material_row import is_rich, material_table, used_materials, with_parts
+from pmviewer.scene.mesh_bounds import mesh_bounds
 from pmviewer.scene.textured_emission import textured_lights
 
 Float = NDArray[np.float32]
@@ -91,8 +93,7 @@ def bounding_sphere(scene: Scene) -> tuple[NDArray[np.float64], float]:
 def _bounds(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     g = shape.geometry
     if isinstance(g, Mesh):
-        used = g.vertices[np.unique(g.faces)]
-        return used.min(axis=0), used.max(axis=0)
+        return mesh_bounds(g)
     if isinstance(g, Parallelogram):
         corners = np.array(g.corner) + np.array(
             [[0, 0, 0], g.edge_u, g.edge_v, np.add(g.edge_u, g.edge_v)], dtype=float
@@ -117,20 +118,20 @@ def flatten(scene: Scene) -> FlatScene:
     round_shapes = [i for i, s in enumerate(shapes) if not _is_triangles(s)]
     if not shapes:
         raise SceneError("The scene has no surface.", scene.path, hint="Add at least one shape.")
-    vertices = np.concatenate([m.vertices[m.faces] for _, m in meshes] or [np.zeros((0, 3, 3))]).astype(np.float32)
-    smooth = any(m.normals is not None for _, m in meshes)
-    normals = np.concatenate([_corner_normals(m) for _, m in meshes]).astype(np.float32) if smooth else None
-    quadrics = np.array([_quadric_row(shapes[i]) for i in round_shapes], np.float32).reshape(-1, 12)
     counts = [len(m.faces) for _, m in meshes]
-    shape_of_prim = np.concatenate([np.repeat([i for i, _ in meshes], counts), round_shapes]).astype(np.int64)
+    vertices = _corners([m for _, m in meshes], sum(counts))
+    quadrics = np.array([_quadric_row(shapes[i]) for i in round_shapes], np.float32).reshape(-1, 12)
+    shape_of_prim = np.repeat(
+        np.array([i for i, _ in meshes] + round_shapes, np.int32), counts + [1] * len(round_shapes)
+    )
     materials, rich = material_table(scene), is_rich(scene)
-    prim_material = np.array([shapes[i].material for i in shape_of_prim], np.int32)
+    prim_material = np.array([s.material for s in shapes], np.int32)[shape_of_prim]
 
     center, radius = bounding_sphere(scene)
     lit, emissions = textured_lights(with_covered_emission(scene))
     lights = LightTable(lit, vertices, shape_of_prim, radius)
     of_shape = np.concatenate([lights.of_shape, np.full(len(shapes) - len(scene.shapes), -1)])
-    prim_light = of_shape[shape_of_prim].astype(np.int32)
+    prim_light = of_shape.astype(np.int32)[shape_of_prim]
     textured = bool(emissions) or (rich and needs_tangents(scene))
     used = used_materials(scene)
     coloured, passable = any(m.vertex_colours for m in with_parts(used)), any(m.passable for m in used)
@@ -151,6 +152,8 @@ def flatten(scene: Scene) -> FlatScene:
     else:
         bvh, shown = build(vertices, quadrics), None
         bvh.store(r)
+    del shape_of_prim
+    normals = _corner_normals([m for _, m in meshes], len(vertices))
     arrays: dict[str, NDArray] = {
         "vertices": vertices,
         "prim_material": prim_material,
@@ -218,14 +221,33 @@ def _triangulate(geometry: object) -> Mesh:
     return Mesh(np.array([corner, corner + u, corner + u + v, corner + v]), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
 
 
-def _corner_normals(mesh: Mesh) -> NDArray[np.float64]:
-    """(F, 3, 3) normals at the triangles' corners; flat meshes repeat the face's."""
-    if mesh.normals is not None:
-        return mesh.normals[mesh.faces]
-    corners = mesh.vertices[mesh.faces]
-    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-300)
-    return np.repeat(face[:, None], 3, axis=1)
+def _corners(meshes: list[Mesh], n: int) -> Float:
+    """(n, 3, 3) vertices at the corners of all triangles."""
+    out, start = np.empty((n, 3, 3), np.float32), 0
+    for m in meshes:
+        _take(m.vertices, m.faces, out[start : start + len(m.faces)])
+        start += len(m.faces)
+    return out
+
+
+def _corner_normals(meshes: list[Mesh], n: int) -> Float | None:
+    """(n, 3, 3) normals at the triangles' corners; flat meshes repeat the face's. None if all are flat."""
+    if all(m.normals is None for m in meshes):
+        return None
+    out, start = np.empty((n, 3, 3), np.float32), 0
+    for m in meshes:
+        rows = out[start : start + len(m.faces)]
+        if m.normals is not None:
+            _take(m.normals, m.faces, rows)
+        else:
+            face_normals(np.ascontiguousarray(m.vertices), m.faces, rows)
+        start += len(m.faces)
+    return out
+
+
+def _take(values: NDArray[np.float64], faces: NDArray[np.int32], out: Float) -> None:
+    """out (F, 3, 3) = values (V, 3) at the corners of the faces."""
+    np.take(values.astype(np.float32), faces, axis=0, out=out, mode="clip")  # checked before; "raise" would copy
 
 
 def _quadric_row(shape: Shape) -> list[float]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.scene.description import Camera, Cylinder, Geometry, Mesh, Parallelogram, Shape
+from pmviewer.scene.mesh_bounds import mesh_bounds
 
 Float = NDArray[np.float64]
 FOV = 40.0
@@ -27,8 +28,7 @@ def bounds(shapes: Sequence[Shape]) -> tuple[Float, Float]:
 
 def _bounds(g: Geometry) -> tuple[Float, Float]:
     if isinstance(g, Mesh):
-        used = g.vertices[g.faces.reshape(-1)]
-        return used.min(axis=0), used.max(axis=0)
+        return mesh_bounds(g)
     if isinstance(g, Parallelogram):
         c, u, v = np.array(g.corner), np.array(g.edge_u), np.array(g.edge_v)
         corners = np.stack([c, c + u, c + v, c + u + v])

@@ -39,7 +39,7 @@ class LightTable:
     `more` tells whether there are lights of the kinds that need LIGHT_FIELDS, `sky` is the image environment.
     """
 
-    def __init__(self, scene: Scene, vertices: Float, shape_of_prim: NDArray[np.int64], radius: float) -> None:
+    def __init__(self, scene: Scene, vertices: Float, shape_of_prim: NDArray[np.integer], radius: float) -> None:
         self.of_shape = np.full(len(scene.shapes), -1, np.int64)
         self.environment = -1
         rows: list[list[float]] = []
@@ -48,13 +48,14 @@ class LightTable:
         triangles: list[NDArray[np.int64]] = [np.zeros(0, np.int64)]
         cdfs: list[NDArray[np.float64]] = [np.zeros(0)]
         listed = 0
+        shape_of_triangle = shape_of_prim[: len(vertices)]  # in ascending order
         for index, shape in enumerate(scene.shapes):
             if shape.radiance is None or not any(c > 0 for c in shape.radiance):
                 continue
             row = [0.0] * K.LIGHT_COLUMNS
             row[K.L_RADIANCE : K.L_RADIANCE + 3] = shape.radiance
             if isinstance(shape.geometry, Mesh):
-                own = np.flatnonzero(shape_of_prim == index)
+                own = np.arange(*np.searchsorted(shape_of_triangle, (index, index + 1)))
                 corners = vertices[own].astype(float)
                 cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
                 areas = np.linalg.norm(cross, axis=1) / 2
