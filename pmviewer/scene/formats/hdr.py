@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
+from pmviewer.scene.formats.open_file import read_regular
 
 MOST_PIXELS = 1 << 27
 _SIZE = re.compile(rb"-Y (\d{1,6}) \+X (\d{1,6})")
@@ -18,10 +19,11 @@ _HINT = "Save it again, best as OpenEXR."
 
 def read_hdr(path: Path) -> NDArray[np.float32]:
     """Linear RGB (h, w, 3) of a .hdr file, rows from top to bottom. Raises SceneError."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise SceneError(f"It can't be read: {error.strerror}.", path) from None
+    return decode_hdr(read_regular(path, "It"), path)
+
+
+def decode_hdr(data: bytes, path: Path | None = None) -> NDArray[np.float32]:
+    """The same for a file's content; `path` is for error messages alone."""
     if not data.startswith((b"#?RADIANCE", b"#?RGBE")):
         raise SceneError("This is not a Radiance HDR picture.", path, hint="Is its ending right?")
     header, blank, rest = data.partition(b"\n\n")
@@ -39,7 +41,7 @@ def read_hdr(path: Path) -> NDArray[np.float32]:
     return np.asarray(coded[:, :, :3] * scale[:, :, None], np.float32)
 
 
-def _decoded(data: bytes, height: int, width: int, path: Path) -> NDArray[np.uint8]:
+def _decoded(data: bytes, height: int, width: int, path: Path | None) -> NDArray[np.uint8]:
     """RGBE (h, w, 4), run-length coded by channel or not at all."""
     cut_off = SceneError("The picture is cut off or damaged.", path, hint="Copy it again.")
     new_style = width in _RUN_LENGTH_WIDTHS and data[:2] == b"\x02\x02" and len(data) > 3 and data[2] < 128

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import Literal, TypeVar
 
@@ -22,11 +21,16 @@ from pmviewer.scene.description import (
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.gltf.load import read_gltf
 from pmviewer.scene.formats.meshfile import DEFAULT_MATERIAL, MeshFile
-from pmviewer.scene.formats.obj import as_utf8, joined, obj_parts, read_obj
-from pmviewer.scene.formats.ply import read_ply
+from pmviewer.scene.formats.obj import read_obj
+from pmviewer.scene.formats.obj import read_single as read_whole_obj
+from pmviewer.scene.formats.open_file import found_beside
+from pmviewer.scene.formats.ply import read_ply_file
+from pmviewer.scene.formats.stl import read_stl
+from pmviewer.scene.formats.texture_file import read_picture
 from pmviewer.scene.framing import framed
 from pmviewer.scene.instances import clean_instances, joint_bounds
 from pmviewer.scene.studio import studio_of
+from pmviewer.scene.texture import Bitmap
 
 T = TypeVar("T")
 SIDE = 512
@@ -82,10 +86,7 @@ def load_mesh_scene(path: Path, choices: Mapping[str, str] | None = None) -> Sce
 
 def read_single(path: Path) -> Mesh:
     """All of an OBJ file as one mesh, without materials. Raises SceneError."""
-    parts = _guarded(lambda: obj_parts(path, skip_materials=True), path)
-    if not parts:
-        raise SceneError("The OBJ file has no faces.", path, hint="Is it an OBJ file? Export it with triangles.")
-    return joined([mesh for _, mesh, _ in parts])
+    return _guarded(lambda: read_whole_obj(path), path)
 
 
 def _guarded(read: Callable[[], T], path: Path) -> T:
@@ -110,25 +111,33 @@ def _read(path: Path, ending: str, diagnostics: Diagnostics, choices: Mapping[st
         return read_gltf(path, diagnostics, choices)
     if ending == ".obj":
         return read_obj(path, diagnostics)
-    meshes = [read_ply(path)] if ending == ".ply" else _stl_meshes(path)
-    return MeshFile([Shape(path.stem, mesh, 0) for mesh in meshes], [DEFAULT_MATERIAL])
+    if ending == ".stl":
+        solids = read_stl(path, diagnostics)
+        return MeshFile([Shape(name, mesh, 0) for name, mesh in solids], [DEFAULT_MATERIAL])
+    return _ply_scene(path, diagnostics)
 
 
-def _stl_meshes(path: Path) -> list[Mesh]:
-    """All solids of an STL file, flat-shaded as the format is."""
-    from trimesh.exchange.stl import load_stl
-
-    data = path.read_bytes()
-    is_binary = len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
-    if not is_binary and data.lstrip()[:5].lower() != b"solid":
-        hint = "Is the file complete? Export it again."
-        raise SceneError("This is neither a binary nor a text STL file.", path, hint=hint)
-    loaded = load_stl(BytesIO(data if is_binary else as_utf8(data)))
-    solids = loaded["geometry"].values() if "geometry" in loaded else [loaded]
-    return [
-        Mesh(np.asarray(s["vertices"], np.float64), np.asarray(s["faces"]).reshape(-1, 3).astype(np.int32))
-        for s in solids
-    ]
+def _ply_scene(path: Path, diagnostics: Diagnostics) -> MeshFile:
+    """The mesh of a PLY file with its colours, and the picture that scanning programs name in a comment."""
+    ply = read_ply_file(path)
+    for note in ply.notes:
+        diagnostics.warn(note)
+    material = replace(DEFAULT_MATERIAL, vertex_colours=ply.mesh.colours is not None)
+    if material.vertex_colours:
+        material = replace(material, reflectance=(1.0, 1.0, 1.0))
+    if ply.picture and ply.mesh.uv is not None:
+        picture = found_beside(path.parent, ply.picture)
+        try:
+            pixels, sentence = read_picture(picture, picture.name, raw=False)
+        except SceneError as error:
+            diagnostics.warn(f"{error.what} The surface is shown without it.")
+        else:
+            if sentence:
+                diagnostics.warn(sentence)
+            # Such files count v from a picture's lower edge.
+            texture = Bitmap(pixels, to_uv=(1.0, 0.0, 0.0, 0.0, -1.0, 1.0), name=picture.name)
+            material = replace(material, reflectance=texture.mean, textures={"reflectance": texture})
+    return MeshFile([Shape(path.stem, ply.mesh, 0)], [material])
 
 
 def _aimed(camera: Camera, box: tuple[np.ndarray, np.ndarray]) -> Camera:

@@ -32,8 +32,11 @@ class MeshFile:
     camera: Camera | None = None
     aspect: float = 1.0
 
+    _numbers: dict[Material, int] = field(default_factory=dict, repr=False)
+
     def material(self, material: Material) -> int:
-        """Index of the material, added if it is new."""
-        if material not in self.materials:
+        """Index of the material, added if it is new. In constant time, for files have thousands."""
+        if material not in self._numbers:
+            self._numbers[material] = len(self.materials)
             self.materials.append(material)
-        return self.materials.index(material)
+        return self._numbers[material]

@@ -1,170 +1,280 @@
-"""Wavefront OBJ with its MTL materials; trimesh decodes the geometry."""
+"""Wavefront OBJ: triangles by material. What its statements say is read in `obj_text`, its materials in `mtl`."""
 
 from __future__ import annotations
 
-import re
-from dataclasses import replace
-from io import BytesIO
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.scene.description import RGB, Material, Mesh, Shape
+from pmviewer.kernels.corners import add_normals, compact, merge
+from pmviewer.kernels.polygons import count_triangles, triangulate
+from pmviewer.progress import stage
+from pmviewer.scene.description import Mesh, Shape
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.meshfile import DEFAULT_MATERIAL, MeshFile
-from pmviewer.scene.formats.mtl_maps import load_maps, read_maps
-from pmviewer.scene.primitives import fans
-from pmviewer.scene.texture import Bitmap, Texture, limited, scaled
+from pmviewer.scene.formats.mtl import MtlMaterial, read_libraries
+from pmviewer.scene.formats.obj_text import MISSING, ObjText, read_text
+from pmviewer.scene.formats.open_file import read_regular
+from pmviewer.scene.formats.texture_file import linear
+from pmviewer.scene.primitives import unit
 
-_TEXTURES, _BUMP_SCALE = " textures", " bump scale"
-"""Beside the file's own keys, which have no spaces."""
-_MIRROR_MODELS, _GLASS_MODELS = (3, 5, 8), (4, 6, 7, 9)
-
-
-def obj_parts(path: Path, skip_materials: bool) -> list[tuple[str, Mesh, str | None]]:
-    """Name, mesh and material name of every part of the file."""
-    from trimesh.exchange.obj import load_obj
-    from trimesh.resolvers import FilePathResolver
-
-    resolver = FilePathResolver(str(path))
-    loaded = load_obj(BytesIO(as_utf8(path.read_bytes())), resolver=resolver, skip_materials=skip_materials)
-    parts = []
-    for name, kwargs in loaded.get("geometry", {}).items():
-        vertices = np.asarray(kwargs["vertices"], np.float64)
-        if vertices.shape[1:] != (3,):
-            raise SceneError("The OBJ file's vertices do not have three coordinates each.", path)
-        faces = fans(np.asarray(kwargs["faces"])).astype(np.int32)  # quads come as quads
-        normals = kwargs.get("vertex_normals")
-        visual = kwargs.get("visual")
-        uv = getattr(visual, "uv", None)
-        if uv is not None and np.shape(uv)[:1] == vertices.shape[:1] and np.shape(uv)[1] >= 2:
-            # The format counts v from a picture's lower edge.
-            uv = np.asarray(uv, np.float64)[:, :2] * [1, -1] + [0, 1]
-        else:
-            uv = None
-        mesh = Mesh(vertices, faces, None if normals is None else np.asarray(normals, np.float64), uv)
-        parts.append((str(name), mesh, str(visual.material.name) if visual is not None else None))
-    return parts
+Ints = NDArray[np.int32]
+Float = NDArray[np.float64]
+_OWN = -(1 << 30)
+"""Numbers of normals below it stand for those of single triangles, −2 − s for those of the smoothing group s."""
+_CURVES = frozenset(("curv", "curv2", "surf", "vp", "cstype", "con", "bsp", "bzp", "cdc", "cdp", "res"))
 
 
-def as_utf8(data: bytes) -> bytes:
-    """Text of an older encoding as UTF-8, which is all that trimesh reads without a further package."""
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError:
-        return data.decode("latin-1").encode("utf-8")
-    return data
+@dataclass
+class _Sections:
+    """What holds from a face on: `first` (k,) the faces, and for each the material's and the group's name and the
+    smoothing group (0: none)."""
 
-
-def joined(meshes: list[Mesh]) -> Mesh:
-    """All parts as one mesh; normals and texture coordinates survive only if every part has them."""
-    offsets = np.cumsum([0] + [len(m.vertices) for m in meshes[:-1]])
-    vertices = np.concatenate([m.vertices for m in meshes])
-    faces = np.concatenate([m.faces + o for m, o in zip(meshes, offsets)]).astype(np.int32)
-    normals = [m.normals for m in meshes if m.normals is not None]
-    uvs = [m.uv for m in meshes if m.uv is not None]
-    return Mesh(
-        vertices,
-        faces,
-        np.concatenate(normals) if len(normals) == len(meshes) else None,
-        np.concatenate(uvs) if len(uvs) == len(meshes) else None,
-    )
+    first: list[int]
+    material: list[str | None]
+    group: list[str]
+    smoothing: list[int]
+    libraries: list[tuple[str, int]]
 
 
 def read_obj(path: Path, diagnostics: Diagnostics) -> MeshFile:
-    """The file's parts with their materials."""
-    materials = _libraries(path, diagnostics)
+    """The file's triangles, one shape a material; those that emit are apart by group, so that each lamp is a light.
+
+    Raises SceneError for a file without triangles.
+    """
+    text = _text(path)
+    sections = _sections(text, diagnostics)
+    materials = read_libraries(path, sections.libraries, diagnostics)
+    keys: list[tuple[str | None, str]] = []
+    numbers: dict[tuple[str | None, str], int] = {}
+    of_section = []
+    for material, group in zip(sections.material, sections.group):
+        emits = material in materials and materials[material].radiance is not None
+        key = (material, group if emits else "")
+        if key not in numbers:
+            numbers[key] = len(keys)
+            keys.append(key)
+        of_section.append(numbers[key])
     result = MeshFile()
-    built: dict[str, tuple[Material, RGB | None, Texture | None]] = {}
-    for name, mesh, material_name in obj_parts(path, skip_materials=not materials):
-        material, radiance, emission = DEFAULT_MATERIAL, None, None
-        if material_name in materials:
-            if material_name not in built:
-                built[material_name] = _material(material_name, materials[material_name], diagnostics)
-            material, radiance, emission = built[material_name]
-        # trimesh names nameless parts after the file it was given.
-        shape_name = path.stem if name in ("geometry", path.name) else name
-        result.shapes.append(Shape(shape_name, mesh, result.material(material), radiance, emission))
+    wants_uv = [material in materials and materials[material].textured for material, _ in keys]
+    meshes = _meshes(text, path, diagnostics, sections, of_section, wants_uv)
+    missing = dict.fromkeys(m for m, _ in keys if m is not None and m not in materials) if sections.libraries else {}
+    if missing and materials:
+        names = ", ".join(f"'{m[:60]}'" for m in list(missing)[:5]) + (" …" if len(missing) > 5 else "")
+        diagnostics.warn(f"No material file defines the materials {names}: grey replaces them.")
+    for (name, group), mesh in zip(keys, meshes):
+        if mesh is None:
+            continue
+        found = materials[name] if name in materials else MtlMaterial(DEFAULT_MATERIAL)
+        shape_name = " ".join(part for part in (group, name) if part) or path.stem
+        material = found.with_vertex_colours() if mesh.colours is not None else found.material
+        result.shapes.append(Shape(shape_name, mesh, result.material(material), found.radiance, found.emission))
     return result
 
 
-def _libraries(path: Path, diagnostics: Diagnostics) -> dict[str, dict[str, Any]]:
-    """Materials of all MTL files that the OBJ names."""
-    from trimesh.exchange.obj import parse_mtl
-    from trimesh.resolvers import FilePathResolver
+def read_single(path: Path) -> Mesh:
+    """All of an OBJ file as one mesh, without materials. It has normals only if all of its corners have them, and
+    texture coordinates if any has; the others are (0, 0) then. Raises SceneError."""
+    diagnostics = Diagnostics(path)
+    text = _text(path)
+    if text.corner_vn is not None and not ((text.corner_vn >= 0) & (text.corner_vn < len(text.vn))).all():
+        text.corner_vn = None
+    one = _Sections([0], [None], [""], [0], [])
+    (mesh,) = _meshes(text, path, diagnostics, one, [0], [True])
+    assert mesh is not None
+    return mesh
 
-    materials: dict[str, dict[str, Any]] = {}
-    text = path.read_bytes().decode("utf-8", "replace")
-    for match in re.finditer(r"^[ \t]*mtllib[ \t]+(.+?)[ \t\r]*$", text, re.MULTILINE):
-        library = path.parent / match[1]
-        line = text.count("\n", 0, match.start()) + 1
-        if not library.is_file():
-            diagnostics.warn(f"The material file {match[1]!r} does not exist: grey replaces its materials.", line)
+
+def _text(path: Path) -> ObjText:
+    data = read_regular(path)
+    if not data:
+        raise SceneError("The file is empty (0 bytes).", path, hint="Export it again.")
+    return read_text(data)
+
+
+def _sections(text: ObjText, diagnostics: Diagnostics) -> _Sections:
+    """What holds for which faces, and the material files that are named."""
+    result = _Sections([0], [None], [""], [0], [])
+    material: str | None = None
+    group, smoothing = "", 0
+    strange: dict[str, int] = {}
+    for word, argument, line, face in text.statements():
+        if word == "usemtl":
+            material = argument or None
+        elif word in ("g", "o"):
+            group = argument
+        elif word == "s":
+            smoothing = int(argument) & 0xFFFFFF if argument.isascii() and argument.isdigit() else 0
+        elif word == "mtllib":
+            result.libraries.append((argument, line))
             continue
-        content = as_utf8(library.read_bytes())
-        maps, ignored = read_maps(content.decode("utf-8"))
-        if ignored:
-            diagnostics.warn(f"The textures {', '.join(sorted(ignored))} are ignored.")
-        # Pictures are read here, so trimesh need not know of them.
-        plain = re.sub(rb"(?im)^[ \t]*map_kd[ \t].*$", b"", content)
-        for name, m in parse_mtl(plain, resolver=FilePathResolver(str(library))).items():
-            m[_TEXTURES] = load_maps(maps.get(" ".join(name.split()), {}), library, diagnostics)
-            if "bump" in maps.get(name, {}):
-                m[_BUMP_SCALE] = maps[name]["bump"].factor
-            materials[name] = m
-    return materials
+        else:
+            strange.setdefault(word, line)
+            continue
+        if result.first[-1] == face:
+            result.material[-1], result.group[-1], result.smoothing[-1] = material, group, smoothing
+        elif (result.material[-1], result.group[-1], result.smoothing[-1]) != (material, group, smoothing):
+            result.first.append(face)
+            result.material.append(material)
+            result.group.append(group)
+            result.smoothing.append(smoothing)
+    curved = sorted(strange.keys() & _CURVES)
+    if curved:
+        diagnostics.warn(f"Curves and curved surfaces ({', '.join(curved)}) are left out.", strange[curved[0]])
+    if text.ignored:
+        diagnostics.warn(f"{text.ignored:,} lines and points are left out: they have no surface.")
+    return result
 
 
-def _numbers(m: dict[str, Any], key: str, default: float) -> RGB:
-    """Three numbers of an MTL statement; one number counts for all channels."""
-    value = m.get(key)
-    if value is None:
-        return (default, default, default)
-    numbers = [float(x) for x in (value if isinstance(value, list) else [value])]
-    r, g, b = numbers[:3] if len(numbers) >= 3 else numbers[:1] * 3
-    return (max(0.0, r), max(0.0, g), max(0.0, b))
-
-
-def _material(name: str, m: dict[str, Any], diagnostics: Diagnostics) -> tuple[Material, RGB | None, Texture | None]:
-    """Kd, Ks, Ke, Ni, the illumination model and the maps as a material, the radiance it emits and its texture."""
-    kd, ks, ke = _numbers(m, "kd", 0.7), _numbers(m, "ks", 0.0), _numbers(m, "ke", 0.0)
-    model = int(_numbers(m, "illum", 2)[0])
-    maps: dict[str, Bitmap] = m[_TEXTURES]
-    textures: dict[str, Texture] = {}
-    if model in _GLASS_MODELS:
-        tint = _numbers(m, "tf", 1.0)
-        material = Material(name, "dielectric", (1.0, 1.0, 1.0), _capped(tint), eta=max(1.0, _numbers(m, "ni", 1.5)[0]))
-    elif model in _MIRROR_MODELS and max(ks) >= 0.5 and max(ks) > max(kd):
-        ks, colour = _textured(ks, maps.get("ks"), 1.0)
-        if colour is not None:
-            textures["reflectance"] = colour
-        material = Material(name, "conductor", _capped(ks), two_sided=True)
+def _meshes(
+    text: ObjText, path: Path, diagnostics: Diagnostics, sections: _Sections, part_of: list[int], uv_of: list[bool]
+) -> list[Mesh | None]:
+    """The triangles of each part, None for those that have none."""
+    n_parts = len(uv_of)
+    triangles, owner = _triangles(text, path, diagnostics)
+    section = np.array([0])
+    if len(sections.first) > 1:
+        lengths = np.diff([*sections.first, len(text.starts) - 1])
+        section = np.repeat(np.arange(len(lengths), dtype=np.int32), lengths)[owner]
+    smoothing = np.array(sections.smoothing, np.int32)[section]
+    parts = np.array(part_of, np.int32)[section]
+    bounds = np.array([0, len(triangles)])
+    if n_parts > 1:
+        order = np.argsort(parts, kind="stable")
+        triangles, parts, smoothing = triangles[order], parts[order], smoothing[order]
+        bounds = np.searchsorted(parts, np.arange(n_parts + 1))
+    stage("joining the corners")
+    corners = triangles.reshape(-1)
+    v = text.corners[corners]
+    vt = _chosen(text.corner_vt, corners, len(text.vt)) if any(uv_of) else np.empty(0, np.int32)
+    vn = _normal_numbers(text, corners, smoothing, parts, bounds)
+    if not len(vt) and not len(vn):
+        faces, keys = v.reshape(-1, 3), None
     else:
-        if _numbers(m, "d", 1.0)[0] < 1:
-            diagnostics.warn("Transparency (d) is ignored except in the glass models (illum 4, 6, 7, 9).")
-        kd, colour = _textured(kd, maps.get("kd"), 1.0)
-        if colour is not None:
-            textures["reflectance"] = colour
-        material = Material(name, "diffuse", _capped(kd), two_sided=True)
-    if "bump" in maps:
-        textures["bump"] = maps["bump"]
-    if "norm" in maps:
-        textures["normal"] = maps["norm"]
-    ke, emission = _textured(ke, maps.get("ke"), None)
-    material = replace(material, textures=textures, bump_scale=float(m.get(_BUMP_SCALE, 1.0)))
-    return (material, ke, emission) if max(ke) > 0 else (material, None, None)
+        merged, keys = np.empty(len(v), np.int32), np.empty((len(v), 3), np.int32)
+        used = merge(v, vt, vn, np.full(len(text.v), -1, np.int32), np.empty(len(v), np.int32), keys, merged)
+        faces, keys = merged.reshape(-1, 3), keys[:used].copy()
+    normals = None if keys is None or not len(vn) else _normals(text, v, vn, faces.reshape(-1), keys)
+    ids, id_starts = np.empty(faces.size, np.int32), np.zeros(n_parts + 1, np.int64)
+    n_vertices = len(text.v) if keys is None else len(keys)
+    scratch = np.empty(n_vertices, np.int32), np.full(n_vertices, -1, np.int32)
+    compact(faces, bounds.astype(np.int64), *scratch, ids, id_starts)
+    meshes: list[Mesh | None] = []
+    for p in range(n_parts):
+        own = ids[id_starts[p] : id_starts[p + 1]]
+        if not len(own):
+            meshes.append(None)
+            continue
+        places = own if keys is None else keys[own, 0]
+        part_normals = None if normals is None else normals[own]
+        if part_normals is not None and np.isnan(part_normals[:, 0]).all():
+            part_normals = None
+        uv = None
+        if uv_of[p] and keys is not None and len(vt):
+            uv = _coordinates(text.vt, keys[own, 1])
+        part = np.ascontiguousarray(faces[bounds[p] : bounds[p + 1]])
+        meshes.append(Mesh(text.v[places], part, part_normals, uv, _colours(text.colours, places)))
+    return meshes
 
 
-def _textured(colour: RGB, bitmap: Bitmap | None, most: float | None) -> tuple[RGB, Texture | None]:
-    """The colour times a map's mean, and the map times the colour; a black colour leaves the map as it is."""
-    if bitmap is None:
-        return colour, None
-    texture, _ = limited(scaled(bitmap, colour if any(colour) else (1.0, 1.0, 1.0)), most)
-    return texture.mean, texture
+def _triangles(text: ObjText, path: Path, diagnostics: Diagnostics) -> tuple[Ints, Ints]:
+    """Triangles (n, 3) as places in the file's list of corners, and the face that each is of."""
+    n_faces, n_corners = len(text.starts) - 1, len(text.corners)
+    usable = np.ones(n_faces, np.bool_)
+    bad = (text.corners < 0) | (text.corners >= len(text.v))
+    if bad.any():
+        owner = np.repeat(np.arange(n_faces), np.diff(text.starts))
+        usable[owner[bad]] = False
+        count = int(n_faces - usable.sum())
+        if count < n_faces:
+            diagnostics.dropped["face with a vertex that does not exist"] += count
+        else:
+            what = f"All {count:,} faces use vertices that do not exist (there are {len(text.v):,})."
+            raise SceneError(what, path, hint="The mesh file is damaged: export it again.")
+    if n_corners == 3 * n_faces and usable.all() and (np.diff(text.starts) == 3).all():
+        return np.arange(n_corners, dtype=np.int32).reshape(-1, 3), np.arange(n_faces, dtype=np.int32)
+    n = count_triangles(text.starts, usable)
+    if not n:
+        hint = "Is it an OBJ file? Export it with triangles."
+        raise SceneError("The OBJ file has no faces.", path, hint=diagnostics.left_out() or hint)
+    triangles, owner = np.empty((n, 3), np.int32), np.empty(n, np.int32)
+    found = triangulate(text.v, text.corners, text.starts, usable, triangles, owner)
+    return triangles[:found], owner[:found]
 
 
-def _capped(colour: RGB) -> RGB:
-    r, g, b = (min(1.0, c) for c in colour)
-    return (r, g, b)
+def _chosen(index: Ints | None, corners: Ints, n: int) -> Ints:
+    """The corners' indices, MISSING for those that have none or one that is not there; empty if none has one."""
+    if index is None or not n:
+        return np.empty(0, np.int32)
+    chosen = index[corners]
+    return np.where((chosen >= 0) & (chosen < n), chosen, np.int32(MISSING))
+
+
+def _normal_numbers(text: ObjText, corners: Ints, smoothing: Ints, parts: Ints, bounds: NDArray[np.int64]) -> Ints:
+    """For each corner the number of its normal in the file, that of its smoothing group, or, in a part where others
+    have one, that of its triangle. Empty where all triangles are flat."""
+    numbers = _chosen(text.corner_vn, corners, len(text.vn))
+    n = len(corners) // 3
+    groups = np.broadcast_to(smoothing, n)
+    if not len(numbers):
+        if not smoothing.any():
+            return numbers
+        numbers = np.full(len(corners), MISSING, np.int32)
+    missing = numbers == MISSING
+    if not missing.any():
+        return numbers
+    triangle = np.repeat(np.arange(n, dtype=np.int32), 3)
+    smooth = missing & (groups[triangle] > 0)
+    numbers[smooth] = -2 - groups[triangle[smooth]]
+    flat = numbers == MISSING
+    if flat.any():
+        has_others = np.zeros(len(bounds) - 1, np.bool_)
+        of_triangle = np.broadcast_to(parts, n)
+        has_others[of_triangle[triangle[~flat]]] = True
+        own = flat & has_others[of_triangle[triangle]]
+        numbers[own] = _OWN - triangle[own]
+    return numbers
+
+
+def _normals(text: ObjText, v: Ints, vn: Ints, vertex: Ints, keys: Ints) -> Float:
+    """The normal of each vertex, NaN in parts that are flat. `v`, `vn` and `vertex` are the corners' positions,
+    normals and vertices, `keys` (vertices, 3) the vertices' triples."""
+    result = np.full((len(keys), 3), np.nan)
+    given = keys[:, 2] >= 0
+    result[given] = text.vn[keys[given, 2]]
+    made = keys[:, 2] < MISSING
+    if not made.any():
+        return result
+    # Vertices that differ in their texture coordinates alone share a normal.
+    _, shared = np.unique(keys[made][:, [0, 2]], axis=0, return_inverse=True)
+    group = np.full(len(keys), -1, np.int64)
+    group[made] = shared.reshape(-1)
+    sums = np.zeros((int(group.max()) + 1, 3))
+    add_normals(text.v, v, group[vertex], sums)
+    result[made] = unit(sums)[group[made]]
+    return result
+
+
+def _coordinates(vt: Float, index: Ints) -> Float:
+    """(n, 2); the format counts v from a picture's lower edge."""
+    uv = np.zeros((len(index), 2))
+    given = index >= 0
+    uv[given] = vt[index[given]] * [1, -1] + [0, 1]
+    return uv
+
+
+def _colours(colours: Float | None, places: Ints) -> Float | None:
+    """Linear colours of a part's vertices, white where one has none; None if none has one. Programs write what they
+    show, encoded as sRGB, from 0 to 1, some from 0 to 255."""
+    if colours is None:
+        return None
+    own = colours[places]
+    known = ~np.isnan(own)
+    if not known.any():
+        return None
+    own = np.where(known, own, 1.0)
+    encoded = own / 255 if own.max() > 1.5 else own
+    return linear(np.clip(encoded, 0.0, 1.0).astype(np.float32)).astype(np.float64)

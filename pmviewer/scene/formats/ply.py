@@ -1,218 +1,158 @@
-"""PLY meshes, ASCII and binary. Own reader: every bundled scene needs it at start and must not wait for imports."""
+"""PLY meshes, text and binary. Own reader: every bundled scene needs it at start and must not wait for imports."""
 
 from __future__ import annotations
 
-import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
+from pmviewer.kernels.polygons import count_triangles, triangulate
+from pmviewer.kernels.rows import strips
 from pmviewer.scene.description import Mesh
-from pmviewer.scene.primitives import fans
+from pmviewer.scene.formats.open_file import read_regular
+from pmviewer.scene.formats.ply_table import Column, Columns, ListColumn, read_columns, read_header
 
-_TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
-    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
-    "double": "f8", "float64": "f8",
-}  # fmt: skip
-_FORMATS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-_HEADER_LIMIT = 1 << 16
-_COORDINATES = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"))
+Ints = NDArray[np.int32]
+Float = NDArray[np.float64]
+_COORDINATES = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
+_COLOURS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _FACE_LISTS = ("vertex_indices", "vertex_index")
+_FACE_ELEMENTS = ("face", "faces", "polygon", "triangle")
 
 
-@dataclass
-class _Property:
-    name: str
-    type: str
-    count_type: str | None = None  # for lists
+@dataclass(frozen=True)
+class PlyFile:
+    """The mesh, the picture that a comment names ("" for none), whether texture coordinates count v from a picture's
+    lower edge, and sentences about what was left out."""
 
-
-@dataclass
-class _Element:
-    name: str
-    count: int
-    properties: list[_Property] = field(default_factory=list)
+    mesh: Mesh
+    picture: str = ""
+    notes: tuple[str, ...] = ()
 
 
 def read_ply(path: Path) -> Mesh:
-    """The file's triangles (polygons are cut into fans), with its normals and texture coordinates if it has
-    them.
+    """The file's triangles (polygons are cut), with its normals, texture coordinates and colours if it has them.
 
-    Raises SceneError for anything unreadable; indices are checked by `clean`.
+    Colours of one byte are decoded from sRGB, others are taken as linear. Raises SceneError for anything unreadable;
+    indices are checked by `clean`.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise SceneError(f"The mesh can't be read: {error.strerror or error}.", path) from None
+    return read_ply_file(path).mesh
+
+
+def read_ply_file(path: Path) -> PlyFile:
+    """`read_ply` with what the file says besides. Raises SceneError."""
+    data = read_regular(path, "The mesh")
     if not data:
         raise SceneError("The PLY file is empty (0 bytes).", path, hint="Export the mesh again.")
-    order, elements, body = _header(data, path)
-    try:
-        columns = _read_ascii(data[body:], elements) if order == "" else _read_binary(data, body, order, elements)
-    except (ValueError, IndexError, OverflowError) as error:
-        raise SceneError(f"The PLY file's data do not fit its header: {error}.", path, hint="Is it complete?") from None
-    vertex = columns.get("vertex", {})
+    header = read_header(data, path)
+    columns = read_columns(data, header, path)
+    vertex = {name: c for name, c in columns.get("vertex", {}).items() if not isinstance(c, ListColumn)}
     if not {"x", "y", "z"} <= vertex.keys():
         raise SceneError("The PLY file has no vertex positions x, y, z.", path)
-    vertices = np.stack([vertex[c] for c in "xyz"], axis=1).astype(np.float64)
-    normals = None
-    if {"nx", "ny", "nz"} <= vertex.keys():
-        normals = np.stack([vertex[c] for c in ("nx", "ny", "nz")], axis=1).astype(np.float64)
-    uv = None
+    notes = []
+    vertices = _stack(vertex, ("x", "y", "z"))
+    faces, owner, face = _faces(columns, vertices, path)
+    has_normals = {"nx", "ny", "nz"} <= vertex.keys()
     pair = next((names for names in _COORDINATES if set(names) <= vertex.keys()), None)
-    if pair is not None:
-        uv = np.stack([vertex[c] for c in pair], axis=1).astype(np.float64)
-    face = columns.get("face", {})
-    lists = next((face[name] for name in _FACE_LISTS if name in face), None)
-    if lists is None or lists.ndim != 2:
-        raise SceneError("The PLY file has no faces (it may be a point cloud).", path, hint="Export it with triangles.")
-    # Indices beyond 32 bits must not wrap around to valid ones.
-    faces = np.where((lists >= 0) & (lists < 2**31), lists, -1).astype(np.int32)
-    return Mesh(vertices, faces, normals, uv)
+    mesh = Mesh(
+        vertices,
+        faces,
+        _stack(vertex, ("nx", "ny", "nz")) if has_normals else None,
+        None if pair is None else _stack(vertex, pair),
+        _colours(vertex),
+    )
+    wedges = face.get("texcoord")
+    if isinstance(wedges, ListColumn) and mesh.uv is None and owner is None and len(wedges.items) == 6 * len(faces):
+        mesh = replace(_apart(mesh), uv=wedges.items.reshape(-1, 2).astype(np.float64))
+    of_faces = _colours({name: c for name, c in face.items() if not isinstance(c, ListColumn)})
+    if of_faces is not None and mesh.colours is None:
+        each = of_faces if owner is None else of_faces[owner]
+        mesh = replace(_apart(mesh), colours=np.repeat(each, 3, axis=0))
+    alpha = vertex.get("alpha")
+    if alpha is not None and mesh.colours is not None and (alpha < (255 if alpha.dtype.kind == "u" else 1)).any():
+        notes.append("The transparency of the vertices' colours (alpha) is ignored: they are shown opaque.")
+    pictures = [c.split(None, 1)[1].strip() for c in header.comments if c.lower().startswith("texturefile ")]
+    return PlyFile(mesh, pictures[0] if pictures else "", tuple(notes))
 
 
-def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
-    """Byte order ("" for ASCII), elements and where the body begins."""
-    end = data.find(b"end_header", 0, _HEADER_LIMIT)
-    if not data.startswith(b"ply") or end < 0:
-        raise SceneError("This is not a PLY file (it has no PLY header).", path, hint="Check the file's ending.")
-    body = data.find(b"\n", end) + 1
-    order: str | None = None
-    elements: list[_Element] = []
-    for number, line in enumerate(data[:end].decode("ascii", "replace").splitlines(), 1):
-        words = line.split()
-        try:
-            match words:
-                case ["format", name, *_]:
-                    order = _FORMATS[name]
-                case ["element", name, count]:
-                    elements.append(_Element(name, int(count)))
-                    if elements[-1].count < 0:
-                        raise ValueError(count)
-                case ["property", "list", count_type, item, name]:
-                    elements[-1].properties.append(_Property(name, _TYPES[item], _TYPES[count_type]))
-                case ["property", item, name]:
-                    elements[-1].properties.append(_Property(name, _TYPES[item]))
-                case ["ply"] | ["comment", *_] | ["obj_info", *_] | []:
-                    pass
-                case _:
-                    raise ValueError(line)
-        except (KeyError, ValueError, IndexError):
-            raise SceneError(f"The PLY header's line {line[:60]!r} is not understood.", path, number) from None
-    if order is None or body == 0:
-        raise SceneError("The PLY header names no format or has no end.", path)
-    return order, elements, body
+def _stack(columns: dict[str, NDArray], names: tuple[str, ...]) -> Float:
+    out = np.empty((len(columns[names[0]]), len(names)))
+    for i, name in enumerate(names):
+        out[:, i] = columns[name]
+    return out
 
 
-Columns = dict[str, dict[str, NDArray]]
+def _colours(columns: dict[str, NDArray]) -> Float | None:
+    """(n, 3) linear RGB of an element, None if it has no colours."""
+    names = next((names for names in _COLOURS if set(names) <= columns.keys()), None)
+    if names is None:
+        return None
+    kind = columns[names[0]].dtype
+    values = _stack(columns, names)
+    whole = {"u1": 255.0, "u2": 65535.0}.get(kind.str[1:])
+    if whole is None and kind.kind == "f" and values.max(initial=0.0) > 1.5 and (values == np.round(values)).all():
+        whole = 255.0  # the bytes of a text, or of a program that writes floats only
+    if whole is None:
+        return values
+    from pmviewer.scene.formats.texture_file import linear
+
+    return linear(np.clip(values / whole, 0, 1).astype(np.float32)).astype(np.float64)
 
 
-def _read_binary(data: bytes, offset: int, order: str, elements: list[_Element]) -> Columns:
-    result: Columns = {}
-    for element in elements:
-        if element.count == 0:
-            continue
-        dtype = _fixed_dtype(data, offset, order, element)
-        if dtype is None:
-            result[element.name], offset = _read_records(data, offset, order, element)
-            continue
-        rows = np.frombuffer(data, dtype, element.count, offset)
-        offset += rows.nbytes
-        result[element.name] = _columns_of(rows, element)
-    return result
+def _apart(mesh: Mesh) -> Mesh:
+    """The mesh with corners of its own for each triangle."""
+    index = mesh.faces.reshape(-1)
+    index = np.where((index >= 0) & (index < len(mesh.vertices)), index, 0)
+    own = [None if a is None else a[index] for a in (mesh.normals, mesh.uv, mesh.colours)]
+    faces = np.arange(len(index), dtype=np.int32).reshape(-1, 3)
+    bad = ((mesh.faces < 0) | (mesh.faces >= len(mesh.vertices))).any(axis=1)
+    faces[bad] = -1
+    return Mesh(mesh.vertices[index], faces, *own)
 
 
-def _fixed_dtype(data: bytes, offset: int, order: str, element: _Element) -> np.dtype | None:
-    """Row type if all lists have the length of the first row's, else None. Almost every mesh is all triangles."""
-    fields: list[tuple] = []
-    for i, p in enumerate(element.properties):
-        if p.count_type is None:
-            fields.append((f"p{i}", order + p.type))
-            continue
-        before = np.dtype(fields).itemsize if fields else 0
-        length = int(np.frombuffer(data, order + p.count_type, 1, offset + before)[0])
-        if not 0 <= length <= 64:
-            return None
-        fields += [(f"c{i}", order + p.count_type), (f"p{i}", order + p.type, (length,))]
-    dtype = np.dtype(fields)
-    if any(name.startswith("c") for name in dtype.names or ()):
-        if offset + dtype.itemsize * element.count > len(data):
-            return None
-        rows = np.frombuffer(data, dtype, element.count, offset)
-        for name in dtype.names or ():
-            if name.startswith("c") and (rows[name] != rows[name][0]).any():
-                return None
-    return dtype
+def _faces(columns: dict[str, Columns], vertices: Float, path: Path) -> tuple[Ints, Ints | None, Columns]:
+    """Triangles (n, 3), the face of each (None: its own number), and the element's other columns."""
+    face = next((columns[name] for name in _FACE_ELEMENTS if name in columns), {})
+    lists = _list_of(face)
+    if lists is None:
+        strip = _list_of(columns.get("tristrips", {}))
+        if strip is None:
+            what = f"The PLY file has no faces: it is a cloud of {len(vertices):,} points."
+            if "range_grid" in columns:
+                what = "The PLY file is a raw range scan: a grid of points without faces."
+            raise SceneError(what, path, hint="Open it in a program that makes a surface of it, such as MeshLab.")
+        out = np.empty((len(strip.items), 3), np.int32)
+        indices = _indices(strip.items)
+        return out[: strips(indices, strip.starts, out)].copy(), None, {}
+    corners = _indices(lists.items)
+    sizes = np.diff(lists.starts)
+    if (sizes == 3).all():
+        return corners.reshape(-1, 3), None, face
+    usable = np.ones(len(sizes), np.bool_)
+    bad = (corners < 0) | (corners >= len(vertices))
+    if bad.any():
+        which = int(np.searchsorted(lists.starts, np.flatnonzero(bad)[0], "right")) - 1
+        what = f"Face {which} uses a vertex that does not exist (there are {len(vertices)})."
+        raise SceneError(what, path, hint="The mesh file is damaged: export it again.")
+    n = count_triangles(lists.starts, usable)
+    places, owner = np.empty((n, 3), np.int32), np.empty(n, np.int32)
+    triangulate(vertices, corners, lists.starts, usable, places, owner)
+    return corners[places], owner, face
 
 
-def _columns_of(rows: NDArray, element: _Element) -> dict[str, NDArray]:
-    columns = {}
-    for i, p in enumerate(element.properties):
-        if p.count_type is None:
-            columns[p.name] = rows[f"p{i}"]
-        else:
-            columns[p.name] = fans(rows[f"p{i}"])
-    return columns
+def _list_of(columns: Columns) -> ListColumn | None:
+    """The list of vertices, by its usual names or the only one of whole numbers."""
+    named: list[Column] = [columns[name] for name in _FACE_LISTS if name in columns]
+    others = [c for name, c in columns.items() if "ind" in name.lower() or "vert" in name.lower()]
+    return next((c for c in (*named, *others) if isinstance(c, ListColumn)), None)
 
 
-def _read_records(data: bytes, offset: int, order: str, element: _Element) -> tuple[dict[str, NDArray], int]:
-    """Row by row, for polygons of mixed sizes."""
-    values: dict[str, list] = {p.name: [] for p in element.properties}
-    byteorder = {"<": "little", ">": "big"}[order]
-    swap = byteorder != sys.byteorder
-    for _ in range(element.count):
-        for p in element.properties:
-            count = 1
-            if p.count_type is not None:
-                count = int(np.frombuffer(data, order + p.count_type, 1, offset)[0])
-                offset += np.dtype(p.count_type).itemsize
-                if count < 0:
-                    raise ValueError("a list has a negative length")
-            row = np.frombuffer(data, order + p.type, count, offset)
-            offset += row.nbytes
-            values[p.name].append(row.byteswap().view(p.type) if swap else row)
-    return {p.name: _join(values[p.name], p) for p in element.properties}, offset
-
-
-def _join(rows: list[NDArray], p: _Property) -> NDArray:
-    if p.count_type is None:
-        return np.concatenate(rows) if rows else np.zeros(0)
-    triangles = [np.zeros((0, 3), np.int64)]
-    sizes = np.array([len(r) for r in rows])
-    for n in np.unique(sizes):
-        if n >= 3:
-            triangles.append(fans(np.stack([r for r in rows if len(r) == n])))
-    return np.concatenate(triangles)
-
-
-def _read_ascii(body: bytes, elements: list[_Element]) -> Columns:
-    words = body.split()
-    result: Columns = {}
-    position = 0
-    for element in elements:
-        if not any(p.count_type for p in element.properties):
-            width = len(element.properties)
-            block = words[position : position + width * element.count]
-            if len(block) < width * element.count:
-                raise ValueError(f"fewer than {element.count} rows of '{element.name}'")
-            table = np.array(block, np.float64).reshape(element.count, width)
-            position += len(block)
-            result[element.name] = {p.name: table[:, i] for i, p in enumerate(element.properties)}
-            continue
-        values: dict[str, list] = {p.name: [] for p in element.properties}
-        for _ in range(element.count):
-            for p in element.properties:
-                count = 1
-                if p.count_type is not None:
-                    count = int(words[position])
-                    position += 1
-                if count < 0 or position + count > len(words):
-                    raise ValueError(f"fewer than {element.count} rows of '{element.name}'")
-                values[p.name].append(np.array(words[position : position + count], np.float64))
-                position += count
-        result[element.name] = {p.name: _join(values[p.name], p) for p in element.properties}
-    return result
+def _indices(items: NDArray[np.number]) -> Ints:
+    """As int32; what is beyond, or no number, becomes −1 and not a valid index."""
+    if items.dtype.str[1:] == "i4":
+        return np.ascontiguousarray(items, np.int32)
+    with np.errstate(invalid="ignore"):
+        return np.where((items >= 0) & (items < 2**31), items, -1).astype(np.int32)

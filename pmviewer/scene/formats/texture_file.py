@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
 from pmviewer.resources import available_memory
+from pmviewer.scene.formats.open_file import read_regular
 
 MOST_PIXELS = 1 << 24
 """A larger picture is reduced by whole factors: 4096 × 4096, 200 MB of texels."""
@@ -24,18 +27,40 @@ def read_picture(source: Path | bytes, name: str, raw: bool) -> tuple[NDArray[np
     `source` is a file or its content. `raw` values are taken as they are; others are decoded from sRGB, unless the file
     holds floats. Raises SceneError for what is not a whole picture or does not fit into memory.
     """
-    try:
-        data = source if isinstance(source, bytes) else source.read_bytes()
-    except OSError as error:
-        raise SceneError(f"The texture {name!r} can't be read: {error.strerror or error}.", hint=_READABLE) from None
-    if not data:
-        raise SceneError(f"The texture {name!r} is empty (0 bytes).", hint="Export it again.")
+    data = _content(source, name)
     if data[:4] == b"\x76\x2f\x31\x01":
         pixels = _exr(source, data, name)
-    elif isinstance(source, Path) and data[:2] == b"#?":
-        pixels = _hdr(source, name)
+    elif data[:2] == b"#?":
+        pixels = _hdr(data, name)
     else:
-        pixels = _encoded(data, name, raw)
+        pixels = _encoded(data, name, partial(_samples, raw=raw))
+    return _finished(pixels, name)
+
+
+def read_opacity(source: Path | bytes, name: str) -> tuple[NDArray[np.float32], str]:
+    """Pixels (h, w, 1 or 3) that say how opaque a surface is: the picture's alpha channel where it has one that isn't
+    the same all over, else its values as they are. Otherwise as `read_picture`."""
+    data = _content(source, name)
+    if data[:4] == b"\x76\x2f\x31\x01" or data[:2] == b"#?":
+        return read_picture(data, name, raw=True)
+    return _finished(_encoded(data, name, _opacity), name)
+
+
+def _content(source: Path | bytes, name: str) -> bytes:
+    if isinstance(source, bytes):
+        data = source
+    else:
+        try:
+            data = read_regular(source, f"The texture {name!r}")
+        except SceneError as error:
+            raise SceneError(error.what, hint=_READABLE) from None
+    if not data:
+        raise SceneError(f"The texture {name!r} is empty (0 bytes).", hint="Export it again.")
+    return data
+
+
+def _finished(pixels: NDArray[np.float32], name: str) -> tuple[NDArray[np.float32], str]:
+    """The pixels finite and not too many, and a sentence if they had to be changed."""
     if not pixels.size:
         raise SceneError(f"The texture {name!r} has no pixels.", hint="Export it again.")
     sentence = ""
@@ -83,55 +108,44 @@ def _exr(source: Path | bytes, data: bytes, name: str) -> NDArray[np.float32]:
     return image[..., :3]
 
 
-def _hdr(path: Path, name: str) -> NDArray[np.float32]:
-    from pmviewer.scene.formats.hdr import read_hdr
+def _hdr(data: bytes, name: str) -> NDArray[np.float32]:
+    from pmviewer.scene.formats.hdr import decode_hdr
 
     try:
-        return read_hdr(path)
+        return decode_hdr(data)
     except SceneError as error:
         raise SceneError(f"The texture {name!r}: {error.what}", hint=error.hint) from None
 
 
-def _encoded(data: bytes, name: str, raw: bool) -> NDArray[np.float32]:
+def _encoded(data: bytes, name: str, values: Callable[[Any], NDArray[np.float32]]) -> NDArray[np.float32]:
+    """What `values` makes of the opened picture."""
     from PIL import Image
 
     try:
         with Image.open(BytesIO(data)) as picture:
             width, height = picture.size
             if max(width, height) > _MOST_SIDE:
-                raise ValueError(f"{width} × {height} pixels are too many")
+                raise SceneError(f"The texture {name!r} has {width} × {height} pixels: too many.", hint="Use a smaller picture.")
             _check_memory(width, height, name)
-            values = _samples(picture, raw)
+            return values(picture)
     except SceneError:
         raise
-    except Exception as error:  # damaged pictures make the decoders raise anything
-        reason = f"{type(error).__name__}: {error}".splitlines()[0][:120]
-        raise SceneError(f"The texture {name!r} can't be read ({reason}).", hint=_READABLE) from None
-    return values
+    except Exception:  # damaged pictures make the decoders raise anything
+        what = f"The texture {name!r} can't be read: it is damaged, or no picture of a known kind."
+        raise SceneError(what, hint=_READABLE) from None
 
 
 def read_alpha(data: bytes, name: str) -> NDArray[np.float32] | None:
     """The picture's alpha (h, w, 1) from 0 to 1, or None where it has none. Raises SceneError as `read_picture`."""
-    from PIL import Image
+    values = _encoded(data, name, _alpha)
+    return _finished(values, name)[0] if values.size else None
 
-    try:
-        with Image.open(BytesIO(data)) as picture:
-            if "A" not in picture.getbands() and "transparency" not in picture.info:
-                return None
-            width, height = picture.size
-            if max(width, height) > _MOST_SIDE:
-                raise ValueError(f"{width} × {height} pixels are too many")
-            _check_memory(width, height, name)
-            values = np.asarray(picture.convert("RGBA").getchannel("A"), np.float32)[..., None] / np.float32(255)
-    except SceneError:
-        raise
-    except Exception as error:  # damaged pictures make the decoders raise anything
-        reason = f"{type(error).__name__}: {error}".splitlines()[0][:120]
-        raise SceneError(f"The texture {name!r} can't be read ({reason}).", hint=_READABLE) from None
-    factor = 1
-    while (width // factor) * (height // factor) > MOST_PIXELS:
-        factor += 1
-    return np.ascontiguousarray(_reduced(values, factor) if factor > 1 else values)
+
+def _alpha(picture: Any) -> NDArray[np.float32]:
+    """(h, w, 1) from 0 to 1; empty for a picture without alpha."""
+    if "A" not in picture.getbands() and "transparency" not in picture.info:
+        return np.empty((0, 0, 1), np.float32)
+    return np.asarray(picture.convert("RGBA").getchannel("A"), np.float32)[..., None] / np.float32(255)
 
 
 def _samples(picture: Any, raw: bool) -> NDArray[np.float32]:
@@ -146,6 +160,14 @@ def _samples(picture: Any, raw: bool) -> NDArray[np.float32]:
     steps = np.arange(256, dtype=np.float32) / np.float32(255)
     eight_bits = (steps if raw else linear(steps))[np.asarray(picture.convert("L" if grey else "RGB"))]
     return eight_bits[..., None] if grey else eight_bits
+
+
+def _opacity(picture: Any) -> NDArray[np.float32]:
+    if "A" in picture.getbands() or "transparency" in picture.info:
+        alpha = _alpha(picture)
+        if alpha.min() < alpha.max():
+            return alpha
+    return _samples(picture, raw=True)
 
 
 def linear(encoded: NDArray[np.float32]) -> NDArray[np.float32]:

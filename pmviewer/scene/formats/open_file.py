@@ -1,0 +1,47 @@
+"""Reading a file that somebody else named: never a device, a pipe or a directory, and never more than there is."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from pmviewer.errors import SceneError
+
+
+def read_regular(path: Path, what: str = "The file") -> bytes:
+    """The content of a regular file.
+
+    What it is is looked up on the opened file, so that nothing else can take its place behind the check; opening does
+    not wait for a pipe's other end. Raises SceneError.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except (OSError, ValueError) as error:
+        raise SceneError(f"{what} can't be read: {getattr(error, 'strerror', None) or error}.", path) from None
+    with open(descriptor, "rb") as file:
+        kind = os.fstat(descriptor)
+        if not stat.S_ISREG(kind.st_mode):
+            raise SceneError(f"{what} is not a regular file.", path)
+        try:
+            return file.read()
+        except OSError as error:
+            raise SceneError(f"{what} can't be read: {error.strerror or error}.", path) from None
+
+
+def found_beside(folder: Path, name: str) -> Path:
+    """The file of that name in the folder, written with / or \\ and, where there is none, in another case."""
+    wanted = folder / name.strip().strip('"').replace("\\", "/")
+    try:
+        if wanted.exists():
+            return wanted
+        at = Path(wanted.anchor) if wanted.is_absolute() else Path()
+        for part in wanted.parts[1:] if wanted.is_absolute() else wanted.parts:
+            here = at / part
+            if part != ".." and not here.exists():
+                same = [entry for entry in sorted(os.listdir(at)) if entry.lower() == part.lower()]
+                here = at / same[0] if same else here
+            at = here
+        return at
+    except (OSError, ValueError):
+        return wanted

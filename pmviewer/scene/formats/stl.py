@@ -1,0 +1,93 @@
+"""STL, text and binary: triangles with nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.errors import SceneError
+from pmviewer.kernels.rows import text_facets, weld
+from pmviewer.progress import stage
+from pmviewer.scene.description import Mesh
+from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.formats.open_file import read_regular
+
+_HEADER, _RECORD = 84, 50
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
+def read_stl(path: Path, diagnostics: Diagnostics) -> list[tuple[str, Mesh]]:
+    """Name and mesh of the file's solids, flat-shaded as the format is; a binary file is one solid.
+
+    Raises SceneError for what is no STL file.
+    """
+    data = read_regular(path)
+    claimed = int.from_bytes(data[80:84], "little") if len(data) >= _HEADER else -1
+    if claimed >= 0 and len(data) == _HEADER + _RECORD * claimed:
+        return _binary(data, claimed, path, diagnostics)
+    start = data[:1024].removeprefix(b"\xef\xbb\xbf").lstrip()
+    if start[:5].lower() == b"solid" and b"facet" in data[:100_000].lower():
+        return _text(data, path)
+    whole = (len(data) - _HEADER) // _RECORD
+    if whole > 0 and start[:5].lower() != b"solid" and _plausible(data, claimed, whole):
+        if claimed > whole:
+            what = f"The file is cut off: it says it has {claimed:,} triangles and holds {whole:,}, which are shown."
+        else:
+            what = f"The file says it has {claimed:,} triangles; what follows them is left out."
+        if claimed == 0 or claimed == 2**32 - 1:
+            what, claimed = f"The file does not say how many triangles it has; {whole:,} are shown.", whole
+        diagnostics.warn(what)
+        return _binary(data, min(claimed, whole), path, diagnostics)
+    hint = "Is the file complete? Export it again."
+    raise SceneError("This is neither a binary nor a text STL file.", path, hint=hint)
+
+
+def _plausible(data: bytes, claimed: int, whole: int) -> bool:
+    """Do the first records look like triangles of a file with a wrong number in its header?"""
+    if not (claimed in (0, 2**32 - 1) or 0 < claimed <= 4 * whole + 1000):
+        return False
+    facets = np.frombuffer(data, _FACET, min(whole, 100), _HEADER)
+    with np.errstate(invalid="ignore", over="ignore"):
+        return bool((np.abs(facets["corners"]) < 1e10).all() and (np.abs(facets["normal"]) < 1.001).all())
+
+
+def _binary(data: bytes, n: int, path: Path, diagnostics: Diagnostics) -> list[tuple[str, Mesh]]:
+    facets = np.frombuffer(data, _FACET, n, _HEADER)
+    if not n:
+        raise SceneError("The STL file has no triangles.", path, hint="Export it again.")
+    if b"COLOR=" in data[:80] or facets["attribute"].any():
+        diagnostics.warn("Colours of the STL file are ignored: programs do not agree on how to write them.")
+    corners = facets["corners"].reshape(-1, 3).astype(np.float32)  # of this machine's byte order
+    del facets, data
+    return [(path.stem, _welded(corners))]
+
+
+def _text(data: bytes, path: Path) -> list[tuple[str, Mesh]]:
+    data = data.replace(b"\r", b"\n") + b"\n" * 16
+    bytes_ = np.frombuffer(data, np.uint8)
+    nothing = np.empty((0, 3)), np.empty((0, 2), np.int64)
+    n, k = text_facets(bytes_, *nothing)
+    if n < 3:
+        raise SceneError("The STL file has no triangles.", path, hint="Export it again.")
+    corners, solids = np.empty((n, 3)), np.empty((k, 2), np.int64)
+    text_facets(bytes_, corners, solids)
+    ends = [*solids[1:, 1].tolist(), n]
+    found = []
+    for (place, first), end in zip(solids.tolist(), ends):
+        own = corners[first : first + (end - first) // 3 * 3]
+        if len(own):
+            name = data[place : data.find(b"\n", place)].decode("utf-8", "replace")[5:].strip()[:80]
+            found.append((name or path.stem, _welded(own.astype(np.float32))))
+    return found
+
+
+def _welded(corners: NDArray[np.float32]) -> Mesh:
+    """The triangles of corners (3 n, 3) with each vertex once."""
+    stage(f"joining the corners of {len(corners) // 3:,} triangles")
+    corners = np.ascontiguousarray(corners + np.float32(0))  # −0 becomes 0
+    size = 1 << max(2, (2 * len(corners)).bit_length())
+    index, first = np.empty(len(corners), np.int32), np.empty(len(corners), np.int32)
+    used = weld(corners.view(np.uint32), np.full(size, -1, np.int32), index, first)
+    return Mesh(corners[first[:used]].astype(np.float64), index.reshape(-1, 3))
