@@ -51,24 +51,27 @@ def read_obj(path: Path, diagnostics: Diagnostics) -> MeshFile:
     keys: list[tuple[str | None, str]] = []
     numbers: dict[tuple[str | None, str], int] = {}
     of_section = []
+    missing: dict[str, None] = {}
     for material, group in zip(sections.material, sections.group):
-        emits = material in materials and materials[material].radiance is not None
+        if material is not None and material not in materials:
+            missing[material] = None
+            material = None
+        emits = material is not None and materials[material].radiance is not None
         key = (material, group if emits else "")
         if key not in numbers:
             numbers[key] = len(keys)
             keys.append(key)
         of_section.append(numbers[key])
     result = MeshFile()
-    wants_uv = [material in materials and materials[material].textured for material, _ in keys]
+    wants_uv = [name is not None and materials[name].textured for name, _ in keys]
     meshes = _meshes(text, path, diagnostics, sections, of_section, wants_uv)
-    missing = dict.fromkeys(m for m, _ in keys if m is not None and m not in materials) if sections.libraries else {}
     if missing and materials:
         names = ", ".join(f"'{m[:60]}'" for m in list(missing)[:5]) + (" …" if len(missing) > 5 else "")
         diagnostics.warn(f"No material file defines the materials {names}: grey replaces them.")
     for (name, group), mesh in zip(keys, meshes):
         if mesh is None:
             continue
-        found = materials[name] if name in materials else MtlMaterial(DEFAULT_MATERIAL)
+        found = materials[name] if name is not None else MtlMaterial(DEFAULT_MATERIAL)
         shape_name = " ".join(part for part in (group, name) if part) or path.stem
         material = found.with_vertex_colours() if mesh.colours is not None else found.material
         result.shapes.append(Shape(shape_name, mesh, result.material(material), found.radiance, found.emission))
@@ -134,6 +137,8 @@ def _meshes(
 ) -> list[Mesh | None]:
     """The triangles of each part, None for those that have none."""
     n_parts = len(uv_of)
+    if len(text.v) and np.isnan(text.v[:, 2]).all():
+        raise SceneError("The OBJ file's vertices do not have three coordinates each.", path)
     triangles, owner = _triangles(text, path, diagnostics)
     section = np.array([0])
     if len(sections.first) > 1:

@@ -28,7 +28,7 @@ def read_stl(path: Path, diagnostics: Diagnostics) -> list[tuple[str, Mesh]]:
     if claimed >= 0 and len(data) == _HEADER + _RECORD * claimed:
         return _binary(data, claimed, path, diagnostics)
     start = data[:1024].removeprefix(b"\xef\xbb\xbf").lstrip()
-    if start[:5].lower() == b"solid" and b"facet" in data[:100_000].lower():
+    if start[:5].lower() == b"solid" and (b"facet" in data[:100_000].lower() or b"endsolid" in data[-1000:].lower()):
         return _text(data, path)
     whole = (len(data) - _HEADER) // _RECORD
     if whole > 0 and start[:5].lower() != b"solid" and _plausible(data, claimed, whole):
