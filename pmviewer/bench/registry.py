@@ -39,6 +39,7 @@ BENCHES: dict[str, tuple[str, str]] = {
     "deposition": ("Deposition rules: photons at equal error, power, cost (I4, I5)", "pmviewer.bench.deposition:run"),
     "emission": ("Guided emission: photons traced for the same error (I6)", "pmviewer.bench.emission:run"),
     "stress": ("Extremes of every kind: finite, unbiased or said so, bounded", "pmviewer.bench.stress.suite:run"),
+    "load": ("Opening large PLY, OBJ and STL files against Mitsuba and Embree", "pmviewer.bench.load:run"),
     "projection": ("Caustic photons by projection maps (T7)", "pmviewer.bench.projection:run"),
 }
 """Name: what it measures, and where its function is."""

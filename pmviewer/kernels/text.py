@@ -61,7 +61,7 @@ def scaled_by_ten(mantissa, exponent):
 
 @device
 def number(data, i):
-    """The decimal number at i and the place behind its word; NaN where the word is none. Ends with the line."""
+    """The decimal number that the word at i begins with and the place behind the word; NaN where there is none."""
     negative = data[i] == _MINUS
     if negative or data[i] == _PLUS:
         i += 1
@@ -97,8 +97,6 @@ def number(data, i):
         # "inf", "-Infinity", "1.#INF" and "nan" in whatever spelling
         is_infinite = (data[i] | _LOWER) == 105 and (data[i + 1] | _LOWER) == 110 if end - i >= 3 else False
         value = np.inf if is_infinite else np.nan
-    elif end > i:
-        value = np.nan
     else:
         value = scaled_by_ten(mantissa, exponent)
     return (-value if negative else value), end

@@ -92,6 +92,10 @@ class Materials:
             self._made[key] = _material(key, self._statements[key], self._pictures, self._diagnostics)
         return self._made[key]
 
+    def tell_missing(self) -> None:
+        """Warn of the pictures that were asked for and are not there."""
+        self._pictures.tell_missing()
+
     def read(self, library: Path, text: str) -> None:
         """Add the materials of a file; the first definition of a name counts."""
         current = _Statements(library, 0)
@@ -127,15 +131,16 @@ def read_libraries(path: Path, named: Sequence[tuple[str, int]], diagnostics: Di
     done: set[Path] = set()
     for argument, line in named:
         whole = found_beside(path.parent, argument)
-        libraries = [whole] if whole.exists() else [found_beside(path.parent, word) for word in argument.split()]
-        missing = [library for library in libraries if not library.exists()]
+        named_files = [argument] if whole.exists() else argument.split()
+        libraries = [found_beside(path.parent, name) for name in named_files]
+        missing = [name for name, library in zip(named_files, libraries) if not library.exists()]
         own = found_beside(path.parent, f"{path.stem}.mtl")
-        if missing and own.exists():
+        if len(missing) == len(libraries) and own.exists():
             diagnostics.warn(f"The material file {argument!r} does not exist: '{own.name}' is taken for it.", line)
             libraries = [own]
-        elif missing or not libraries:
-            what = f"The material file {argument[:200]!r} does not exist: grey replaces its materials."
-            diagnostics.warn(what, line)
+        elif missing:
+            gone = argument if len(missing) == len(libraries) else " ".join(missing)
+            diagnostics.warn(f"The material file {gone[:200]!r} does not exist: grey replaces its materials.", line)
         for library in libraries:
             if library in done or not library.exists():
                 continue

@@ -87,6 +87,7 @@ class Pictures:
 
     def __init__(self, diagnostics: Diagnostics) -> None:
         self._diagnostics = diagnostics
+        self._missing: dict[str, str] = {}
         self._pixels: dict[tuple[Path, str], NDArray[np.float32] | None] = {}
 
     def read(self, m: Map, library: Path) -> Bitmap | None:
@@ -109,10 +110,22 @@ class Pictures:
             pixels = np.float32(1) - pixels
         return Bitmap(np.ascontiguousarray(pixels), "clamp" if m.clamp else "repeat", to_uv=m.to_uv, name=path.name)
 
+    def tell_missing(self) -> None:
+        """Warn of the files that are not there, once for all of them."""
+        if not self._missing:
+            return
+        names, where = list(self._missing), next(iter(self._missing.values()))
+        if len(names) == 1:
+            self._diagnostics.warn(f"The texture {names[0]!r} does not exist. It is left out ({where}).")
+            return
+        listed = ", ".join(repr(name) for name in names[:5]) + (", …" if len(names) > 5 else "")
+        self._diagnostics.warn(f"{len(names)} textures do not exist and are left out: {listed} (the first in {where}).")
+
     def _load(self, path: Path, kind: str, m: Map, library: Path) -> NDArray[np.float32] | None:
         try:
             if not path.exists():
-                raise SceneError(f"The texture {m.file[:200]!r} does not exist.")
+                self._missing.setdefault(m.file[:100], f"{library.name}, line {m.line}")
+                return None
             if kind == "opacity":
                 pixels, sentence = read_opacity(path, path.name)
             else:

@@ -75,6 +75,7 @@ def read_obj(path: Path, diagnostics: Diagnostics) -> MeshFile:
         shape_name = " ".join(part for part in (group, name) if part) or path.stem
         material = found.with_vertex_colours() if mesh.colours is not None else found.material
         result.shapes.append(Shape(shape_name, mesh, result.material(material), found.radiance, found.emission))
+    materials.tell_missing()
     return result
 
 
@@ -199,7 +200,7 @@ def _triangles(text: ObjText, path: Path, diagnostics: Diagnostics) -> tuple[Int
         else:
             what = f"All {count:,} faces use vertices that do not exist (there are {len(text.v):,})."
             raise SceneError(what, path, hint="The mesh file is damaged: export it again.")
-    if n_corners == 3 * n_faces and usable.all() and (np.diff(text.starts) == 3).all():
+    if n_faces and n_corners == 3 * n_faces and usable.all() and (np.diff(text.starts) == 3).all():
         return np.arange(n_corners, dtype=np.int32).reshape(-1, 3), np.arange(n_faces, dtype=np.int32)
     n = count_triangles(text.starts, usable)
     if not n:

@@ -69,6 +69,9 @@ def decoded(data: bytes) -> str:
 
 def read_text(data: bytes) -> ObjText:
     """All statements of a file. What is no number becomes NaN, what is no index BAD."""
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        data = data.decode("utf-16", "replace").encode("utf-8")
+    data = data.removeprefix(b"\xef\xbb\xbf")
     if b"\\" in data:  # a line that goes on in the next one
         data = re.sub(rb"\\[ \t]*\r?\n", lambda match: b" " * len(match[0]), data)
     if b"\r" in data:
