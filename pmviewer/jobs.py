@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterable, Mapping
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -23,6 +25,7 @@ from pmviewer.output.compare import ERROR_COLUMNS, Reference, error_row, load_re
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.output.frame_export import LAYERS, write_frame_exr, write_frame_png
 from pmviewer.output.metric import metrics
+from pmviewer.progress import watched
 from pmviewer.render.camera import resolve_camera, size_only
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.describe import describe
@@ -32,6 +35,8 @@ from pmviewer.scene.recentre import recentred
 from pmviewer.settings import Settings, with_values
 
 FORMATS = (".exr", ".png")
+_PATIENCE = 2.0
+"""Seconds that a scene may take to load without a word."""
 
 
 def render_job(
@@ -55,7 +60,8 @@ def render_job(
     for path in outputs:
         check_output(path, FORMATS)
     settings = with_values(job.settings, overrides(passes, seconds, size, seed, job.passes))
-    opened = open_scene(job.scene, job.parameters)
+    with _patiently() as tell, watched(tell, threads=threads):
+        opened = open_scene(job.scene, job.parameters)
     _print_warnings(opened.scene.warnings, opened.scene.dropped)
     target = None if reference is None else _reference(reference, opened.scene, settings)
     view = _view(settings, opened)
@@ -100,6 +106,37 @@ def render_job(
             write_frame_png(path, frame, view=view)
         print(f"wrote {path}")
     return frame
+
+
+@contextmanager
+def _patiently() -> Iterator[Callable[[str], None]]:
+    """Gives what prints the loader's stages once loading has taken `_PATIENCE` seconds, first the one it is in then."""
+    lock, current, late = threading.Lock(), "", False
+
+    def show(text: str) -> None:
+        print(f"{text} …", file=sys.stderr, flush=True)
+
+    def tell(text: str) -> None:
+        nonlocal current
+        with lock:
+            current = text
+            if late:
+                show(text)
+
+    def begin() -> None:
+        nonlocal late
+        with lock:
+            late = True
+            if current:
+                show(current)
+
+    timer = threading.Timer(_PATIENCE, begin)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield tell
+    finally:
+        timer.cancel()
 
 
 def _view(settings: Settings, opened: OpenScene) -> str:

@@ -60,8 +60,8 @@ def write_stl(path: Path, vertices: NDArray[np.float32], faces: NDArray[np.int32
 def write_obj(path: Path, vertices: NDArray[np.float32], faces: NDArray[np.int32], groups: int = 1) -> None:
     """Positions and triangles, in that many groups."""
     with open(path, "w") as file:
-        for part in np.array_split(vertices, max(1, len(vertices) // 100_000)):
-            file.write("".join([f"v {x:.6f} {y:.6f} {z:.6f}\n" for x, y, z in part.tolist()]))
+        for points in np.array_split(vertices, max(1, len(vertices) // 100_000)):
+            file.write("".join([f"v {x:.6f} {y:.6f} {z:.6f}\n" for x, y, z in points.tolist()]))
         pieces = groups if groups > 1 else max(1, len(faces) // 100_000)
         for k, part in enumerate(np.array_split(faces + 1, pieces)):
             name = f"g part{k}\nusemtl m{k % 100}\n" if groups > 1 else ""

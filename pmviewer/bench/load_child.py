@@ -72,7 +72,7 @@ def _mitsuba() -> Callable[[Path], object]:
     def load(path: Path) -> object:
         mesh = {"type": path.suffix[1:], "filename": str(path), "face_normals": True}
         scene = mi.load_dict({"type": "scene", "mesh": mesh, "light": {"type": "constant"}})
-        scene.ray_intersect(mi.Ray3f([0, 0, -5], [0, 0, 1]))
+        scene.ray_intersect(mi.Ray3f(mi.Point3f(0, 0, -5), mi.Vector3f(0, 0, 1)))
         return scene
 
     return load

@@ -10,22 +10,12 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-Task = Callable[[], Any]
-
+from pmviewer.progress import Cancelled as Cancelled
+from pmviewer.progress import Task as Task
+from pmviewer.progress import available_threads as available_threads
 
 BEHIND_WINDOW = 10
 """Niceness of threads that work beside a window."""
-
-
-class Cancelled(Exception):
-    """Work was dropped because newer settings arrived."""
-
-
-def available_threads() -> int:
-    """Processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def lower_priority() -> None:

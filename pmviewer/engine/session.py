@@ -23,6 +23,7 @@ from pmviewer.engine.pool import Cancelled, WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.errors import PmviewerError
+from pmviewer.progress import stage, watched
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.scene.description import Scene
 from pmviewer.scene.tessellate import DrawGeometry, tessellate
@@ -32,7 +33,8 @@ Source = str | Path | Scene
 
 
 class Session:
-    """See the module. All public attributes may be read from any thread; frames and statuses are immutable."""
+    """See the module. All public attributes may be read from any thread; frames and statuses are immutable. `loading`
+    says what the loader is doing ("ball.ply: building the tree …"), "" when nothing is being loaded."""
 
     def __init__(self, threads: int | None = None, settings: Settings | None = None) -> None:
         self.on_update: Callable[[], None] | None = None
@@ -49,6 +51,8 @@ class Session:
         self._paused = False
         self._closed = False
         self._loading_done = 0
+        self._loading_cancelled = 0
+        self.loading = ""
         self._first_picture = False
         self._attempt = 0
         self._failed_version = -1
@@ -74,6 +78,11 @@ class Session:
             ticket = self._loading
         arguments = (ticket, source, settings, parameters or {})
         threading.Thread(target=self._load, args=arguments, name="pmviewer loader", daemon=True).start()
+
+    def cancel_loading(self) -> None:
+        """Give up the scene that is being loaded; the old one stays."""
+        with self._changed:
+            self._loading_cancelled = self._loading
 
     def set(self, settings: Settings) -> int:
         """Use these settings from now on; returns the version that frames made with them will carry."""
@@ -204,11 +213,15 @@ class Session:
     def _load(self, ticket: int, source: Source, settings: Settings | None, parameters: Mapping[str, str]) -> None:
         """In a thread of its own: load, then hand over to the worker, unless another scene was asked for meanwhile."""
         name = source.name if isinstance(source, Scene) else str(source)
-        if self._opened is None:
-            self._tell("loading", f"loading {name}")
+        self._tell_loading(ticket, name)
         try:
-            opened = open_scene(source, parameters)
-            geometry = tessellate(opened.scene)
+            with watched(lambda text: self._tell_loading(ticket, name, text), lambda: self._is_unwanted(ticket)):
+                opened = open_scene(source, parameters)
+                stage("preparing the geometry view")
+                geometry = tessellate(opened.scene)
+        except Cancelled:
+            self._load_cancelled(ticket, name)
+            return
         except PmviewerError as error:
             self._load_failed(ticket, str(error))
             return
@@ -222,13 +235,36 @@ class Session:
             if ticket != self._loading or self._closed:
                 return
             self._loaded = (opened, geometry, settings)
-            self._loading_done = ticket
+            self._loading_done, self.loading = ticket, ""
             self._interrupt()
 
-    def _load_failed(self, ticket: int, text: str) -> None:
-        self._say("error", text)
+    def _is_unwanted(self, ticket: int) -> bool:
+        """Has the load been cancelled, or another scene been asked for?"""
+        return self._closed or ticket != self._loading or ticket <= self._loading_cancelled
+
+    def _tell_loading(self, ticket: int, name: str, text: str = "") -> None:
+        """What the loader is doing: the state, where there is no picture yet, and beside it where there is."""
+        with self._changed:
+            if ticket != self._loading:
+                return
+            self.loading = f"{name}: {text}" if text else name
+        if self._opened is None:
+            self._tell("loading", f"loading {self.loading}")
+        else:
+            self._notify()
+
+    def _load_cancelled(self, ticket: int, name: str) -> None:
+        with self._changed:
+            asked_for = ticket == self._loading and not self._closed
+        if asked_for:
+            self._load_failed(ticket, f"{name}: loading was cancelled.", "info")
+
+    def _load_failed(self, ticket: int, text: str, level: Level = "error") -> None:
+        self._say(level, text)
         with self._changed:
             self._loading_done = max(self._loading_done, ticket)
+            if ticket == self._loading:
+                self.loading = ""
             if self._opened is None:
                 self.status = Status("failed", text)
             self._changed.notify_all()

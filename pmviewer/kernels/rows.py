@@ -120,7 +120,7 @@ def _mixed(a, b, c):
 def weld(bits, table, index, first):
     """Number the different rows of bits (n, 3) uint32 in the order of their first appearance.
 
-    `table` (a power of two above 2 n,) int32 is −1 everywhere; index (n,) int32 becomes each row's number, first (n,)
+    `table` (a power of two above n,) int32 is −1 everywhere; index (n,) int32 becomes each row's number, first (n,)
     int32 the first row with each number. Returns how many there are.
     """
     mask = np.uint32(len(table) - 1)

@@ -143,19 +143,19 @@ def clean_mesh(mesh: Mesh, dropped: Counter[str]) -> Mesh | None:
         faces = faces[verdict == WHOLE]
     if not len(faces):
         return None
-    number = np.empty(len(vertices), np.int32)
-    n_used = number_used(faces, number)
+    place = np.empty(len(vertices), np.int32)
+    n_used = number_used(faces, place)
     if n_used == len(vertices):
         normals = None if mesh.normals is None else _mended(Mesh(vertices, faces, mesh.normals))
         return Mesh(vertices, faces, normals, _finite(mesh.uv), _colours(mesh.colours))
-    used = np.flatnonzero(number >= 0)
+    used = np.flatnonzero(place >= 0)
     normals = mesh.normals
     if normals is not None:
         whole = np.where(np.isfinite(vertices), vertices, 0.0)
         normals = _mended(Mesh(whole, faces, normals))[used]
     uv = None if mesh.uv is None else _finite(mesh.uv[used])
     colours = None if mesh.colours is None else _colours(mesh.colours[used])
-    return Mesh(vertices[used], number[faces], normals, uv, colours)
+    return Mesh(vertices[used], place[faces], normals, uv, colours)
 
 
 def _finite(uv: NDArray[np.float64] | None) -> NDArray[np.float64] | None:

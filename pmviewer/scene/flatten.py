@@ -15,6 +15,7 @@ from pmviewer.kernels import scene as K
 from pmviewer.kernels.bvh import Bvh, build
 from pmviewer.scene.covered_emission import with_covered_emission
 from pmviewer.kernels.mesh import face_normals
+from pmviewer.progress import stage
 from pmviewer.scene.description import (
     LUMINANCE,
     Cylinder,
@@ -147,6 +148,7 @@ def flatten(scene: Scene) -> FlatScene:
         ),
     )
     r = record[0]
+    stage(f"building the tree over {len(vertices):,} triangles")
     if groups:
         bvh, shown = build_instanced(scene, groups, vertices, quadrics, shape_of_prim, r)
     else:

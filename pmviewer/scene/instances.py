@@ -114,7 +114,7 @@ def build_instanced(
     normals: Sequence[Normal],
     triangles: NDArray[np.float32],
     quadrics: NDArray[np.float32],
-    shape_of_prim: NDArray[np.int64],
+    shape_of_prim: NDArray[np.integer],
     record: np.record,
 ) -> tuple[Bvh, InstanceTables]:
     """Build the groups' trees and the scene's own over them, and write both into `record`.

@@ -41,6 +41,9 @@ class SessionLike(Protocol):
     def threads(self) -> int | None: ...
     @property
     def paused(self) -> bool: ...
+    @property
+    def loading(self) -> str: ...
+    def cancel_loading(self) -> None: ...
     def open(
         self, source: Any, settings: Settings | None = None, parameters: Mapping[str, str] | None = None
     ) -> None: ...
@@ -112,6 +115,11 @@ class SessionLink:
                 return
             self._source = (source, settings, parameters)
 
+    def cancel_loading(self) -> None:
+        with self._lock:
+            if self._session is not None:
+                self._session.cancel_loading()
+
     def set(self, settings: Settings) -> None:
         with self._lock:
             self._settings = settings
@@ -166,6 +174,10 @@ class SessionLink:
     @property
     def status(self) -> Status:
         return self._session.status if self._session else self._status
+
+    @property
+    def loading(self) -> str:
+        return self._session.loading if self._session else ""
 
     @property
     def scene(self) -> Scene | None:

@@ -59,6 +59,15 @@ def draw_status_bar(state: ViewerState) -> None:
         imgui.pop_style_color()
         if not busy:
             imgui.set_item_tooltip(f"{grouped(status.passes)} of {grouped(state.settings.render.passes)} passes")
+    loading = state.session.loading
+    if loading:
+        if status.state != "loading":
+            imgui.same_line()
+            imgui.text_colored(imgui.ImVec4(*theme.ACCENT), theme.drawable(f"loading {loading} …"))
+        imgui.same_line()
+        if imgui.small_button("Cancel##loading"):
+            state.session.cancel_loading()
+        imgui.set_item_tooltip("Give up loading; the open scene stays")
     for part in status_parts(state):
         imgui.same_line()
         imgui.text_disabled("·")

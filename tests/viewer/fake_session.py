@@ -96,6 +96,7 @@ class FakeSession:
         self.frame: Frame | None = None
         self.status = Status()
         self.opened_scene = None
+        self.loading = ""
         self.threads = None
         self.paused = False
         self.restarts = 0
@@ -103,6 +104,9 @@ class FakeSession:
         self.closed = False
         self.inspected: tuple[int, int] | None = None
         self._messages: list[Message] = []
+
+    def cancel_loading(self) -> None:
+        self.loading = ""
 
     def open(self, source: str | Path, settings: Settings | None = None, parameters=None) -> None:
         self.opened.append(str(source))

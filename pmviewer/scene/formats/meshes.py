@@ -11,6 +11,7 @@ from typing import Literal, TypeVar
 import numpy as np
 
 from pmviewer.errors import SceneError
+from pmviewer.progress import Cancelled, stage
 from pmviewer.scene.clean import check_camera, check_faces, check_size, clean_lights, clean_shapes
 from pmviewer.scene.description import (
     Camera,
@@ -41,11 +42,13 @@ def load_mesh_scene(path: Path, choices: Mapping[str, str] | None = None) -> Sce
     looks. Raises SceneError."""
     ending = path.suffix.lower()
     diagnostics = Diagnostics(path)
+    stage(f"reading {path.name}")
     content = _guarded(lambda: _read(path, ending, diagnostics, choices or {}), path)
     groups = dict.fromkeys(instance.group for instance in content.instances)
     for shape in (*content.shapes, *(shape for group in groups for shape in group.shapes)):
         if isinstance(shape.geometry, Mesh):
             check_faces(shape.geometry, path)
+    stage("looking for broken triangles")
     shapes = clean_shapes(content.shapes, diagnostics)
     instances = clean_instances(content.instances, diagnostics)
     if not shapes and not instances:
@@ -95,7 +98,7 @@ def _guarded(read: Callable[[], T], path: Path) -> T:
         if path.stat().st_size == 0:
             raise SceneError("The file is empty (0 bytes).", path, hint="Export it again.")
         return read()
-    except SceneError:
+    except (SceneError, Cancelled, MemoryError):
         raise
     except OSError as error:
         raise SceneError(f"The file can't be read: {error.strerror or error}.", path) from None

@@ -158,7 +158,7 @@ def _name(name: str) -> str:
 
 def _numbers(text: str) -> list[float]:
     """The finite numbers that a statement begins with, behind options such as -halo."""
-    numbers = []
+    numbers: list[float] = []
     for word in text.split():
         try:
             value = float(word)
@@ -193,7 +193,7 @@ def _material(name: str, s: _Statements, pictures: Pictures, diagnostics: Diagno
             )
         else:
             material = replace(material, opacity=opacity)
-    surface = {slot: maps[slot] for slot in ("bump", "normal") if slot in maps}
+    surface: dict[str, Texture] = {slot: maps[slot] for slot in ("bump", "normal") if slot in maps}
     scale = s.maps["bump"].factor if "bump" in maps else 1.0
     material = replace(material, textures={**material.textures, **surface}, bump_scale=scale)
     ke = s.colour("ke", 0.0)

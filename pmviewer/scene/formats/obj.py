@@ -73,8 +73,8 @@ def read_obj(path: Path, diagnostics: Diagnostics) -> MeshFile:
             continue
         found = materials[name] if name is not None else MtlMaterial(DEFAULT_MATERIAL)
         shape_name = " ".join(part for part in (group, name) if part) or path.stem
-        material = found.with_vertex_colours() if mesh.colours is not None else found.material
-        result.shapes.append(Shape(shape_name, mesh, result.material(material), found.radiance, found.emission))
+        look = found.with_vertex_colours() if mesh.colours is not None else found.material
+        result.shapes.append(Shape(shape_name, mesh, result.material(look), found.radiance, found.emission))
     materials.tell_missing()
     return result
 
@@ -192,8 +192,8 @@ def _triangles(text: ObjText, path: Path, diagnostics: Diagnostics) -> tuple[Int
     usable = np.ones(n_faces, np.bool_)
     bad = (text.corners < 0) | (text.corners >= len(text.v))
     if bad.any():
-        owner = np.repeat(np.arange(n_faces), np.diff(text.starts))
-        usable[owner[bad]] = False
+        face_of = np.repeat(np.arange(n_faces), np.diff(text.starts))
+        usable[face_of[bad]] = False
         count = int(n_faces - usable.sum())
         if count < n_faces:
             diagnostics.dropped["face with a vertex that does not exist"] += count
@@ -201,7 +201,8 @@ def _triangles(text: ObjText, path: Path, diagnostics: Diagnostics) -> tuple[Int
             what = f"All {count:,} faces use vertices that do not exist (there are {len(text.v):,})."
             raise SceneError(what, path, hint="The mesh file is damaged: export it again.")
     if n_faces and n_corners == 3 * n_faces and usable.all() and (np.diff(text.starts) == 3).all():
-        return np.arange(n_corners, dtype=np.int32).reshape(-1, 3), np.arange(n_faces, dtype=np.int32)
+        everything: Ints = np.arange(n_corners, dtype=np.int32)
+        return everything.reshape(-1, 3), everything[:n_faces]
     n = count_triangles(text.starts, usable)
     if not n:
         hint = "Is it an OBJ file? Export it with triangles."

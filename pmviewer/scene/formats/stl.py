@@ -59,7 +59,7 @@ def _binary(data: bytes, n: int, path: Path, diagnostics: Diagnostics) -> list[t
         raise SceneError("The STL file has no triangles.", path, hint="Export it again.")
     if b"COLOR=" in data[:80] or facets["attribute"].any():
         diagnostics.warn("Colours of the STL file are ignored: programs do not agree on how to write them.")
-    corners = facets["corners"].reshape(-1, 3).astype(np.float32)  # of this machine's byte order
+    corners = np.add(facets["corners"], np.float32(0), dtype=np.float32).reshape(-1, 3)  # −0 becomes 0
     del facets, data
     return [(path.stem, _welded(corners))]
 
@@ -79,15 +79,14 @@ def _text(data: bytes, path: Path) -> list[tuple[str, Mesh]]:
         own = corners[first : first + (end - first) // 3 * 3]
         if len(own):
             name = data[place : data.find(b"\n", place)].decode("utf-8", "replace")[5:].strip()[:80]
-            found.append((name or path.stem, _welded(own.astype(np.float32))))
+            found.append((name or path.stem, _welded(own.astype(np.float32) + np.float32(0))))
     return found
 
 
 def _welded(corners: NDArray[np.float32]) -> Mesh:
-    """The triangles of corners (3 n, 3) with each vertex once."""
+    """The triangles of corners (3 n, 3), which have no −0, with each vertex once."""
     stage(f"joining the corners of {len(corners) // 3:,} triangles")
-    corners = np.ascontiguousarray(corners + np.float32(0))  # −0 becomes 0
-    size = 1 << max(2, (2 * len(corners)).bit_length())
+    size = 1 << max(2, (4 * len(corners) // 3).bit_length())
     index, first = np.empty(len(corners), np.int32), np.empty(len(corners), np.int32)
     used = weld(corners.view(np.uint32), np.full(size, -1, np.int32), index, first)
     return Mesh(corners[first[:used]].astype(np.float64), index.reshape(-1, 3))
