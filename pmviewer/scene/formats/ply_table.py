@@ -175,7 +175,7 @@ def _read_element(source: NDArray, at: int, order: str, element: Element, path: 
         gather(source, np.ascontiguousarray(places[:, k]), np.ascontiguousarray(lengths[:, k]), size, items)
         values = items.view(order + x.type) if order else items
         if x.count_type is None:
-            columns[x.name] = values
+            columns[x.name] = _typed(values, x)
         else:
             columns[x.name] = ListColumn(values, np.concatenate([[0], np.cumsum(lengths[:, k])]))
     return columns, end
@@ -209,12 +209,20 @@ def _uniform_row(source: NDArray, at: int, order: str, element: Element) -> np.d
     return row
 
 
+def _typed(values: NDArray, p: Property) -> NDArray:
+    """Whole numbers of a text in their own type, which tells bytes of colours from shares."""
+    if values.dtype.kind != "f" or np.dtype(p.type).kind == "f":
+        return values
+    with np.errstate(invalid="ignore"):
+        return values.astype(p.type)
+
+
 def _columns_of(rows: NDArray, element: Element) -> Columns:
     columns: Columns = {}
     for i, p in enumerate(element.properties):
         values = rows[f"p{i}"]
         if p.count_type is None:
-            columns[p.name] = values
+            columns[p.name] = _typed(values, p)
         else:
             n, length = values.shape
             columns[p.name] = ListColumn(values.reshape(-1), np.arange(n + 1, dtype=np.int64) * length)
