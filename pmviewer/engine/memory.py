@@ -13,8 +13,8 @@ BYTES_PER_PIXEL = CHANNELS * (8 + 3 * 4)
 BYTES_PER_TRAJECTORY = 250
 """Some three photons stored, twice while batches are joined, and their map."""
 
-BYTES_PER_TRIANGLE = 600
-"""Vertices and normals in float64 and float32, and the tree with what building it takes."""
+BYTES_PER_TRIANGLE = 300
+"""Vertices and normals in float64 and float32, and the tree with what building it takes (`pmviewer bench load`)."""
 
 BYTES_PER_INSTANCE = 1200
 

@@ -404,3 +404,30 @@ def test_a_session_starts_with_the_default_settings():
     session = Session(threads=1)
     assert session.settings == Settings()
     session.close()
+
+
+def test_loading_says_what_it_does_and_can_be_cancelled(session, tmp_path):
+    points = "".join(f"v {i % 7} {i % 11} {i % 13}\n" for i in range(300))
+    (tmp_path / "a.obj").write_text(points + "".join(f"f {i} {i + 1} {i + 2}\n" for i in range(1, 290)))
+    seen = []
+
+    def look():
+        if session.loading and session.loading not in seen:
+            seen.append(session.loading)
+            if "building the tree" in session.loading:
+                session.cancel_loading()
+
+    session.on_update = look
+    session.open(tmp_path / "a.obj")
+    until(lambda: session.status.state == "failed")
+    assert [text.rsplit(": ", 1)[-1].split(" over")[0] for text in seen[1:]] == [
+        "reading a.obj", "joining the corners", "looking for broken triangles", "building the tree",
+    ]  # fmt: skip
+    assert session.loading == ""
+    assert session.scene is None
+    (message,) = session.take_messages()
+    assert (message.level, "cancelled" in message.text) == ("info", True)
+    session.on_update = None
+    session.open(tmp_path / "a.obj")
+    until(lambda: session.scene is not None)
+    assert session.loading == ""

@@ -82,6 +82,17 @@ def test_lights_by_ke_or_by_an_ambient_above_one(tmp_path: Path) -> None:
     assert any("'light' has no Ke" in w for w in scene.warnings)
 
 
+def test_lights_by_name_where_nothing_emits(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text(TRIANGLE + "usemtl AreaLight\nf 1 2 3\nusemtl light wood\nf 1 2 3\n")
+    mtl = "newmtl m\n{}newmtl AreaLight\nKd 1 0.5 0\nnewmtl light wood\n"
+    (tmp_path / "a.mtl").write_text(mtl.format(""))
+    scene = load_scene(tmp_path / "a.obj")
+    assert [s.radiance for s in scene.shapes] == [None, (10, 5, 0), None]
+    assert any("'AreaLight' does, for its name" in w for w in scene.warnings)
+    (tmp_path / "a.mtl").write_text(mtl.format("Ke 1 1 1\n"))
+    assert [s.radiance for s in load_scene(tmp_path / "a.obj").shapes] == [(1, 1, 1), None, None]
+
+
 def picture(path: Path, mode: str, *colours: object) -> None:
     from PIL import Image
 

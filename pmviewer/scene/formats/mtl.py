@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -29,6 +29,9 @@ _FAINTEST = 0.004
 _SPECULAR = 0.08
 """Reflectance at normal incidence that Ks 1 stands for beside a diffuse colour, as Blender and others write it."""
 _LIGHT_NAME = re.compile(r"light|lamp|emit|luminaire|bulb", re.IGNORECASE)
+_ALL_LIGHT = re.compile(r"(area|ceiling|top|room|sun|sky|key|fill)?[ _.-]*(light|emitter)(s|source)?[ _.-]*\d*", re.I)
+_BRIGHT = 10.0
+"""Radiance of a white light whose file doesn't say."""
 _KNOWN = ("ka", "kd", "ks", "ke", "tf", "ns", "ni", "d", "tr", "illum", "pr", "pm", "ps", "pc", "pcr")
 
 
@@ -91,6 +94,20 @@ class Materials:
         if key not in self._made:
             self._made[key] = _material(key, self._statements[key], self._pictures, self._diagnostics)
         return self._made[key]
+
+    def light_up(self, names: Iterable[str]) -> None:
+        """Where none of these materials emits, those named like a light do, in their own colour: many programs leave
+        lights out of the file."""
+        found = {name: self[name] for name in dict.fromkeys(names) if name in self}
+        if any(m.radiance is not None for m in found.values()):
+            return
+        for name, m in found.items():
+            if not _ALL_LIGHT.fullmatch(_name(name)) or m.material.transparent:
+                continue
+            r, g, b = m.material.reflectance if max(m.material.reflectance) > 0 else (1.0, 1.0, 1.0)
+            self._made[_name(name)] = replace(m, radiance=(_BRIGHT * r, _BRIGHT * g, _BRIGHT * b))
+            what = f"No material emits light (Ke). That of '{name[:60]}' does, for its name, with a guessed radiance."
+            self._diagnostics.warn(what)
 
     def tell_missing(self) -> None:
         """Warn of the pictures that were asked for and are not there."""

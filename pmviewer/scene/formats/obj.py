@@ -48,6 +48,7 @@ def read_obj(path: Path, diagnostics: Diagnostics) -> MeshFile:
     text = _text(path)
     sections = _sections(text, diagnostics)
     materials = read_libraries(path, sections.libraries, diagnostics)
+    materials.light_up(m for m in sections.material if m is not None)
     keys: list[tuple[str | None, str]] = []
     numbers: dict[tuple[str | None, str], int] = {}
     of_section = []
