@@ -23,7 +23,7 @@ ERRORS: dict[str, tuple[int | None, tuple[str, ...]]] = {
     "external_entity.xml": (2, ("entities", "refused")),
     "garbage.glb": (None, ("not a glTF file",)),
     "garbage.gltf": (None, ("not a glTF file",)),
-    "garbage.obj": (None, ("no triangle",)),
+    "garbage.obj": (None, ("no faces",)),
     "garbage.ply": (None, ("not a PLY file",)),
     "garbage.stl": (None, ("neither a binary nor a text STL",)),
     "garbage.xml": (1, ("not well-formed XML",)),

@@ -82,8 +82,9 @@ def read_ply_file(path: Path) -> PlyFile:
 
 def _stack(columns: dict[str, NDArray], names: tuple[str, ...]) -> Float:
     out = np.empty((len(columns[names[0]]), len(names)))
-    for i, name in enumerate(names):
-        out[:, i] = columns[name]
+    with np.errstate(invalid="ignore"):  # of NaNs that signal
+        for i, name in enumerate(names):
+            out[:, i] = columns[name]
     return out
 
 

@@ -59,7 +59,8 @@ def _binary(data: bytes, n: int, path: Path, diagnostics: Diagnostics) -> list[t
         raise SceneError("The STL file has no triangles.", path, hint="Export it again.")
     if b"COLOR=" in data[:80] or facets["attribute"].any():
         diagnostics.warn("Colours of the STL file are ignored: programs do not agree on how to write them.")
-    corners = np.add(facets["corners"], np.float32(0), dtype=np.float32).reshape(-1, 3)  # −0 becomes 0
+    with np.errstate(invalid="ignore"):
+        corners = np.add(facets["corners"], np.float32(0), dtype=np.float32).reshape(-1, 3)  # −0 becomes 0
     del facets, data
     return [(path.stem, _welded(corners))]
 
@@ -79,7 +80,9 @@ def _text(data: bytes, path: Path) -> list[tuple[str, Mesh]]:
         own = corners[first : first + (end - first) // 3 * 3]
         if len(own):
             name = data[place : data.find(b"\n", place)].decode("utf-8", "replace")[5:].strip()[:80]
-            found.append((name or path.stem, _welded(own.astype(np.float32) + np.float32(0))))
+            with np.errstate(over="ignore", invalid="ignore"):  # what is infinite is left out later
+                rounded = own.astype(np.float32) + np.float32(0)
+            found.append((name or path.stem, _welded(rounded)))
     return found
 
 
