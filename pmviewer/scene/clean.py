@@ -164,7 +164,9 @@ def _finite(uv: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
 
 def _colours(colours: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
     """Finite colours between 0 and 1: they multiply what a surface reflects."""
-    if colours is None or (np.isfinite(colours).all() and 0 <= colours.min(initial=0.0) <= colours.max(initial=0.0) <= 1):
+    if colours is None or (
+        np.isfinite(colours).all() and 0 <= colours.min(initial=0.0) <= colours.max(initial=0.0) <= 1
+    ):
         return colours
     return np.clip(np.nan_to_num(colours, posinf=0.0, neginf=0.0), 0.0, 1.0)
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError
 from pmviewer.kernels import scene as K
 from pmviewer.kernels.bvh import Bvh, build
-from pmviewer.scene.covered_emission import with_covered_emission
 from pmviewer.kernels.mesh import face_normals
 from pmviewer.progress import stage
+from pmviewer.scene.covered_emission import with_covered_emission
 from pmviewer.scene.description import (
     LUMINANCE,
     Cylinder,

@@ -125,7 +125,9 @@ def _encoded(data: bytes, name: str, values: Callable[[Any], NDArray[np.float32]
         with Image.open(BytesIO(data)) as picture:
             width, height = picture.size
             if max(width, height) > _MOST_SIDE:
-                raise SceneError(f"The texture {name!r} has {width} × {height} pixels: too many.", hint="Use a smaller picture.")
+                raise SceneError(
+                    f"The texture {name!r} has {width} × {height} pixels: too many.", hint="Use a smaller picture."
+                )
             _check_memory(width, height, name)
             return values(picture)
     except SceneError:
