@@ -14,7 +14,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -139,6 +139,21 @@ class Guarded:
         """End the process, if there is one."""
         if self._process is not None:
             self._end(kill=True)
+
+
+def requests() -> Iterator[dict[str, Any]]:
+    """For the process that is asked: the requests, one after another. It ends at once, even in the midst of one, when
+    there is nobody left to ask: a bench that was ended leaves no process behind."""
+    lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+
+    def read() -> None:
+        for line in sys.stdin:
+            lines.put(line)
+        os._exit(0)
+
+    threading.Thread(target=read, daemon=True).start()
+    while True:
+        yield json.loads(lines.get())
 
 
 def _forward(stream: IO[str], lines: queue.SimpleQueue[str]) -> None:

@@ -5,10 +5,11 @@ import os
 import sys
 import time
 
+from pmviewer.bench.guarded import requests
+
 
 def main() -> None:
-    for line in sys.stdin:
-        request = json.loads(line)
+    for request in requests():
         what = request["do"]
         if what == "wait":
             time.sleep(1000)

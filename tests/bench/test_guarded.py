@@ -1,5 +1,6 @@
 """The watchdog: a process that hangs, computes for ever, grows or dies is ended, and the next request is answered."""
 
+import subprocess
 import sys
 
 import pytest
@@ -45,6 +46,20 @@ def test_the_clock_ends_what_the_system_does_not_watch(server, monkeypatch):
     monkeypatch.setattr("pmviewer.bench.guarded.cpu_seconds", lambda pid: 0.0)
     with pytest.raises(Ended, match=r"after 0\.5 s"):
         server.ask({"do": "wait"}, Limits(wall=0.5))
+
+
+def test_a_process_ends_with_the_one_that_asks_it():
+    """Even while it does what would never end."""
+    command = [sys.executable, "-m", "tests.bench.odd_server"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write('{"do": "answer"}\n')
+        process.stdin.flush()
+        assert process.stdout.readline()
+        process.stdin.write('{"do": "wait"}\n')
+        process.stdin.close()
+        assert process.wait(60) == 0
 
 
 @linux

@@ -10,7 +10,6 @@ import base64
 import io
 import json
 import os
-import sys
 import time
 import traceback
 from pathlib import Path
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from pmviewer.bench.files.mitsuba_file import noise, small_size
+from pmviewer.bench.guarded import requests
 from pmviewer.errors import PmviewerError
 
 DARK = 1 / 255
@@ -32,8 +32,7 @@ def main() -> None:
     where there is nothing else to say."""
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
-    for line in sys.stdin:
-        request = json.loads(line)
+    for request in requests():
         try:
             answer = _WORK[request["do"]](request)
         except PmviewerError as error:

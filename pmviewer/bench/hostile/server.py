@@ -5,12 +5,11 @@ from __future__ import annotations
 import gc
 import json
 import os
-import sys
 import time
 import traceback
 from typing import Any
 
-from pmviewer.bench.guarded import forget_peak, resident_bytes
+from pmviewer.bench.guarded import forget_peak, requests, resident_bytes
 from pmviewer.errors import SceneError
 
 FRAMES = 3
@@ -23,8 +22,8 @@ def main() -> None:
     os.dup2(2, 1)
     from pmviewer.engine.opened import open_scene
 
-    for line in sys.stdin:
-        path = json.loads(line)["path"]
+    for request in requests():
+        path = request["path"]
         gc.collect()
         forget_peak()
         before, started = resident_bytes(), time.process_time()
