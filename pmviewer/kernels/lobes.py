@@ -63,9 +63,12 @@ __all__ = [
     "bsdf_sample",
     "bsdf_transmits",
     "followed_share",
+    "frame",
     "interior_attenuation",
+    "local",
     "material_params",
     "sees_side",
+    "world",
 ]
 
 _f4 = np.float32
@@ -91,12 +94,14 @@ class Bsdf(NamedTuple):
 
 
 @device
-def _local(b, w):
+def local(b, w):
+    """The direction w in the frame of the BSDF b."""
     return dot(w, b.s), dot(w, b.t), dot(w, b.n)
 
 
 @device
-def _world(b, w):
+def world(b, w):
+    """The direction w of the frame of b in the world."""
     return (
         w[0] * b.s[0] + w[1] * b.t[0] + w[2] * b.n[0],
         w[0] * b.s[1] + w[1] * b.t[1] + w[2] * b.n[1],
@@ -105,7 +110,7 @@ def _world(b, w):
 
 
 @device
-def _frame(n, tangent):
+def frame(n, tangent):
     """Axes of anisotropy: the tangent made orthogonal to n; any when it is zero or along n."""
     along = dot(n, tangent)
     x = (tangent[0] - along * n[0], tangent[1] - along * n[1], tangent[2] - along * n[2])
@@ -145,7 +150,7 @@ def bsdf_at(scene, material, p, ng, ns, tangent, wo, glossy):
     # Not so those of maps, which Mitsuba leaves black as well.
     if opaque and p.kind != DIFFUSE and not p.mapped:
         ns = reflecting_normal(ns, ng, wo)
-    s, t = _frame(ns, tangent)
+    s, t = frame(ns, tangent)
     cos = min(abs(dot(ns, wo)), _f4(1.0))
     groups, lobe, delta = NOTHING, NOTHING, False
     if not hidden:
@@ -300,19 +305,19 @@ def _f_pdf(b, group, o, i):
 @device
 def bsdf_f_pdf(b, group, wo, wi):
     """(f, pdf) of a group's lobes: what `bsdf_f` and `bsdf_pdf` give, in one evaluation."""
-    return _f_pdf(b, group, _local(b, wo), _local(b, wi))
+    return _f_pdf(b, group, local(b, wo), local(b, wi))
 
 
 @device
 def bsdf_f(b, group, wo, wi):
     """Value of a group's lobes (red, green, blue); 0 for deltas and for the wrong side."""
-    return _f_pdf(b, group, _local(b, wo), _local(b, wi))[0]
+    return _f_pdf(b, group, local(b, wo), local(b, wi))[0]
 
 
 @device
 def bsdf_pdf(b, group, wo, wi):
     """Density per solid angle of `bsdf_sample` within the group; 0 for deltas."""
-    return _f_pdf(b, group, _local(b, wo), _local(b, wi))[1]
+    return _f_pdf(b, group, local(b, wo), local(b, wi))[1]
 
 
 @device
@@ -334,12 +339,12 @@ def bsdf_sample(b, group, wo, u_lobe, u, v):
     A weight of zero means absorbed; wi is then wo.
     """
     p = b.p
-    o = _local(b, wo)
+    o = local(b, wo)
     if b.groups & group == 0:
         return wo, _BLACK, _f4(0.0), _f4(1.0)
     if group == FOLLOWED and b.delta:
         i, weight, compression = sample_smooth(p, o, u_lobe)
-        return _world(b, i), weight, _f4(0.0), compression
+        return world(b, i), weight, _f4(0.0), compression
     if p.kind == ROUGH_DIELECTRIC:
         i, useful = sample_rough_dielectric(p, o, u_lobe, u, v)
         if useful == 0:
@@ -353,5 +358,5 @@ def bsdf_sample(b, group, wo, u_lobe, u, v):
     f, pdf = _f_pdf(b, group, o, i)
     if not pdf > _f4(0.0):
         return wo, _BLACK, _f4(0.0), _f4(1.0)
-    wi = _world(b, i)
+    wi = world(b, i)
     return wi, scale(f, abs(i[2]) / pdf), pdf, bsdf_compression(b, wo, wi)

@@ -14,11 +14,14 @@ power; radiance is multiplied by the `compression` (n_i/n_t)² as well.
 
 from __future__ import annotations
 
+from types import ModuleType
+
 import numpy as np
 from numba.core import types
 from numba.extending import overload
 
-from pmviewer.kernels import lobes
+from pmviewer.kernels import lobes, principled_bsdf
+from pmviewer.kernels.blend import blend_keeps, chosen_part, inside_attenuation
 from pmviewer.kernels.material_textures import texture_params
 from pmviewer.kernels.normal_map import shading_frame
 from pmviewer.kernels.plain_bsdf import (
@@ -31,7 +34,9 @@ from pmviewer.kernels.plain_bsdf import (
     plain_pdf,
     plain_sample,
 )
+from pmviewer.kernels.principled import metallic_at
 from pmviewer.kernels.random import draw1, draw4
+from pmviewer.kernels.scene import BLEND, material_kind
 from pmviewer.kernels.vector import dot, scale
 
 __all__ = [
@@ -49,6 +54,7 @@ __all__ = [
     "is_delta",
     "is_lambertian",
     "is_plain",
+    "keeps",
     "pick_group",
     "same_side",
     "shading_normal",
@@ -64,17 +70,43 @@ def is_plain(b: object) -> bool:
     return isinstance(b, types.BaseNamedTuple) and b.instance_class is PlainBsdf
 
 
+def _rich(b: types.Type) -> ModuleType:
+    """The module that knows a BSDF's type in kernels of rich scenes."""
+    return principled_bsdf if b.instance_class is principled_bsdf.AnyBsdf else lobes
+
+
 def bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
     """The BSDF at the point p of primitive `prim`, at its coordinates (u, v), with normals ng and ns, seen from wo.
 
-    Its fields `groups` (NOTHING, or bits STORED and FOLLOWED) and `albedo` are for anyone to read. A black surface, or
-    the back of a one-sided one, has no groups.
+    Of a blend it is that of the part that counts at this hit (`pmviewer.kernels.blend`). Its fields `groups` (NOTHING,
+    or bits STORED and FOLLOWED) and `albedo` are for anyone to read. A black surface, or the back of a one-sided one,
+    has no groups.
     """
     raise NotImplementedError("only for kernels")
 
 
 @overload(bsdf_at)
 def _bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+    if "blends" in scene.fields:
+
+        def blended(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+            part = chosen_part(scene, material, prim, u, v, p, wo)
+            return unblended(scene, prim, part, u, v, p, ng, ns, wo, glossy)
+
+        return blended
+    return _unblended(scene, prim, material, u, v, p, ng, ns, wo, glossy)
+
+
+def unblended(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+    """`bsdf_at` of a material that is no blend."""
+    raise NotImplementedError("only for kernels")
+
+
+@overload(unblended)
+def _unblended(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+    if "principled" in scene.fields:
+        return _with_principled(scene)
+
     if "bsdfs" in scene.fields and "textures" in scene.fields:
 
         def textured(scene, prim, material, u, v, p, ng, ns, wo, glossy):
@@ -98,6 +130,51 @@ def _bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
     return plain
 
 
+def _with_principled(scene):
+    """`unblended` for scenes with principled materials, by the type of the scene's record."""
+    if "textures" in scene.fields:
+
+        def textured(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+            numbers = texture_params(scene, material, prim, u, v, p)
+            metallic = metallic_at(scene, material, prim, u, v, p)
+            ns, tangent = shading_frame(scene, material, prim, u, v, p, ng, ns, wo)
+            return principled_bsdf.bsdf_at(scene, material, numbers, metallic, ng, ns, tangent, wo, glossy)
+
+        return textured
+
+    def untextured(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+        tangent = (_f4(0.0), _f4(0.0), _f4(0.0))
+        numbers = lobes.material_params(scene, material)
+        metallic = metallic_at(scene, material, prim, u, v, p)
+        return principled_bsdf.bsdf_at(scene, material, numbers, metallic, ng, ns, tangent, wo, glossy)
+
+    return untextured
+
+
+def keeps(scene, material, b, ng, wo, glossy):
+    """The groups that photons are kept for at a hit seen from wo: STORED, and FOLLOWED where such lobes are no deltas.
+
+    b is the BSDF there and ng the surface's normal, outwards. Of a blend, where b is that of one part, those of all.
+    """
+    raise NotImplementedError("only for kernels")
+
+
+@overload(keeps)
+def _keeps(scene, material, b, ng, wo, glossy):
+    def own(scene, material, b, ng, wo, glossy):
+        return b.groups & STORED if is_delta(b) else b.groups
+
+    if "blends" not in scene.fields:
+        return own
+
+    def blended(scene, material, b, ng, wo, glossy):
+        if material_kind(scene, material) == BLEND:
+            return blend_keeps(scene, material, dot(ng, wo) < _f4(0.0), glossy)
+        return b.groups & STORED if is_delta(b) else b.groups
+
+    return blended
+
+
 def bsdf_f(b, group, wo, wi):
     """Value of a group's lobes (red, green, blue); 0 for deltas."""
     raise NotImplementedError("only for kernels")
@@ -106,7 +183,8 @@ def bsdf_f(b, group, wo, wi):
 @overload(bsdf_f)
 def _bsdf_f(b, group, wo, wi):
     if not is_plain(b):
-        return lambda b, group, wo, wi: lobes.bsdf_f(b, group, wo, wi)
+        f = _rich(b).bsdf_f
+        return lambda b, group, wo, wi: f(b, group, wo, wi)
     return lambda b, group, wo, wi: plain_f(b, group, wo, wi)
 
 
@@ -118,7 +196,8 @@ def bsdf_pdf(b, group, wo, wi):
 @overload(bsdf_pdf)
 def _bsdf_pdf(b, group, wo, wi):
     if not is_plain(b):
-        return lambda b, group, wo, wi: lobes.bsdf_pdf(b, group, wo, wi)
+        f = _rich(b).bsdf_pdf
+        return lambda b, group, wo, wi: f(b, group, wo, wi)
     return lambda b, group, wo, wi: plain_pdf(b, group, wo, wi)
 
 
@@ -130,7 +209,8 @@ def bsdf_sample(scene, b, group, wo, u_lobe, u, v):
 @overload(bsdf_sample)
 def _bsdf_sample(scene, b, group, wo, u_lobe, u, v):
     if not is_plain(b):
-        return lambda scene, b, group, wo, u_lobe, u, v: lobes.bsdf_sample(b, group, wo, u_lobe, u, v)
+        f = _rich(b).bsdf_sample
+        return lambda scene, b, group, wo, u_lobe, u, v: f(b, group, wo, u_lobe, u, v)
     return lambda scene, b, group, wo, u_lobe, u, v: plain_sample(scene, b, group, wo, u_lobe, u, v)
 
 
@@ -142,7 +222,8 @@ def same_side(b, group, ng, wo, wi):
 @overload(same_side)
 def _same_side(b, group, ng, wo, wi):
     if not is_plain(b):
-        return lambda b, group, ng, wo, wi: 1 if lobes.sees_side(b, group, ng, wo, wi) else 0
+        f = _rich(b).sees_side
+        return lambda b, group, ng, wo, wi: 1 if f(b, group, ng, wo, wi) else 0
     return lambda b, group, ng, wo, wi: 1 if group == FOLLOWED or dot(ng, wi) > _f4(0.0) else 0
 
 
@@ -166,7 +247,8 @@ def followed_share(b, wo):
 @overload(followed_share)
 def _followed_share(b, wo):
     if not is_plain(b):
-        return lambda b, wo: lobes.followed_share(b, wo)
+        f = _rich(b).followed_share
+        return lambda b, wo: f(b, wo)
     return lambda b, wo: _f4(1.0) if b.groups == FOLLOWED else _f4(0.0)
 
 
@@ -178,9 +260,10 @@ def pick_group(b, wo, u):
 @overload(pick_group)
 def _pick_group(b, wo, u):
     if not is_plain(b):
+        share_of = _rich(b).followed_share
 
         def rich(b, wo, u):
-            share = lobes.followed_share(b, wo)
+            share = share_of(b, wo)
             if u < share:
                 return FOLLOWED, _f4(1.0) / share, u / share
             rest = _f4(1.0) - share
@@ -198,7 +281,8 @@ def transmits(b):
 @overload(transmits)
 def _transmits(b):
     if not is_plain(b):
-        return lambda b: lobes.bsdf_transmits(b)
+        f = _rich(b).bsdf_transmits
+        return lambda b: f(b)
     return lambda b: False
 
 
@@ -210,7 +294,8 @@ def compressed(b, wo, wi, f):
 @overload(compressed)
 def _compressed(b, wo, wi, f):
     if not is_plain(b):
-        return lambda b, wo, wi, f: scale(f, lobes.bsdf_compression(b, wo, wi))
+        factor = _rich(b).bsdf_compression
+        return lambda b, wo, wi, f: scale(f, factor(b, wo, wi))
     return lambda b, wo, wi, f: f
 
 
@@ -234,7 +319,8 @@ def is_lambertian(b):
 @overload(is_lambertian)
 def _is_lambertian(b):
     if not is_plain(b):
-        return lambda b: lobes.bsdf_is_lambertian(b)
+        f = _rich(b).bsdf_is_lambertian
+        return lambda b: f(b)
     return lambda b: True
 
 
@@ -265,6 +351,8 @@ def attenuation(scene, material, ng, d, t, beta):
 
 @overload(attenuation)
 def _attenuation(scene, material, ng, d, t, beta):
+    if "blends" in scene.fields or "principled" in scene.fields:
+        return lambda scene, material, ng, d, t, beta: inside_attenuation(scene, material, ng, d, t, beta)
     if "bsdfs" in scene.fields:
         return lambda scene, material, ng, d, t, beta: lobes.interior_attenuation(scene, material, ng, d, t, beta)
     return lambda scene, material, ng, d, t, beta: beta

@@ -38,6 +38,10 @@ BSDF_FIELDS: list[tuple[str, str]] = [
     ("bsdfs", "i8"),  # 1; its presence says that materials are not all diffuse, mirror or smooth glass
     ("bsdf_tables", "i8"),  # float32 (n_tables, BSDF_TABLE_SIZE), see `pmviewer.scene.bsdf_tables`
 ]
+PRINCIPLED_FIELDS: list[tuple[str, str]] = [("principled", "i8")]
+"""1; its presence says that there are principled materials."""
+BLEND_FIELDS: list[tuple[str, str]] = [("blends", "i8")]
+"""1; its presence says that there are blends of materials."""
 LIGHT_FIELDS: list[tuple[str, str]] = [
     ("more_lights", "i8"),  # 1; its presence says that there are spot, directional or image environment lights
     ("sky_texels", "i8"),  # float32 (sky_height, sky_width, 3): radiance of the image environment
@@ -73,12 +77,16 @@ def scene_dtype(
     textures: bool = False,
     colours: bool = False,
     opacity: bool = False,
+    principled: bool = False,
+    blends: bool = False,
 ) -> np.dtype:
     """The record of a scene with or without these features.
 
     Kernels are compiled for the record's type, so that simple scenes neither run nor compile what they don't use.
     """
     extra = [
+        *(PRINCIPLED_FIELDS if principled else []),
+        *(BLEND_FIELDS if blends else []),
         *(BSDF_FIELDS if bsdfs else []),
         *(LIGHT_FIELDS if lights else []),
         *(TEXTURE_FIELDS if textures else []),
@@ -98,6 +106,7 @@ _columns = np.arange(48, dtype=np.int64)
 
 DIFFUSE, CONDUCTOR, DIELECTRIC = 0, 1, 2
 ROUGH_CONDUCTOR, ROUGH_DIELECTRIC, THIN_DIELECTRIC, PLASTIC, ROUGH_PLASTIC, SCHLICK, WARD = range(3, 10)
+PRINCIPLED, BLEND = 10, 11
 GGX, BECKMANN = 0, 1
 MATERIAL_COLUMNS = 48
 M_KIND, M_TWO_SIDED, M_ETA, M_REFLECTANCE, M_TRANSMITTANCE = _columns[[0, 1, 2, 4, 8]]
@@ -112,6 +121,12 @@ M_TRANSMITTANCE_MAP = _columns[30]
 """The maps are texture numbers, -1 for none."""
 M_OPACITY, M_OPACITY_MAP, M_ALPHA_CUTOFF, M_COLOURED = _columns[44:48]
 """M_ALPHA_CUTOFF: −1 for none. M_COLOURED: whether colours at vertices multiply the reflectance."""
+M_METALLIC, M_SPEC_TRANS, M_SPEC_TINT, M_SHEEN, M_SHEEN_TINT, M_FLATNESS, M_CLEARCOAT, M_COAT_ALPHA = _columns[32:40]
+"""Of a principled material; M_SPECULAR is the absorption inside."""
+M_PART_0, M_PART_1, M_WEIGHT, M_STORES_FRONT, M_STORES_BACK, M_FOLLOWS_FRONT, M_FOLLOWS_BACK = _columns[32:39]
+"""Of a blend: the rows of its parts, the share of the second, and by side the roughness up to which some part has
+STORED lobes, and that above which one has FOLLOWED lobes that are no deltas. M_SPECULAR is the absorption inside."""
+M_METALLIC_MAP, M_WEIGHT_MAP = _columns[40:42]
 BSDF_TABLE_SIZE = 64
 
 PARALLELOGRAM, DISK, SPHERE, CYLINDER, MESH, POINT, ENVIRONMENT, SPOT, DIRECTIONAL, IMAGE = range(10)

@@ -23,7 +23,7 @@ from pmviewer.kernels.light import emit_photon
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import SOBOL, draw1, draw4
 from pmviewer.kernels.raycast import closest_hit
-from pmviewer.kernels.scattering import FOLLOWED, NOTHING, bsdf_at, is_delta
+from pmviewer.kernels.scattering import NOTHING, bsdf_at, keeps
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.maps.record import encode_direction, encode_power
@@ -76,8 +76,9 @@ def trace_shadows(scenes, seed, glossy, i0, i1, out, counts):
             if prim < 0:
                 break
             q, ng, ns, gap = surface_at(scene, prim, u, v, p[0], p[1], p[2], d[0], d[1], d[2], t)
-            bsdf = bsdf_at(scene, prim, material_of(scene, prim), u, v, q, ng, ns, wi, glossy)
-            if bsdf.groups != NOTHING and not (bsdf.groups == FOLLOWED and is_delta(bsdf)):
+            material = material_of(scene, prim)
+            bsdf = bsdf_at(scene, prim, material, u, v, q, ng, ns, wi, glossy)
+            if keeps(scene, material, bsdf, ng, wi, glossy) != NOTHING:
                 row = counts[0]
                 out[row, 0], out[row, 1], out[row, 2] = q
                 out[row, 3] = float_of_bits(_u4(code | flags))

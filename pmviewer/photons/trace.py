@@ -27,6 +27,7 @@ from pmviewer.kernels.scattering import (
     bsdf_at,
     bsdf_sample,
     is_delta,
+    keeps,
     pick_group,
     same_side,
     shading_normal,
@@ -180,13 +181,14 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
             extend_path(paths, i, prim, p, d, scale(beta, worth), _u4(flags | _u4(min(bounces, BOUNCES))), light)
             wi = (-d[0], -d[1], -d[2])
             b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
-            if b.groups == NOTHING or not luminance(beta) > _f4(0.0):
+            kept = keeps(scene, material, b, ng, wi, pass_.glossy)
+            if b.groups | kept == NOTHING or not luminance(beta) > _f4(0.0):
                 ledgers[book, E_ABSORBED] += _f8(luminance(beta) * worth)
                 break
             ng = face(ng, wi)
             u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
-            unfound = deltas and bounces > 0 and b.groups & FOLLOWED != 0 and not is_delta(b)
-            if b.groups & STORED != 0 or unfound:
+            unfound = deltas and bounces > 0 and kept & FOLLOWED != 0
+            if kept & STORED != 0 or unfound:
                 path_class = np.int32(flags >> _u4(6))
                 word = _u4(flags | _u4(min(bounces, BOUNCES)))
                 if unfound:
@@ -209,7 +211,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                         counts[C_CAUSTIC] += 1
                 if (
                     to_global
-                    and b.groups & STORED != 0
+                    and kept & STORED != 0
                     and (
                         pass_.store_probability >= _f4(1.0)
                         or draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
@@ -222,6 +224,9 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                         counts[C_GLOBAL] += 1
                 ledgers[book, E_STORED] += _f8(luminance(beta) * worth)
             before = luminance(beta)
+            if b.groups == NOTHING:  # a part of a blend that others keep photons for
+                ledgers[book, E_ABSORBED] += _f8(before * worth)
+                break
             group, share, u_lobe = pick_group(b, wi, u_lobe)
             deltas = deltas and group == FOLLOWED and is_delta(b)
             if group == FOLLOWED:

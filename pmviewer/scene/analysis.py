@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pmviewer.scene.description import DirectionalLight, Environment, Material, PointLight, Scene, SpotLight
+from pmviewer.scene.description import DirectionalLight, Environment, PointLight, Scene, SpotLight
+from pmviewer.scene.material_lobes import (
+    always_followed,
+    glossy_roughness,
+    has_diffuse_lobe,
+    is_delta,
+    is_rough_glass,
+)
 from pmviewer.scene.material_row import is_rich, used_materials
 
 
@@ -54,45 +61,19 @@ class SceneTraits:
         return self.has_rough_glass or any(alpha < glossy for alpha in self.glossy_roughness)
 
 
-def glossy_roughness(material: Material) -> float | None:
-    """Roughness of the material's glossy reflection as kernels compare it with the setting; None without one."""
-    glossy = {"rough conductor": material.reflectance, "rough plastic": material.specular}
-    glossy |= {"schlick": material.specular, "ward": material.specular}
-    if material.kind not in glossy or not max(glossy[material.kind]) > 0:
-        return None
-    return min(material.alpha)
-
-
-def _always_followed(material: Material) -> bool:
-    if material.kind == "conductor":
-        return max(material.reflectance) > 0
-    if material.kind == "plastic":
-        return max(material.specular) > 0
-    return material.transparent and max(*material.reflectance, *material.transmittance) > 0
-
-
-def _is_delta(material: Material) -> bool:
-    return _always_followed(material) and material.kind != "rough dielectric"
-
-
-def _has_diffuse_lobe(material: Material) -> bool:
-    based = ("diffuse", "plastic", "rough plastic", "schlick", "ward")
-    return material.kind in based and max(material.reflectance) > 0
-
-
 def analyse(scene: Scene) -> SceneTraits:
     """Traits of what is actually used by the scene's shapes."""
-    used = used_materials(scene)
+    used = [m for m in used_materials(scene) if m.kind != "blend"]  # what blends do, their parts do
     return SceneTraits(
-        has_specular=any(_always_followed(m) for m in used),
-        has_diffuse=any(_has_diffuse_lobe(m) for m in used),
+        has_specular=any(always_followed(m) for m in used),
+        has_diffuse=any(has_diffuse_lobe(m) for m in used),
         has_environment=any(isinstance(light, Environment) for light in scene.lights),
         has_smooth_normals=any(getattr(s.geometry, "normals", None) is not None for s in scene.all_shapes),
         n_lights=len(scene.lights) + sum(s.radiance is not None and max(s.radiance) > 0 for s in scene.shapes),
         rich=is_rich(scene),
-        has_delta=any(_is_delta(m) for m in used),
-        has_rough_glass=any(_always_followed(m) and m.kind == "rough dielectric" for m in used),
+        has_delta=any(is_delta(m) for m in used),
+        has_rough_glass=any(is_rough_glass(m) for m in used),
         has_delta_lights=any(isinstance(light, PointLight | SpotLight | DirectionalLight) for light in scene.lights),
         orthographic=scene.camera.projection == "orthographic",
-        glossy_roughness=tuple(sorted({a for m in used if (a := glossy_roughness(m)) is not None})),
+        glossy_roughness=tuple(sorted({alpha for m in used for alpha in glossy_roughness(m)})),
     )

@@ -7,6 +7,7 @@ from collections import Counter
 
 import numpy as np
 
+from pmviewer.scene.blends import blend_text
 from pmviewer.scene.description import (
     RGB,
     ConstantEnvironment,
@@ -126,7 +127,9 @@ def _materials(scene: Scene) -> str:
         groups.setdefault(material.kind, []).append(material)
     texts = []
     for kind, members in groups.items():
-        names = ", ".join(m.name for m in members[:_LISTED]) + (" …" if len(members) > _LISTED else "")
+        names = ", ".join(blend_text(m) if kind == "blend" else m.name for m in members[:_LISTED]) + (
+            " …" if len(members) > _LISTED else ""
+        )
         texts.append(f"{len(members)} {kind} ({names})")
     passed = [m.name for m in used if m.passable]
     if passed:

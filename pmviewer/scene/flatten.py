@@ -29,7 +29,7 @@ from pmviewer.scene.description import (
 from pmviewer.scene.flatten_textures import TextureTable, coordinates, corner_colours, light_arrays, needs_tangents
 from pmviewer.scene.instances import build_instanced, instance_bounds, normalised
 from pmviewer.scene.light_table import LightTable, axis_of, side_of
-from pmviewer.scene.material_row import is_rich, material_table, used_materials, with_parts
+from pmviewer.scene.material_row import is_rich, material_table, used_materials
 from pmviewer.scene.mesh_bounds import mesh_bounds
 from pmviewer.scene.textured_emission import textured_lights
 
@@ -135,7 +135,7 @@ def flatten(scene: Scene) -> FlatScene:
     prim_light = of_shape.astype(np.int32)[shape_of_prim]
     textured = bool(emissions) or (rich and needs_tangents(scene))
     used = used_materials(scene)
-    coloured, passable = any(m.vertex_colours for m in with_parts(used)), any(m.passable for m in used)
+    coloured, passable = any(m.vertex_colours for m in used), any(m.passable for m in used)
     record = np.zeros(
         1,
         K.scene_dtype(
@@ -145,9 +145,13 @@ def flatten(scene: Scene) -> FlatScene:
             textures=textured,
             colours=coloured,
             opacity=passable,
+            principled="principled" in materials.kinds,
+            blends="blend" in materials.kinds,
         ),
     )
     r = record[0]
+    for name in {"principled", "blends"}.intersection(record.dtype.names):
+        r[name] = 1
     stage(f"building the tree over {len(vertices):,} triangles")
     if groups:
         bvh, shown = build_instanced(scene, groups, vertices, quadrics, shape_of_prim, r)
@@ -177,7 +181,7 @@ def flatten(scene: Scene) -> FlatScene:
     if rich:
         r["bsdfs"] = 1
         arrays["bsdf_tables"] = materials.tables
-        textures.write_rows(materials.rows, scene.materials)
+        textures.write_rows(materials.rows, materials.materials)
     if textured:
         arrays |= coordinates([shapes[i].geometry for i, _ in meshes], [shapes[i].geometry for i in round_shapes])
         arrays |= light_arrays(emissions, lights.of_shape, len(lights.rows), textures)

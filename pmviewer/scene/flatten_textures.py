@@ -11,7 +11,7 @@ from pmviewer.errors import SceneError
 from pmviewer.kernels import scene as K
 from pmviewer.resources import available_memory
 from pmviewer.scene.description import Geometry, Material, Mesh, Scene
-from pmviewer.scene.material_row import with_parts
+from pmviewer.scene.material_row import used_materials
 from pmviewer.scene.texture import Checkerboard, Texture
 from pmviewer.scene.texture_coordinates import corner_uv, frame_of
 from pmviewer.scene.textured_emission import Emission
@@ -25,13 +25,14 @@ _COLUMN = {
     "normal": K.M_NORMAL_MAP,
     "bump": K.M_BUMP_MAP,
     "opacity": K.M_OPACITY_MAP,
+    "metallic": K.M_METALLIC_MAP,
+    "weight": K.M_WEIGHT_MAP,
 }
 
 
 def needs_tangents(scene: Scene) -> bool:
     """Does any surface's material have a texture, colours at vertices, or a direction of its own?"""
-    used = with_parts([scene.materials[i] for i in {s.material for s in scene.all_shapes}])
-    return any(m.textures or m.vertex_colours or m.alpha[0] != m.alpha[1] for m in used)
+    return any(m.textures or m.vertex_colours or m.alpha[0] != m.alpha[1] for m in used_materials(scene))
 
 
 class TextureTable:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -12,7 +11,9 @@ from numpy.typing import NDArray
 from pmviewer.kernels import scene as K
 from pmviewer.kernels.bsdf_tables import fill_coat, fill_schlick
 from pmviewer.kernels.microfacet import SMOOTHEST
+from pmviewer.scene.blends import fill_blend, with_parts
 from pmviewer.scene.description import Material, Scene
+from pmviewer.scene.material_lobes import coat_alpha, principled_of
 
 Float = NDArray[np.float32]
 KINDS = {
@@ -26,20 +27,27 @@ KINDS = {
     "rough plastic": K.ROUGH_PLASTIC,
     "schlick": K.SCHLICK,
     "ward": K.WARD,
+    "principled": K.PRINCIPLED,
+    "blend": K.BLEND,
 }
 _DISTRIBUTIONS = {"ggx": K.GGX, "beckmann": K.BECKMANN}
 _PERFECT_MIRROR = ((0.0,) * 3, (1.0,) * 3)
 """The complex index that reflects everything: Mitsuba's metal 'none'."""
 _CLEAR = 1e-4
 """An index this close to 1 bends nothing."""
+_LEAST_BEND = 1e-3
+"""A principled material that transmits has an index this far from 1 at least, as in Mitsuba."""
 
 
 @dataclass(frozen=True)
 class MaterialTable:
-    """rows: float32 (materials, MATERIAL_COLUMNS); tables: float32 (tables, BSDF_TABLE_SIZE), at least one."""
+    """rows: float32 (materials, MATERIAL_COLUMNS), of the scene's `materials` and then of the parts of blends; tables:
+    float32 (tables, BSDF_TABLE_SIZE), at least one; kinds: those that are used."""
 
     rows: Float
     tables: Float
+    materials: tuple[Material, ...]
+    kinds: frozenset[str]
 
 
 def is_plain(m: Material) -> bool:
@@ -55,16 +63,9 @@ def is_plain(m: Material) -> bool:
 
 
 def used_materials(scene: Scene) -> list[Material]:
-    """Materials that some shape has, instanced ones included, in the order of the scene's list."""
-    return [scene.materials[i] for i in sorted({s.material for s in scene.all_shapes}) if i < len(scene.materials)]
-
-
-def with_parts(materials: Iterable[Material]) -> list[Material]:
-    """The materials and all that they are blended from."""
-    found = list(materials)
-    for material in found:
-        found.extend(material.parts)
-    return found
+    """Materials that some shape has, instanced ones included, in the order of the scene's list, and parts of blends."""
+    used = [scene.materials[i] for i in sorted({s.material for s in scene.all_shapes}) if i < len(scene.materials)]
+    return with_parts(used)
 
 
 def is_rich(scene: Scene) -> bool:
@@ -79,11 +80,20 @@ def is_rich(scene: Scene) -> bool:
 
 def material_table(scene: Scene) -> MaterialTable:
     """Rows of all materials; tables of those that are used."""
-    used = {s.material for s in scene.all_shapes}
+    materials, used = with_parts(scene.materials), used_materials(scene)
+    counts, number_of = {id(m) for m in used}, {id(m): i for i, m in enumerate(materials)}
     tables: list[Float] = []
-    rows = [_row(m, tables if i in used else None) for i, m in enumerate(scene.materials)]
+    rows = [_row(m, tables if id(m) in counts else None) for m in materials]
+    for row, m in zip(rows, materials):
+        if m.kind == "blend":
+            fill_blend(row, m, number_of)
     tables = tables or [np.zeros(K.BSDF_TABLE_SIZE, np.float32)]
-    return MaterialTable(np.array(rows, np.float32).reshape(-1, K.MATERIAL_COLUMNS), np.array(tables, np.float32))
+    return MaterialTable(
+        np.array(rows, np.float32).reshape(-1, K.MATERIAL_COLUMNS),
+        np.array(tables, np.float32),
+        tuple(materials),
+        frozenset(m.kind for m in used),
+    )
 
 
 def _row(m: Material, tables: list[Float] | None) -> list[float]:
@@ -95,7 +105,7 @@ def _row(m: Material, tables: list[Float] | None) -> list[float]:
     row[K.M_REFLECTANCE : K.M_REFLECTANCE + 3] = m.reflectance
     row[K.M_TRANSMITTANCE : K.M_TRANSMITTANCE + 3] = m.transmittance
     row[K.M_OPACITY : K.M_COLOURED + 1] = [*opacity_numbers(m), m.vertex_colours]
-    if is_plain(m) and kind != K.CONDUCTOR:
+    if kind == K.BLEND or (is_plain(m) and kind != K.CONDUCTOR):
         return row
     alpha_x, alpha_y = (max(float(SMOOTHEST), a) for a in m.alpha)
     row[K.M_ALPHA_X], row[K.M_ALPHA_Y] = alpha_x, alpha_y
@@ -105,7 +115,9 @@ def _row(m: Material, tables: list[Float] | None) -> list[float]:
     eta, k = m.metal if m.metal is not None else _PERFECT_MIRROR
     row[K.M_ETA_RGB : K.M_ETA_RGB + 3], row[K.M_K_RGB : K.M_K_RGB + 3] = eta, k
     transparent = kind in (K.DIELECTRIC, K.ROUGH_DIELECTRIC, K.THIN_DIELECTRIC)
-    row[K.M_SPECULAR : K.M_SPECULAR + 3] = m.absorption if transparent else m.specular
+    row[K.M_SPECULAR : K.M_SPECULAR + 3] = m.absorption if transparent or kind == K.PRINCIPLED else m.specular
+    if kind == K.PRINCIPLED:
+        _fill_principled(row, m)
     if kind == K.PLASTIC:
         row[K.M_INNER] = inner_reflectance(m.eta)
     elif kind == K.ROUGH_PLASTIC and tables is not None:
@@ -125,6 +137,15 @@ def opacity_numbers(m: Material) -> tuple[float, float, float]:
     if m.alpha_cutoff is None:
         return min(max(m.opacity, 0.0), 1.0), -1.0, -1.0
     return 0.0, -1.0, max(m.alpha_cutoff, 0.0)
+
+
+def _fill_principled(row: list[float], m: Material) -> None:
+    p = principled_of(m)
+    if p.spec_trans > 0 and abs(m.eta - 1) < _LEAST_BEND:
+        row[K.M_ETA] = 1 + _LEAST_BEND
+    row[K.M_METALLIC], row[K.M_SPEC_TRANS], row[K.M_SPEC_TINT] = p.metallic, p.spec_trans, p.spec_tint
+    row[K.M_SHEEN], row[K.M_SHEEN_TINT], row[K.M_FLATNESS] = p.sheen, p.sheen_tint, p.flatness
+    row[K.M_CLEARCOAT], row[K.M_COAT_ALPHA] = p.clearcoat, coat_alpha(m)
 
 
 @lru_cache(maxsize=64)

@@ -8,7 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.scene.description import Cylinder, Disk, Group, Mesh, Parallelogram, Scene, Shape, Sphere
+from pmviewer.scene.blends import mean_colour
+from pmviewer.scene.description import (
+    RGB,
+    Cylinder,
+    Disk,
+    Group,
+    Material,
+    Mesh,
+    Parallelogram,
+    Scene,
+    Shape,
+    Sphere,
+)
 from pmviewer.scene.flatten import bounding_sphere
 from pmviewer.scene.formats.mitsuba.transform import cofactor, mirrors
 from pmviewer.scene.primitives import unit
@@ -58,16 +70,21 @@ def _drawn(scene: Scene, shape: Shape) -> Drawn:
     """Corners, normals and albedo of a shape, (3n, 3) each."""
     corners, corner_normals = _triangles(shape.geometry)
     material = scene.materials[shape.material]
-    colour = np.array(material.reflectance)
+    colour = np.array(mean_colour(material, _colour))
     tint: Float = np.ones(3)
     if material.vertex_colours and isinstance(shape.geometry, Mesh) and shape.geometry.colours is not None:
         tint = shape.geometry.colours[shape.geometry.faces].reshape(-1, 3)
     if shape.radiance is not None and max(shape.radiance) > 0:
         colour, tint = np.array(shape.radiance) / max(shape.radiance), np.ones(3)
-    elif material.transparent:
-        colour = 0.5 + 0.5 * np.array(material.transmittance) * np.array([0.8, 0.9, 1.0])
     albedo = np.broadcast_to(colour * tint, (corners.shape[0] * 3, 3))
     return corners.reshape(-1, 3), corner_normals.reshape(-1, 3), albedo
+
+
+def _colour(material: Material) -> RGB:
+    if not material.transparent:
+        return material.reflectance
+    r, g, b = 0.5 + 0.5 * np.array(material.transmittance) * np.array([0.8, 0.9, 1.0])
+    return (r, g, b)
 
 
 def _copies(scene: Scene) -> tuple[list[Drawn], str]:
