@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from pmviewer.kernels import lobes
+from pmviewer.kernels import lobes, principled_bsdf
 from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.memory import load_f4
+from pmviewer.kernels.scene import M_METALLIC, MATERIAL_COLUMNS
 from pmviewer.scene.description import Material, Shape, Sphere
 from pmviewer.scene.flatten import flatten
 from tests.scenes_for_tests import diffuse_box
@@ -64,8 +66,59 @@ def _describe(scenes, material, glossy, ng, ns, wo, groups, share, albedo, flags
         flags[k, 2] = lobes.sees_side(b, lobes.FOLLOWED, n, o, (-o[0], -o[1], -o[2]))
 
 
+@kernel
+def _evaluate_principled(scenes, material, glossy, group, ng, ns, tangent, wo, wi, f, pdf, compression):
+    p = lobes.material_params(scenes[0], material)
+    metallic = load_f4(scenes[0].materials, material * MATERIAL_COLUMNS + M_METALLIC)
+    n, s, t = (ng[0], ng[1], ng[2]), (ns[0], ns[1], ns[2]), (tangent[0], tangent[1], tangent[2])
+    for k in range(len(wo)):
+        o, i = (wo[k, 0], wo[k, 1], wo[k, 2]), (wi[k, 0], wi[k, 1], wi[k, 2])
+        b = principled_bsdf.bsdf_at(scenes[0], material, p, metallic, n, s, t, o, glossy)
+        value, density = principled_bsdf.bsdf_f_pdf(b, group, o, i)
+        for c in range(3):
+            f[k, c] = value[c]
+        pdf[k] = density
+        compression[k] = principled_bsdf.bsdf_compression(b, o, i)
+
+
+@kernel
+def _sample_principled(scenes, material, glossy, group, ng, ns, tangent, wo, u, wi, weight, pdf, compression):
+    p = lobes.material_params(scenes[0], material)
+    metallic = load_f4(scenes[0].materials, material * MATERIAL_COLUMNS + M_METALLIC)
+    n, s, t = (ng[0], ng[1], ng[2]), (ns[0], ns[1], ns[2]), (tangent[0], tangent[1], tangent[2])
+    for k in range(len(u)):
+        o = (wo[k, 0], wo[k, 1], wo[k, 2])
+        b = principled_bsdf.bsdf_at(scenes[0], material, p, metallic, n, s, t, o, glossy)
+        i, w, density, factor = principled_bsdf.bsdf_sample(b, group, o, u[k, 0], u[k, 1], u[k, 2])
+        for c in range(3):
+            wi[k, c] = i[c]
+            weight[k, c] = w[c]
+        pdf[k] = density
+        compression[k] = factor
+
+
+@kernel
+def _describe_principled(scenes, material, glossy, ng, ns, wo, groups, share, albedo, flags):
+    p = lobes.material_params(scenes[0], material)
+    metallic = load_f4(scenes[0].materials, material * MATERIAL_COLUMNS + M_METALLIC)
+    n, s = (ng[0], ng[1], ng[2]), (ns[0], ns[1], ns[2])
+    tangent = (np.float32(0), np.float32(0), np.float32(0))
+    for k in range(len(wo)):
+        o = (wo[k, 0], wo[k, 1], wo[k, 2])
+        b = principled_bsdf.bsdf_at(scenes[0], material, p, metallic, n, s, tangent, o, glossy)
+        groups[k] = b.groups
+        share[k] = principled_bsdf.followed_share(b, o)
+        for c in range(3):
+            albedo[k, c] = b.albedo[c]
+        flags[k, 0] = b.delta
+        flags[k, 1] = principled_bsdf.bsdf_is_lambertian(b)
+        flags[k, 2] = principled_bsdf.sees_side(b, lobes.FOLLOWED, n, o, (-o[0], -o[1], -o[2]))
+
+
 class Probe:
     """The lobes of some materials at a surface with these normals and tangent; directions are float32 (n, 3)."""
+
+    kernels = (_evaluate, _sample, _describe)
 
     def __init__(self, materials: list[Material]) -> None:
         box = diffuse_box()
@@ -87,7 +140,7 @@ class Probe:
         wo = np.ascontiguousarray(np.broadcast_to(wo, wi.shape), np.float32)
         f, pdf, compression = np.empty_like(wi), np.empty(len(wi), np.float32), np.empty(len(wi), np.float32)
         frame = (self.ng, self.ns, self.tangent)
-        _evaluate(self.record, self.index(material), glossy, group, *frame, wo, wi, f, pdf, compression)
+        self.kernels[0](self.record, self.index(material), glossy, group, *frame, wo, wi, f, pdf, compression)
         return f.astype(float), pdf.astype(float), compression.astype(float)
 
     def sample(self, material, group, wo, u, glossy=EVERYTHING_STORED):
@@ -97,7 +150,7 @@ class Probe:
         wi, weight = np.empty_like(u), np.empty_like(u)
         pdf, compression = np.empty(len(u), np.float32), np.empty(len(u), np.float32)
         frame = (self.ng, self.ns, self.tangent)
-        _sample(self.record, self.index(material), glossy, group, *frame, wo, u, wi, weight, pdf, compression)
+        self.kernels[1](self.record, self.index(material), glossy, group, *frame, wo, u, wi, weight, pdf, compression)
         return wi, weight.astype(float), pdf.astype(float), compression.astype(float)
 
     def describe(self, material, wo, glossy=EVERYTHING_STORED):
@@ -105,8 +158,15 @@ class Probe:
         wo = np.ascontiguousarray(wo, np.float32)
         groups, share = np.empty(len(wo), np.int32), np.empty(len(wo), np.float32)
         albedo, flags = np.empty_like(wo), np.empty((len(wo), 3), np.bool_)
-        _describe(self.record, self.index(material), glossy, self.ng, self.ns, wo, groups, share, albedo, flags)
+        frame = (self.ng, self.ns)
+        self.kernels[2](self.record, self.index(material), glossy, *frame, wo, groups, share, albedo, flags)
         return groups, share, albedo, flags
+
+
+class PrincipledProbe(Probe):
+    """The same in a scene that has principled materials."""
+
+    kernels = (_evaluate_principled, _sample_principled, _describe_principled)
 
 
 class Grid:

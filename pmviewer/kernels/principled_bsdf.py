@@ -120,7 +120,7 @@ def _rough_dielectric(p, q):
         p.k_rgb,
         q.ax,
         q.ay,
-        GGX,
+        np.int32(GGX),
         p.nonlinear,
         p.inner,
         p.table,
