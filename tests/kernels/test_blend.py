@@ -33,7 +33,7 @@ def _numbers(p, wo, prim, salt, out):
 
 @kernel
 def _parts(scenes, material, prim, p, wo, out):
-    b1, b2 = np.float32(0.25), np.float32(0.25)
+    b1, b2 = np.float32(0.125), np.float32(0.125)
     for k in range(len(p)):
         o = (wo[k, 0], wo[k, 1], wo[k, 2])
         out[k] = chosen_part(scenes[0], material, prim, b1, b2, (p[k, 0], p[k, 1], p[k, 2]), o)
@@ -149,7 +149,7 @@ def test_parts_are_chosen_by_their_shares():
 
 
 def test_a_texture_gives_the_share():
-    """Its luminance at the hit: u = v = 1/4 lies in the first of four texels."""
+    """Its luminance at the hit: u = 1/4, v = 1/8 lie in the first of four texels."""
     pixels = np.array([[[0.2], [0.9]], [[0.9], [0.9]]], np.float32)
     mixed = blend(0.5, diffuse("a"), diffuse("b"), textures={"weight": Bitmap(pixels, filter="nearest")})
     flat = flatten(with_floor(mixed))
@@ -194,7 +194,6 @@ def test_photons_are_kept_for_every_part(first, second, glossy, front, back):
     assert set(out[wo[:, 2] > 0, 0]) == {front}
     assert set(out[wo[:, 2] < 0, 0]) == {back}
     assert np.all(out[:, 1] & STORED & ~out[:, 0] == 0)
-    assert len(set(out[wo[:, 2] > 0, 1])) > 1 or first.kind == "blend" or second is GLASS
 
 
 def test_absorption_is_that_of_the_part_which_absorbs():
