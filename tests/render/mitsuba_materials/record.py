@@ -20,7 +20,7 @@ RUNS, SAMPLES, SIZE = 8, 512, 24
 LIGHTS: dict[str, dict[str, Any]] = {
     "constant": {"type": "constant", "radiance": {"type": "rgb", "value": [0.8, 0.9, 1.1]}},
     "point": {"type": "point", "position": [2.0, 3.0, 2.0], "intensity": {"type": "rgb", "value": [30.0, 25.0, 20.0]}},
-    "area": {"type": "rectangle", "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [6.0, 5.0, 4.0]}}},
+    "area": {"type": "rectangle", "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [1.5, 1.25, 1.0]}}},
 }
 DIFFUSE = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.2, 0.5, 0.8]}}
 RED = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.8, 0.2, 0.1]}}
@@ -89,7 +89,7 @@ def record(material: dict[str, Any], light: str) -> tuple[list[float], list[floa
     T = mi.ScalarTransform4f
     lamp = dict(LIGHTS[light])
     if light == "area":
-        lamp["to_world"] = T().translate([0, 3, 0]).rotate([1, 0, 0], 90)
+        lamp["to_world"] = T().translate([0, 3, 0]).rotate([1, 0, 0], 90).scale([3, 3, 1])
         lamp["bsdf"] = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0, 0, 0]}}
     camera = T().look_at(origin=[0, 1.5, 5], target=[0, 0.6, 0], up=[0, 1, 0])
     scene = mi.load_dict(
