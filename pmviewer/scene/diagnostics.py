@@ -8,6 +8,7 @@ from pathlib import Path
 from pmviewer.errors import SceneError
 
 _SHOWN_LINES = 5
+_SHOWN_NAMES = 12
 
 
 class Diagnostics:
@@ -18,6 +19,7 @@ class Diagnostics:
         self.dropped: Counter[str] = Counter()
         self._sentences: dict[str, str] = {}
         self._lines: dict[str, list[int]] = {}
+        self._names: dict[str, list[str]] = {}
 
     def error(self, what: str, line: int | None = None, hint: str = "") -> SceneError:
         """The error to raise."""
@@ -31,6 +33,13 @@ class Diagnostics:
         if line is not None and line not in lines:
             lines.append(line)
 
+    def warn_of(self, name: str, sentence: str, line: int | None = None) -> None:
+        """One warning for all names of a kind: `sentence` has {names} where they are listed."""
+        self.warn(sentence, line)
+        names = self._names.setdefault(sentence, [])
+        if name not in names:
+            names.append(name)
+
     def left_out(self) -> str:
         """What was ignored or dropped, as a hint for an error about what is missing; empty if nothing was."""
         counts = ", ".join(f"{count} × {reason}" for reason, count in self.dropped.items())
@@ -39,7 +48,14 @@ class Diagnostics:
 
     def warnings(self) -> tuple[str, ...]:
         """One sentence a kind, in the order of their first appearance."""
-        return tuple(_located(sentence, self._lines[key]) for key, sentence in self._sentences.items())
+        return tuple(_located(self._filled(key), self._lines[key]) for key in self._sentences)
+
+    def _filled(self, key: str) -> str:
+        names = self._names.get(key)
+        if names is None:
+            return self._sentences[key]
+        more = f" and {len(names) - _SHOWN_NAMES} more" if len(names) > _SHOWN_NAMES else ""
+        return self._sentences[key].replace("{names}", ", ".join(names[:_SHOWN_NAMES]) + more)
 
 
 def _located(sentence: str, lines: list[int]) -> str:

@@ -1,4 +1,4 @@
-"""Pictures of the sky: OpenEXR, Radiance HDR, PNG, JPEG as linear radiance."""
+"""Pictures of the sky: OpenEXR, Radiance HDR, PFM, PNG, JPEG as linear radiance."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError
 from pmviewer.output.exr import BEAUTY, read_exr
 from pmviewer.scene.formats.hdr import read_hdr
+from pmviewer.scene.formats.pfm import decode_pfm
 
 LEAST_WIDTH, LEAST_HEIGHT = 2, 3
 MOST_PIXELS = 1 << 27
@@ -26,6 +27,8 @@ def read_sky(path: Path) -> tuple[NDArray[np.float32], int]:
         pixels = _exr(path)
     elif ending in (".hdr", ".rgbe", ".pic"):
         pixels = read_hdr(path)
+    elif ending == ".pfm":
+        pixels = _pfm(path)
     else:
         pixels = _encoded(path)
     height, width = pixels.shape[:2]
@@ -45,6 +48,14 @@ def _exr(path: Path) -> NDArray[np.float32]:
     return np.broadcast_to(pixels, (*pixels.shape[:2], 3))
 
 
+def _pfm(path: Path) -> NDArray[np.float32]:
+    try:
+        pixels = decode_pfm(path.read_bytes(), path.name)
+    except OSError as error:
+        raise SceneError(f"It can't be read: {error.strerror}.", path) from None
+    return np.broadcast_to(pixels, (*pixels.shape[:2], 3))
+
+
 def _encoded(path: Path) -> NDArray[np.float32]:
     from PIL import Image, UnidentifiedImageError
 
@@ -52,11 +63,13 @@ def _encoded(path: Path) -> NDArray[np.float32]:
         with Image.open(path) as picture:
             if picture.width * picture.height > MOST_PIXELS:
                 raise SceneError(f"The picture has {picture.width} × {picture.height} pixels: too many.", path)
-            if picture.mode.startswith("I") or picture.mode == "F":
+            if picture.mode == "F":
+                return np.repeat(np.asarray(picture, np.float32)[..., None], 3, axis=2)
+            if picture.mode.startswith("I"):
                 raise SceneError("Pictures of 16 or 32 bits a pixel can't be read.", path, hint="Save it as OpenEXR.")
             encoded = np.asarray(picture.convert("RGB"))
     except (OSError, ValueError, SyntaxError, UnidentifiedImageError, Image.DecompressionBombError) as error:
-        hint = "OpenEXR, Radiance HDR, PNG and JPEG files can be read."
+        hint = "OpenEXR, Radiance HDR, PFM, PNG and JPEG files can be read."
         raise SceneError(f"It can't be read: {error}.", path, hint=hint) from None
     levels = np.arange(256) / 255
     linear = np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Picture files as linear float32 pixels: OpenEXR, Radiance HDR, PNG, JPEG and whatever else Pillow opens."""
+"""Picture files as linear float32 pixels: OpenEXR, Radiance HDR, PFM, PNG, JPEG and whatever else Pillow opens."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError
 from pmviewer.resources import available_memory
 from pmviewer.scene.formats.open_file import read_regular
+from pmviewer.scene.formats.pfm import decode_pfm, is_pfm
 
 MOST_PIXELS = 1 << 24
 """A larger picture is reduced by whole factors: 4096 × 4096, 200 MB of texels."""
@@ -32,6 +33,8 @@ def read_picture(source: Path | bytes, name: str, raw: bool) -> tuple[NDArray[np
         pixels = _exr(source, data, name)
     elif data[:2] == b"#?":
         pixels = _hdr(data, name)
+    elif is_pfm(data):
+        pixels = decode_pfm(data, name)
     else:
         pixels = _encoded(data, name, partial(_samples, raw=raw))
     return _finished(pixels, name)
@@ -156,8 +159,7 @@ def _samples(picture: Any, raw: bool) -> NDArray[np.float32]:
         values = np.asarray(picture, np.float32)[..., None] / np.float32(65535)
         return values if raw else linear(values)
     if picture.mode == "F":
-        values = np.asarray(picture, np.float32)[..., None]
-        return values if raw else linear(values)
+        return np.asarray(picture, np.float32)[..., None]  # floats are linear already
     grey = picture.mode in ("1", "L", "LA")
     steps = np.arange(256, dtype=np.float32) / np.float32(255)
     eight_bits = (steps if raw else linear(steps))[np.asarray(picture.convert("L" if grey else "RGB"))]

@@ -14,8 +14,7 @@ from pmviewer.errors import SceneError
 from pmviewer.scene.description import RGB, Vec3
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.mitsuba.spectrum import spectrum_object
-from pmviewer.scene.formats.mitsuba.texture import TYPES as TEXTURE_TYPES
-from pmviewer.scene.formats.mitsuba.texture import read_texture
+from pmviewer.scene.formats.mitsuba.texture import is_constant, read_texture
 from pmviewer.scene.formats.mitsuba.transform import Matrix, is_unit_rotation, operation
 from pmviewer.scene.formats.mitsuba.values import (
     LARGEST,
@@ -127,6 +126,7 @@ class Properties:
         self.type = element.attributes.get("type", "")
         self.values: dict[str, Element] = {}
         self.textures: dict[str, Texture] = {}
+        self._read: dict[str, Texture | None] = {}
         self._objects: list[tuple[Element, Element]] = []
         self._asked: set[str] = set()
         for child in element.children:
@@ -201,24 +201,29 @@ class Properties:
         return word
 
     def texture(self, name: str) -> Texture | None:
-        """The value of that name if it is a texture that varies; None for anything else."""
+        """The value of that name if it is a texture; None for anything else, and for one that can't be used."""
         element = self.values.get(name)
-        if element is None or element.tag != "texture" or element.attributes.get("type") not in TEXTURE_TYPES:
+        if element is None or element.tag != "texture":
             return None
         self._asked.add(name)
-        if name not in self.textures:
-            self.textures[name] = read_texture(Properties(element, self.document, self._depth + 1))
-        return self.textures[name]
+        if name not in self._read:
+            self._read[name] = read_texture(Properties(element, self.document, self._depth + 1))
+        texture = self._read[name]
+        if texture is not None and not is_constant(texture):
+            self.textures.setdefault(name, texture)
+        return texture
 
     def unnamed_textures(self) -> list[Texture]:
-        """Nested textures that vary and have no name of a property."""
-        found = [target for target in self.objects("texture") if target.attributes.get("type") in TEXTURE_TYPES]
-        return [read_texture(Properties(element, self.document, self._depth + 1)) for element in found]
+        """Nested textures that can be used and have no name of a property."""
+        found = [read_texture(Properties(e, self.document, self._depth + 1)) for e in self.objects("texture")]
+        return [texture for texture in found if texture is not None]
 
     def roughness(self, name: str, default: float) -> float:
         """A number, or a texture's mean luminance."""
         texture = self.texture(name)
-        return float(np.dot(texture.mean, LUMINANCE)) if texture is not None else self.number(name, default)
+        if texture is None:
+            return default if self.tag_of(name) == "texture" else self.number(name, default)
+        return float(np.dot(texture.mean, LUMINANCE))
 
     def number(self, name: str, default: float) -> float:
         return self._take(name, ("float", "integer"), parse_float, default)
@@ -249,7 +254,9 @@ class Properties:
         if texture is not None:
             return texture.mean
         text = element.attributes.get("value")
-        if element.tag == "texture" or "type" in element.attributes:
+        if element.tag == "texture":
+            return (default, default, default)
+        if "type" in element.attributes:
             nested = Properties(element, self.document, self._depth + 1)
             return spectrum_object(nested, (default, default, default))
         if element.tag == "rgb":
@@ -283,7 +290,8 @@ class Properties:
             self.textures[name] = texture
             return texture.mean
         if min(value) < 0:
-            raise self.document.error(f"'{name}' of {self.element} must not be negative, found {value}.", at)
+            self.document.warn(f"'{name}' of {self.element}: negative numbers count as 0.", at)
+            value = (max(value[0], 0.0), max(value[1], 0.0), max(value[2], 0.0))
         if most is not None and max(value) > most:
             self.document.warn(f"'{name}' of {self.element} above {most:g} was cut: it would create energy.", at)
             r, g, b = (min(c, most) for c in value)

@@ -1,46 +1,175 @@
-"""`<texture type="bitmap">` and `checkerboard` as descriptions."""
+"""`<texture>` elements as descriptions: those that vary over a surface, and colours written as textures."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from pmviewer.errors import SceneError
-from pmviewer.scene.formats.texture_file import read_picture
-from pmviewer.scene.texture import Affine, Bitmap, Checkerboard, Texture
+import numpy as np
+
+from pmviewer.scene.description import RGB
+from pmviewer.scene.formats.mitsuba.spectrum import spectrum_object
+from pmviewer.scene.texture import LUMINANCE, Affine, Bitmap, Checkerboard, Texture, scaled
 
 if TYPE_CHECKING:
     from pmviewer.scene.formats.mitsuba.document import Properties
+    from pmviewer.scene.formats.mitsuba.xml import Element
 
-TYPES = ("bitmap", "checkerboard")
+_SPECTRA = frozenset(("rgb", "srgb", "uniform", "d65", "regular", "irregular", "blackbody", "spectrum", "rawconstant"))
+_BITMAPS = frozenset(("bitmap", "ldrtexture", "exrtexture", "hdrtexture"))
+_VERTEX_COLOURS = frozenset(("mesh_attribute", "vertexcolors"))
+_ATTRIBUTE = "vertex_color"
+_MOST_GRID = 1024
+WHITE: RGB = (1.0, 1.0, 1.0)
 
 
-def read_texture(p: Properties) -> Texture:
-    """The texture of an element of one of `TYPES`. Raises SceneError naming its line."""
-    matrix = p.transform("to_uv")
-    a, b, d, e = (float(x) for x in matrix[:2, :2].reshape(-1))
-    to_uv: Affine = (a, b, float(matrix[0, 3]), d, e, float(matrix[1, 3]))
+def read_texture(p: Properties) -> Texture | None:
+    """The texture of a <texture> element; None, with a warning, where only the property's default is left. What has
+    the same colour everywhere is a bitmap of one pixel. Raises SceneError naming its line."""
+    from pmviewer.scene.formats.mitsuba.bitmap import read_bitmap
+
+    if p.type in _BITMAPS:
+        return read_bitmap(p)
     if p.type == "checkerboard":
-        texture: Texture = Checkerboard(
-            p.bounded_colour("color0", 0.4, None), p.bounded_colour("color1", 0.2, None), to_uv
-        )
-        p.warn_unused()
-        return texture
-    raw = p.boolean("raw", False)
-    name = p.string("filename", "")
-    if not name:
-        raise p.document.error(f"{p.element} needs a 'filename'.", p.element)
-    path = p.document.file(name, p.element)
-    key = (str(path), raw)
-    if key not in p.document.pictures:
-        try:
-            pixels, sentence = read_picture(path, path.name, raw)
-        except SceneError as error:
-            raise p.document.error(error.what, p.element, error.hint) from None
-        if sentence:
-            p.document.warn(sentence, p.element)
-        p.document.pictures[key] = pixels
-    wrap = p.choice("wrap_mode", ("repeat", "mirror", "clamp"))
-    filter = p.choice("filter_type", ("bilinear", "nearest"))
-    p.known("accel", "format")
+        return _checkerboard(p)
+    if p.type == "gridtexture":
+        return _grid(p)
+    if p.type == "scale":
+        return _scale(p)
+    if p.type in _VERTEX_COLOURS:
+        return _vertex_colours(p)
+    if p.type == "wireframe":
+        sentence = f"{p.element} is not supported: the colour between its lines is shown everywhere."
+        p.document.warn(sentence, p.element)
+        return constant(p.bounded_colour("interior_color", 0.5, None))
+    if p.type == "volume":
+        return _volume(p)
+    if p.type in _SPECTRA:
+        return constant(spectrum_object(p, (0.5, 0.5, 0.5)))
+    p.document.warn(f"{p.element} is not supported: what it would colour keeps its default.", p.element)
+    return None
+
+
+def constant(colour: RGB) -> Bitmap:
+    """The same linear colour everywhere."""
+    return Bitmap(np.ones((1, 1, 3), np.float32), scale=colour, name="colour")
+
+
+def is_constant(texture: Texture) -> bool:
+    """Is the texture the same everywhere?"""
+    return isinstance(texture, Bitmap) and texture.pixels.shape[:2] == (1, 1)
+
+
+def squared_luminance(texture: Texture) -> Texture:
+    """The texture whose luminance is the square of this one's: of roughness it makes the α of microfacets."""
+    if isinstance(texture, Checkerboard):
+        a, b = (float(np.dot(c, LUMINANCE)) ** 2 for c in (texture.color0, texture.color1))
+        return replace(texture, color0=(a, a, a), color1=(b, b, b))
+    colours = texture.pixels * np.array(texture.scale, np.float32)
+    grey = (colours @ LUMINANCE.astype(np.float32))[..., None] ** 2
+    return replace(texture, pixels=np.ascontiguousarray(grey, np.float32), scale=WHITE)
+
+
+def to_uv(p: Properties) -> Affine:
+    """How the texture's coordinates follow from the surface's: `to_uv`, or `uscale`, `uoffset`, … of version 0.x,
+    which count as s·(u + o), as Mitsuba 3 upgrades them."""
+    if "to_uv" in p:
+        matrix = p.transform("to_uv")
+        a, b, d, e = (float(x) for x in matrix[:2, :2].reshape(-1))
+        return (a, b, float(matrix[0, 3]), d, e, float(matrix[1, 3]))
+    su, sv = p.number("uscale", 1.0), p.number("vscale", 1.0)
+    return (su, 0.0, su * p.number("uoffset", 0.0), 0.0, sv, sv * p.number("voffset", 0.0))
+
+
+def has_vertex_colours(p: Properties, name: str) -> bool:
+    """Does the value of that name come from a mesh's vertices, whatever scales it?"""
+    element = p.values.get(name)
+    return element is not None and element.tag == "texture" and _from_vertices(element, p, 0)
+
+
+def _from_vertices(element: Element, p: Properties, depth: int) -> bool:
+    kind = element.attributes.get("type")
+    if kind in _VERTEX_COLOURS:
+        return _attribute_of(element) == _ATTRIBUTE
+    if kind != "scale" or depth > 8:
+        return False
+    inside = (p.document.resolve(c) if c.tag == "ref" else c for c in element.children)
+    return any(c.tag == "texture" and _from_vertices(c, p, depth + 1) for c in inside)
+
+
+def _attribute_of(element: Element) -> str:
+    """Name of the attribute that a texture reads; the texture of version 0.6 has no choice."""
+    names = [c.attributes.get("value", "") for c in element.children if c.attributes.get("name") == "name"]
+    return names[0].strip() if names else _ATTRIBUTE
+
+
+def _checkerboard(p: Properties) -> Texture:
+    colours = p.bounded_colour("color0", 0.4, None), p.bounded_colour("color1", 0.2, None)
+    for name in ("color0", "color1"):
+        if name in p.textures:
+            p.document.warn(f"'{name}' of {p.element} is a texture: its mean colour is shown.", p.element)
+    texture = Checkerboard(*colours, to_uv(p))
     p.warn_unused()
-    return Bitmap(p.document.pictures[key], wrap, filter, to_uv, name=path.name)  # type: ignore[arg-type]
+    return texture
+
+
+def _grid(p: Properties) -> Texture:
+    """Lines of `color1` around cells of 1 × 1 filled with `color0`, as a bitmap of one cell."""
+    ground, line = p.bounded_colour("color0", 0.2, None), p.bounded_colour("color1", 0.4, None)
+    width = min(max(p.number("line_width", 0.01), 0.0), 0.5)
+    sizes = np.arange(2, _MOST_GRID + 1)
+    side = int(sizes[np.argmin(np.abs(np.round(sizes * width) / sizes - width))])
+    border = round(side * width)
+    pixels = np.empty((side, side, 3), np.float32)
+    pixels[:] = line
+    pixels[border : side - border, border : side - border] = ground
+    texture = Bitmap(pixels, "repeat", "nearest", to_uv(p), name="grid")
+    p.warn_unused()
+    return texture
+
+
+def _scale(p: Properties) -> Texture | None:
+    """A nested texture times a number or a colour (version 0.6)."""
+    name = "value" if p.tag_of("value") is not None else "scale"
+    inner = [t for n in p.values if n != name and (t := p.texture(n)) is not None] + p.unnamed_textures()
+    if p.tag_of(name) == "texture":
+        inner = [t for t in [p.texture(name)] if t is not None] + inner
+        factor = p.bounded_colour("scale", 1.0, None) if name != "scale" else WHITE
+    else:
+        factor = p.bounded_colour(name, 1.0, None)
+        if name == "value":  # a colour in place of the texture
+            inner = inner or [constant(factor)]
+            factor = p.bounded_colour("scale", 1.0, None)
+    p.warn_unused("texture")
+    if not inner:
+        if not p.objects("texture"):
+            p.document.warn(f"{p.element} has no texture inside: what it would colour keeps its default.", p.element)
+        return None
+    return scaled(inner[0], factor)
+
+
+def _vertex_colours(p: Properties) -> Texture | None:
+    """White, which the colours at the vertices multiply (`Material.vertex_colours`)."""
+    attribute = _attribute_of(p.element)
+    p.known("name")
+    factor = p.number("scale", 1.0)
+    p.warn_unused()
+    if attribute == _ATTRIBUTE:
+        return constant((factor, factor, factor))
+    what = f"The attribute '{attribute[:40]}' of {p.element} is not read: what it would colour keeps its default."
+    p.document.warn(what, p.element)
+    return None
+
+
+def _volume(p: Properties) -> Texture | None:
+    """The colour of a constant volume; grids are not read."""
+    from pmviewer.scene.formats.mitsuba.document import Properties
+
+    for element in p.objects("volume"):
+        inner = Properties(element, p.document)
+        if inner.type == "constvolume":
+            return constant(inner.bounded_colour("value", 1.0, None))
+    p.document.warn(f"{p.element} is not supported: what it would colour keeps its default.", p.element)
+    return None
+
+

@@ -1,0 +1,109 @@
+"""Mitsuba's `principled` and `principledthin` (Burley 2012, 2015) as materials."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from pmviewer.scene.description import BLACK, Material, Principled
+from pmviewer.scene.formats.mitsuba.document import Properties
+from pmviewer.scene.formats.mitsuba.interface import bounded, share
+from pmviewer.scene.formats.mitsuba.texture import has_vertex_colours, squared_luminance
+from pmviewer.scene.texture import scaled
+
+_SHARES = ("metallic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness", "clearcoat", "clearcoat_gloss")
+_THIN_SHARES = ("sheen", "sheen_tint", "flatness")
+_SMOOTHEST = 1e-3
+"""Mitsuba's least roughness of microfacets."""
+_LARGEST_SPECULAR = 12.0
+"""The index grows beyond all bounds at 12.5."""
+_NO_COAT = 1e-4
+
+
+def index_of(specular: float) -> float:
+    """Refractive index whose reflection head-on is 0.08·specular."""
+    return 2 / (1 - math.sqrt(0.08 * specular)) - 1
+
+
+def principled(p: Properties, name: str) -> Material:
+    """`base_color`, `roughness` and `metallic` may be textures; of other textures the mean counts, with a warning."""
+    numbers = {n: share(p, n) for n in _SHARES}
+    if "eta" in p:
+        eta = bounded(p, "eta", p.number("eta", 1.5), 1e-3, 1e3)
+        if "specular" in p:
+            p.known("specular")
+            p.document.warn(f"{p.element} has both 'eta' and 'specular': 'eta' is used.", p.element)
+    else:
+        eta = index_of(bounded(p, "specular", p.roughness("specular", 0.5), 0.0, _LARGEST_SPECULAR))
+    if numbers["spec_trans"] > 0 and abs(eta - 1) < _NO_COAT:
+        eta = 1.001  # as Mitsuba: what transmits needs an index
+    p.known("main_specular_sampling_rate", "clearcoat_sampling_rate", "diffuse_reflectance_sampling_rate")
+    return _textured(
+        p,
+        Material(
+            name,
+            "principled",
+            reflectance=p.bounded_colour("base_color", 0.5, 1),
+            alpha=_alphas(p),
+            eta=eta,
+            principled=Principled(**numbers),
+        ),
+        set(_SHARES) - {"metallic"},
+    )
+
+
+def principled_thin(p: Properties, name: str) -> Material:
+    """A sheet without an inside: diffuse and sheen on both sides in the share 1 − `spec_trans`, thin glass in the
+    rest."""
+    numbers = {n: share(p, n) for n in _THIN_SHARES}
+    glass = share(p, "spec_trans")
+    through = bounded(p, "diff_trans", p.roughness("diff_trans", 0.0), 0.0, 2.0) / 2
+    eta = bounded(p, "eta", p.roughness("eta", 1.5), 1e-3, 1e3)
+    colour = p.bounded_colour("base_color", 0.5, 1)
+    p.known("spec_tint", *(f"{what}_sampling_rate" for what in (
+        "specular_reflectance", "diffuse_reflectance", "specular_transmittance", "diffuse_transmittance",
+    )))  # fmt: skip
+    sheet = _textured(
+        p,
+        Material(name, "principled", colour, two_sided=True, alpha=_alphas(p), eta=1.0, principled=Principled(**numbers)),
+        {*_THIN_SHARES, "spec_trans", "diff_trans", "eta"},
+    )
+    if through > 0 and glass < 1:
+        p.document.warn(f"{p.element}: the light that 'diff_trans' lets through is left out.", p.element)
+        left = 1 - through
+        textures = {s: scaled(t, (left, left, left)) if s == "reflectance" else t for s, t in sheet.textures.items()}
+        r, g, b = (left * c for c in sheet.reflectance)
+        sheet = replace(sheet, reflectance=(r, g, b), textures=textures)
+    if not glass > 0:
+        return sheet
+    p.document.warn(f"{p.element}: the share 'spec_trans' is shown as smooth thin glass.", p.element)
+    r, g, b = (math.sqrt(c) for c in colour)
+    pane = Material(f"{name} (glass)", "thin dielectric", (1.0, 1.0, 1.0), transmittance=(r, g, b), eta=eta)
+    if glass >= 1:
+        return replace(pane, name=name)
+    return Material(name, "blend", BLACK, parts=(sheet, pane), weight=glass)
+
+
+def _alphas(p: Properties) -> tuple[float, float]:
+    """Roughness squared, along and across the grain."""
+    squared = share(p, "roughness", 0.5) ** 2
+    aspect = math.sqrt(1 - 0.9 * share(p, "anisotropic"))
+    return max(_SMOOTHEST, squared / aspect), max(_SMOOTHEST, squared * aspect)
+
+
+def _textured(p: Properties, material: Material, means: set[str]) -> Material:
+    """With the textures of base colour, roughness and metal; `means` are properties of whose textures only the mean
+    was read."""
+    textures = dict(material.textures)
+    if "base_color" in p.textures:
+        textures["reflectance"] = p.textures["base_color"]
+    if "roughness" in p.textures:
+        textures["alpha"] = squared_luminance(p.textures["roughness"])
+        if "anisotropic" in p:
+            p.document.warn(f"{p.element}: where a texture gives 'roughness', 'anisotropic' has no effect.", p.element)
+    if "metallic" in p.textures and material.principled is not None and "metallic" not in means:
+        textures["metallic"] = p.textures["metallic"]
+    for name in sorted((means | {"anisotropic", "specular"}) & p.textures.keys()):
+        what = f"'{name}' of {p.element} is a texture: its mean is used everywhere."
+        p.document.warn(what, p.values[name])
+    return replace(material, textures=textures, vertex_colours=has_vertex_colours(p, "base_color"))
