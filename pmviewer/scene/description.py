@@ -314,6 +314,8 @@ class Scene:
     warnings: tuple[str, ...] = ()
     dropped: Mapping[str, int] = field(default_factory=dict)
     instances: tuple[Instance, ...] = ()
+    cameras: tuple[tuple[str, Camera, int, int], ...] = ()
+    """All cameras of a file that has several: name, camera, width and height; `camera` is the first of them."""
 
     @property
     def groups(self) -> tuple[Group, ...]:

@@ -1,119 +1,229 @@
-"""Sensor and film elements as camera and image size."""
+"""Sensor elements as cameras: what is no camera of ours becomes the nearest one, with a sentence."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pmviewer.scene.clean import check_camera, check_size
+from pmviewer.errors import SceneError
+from pmviewer.scene.clean import check_camera
 from pmviewer.scene.description import Camera, Vec3
 from pmviewer.scene.formats.mitsuba.document import Document, Properties
-from pmviewer.scene.formats.mitsuba.transform import mirrors
+from pmviewer.scene.formats.mitsuba.film import DEFAULT_SIZE, Film, read_film
+from pmviewer.scene.formats.mitsuba.transform import Matrix, mirrors
 from pmviewer.scene.formats.mitsuba.values import parse_float, parse_numbers
 from pmviewer.scene.formats.mitsuba.xml import Element
+from pmviewer.scene.framing import framed
 
 Axis = Literal["x", "y", "diagonal", "smaller", "larger"]
-DEFAULT_SIZE = (768, 576)
+Box = tuple[NDArray[np.float64], NDArray[np.float64]]
 _FILM_DIAGONAL_MM = math.hypot(36, 24)
-_FILM_SILENT = (
-    "pixel_format", "component_format", "file_format", "sample_border", "compensate", "banner", "high_quality_edges",
-    "gamma", "exposure", "tonemap_method", "attach_log", "rfilter",
-)  # fmt: skip
+_LEAST_FOV, _LARGEST_FOV = 1e-3, 179.0
+_UNPOINTED = frozenset(("irradiancemeter", "fluencemeter", "distant", "mdistant"))
+_INSTEAD = {
+    "thinlens": "everything is sharp, the size of its lens has no effect",
+    "perspective_rdist": "it is shown without its distortion",
+    "telecentric": "it is shown as an orthographic camera, everything is sharp",
+    "spherical": "a perspective camera 120° wide in its direction replaces it",
+    "radiancemeter": "a perspective camera in its direction replaces it",
+}
+_SPHERICAL_FOV = 120.0
+_PROBE_SIDE = 512
 
 
 @dataclass(frozen=True)
 class View:
+    name: str
     camera: Camera
     width: int
     height: int
 
 
-def film_size(sensor: Properties) -> tuple[int, int]:
-    """Width and height in pixels of a sensor's film."""
-    films = sensor.objects("film")
-    if not films:
-        return DEFAULT_SIZE
-    film = Properties(films[0], sensor.document)
-    if film.type != "hdrfilm":
-        sensor.document.warn(f"{film.element} is read as an hdrfilm.", film.element)
-    film.known(*_FILM_SILENT)
-    width, height = film.integer("width", DEFAULT_SIZE[0]), film.integer("height", DEFAULT_SIZE[1])
-    film.warn_unused()
-    check_size(width, height, sensor.document.diagnostics.path, film.element.line)
-    return width, height
+class _Unusable(Exception):
+    """A sensor that no camera can stand in for."""
 
 
-def view(element: Element, document: Document, center: np.ndarray) -> View:
-    """Camera of a perspective <sensor>. `center` of the scene tells how far away its orbit point is."""
-    p = Properties(element, document)
-    if p.type != "perspective":
+def read_views(sensors: Sequence[Element], document: Document, box: Box) -> list[View]:
+    """A view for every usable <sensor>, in the order of the file; one framed on the scene, whose bounds are given, if
+    there is none. `batch` stands for the sensors in it."""
+    found: list[View] = []
+    size = DEFAULT_SIZE
+    for element in _flat(sensors, document):
+        p = Properties(element, document)
+        film = read_film(p)
+        try:
+            found.append(_view(p, film, (box[0] + box[1]) / 2))
+        except _Unusable as reason:
+            document.warn(f"{reason}: a camera framed on the scene replaces it.", element)
+            size = (film.width, film.height) if size == DEFAULT_SIZE else size
+    if not sensors:
+        document.diagnostics.warn("The scene has no camera: one framed on it is used.")
+    if len(found) > 1:
+        more = f"{len(found) - 1} other camera{'s' if len(found) > 2 else ''} of the scene can be chosen"
+        document.diagnostics.warn(f"'{found[0].name}' gives the view, {more}.")
+    return found or [View("framed", framed((), box=box), *size)]
+
+
+def _flat(sensors: Sequence[Element], document: Document) -> list[Element]:
+    flat: list[Element] = []
+    for element in sensors:
+        if element.attributes.get("type") == "batch":
+            document.warn(f"{element}: the sensors in it are shown one at a time.", element)
+            flat += Properties(element, document).objects("sensor")
+        else:
+            flat.append(element)
+    return flat
+
+
+def _view(p: Properties, film: Film, center: NDArray[np.float64]) -> View:
+    element, document = p.element, p.document
+    if p.type in _UNPOINTED:
+        raise _Unusable(f"{element} looks nowhere in particular")
+    if p.type in _INSTEAD:
+        document.warn(f"{element}: {_INSTEAD[p.type]}.", element)
+    elif p.type not in ("perspective", "orthographic"):
         document.warn(f"{element} is approximated by a perspective camera.", element)
-        p.known("aperture_radius", "focus_distance")
-    width, height = film_size(p)
-    m = p.transform()
-    origin, left, up, forward = m[:3, 3], m[:3, 0], m[:3, 1], m[:3, 2]
-    lengths = np.linalg.norm(m[:3, :3], axis=0)
-    if not np.isfinite(lengths).all() or lengths.min() <= 1e-12 * lengths.max():
-        at = p.values.get("to_world", element)
-        hint = "Use <lookat>, or a matrix of rotation and translation."
-        raise document.error(f"The to_world matrix of {element} is singular.", at, hint)
-    angles = (m[:3, :3] / lengths).T @ (m[:3, :3] / lengths) - np.eye(3)
-    if np.abs(lengths - 1).max() > 1e-3 or np.abs(angles).max() > 1e-3:
-        document.warn(f"Scale and shear in the to_world matrix of {element} are ignored.", element)
-    if float(np.linalg.norm(np.cross(left / lengths[0], forward / lengths[2]))) < 1e-6:
-        at = p.values.get("to_world", element)
-        raise document.error(f"The to_world matrix of {element} is singular.", at, "Use <lookat>.")
-    direction = forward / lengths[2]
-    fov, axis = _fov(p)
-    target = _lookat_target(p)
-    if target is None:
-        distance = float((center - origin) @ direction)
-        t = origin + direction * (distance if distance > 1e-6 else 1.0)
-        target = (float(t[0]), float(t[1]), float(t[2]))
-    camera = Camera(
-        origin=(float(origin[0]), float(origin[1]), float(origin[2])),
-        target=target,
-        up=(float(up[0]), float(up[1]), float(up[2])),
-        fov=fov,
-        fov_axis=axis,
-        near=p.number("near_clip", 0.0),
-        far=p.number("far_clip", math.inf),
-        mirrored=mirrors(m),
-    )
-    p.known("shutter_open", "shutter_close")
+    p.known("aperture_radius", "focus_distance", "kc", "shutter_open", "shutter_close", "srf")
+    if p.type == "radiancemeter" and (film.width, film.height) == (1, 1):
+        film = Film(_PROBE_SIDE, _PROBE_SIDE, (_PROBE_SIDE, _PROBE_SIDE))
+    origin, target, up, m = _placed(p, center)
+    camera = Camera(origin, target, up, fov=40.0, mirrored=m is not None and mirrors(m))
+    camera = _orthographic(p, camera, film, m) if p.type in ("orthographic", "telecentric") else _lens(p, camera, film)
+    near, far = _clip(p)
     p.warn_unused("film")
-    check_camera(camera, document.diagnostics.path, element.line)
-    return View(camera, width, height)
+    camera = replace(camera, near=near, far=far)
+    try:
+        check_camera(camera, document.diagnostics.path, element.line)
+    except SceneError as error:
+        raise _Unusable(f"{element} can't be used: {error.what.rstrip('.')}") from None
+    name = element.attributes.get("id") or f"{p.type} (line {element.line})"
+    return View(name, camera, film.width, film.height)
 
 
-def _lookat_target(p: Properties) -> Vec3 | None:
-    """The point that the file says it looks at, when nothing else moves the camera."""
+def _placed(p: Properties, center: NDArray[np.float64]) -> tuple[Vec3, Vec3, Vec3, Matrix | None]:
+    """Origin, target and up, and the matrix they come from, if that can be used. `center` of the scene tells how far
+    away the orbit point is, where nothing else does."""
+    element, document = p.element, p.document
+    at = p.values.get("to_world", element)
+    looked = _lookat(p)
+    try:
+        m = p.transform()
+    except SceneError as error:
+        if looked is None or looked[0] == looked[1]:
+            raise _Unusable(f"The to_world matrix of {element} can't be used ({error.what.rstrip('.')})") from None
+        document.warn(f"{element}: 'up' is along the view, another one replaces it.", at)
+        origin, target = looked
+        away = np.argmin(np.abs(np.subtract(target, origin)))
+        return origin, target, (float(away == 0), float(away == 1), float(away == 2)), None
+    lengths = np.linalg.norm(m[:3, :3], axis=0)
+    singular = _Unusable(f"The to_world matrix of {element} is singular")
+    if not np.isfinite(lengths).all() or lengths.min() <= 1e-12 * lengths.max():
+        raise singular
+    axes = m[:3, :3] / lengths
+    if float(np.linalg.norm(np.cross(axes[:, 0], axes[:, 2]))) < 1e-6:
+        raise singular
+    flat = p.type in ("orthographic", "telecentric")
+    uneven = abs(lengths[0] / lengths[1] - 1) if flat else np.abs(lengths - 1).max()
+    if uneven > 1e-3 or np.abs(axes.T @ axes - np.eye(3)).max() > 1e-3:
+        what = "Uneven scale and shear" if flat else "Scale and shear"
+        document.warn(f"{what} in the to_world matrix of {element} are ignored.", element)
+    origin = _vec3(m[:3, 3])
+    alone = p.values.get("to_world")
+    if looked is not None and alone is not None and len(alone.children) == 1:
+        return origin, looked[1], _vec3(m[:3, 1]), m
+    distance = float((center - m[:3, 3]) @ axes[:, 2])
+    target = _vec3(m[:3, 3] + axes[:, 2] * (distance if distance > 1e-6 else 1.0))
+    return origin, target, _vec3(m[:3, 1]), m
+
+
+def _vec3(v: NDArray[np.float64]) -> Vec3:
+    return (float(v[0]), float(v[1]), float(v[2]))
+
+
+def _lookat(p: Properties) -> tuple[Vec3, Vec3] | None:
+    """The two points of the only <lookat> in the transformation."""
     transform = p.values.get("to_world")
-    if transform is None or [c.tag.lower() for c in transform.children] != ["lookat"]:
+    if transform is None:
         return None
-    x, y, z = parse_numbers(transform.children[0].attributes["target"], (3,))
-    return (x, y, z)
+    looks = [c for c in transform.children if c.tag.lower() == "lookat"]
+    try:
+        (only,) = looks
+        origin, target = (parse_numbers(only.attributes[name], (3,)) for name in ("origin", "target"))
+    except (KeyError, ValueError):
+        return None
+    return (origin[0], origin[1], origin[2]), (target[0], target[1], target[2])
+
+
+def _clip(p: Properties) -> tuple[float, float]:
+    near, far = p.number("near_clip", 0.0), p.number("far_clip", math.inf)
+    if 0 <= near < far:
+        return near, far
+    p.document.warn(f"'near_clip' and 'far_clip' of {p.element} leave nothing to see: nothing is clipped.", p.element)
+    return 0.0, math.inf
+
+
+def _orthographic(p: Properties, camera: Camera, film: Film, m: Matrix | None) -> Camera:
+    """Mitsuba's picture is 2 units wide before `to_world` scales it."""
+    scale = float(np.linalg.norm(m[:3, 0])) if m is not None else 1.0
+    p.known("fov", "fov_axis", "focal_length")
+    width = 2 * scale * film.width / film.full[0]
+    return replace(camera, projection="orthographic", width=width, shift=film.shift((0.0, 0.0)))
+
+
+def _lens(p: Properties, camera: Camera, film: Film) -> Camera:
+    fov, axis = _fov(p)
+    if p.type == "spherical":
+        fov, axis = _SPHERICAL_FOV, "larger"
+    offset = p.number("principal_point_offset_x", 0.0), p.number("principal_point_offset_y", 0.0)
+    if film.cropped:
+        half = math.tan(math.radians(fov) / 2) * _share_of_width(axis, *film.full)
+        fov, axis = math.degrees(2 * math.atan(half * film.width / film.full[0])), "x"
+    return replace(camera, fov=fov, fov_axis=axis, shift=film.shift(offset))
+
+
+def _share_of_width(axis: Axis, width: int, height: int) -> float:
+    """The film's width over its size along an axis."""
+    along = {
+        "x": width,
+        "y": height,
+        "diagonal": math.hypot(width, height),
+        "smaller": min(width, height),
+        "larger": max(width, height),
+    }
+    return width / along[axis]
 
 
 def _fov(p: Properties) -> tuple[float, Axis]:
+    """Field of view in degrees and its axis."""
     if "fov" in p:
         fov, axis = p.number("fov", 0.0), p.string("fov_axis", "x").lower()
         p.known("focal_length")
         if axis not in get_args(Axis):
             at = p.values["fov_axis"]
-            expected = ", ".join(get_args(Axis))
-            raise p.document.error(f"'fov_axis' of {p.element}: expected one of {expected}, found '{axis}'.", at)
-        return fov, axis  # type: ignore[return-value]
+            p.document.warn(f"'fov_axis' of {p.element}: '{axis[:40]}' is not known, x replaces it.", at)
+            axis = "x"
+        cut = min(max(fov, _LEAST_FOV), _LARGEST_FOV)
+        if cut != fov:
+            what = f"The field of view of {p.element} can't be {fov:g} degrees: it was taken as {cut:g}."
+            p.document.warn(what, p.values["fov"])
+        return cut, axis  # type: ignore[return-value]
     p.known("fov_axis")
-    text = p.string("focal_length", "50mm").removesuffix("mm")
+    millimetres = 50.0
     try:
-        millimetres = parse_float(text)
+        if p.tag_of("focal_length") in ("float", "integer"):
+            millimetres = p.number("focal_length", 50.0)
+        else:
+            millimetres = parse_float(p.string("focal_length", "50mm").removesuffix("mm"))
         if millimetres <= 0:
             raise ValueError("expected a length above zero")
     except ValueError as error:
         at = p.values.get("focal_length", p.element)
-        raise p.document.error(f"'focal_length' of {p.element}: {error}.", at) from None
-    return math.degrees(2 * math.atan(_FILM_DIAGONAL_MM / (2 * millimetres))), "diagonal"
+        p.document.warn(f"'focal_length' of {p.element}: {error}; 50 mm replace it.", at)
+        millimetres = 50.0
+    fov = math.degrees(2 * math.atan(_FILM_DIAGONAL_MM / (2 * millimetres)))
+    return min(max(fov, _LEAST_FOV), _LARGEST_FOV), "diagonal"

@@ -14,19 +14,17 @@ from pmviewer.scene.clean import clean_lights, clean_shapes, on_a_surface
 from pmviewer.scene.description import RGB, Light, Scene, Shape
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.mitsuba.bsdf import Materials
-from pmviewer.scene.formats.mitsuba.camera import DEFAULT_SIZE, View, film_size, view
+from pmviewer.scene.formats.mitsuba.camera import read_views
 from pmviewer.scene.formats.mitsuba.document import SILENT_TAGS, Document, Properties
 from pmviewer.scene.formats.mitsuba.emitter import read_light
 from pmviewer.scene.formats.mitsuba.group import GROUP, INSTANCE, Groups
 from pmviewer.scene.formats.mitsuba.shape import SUPPORTED, geometry
 from pmviewer.scene.formats.mitsuba.xml import Element, read_xml, substitute
-from pmviewer.scene.framing import framed
 from pmviewer.scene.instances import joint_bounds
 from pmviewer.scene.texture import Texture
 
 # Definitions that other objects refer to change nothing where they stand.
 _SILENT = SILENT_TAGS | {"bsdf", "texture", "spectrum", "alias"}
-_PERSPECTIVE = ("perspective", "thinlens")
 
 
 def load_mitsuba(path: Path, parameters: Mapping[str, str]) -> Scene:
@@ -50,7 +48,7 @@ def load_mitsuba(path: Path, parameters: Mapping[str, str]) -> Scene:
         hint = diagnostics.left_out() or 'Add an <emitter>, for example of type "area", "point" or "envmap".'
         raise diagnostics.error("The scene has no light.", hint=hint)
     low, high = box = joint_bounds(shapes, instances)
-    seen = scene.view(box)
+    seen, *others = views = read_views(scene.sensors, document, box)
     touched = on_a_surface(seen.camera.origin, shapes, float(np.linalg.norm(high - low)))
     if touched is not None:
         diagnostics.warn(f"The camera stands on the surface of '{touched}' and may see nothing.")
@@ -66,6 +64,7 @@ def load_mitsuba(path: Path, parameters: Mapping[str, str]) -> Scene:
         warnings=diagnostics.warnings(),
         dropped=dict(diagnostics.dropped),
         instances=instances,
+        cameras=tuple((v.name, v.camera, v.width, v.height) for v in views) if others else (),
     )
 
 
@@ -134,19 +133,3 @@ class _Reader:
         light = read_light(Properties(element, self.document), self.lights)
         if light is not None:
             self.lights.append(light)
-
-    def view(self, box: tuple[np.ndarray, np.ndarray]) -> View:
-        """The first usable sensor, or a camera framed on the scene, whose bounds are given."""
-        usable = [s for s in self.sensors if s.attributes.get("type") in _PERSPECTIVE]
-        if usable:
-            if len(self.sensors) > 1:
-                sentence = f"{usable[0]} in line {usable[0].line} is used, the scene's other sensors are ignored."
-                self.document.diagnostics.warn(sentence)
-            return view(usable[0], self.document, (box[0] + box[1]) / 2)
-        width, height = DEFAULT_SIZE
-        for sensor in self.sensors[:1]:
-            self.document.ignore(sensor, "is not supported: a camera framed on the scene replaces it")
-            width, height = film_size(Properties(sensor, self.document))
-        if not self.sensors:
-            self.document.diagnostics.warn("The scene has no camera: one framed on it is used.")
-        return View(framed((), box=box), width, height)
