@@ -299,6 +299,16 @@ class Camera:
 
 
 @dataclass(frozen=True)
+class NamedCamera:
+    """A camera of the file with the size of its picture in pixels."""
+
+    name: str
+    camera: Camera
+    width: int
+    height: int
+
+
+@dataclass(frozen=True)
 class Scene:
     """Everything a loader found. `warnings` are complete sentences ("line 12: texture 'bitmap' is ignored …");
     `dropped` counts what was unusable, by reason ("degenerate triangle": 3)."""
@@ -314,8 +324,9 @@ class Scene:
     warnings: tuple[str, ...] = ()
     dropped: Mapping[str, int] = field(default_factory=dict)
     instances: tuple[Instance, ...] = ()
-    cameras: tuple[tuple[str, Camera, int, int], ...] = ()
-    """All cameras of a file that has several: name, camera, width and height; `camera` is the first of them."""
+    cameras: tuple[NamedCamera, ...] = ()
+    """All cameras of the file; `camera` is the first. Without any, `camera` is a makeshift until one is chosen
+    (`pmviewer.scene.completion`)."""
 
     @property
     def groups(self) -> tuple[Group, ...]:

@@ -27,7 +27,8 @@ def decode_pfm(data: bytes, name: str) -> NDArray[np.float32]:
     channels = 3 if header[1] == b"PF" else 1
     width, height = int(header[2]), int(header[3])
     if not 0 < width * height <= MOST_PIXELS or len(data) - header.end() < 4 * channels * width * height:
-        raise SceneError(f"The picture {name!r} claims {width} × {height} pixels and is cut off.", hint="Copy it again.")
+        what = f"The picture {name!r} claims {width} × {height} pixels and is cut off."
+        raise SceneError(what, hint="Copy it again.")
     order = "<f4" if header[4].startswith(b"-") else ">f4"
     pixels = np.frombuffer(data, order, channels * width * height, header.end()).reshape(height, width, channels)
     return np.ascontiguousarray(pixels[::-1], np.float32)

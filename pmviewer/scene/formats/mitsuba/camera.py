@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.clean import check_camera
-from pmviewer.scene.description import Camera, Vec3
+from pmviewer.scene.description import Camera, NamedCamera, Vec3
 from pmviewer.scene.formats.mitsuba.document import Document, Properties
 from pmviewer.scene.formats.mitsuba.film import DEFAULT_SIZE, Film, read_film
 from pmviewer.scene.formats.mitsuba.transform import Matrix, mirrors
 from pmviewer.scene.formats.mitsuba.values import parse_float, parse_numbers
 from pmviewer.scene.formats.mitsuba.xml import Element
-from pmviewer.scene.framing import framed
 
 Axis = Literal["x", "y", "diagonal", "smaller", "larger"]
 Box = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -36,37 +35,31 @@ _SPHERICAL_FOV = 120.0
 _PROBE_SIDE = 512
 
 
-@dataclass(frozen=True)
-class View:
-    name: str
-    camera: Camera
-    width: int
-    height: int
-
-
 class _Unusable(Exception):
     """A sensor that no camera can stand in for."""
 
 
-def read_views(sensors: Sequence[Element], document: Document, box: Box) -> list[View]:
-    """A view for every usable <sensor>, in the order of the file; one framed on the scene, whose bounds are given, if
-    there is none. `batch` stands for the sensors in it."""
-    found: list[View] = []
+def read_cameras(
+    sensors: Sequence[Element], document: Document, box: Box
+) -> tuple[list[NamedCamera], tuple[int, int]]:
+    """Every usable <sensor> in the order of the file, and the size of the picture if there is none. `box` has the
+    corners of the scene; `batch` stands for the sensors in it."""
+    found: list[NamedCamera] = []
     size = DEFAULT_SIZE
     for element in _flat(sensors, document):
         p = Properties(element, document)
         film = read_film(p)
         try:
-            found.append(_view(p, film, (box[0] + box[1]) / 2))
+            found.append(_camera(p, film, (box[0] + box[1]) / 2))
         except _Unusable as reason:
-            document.warn(f"{reason}: a camera framed on the scene replaces it.", element)
+            document.warn(f"{reason}: it is left out.", element)
             size = (film.width, film.height) if size == DEFAULT_SIZE else size
-    if not sensors:
-        document.diagnostics.warn("The scene has no camera: one framed on it is used.")
+    if not found:
+        document.diagnostics.warn("The scene has no camera that can be used: one framed on it is.")
     if len(found) > 1:
         more = f"{len(found) - 1} other camera{'s' if len(found) > 2 else ''} of the scene can be chosen"
         document.diagnostics.warn(f"'{found[0].name}' gives the view, {more}.")
-    return found or [View("framed", framed((), box=box), *size)]
+    return found, size
 
 
 def _flat(sensors: Sequence[Element], document: Document) -> list[Element]:
@@ -80,7 +73,7 @@ def _flat(sensors: Sequence[Element], document: Document) -> list[Element]:
     return flat
 
 
-def _view(p: Properties, film: Film, center: NDArray[np.float64]) -> View:
+def _camera(p: Properties, film: Film, center: NDArray[np.float64]) -> NamedCamera:
     element, document = p.element, p.document
     if p.type in _UNPOINTED:
         raise _Unusable(f"{element} looks nowhere in particular")
@@ -102,7 +95,7 @@ def _view(p: Properties, film: Film, center: NDArray[np.float64]) -> View:
     except SceneError as error:
         raise _Unusable(f"{element} can't be used: {error.what.rstrip('.')}") from None
     name = element.attributes.get("id") or f"{p.type} (line {element.line})"
-    return View(name, camera, film.width, film.height)
+    return NamedCamera(name, camera, film.width, film.height)
 
 
 def _placed(p: Properties, center: NDArray[np.float64]) -> tuple[Vec3, Vec3, Vec3, Matrix | None]:

@@ -11,15 +11,16 @@ from pathlib import Path
 import numpy as np
 
 from pmviewer.scene.clean import clean_lights, clean_shapes, on_a_surface
-from pmviewer.scene.description import RGB, Light, Scene, Shape
+from pmviewer.scene.description import RGB, Light, NamedCamera, Scene, Shape
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.mitsuba.bsdf import Materials
-from pmviewer.scene.formats.mitsuba.camera import read_views
+from pmviewer.scene.formats.mitsuba.camera import read_cameras
 from pmviewer.scene.formats.mitsuba.document import SILENT_TAGS, Document, Properties
 from pmviewer.scene.formats.mitsuba.emitter import read_light
 from pmviewer.scene.formats.mitsuba.group import GROUP, INSTANCE, Groups
 from pmviewer.scene.formats.mitsuba.shape import SUPPORTED, geometry
 from pmviewer.scene.formats.mitsuba.xml import Element, read_xml, substitute
+from pmviewer.scene.framing import framed
 from pmviewer.scene.instances import joint_bounds
 from pmviewer.scene.texture import Texture
 
@@ -48,7 +49,8 @@ def load_mitsuba(path: Path, parameters: Mapping[str, str]) -> Scene:
         hint = diagnostics.left_out() or 'Add an <emitter>, for example of type "area", "point" or "envmap".'
         raise diagnostics.error("The scene has no light.", hint=hint)
     low, high = box = joint_bounds(shapes, instances)
-    seen, *others = views = read_views(scene.sensors, document, box)
+    cameras, size = read_cameras(scene.sensors, document, box)
+    seen = cameras[0] if cameras else NamedCamera("framed", framed((), box=box), *size)
     touched = on_a_surface(seen.camera.origin, shapes, float(np.linalg.norm(high - low)))
     if touched is not None:
         diagnostics.warn(f"The camera stands on the surface of '{touched}' and may see nothing.")
@@ -64,7 +66,7 @@ def load_mitsuba(path: Path, parameters: Mapping[str, str]) -> Scene:
         warnings=diagnostics.warnings(),
         dropped=dict(diagnostics.dropped),
         instances=instances,
-        cameras=tuple((v.name, v.camera, v.width, v.height) for v in views) if others else (),
+        cameras=tuple(cameras),
     )
 
 

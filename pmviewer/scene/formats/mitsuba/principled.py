@@ -63,11 +63,16 @@ def principled_thin(p: Properties, name: str) -> Material:
     p.known("spec_tint", *(f"{what}_sampling_rate" for what in (
         "specular_reflectance", "diffuse_reflectance", "specular_transmittance", "diffuse_transmittance",
     )))  # fmt: skip
-    sheet = _textured(
-        p,
-        Material(name, "principled", colour, two_sided=True, alpha=_alphas(p), eta=1.0, principled=Principled(**numbers)),
-        {*_THIN_SHARES, "spec_trans", "diff_trans", "eta"},
+    sheet = Material(
+        name,
+        "principled",
+        colour,
+        two_sided=True,
+        alpha=_alphas(p),
+        eta=1.0,  # all that it mirrors is the glass's
+        principled=Principled(**numbers),
     )
+    sheet = _textured(p, sheet, {*_THIN_SHARES, "spec_trans", "diff_trans", "eta"})
     if through > 0 and glass < 1:
         p.document.warn(f"{p.element}: the light that 'diff_trans' lets through is left out.", p.element)
         left = 1 - through
