@@ -20,7 +20,8 @@ LARGEST_RADIANCE = 1e30
 def read_sky(path: Path) -> tuple[NDArray[np.float32], int]:
     """Linear RGB (h, w, 3), and how many of its numbers were negative or not finite and are 0 now.
 
-    8-bit pictures are decoded from sRGB. Raises SceneError for what is no such picture, or too small for directions.
+    8-bit pictures are decoded from sRGB, those of less than 2 × 3 pixels continued. Raises SceneError for what is no
+    such picture.
     """
     ending = path.suffix.lower()
     if ending == ".exr":
@@ -32,9 +33,12 @@ def read_sky(path: Path) -> tuple[NDArray[np.float32], int]:
     else:
         pixels = _encoded(path)
     height, width = pixels.shape[:2]
+    if not width * height:
+        raise SceneError("The picture has no pixels.", path)
     if width < LEAST_WIDTH or height < LEAST_HEIGHT:
-        what = f"An environment needs at least {LEAST_WIDTH} × {LEAST_HEIGHT} pixels, found {width} × {height}."
-        raise SceneError(what, path)
+        # The last column and row again, as Mitsuba does.
+        wider = (0, max(0, LEAST_HEIGHT - height)), (0, max(0, LEAST_WIDTH - width)), (0, 0)
+        pixels = np.pad(pixels, wider, mode="edge")
     with np.errstate(invalid="ignore"):
         usable = (pixels >= 0) & (pixels <= LARGEST_RADIANCE)
     return np.ascontiguousarray(np.where(usable, pixels, 0), np.float32), int((~usable).sum())

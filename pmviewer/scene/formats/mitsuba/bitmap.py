@@ -57,7 +57,7 @@ def _picture(p: Properties, name: str, raw: bool, channel: str) -> NDArray[np.fl
         return document.pictures[key]
     except SceneError as error:
         reason = "does not exist" if "does not exist" in error.what else error.what.rstrip(".")
-        shown = name.replace("\\", "/")[-80:] or "<texture type=\"bitmap\">"
+        shown = name.replace("\\", "/")[-80:] or '<texture type="bitmap">'
         document.diagnostics.warn_of(f"{shown} ({reason[:160]})", _LEFT_OUT, p.element.line)
         return None
 

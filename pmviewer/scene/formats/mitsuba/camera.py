@@ -39,9 +39,7 @@ class _Unusable(Exception):
     """A sensor that no camera can stand in for."""
 
 
-def read_cameras(
-    sensors: Sequence[Element], document: Document, box: Box
-) -> tuple[list[NamedCamera], tuple[int, int]]:
+def read_cameras(sensors: Sequence[Element], document: Document, box: Box) -> tuple[list[NamedCamera], tuple[int, int]]:
     """Every usable <sensor> in the order of the file, and the size of the picture if there is none. `box` has the
     corners of the scene; `batch` stands for the sensors in it."""
     found: list[NamedCamera] = []
@@ -169,17 +167,17 @@ def _orthographic(p: Properties, camera: Camera, film: Film, m: Matrix | None) -
 
 
 def _lens(p: Properties, camera: Camera, film: Film) -> Camera:
-    fov, axis = _fov(p)
+    fov, axis = field_of_view(p)
     if p.type == "spherical":
         fov, axis = _SPHERICAL_FOV, "larger"
     offset = p.number("principal_point_offset_x", 0.0), p.number("principal_point_offset_y", 0.0)
     if film.cropped:
-        half = math.tan(math.radians(fov) / 2) * _share_of_width(axis, *film.full)
+        half = math.tan(math.radians(fov) / 2) * share_of_width(axis, *film.full)
         fov, axis = math.degrees(2 * math.atan(half * film.width / film.full[0])), "x"
     return replace(camera, fov=fov, fov_axis=axis, shift=film.shift(offset))
 
 
-def _share_of_width(axis: Axis, width: int, height: int) -> float:
+def share_of_width(axis: Axis, width: int, height: int) -> float:
     """The film's width over its size along an axis."""
     along = {
         "x": width,
@@ -191,7 +189,7 @@ def _share_of_width(axis: Axis, width: int, height: int) -> float:
     return width / along[axis]
 
 
-def _fov(p: Properties) -> tuple[float, Axis]:
+def field_of_view(p: Properties) -> tuple[float, Axis]:
     """Field of view in degrees and its axis."""
     if "fov" in p:
         fov, axis = p.number("fov", 0.0), p.string("fov_axis", "x").lower()

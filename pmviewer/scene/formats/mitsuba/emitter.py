@@ -1,13 +1,15 @@
-"""Emitter elements without a surface: point, spot, directional, constant and image environments."""
+"""Emitter elements without a surface: point, spot, directional, environments, sun and sky."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable
 
 import numpy as np
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.description import (
+    RGB,
     ConstantEnvironment,
     DirectionalLight,
     Environment,
@@ -18,109 +20,145 @@ from pmviewer.scene.description import (
     Vec3,
 )
 from pmviewer.scene.formats.mitsuba.document import Properties
-from pmviewer.scene.formats.mitsuba.transform import Matrix, similar_columns
+from pmviewer.scene.formats.mitsuba.interface import bounded
+from pmviewer.scene.formats.mitsuba.sky import TYPES as DAYLIGHT
+from pmviewer.scene.formats.mitsuba.sky import read_daylight
+from pmviewer.scene.formats.mitsuba.transform import Matrix
 from pmviewer.scene.sky_image import read_sky
+from pmviewer.scene.sky_sum import sum_of_skies
 
 CUTOFF = 20.0
 """Mitsuba's default in degrees; the beam width's is three quarters of the cut-off."""
 BEAM = 0.75
+_LEAST_CUTOFF = 0.01
+_ROTATION = 1e-3
+_LEFT_OUT = "Pictures that can't be used are left out, what they would light stays dark: {names}."
 
 
-def read_light(p: Properties, others: Sequence[Light]) -> Light | None:
-    """The light that an <emitter> outside a shape describes, None for one that is left out with a warning.
-
-    `others` are the lights read before. Raises SceneError.
-    """
+def add_lights(p: Properties, lights: list[Light]) -> None:
+    """Add what an <emitter> outside a shape describes to the lights read before. Several environments are added up;
+    what can't be shown is left out with a warning. Raises SceneError."""
     element, document = p.element, p.document
     name = element.attributes.get("id") or f"{p.type} (line {element.line})"
     p.known("sampling_weight")
     if p.type == "area":
         document.ignore(element, "outside a shape has no surface to shine from and was ignored")
-        return None
-    if p.type in ("constant", "envmap") and any(isinstance(light, Environment) for light in others):
-        document.ignore(element, "beside another environment was ignored")
-        return None
-    readers = {
-        "point": _point,
-        "spot": _spot,
-        "directional": _directional,
-        "constant": _constant,
-        "envmap": _image,
-    }
-    if p.type not in readers:
+        return
+    if p.type not in _READERS:
         document.ignore(element)
-        return None
-    light = readers[p.type](p, name)
-    p.warn_unused()
-    return light
+        return
+    found = _READERS[p.type](p, name)
+    p.warn_unused("texture")
+    for light in found:
+        before = next((i for i, old in enumerate(lights) if isinstance(old, Environment)), None)
+        if before is None or not isinstance(light, Environment):
+            lights.append(light)
+            continue
+        old = lights[before]
+        assert isinstance(old, Environment)
+        lights[before] = sum_of_skies(old, light)
+        document.warn("The scene has several environments: their light is added up.", element)
 
 
-def _one_of(p: Properties, name: str) -> bool:
-    """Whether the property stands there instead of 'to_world'."""
+def _instead_of_matrix(p: Properties, name: str) -> bool:
+    """Whether the property stands there and counts, and 'to_world' does not."""
     if name in p and "to_world" in p:
-        raise p.document.error(f"{p.element} has both '{name}' and 'to_world'.", p.element, "Keep one of them.")
+        p.document.warn(f"{p.element} has both '{name}' and 'to_world': '{name}' is used.", p.element)
+        p.known("to_world")
     return name in p
 
 
-def _point(p: Properties, name: str) -> Light:
-    x, y, z = p.point("position", (0.0, 0.0, 0.0)) if _one_of(p, "position") else p.transform()[:3, 3].tolist()
-    return PointLight(name, (x, y, z), p.bounded_colour("intensity", 1.0, None))
+def _point(p: Properties, name: str) -> list[Light]:
+    instead = _instead_of_matrix(p, "position")
+    x, y, z = p.point("position", (0.0, 0.0, 0.0)) if instead else p.transform()[:3, 3].tolist()
+    return [PointLight(name, (x, y, z), p.bounded_colour("intensity", 1.0, None))]
 
 
-def _unit(v: np.ndarray, p: Properties, what: str) -> Vec3:
+def _unit(v: np.ndarray, p: Properties) -> Vec3 | None:
+    """The direction, None with a warning where there is none."""
     length = float(np.linalg.norm(v))
     if not 0 < length < np.inf:
-        raise p.document.error(f"{what} of {p.element} has no length.", p.element, "Give it a direction.")
+        p.document.warn(f"{p.element} has no direction to shine in: it is left out.", p.element)
+        return None
     x, y, z = (float(c) for c in v / length)
     return (x, y, z)
 
 
-def _spot(p: Properties, name: str) -> Light:
+def _spot(p: Properties, name: str) -> list[Light]:
     m = p.transform()
-    cutoff = p.number("cutoff_angle", CUTOFF)
-    beam = p.number("beam_width", BEAM * cutoff)
-    if not 0 < cutoff <= 180:
-        what = f"'cutoff_angle' of {p.element} must be above 0 and at most 180 degrees, found {cutoff:g}."
-        raise p.document.error(what, p.values.get("cutoff_angle", p.element))
-    if not 0 <= beam <= cutoff:
-        what = f"'beam_width' of {p.element} must lie between 0 and 'cutoff_angle' ({cutoff:g}), found {beam:g}."
-        raise p.document.error(what, p.values.get("beam_width", p.element))
+    cutoff = bounded(p, "cutoff_angle", p.number("cutoff_angle", CUTOFF), _LEAST_CUTOFF, 180.0)
+    beam = bounded(p, "beam_width", p.number("beam_width", BEAM * cutoff), 0.0, cutoff)
+    intensity = p.bounded_colour("intensity", 1.0, None)
+    if "texture" in p or p.objects("texture"):
+        p.document.warn(f"{p.element}: its texture is left out, it shines in the texture's mean colour.", p.element)
+        found = [t for t in [p.texture("texture")] if t is not None] + p.unnamed_textures()
+        if found:
+            intensity = _times(intensity, found[0].mean)
     x, y, z = (float(c) for c in m[:3, 3])
-    axis = _unit(m[:3, 2], p, "'to_world'")
-    return SpotLight(name, (x, y, z), axis, p.bounded_colour("intensity", 1.0, None), cutoff, beam)
+    axis = _unit(m[:3, 2], p)
+    return [] if axis is None else [SpotLight(name, (x, y, z), axis, intensity, cutoff, beam)]
 
 
-def _directional(p: Properties, name: str) -> Light:
-    if _one_of(p, "direction"):
-        direction = _unit(np.array(p.point("direction", (0.0, 0.0, 1.0))), p, "'direction'")
+def _times(a: RGB, b: RGB) -> RGB:
+    return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
+
+
+def _directional(p: Properties, name: str) -> list[Light]:
+    if _instead_of_matrix(p, "direction"):
+        direction = _unit(np.array(p.point("direction", (0.0, 0.0, 1.0))), p)
     else:
-        direction = _unit(p.transform()[:3, 2], p, "'to_world'")
-    return DirectionalLight(name, direction, p.bounded_colour("irradiance", 1.0, None))
+        direction = _unit(p.transform()[:3, 2], p)
+    irradiance = p.bounded_colour("irradiance", 1.0, None)
+    return [] if direction is None else [DirectionalLight(name, direction, irradiance)]
 
 
-def _constant(p: Properties, name: str) -> Light:
-    return ConstantEnvironment(name, p.bounded_colour("radiance", 1.0, None))
+def _projector(p: Properties, name: str) -> list[Light]:
+    """A spot that sends as much light into as wide a cone. On a plane at distance 1 Mitsuba's projector has π times its
+    `irradiance`, cosine aside: its power is π times that and the picture's area there."""
+    from pmviewer.scene.formats.mitsuba.camera import field_of_view, share_of_width
+    from pmviewer.scene.texture import Bitmap
+
+    p.document.warn(
+        f"{p.element}: its picture is left out, a spot of its mean colour and power replaces it.", p.element
+    )
+    m = p.transform()
+    irradiance, scale = p.bounded_colour("irradiance", 1.0, None), max(p.number("scale", 1.0), 0.0)
+    picture = p.textures.get("irradiance")
+    height, width = picture.pixels.shape[:2] if isinstance(picture, Bitmap) else (1, 1)
+    fov, axis = field_of_view(p)
+    half = math.tan(math.radians(fov) / 2) * share_of_width(axis, width, height)
+    half_height = half * height / width
+    area = 4 * half * half_height
+    # Solid angle of a pyramid of these half widths, then the cone that has it.
+    solid = 4 * math.asin(half * half_height / math.sqrt((1 + half**2) * (1 + half_height**2)))
+    cone = math.degrees(math.acos(1 - solid / (2 * math.pi)))
+    factor = scale * math.pi * area / solid
+    x, y, z = (float(c) for c in m[:3, 3])
+    direction = _unit(m[:3, 2], p)
+    if direction is None:
+        return []
+    return [SpotLight(name, (x, y, z), direction, _times(irradiance, (factor, factor, factor)), cone, cone)]
 
 
-def _image(p: Properties, name: str) -> Light:
+def _constant(p: Properties, name: str) -> list[Light]:
+    return [ConstantEnvironment(name, p.bounded_colour("radiance", 1.0, None))]
+
+
+def _image(p: Properties, name: str) -> list[Light]:
+    scale = bounded(p, "scale", p.number("scale", 1.0), 0.0, 1e30)
+    p.known("mis_compensation", "cache")
+    turn = _turned(p)
     file = p.string("filename", "")
-    if not file:
-        raise p.document.error(f"{p.element} needs a 'filename'.", p.element)
-    path = p.document.file(file, p.element)
-    scale = p.number("scale", 1.0)
-    if scale < 0:
-        what = f"'scale' of {p.element} must not be negative, found {scale:g}."
-        raise p.document.error(what, p.values["scale"])
-    p.known("mis_compensation")
-    turn = rotation_of(p.transform())
-    if turn is None:
-        what = f"'to_world' of {p.element} must be a rotation, it squeezes or shears."
-        raise p.document.error(what, p.values["to_world"], "Leave scaling out of it.")
     try:
+        if not file:
+            raise SceneError("it names no file")
+        path = p.document.file(file, p.element)
         sky, unusable = read_sky(path)
     except SceneError as error:
-        what = f"The picture {path.name} named by {p.element}: {error.what}"
-        raise p.document.error(what, p.element, error.hint) from None
+        reason = "does not exist" if "does not exist" in error.what else error.what.rstrip(".")
+        shown = file.replace("\\", "/")[-80:] or str(p.element)
+        p.document.diagnostics.warn_of(f"{shown} ({reason[:160]})", _LEFT_OUT, p.element.line)
+        return []
     if unusable:
         what = f"{path.name} has {unusable} numbers that are negative or not finite: they count as 0."
         p.document.warn(what, p.element)
@@ -128,13 +166,38 @@ def _image(p: Properties, name: str) -> Light:
         pixels = sky * np.float32(scale)
     if not np.isfinite(pixels).all():
         raise p.document.error(f"'scale' of {p.element} makes radiances too large.", p.values["scale"])
-    return ImageEnvironment(name, pixels, turn)
+    return [ImageEnvironment(name, pixels, turn)]
 
 
-def rotation_of(m: Matrix) -> Matrix | None:
-    """The rotation, or mirroring, of a transformation that keeps angles; None for any other."""
-    size = similar_columns(m)
-    if size is None or not size > 0:
-        return None
-    u, _, v = np.linalg.svd(m[:3, :3] / size)
-    return np.asarray(u @ v)
+def _daylight(p: Properties, name: str) -> list[Light]:
+    return read_daylight(p, name, _turned(p))
+
+
+def _turned(p: Properties) -> Matrix:
+    """How `to_world` turns an environment, which has no size and no place."""
+    m = p.transform()[:3, :3]
+    turn, even = nearest_rotation(m)
+    if not even:
+        what = f"'to_world' of {p.element} squeezes or shears: only its rotation is used."
+        p.document.warn(what, p.values["to_world"])
+    return turn
+
+
+def nearest_rotation(m: Matrix) -> tuple[Matrix, bool]:
+    """The rotation, or mirroring, nearest to a matrix (3, 3), and whether the matrix keeps angles; the identity where
+    the matrix is singular."""
+    u, sizes, v = np.linalg.svd(m)
+    if not sizes[2] > 1e-12 * sizes[0]:
+        return np.eye(3), False
+    return np.asarray(u @ v), bool(sizes[0] - sizes[2] <= _ROTATION * sizes[0])
+
+
+_READERS: dict[str, Callable[[Properties, str], list[Light]]] = {
+    "point": _point,
+    "spot": _spot,
+    "directional": _directional,
+    "projector": _projector,
+    "constant": _constant,
+    "envmap": _image,
+    **dict.fromkeys(DAYLIGHT, _daylight),
+}

@@ -16,7 +16,7 @@ from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.mitsuba.bsdf import Materials
 from pmviewer.scene.formats.mitsuba.camera import read_cameras
 from pmviewer.scene.formats.mitsuba.document import SILENT_TAGS, Document, Properties
-from pmviewer.scene.formats.mitsuba.emitter import read_light
+from pmviewer.scene.formats.mitsuba.emitter import add_lights
 from pmviewer.scene.formats.mitsuba.group import GROUP, INSTANCE, Groups
 from pmviewer.scene.formats.mitsuba.shape import SUPPORTED, geometry
 from pmviewer.scene.formats.mitsuba.xml import Element, read_xml, substitute
@@ -132,6 +132,4 @@ class _Reader:
         return radiance, p.textures.get("radiance")
 
     def _emitter(self, element: Element) -> None:
-        light = read_light(Properties(element, self.document), self.lights)
-        if light is not None:
-            self.lights.append(light)
+        add_lights(Properties(element, self.document), self.lights)

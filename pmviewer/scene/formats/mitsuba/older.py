@@ -123,7 +123,7 @@ def coating(p: Properties, name: str, inner: Material) -> Material:
         specular=specular,
         eta=eta,
         alpha=(across, across),
-        distribution=normals,  # type: ignore[arg-type]
+        distribution=normals,
         nonlinear=True,
         textures=tinted,
     )

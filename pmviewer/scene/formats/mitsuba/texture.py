@@ -171,5 +171,3 @@ def _volume(p: Properties) -> Texture | None:
             return constant(inner.bounded_colour("value", 1.0, None))
     p.document.warn(f"{p.element} is not supported: what it would colour keeps its default.", p.element)
     return None
-
-
