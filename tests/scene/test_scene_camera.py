@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pmviewer.errors import SceneError
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.clean import clean_mesh
 from pmviewer.scene.description import Mesh, Scene
@@ -74,23 +73,114 @@ def test_scaled_camera_is_straightened_with_a_warning(tmp_path: Path) -> None:
 def test_missing_and_unsupported_sensors_are_replaced(tmp_path: Path) -> None:
     without = load(tmp_path, '<shape type="cube"/>', camera="")
     assert "no camera" in without.warnings[0]
-    flat = sensor(tmp_path, FILM, kind="orthographic")
-    assert "orthographic" in flat.warnings[0]
-    assert (flat.width, flat.height) == (200, 100)
+    assert without.cameras == ()
+    meter = sensor(tmp_path, FILM, kind="irradiancemeter")
+    assert "looks nowhere in particular" in meter.warnings[0]
+    assert (meter.width, meter.height) == (200, 100)
     lens = sensor(
         tmp_path, f'<float name="fov" value="30"/><float name="aperture_radius" value="1"/>{FILM}', kind="thinlens"
     )
     assert len(lens.warnings) == 1
     assert lens.camera.fov == 30
+    odd = sensor(tmp_path, f'<float name="fov" value="30"/>{FILM}', kind="fisheye")
+    assert "approximated by a perspective camera" in odd.warnings[0]
+    assert odd.camera.fov == 30
 
 
-@pytest.mark.parametrize("inside", ['<float name="fov" value="180"/>', '<float name="fov" value="0"/>',
-                                    '<string name="focal_length" value="long"/>',
-                                    '<float name="fov" value="9"/><string name="fov_axis" value="z"/>'])  # fmt: skip
-def test_impossible_lenses(tmp_path: Path, inside: str) -> None:
-    with pytest.raises(SceneError) as caught:
-        sensor(tmp_path, inside)
-    assert caught.value.line == 3
+def test_orthographic_cameras(tmp_path: Path) -> None:
+    """Mitsuba's documentation: 2 units wide and high, which `to_world` scales."""
+    turn = '<scale x="10" y="10"/><lookat origin="1 1 9" target="1 1 1" up="0 1 0"/>'
+    scene = sensor(tmp_path, FILM, turn, kind="orthographic")
+    camera = scene.camera
+    assert (camera.projection, camera.width, camera.shift, scene.warnings) == ("orthographic", 20, (0, 0), ())
+    assert (camera.origin, camera.up[1]) == ((1, 1, 9), 10)
+    uneven = sensor(tmp_path, FILM, '<scale x="2" y="3"/><translate z="-9"/>', kind="telecentric")
+    assert uneven.camera.width == 4
+    assert len(uneven.warnings) == 2
+
+
+CROP = (
+    '<film type="hdrfilm"><integer name="width" value="200"/><integer name="height" value="100"/>'
+    '<integer name="crop_width" value="{w}"/><integer name="crop_height" value="20"/>'
+    '<integer name="crop_offset_x" value="110"/><integer name="crop_offset_y" value="10"/></film>'
+)
+
+
+@pytest.mark.parametrize(("axis", "fov"), [("x", 90), ("y", 90), ("diagonal", 90), ("larger", 90), ("smaller", 90)])
+def test_a_cropped_film_is_a_smaller_picture_moved_aside(tmp_path: Path, axis: str, fov: float) -> None:
+    words = f'<float name="fov" value="{fov}"/><string name="fov_axis" value="{axis}"/>'
+    whole, part = sensor(tmp_path, words + FILM), sensor(tmp_path, words + CROP.format(w=50))
+    assert (part.width, part.height) == (50, 20)
+    # Columns 110 to 160 lie 35 pixels right of the film's middle, rows 10 to 30 lie 30 above it.
+    assert part.camera.shift == pytest.approx((35 / 50, -30 / 20))
+    a, b = (resolve_camera(s, CameraSettings()).pixel_angle() for s in (whole, part))
+    assert b == pytest.approx(a)
+
+
+def test_crop_windows_that_leave_the_film_and_odd_sizes_are_cut(tmp_path: Path) -> None:
+    scene = sensor(tmp_path, CROP.format(w=150))
+    assert (scene.width, scene.height, scene.camera.shift) == (200, 100, (0, 0))
+    assert "leaves the film" in scene.warnings[0]
+    huge = FILM.replace('"200"', '"32768"').replace('"100"', '"0"')
+    scene = sensor(tmp_path, huge)
+    assert (scene.width, scene.height) == (16384, 1)
+    assert "can't be 32768 × 0 pixels" in scene.warnings[0]
+
+
+def test_the_principal_point(tmp_path: Path) -> None:
+    """Mitsuba 3.9.1 with principal_point_offset_x = 0.1: what was in the middle of 20 pixels is 2 pixels to the left,
+    so the picture's middle lies to the right of the view direction."""
+    offsets = '<float name="principal_point_offset_x" value="0.1"/><float name="principalPointOffsetY" value="-0.2"/>'
+    scene = sensor(tmp_path, offsets + FILM)
+    assert (scene.camera.shift, scene.warnings) == ((0.1, -0.2), ())
+
+
+def test_all_cameras_of_a_file_are_there(tmp_path: Path) -> None:
+    first = '<sensor type="irradiancemeter"/>'
+    second = '<sensor type="perspective" id="front"><float name="fov" value="30"/></sensor>'
+    third = f'<sensor type="batch"><sensor type="orthographic">{FILM}</sensor><sensor type="thinlens"/></sensor>'
+    scene = load(tmp_path, '<shape type="cube"/>', first, second, third, camera="")
+    assert [c.name for c in scene.cameras] == ["front", "orthographic (line 5)", "thinlens (line 5)"]
+    assert scene.camera is scene.cameras[0].camera
+    assert (scene.cameras[1].width, scene.cameras[1].camera.projection) == (200, "orthographic")
+    assert any("'front' gives the view, 2 other cameras" in w for w in scene.warnings)
+
+
+@pytest.mark.parametrize(
+    ("inside", "fov", "words"),
+    [
+        ('<float name="fov" value="180"/>', 179, "can't be 180 degrees"),
+        ('<float name="fov" value="0"/>', 0.001, "can't be 0 degrees"),
+        ('<string name="focal_length" value="long"/>', 46.793, "50 mm replace it"),
+        ('<float name="focal_length" value="50"/>', 46.793, ""),
+        ('<float name="fov" value="9"/><string name="fov_axis" value="z"/>', 9, "'z' is not known, x"),
+        ('<float name="near_clip" value="5"/><float name="far_clip" value="2"/>', 46.793, "nothing is clipped"),
+    ],
+)
+def test_impossible_lenses_are_cut(tmp_path: Path, inside: str, fov: float, words: str) -> None:
+    scene = sensor(tmp_path, inside)
+    assert scene.camera.fov == pytest.approx(fov, abs=1e-3)
+    assert [words in w for w in scene.warnings] == [True] * bool(words)
+
+
+@pytest.mark.parametrize(
+    "turn", ['<scale x="0"/>', '<scale value="1e-20"/>', '<matrix value="1 0 0 0 0 1 0 0 1 0 0 0 0 0 0 1"/>']
+)
+def test_a_singular_camera_is_left_out(tmp_path: Path, turn: str) -> None:
+    scene = sensor(tmp_path, FILM, turn)
+    if "1e-20" in turn:  # small, but it looks somewhere
+        assert len(scene.cameras) == 1
+        return
+    assert scene.cameras == ()
+    assert any("singular: it is left out" in w for w in scene.warnings)
+    assert (scene.width, scene.height) == (200, 100)
+
+
+def test_up_along_the_view_is_replaced(tmp_path: Path) -> None:
+    scene = sensor(tmp_path, FILM, '<lookat origin="0 9 0" target="0 0 0" up="0 1 0"/>')
+    assert (scene.camera.origin, scene.camera.target) == ((0, 9, 0), (0, 0, 0))
+    assert abs(scene.camera.up[1]) < 1
+    assert any("'up' is along the view" in w for w in scene.warnings)
 
 
 def test_degenerate_triangles_are_dropped_and_counted() -> None:

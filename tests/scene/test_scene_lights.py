@@ -13,7 +13,9 @@ from pmviewer.output.exr import write_exr
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.describe import describe
 from pmviewer.scene.description import DirectionalLight, ImageEnvironment, SpotLight
+from pmviewer.scene.emission import emitted_power, spot_solid_angle
 from pmviewer.scene.formats.hdr import read_hdr
+from pmviewer.scene.formats.texture_file import read_picture
 from pmviewer.scene.sky_image import read_sky
 from tests.scene.helpers import load
 
@@ -60,41 +62,68 @@ def test_spot_and_directional_light(tmp_path: Path) -> None:
     assert any("spot light" in value for _, value in describe(scene))
 
 
+TURN = '<transform name="to_world"><translate y="4"/></transform>'
+
+
 @pytest.mark.parametrize(
-    ("light", "words"),
+    ("light", "words", "left"),
     [
-        ('<emitter type="spot"><float name="cutoff_angle" value="0"/></emitter>', "above 0 and at most 180"),
-        ('<emitter type="spot"><float name="beam_width" value="30"/></emitter>', "between 0 and 'cutoff_angle'"),
-        ('<emitter type="spot"><rgb name="intensity" value="-1"/></emitter>', "must not be negative"),
-        ('<emitter type="spot"><transform name="to_world"><scale value="0"/></transform></emitter>', "no length"),
-        ('<emitter type="directional"><vector name="direction" value="0 0 0"/></emitter>', "no length"),
-        ('<emitter type="envmap"/>', "needs a 'filename'"),
-        (envmap(name="gone.exr"), "does not exist"),
-        (envmap('<transform name="to_world"><scale x="2"/></transform>'), "must be a rotation"),
-        (envmap('<float name="scale" value="-1"/>'), "must not be negative"),
-        (envmap('<float name="scale" value="1e30"/>', '<float name="other" value="1"/>'), None),
+        ('<emitter type="spot"><float name="cutoff_angle" value="0"/></emitter>', "0 was taken as 0.01", True),
+        ('<emitter type="spot"><float name="beam_width" value="30"/></emitter>', "30 was taken as 20", True),
+        ('<emitter type="spot"><rgb name="intensity" value="-1 2 2"/></emitter>', "negative numbers count as 0", True),
+        ('<emitter type="spot"><transform name="to_world"><scale value="0"/></transform></emitter>', "no direction", 0),
+        ('<emitter type="directional"><vector name="direction" value="0 0 0"/></emitter>', "no direction", False),
+        (f'<emitter type="point"><point name="position" x="1"/>{TURN}</emitter>', "'position' is used", True),
+        ('<emitter type="envmap"/>', "names no file", False),
+        (envmap(name="gone.exr"), "left out, what they would light stays dark: gone.exr (does not exist)", False),
+        (envmap('<transform name="to_world"><scale x="2"/></transform>'), "only its rotation", True),
+        (envmap('<float name="scale" value="-1"/>'), "-1 was taken as 0", False),
+        (envmap('<float name="other" value="1"/>'), "'other'", True),
+        ('<emitter type="spot"><texture name="texture" type="checkerboard"/></emitter>', "its texture", True),
     ],
 )
-def test_wrong_lights_are_named(tmp_path: Path, light: str, words: str | None) -> None:
+def test_odd_lights_are_cut_or_left_out(tmp_path: Path, light: str, words: str, left: bool) -> None:
     sky_file(tmp_path)
-    if words is None:
-        assert any("'other'" in w for w in load(tmp_path, SHAPE, light, sky="").warnings)
-        return
-    with pytest.raises(SceneError, match=words) as caught:
-        load(tmp_path, SHAPE, light, sky="")
-    assert caught.value.line == 3
+    lamp = '<emitter type="point"/>'
+    scene = load(tmp_path, SHAPE, lamp, light.replace('x="1"/>', 'x="1" y="0" z="0"/>'), sky="")
+    (warning,) = scene.warnings
+    assert warning.startswith("line 4: ")
+    assert words in warning
+    assert len(scene.lights) == 1 + bool(left)
+
+
+def test_a_spots_texture_counts_by_its_mean(tmp_path: Path) -> None:
+    board = '<texture name="texture" type="checkerboard"><rgb name="color0" value="1 0 0"/></texture>'
+    scene = load(tmp_path, SHAPE, f'<emitter type="spot"><rgb name="intensity" value="10"/>{board}</emitter>', sky="")
+    (spot,) = scene.lights
+    assert isinstance(spot, SpotLight)
+    assert spot.intensity == pytest.approx((6, 1, 1))
+
+
+def test_a_projector_becomes_a_spot_of_its_power(tmp_path: Path) -> None:
+    """Mitsuba 3.9.1's projector of irradiance 1 and fov 90 lights a plane at distance 1, facing it, with π on 2 × 2."""
+    words = '<float name="fov" value="90"/><rgb name="irradiance" value="2 1 0"/><float name="scale" value="3"/>'
+    scene = load(tmp_path, SHAPE, f'<emitter type="projector">{words}{TURN}</emitter>', sky="")
+    (spot,) = scene.lights
+    assert isinstance(spot, SpotLight)
+    assert (spot.position, spot.axis, spot.cutoff) == ((0, 4, 0), (0, 0, 1), spot.beam)
+    assert emitted_power(spot, 1.0) == pytest.approx([2 * 3 * math.pi * 4, 3 * math.pi * 4, 0])
+    # A pyramid of 90° by 90° is a sixth of the sphere.
+    assert spot_solid_angle(spot) == pytest.approx(4 * math.pi / 6)
+    assert "its picture is left out" in scene.warnings[0]
 
 
 def test_image_environment(tmp_path: Path) -> None:
     pixels = sky_file(tmp_path)
     turn = '<transform name="to_world"><rotate y="1" angle="90"/><scale value="3"/></transform>'
-    scene = load(tmp_path, SHAPE, envmap('<float name="scale" value="2"/>', turn), '<emitter type="constant"/>', sky="")
+    constant = '<emitter type="constant"><rgb name="radiance" value="1 2 3"/></emitter>'
+    scene = load(tmp_path, SHAPE, envmap('<float name="scale" value="2"/>', turn), constant, sky="")
     (light,) = scene.lights
     assert isinstance(light, ImageEnvironment)
-    assert light.pixels == pytest.approx(2 * pixels, rel=1e-3)
+    assert light.pixels == pytest.approx(2 * pixels + [1, 2, 3], rel=1e-3)
     assert light.to_world == pytest.approx(np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]]), abs=1e-12)
     assert analyse(scene).has_environment
-    assert any("beside another environment" in w for w in scene.warnings)
+    assert any("light is added up" in w for w in scene.warnings)
 
 
 def test_numbers_that_are_no_radiance_count_as_black(tmp_path: Path) -> None:
@@ -145,15 +174,48 @@ def test_hdr_pictures(tmp_path: Path) -> None:
         ("sky.hdr", hdr(b"", 999999, 999999), "claims 999999"),
         ("sky.exr", b"garbage", "not a whole OpenEXR"),
         ("sky.png", b"garbage", "can't be read"),
-        ("tiny.exr", None, "at least 2 × 3"),
     ],
 )
-def test_broken_pictures_are_one_error(tmp_path: Path, name: str, data: bytes | None, words: str) -> None:
-    if data is None:
-        write_exr(tmp_path / name, {"": np.ones((1, 1, 3), np.float32)})
-    else:
-        (tmp_path / name).write_bytes(data)
-    with pytest.raises(SceneError, match=words) as caught:
-        load(tmp_path, SHAPE, envmap(name=name), sky="")
-    assert name in str(caught.value)
-    assert caught.value.line == 3
+def test_broken_pictures_are_left_out_with_a_warning(tmp_path: Path, name: str, data: bytes, words: str) -> None:
+    (tmp_path / name).write_bytes(data)
+    (warning,) = load(tmp_path, SHAPE, envmap(name=name)).warnings
+    assert warning.startswith(
+        f"line 3: Pictures that can't be used are left out, what they would light stays dark: {name} ("
+    )
+    assert words in warning
+
+
+def test_a_small_picture_is_continued(tmp_path: Path) -> None:
+    write_exr(tmp_path / "sky.exr", {"": np.full((1, 1, 3), [1, 2, 3], np.float32)})
+    (light,) = load(tmp_path, SHAPE, envmap(), sky="").lights
+    assert isinstance(light, ImageEnvironment)
+    assert light.pixels == pytest.approx(np.broadcast_to([1.0, 2.0, 3.0], (3, 2, 3)))
+
+
+def test_two_images_are_added_where_they_are_turned(tmp_path: Path) -> None:
+    """A bright hemisphere turned on its side over one that is not: their sum, seen along the axes."""
+    pixels = np.zeros((33, 64, 3), np.float32)
+    pixels[:17] = 1
+    sky_file(tmp_path, pixels)
+    turn = '<transform name="to_world"><rotate x="1" angle="90"/></transform>'
+    (light,) = load(tmp_path, SHAPE, envmap(), envmap(turn), sky="").lights
+    assert isinstance(light, ImageEnvironment)
+    assert light.to_world == pytest.approx(np.eye(3))
+    # The middle of the image is +z, where the second one's up has gone; its edge is −z.
+    assert light.pixels[8, 32, 0] == pytest.approx(2)
+    assert light.pixels[8, 0, 0] == pytest.approx(1)
+    assert light.pixels[24, 32, 0] == pytest.approx(1)
+    assert light.pixels[24, 0, 0] == pytest.approx(0)
+
+
+def test_portable_float_maps(tmp_path: Path) -> None:
+    """Rows from the bottom up; the sign of the scale is the byte order."""
+    values = np.arange(12, dtype=np.float32).reshape(2, 2, 3)
+    (tmp_path / "a.pfm").write_bytes(b"PF\n2 2\n-1.0\n" + values[::-1].astype("<f4").tobytes())
+    assert read_sky(tmp_path / "a.pfm")[0][:2] == pytest.approx(values)
+    assert read_picture(tmp_path / "a.pfm", "a.pfm", raw=False)[0] == pytest.approx(values)
+    (tmp_path / "b.pfm").write_bytes(b"Pf\n2 2\n1\n" + values[::-1, :, 0].astype(">f4").tobytes())
+    assert read_picture(tmp_path / "b.pfm", "b.pfm", raw=False)[0][..., 0] == pytest.approx(values[..., 0])
+    (tmp_path / "c.pfm").write_bytes(b"PF\n900000 900000\n-1\n")
+    with pytest.raises(SceneError, match="cut off"):
+        read_picture(tmp_path / "c.pfm", "c.pfm", raw=False)

@@ -127,15 +127,23 @@ BROKEN = {
 }
 
 
-@pytest.mark.parametrize("name", [*BROKEN, "gone.png"])
-def test_broken_texture_is_one_error_with_its_line(tmp_path: Path, name: str) -> None:
-    content, words = BROKEN.get(name, (None, "does not exist"))
-    if content is not None:
+def test_broken_textures_are_left_out_and_listed_once(tmp_path: Path) -> None:
+    for name, (content, _) in BROKEN.items():
         (tmp_path / name).write_bytes(content)
-    with pytest.raises(SceneError, match=words) as caught:
-        load(tmp_path, '<shape type="sphere">', '<bsdf type="diffuse">', bitmap("reflectance", name), "</bsdf></shape>")
-    assert caught.value.line == 4
-    assert name in str(caught.value)
+    picture(tmp_path, "cut.png")
+    names = [*BROKEN, "gone.png"]
+    shapes = [
+        f'<shape type="sphere"><bsdf type="diffuse">{bitmap("reflectance", name)}</bsdf></shape>' for name in names
+    ]
+    nameless = '<texture name="reflectance" type="bitmap"/>'
+    scene = load(tmp_path, *shapes, f'<shape type="cube"><bsdf type="diffuse">{nameless}</bsdf></shape>')
+    assert [m.reflectance for m in scene.materials] == [(0.5, 0.5, 0.5)] * 6
+    assert not any(m.textures for m in scene.materials)
+    (warning,) = scene.warnings
+    assert warning.startswith("lines 2, 3, 4, 5, 6 and 1 more: Pictures that can't be used are left out")
+    for name, (_, words) in (BROKEN | {"gone.png": (b"", "does not exist")}).items():
+        assert f"{name} (" in warning
+        assert words in warning
 
 
 @pytest.mark.filterwarnings("error")
@@ -164,25 +172,36 @@ def test_every_cut_of_a_picture_opens_or_raises(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("more", "words"),
+    ("more", "wrap", "filter", "words"),
     [
-        (
-            '<string name="wrap_mode" value="bounce"/>',
-            "'wrap_mode'.*expected repeat or mirror or clamp, found 'bounce'",
-        ),
-        ('<string name="filter_type" value="cubic"/>', "'filter_type'.*expected bilinear or nearest"),
-        ('<boolean name="raw" value="maybe"/>', "'raw'.*expected true or false"),
+        ('<string name="wrap_mode" value="bounce"/>', "repeat", "bilinear", "'bounce' is not supported"),
+        ('<string name="wrapMode" value="zero"/>', "clamp", "bilinear", "taken as clamp"),
+        ('<string name="wrapModeU" value="mirror"/>', "mirror", "bilinear", "along v as it does along u"),
+        ('<string name="filter_type" value="cubic"/>', "repeat", "bilinear", "looked up bilinearly"),
+        ('<string name="filterType" value="ewa"/>', "repeat", "bilinear", "looked up bilinearly"),
+        ('<float name="maxAnisotropy" value="20"/>', "repeat", "bilinear", ""),
     ],
 )
-def test_wrong_options_are_errors(tmp_path: Path, more: str, words: str) -> None:
+def test_odd_options_are_replaced(tmp_path: Path, more: str, wrap: str, filter: str, words: str) -> None:
     picture(tmp_path)
-    with pytest.raises(SceneError, match=words):
-        sphere(tmp_path, f'<bsdf type="diffuse">{bitmap("reflectance", more=more)}</bsdf>')
+    scene = sphere(tmp_path, f'<bsdf type="diffuse">{bitmap("reflectance", more=more)}</bsdf>')
+    texture = scene.materials[scene.shapes[0].material].textures["reflectance"]
+    assert isinstance(texture, Bitmap)
+    assert (texture.wrap, texture.filter) == (wrap, filter)
+    assert [words in w for w in scene.warnings] == [True] * bool(words)
 
 
-def test_maps_need_a_texture(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match="needs a <texture>"):
-        sphere(tmp_path, '<bsdf type="bumpmap"><bsdf type="diffuse"/></bsdf>')
+def test_wrong_values_are_errors(tmp_path: Path) -> None:
+    picture(tmp_path)
+    wrong = '<boolean name="raw" value="maybe"/>'
+    with pytest.raises(SceneError, match=r"'raw'.*expected true or false"):
+        sphere(tmp_path, f'<bsdf type="diffuse">{bitmap("reflectance", more=wrong)}</bsdf>')
+
+
+def test_maps_without_a_texture_are_flat(tmp_path: Path) -> None:
+    scene = sphere(tmp_path, '<bsdf type="bumpmap"><bsdf type="diffuse"/></bsdf>')
+    assert not scene.materials[scene.shapes[0].material].textures
+    assert "shown flat" in scene.warnings[0]
 
 
 def test_large_pictures_are_reduced_and_full_memory_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -39,9 +39,11 @@ def sky_image(
     if sun_scale > 0:
         pixels = _finer(pixels, (_SUN_ROWS - 1) // (_SKY_ROWS - 1))
         rows = len(pixels)
-        disc = _disc(rows, sun, half_aperture)
-        whole = float(sky_integral(disc[:, :, None].astype(np.float32).repeat(3, axis=2))[0])
-        pixels += (disc[:, :, None] * (sun_scale / whole) * model.sun()).astype(np.float32)
+        first, disc = _disc(rows, sun, half_aperture)
+        means = np.zeros((rows, 1, 1))
+        means[first : first + len(disc), 0, 0] = disc.mean(axis=1)
+        whole = float(sky_integral(means.astype(np.float32))[0])
+        pixels[first : first + len(disc)] += (disc[:, :, None] * (sun_scale / whole) * model.sun()).astype(np.float32)
     return pixels
 
 
@@ -81,8 +83,9 @@ def _finer(pixels: NDArray[np.float32], factor: int) -> NDArray[np.float32]:
     return wide[top] * (1 - t) + wide[top + 1] * t
 
 
-def _disc(rows: int, sun: Float, half_aperture: float) -> NDArray[np.float32]:
-    """Share of each pixel (rows, 2 rows − 2) that the disc covers; at least that of the pixel it is in."""
+def _disc(rows: int, sun: Float, half_aperture: float) -> tuple[int, Float]:
+    """The first row that the disc reaches, and the share of each pixel from there on that it covers, at least of the
+    one that its centre lies in: (rows it reaches, 2 rows − 2)."""
     step = math.pi / (rows - 1)
     columns = 2 * (rows - 1)
     theta = math.acos(min(max(float(sun[1]), -1.0), 1.0))
@@ -90,16 +93,12 @@ def _disc(rows: int, sun: Float, half_aperture: float) -> NDArray[np.float32]:
     reach = half_aperture + 2 * step
     first, last = max(0, int((theta - reach) / step)), min(rows - 1, math.ceil((theta + reach) / step))
     offsets = (np.arange(_SAMPLES) + 0.5) / _SAMPLES - 0.5
-    disc = np.zeros((rows, columns), np.float32)
-    cosine = math.cos(half_aperture)
-    around = (np.arange(columns)[:, None] + 0.5 + offsets) * step  # (columns, samples)
-    for row in range(first, last + 1):
-        down = np.clip((row + offsets) * step, 0.0, math.pi)
-        dots = (
-            np.cos(down)[:, None, None] * math.cos(theta)
-            + np.sin(down)[:, None, None] * math.sin(theta) * np.cos(around - phi)[None]
-        )
-        disc[row] = (dots >= cosine).mean(axis=(0, 2))
+    across = np.cos((np.arange(columns)[:, None] + 0.5 + offsets) * step - phi)
+    disc = np.zeros((last - first + 1, columns))
+    for i in range(len(disc)):
+        down = np.clip((first + i + offsets) * step, 0.0, math.pi)[:, None, None]
+        dots = np.cos(down) * math.cos(theta) + np.sin(down) * math.sin(theta) * across
+        disc[i] = (dots >= math.cos(half_aperture)).mean(axis=(0, 2))
     if not disc.any():
-        disc[min(round(theta / step), rows - 1), int(phi / step) % columns] = 1.0
-    return disc
+        disc[min(max(round(theta / step) - first, 0), len(disc) - 1), int(phi / step) % columns] = 1.0
+    return first, disc

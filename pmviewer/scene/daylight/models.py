@@ -26,6 +26,10 @@ Colour = tuple[float, float, float]
 SUN_HALF_APERTURE = math.radians(0.5358 / 2)
 
 
+_SUN_FACTOR = 467.069280386 / 440
+"""Mitsuba's constant for the sun's colours, over the 440 nm that its eleven values stand for."""
+
+
 class SkyModel(Protocol):
     """A sky for one place of the sun."""
 
@@ -76,7 +80,7 @@ class HosekWilkie:
         return np.maximum(shape * self._scale / CIE_Y, 0.0)
 
     def sun(self) -> Float:
-        return np.maximum(rgb_of_spectrum(self._sun), 0.0)
+        return np.maximum(_SUN_FACTOR * rgb_of_spectrum(self._sun), 0.0)
 
 
 def _between(table: Float, place: float) -> Float:
