@@ -31,11 +31,11 @@ def sum_of_skies(a: Environment, b: Environment) -> Environment:
         theta = math.pi * row / (height - 1)
         flat = math.sin(theta)
         directions = np.stack([flat * np.sin(phi), np.full(width, math.cos(theta)), -flat * np.cos(phi)], axis=1)
-        pixels[row] += _looked_up(b, directions @ a.to_world.T)
+        pixels[row] += looked_up(b, directions @ a.to_world.T)
     return ImageEnvironment(a.name, pixels, a.to_world)
 
 
-def _looked_up(sky: ImageEnvironment, directions: Float) -> NDArray[np.float32]:
+def looked_up(sky: ImageEnvironment, directions: Float) -> NDArray[np.float32]:
     """Radiance (n, 3) from directions (n, 3) of the world, as `pmviewer.kernels.environment` has it."""
     height, width = sky.pixels.shape[:2]
     x, y, z = (directions @ sky.to_world).T

@@ -21,6 +21,8 @@ def xml_file(folder: Path, *lines: str, version: str = "3.0.0") -> Path:
     return path
 
 
-def load(folder: Path, *lines: str, camera: str = CAMERA, sky: str = SKY, **parameters: str) -> Scene:
+def load(
+    folder: Path, *lines: str, camera: str = CAMERA, sky: str = SKY, version: str = "3.0.0", **parameters: str
+) -> Scene:
     """The scene with these elements, a camera and a sky. Elements start in line 2."""
-    return load_scene(xml_file(folder, *lines, camera, sky), parameters)
+    return load_scene(xml_file(folder, *lines, camera, sky, version=version), parameters)

@@ -15,7 +15,7 @@ from pmviewer.scene.description import Mesh, Scene
 from pmviewer.scene.formats import texture_file
 from pmviewer.scene.formats.texture_file import linear, read_picture
 from pmviewer.scene.load import load_scene
-from pmviewer.scene.texture import Bitmap, Checkerboard
+from pmviewer.scene.texture import Bitmap, Checkerboard, evaluate
 from tests.scene.helpers import load
 
 RED = ((188 / 255 + 0.055) / 1.055) ** 2.4
@@ -258,3 +258,77 @@ def test_a_map_takes_a_texture_without_a_name(tmp_path: Path) -> None:
     scene = sphere(tmp_path, f'<bsdf type="bumpmap">{unnamed}<bsdf type="diffuse"/></bsdf>')
     assert scene.materials[scene.shapes[0].material].textures.keys() == {"bump"}
     assert scene.warnings == ()
+
+
+def reflectance(folder: Path, texture: str) -> tuple[object, tuple[str, ...]]:
+    scene = sphere(folder, f'<bsdf type="diffuse">{texture}</bsdf>')
+    material = scene.materials[scene.shapes[0].material]
+    return material.textures.get("reflectance", material.reflectance), scene.warnings
+
+
+def test_a_scaled_texture(tmp_path: Path) -> None:
+    """`scale` of version 0.6: a nested texture, named or not, times a number or a colour."""
+    picture(tmp_path)
+    for words in ('<float name="scale" value="0.5"/>', '<rgb name="scale" value="0.5 0.5 0.25"/>'):
+        found, warnings = reflectance(
+            tmp_path, f'<texture name="reflectance" type="scale">{words}{bitmap("x")}</texture>'
+        )
+        assert isinstance(found, Bitmap)
+        assert found.mean == pytest.approx((0.5 * RED, 0, 0.5 if "float" in words else 0.25), rel=1e-5)
+        assert warnings == ()
+    colour = '<texture name="reflectance" type="scale"><rgb name="value" value="0.2 0.4 0.6"/>{}</texture>'
+    assert reflectance(tmp_path, colour.format('<float name="scale" value="0.5"/>')) == ((0.1, 0.2, 0.3), ())
+    empty, warnings = reflectance(tmp_path, '<texture name="reflectance" type="scale"/>')
+    assert empty == (0.5, 0.5, 0.5)
+    assert "no texture inside" in warnings[0]
+
+
+@pytest.mark.parametrize("width", [0.01, 0.125, 0.3])
+def test_a_grid(tmp_path: Path, width: float) -> None:
+    """Version 0.6: `color1` within `lineWidth` of the edges of cells of 1 × 1, `color0` elsewhere."""
+    words = f'<float name="lineWidth" value="{width}"/><float name="uscale" value="3"/>'
+    found, warnings = reflectance(tmp_path, f'<texture name="reflectance" type="gridtexture">{words}</texture>')
+    assert isinstance(found, Bitmap)
+    assert (found.to_uv, found.filter, found.wrap, warnings) == ((3, 0, 0, 0, 1, 0), "nearest", "repeat", ())
+    uv = np.array([[0.5, 0.5], [0.5, 0.5 * width], [1 - 0.5 * width, 0.5], [0.5, 1.2 * width], [0.5, 1 - 1.2 * width]])
+    values = evaluate(Bitmap(found.pixels, "repeat", "nearest"), uv)[:, 0]
+    assert values == pytest.approx([0.2, 0.4, 0.4, 0.2, 0.2])
+
+
+def test_scales_and_offsets_of_version_0(tmp_path: Path) -> None:
+    """As Mitsuba 3 upgrades them: the offset first, then the scale."""
+    words = "".join(
+        f'<float name="{n}" value="{v}"/>' for n, v in [("uscale", 2), ("vscale", 3), ("uoffset", 0.5), ("voffset", 1)]
+    )
+    found, _ = reflectance(tmp_path, f'<texture name="reflectance" type="checkerboard">{words}</texture>')
+    assert isinstance(found, Checkerboard)
+    assert found.to_uv == (2, 0, 1, 0, 3, 3)
+
+
+def test_gamma_and_channel_of_version_0(tmp_path: Path) -> None:
+    picture(tmp_path)
+    linear_blue, _ = reflectance(tmp_path, bitmap("reflectance", more='<string name="channel" value="b"/>'))
+    assert isinstance(linear_blue, Bitmap)
+    assert linear_blue.pixels.shape == (2, 4, 1)
+    assert linear_blue.mean == pytest.approx((1, 1, 1))
+    square, _ = reflectance(tmp_path, bitmap("reflectance", more='<float name="gamma" value="2"/>'))
+    assert isinstance(square, Bitmap)
+    assert square.mean[0] == pytest.approx((188 / 255) ** 2, rel=1e-5)
+    plain, _ = reflectance(tmp_path, bitmap("reflectance", more='<float name="gamma" value="1"/>'))
+    assert isinstance(plain, Bitmap)
+    assert plain.mean[0] == pytest.approx(188 / 255, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("texture", "colour", "words"),
+    [
+        ('<texture name="reflectance" type="wireframe"/>', 0.5, "between its lines"),
+        ('<texture name="reflectance" type="curvature"/>', 0.5, "keeps its default"),
+        ('<texture name="reflectance" type="volume"/>', 0.5, "keeps its default"),
+        ('<texture name="reflectance" type="uniform"><float name="value" value="0.25"/></texture>', 0.25, ""),
+    ],
+)  # fmt: skip
+def test_textures_that_are_one_colour(tmp_path: Path, texture: str, colour: float, words: str) -> None:
+    found, warnings = reflectance(tmp_path, texture)
+    assert found == (colour,) * 3
+    assert [words in w for w in warnings] == [True] * bool(words)

@@ -1,0 +1,126 @@
+"""`principled` and `principledthin` as materials; defaults and formulas are those of Mitsuba 3's documentation."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pmviewer.scene.description import Material, Principled
+from pmviewer.scene.texture import Bitmap, Checkerboard
+from tests.scene.helpers import load
+
+
+def material(folder: Path, inside: str, kind: str = "principled") -> tuple[Material, tuple[str, ...]]:
+    scene = load(folder, f'<shape type="sphere"><bsdf type="{kind}">{inside}</bsdf></shape>')
+    return scene.materials[scene.shapes[0].material], scene.warnings
+
+
+def number(name: str, value: float) -> str:
+    return f'<float name="{name}" value="{value}"/>'
+
+
+def test_defaults(tmp_path: Path) -> None:
+    found, warnings = material(tmp_path, "")
+    assert (found.kind, found.reflectance, found.principled) == ("principled", (0.5, 0.5, 0.5), Principled())
+    # specular 0.5 is a reflection of 4 % head-on, that of an index of 1.5; roughness 0.5 is α = ¼.
+    assert found.eta == pytest.approx(1.5)
+    assert (found.alpha, found.two_sided, warnings) == ((0.25, 0.25), False, ())
+
+
+def test_all_its_numbers(tmp_path: Path) -> None:
+    shares = {"metallic": 0.7, "spec_trans": 0.4, "spec_tint": 0.35, "sheen": 0.3, "sheen_tint": 0.2, "flatness": 0.1,
+              "clearcoat": 0.6, "clearcoat_gloss": 0.25}  # fmt: skip
+    words = "".join(number(name, value) for name, value in shares.items())
+    words += '<rgb name="base_color" value="0.9 0.5 0.1"/>' + number("roughness", 0.2) + number("anisotropic", 0.5)
+    found, warnings = material(tmp_path, words + number("eta", 1.4) + number("clearcoat_sampling_rate", 2))
+    assert found.principled == Principled(**shares)
+    assert (found.reflectance, found.eta, warnings) == ((0.9, 0.5, 0.1), 1.4, ())
+    aspect = math.sqrt(1 - 0.9 * 0.5)
+    assert found.alpha == pytest.approx((0.04 / aspect, 0.04 * aspect))
+
+
+@pytest.mark.parametrize(("specular", "eta"), [(0.0, 1.0), (1.0, 1.7887), (0.25, 1.3294)])
+def test_specular_gives_the_index(tmp_path: Path, specular: float, eta: float) -> None:
+    """((η − 1)/(η + 1))² = 0.08·specular."""
+    found, _ = material(tmp_path, number("specular", specular))
+    assert found.eta == pytest.approx(eta, abs=1e-4)
+    assert ((found.eta - 1) / (found.eta + 1)) ** 2 == pytest.approx(0.08 * specular, abs=1e-9)
+
+
+def test_odd_numbers_are_cut(tmp_path: Path) -> None:
+    found, warnings = material(tmp_path, number("metallic", 2) + number("sheen", -1) + number("roughness", 0))
+    assert found.principled == Principled(metallic=1.0)
+    assert found.alpha == (0.001, 0.001)
+    assert len(warnings) == 2
+    both, warnings = material(tmp_path, number("eta", 1.3) + number("specular", 0.5))
+    assert both.eta == 1.3
+    assert "both 'eta' and 'specular'" in warnings[0]
+    glass, _ = material(tmp_path, number("eta", 1.0) + number("spec_trans", 1))
+    assert glass.eta == 1.001
+
+
+def test_its_textures(tmp_path: Path) -> None:
+    rough = np.uint8([[[51, 51, 51], [255, 0, 0]]])
+    Image.fromarray(rough).save(tmp_path / "rough.png")
+
+    def bitmap(name: str) -> str:
+        raw = '<boolean name="raw" value="true"/>'
+        return f'<texture name="{name}" type="bitmap"><string name="filename" value="rough.png"/>{raw}</texture>'
+
+    board = '<texture name="base_color" type="checkerboard"/>'
+    words = board + bitmap("roughness") + bitmap("metallic") + bitmap("clearcoat")
+    found, warnings = material(tmp_path, words)
+    assert found.textures.keys() == {"reflectance", "alpha", "metallic"}
+    alpha, metal = found.textures["alpha"], found.textures["metallic"]
+    assert isinstance(found.textures["reflectance"], Checkerboard)
+    assert isinstance(alpha, Bitmap)
+    assert isinstance(metal, Bitmap)
+    # Grey 51 is a roughness of 0.2; red has the luminance 0.2126.
+    assert alpha.pixels[0, :, 0] == pytest.approx([0.04, 0.2126**2], rel=1e-5)
+    assert metal.pixels.shape == (1, 2, 3)
+    assert found.principled is not None
+    assert found.principled.metallic == pytest.approx((0.2 + 0.2126) / 2)
+    assert found.principled.clearcoat == pytest.approx((0.2 + 0.2126) / 2)
+    (warning,) = warnings
+    assert "'clearcoat'" in warning
+    assert "its mean is used everywhere" in warning
+
+
+def test_a_thin_sheet(tmp_path: Path) -> None:
+    colour = '<rgb name="base_color" value="0.64 0.36 0.16"/>'
+    sheet, warnings = material(tmp_path, colour + number("sheen", 0.5), "principledthin")
+    assert (sheet.kind, sheet.two_sided, sheet.eta, warnings) == ("principled", True, 1.0, ())
+    assert sheet.principled == Principled(sheen=0.5)
+    mixed, warnings = material(
+        tmp_path, colour + number("spec_trans", 0.3) + number("diff_trans", 0.5) + number("eta", 1.4), "principledthin"
+    )
+    assert (mixed.kind, mixed.weight, len(warnings)) == ("blend", 0.3, 2)
+    diffuse, glass = mixed.parts
+    # A quarter of the diffuse light goes through.
+    assert diffuse.reflectance == pytest.approx((0.48, 0.27, 0.12))
+    assert (glass.kind, glass.eta) == ("thin dielectric", 1.4)
+    assert glass.transmittance == pytest.approx((0.8, 0.6, 0.4))
+    pane, _ = material(tmp_path, number("spec_trans", 1), "principledthin")
+    assert pane.kind == "thin dielectric"
+
+
+def test_colours_at_vertices(tmp_path: Path) -> None:
+    """In a mesh attribute, or scaled, as version 0.6 has them."""
+    attribute = '<texture name="base_color" type="mesh_attribute"><string name="name" value="vertex_color"/></texture>'
+    found, warnings = material(tmp_path, attribute)
+    assert (found.vertex_colours, found.reflectance, warnings) == (True, (1, 1, 1), ())
+    old = '<texture name="reflectance" type="scale"><float name="scale" value="0.5"/><texture type="vertexcolors"/>'
+    found, warnings = material(tmp_path, f"{old}</texture>", "diffuse")
+    assert (found.vertex_colours, found.reflectance, warnings) == (True, (0.5, 0.5, 0.5), ())
+    other = attribute.replace("vertex_color", "face_color").replace("base_color", "reflectance")
+    found, warnings = material(tmp_path, other, "diffuse")
+    assert (found.vertex_colours, found.reflectance) == (False, (0.5, 0.5, 0.5))
+    assert "'face_color'" in warnings[0]
+    coat = attribute.replace("base_color", "specular_reflectance")
+    found, warnings = material(tmp_path, coat, "plastic")
+    assert (found.vertex_colours, found.specular) == (False, (1, 1, 1))
+    assert "no effect here" in warnings[0]
