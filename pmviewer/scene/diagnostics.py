@@ -18,27 +18,25 @@ class Diagnostics:
         self.path = path
         self.dropped: Counter[str] = Counter()
         self._sentences: dict[str, str] = {}
-        self._lines: dict[str, list[int]] = {}
-        self._names: dict[str, list[str]] = {}
+        self._places: dict[str, dict[tuple[Path | None, int], None]] = {}
+        self._names: dict[str, dict[str, None]] = {}
 
-    def error(self, what: str, line: int | None = None, hint: str = "") -> SceneError:
-        """The error to raise."""
-        return SceneError(what, self.path, line, hint)
+    def error(self, what: str, line: int | None = None, hint: str = "", file: Path | None = None) -> SceneError:
+        """The error to raise. `file`: the included one that it is about, if it isn't the scene's own."""
+        return SceneError(what, file or self.path, line, hint)
 
-    def warn(self, sentence: str, line: int | None = None, kind: str | None = None) -> None:
-        """Keep one warning per kind (the sentence itself if no kind is given), with all lines where it applies."""
+    def warn(self, sentence: str, line: int | None = None, kind: str | None = None, file: Path | None = None) -> None:
+        """Keep one warning per kind (the sentence itself if no kind is given), with all places where it applies."""
         key = kind or sentence
         self._sentences.setdefault(key, sentence)
-        lines = self._lines.setdefault(key, [])
-        if line is not None and line not in lines:
-            lines.append(line)
+        places = self._places.setdefault(key, {})
+        if line is not None:
+            places[file, line] = None
 
-    def warn_of(self, name: str, sentence: str, line: int | None = None) -> None:
+    def warn_of(self, name: str, sentence: str, line: int | None = None, file: Path | None = None) -> None:
         """One warning for all names of a kind: `sentence` has {names} where they are listed."""
-        self.warn(sentence, line)
-        names = self._names.setdefault(sentence, [])
-        if name not in names:
-            names.append(name)
+        self.warn(sentence, line, file=file)
+        self._names.setdefault(sentence, {})[name] = None
 
     def left_out(self) -> str:
         """What was ignored or dropped, as a hint for an error about what is missing; empty if nothing was."""
@@ -48,21 +46,22 @@ class Diagnostics:
 
     def warnings(self) -> tuple[str, ...]:
         """One sentence a kind, in the order of their first appearance."""
-        return tuple(_located(self._filled(key), self._lines[key]) for key in self._sentences)
+        return tuple(_located(self._filled(key), list(self._places[key])) for key in self._sentences)
 
     def _filled(self, key: str) -> str:
-        names = self._names.get(key)
-        if names is None:
+        names = list(self._names.get(key, ()))
+        if not names:
             return self._sentences[key]
         more = f" and {len(names) - _SHOWN_NAMES} more" if len(names) > _SHOWN_NAMES else ""
         return self._sentences[key].replace("{names}", ", ".join(names[:_SHOWN_NAMES]) + more)
 
 
-def _located(sentence: str, lines: list[int]) -> str:
-    if not lines:
+def _located(sentence: str, places: list[tuple[Path | None, int]]) -> str:
+    if not places:
         return sentence
-    if len(lines) == 1:
-        return f"line {lines[0]}: {sentence}"
-    shown = ", ".join(map(str, lines[:_SHOWN_LINES]))
-    more = f" and {len(lines) - _SHOWN_LINES} more" if len(lines) > _SHOWN_LINES else ""
-    return f"lines {shown}{more}: {sentence}"
+    words = "line" if len(places) == 1 else "lines"
+    shown: list[str] = []
+    for file, line in places[:_SHOWN_LINES]:
+        shown.append(str(line) if file is None else f"{line} of {file.name}")
+    more = f" and {len(places) - _SHOWN_LINES} more" if len(places) > _SHOWN_LINES else ""
+    return f"{words} {', '.join(shown)}{more}: {sentence}"

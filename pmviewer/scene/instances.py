@@ -205,8 +205,14 @@ def clean_instances(instances: Sequence[Instance], diagnostics: Diagnostics) -> 
 
 def first_singular(instances: Sequence[Instance]) -> int | None:
     """Index of the first instance whose transformation can't be undone."""
+    bad = np.flatnonzero(singular(instances))
+    return int(bad[0]) if len(bad) else None
+
+
+def singular(instances: Sequence[Instance]) -> NDArray[np.bool_]:
+    """Which of the instances have a transformation that can't be undone."""
     if not instances:
-        return None
+        return np.zeros(0, bool)
     linear = np.stack([instance.to_world[:3, :3] for instance in instances])
     a, b, c = linear[:, :, 0], linear[:, :, 1], linear[:, :, 2]
     with np.errstate(all="ignore"):
@@ -214,8 +220,7 @@ def first_singular(instances: Sequence[Instance]) -> int | None:
         determinant = np.abs((a * adjugate[:, 0]).sum(axis=1))
         # The product of the Frobenius norms of the matrix and its inverse: at least its condition, at most three times.
         condition = np.linalg.norm(linear, axis=(1, 2)) * np.linalg.norm(adjugate, axis=(1, 2)) / determinant
-    bad = np.flatnonzero(~(condition < LARGEST_CONDITION))
-    return int(bad[0]) if len(bad) else None
+    return np.asarray(~(condition < LARGEST_CONDITION))
 
 
 def _boxes(

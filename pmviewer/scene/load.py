@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -40,7 +40,9 @@ def bundled_scenes() -> list[BundledScene]:
     return found
 
 
-def load_scene(path_or_name: str | Path, parameters: Mapping[str, str] | None = None) -> Scene:
+def load_scene(
+    path_or_name: str | Path, parameters: Mapping[str, str] | None = None, search_paths: Sequence[Path] = ()
+) -> Scene:
     """Open a bundled scene by name, a folder with scene.xml, or a file by its ending.
 
     Parameters
@@ -48,18 +50,19 @@ def load_scene(path_or_name: str | Path, parameters: Mapping[str, str] | None = 
     path_or_name: "cornell_caustic", "my/folder", "my/scene.xml", "chair.glb" …
     parameters: values for the `<default>` names of a Mitsuba file; which "scene", "camera" and "variant" of a glTF
         file to show; other formats have none.
+    search_paths: folders where a Mitsuba file's meshes, pictures and included files are looked for beside its own.
 
     Raises SceneError for anything wrong with the input, and nothing else.
     """
-    scene = _read(_find(path_or_name), parameters)
+    scene = _read(_find(path_or_name), parameters or {}, search_paths)
     leaning = leaning_mirrors(scene)
     return replace(scene, warnings=(*scene.warnings, leaning)) if leaning else scene
 
 
-def _read(path: Path, parameters: Mapping[str, str] | None) -> Scene:
+def _read(path: Path, parameters: Mapping[str, str], search_paths: Sequence[Path]) -> Scene:
     ending = path.suffix.lower()
     if ending == ".xml":
-        return load_mitsuba(path, parameters or {})
+        return load_mitsuba(path, parameters, search_paths)
     if ending not in MESH_ENDINGS:
         what = (
             f"Files ending in '{path.suffix}' can't be opened."
@@ -71,10 +74,9 @@ def _read(path: Path, parameters: Mapping[str, str] | None) -> Scene:
     from pmviewer.scene.formats.meshes import load_mesh_scene
 
     known = CHOICES if ending in (".glb", ".gltf") else ()
-    given = parameters or {}
-    scene = load_mesh_scene(path, {name: value for name, value in given.items() if name in known})
+    scene = load_mesh_scene(path, {name: value for name, value in parameters.items() if name in known})
     has = f"have only {', '.join(known)}" if known else "have none"
-    ignored = tuple(f"Parameter '{name}' was given, but {ending} files {has}." for name in given if name not in known)
+    ignored = tuple(f"Parameter '{name}' was given, but {ending} files {has}." for name in parameters if name not in known)
     return replace(scene, warnings=scene.warnings + ignored)
 
 

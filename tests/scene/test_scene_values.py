@@ -1,15 +1,19 @@
 """Numbers, vectors, colours: what is read and what is refused."""
 
 import math
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from pmviewer.errors import SceneError
+from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.mitsuba import values as values
+from pmviewer.scene.formats.mitsuba.expand import Expansion
+from pmviewer.scene.formats.mitsuba.folders import Folders
 from pmviewer.scene.formats.mitsuba.transform import OPERATIONS, operation
-from pmviewer.scene.formats.mitsuba.xml import Element, parse_xml, substitute
+from pmviewer.scene.formats.mitsuba.xml import Element, parse_xml
 
 PARSERS = [
     values.parse_float,
@@ -18,7 +22,7 @@ PARSERS = [
     values.parse_vector,
     values.parse_rgb,
     values.parse_srgb,
-    values.parse_spectrum,
+    values.parse_list,
 ]
 
 
@@ -56,10 +60,21 @@ def test_srgb_is_decoded() -> None:
         values.parse_srgb("1.5 0 0")
 
 
-def test_sampled_spectrum_is_averaged_by_thirds() -> None:
-    assert values.parse_spectrum("400:2, 700:2") == (2, 2, 2)
-    red, green, blue = values.parse_spectrum("400:0 700:3")
-    assert (red, green, blue) == pytest.approx((2.5, 1.5, 0.5))
+def test_samples_of_a_spectrum_are_sorted() -> None:
+    assert values.parse_samples("700:2, 400:1 500:3") == ([400, 500, 700], [1, 3, 2])
+    with pytest.raises(ValueError, match="two wavelengths or more"):
+        values.parse_samples("400:2")
+    with pytest.raises(ValueError, match="expected wavelength:value pairs, found '7'"):
+        values.parse_samples("400:2 7")
+
+
+def test_whole_numbers_and_truth_are_read_as_people_write_them() -> None:
+    assert values.parse_integer("64.0") == 64
+    assert values.parse_boolean("TRUE") is values.parse_boolean("1") is True
+    with pytest.raises(ValueError, match="whole number"):
+        values.parse_integer("64.5")
+    with pytest.raises(ValueError, match="true or false"):
+        values.parse_boolean("yes")
 
 
 @given(st.floats(-1e30, 1e30))
@@ -73,7 +88,7 @@ def test_random_text_gives_a_value_or_a_value_error(text, parse) -> None:
     if isinstance(result, ValueError):
         assert "expected" in str(result)
     else:
-        assert all(math.isfinite(x) for x in (result if isinstance(result, tuple) else [result]))
+        assert all(math.isfinite(x) for x in (result if isinstance(result, tuple | list) else [result]))
 
 
 @given(
@@ -98,7 +113,11 @@ def test_random_bytes_as_xml_give_a_tree_or_a_scene_error(data: bytes) -> None:
 
 
 @given(st.text("$ab\\ ", max_size=20), st.dictionaries(st.sampled_from(["a", "b", "ab"]), st.text("$xy", max_size=5)))
-def test_random_parameters_leave_no_reference_or_raise(text, parameters) -> None:
-    root = Element("scene", {"value": text}, 1)
-    result = outcome(lambda: substitute(root, parameters), SceneError)
-    assert result.line == 1 if isinstance(result, SceneError) else set(result) <= parameters.keys()
+def test_random_parameters_are_all_replaced_or_named(text, parameters) -> None:
+    root = Element("scene", {"value": text, "version": "3.0.0"}, 1)
+    diagnostics = Diagnostics()
+    expansion = Expansion(parameters, Folders(Path()), diagnostics)
+    expansion.expand(root, None)
+    assert expansion.used <= parameters.keys()
+    if "\\" not in text and not any("$" in value for value in parameters.values()):
+        assert ("$" in root.attributes["value"]) == bool(diagnostics.warnings())

@@ -6,8 +6,18 @@ import pytest
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.description import Sphere
-from pmviewer.scene.formats.mitsuba.xml import parse_xml, substitute
+from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.formats.mitsuba.expand import Expansion
+from pmviewer.scene.formats.mitsuba.folders import Folders
+from pmviewer.scene.formats.mitsuba.xml import Element, parse_xml
 from tests.scene.helpers import load
+
+
+def expanded(root: Element, **parameters: str) -> tuple[str, ...]:
+    """Put the parameters into the tree; the warnings."""
+    diagnostics = Diagnostics()
+    Expansion(parameters, Folders(Path()), diagnostics).expand(root, None)
+    return diagnostics.warnings()
 
 
 def test_elements_know_their_line() -> None:
@@ -32,15 +42,33 @@ def test_parameters_replace_defaults_and_the_longest_name_wins(tmp_path: Path) -
 
 
 def test_substituted_text_is_not_substituted_again() -> None:
-    root = parse_xml(rb'<scene a="$x" b="\$x"><default name="y" value="1"/></scene>')
-    with pytest.raises(SceneError, match="not defined"):
-        substitute(root, {"x": "$y"})
+    root = parse_xml(rb'<scene version="3.0.0" a="$x"><default name="y" value="1"/></scene>')
+    assert "Parameter $y in <scene> is not defined" in expanded(root, x="$y")[0]
+    assert root.attributes["a"] == "$y"
+
+
+def test_what_uses_an_undefined_parameter_counts_as_not_given(tmp_path: Path) -> None:
+    film = '<film type="hdrfilm"><integer name="width" value="$w"/><integer name="height" value="32"/></film>'
+    camera = '<sensor type="perspective"><transform name="to_world"><translate z="5"/></transform>' + film + "</sensor>"
+    scene = load(tmp_path, '<shape type="cube"/>', camera=camera)
+    assert (scene.width, scene.height) == (768, 32)
+    assert (
+        "Parameter $w in <integer> is not defined: the value counts as not given. Give it with -D w=…"
+        in scene.warnings[0]
+    )
 
 
 def test_escaped_dollar_stays() -> None:
-    root = parse_xml(rb'<scene b="\$x costs $x"/>')
-    assert substitute(root, {"x": "5"}) == ()
+    root = parse_xml(rb'<scene version="3.0.0" b="\$x costs $x"/>')
+    assert expanded(root, x="5") == ()
     assert root.attributes["b"] == "$x costs 5"
+
+
+def test_elements_of_a_file_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pmviewer.scene.formats.mitsuba.xml.MAX_ELEMENTS", 3)
+    parse_xml(b"<scene><a/><b/></scene>")
+    with pytest.raises(SceneError, match="more than 3 elements"):
+        parse_xml(b"<scene><a/><b/><c/></scene>")
 
 
 def test_references_work_before_their_definition_and_by_alias(tmp_path: Path) -> None:
@@ -63,11 +91,16 @@ def test_shared_material_is_one_material(tmp_path: Path) -> None:
     assert [m.name for m in scene.materials] == ["m"]
 
 
-def test_circular_textures_are_refused(tmp_path: Path) -> None:
+def test_circles_are_said_only_of_circles(tmp_path: Path) -> None:
     texture = '<texture type="checkerboard" id="t" name="x"><ref id="t" name="color0"/></texture>'
     bsdf = '<bsdf type="diffuse"><ref id="t" name="reflectance"/></bsdf>'
-    with pytest.raises(SceneError, match="contains itself"):
-        load(tmp_path, texture, f'<shape type="sphere">{bsdf}</shape>')
+    scene = load(tmp_path, texture, f'<shape type="sphere">{bsdf}</shape>')
+    assert any('<texture type="checkerboard"> contains itself' in w for w in scene.warnings)
+    deep = '<bsdf type="twosided">' * 40 + '<bsdf type="diffuse"/>' + "</bsdf>" * 40
+    scene = load(tmp_path, f'<shape type="sphere">{deep}</shape>')
+    assert scene.warnings == (
+        'line 2: <bsdf type="twosided"> lies within more than 32 objects. A grey diffuse surface replaces it.',
+    )
 
 
 def test_each_kind_of_unknown_thing_is_named_once_with_its_lines(tmp_path: Path) -> None:
@@ -88,7 +121,17 @@ def test_integrators_samplers_and_filters_are_silent(tmp_path: Path) -> None:
     assert load(tmp_path, *lines, camera=sensor).warnings == ()
 
 
-def test_two_values_of_one_name_are_an_error(tmp_path: Path) -> None:
-    radius = '<float name="radius" value="1"/>'
-    with pytest.raises(SceneError, match="two values for 'radius'"):
-        load(tmp_path, f'<shape type="sphere">{radius}{radius}</shape>')
+def test_the_first_of_two_values_counts(tmp_path: Path) -> None:
+    lines = '<float name="radius" value="2"/><float name="radius" value="3"/>'
+    scene = load(tmp_path, f'<shape type="sphere">{lines}</shape>')
+    assert scene.shapes[0].geometry.radius == 2
+    assert scene.warnings == ("line 2: <shape type=\"sphere\"> has two values for 'radius': the first one counts.",)
+
+
+def test_merged_shapes_are_shapes_of_the_scene(tmp_path: Path) -> None:
+    inner = '<shape type="merge"><shape type="cube"/></shape>'
+    scene = load(tmp_path, f'<shape type="merge"><shape type="sphere"/>{inner}</shape>')
+    assert [shape.name for shape in scene.shapes] == ["sphere (line 2)", "cube (line 2)"]
+    assert scene.warnings == ()
+    with pytest.raises(SceneError, match="contains itself"):
+        load(tmp_path, '<shape type="merge" id="m"><ref id="m"/></shape>')

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from pmviewer.errors import SceneError
 from pmviewer.scene import primitives
-from pmviewer.scene.clean import check_faces
-from pmviewer.scene.description import Cylinder, Disk, Frame, Geometry, Mesh, Parallelogram, Sphere, Vec3
+from pmviewer.scene.description import Cylinder, Disk, Frame, Geometry, Parallelogram, Sphere, Vec3
 from pmviewer.scene.formats.mitsuba.displacement import displacement
 from pmviewer.scene.formats.mitsuba.document import Properties
+from pmviewer.scene.formats.mitsuba.mesh_file import MESH_FILES, mesh_file
 from pmviewer.scene.formats.mitsuba.transform import Matrix, apply, mirrors, similar_columns
-from pmviewer.scene.formats.ply import read_ply
 from pmviewer.scene.texture_coordinates import orthonormal
 
-SUPPORTED = ("obj", "ply", "rectangle", "cube", "sphere", "disk", "cylinder")
+SUPPORTED = (*MESH_FILES, "rectangle", "cube", "sphere", "disk", "cylinder")
 
 
 def _vec3(v: np.ndarray) -> Vec3:
@@ -34,8 +30,8 @@ def geometry(p: Properties) -> Geometry:
 def _smooth_geometry(p: Properties) -> Geometry:
     to_world = p.transform()
     flip = p.boolean("flip_normals", False)
-    if p.type in ("obj", "ply"):
-        return _mesh_file(p, to_world, flip)
+    if p.type in MESH_FILES:
+        return mesh_file(p, to_world, flip)
     if p.type == "cube":
         return primitives.transformed(primitives.cube(), to_world, flip)
     if p.type == "rectangle":
@@ -109,33 +105,3 @@ def _cylinder(p: Properties, to_world: Matrix, flip: bool) -> Geometry:
         return Cylinder(_vec3(m[:3, 3]), _vec3(m[:3, 3] + m[:3, 2]), world_radius, flip, _frame(m))
     _uneven(p)
     return primitives.transformed(primitives.cylinder(), m, flip)
-
-
-def _mesh_file(p: Properties, to_world: Matrix, flip: bool) -> Mesh:
-    name = p.string("filename", "")
-    if not name:
-        raise p.document.error(f"{p.element} needs a 'filename'.", p.element)
-    flat = p.boolean("face_normals", False)
-    # OBJ counts v from a picture's lower edge, which `read_obj` has turned round already.
-    flip_v = p.boolean("flip_tex_coords", p.type == "obj") != (p.type == "obj")
-    path = p.document.file(name, p.element)
-    try:
-        mesh = read_ply(path) if p.type == "ply" else _read_obj(path)
-        check_faces(mesh, path)
-    except SceneError as error:
-        raise p.document.error(
-            f"The mesh {path.name} named by {p.element}: {error.what}", p.element, error.hint
-        ) from None
-    if flip_v and mesh.uv is not None:
-        mesh = replace(mesh, uv=mesh.uv * [1, -1] + [0, 1])
-    if mesh.normals is not None and not flat:
-        return primitives.wound_by_normals(primitives.transformed(mesh, to_world, flip))
-    # Faces keep the order of their corners, so that a mirrored mesh turns inside out.
-    mesh = primitives.transformed(replace(mesh, normals=None), to_world, flip != mirrors(to_world))
-    return mesh if flat else primitives.with_smooth_normals(mesh, seams=True)
-
-
-def _read_obj(path: Path) -> Mesh:
-    from pmviewer.scene.formats.meshes import read_single
-
-    return read_single(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +29,10 @@ def scaling(x: float, y: float, z: float) -> Matrix:
 
 
 def rotation(axis: tuple[float, float, float], degrees: float) -> Matrix:
-    """Right-handed rotation about a unit axis through the origin (Rodrigues). ValueError for a zero axis.
+    """Right-handed rotation about a unit axis through the origin (Rodrigues).
 
     Mitsuba does not scale other axes to unit length: with them its formula stretches and shears, and so does this one.
     """
-    if not any(axis):
-        raise ValueError("expected a rotation axis other than zero")
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     angle = math.radians(degrees)
@@ -43,33 +42,37 @@ def rotation(axis: tuple[float, float, float], degrees: float) -> Matrix:
     return m
 
 
-def is_unit_rotation(element: Element) -> bool:
-    """Whether the element is anything but a <rotate> whose axis is not of unit length."""
-    if element.tag.lower() != "rotate":
-        return True
-    return abs(math.hypot(*_components(element.attributes, 0.0)) - 1) <= _NEARLY_UNIT
-
-
 def look_at(origin: tuple[float, ...], target: tuple[float, ...], up: tuple[float, ...]) -> Matrix:
     """Camera space to world: +x to the left of the image, +y up, +z into the view.
 
-    A zero `up` is replaced; ValueError when origin and target coincide or `up` is along the view.
+    An `up` that is zero or along the view is replaced as Mitsuba 3 replaces a zero one; ValueError when origin and
+    target coincide.
     """
     forward = np.subtract(target, origin, dtype=np.float64)
     length = float(np.linalg.norm(forward))
     if length == 0:
         raise ValueError("expected a lookat whose origin and target differ")
     forward /= length
-    up_vector = np.asarray(up, float)
-    if not up_vector.any():
-        up_vector = np.eye(3)[np.argmin(np.abs(forward))]
-    left = np.cross(up_vector, forward)
-    if float(np.linalg.norm(left)) <= 1e-12 * float(np.linalg.norm(up_vector)):
-        raise ValueError("expected a lookat whose 'up' is not along the view direction")
+    left = np.cross(np.asarray(up, float), forward)
+    if _along(forward, up):
+        left = np.cross(_across(forward), forward)
     left /= np.linalg.norm(left)
     m = np.eye(4)
     m[:3, 0], m[:3, 1], m[:3, 2], m[:3, 3] = left, np.cross(forward, left), forward, origin
     return m
+
+
+def _along(forward: NDArray[np.float64], up: tuple[float, ...]) -> bool:
+    """Does `up` say nothing about the roll of a camera that looks along the unit vector?"""
+    across = float(np.linalg.norm(np.cross(np.asarray(up, float), forward)))
+    return across <= 1e-12 * float(np.linalg.norm(up))
+
+
+def _across(n: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A unit vector at right angles to a unit vector (Duff et al., "Building an orthonormal basis, revisited")."""
+    sign = math.copysign(1.0, n[2])
+    a = -1.0 / (sign + n[2])
+    return np.array([1.0 + sign * n[0] * n[0] * a, sign * n[0] * n[1] * a, -sign * n[0]])
 
 
 def _components(attributes: dict[str, str], default: float) -> tuple[float, float, float]:
@@ -79,29 +82,50 @@ def _components(attributes: dict[str, str], default: float) -> tuple[float, floa
     return (x, y, z)
 
 
-def operation(element: Element) -> Matrix:
-    """The matrix of <translate>, <rotate>, <scale>, <matrix> or <lookat>. ValueError says what was expected."""
+def operation(element: Element, warn: Callable[[str], None] = lambda sentence: None) -> Matrix:
+    """The matrix of <translate>, <rotate>, <scale>, <matrix> or <lookat>. ValueError says what was expected; what is
+    odd but has a meaning goes to `warn`."""
     attributes, tag = element.attributes, element.tag.lower()
     if tag == "translate":
         return translation(*_components(attributes, 0.0))
     if tag == "scale":
         return scaling(*_components(attributes, 1.0))
     if tag == "rotate":
-        return rotation(_components(attributes, 0.0), parse_float(_required(attributes, "angle")))
+        return _rotate(attributes, warn)
     if tag == "matrix":
-        numbers = parse_numbers(_required(attributes, "value"), (9, 16))
-        if len(numbers) == 16:
-            if numbers[12:] != [0.0, 0.0, 0.0, 1.0]:
-                raise ValueError("expected a matrix whose last row is 0 0 0 1")
-            return np.reshape(numbers, (4, 4))
+        return _matrix(parse_numbers(_required(attributes, "value"), (9, 16)), warn)
+    if tag == "lookat":
+        up = tuple(parse_numbers(attributes["up"], (3,))) if "up" in attributes else (0.0, 0.0, 0.0)
+        origin = tuple(parse_numbers(_required(attributes, "origin"), (3,)))
+        target = tuple(parse_numbers(_required(attributes, "target"), (3,)))
+        m = look_at(origin, target, up)
+        if any(up) and _along(m[:3, 2], up):
+            warn("'up' of <lookat> is along the view: another direction is up in the picture.")
+        return m
+    raise ValueError(f"expected one of {', '.join(OPERATIONS)} in a transformation, found <{element.tag}>")
+
+
+def _rotate(attributes: dict[str, str], warn: Callable[[str], None]) -> Matrix:
+    axis, angle = _components(attributes, 0.0), parse_float(_required(attributes, "angle"))
+    if not any(axis):
+        if angle:
+            warn("<rotate> has no axis: it was left out.")
+        return np.eye(4)
+    if abs(math.hypot(*axis) - 1) > _NEARLY_UNIT:
+        warn("The axis of <rotate> is not of unit length: it stretches and shears, as it does in Mitsuba 3.")
+    return rotation(axis, angle)
+
+
+def _matrix(numbers: list[float], warn: Callable[[str], None]) -> Matrix:
+    if len(numbers) == 9:
         m = np.eye(4)
         m[:3, :3] = np.reshape(numbers, (3, 3))
         return m
-    if tag == "lookat":
-        up = parse_numbers(attributes["up"], (3,)) if "up" in attributes else [0.0, 0.0, 0.0]
-        origin = parse_numbers(_required(attributes, "origin"), (3,))
-        return look_at(tuple(origin), tuple(parse_numbers(_required(attributes, "target"), (3,))), tuple(up))
-    raise ValueError(f"expected one of {', '.join(OPERATIONS)} in a transformation, found <{element.tag}>")
+    m = np.reshape(numbers, (4, 4)).copy()
+    if numbers[12:] != [0.0, 0.0, 0.0, 1.0]:
+        warn("The last row of a <matrix> is not 0 0 0 1: it is taken for that, as in Mitsuba 3.")
+        m[3] = 0.0, 0.0, 0.0, 1.0
+    return m
 
 
 def _required(attributes: dict[str, str], name: str) -> str:

@@ -7,16 +7,12 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
-
 from pmviewer.scene.description import RGB, Vec3
 
 LARGEST = 1e30
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 _SEPARATOR = re.compile(r"[\s,]+")
-# Averages over these ranges stand for the channels of a sampled spectrum.
-_BANDS_NM = ((600.0, 700.0), (500.0, 600.0), (400.0, 500.0))
 
 
 def quoted(text: str) -> str:
@@ -36,19 +32,21 @@ def parse_float(text: str) -> float:
 
 
 def parse_integer(text: str) -> int:
-    """A whole number."""
+    """A whole number, also written as 64.0."""
     text = text.strip()
-    if not _INTEGER.fullmatch(text):
-        raise ValueError(f"expected a whole number, found {quoted(text)}")
-    return int(text)
+    if _INTEGER.fullmatch(text):
+        return int(text)
+    if _NUMBER.fullmatch(text) and abs(float(text)) < 1e15 and float(text).is_integer():
+        return int(float(text))
+    raise ValueError(f"expected a whole number, found {quoted(text)}")
 
 
 def parse_boolean(text: str) -> bool:
-    """true or false, in any case."""
+    """true or false, in any case, or 1 or 0."""
     word = text.strip().lower()
-    if word not in ("true", "false"):
+    if word not in ("true", "false", "1", "0"):
         raise ValueError(f"expected true or false, found {quoted(text)}")
-    return word == "true"
+    return word in ("true", "1")
 
 
 def parse_numbers(text: str, counts: tuple[int, ...]) -> list[float]:
@@ -95,21 +93,27 @@ def is_sampled(text: str) -> bool:
     return ":" in text
 
 
-def parse_spectrum(text: str) -> RGB:
-    """One number (uniform), three (linear RGB), or "wavelength:value, …" in nm, averaged over thirds of 400–700 nm."""
-    if not is_sampled(text):
-        return parse_rgb(text)
+def parse_samples(text: str) -> tuple[list[float], list[float]]:
+    """Wavelengths in nm, increasing, and values of "wavelength:value, …"."""
     samples: dict[float, float] = {}
     for word in (w for w in _SEPARATOR.split(text) if w):
-        wavelength, _, value = word.partition(":")
+        wavelength, colon, value = word.partition(":")
+        if not colon:
+            raise ValueError(f"expected wavelength:value pairs, found {quoted(word)}")
         samples[parse_float(wavelength)] = parse_float(value)
-    wavelengths = sorted(samples)
-    return average_spectrum(wavelengths, [samples[w] for w in wavelengths])
+    return in_order(list(samples), list(samples.values()))
 
 
-def average_spectrum(wavelengths: list[float], values: list[float]) -> RGB:
-    """Mean over the three bands of a piecewise linear spectrum that is constant outside its ends."""
-    if not wavelengths:
-        raise ValueError("expected wavelength:value pairs, found none")
-    r, g, b = (float(np.mean(np.interp(np.linspace(lo, hi, 21), wavelengths, values))) for lo, hi in _BANDS_NM)
-    return (r, g, b)
+def in_order(wavelengths: list[float], values: list[float]) -> tuple[list[float], list[float]]:
+    """Both lists sorted by wavelength, if they are a spectrum."""
+    if len(wavelengths) != len(values):
+        raise ValueError(f"expected as many values as wavelengths, found {len(values)} and {len(wavelengths)}")
+    if len(set(wavelengths)) < 2:
+        raise ValueError("expected values at two wavelengths or more")
+    pairs = sorted(dict(zip(wavelengths, values)).items())
+    return [w for w, _ in pairs], [v for _, v in pairs]
+
+
+def parse_list(text: str) -> list[float]:
+    """Any number of numbers, separated by spaces or commas."""
+    return [parse_float(w) for w in _SEPARATOR.split(text) if w]

@@ -1,13 +1,10 @@
-"""Mitsuba's XML as a tree whose elements know their line; parameters substituted, entities and DTDs refused.
+"""Mitsuba's XML as a tree whose elements know their file and line; entities and DTDs refused.
 
-A scene file comes from anywhere, so nothing in it may reach outside (external entities) or blow up (entity bombs,
-parameters that double each other).
+A scene file comes from anywhere, so nothing in it may reach outside (external entities) or blow up (entity bombs).
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
@@ -18,24 +15,27 @@ from pmviewer.errors import SceneError
 MAX_FILE_BYTES = 64 << 20
 MAX_DEPTH = 64
 MAX_ATTRIBUTE = 1 << 16
+MAX_ELEMENTS = 1_500_000
+"""Of a file and of all that it includes: more take too long to read and gigabytes to keep."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Element:
-    """One XML element; `line` counts from 1."""
+    """One XML element; `line` counts from 1. `file` is the included file that it stands in, None in the scene's own."""
 
     tag: str
     attributes: dict[str, str]
     line: int
     children: list[Element] = field(default_factory=list)
+    file: Path | None = None
 
     def __str__(self) -> str:
         kind = self.attributes.get("type")
         return f'<{self.tag} type="{kind}">' if kind else f"<{self.tag}>"
 
 
-def read_xml(path: Path) -> Element:
-    """Root element of the file. Raises SceneError."""
+def read_xml(path: Path, included: Path | None = None) -> Element:
+    """Root element of the file, whose elements say that they stand in `included`. Raises SceneError."""
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
             limit = MAX_FILE_BYTES >> 20
@@ -45,25 +45,31 @@ def read_xml(path: Path) -> Element:
         data = path.read_bytes()
     except OSError as error:
         raise SceneError(f"The file can't be read: {error.strerror or error}.", path) from None
-    return parse_xml(data, path)
+    return parse_xml(data, path, included)
 
 
-def parse_xml(data: bytes, path: Path | None = None) -> Element:
+def parse_xml(data: bytes, path: Path | None = None, included: Path | None = None) -> Element:
     """Root element of XML text. Raises SceneError naming the line for anything that is not plain, well-formed XML."""
     parser = expat.ParserCreate()
     root: list[Element] = []
     stack: list[Element] = []
+    count = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
         line = parser.CurrentLineNumber
         if len(stack) >= MAX_DEPTH:
             raise SceneError(f"Elements are nested deeper than {MAX_DEPTH}.", path, line, "Flatten the file.")
+        if count > MAX_ELEMENTS:
+            hint = "Keep many triangles in mesh files, and copies in nested groups."
+            raise SceneError(f"The file has more than {MAX_ELEMENTS:,} elements.", path, line, hint)
         for name, value in attributes.items():
             if len(value) > MAX_ATTRIBUTE:
                 raise SceneError(
                     f"Attribute '{name}' of <{tag}> is longer than {MAX_ATTRIBUTE} characters.", path, line
                 )
-        element = Element(tag, attributes, line)
+        element = Element(tag, attributes, line, [], included)
         (stack[-1].children if stack else root).append(element)
         stack.append(element)
 
@@ -92,51 +98,3 @@ def parse_xml(data: bytes, path: Path | None = None) -> Element:
     except (LookupError, ValueError) as error:
         raise SceneError(f"The XML's encoding can't be read: {error}.", path, 1, "Save the file as UTF-8.") from None
     return root[0]
-
-
-def substitute(root: Element, overrides: Mapping[str, str], path: Path | None = None) -> tuple[str, ...]:
-    """Replace `$name` in all attributes, in document order, and take <default> elements out of the tree.
-
-    `overrides` win over the file's defaults. A backslash before the dollar keeps it. Returns the names of overrides
-    that the file never mentions. Raises SceneError for a name that is not defined at that point.
-    """
-    values = {str(k): str(v) for k, v in overrides.items()}
-    used: set[str] = set()
-    _substitute(root, values, used, path)
-    return tuple(name for name in overrides if name not in used)
-
-
-def _substitute(element: Element, values: dict[str, str], used: set[str], path: Path | None) -> None:
-    for name, text in element.attributes.items():
-        if "$" in text:
-            element.attributes[name] = _expand(text, values, used, element, path)
-    for child in element.children:
-        _substitute(child, values, used, path)
-        if child.tag == "default":
-            key, value = child.attributes.get("name"), child.attributes.get("value")
-            if not key or value is None:
-                raise SceneError("<default> needs a name and a value.", path, child.line)
-            used.add(key)
-            values.setdefault(key, value)
-    element.children = [c for c in element.children if c.tag != "default"]
-
-
-def _expand(text: str, values: dict[str, str], used: set[str], element: Element, path: Path | None) -> str:
-    def value(match: re.Match[str]) -> str:
-        used.add(match[1])
-        return values[match[1]]
-
-    if values:
-        # Longest names first: $resolution must not be read as $res followed by "olution".
-        names = "|".join(re.escape(n) for n in sorted(values, key=len, reverse=True))
-        # The substituted text is not looked at again, so parameters can't recurse.
-        pieces = re.split(r"(\\\$)", text)
-        text = "".join(p if p == r"\$" else re.sub(rf"\$({names})", value, p) for p in pieces)
-    if len(text) > MAX_ATTRIBUTE:
-        what = f"An attribute of {element} grows beyond {MAX_ATTRIBUTE} characters by its parameters."
-        raise SceneError(what, path, element.line, "Use shorter <default> values.")
-    undefined = re.search(r"(?<!\\)\$(\w*)", text)
-    if undefined:
-        hint = f'Put <default name="{undefined[1]}" value="…"/> before this line, or write \\$ for a dollar sign.'
-        raise SceneError(f"Parameter ${undefined[1]} in {element} is not defined.", path, element.line, hint)
-    return text.replace(r"\$", "$")
