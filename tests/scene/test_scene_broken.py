@@ -64,7 +64,7 @@ OPENS: dict[str, tuple[str, dict[str, int]]] = {
         "line 4: Meshes that can't be used, whose shapes are left out: index_out_of_range.ply",
         {},
     ),
-    "lookat_up_along_view.xml": ("line 2: 'up' of <lookat> is along the view", {}),
+    "lookat_up_along_view.xml": ("line 2: <lookat>: 'up' is along the view", {}),
     "missing_mesh.xml": ("line 4: Files that do not exist", {}),
     "nan_number.xml": ("line 4: 'center' of <shape type=\"sphere\">: expected a number, found 'nan'", {}),
     "nan_vertices.ply": ("no light", {"triangle with a NaN, infinite or huge vertex": 2}),

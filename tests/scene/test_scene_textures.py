@@ -191,11 +191,13 @@ def test_odd_options_are_replaced(tmp_path: Path, more: str, wrap: str, filter: 
     assert [words in w for w in scene.warnings] == [True] * bool(words)
 
 
-def test_wrong_values_are_errors(tmp_path: Path) -> None:
+def test_wrong_values_take_their_default(tmp_path: Path) -> None:
     picture(tmp_path)
     wrong = '<boolean name="raw" value="maybe"/>'
-    with pytest.raises(SceneError, match=r"'raw'.*expected true or false"):
-        sphere(tmp_path, f'<bsdf type="diffuse">{bitmap("reflectance", more=wrong)}</bsdf>')
+    scene = sphere(tmp_path, f'<bsdf type="diffuse">{bitmap("reflectance", more=wrong)}</bsdf>')
+    assert (
+        "'raw' of <texture type=\"bitmap\">: expected true or false, found 'maybe'; false is used." in scene.warnings[0]
+    )
 
 
 def test_maps_without_a_texture_are_flat(tmp_path: Path) -> None:

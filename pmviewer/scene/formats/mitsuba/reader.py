@@ -48,7 +48,8 @@ class Reader:
         if element.tag == "shape":
             self._surface(element)
         elif element.tag == "emitter":
-            self._emitter(element)
+            if element.attributes.get("type") != "area" or "id" not in element.attributes:  # else shapes refer to it
+                self._emitter(element)
         elif element.tag == "sensor":
             self.sensors.append(element)
         elif element.tag not in _SILENT:

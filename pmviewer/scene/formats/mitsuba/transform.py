@@ -100,7 +100,7 @@ def operation(element: Element, warn: Callable[[str], None] = lambda sentence: N
         target = tuple(parse_numbers(_required(attributes, "target"), (3,)))
         m = look_at(origin, target, up)
         if any(up) and _along(m[:3, 2], up):
-            warn("'up' of <lookat> is along the view: another direction is up in the picture.")
+            warn("<lookat>: 'up' is along the view, another direction is up in the picture.")
         return m
     raise ValueError(f"expected one of {', '.join(OPERATIONS)} in a transformation, found <{element.tag}>")
 
