@@ -16,6 +16,11 @@ from pmviewer.scene.formats.mitsuba.properties import SILENT_TAGS as SILENT_TAGS
 from pmviewer.scene.formats.mitsuba.properties import Properties as Properties
 from pmviewer.scene.formats.mitsuba.xml import Element
 
+MISSING = (
+    "Files that do not exist: the shapes, lights or parts of the scene that need them are left out: {names}. "
+    "Put them there, or name their folder with --search-path."
+)
+
 
 class MissingFile(SceneError):
     """A file that an object needs does not exist. `name` is what it is called in the scene."""
@@ -96,6 +101,10 @@ class Document:
             what = f"The file {name[:200]!r} named by {element} does not exist."
             raise MissingFile(name[:200], what, element.file or self.diagnostics.path, element.line, hint)
         return path
+
+    def missing(self, name: str, element: Element) -> None:
+        """Put a file that was not found on the list of the one warning about them."""
+        self.diagnostics.warn_of(name, MISSING, element.line, element.file)
 
     def circular(self, element: Element) -> bool:
         """Does the object contain itself, over references?"""

@@ -42,7 +42,7 @@ def load_mitsuba(path: Path, parameters: Mapping[str, str], search_paths: Sequen
     document = Document(root, path, diagnostics, folders)
     scene = Reader(document)
     for name, element in expansion.missing:
-        scene.missing(name, element)
+        document.missing(name, element)
     shapes = clean_shapes(scene.shapes, diagnostics)
     lights = clean_lights(scene.lights, diagnostics)
     instances = scene.groups.checked()

@@ -259,9 +259,12 @@ class Properties:
         return self._parsed(name, parse_rgb, text, default)
 
     def _file(self, name: str, element: Element, default: RGB, emitted: bool) -> RGB:
-        path = self.document.file(element.attributes["filename"], element)
         try:
+            path = self.document.file(element.attributes["filename"], element)
             return spectrum_file(path, emitted, element, self.document)
+        except SceneError:
+            self.document.missing(element.attributes["filename"][:200], element)
+            return default
         except (ValueError, OSError) as error:
             reason = str(error) if isinstance(error, ValueError) else "expected a file that can be read"
             return self._refused(name, reason, default)

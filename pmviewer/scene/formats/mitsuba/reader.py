@@ -19,10 +19,6 @@ from pmviewer.scene.texture import Texture
 _SILENT = SILENT_TAGS | {"bsdf", "texture", "spectrum", "alias"}
 _MERGE = "merge"
 MOST_MERGED = 1 << 17
-MISSING = (
-    "Files that do not exist: the shapes, lights or parts of the scene that need them are left out: {names}. "
-    "Put them there, or name their folder with --search-path."
-)
 BROKEN = "Meshes that can't be used, whose shapes are left out: {names}."
 
 
@@ -55,15 +51,11 @@ class Reader:
         elif element.tag not in _SILENT:
             self.document.ignore(element)
 
-    def missing(self, name: str, element: Element) -> None:
-        """Put a file that was not found on the list of the one warning about them."""
-        self.document.diagnostics.warn_of(name, MISSING, element.line, element.file)
-
     def _failed(self, element: Element, error: SceneError, instead: str) -> None:
         """Say what was left out and why."""
         self.failures.append(error)
         if isinstance(error, MissingFile):
-            self.missing(error.name, element)
+            self.document.missing(error.name, element)
         elif isinstance(error, BrokenMesh):
             self.document.diagnostics.warn_of(error.name, BROKEN, element.line, element.file)
         else:
