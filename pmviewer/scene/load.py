@@ -76,7 +76,9 @@ def _read(path: Path, parameters: Mapping[str, str], search_paths: Sequence[Path
     known = CHOICES if ending in (".glb", ".gltf") else ()
     scene = load_mesh_scene(path, {name: value for name, value in parameters.items() if name in known})
     has = f"have only {', '.join(known)}" if known else "have none"
-    ignored = tuple(f"Parameter '{name}' was given, but {ending} files {has}." for name in parameters if name not in known)
+    ignored = tuple(
+        f"Parameter '{name}' was given, but {ending} files {has}." for name in parameters if name not in known
+    )
     return replace(scene, warnings=scene.warnings + ignored)
 
 

@@ -72,7 +72,9 @@ def _encoded(path: Path) -> NDArray[np.float32]:
             if picture.mode.startswith("I"):
                 raise SceneError("Pictures of 16 or 32 bits a pixel can't be read.", path, hint="Save it as OpenEXR.")
             encoded = np.asarray(picture.convert("RGB"))
-    except (OSError, ValueError, SyntaxError, UnidentifiedImageError, Image.DecompressionBombError) as error:
+    except UnidentifiedImageError:
+        raise SceneError("It is no kind of picture that is known.", path) from None
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         hint = "OpenEXR, Radiance HDR, PFM, PNG and JPEG files can be read."
         raise SceneError(f"It can't be read: {error}.", path, hint=hint) from None
     levels = np.arange(256) / 255

@@ -138,6 +138,16 @@ def test_nearest_materials_are_named_once(tmp_path: Path, bsdf: str, kind: str, 
     assert "is not supported" in warnings[0]
 
 
+def test_plugins_of_others_are_read_as_what_they_are_called_after(tmp_path: Path) -> None:
+    """Of two public scenes; a name like no other stays grey."""
+    alpha = '<float name="alpha" value="0.3"/>'
+    found, warnings = material(tmp_path, f'<bsdf type="roughconductorGGX">{alpha}</bsdf>')
+    assert (found.kind, found.alpha, found.distribution) == ("rough conductor", (0.3, 0.3), "ggx")
+    assert "it is read as 'roughconductor'" in warnings[0]
+    found, warnings = material(tmp_path, f'<bsdf type="TwoSided">{METAL}</bsdf>')
+    assert (found.kind, found.two_sided, len(warnings)) == ("conductor", True, 1)
+
+
 @pytest.mark.parametrize("exponent", [20.0, 300.0])
 def test_phongs_lobe_has_wards_width(tmp_path: Path, exponent: float) -> None:
     """Where cosⁿ δ about the mirror direction is a half, exp(−tan²(δ/2)/α²) about the half vector is too."""

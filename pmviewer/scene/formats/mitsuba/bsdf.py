@@ -17,6 +17,7 @@ from pmviewer.scene.formats.mitsuba.xml import Element
 from pmviewer.scene.optics import IOR, METALS, metal
 
 _AROUND_ONE = frozenset(("twosided", "mask", "bumpmap", "bump", "normalmap", "coating", "roughcoating"))
+_COMPOUND = _AROUND_ONE | {"blendbsdf", "mixturebsdf"}
 _GREY = (0.5, 0.5, 0.5)
 
 
@@ -48,6 +49,8 @@ class Materials:
 
     def _build(self, element: Element, name: str, depth: int) -> Material:
         p = Properties(element, self.document, depth)
+        if p.type not in SIMPLE and p.type not in _COMPOUND:
+            p.type = self._similar(p)
         if p.type in SIMPLE:
             material = with_textures(p, SIMPLE[p.type](p, name))
             p.warn_unused("texture")
@@ -68,6 +71,14 @@ class Materials:
             return replace(parts[0], name=name)
         self.document.warn(f"{element} is not supported: a grey diffuse surface replaces it.", element)
         return Material(name, "diffuse", _GREY)
+
+    def _similar(self, p: Properties) -> str:
+        """The longest known type that the name of an unknown one begins with: others' plugins are called so."""
+        word = p.type.lower()
+        known = max((t for t in (*SIMPLE, *_COMPOUND) if word.startswith(t)), key=len, default=p.type)
+        if known != p.type:
+            self.document.warn(f"{p.element} is not supported: it is read as '{known}'.", p.element)
+        return known
 
 
 def _around(p: Properties, inner: Material, others: list[Material]) -> Material:

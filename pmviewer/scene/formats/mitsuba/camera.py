@@ -31,6 +31,7 @@ _INSTEAD = {
     "spherical": "a perspective camera 120° wide in its direction replaces it",
     "radiancemeter": "a perspective camera in its direction replaces it",
 }
+_A = {"perspective": "a perspective", "orthographic": "an orthographic"}
 _SPHERICAL_FOV = 120.0
 _PROBE_SIDE = 512
 
@@ -78,7 +79,8 @@ def _camera(p: Properties, film: Film, center: NDArray[np.float64]) -> NamedCame
     if p.type in _INSTEAD:
         document.warn(f"{element}: {_INSTEAD[p.type]}.", element)
     elif p.type not in ("perspective", "orthographic"):
-        document.warn(f"{element} is approximated by a perspective camera.", element)
+        p.type = "orthographic" if "orthographic" in p.type.lower() else "perspective"
+        document.warn(f"{element} is approximated by {_A[p.type]} camera.", element)
     p.known("aperture_radius", "focus_distance", "kc", "shutter_open", "shutter_close", "srf")
     if p.type == "radiancemeter" and (film.width, film.height) == (1, 1):
         film = Film(_PROBE_SIDE, _PROBE_SIDE, (_PROBE_SIDE, _PROBE_SIDE))

@@ -8,11 +8,6 @@ from pmviewer.scene.clean import LARGEST_SIDE
 from pmviewer.scene.formats.mitsuba.document import Properties
 
 DEFAULT_SIZE = (768, 576)
-_SILENT = (
-    "pixel_format", "component_format", "file_format", "sample_border", "compensate", "banner", "high_quality_edges",
-    "gamma", "exposure", "tonemap_method", "attach_log", "rfilter", "key", "burn", "fileformat", "pixelformat",
-    "label", "digits", "variable",
-)  # fmt: skip
 _KNOWN = ("hdrfilm", "ldrfilm", "tiledhdrfilm", "mfilm", "specfilm")
 
 
@@ -39,7 +34,8 @@ class Film:
 
 
 def read_film(sensor: Properties) -> Film:
-    """The film of a sensor, 768 × 576 without one; sizes that can't be are cut with a warning."""
+    """The film of a sensor, 768 × 576 without one; sizes that can't be are cut with a warning. What else it says is
+    about files and tone curves, which are chosen here by other means."""
     films = sensor.objects("film")
     if not films:
         return Film(*DEFAULT_SIZE, DEFAULT_SIZE)
@@ -47,11 +43,9 @@ def read_film(sensor: Properties) -> Film:
     if film.type not in _KNOWN:
         film.document.warn(f"{film.element} is read as an hdrfilm.", film.element)
     default = (1, 1) if film.type == "mfilm" else DEFAULT_SIZE
-    film.known(*_SILENT)
     width, height = _size(film, film.integer("width", default[0]), film.integer("height", default[1]))
     across, down = film.integer("crop_width", width), film.integer("crop_height", height)
     left, top = film.integer("crop_offset_x", 0), film.integer("crop_offset_y", 0)
-    film.warn_unused()
     if not (0 <= left < left + across <= width and 0 <= top < top + down <= height):
         film.document.warn(f"The crop window of {film.element} leaves the film: it is ignored.", film.element)
         return Film(width, height, (width, height))

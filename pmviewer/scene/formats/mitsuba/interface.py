@@ -14,7 +14,8 @@ _LEAST_IOR, _LARGEST_IOR = 1e-3, 1e3
 def distribution(p: Properties) -> Literal["ggx", "beckmann"]:
     """Beckmann's by default, as in Mitsuba."""
     p.known("sample_visible")
-    name = p.string("distribution", "beckmann").lower()
+    own = p.element.attributes.get("type", "").lower()
+    name = p.string("distribution", "ggx" if own.endswith("ggx") else "beckmann").lower()
     if name == "ggx":
         return "ggx"
     if name != "beckmann":
