@@ -180,7 +180,7 @@ def test_up_along_the_view_is_replaced(tmp_path: Path) -> None:
     scene = sensor(tmp_path, FILM, '<lookat origin="0 9 0" target="0 0 0" up="0 1 0"/>')
     assert (scene.camera.origin, scene.camera.target) == ((0, 9, 0), (0, 0, 0))
     assert abs(scene.camera.up[1]) < 1
-    assert any("'up' is along the view" in w for w in scene.warnings)
+    assert len(scene.warnings) == 1
 
 
 def test_degenerate_triangles_are_dropped_and_counted() -> None:

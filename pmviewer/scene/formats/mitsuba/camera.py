@@ -85,7 +85,7 @@ def _camera(p: Properties, film: Film, center: NDArray[np.float64]) -> NamedCame
     if p.type == "radiancemeter" and (film.width, film.height) == (1, 1):
         film = Film(_PROBE_SIDE, _PROBE_SIDE, (_PROBE_SIDE, _PROBE_SIDE))
     origin, target, up, m = _placed(p, center)
-    camera = Camera(origin, target, up, fov=40.0, mirrored=m is not None and mirrors(m))
+    camera = Camera(origin, target, up, fov=40.0, mirrored=mirrors(m))
     camera = _orthographic(p, camera, film, m) if p.type in ("orthographic", "telecentric") else _lens(p, camera, film)
     near, far = _clip(p)
     p.warn_unused("film")
@@ -98,21 +98,15 @@ def _camera(p: Properties, film: Film, center: NDArray[np.float64]) -> NamedCame
     return NamedCamera(name, camera, film.width, film.height)
 
 
-def _placed(p: Properties, center: NDArray[np.float64]) -> tuple[Vec3, Vec3, Vec3, Matrix | None]:
-    """Origin, target and up, and the matrix they come from, if that can be used. `center` of the scene tells how far
-    away the orbit point is, where nothing else does."""
+def _placed(p: Properties, center: NDArray[np.float64]) -> tuple[Vec3, Vec3, Vec3, Matrix]:
+    """Origin, target and up, and the matrix they come from. `center` of the scene tells how far away
+    the orbit point is, where nothing else does."""
     element, document = p.element, p.document
-    at = p.values.get("to_world", element)
     looked = _lookat(p)
     try:
         m = p.transform()
     except SceneError as error:
-        if looked is None or looked[0] == looked[1]:
-            raise _Unusable(f"The to_world matrix of {element} can't be used ({error.what.rstrip('.')})") from None
-        document.warn(f"{element}: 'up' is along the view, another one replaces it.", at)
-        origin, target = looked
-        away = np.argmin(np.abs(np.subtract(target, origin)))
-        return origin, target, (float(away == 0), float(away == 1), float(away == 2)), None
+        raise _Unusable(f"The to_world matrix of {element} can't be used ({error.what.rstrip('.')})") from None
     lengths = np.linalg.norm(m[:3, :3], axis=0)
     singular = _Unusable(f"The to_world matrix of {element} is singular")
     if not np.isfinite(lengths).all() or lengths.min() <= 1e-12 * lengths.max():
@@ -160,9 +154,9 @@ def _clip(p: Properties) -> tuple[float, float]:
     return 0.0, math.inf
 
 
-def _orthographic(p: Properties, camera: Camera, film: Film, m: Matrix | None) -> Camera:
+def _orthographic(p: Properties, camera: Camera, film: Film, m: Matrix) -> Camera:
     """Mitsuba's picture is 2 units wide before `to_world` scales it."""
-    scale = float(np.linalg.norm(m[:3, 0])) if m is not None else 1.0
+    scale = float(np.linalg.norm(m[:3, 0]))
     p.known("fov", "fov_axis", "focal_length")
     width = 2 * scale * film.width / film.full[0]
     return replace(camera, projection="orthographic", width=width, shift=film.shift((0.0, 0.0)))
