@@ -42,12 +42,28 @@ ParameterOption = Annotated[
 ]
 
 
+def _search(folders: list[Path] | None) -> list[Path] | None:
+    if folders:
+        from pmviewer.scene.load import search_also
+
+        search_also(folders)
+    return folders
+
+
+SearchOption = Annotated[
+    list[Path] | None,
+    typer.Option("--search-path", metavar="FOLDER", callback=_search, expose_value=False,
+                 help="Look here too for the files that a scene names."),
+]  # fmt: skip
+
+
 @app.command()
 def view(
     scene: SceneArgument = DEFAULT_SCENE,
     set_: SetOption = None,
     threads: ThreadsOption = None,
     define: ParameterOption = None,
+    search_path: SearchOption = None,
 ) -> None:
     """Open the window (the default command)."""
     from pmviewer.job import load_job
@@ -119,6 +135,7 @@ def shot(
     threads: ThreadsOption = None,
     set_: SetOption = None,
     define: ParameterOption = None,
+    search_path: SearchOption = None,
 ) -> None:
     """Open the window, wait for the last pass, write the picture with all overlays, captions and legends, close it."""
     from pmviewer.job import load_job
@@ -152,6 +169,7 @@ def compare_importance(
     threads: ThreadsOption = None,
     set_: SetOption = None,
     define: ParameterOption = None,
+    search_path: SearchOption = None,
 ) -> None:
     """Compare the picture with importance and without, at as many stored photons or at equal error."""
     from pmviewer.gain_job import gain_job
@@ -171,7 +189,7 @@ def scenes() -> None:
 
 
 @app.command()
-def info(scene: SceneArgument, define: ParameterOption = None) -> None:
+def info(scene: SceneArgument, define: ParameterOption = None, search_path: SearchOption = None) -> None:
     """Say what is in a scene, what was ignored, and which stages it needs or skips."""
     from pmviewer.job import load_job
     from pmviewer.jobs import scene_report

@@ -229,14 +229,26 @@ def on_a_surface(origin: tuple[float, float, float], shapes: tuple[Shape, ...], 
         if isinstance(g, Sphere) and abs(math.dist(g.center, origin) - g.radius) <= near:
             return shape.name
         if isinstance(g, Parallelogram):
+            if _far(eye, g, near):
+                continue
             corner, u, v = np.array(g.corner), np.array(g.edge_u), np.array(g.edge_v)
             if _touches(
                 np.array([[corner, corner + u, corner + u + v], [corner, corner + u + v, corner + v]]), eye, near
             ):
                 return shape.name
-        if isinstance(g, Mesh) and _touches(g.vertices[g.faces], eye, near):
+        if isinstance(g, Mesh) and not _far(eye, g, near) and _touches(g.vertices[g.faces], eye, near):
             return shape.name
     return None
+
+
+def _far(eye: NDArray[np.float64], g: Mesh | Parallelogram, near: float) -> bool:
+    """Is the point further than `near` from the box around the geometry?"""
+    if isinstance(g, Mesh):
+        low, high = g.vertices.min(axis=0).tolist(), g.vertices.max(axis=0).tolist()
+    else:
+        low = [c + min(u, 0.0) + min(v, 0.0) for c, u, v in zip(g.corner, g.edge_u, g.edge_v)]
+        high = [c + max(u, 0.0) + max(v, 0.0) for c, u, v in zip(g.corner, g.edge_u, g.edge_v)]
+    return any(not a - near <= x <= b + near for a, x, b in zip(low, eye.tolist(), high))
 
 
 def _touches(corners: NDArray[np.float64], eye: NDArray[np.float64], near: float) -> bool:

@@ -13,16 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.kernels.noise import add_noise
 from pmviewer.scene.description import Geometry, Mesh, Parallelogram, Sphere
 from pmviewer.scene.primitives import sphere, transformed, unit, with_smooth_normals
 
 Float = NDArray[np.float64]
-Index = NDArray[np.int64]
 Height = Callable[[Float], Float]
 """Heights (n,) over places (n, 3)."""
 
-MOST_TRIANGLES = 20_000_000
-_MIXED = np.uint64(0x9E3779B97F4A7C15)
+MOST_TRIANGLES = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -30,8 +29,7 @@ class Fractal:
     """Fractional Brownian motion: `octaves` of gradient noise, each of twice the frequency and `roughness` times the
     amplitude of the one before, between about −1 and 1.
 
-    The first octave has `frequency` cells along the unit cube, beyond which the noise repeats, so tiles join. Noise:
-    Perlin, "Improving noise", 2002, with a hash in place of the table.
+    The first octave has `frequency` cells along the unit cube, beyond which the noise repeats, so tiles join.
     """
 
     octaves: int = 6
@@ -42,8 +40,7 @@ class Fractal:
     def __call__(self, places: Float) -> Float:
         total = np.zeros(len(places))
         for octave in range(self.octaves):
-            cells = self.frequency << octave
-            total += self.roughness**octave * _noise(places, cells, self.seed * 64 + octave)
+            add_noise(places, self.frequency << octave, self.seed * 64 + octave, self.roughness**octave, total)
         return total
 
 
@@ -75,34 +72,10 @@ class Waves:
         return total / math.sqrt(2.0 * squares)
 
 
-def _hash(x: Index, y: Index, z: Index, seed: int) -> NDArray[np.uint64]:
-    """Well-mixed bits of three integers (the finaliser of Steele, Lea and Flood's SplitMix, 2014)."""
-    with np.errstate(over="ignore"):
-        h = (x.astype(np.uint64) * _MIXED + y.astype(np.uint64)) * _MIXED + z.astype(np.uint64)
-        h += np.uint64(seed) * np.uint64(0xD1B54A32D192ED03)
-        h = (h ^ (h >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-        h = (h ^ (h >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-        return h ^ (h >> np.uint64(31))
-
-
-def _noise(places: Float, cells: int, seed: int) -> Float:
-    """Gradient noise with `cells` lattice cells along the unit cube, periodic, in about [-1, 1]."""
-    corner = np.floor(places * cells)
-    f = places * cells - corner
-    fade = f * f * f * (f * (f * 6 - 15) + 10)
-    corner = corner.astype(np.int64)
-    total = np.zeros(len(places))
-    for d in np.ndindex(2, 2, 2):
-        x, y, z = ((corner + d) % cells).T
-        h = _hash(x, y, z, seed)
-        # A gradient of unit length: height and longitude from the two halves of the bits.
-        up = (h >> np.uint64(32)).astype(np.float64) * 2.0**-31 - 1.0
-        angle = (h & np.uint64(0xFFFFFFFF)).astype(np.float64) * (2 * np.pi * 2.0**-32)
-        side = np.sqrt(1.0 - up * up)
-        g = f - d
-        slope = side * np.cos(angle) * g[:, 0] + side * np.sin(angle) * g[:, 1] + up * g[:, 2]
-        total += slope * np.prod(np.where(d, fade, 1.0 - fade), axis=1)
-    return 1.5 * total
+def n_displaced(geometry: Geometry, cuts: int) -> int:
+    """Triangles that `displaced` would make."""
+    faces_now = len(geometry.faces) if isinstance(geometry, Mesh) else 64 if isinstance(geometry, Sphere) else 2
+    return faces_now * cuts * cuts
 
 
 def displaced(geometry: Geometry, height: Height, scale: float, offset: float, cuts: int) -> Mesh:
@@ -115,9 +88,11 @@ def displaced(geometry: Geometry, height: Height, scale: float, offset: float, c
 
     Raises ValueError for other geometry and when the result would have more than MOST_TRIANGLES triangles.
     """
-    faces_now = len(geometry.faces) if isinstance(geometry, Mesh) else 64 if isinstance(geometry, Sphere) else 2
-    if faces_now * cuts * cuts > MOST_TRIANGLES:
-        raise ValueError(f"subdivision {cuts} would make {faces_now * cuts * cuts:,} triangles of it")
+    count = n_displaced(geometry, cuts)
+    if count > MOST_TRIANGLES:
+        raise ValueError(
+            f"subdivision {cuts} would make {count:,} triangles of it, at most {MOST_TRIANGLES:,} are made"
+        )
     colours: Float | None = None
     if isinstance(geometry, Parallelogram):
         vertices, places, faces = _grid(geometry, cuts)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,6 +15,17 @@ from pmviewer.scene.tilt import leaning_mirrors
 
 MESH_ENDINGS = (".glb", ".gltf", ".obj", ".ply", ".stl")
 ENDINGS = (".xml", *MESH_ENDINGS)
+
+_search_paths: list[Path] = []
+
+
+def search_also(folders: Iterable[Path]) -> None:
+    """From now on, look in these folders too for the files that Mitsuba scenes name (the command line's
+    `--search-path`). Raises SceneError for one that is no folder."""
+    for folder in folders:
+        if not folder.is_dir():
+            raise SceneError("This search path is not a folder.", folder, hint="Name an existing folder.")
+        _search_paths.append(folder)
 
 
 @dataclass(frozen=True)
@@ -50,7 +61,8 @@ def load_scene(
     path_or_name: "cornell_caustic", "my/folder", "my/scene.xml", "chair.glb" …
     parameters: values for the `<default>` names of a Mitsuba file; which "scene", "camera" and "variant" of a glTF
         file to show; other formats have none.
-    search_paths: folders where a Mitsuba file's meshes, pictures and included files are looked for beside its own.
+    search_paths: folders where a Mitsuba file's meshes, pictures and included files are looked for beside its own and
+        those of `search_also`.
 
     Raises SceneError for anything wrong with the input, and nothing else.
     """
@@ -62,7 +74,7 @@ def load_scene(
 def _read(path: Path, parameters: Mapping[str, str], search_paths: Sequence[Path]) -> Scene:
     ending = path.suffix.lower()
     if ending == ".xml":
-        return load_mitsuba(path, parameters, search_paths)
+        return load_mitsuba(path, parameters, (*search_paths, *_search_paths))
     if ending not in MESH_ENDINGS:
         what = (
             f"Files ending in '{path.suffix}' can't be opened."

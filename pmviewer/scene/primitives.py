@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from pmviewer.scene.formats.mitsuba.transform import Matrix, cofactor, mirrors
 Float = NDArray[np.float64]
 
 
+@cache
 def cube() -> Mesh:
     """[-1, 1]³ with flat faces, outwards; each face has the whole square as texture coordinates."""
     vertices = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)

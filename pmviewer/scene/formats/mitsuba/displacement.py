@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pmviewer.scene.description import Geometry
-from pmviewer.scene.displacement import Fractal, Height, Waves, displaced
+from pmviewer.scene.displacement import MOST_TRIANGLES, Fractal, Height, Waves, displaced, n_displaced
 from pmviewer.scene.formats.mitsuba.document import Properties
 
 FINEST = 4096
@@ -18,6 +18,14 @@ def displacement(p: Properties, geometry: Geometry) -> Geometry:
     scale, offset = p.number("displacement_scale", 1.0), p.number("displacement_offset", 0.0)
     cuts = _between(p, "subdivision", 32, 1, FINEST)
     texture.warn_unused()
+    document = p.document
+    count = n_displaced(geometry, cuts)
+    if document.displaced + count > MOST_TRIANGLES:
+        what = (
+            f"'displacement' of {p.element} would make {count:,} triangles, at most {MOST_TRIANGLES:,} in all are made."
+        )
+        raise document.error(what, p.element, "Use a smaller 'subdivision', or instances of one displaced shape.")
+    document.displaced += count
     try:
         return displaced(geometry, height, scale, offset, cuts)
     except ValueError as error:
@@ -34,7 +42,7 @@ def _height(p: Properties) -> Height:
         return Fractal(octaves, roughness, _between(p, "frequency", 4, 1, 1 << 16), seed)
     if p.type == "waves":
         count, frequency, spread = (
-            _between(p, "count", 24, 1, 1000),
+            _between(p, "count", 24, 1, 100),
             p.number("frequency", 4.0),
             p.number("spread", 60.0),
         )

@@ -31,7 +31,8 @@ class MissingFile(SceneError):
 
 
 class Document:
-    """The tree with everything that reading it needs. `folders` say where files are looked for."""
+    """The tree with everything that reading it needs. `folders` say where files are looked for; `pictures`, `meshes`
+    and `broken_meshes` keep what was read, `displaced` counts the triangles that displacement has made."""
 
     def __init__(
         self, root: Element, path: Path | None, diagnostics: Diagnostics, folders: Folders | None = None
@@ -40,6 +41,7 @@ class Document:
         self.folders = folders or Folders(path.parent if path is not None else Path())
         self.diagnostics = diagnostics
         self.pictures: dict[tuple[str, bool], NDArray[np.float32]] = {}
+        self.displaced = 0
         self.meshes: dict[tuple[str, str, int], Mesh] = {}
         self.broken_meshes: dict[tuple[str, str, int], SceneError] = {}
         self.ids: dict[str, Element] = {}
@@ -97,7 +99,7 @@ class Document:
         """Existing plain file that an object names. Raises MissingFile."""
         path = self.folders.file(name, None if element.file is None else element.file.parent)
         if path is None:
-            hint = f"Put it there, relative to {self.folders.home}, or correct the name."
+            hint = f"Put it there, relative to {self.folders.home}, or name its folder with --search-path."
             what = f"The file {name[:200]!r} named by {element} does not exist."
             raise MissingFile(name[:200], what, element.file or self.diagnostics.path, element.line, hint)
         return path

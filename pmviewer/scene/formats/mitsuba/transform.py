@@ -147,7 +147,8 @@ def cofactor(m: Matrix) -> Matrix:
 
 def mirrors(m: Matrix) -> bool:
     """Does the transformation swap left and right?"""
-    return bool(m[:3, 0] @ np.cross(m[:3, 1], m[:3, 2]) < 0)
+    (a, b, c), (d, e, f), (g, h, i) = m[:3, :3].tolist()
+    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0
 
 
 def similar_columns(m: Matrix, count: int = 3) -> float | None:
