@@ -96,6 +96,19 @@ def test_session_file_renders_what_it_was_saved_from(tmp_path, capsys):
     np.testing.assert_array_equal(read_exr(tmp_path / "a.exr")[0][""], read_exr(tmp_path / "b.exr")[0][""])
 
 
+def test_search_path_finds_what_a_scene_names(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("pmviewer.scene.load._search_paths", [])
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes/t.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "utf-8")
+    shape = '<shape type="obj"><string name="filename" value="t.obj"/></shape><emitter type="constant"/>'
+    (tmp_path / "s.xml").write_text(f'<scene version="3.0.0">{shape}</scene>', "utf-8")
+    assert call("info", str(tmp_path / "s.xml")) == 2
+    assert "--search-path" in capsys.readouterr().err
+    assert call("info", str(tmp_path / "s.xml"), "--search-path", str(tmp_path / "meshes")) == 0
+    assert call("info", str(tmp_path / "s.xml"), "--search-path", str(tmp_path / "gone")) == 2
+    assert "not a folder" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [

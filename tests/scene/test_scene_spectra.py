@@ -87,6 +87,12 @@ def test_walls_of_the_measured_box(tmp_path: Path) -> None:
         ),
         ('type="uniform"><float name="value" value="0.5"/>', (0.5, 0.5, 0.5)),
         ('type="d65"><float name="scale" value="3"/>', (3, 3, 3)),
+        (
+            'type="d65"><float name="scale" value="2"/><spectrum type="irregular">'
+            '<string name="wavelengths" value="400 500 600 700"/><string name="values" value="0.2, 0.5, 0.1, 0.9"/>'
+            "</spectrum>",
+            (0.325168, 0.672064, 0.737426),
+        ),
         ('type="d65"><rgb name="color" value="1 2 3"/><float name="scale" value="2"/>', (2, 4, 6)),
     ],
 )

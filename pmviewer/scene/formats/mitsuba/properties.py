@@ -240,6 +240,13 @@ class Properties:
             return grey  # why it can't be used has been said
         return self._colour(name, element, grey, self.element.tag == "emitter")
 
+    def nested_spectrum(self, element: Element) -> RGB:
+        """Colour in daylight of a spectrum that stands in here without a name."""
+        if "type" not in element.attributes:
+            self.document.ignore(element, "without a name was ignored")
+            return (1.0, 1.0, 1.0)
+        return spectrum_object(Properties(element, self.document, self._depth + 1), (1.0, 1.0, 1.0))
+
     def _colour(self, name: str, element: Element, default: RGB, emitted: bool) -> RGB:
         document = self.document
         if "type" in element.attributes:

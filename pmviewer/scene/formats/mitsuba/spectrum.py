@@ -55,7 +55,7 @@ def spectrum_object(p: Properties, default: RGB) -> RGB:
         return (value, value, value)
     if kind == "d65":
         scale = p.number("scale", 1.0)
-        r, g, b = p.colour("color", 1.0)
+        r, g, b = _in_daylight(p)
         return (scale * r, scale * g, scale * b)
     try:
         if kind in ("regular", "irregular"):
@@ -67,6 +67,15 @@ def spectrum_object(p: Properties, default: RGB) -> RGB:
         return default
     document.warn(f"{element} is not supported: the default ({_shown(default)}) is used.", element)
     return default
+
+
+def _in_daylight(p: Properties) -> RGB:
+    """Colour of what stands inside a d65; white if nothing does. Textures have been taken out before."""
+    named = [name for name, value in p.values.items() if name == "color" or value.tag == "spectrum"]
+    if named:
+        return p.colour(named[0], 1.0)
+    inner = p.objects("spectrum")
+    return p.nested_spectrum(inner[0]) if inner else (1.0, 1.0, 1.0)
 
 
 def blackbody_tag(element: Element, document: Document) -> RGB:
