@@ -17,9 +17,9 @@ POINTS = RNG.uniform(-1, 1, (50, 3)).astype(np.float32)
 FACES = np.stack([np.arange(48), np.arange(48) + 1, np.arange(48) + 2], axis=1).astype(np.uint32)
 
 
-def draco_file(folder: Path, data: bytes) -> Path:
+def draco_file(folder: Path, data: bytes, number=0) -> Path:
     f = Gltf(extensionsRequired=["KHR_draco_mesh_compression"])
-    packed = {"bufferView": f.view(data), "attributes": {"POSITION": 0}}
+    packed = {"bufferView": f.view(data), "attributes": {"POSITION": number}}
     f.mesh({
         "attributes": {"POSITION": f.accessor(len(POINTS), "f", 3)}, "indices": f.accessor(FACES.size, "I", 1),
         "extensions": {"KHR_draco_mesh_compression": packed},
@@ -36,6 +36,9 @@ def test_draco(tmp_path: Path) -> None:
     for damaged in (data[: len(data) // 2], b"DRACO" + bytes(40), b"nothing"):
         with pytest.raises(SceneError, match=r"[mM]esh 0"):
             load_scene(draco_file(tmp_path, damaged))
+    for number in (7, [0], None):
+        with pytest.raises(SceneError, match="mesh 0 lack POSITION"):
+            load_scene(draco_file(tmp_path, data, number))
 
 
 def meshopt_file(folder: Path, parts: list[tuple[bytes, dict]], attributes: dict, indices: int | None = None) -> Path:

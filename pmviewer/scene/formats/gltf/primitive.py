@@ -14,7 +14,7 @@ from pmviewer.scene.description import Mesh
 from pmviewer.scene.formats.gltf.accessors import Accessors, Float
 from pmviewer.scene.formats.gltf.buffers import Buffers
 from pmviewer.scene.formats.gltf.compression import DracoMesh, decode_draco
-from pmviewer.scene.formats.gltf.document import DAMAGED, Document, Json, extension
+from pmviewer.scene.formats.gltf.document import DAMAGED, Document, Json, extension, is_index
 from pmviewer.scene.primitives import unit
 
 Faces = NDArray[np.int64]
@@ -161,7 +161,8 @@ class _Source:
     def _drawn(self, name: str, components: tuple[int, ...]) -> NDArray:
         """One attribute of Draco's data. Raises SceneError if it is not there."""
         assert self._draco is not None
-        found = self._draco.attributes.get(self._numbers[name])
+        number = self._numbers[name]
+        found = self._draco.attributes.get(number) if is_index(number) else None
         if found is None or found.shape[1] not in components:
             raise self._document.error(f"The compressed data of {self._who} lack {name}.")
         return found
