@@ -129,14 +129,13 @@ def weld(bits, table, index, first):
         a, b, c = bits[i, 0], bits[i, 1], bits[i, 2]
         slot = _mixed(a, b, c) & mask
         while True:
-            k = table[slot]
-            if k < 0:
-                table[slot], first[used], index[i] = used, i, used
+            j = table[slot]  # the first row of some number; most are near this one in memory
+            if j < 0:
+                table[slot], first[used], index[i] = i, i, used
                 used += 1
                 break
-            j = first[k]
             if bits[j, 0] == a and bits[j, 1] == b and bits[j, 2] == c:
-                index[i] = k
+                index[i] = index[j]
                 break
             slot = (slot + np.uint32(1)) & mask
     return used
