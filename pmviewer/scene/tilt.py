@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from pmviewer.scene.blends import leaves
 from pmviewer.scene.description import Material, Mesh, Scene
 
 LEANING = 30.0
@@ -55,4 +56,4 @@ def leaning_mirrors(scene: Scene) -> str:
 
 
 def _mirrors(material: Material) -> bool:
-    return material.kind in _MIRRORING or any(map(_mirrors, material.parts))
+    return any(part.kind in _MIRRORING for part in leaves(material))

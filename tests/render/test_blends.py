@@ -135,6 +135,19 @@ def test_textures_of_weight_and_metal():
     assert numbers.max() > 0.1
 
 
+def test_parts_have_their_own_bumps():
+    """Two colours under one bump map are the mixed colour under it, and not what they are without."""
+    waves = np.sin(np.arange(32) * np.pi / 4)[:, None, None].repeat(32, 1).astype(np.float32)
+    bumps = {"textures": {"bump": Bitmap(waves)}, "bump_scale": 0.3}
+    first, second = (replace(part, **bumps) for part in TWO_COLOURS.parts)
+    sides = [
+        pass_means(box(m, MIRROR), 120, settings("path"))
+        for m in (replace(TWO_COLOURS, parts=(first, second)), replace(MIXED, **bumps), MIXED)
+    ]
+    agree(*sides[:2], "bumped")
+    assert abs(sides[0].mean() / sides[2].mean() - 1) > 0.02
+
+
 def test_threads_change_nothing():
     scene = box(MIXES["diffuse and mirror"][0], MIXES["diffuse and glass"][1])
     one, two = (rendered(scene, settings("progressive"), 2, threads) for threads in (1, 2))
