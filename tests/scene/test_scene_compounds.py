@@ -76,6 +76,20 @@ def test_a_mixture_is_blends_in_blends(tmp_path: Path) -> None:
     assert "scaled to 1" in warnings[0]
 
 
+def test_blends_of_blends_end(tmp_path: Path) -> None:
+    """Each a blend of the one before with itself: 2³⁰ parts if they were written out."""
+    lines = ['<bsdf type="conductor" id="b0"/>']
+    for i in range(30):
+        lines.append(f'<bsdf type="blendbsdf" id="b{i + 1}"><ref id="b{i}"/><ref id="b{i}"/></bsdf>')
+    scene = load(tmp_path, *lines, '<shape type="sphere"><ref id="b30"/></shape>')
+
+    def depth(m: Material) -> int:
+        return 1 + max(map(depth, m.parts)) if m.parts else 0
+
+    assert depth(scene.materials[scene.shapes[0].material]) <= 5
+    assert any("more than 5 deep" in w for w in scene.warnings)
+
+
 def test_masks(tmp_path: Path) -> None:
     half, warnings = material(tmp_path, f'<bsdf type="mask">{GREY}</bsdf>')
     assert (half.kind, half.opacity, warnings) == ("diffuse", 0.5, ())

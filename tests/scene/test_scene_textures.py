@@ -334,3 +334,17 @@ def test_textures_that_are_one_colour(tmp_path: Path, texture: str, colour: floa
     found, warnings = reflectance(tmp_path, texture)
     assert found == (colour,) * 3
     assert [words in w for w in warnings] == [True] * bool(words)
+
+
+@pytest.mark.timeout(20)
+def test_textures_of_textures_end(tmp_path: Path) -> None:
+    """Each has the one before twice: 2²⁵ if they were written out."""
+    lines = ['<texture type="checkerboard" id="t0"/>']
+    for i in range(25):
+        twice = f'<ref name="color0" id="t{i}"/><ref name="color1" id="t{i}"/>'
+        lines.append(f'<texture type="checkerboard" id="t{i + 1}">{twice}</texture>')
+    scene = sphere(tmp_path, '<bsdf type="diffuse"><ref name="reflectance" id="t25"/></bsdf>', *lines)
+    assert scene.materials[0].reflectance == pytest.approx((0.3,) * 3)
+    circle = '<texture type="scale" id="s"><ref id="s"/><ref id="s"/></texture>'
+    scene = sphere(tmp_path, '<bsdf type="diffuse"><ref name="reflectance" id="s"/></bsdf>', circle)
+    assert any("contains itself" in w for w in scene.warnings)

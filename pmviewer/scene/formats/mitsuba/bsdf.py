@@ -28,6 +28,7 @@ class Materials:
         self.document = document
         self.list: list[Material] = []
         self._index: dict[int, int] = {}
+        self._built: dict[int, Material] = {}
         self._defaults: dict[RGB, int] = {}
 
     def default(self, emits: bool) -> int:
@@ -48,6 +49,12 @@ class Materials:
         return self._index[key]
 
     def _build(self, element: Element, name: str, depth: int) -> Material:
+        """The element's material, once however many others it is a part of."""
+        if id(element) not in self._built:
+            self._built[id(element)] = self._read(element, name, depth)
+        return self._built[id(element)]
+
+    def _read(self, element: Element, name: str, depth: int) -> Material:
         p = Properties(element, self.document, depth)
         if p.type not in SIMPLE and p.type not in _COMPOUND:
             p.type = self._similar(p)

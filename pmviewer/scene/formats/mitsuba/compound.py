@@ -13,6 +13,8 @@ from pmviewer.scene.texture import limited
 
 _MAP_SLOTS = frozenset(("bump", "normal"))
 _MOST_PARTS = 16
+_DEEPEST = 5
+"""Blends inside blends: each costs every hit another choice."""
 
 
 def on_parts(material: Material, change: Callable[[Material], Material]) -> Material:
@@ -85,6 +87,7 @@ def blend(p: Properties, name: str, parts: list[Material]) -> Material:
     weight = _share_of(p, "weight", 0.5)
     texture = p.textures.get("weight")
     p.warn_unused("bsdf", "texture")
+    parts = [_not_too_deep(p, part) for part in parts]
     if len(parts) > 2:
         p.document.warn(f"{p.element} has more than two BSDFs inside: the first two are used.", p.element)
     if len(parts) < 2:
@@ -98,6 +101,20 @@ def blend(p: Properties, name: str, parts: list[Material]) -> Material:
     if sentence:
         p.document.warn(f"'weight' of {p.element}: {sentence}", p.element)
     return Material(name, "blend", BLACK, parts=(parts[0], parts[1]), weight=weight, textures={"weight": texture})
+
+
+def _not_too_deep(p: Properties, part: Material) -> Material:
+    """The part, or where too many blends stand in it the heaviest of what they blend."""
+    if _depth(part) < _DEEPEST:
+        return part
+    p.document.warn(f"{p.element}: of blends more than {_DEEPEST} deep the heaviest parts are used.", p.element)
+    while part.kind == "blend":
+        part = part.parts[int(part.weight >= 0.5)]
+    return part
+
+
+def _depth(material: Material) -> int:
+    return 1 + max(_depth(part) for part in material.parts) if material.kind == "blend" else 0
 
 
 def _instead(parts: list[Material]) -> str:
@@ -115,7 +132,7 @@ def mixture(p: Properties, name: str, parts: list[Material]) -> Material:
     if len(weights) != len(parts):
         what = f"{p.element} has {len(parts)} BSDFs and {len(weights)} weights: those without one are left out."
         p.document.warn(what, p.element)
-    pairs = [(w, m) for w, m in zip(weights, parts) if w > 0]
+    pairs = [(w, _not_too_deep(p, m)) for w, m in zip(weights, parts) if w > 0]
     if len(pairs) > _MOST_PARTS:
         p.document.warn(f"{p.element}: only the heaviest {_MOST_PARTS} of its BSDFs are used.", p.element)
         pairs = sorted(pairs, key=lambda pair: -pair[0])[:_MOST_PARTS]
@@ -127,9 +144,14 @@ def mixture(p: Properties, name: str, parts: list[Material]) -> Material:
         pairs.append((1 - total, Material(f"{name} (black)", "diffuse", BLACK)))
     elif total > 1 + 1e-6:
         p.document.warn(f"The weights of {p.element} add up to more than 1: they were scaled to 1.", p.element)
-    mixed, share_so_far = pairs[-1][1], pairs[-1][0]
-    for weight, material in reversed(pairs[:-1]):
-        share_so_far += weight
-        parts_of = (material, mixed)
-        mixed = Material(name, "blend", BLACK, parts=parts_of, weight=1 - weight / share_so_far)
-    return replace(mixed, name=name)
+    return replace(_tree(name, pairs), name=name)
+
+
+def _tree(name: str, pairs: list[tuple[float, Material]]) -> Material:
+    """Blends of halves of the list, so that few stand one inside the other."""
+    if len(pairs) == 1:
+        return pairs[0][1]
+    half = len(pairs) // 2
+    first, second = pairs[:half], pairs[half:]
+    a, b = sum(w for w, _ in first), sum(w for w, _ in second)
+    return Material(name, "blend", BLACK, parts=(_tree(name, first), _tree(name, second)), weight=b / (a + b))

@@ -15,6 +15,7 @@ from pmviewer.scene.formats.mitsuba.properties import OBJECT_TAGS as OBJECT_TAGS
 from pmviewer.scene.formats.mitsuba.properties import SILENT_TAGS as SILENT_TAGS
 from pmviewer.scene.formats.mitsuba.properties import Properties as Properties
 from pmviewer.scene.formats.mitsuba.xml import Element
+from pmviewer.scene.texture import Texture
 
 MISSING = (
     "Files that do not exist: the shapes, lights or parts of the scene that need them are left out: {names}. "
@@ -41,6 +42,7 @@ class Document:
         self.folders = folders or Folders(path.parent if path is not None else Path())
         self.diagnostics = diagnostics
         self.pictures: dict[tuple[str, bool], NDArray[np.float32]] = {}
+        self.textures: dict[int, tuple[Texture | None, list[Element]]] = {}
         self.displaced = 0
         self.meshes: dict[tuple[str, str, int], Mesh] = {}
         self.broken_meshes: dict[tuple[str, str, int], SceneError] = {}

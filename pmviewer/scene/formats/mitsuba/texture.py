@@ -24,8 +24,16 @@ WHITE: RGB = (1.0, 1.0, 1.0)
 
 
 def read_texture(p: Properties) -> Texture | None:
-    """The texture of a <texture> element; None, with a warning, where only the property's default is left. What has
-    the same colour everywhere is a bitmap of one pixel. Raises SceneError naming its line."""
+    """The texture of a <texture> element, read once however many refer to it; None, with a warning, where only the
+    property's default is left. What has the same colour everywhere is a bitmap of one pixel. Raises SceneError naming
+    its line."""
+    key = id(p.element.children)  # a reference makes an element of its own with the same children
+    if key not in p.document.textures:
+        p.document.textures[key] = _read(p), p.element.children
+    return p.document.textures[key][0]
+
+
+def _read(p: Properties) -> Texture | None:
     from pmviewer.scene.formats.mitsuba.bitmap import read_bitmap
 
     if p.type in _BITMAPS:
@@ -93,8 +101,10 @@ def _from_vertices(element: Element, p: Properties, depth: int) -> bool:
         return _attribute_of(element) == _ATTRIBUTE
     if kind != "scale" or depth > 8:
         return False
-    inside = (p.document.resolve(c) if c.tag == "ref" else c for c in element.children)
-    return any(c.tag == "texture" and _from_vertices(c, p, depth + 1) for c in inside)
+    ids = p.document.ids
+    inside = (ids.get(c.attributes.get("id", "")) if c.tag == "ref" else c for c in element.children)
+    first = next((c for c in inside if c is not None and c.tag == "texture"), None)
+    return first is not None and _from_vertices(first, p, depth + 1)
 
 
 def _attribute_of(element: Element) -> str:
