@@ -9,6 +9,7 @@ from pmviewer.errors import SceneError
 
 _SHOWN_LINES = 5
 _SHOWN_NAMES = 12
+_LONGEST_NAME = 120
 
 
 class Diagnostics:
@@ -53,7 +54,12 @@ class Diagnostics:
         if not names:
             return self._sentences[key]
         more = f" and {len(names) - _SHOWN_NAMES} more" if len(names) > _SHOWN_NAMES else ""
-        return self._sentences[key].replace("{names}", ", ".join(names[:_SHOWN_NAMES]) + more)
+        return self._sentences[key].replace("{names}", ", ".join(map(_short, names[:_SHOWN_NAMES])) + more)
+
+
+def _short(name: str) -> str:
+    """Both ends of a name that is longer than anybody reads."""
+    return name if len(name) <= _LONGEST_NAME else f"{name[: _LONGEST_NAME // 2]}…{name[-_LONGEST_NAME // 2 :]}"
 
 
 def _located(sentence: str, places: list[tuple[Path | None, int]]) -> str:

@@ -186,7 +186,7 @@ def test_a_folder_of_files_is_opened_looked_at_and_reported(tmp_path, monkeypatc
     monkeypatch.setattr(bench, "NICE", 0)
     folder = tmp_path / "files"
     write(folder, "good.xml", scene())
-    write(folder, "bad.xml", scene('<shape type="rectangle"><ref id="nobody"/></shape>'))
+    write(folder, "bad.xml", '<scene version="3.0.0"><shape type="sdfgrid"/></scene>')
     write(folder, "sub/triangle.obj", OBJ)
     write(folder, "lonely.xml", scene(MESH))
     kept, sheet = tmp_path / "kept.jsonl", tmp_path / "sheet.png"
@@ -194,7 +194,7 @@ def test_a_folder_of_files_is_opened_looked_at_and_reported(tmp_path, monkeypatc
     rows = {cells[0]: dict(zip(result.columns, cells, strict=True)) for cells in result.rows}
     assert set(rows) == {"good.xml", "bad.xml", "sub/triangle.obj"}
     assert rows["good.xml"]["loads"] == rows["sub/triangle.obj"]["loads"] == "yes"
-    assert "nobody" in str(rows["bad.xml"]["loads"])
+    assert "no surface" in str(rows["bad.xml"]["loads"])
     assert rows["bad.xml"]["judgement"] == "error"
     assert rows["sub/triangle.obj"]["triangles"] >= 1
     assert float(rows["good.xml"]["luminance"]) > 0.01

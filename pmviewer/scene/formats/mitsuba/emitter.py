@@ -50,8 +50,11 @@ def add_lights(p: Properties, lights: list[Light]) -> None:
     found = _READERS[p.type](p, name)
     p.warn_unused("texture")
     for light in found:
+        if not isinstance(light, Environment):
+            lights.append(light)
+            continue
         before = next((i for i, old in enumerate(lights) if isinstance(old, Environment)), None)
-        if before is None or not isinstance(light, Environment):
+        if before is None:
             lights.append(light)
             continue
         old = lights[before]
