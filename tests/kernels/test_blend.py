@@ -93,7 +93,7 @@ def neighbours():
     yield "primitives", (place, up, np.arange(N))
 
 
-@pytest.mark.parametrize(("name", "arguments"), neighbours(), ids=lambda x: x if isinstance(x, str) else "")
+@pytest.mark.parametrize(("name", "arguments"), list(neighbours()), ids=lambda x: x if isinstance(x, str) else "")
 def test_the_number_is_uniform_and_forgets_its_neighbour(name, arguments):
     values = numbers(*arguments)
     assert is_uniform(values)
