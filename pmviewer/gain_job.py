@@ -37,7 +37,7 @@ def gain_job(
             raise OutputError(f"{output}: the folder {output.absolute().parent} does not exist. Create it first.")
     asked = {"compare.equal": equal, "compare.passes": passes}
     settings = with_values(job.settings, {path: value for path, value in asked.items() if value is not None})
-    opened = open_scene(job.scene, job.parameters)
+    opened = open_scene(job.scene, job.parameters, settings.light.rig)
     target = _reference(opened, settings, reference)
     pool = WorkPool(threads)
     try:

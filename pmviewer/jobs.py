@@ -61,13 +61,15 @@ def render_job(
         check_output(path, FORMATS)
     settings = with_values(job.settings, overrides(passes, seconds, size, seed, job.passes))
     with _patiently() as tell, watched(tell, threads=threads):
-        opened = open_scene(job.scene, job.parameters)
+        opened = open_scene(job.scene, job.parameters, settings.light.rig)
     _print_warnings(opened.scene.warnings, opened.scene.dropped)
     target = None if reference is None else _reference(reference, opened.scene, settings)
     view = _view(settings, opened)
     pool = WorkPool(threads)
     try:
         renderer = Renderer(opened, settings, pool, StageCache(0))
+        if opened.scene.exposure is None and settings.display.exposure == "auto":
+            renderer.coarse_frame(0)  # as in the window it decides the exposure
         _run(renderer, pool, None if target is None else partial(_print_error, target))
         frame = renderer.frame(1)
     finally:
@@ -233,7 +235,7 @@ def statistics_report(s: Statistics) -> str:
 
 def scene_report(job: Job) -> str:
     """Text of `pmviewer info`: what is in the scene, what was ignored, which stages run."""
-    scene = recentred(load_scene(job.scene, job.parameters))
+    scene = recentred(load_scene(job.scene, job.parameters, rig=job.settings.light.rig))
     plan = plan_of(job.settings, analyse(scene))
     rows = describe(scene)
     needed = [

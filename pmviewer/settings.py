@@ -21,6 +21,7 @@ from pmviewer.schema import (
     GatherOverlay,
     Importance,
     ImportonOverlay,
+    Light,
     LightOverlay,
     Overlays,
     PathOverlay,
@@ -45,6 +46,7 @@ __all__ = [
     "GatherOverlay",
     "Importance",
     "ImportonOverlay",
+    "Light",
     "LightOverlay",
     "Overlays",
     "PathOverlay",
@@ -195,6 +197,8 @@ def range_text(info: SettingInfo) -> str:
         return "one of " + ", ".join(info.choices)
     if info.scale == "vector":
         text = "three numbers (x, y, z)"
+    elif info.scale == "name":
+        text = "a name"
     elif info.kind is bool:
         text = "true or false"
     else:

@@ -34,7 +34,8 @@ def test_every_setting_is_described(path):
     assert info.scale in typing.get_args(Scale)
     assert info.stage in typing.get_args(Stage)
     assert info.kind in (int, float, bool, str, tuple)
-    assert (info.scale == "choice") == bool(info.choices) == (info.kind is str)
+    assert (info.scale == "choice") == bool(info.choices)
+    assert (info.scale in ("choice", "name")) == (info.kind is str)
     assert (info.scale == "switch") == (info.kind is bool)
     assert (info.scale == "vector") == (info.kind is tuple)
     if info.kind in (int, float):
@@ -46,7 +47,7 @@ def test_every_setting_is_described(path):
     if info.choices:
         assert info.default in info.choices
     if info.default == "auto":
-        assert info.auto or "auto" in info.choices
+        assert info.auto or "auto" in info.choices or info.scale == "name"
 
 
 @pytest.mark.parametrize("path", SETTINGS)
@@ -66,10 +67,11 @@ def test_defaults_and_bounds_are_accepted_and_what_lies_beyond_is_not(path):
         allowed += [(1.0, 2.0, -3.0)]
         refused += [(1.0, 2.0), (1.0, float("nan"), 0.0), "here", 1.0, None]
     else:
-        refused += ["nothing of the sort", 1, None]
+        refused += [1, None] if info.scale == "name" else ["nothing of the sort", 1, None]
+    open_to_auto = info.auto or "auto" in info.choices or info.scale == "name"
     for value in [*allowed, *(["auto"] if info.auto else [])]:
         assert get(with_values(settings, {path: value}), path) == value
-    for value in [*refused, *([] if info.auto or "auto" in info.choices else ["auto"])]:
+    for value in [*refused, *([] if open_to_auto else ["auto"])]:
         with pytest.raises(SettingError) as refusal:
             with_values(settings, {path: value})
         text = str(refusal.value)

@@ -114,6 +114,8 @@ class Frame:
     projections: Mapping[str, tuple[ProjectionMap, ...]] = field(default_factory=dict)
     """Projection maps of the lights by what they show, "surfaces" and "caustic"; empty where photons start everywhere.
     """
+    exposure: float = 0.0
+    """EV that it is shown with where the setting is automatic."""
     lights: LightImportance | None = None
     """Importance of the lights in the latest pass, with guided emission."""
     light_places: NDArray[np.float64] | None = None

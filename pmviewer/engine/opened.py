@@ -11,10 +11,12 @@ from pmviewer.engine.hidden_lights import hidden_lights
 from pmviewer.engine.memory import check_scene_memory
 from pmviewer.photons.projection import Projection
 from pmviewer.scene.analysis import SceneTraits, analyse
+from pmviewer.scene.completion import completed
 from pmviewer.scene.covered_emission import ignored_opacity, without_unseen_lights
 from pmviewer.scene.description import Scene
 from pmviewer.scene.flatten import FlatScene, flatten
-from pmviewer.scene.load import load_scene
+from pmviewer.scene.light_rigs import Rig
+from pmviewer.scene.load import read_scene
 from pmviewer.scene.recentre import recentred
 
 _uids = itertools.count(1)
@@ -30,17 +32,42 @@ class OpenScene:
     traits: SceneTraits
     source: str
     uid: int = field(default_factory=lambda: next(_uids))
+    content: Scene | None = None
+    """What was in the file, before camera and light were added; None for a scene that was no file."""
+    rig: Rig = "auto"
+    """By which lights the file is seen."""
+    exposures: dict[str, float] = field(default_factory=dict, compare=False, repr=False)
+    """In EV, by the name of the camera, as first pictures decided; empty where the scene has its own."""
     projections: dict[tuple[str, bool], Projection | None] = field(default_factory=dict, compare=False, repr=False)
 
+    def exposure(self, camera: str) -> float:
+        """EV that the picture by that camera is shown with unless the user says otherwise; 0 until it is decided."""
+        own = self.scene.exposure
+        return self.exposures.get(camera, 0.0) if own is None else own
 
-def open_scene(source: str | Path | Scene, parameters: Mapping[str, str] | None = None) -> OpenScene:
-    """Load, check, move to the origin and flatten. Raises SceneError."""
-    scene = source if isinstance(source, Scene) else load_scene(source, parameters or {})
+
+def open_scene(source: str | Path | Scene, parameters: Mapping[str, str] | None = None, rig: Rig = "auto") -> OpenScene:
+    """Load, add the camera that the file lacks and the lights of the rig, check, move to the origin and flatten. A
+    scene that is given instead of a file is taken as it is. Raises SceneError."""
+    if isinstance(source, Scene):
+        return _opened(source, source.name, None, "auto")
+    content = read_scene(source, parameters or {})
+    check_scene_memory(content)
+    return _opened(completed(content, rig), str(source), content, rig)
+
+
+def relit(opened: OpenScene, rig: Rig) -> OpenScene:
+    """The scene with other lights, without reading its file again. Raises SceneError."""
+    if opened.content is None:
+        return opened
+    return _opened(completed(opened.content, rig), opened.source, opened.content, rig)
+
+
+def _opened(scene: Scene, source: str, content: Scene | None, rig: Rig) -> OpenScene:
     check_scene_memory(scene)
     scene = without_unseen_lights(recentred(scene))
-    name = scene.name if isinstance(source, Scene) else str(source)
     flat = flatten(scene)
     said = (*hidden_lights(scene, flat), *ignored_opacity(scene))
     if said:
         scene = replace(scene, warnings=(*scene.warnings, *said))
-    return OpenScene(scene, flat, analyse(scene), name)
+    return OpenScene(scene, flat, analyse(scene), source, content=content, rig=rig)

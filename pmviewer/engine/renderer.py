@@ -18,6 +18,7 @@ from pmviewer.engine.cache import StageCache
 from pmviewer.engine.cache_stage import cache_cloud, fill_cache, recipe
 from pmviewer.engine.caveats import caveats
 from pmviewer.engine.diagnose import Looked, diagnostic_planes, wanted_of
+from pmviewer.engine.exposure import metered
 from pmviewer.engine.frame import Frame, PhotonCloud, Statistics
 from pmviewer.engine.guides import gather_records
 from pmviewer.engine.importance import ImportanceStage
@@ -123,6 +124,8 @@ class Renderer:
         quick.first_radius = self.first_radius * min(2.0, (self.settings.photons.N / N) ** 0.25)
         quick._pass(film, small, 0, N)
         film.passes = 1
+        if self.scene.scene.exposure is None:
+            self.scene.exposures.setdefault(self.settings.camera.name, metered(film.planes()))
         wanted = replace(wanted or wanted_of(self.settings, self.plan), pixel=None)  # its pixels are others
         return quick._frame(serial, film, True, wanted)
 
@@ -251,6 +254,7 @@ class Renderer:
             clouds=clouds,
             projections=self.light.projection.maps if self.light.projection is not None else {},
             light_places=self.light.places,
+            exposure=self.scene.exposure(self.settings.camera.name),
             lights=self.light.emission,
             scene_name=self.scene.scene.name,
             inspection=self._inspect(wanted or wanted_of(self.settings, self.plan), film),

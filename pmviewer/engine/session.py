@@ -18,7 +18,7 @@ from pmviewer.engine.cache import StageCache
 from pmviewer.engine.diagnose import wanted_of
 from pmviewer.engine.frame import Frame, Level, Message, State, Status
 from pmviewer.engine.inspection import Wanted
-from pmviewer.engine.opened import OpenScene, open_scene
+from pmviewer.engine.opened import OpenScene, open_scene, relit
 from pmviewer.engine.pool import Cancelled, WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
@@ -76,7 +76,9 @@ class Session:
         with self._changed:
             self._loading += 1
             ticket = self._loading
-        arguments = (ticket, source, settings, parameters or {})
+            rig = (settings or self._settings).light.rig
+        name = source.name if isinstance(source, Scene) else str(source)
+        arguments = (ticket, lambda: open_scene(source, parameters or {}, rig), name, settings)
         threading.Thread(target=self._load, args=arguments, name="pmviewer loader", daemon=True).start()
 
     def cancel_loading(self) -> None:
@@ -88,11 +90,23 @@ class Session:
         """Use these settings from now on; returns the version that frames made with them will carry."""
         with self._changed:
             before, self._settings = self._settings, settings
-            if changed_stages(before, settings) - {"display", "stop"}:
+            changed = changed_stages(before, settings)
+            if "scene" in changed:
+                self._relight(settings)
+            if changed - {"scene", "display", "stop"}:
                 self._outdate()
             else:
                 self._settle()
             return self._version
+
+    def _relight(self, settings: Settings) -> None:
+        """Open the open scene anew with other lights. A scene that is being loaded gets them anyway."""
+        opened = self._loaded[0] if self._loaded else self._opened
+        if opened is None or opened.content is None or self._pending_loads:
+            return
+        self._loading += 1
+        arguments = (self._loading, lambda: relit(opened, settings.light.rig), opened.source, None)
+        threading.Thread(target=self._load, args=arguments, name="pmviewer loader", daemon=True).start()
 
     def restart(self) -> None:
         """Forget the film and begin with pass 0."""
@@ -210,15 +224,17 @@ class Session:
 
     # worker -----------------------------------------------------------------------------------------------------
 
-    def _load(self, ticket: int, source: Source, settings: Settings | None, parameters: Mapping[str, str]) -> None:
+    def _load(self, ticket: int, load: Callable[[], OpenScene], name: str, settings: Settings | None) -> None:
         """In a thread of its own: load, then hand over to the worker, unless another scene was asked for meanwhile."""
-        name = source.name if isinstance(source, Scene) else str(source)
         self._tell_loading(ticket, name)
         try:
             with watched(lambda text: self._tell_loading(ticket, name, text), lambda: self._is_unwanted(ticket)):
-                opened = open_scene(source, parameters)
-                stage("preparing the geometry view")
-                geometry = tessellate(opened.scene)
+                opened = load()
+                while True:
+                    stage("preparing the geometry view")
+                    if self._hand_over(ticket, opened, tessellate(opened.scene), settings):
+                        return
+                    opened = relit(opened, self._settings.light.rig)
         except Cancelled:
             self._load_cancelled(ticket, name)
             return
@@ -231,12 +247,18 @@ class Session:
         except Exception as error:
             self._load_failed(ticket, f"{name}: {unexpected(error)}")
             return
+
+    def _hand_over(self, ticket: int, opened: OpenScene, geometry: DrawGeometry, settings: Settings | None) -> bool:
+        """Give the worker a loaded scene, if it is still asked for. False if other lights are asked for meanwhile."""
         with self._changed:
             if ticket != self._loading or self._closed:
-                return
+                return True
+            if settings is None and opened.content is not None and opened.rig != self._settings.light.rig:
+                return False
             self._loaded = (opened, geometry, settings)
             self._loading_done, self.loading = ticket, ""
             self._interrupt()
+            return True
 
     def _is_unwanted(self, ticket: int) -> bool:
         """Has the load been cancelled, or another scene been asked for?"""
@@ -283,11 +305,12 @@ class Session:
                     return
                 self._pool.cancel.clear()
                 loaded, self._loaded = self._loaded, None
+                before = self._opened
                 if loaded:
                     self._adopt(*loaded)
             try:
                 if loaded:
-                    self._welcome(loaded[0])
+                    self._welcome(loaded[0], before)
                 else:
                     self._advance()
             except Cancelled:
@@ -341,10 +364,15 @@ class Session:
             self._settings = settings
         self._version += 1
 
-    def _welcome(self, opened: OpenScene) -> None:
-        """What the log says of a newly opened scene."""
+    def _welcome(self, opened: OpenScene, before: OpenScene | None) -> None:
+        """What the log says of a newly opened scene; of one with other lights than before only what is new."""
+        relit = before is not None and opened.content is not None and opened.content is before.content
         for warning in opened.scene.warnings:
-            self._say("warning", warning)
+            if not (relit and before is not None and warning in before.scene.warnings):
+                self._say("warning", warning)
+        if relit:
+            self._say("info", f"light rig: {opened.rig}")
+            return
         for reason, count in opened.scene.dropped.items():
             self._say("warning", f"{count} × {reason} left out")
         flat = opened.flat

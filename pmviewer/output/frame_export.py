@@ -77,6 +77,8 @@ class Exportable(Protocol):
     @property
     def scene_name(self) -> str: ...
     @property
+    def exposure(self) -> float: ...
+    @property
     def diagnostics(self) -> Mapping[str, NDArray[np.float32]]: ...
     def image(self, view: str = ...) -> NDArray[np.float32]: ...
 
@@ -113,6 +115,7 @@ def frame_metadata(frame: Exportable) -> dict[str, Value]:
         "view.target": _text(camera.target),
         "view.up": _text(camera.up),
         "view.projection": camera.projection,
+        "view.exposure": exposure_of(frame, frame.settings.display),
     }
     if camera.projection == "orthographic":
         about["view.width"] = float(camera.view_width)
@@ -125,6 +128,11 @@ def frame_metadata(frame: Exportable) -> dict[str, Value]:
     about |= {f"dropped.{place}": count for place, count in counts.dropped.items()}
     about |= {f"units.{layer_name(view)}": DIAGNOSTICS[view].unit for view in frame.diagnostics}
     return about | {path: _plain(value) for path, value in flat(frame.settings).items()}
+
+
+def exposure_of(frame: Exportable, display: Display) -> float:
+    """EV that the frame is shown with by these display settings. EXR files hold radiance, whatever it is."""
+    return frame.exposure if display.exposure == "auto" else float(display.exposure)
 
 
 def write_frame_exr(path: str | Path, frame: Exportable, half: bool = False) -> None:
@@ -153,7 +161,7 @@ def write_frame_png(
     if view in DIAGNOSTICS:
         pixels = coloured(view, frame.image(view))
     else:
-        pixels = display_image(view, frame.image(view), display.exposure, display.tone).pixels
+        pixels = display_image(view, frame.image(view), exposure_of(frame, display), display.tone).pixels
     texts = {PREFIX + name: _text(value) for name, value in frame_metadata(frame).items()}
     write_png(path, pixels, {"Software": f"pmviewer {__version__}", "Title": frame.scene_name, **texts})
 
@@ -173,7 +181,8 @@ def gain_sheet(pair: Pair, display: Display | None = None) -> NDArray[np.uint8]:
     display = display or frames[0].settings.display
     view = display.view if display.view in LAYERS else BEAUTY_VIEW
     left, right = (
-        to_uint8(display_image(view, frame.image(view), display.exposure, display.tone).pixels) for frame in frames
+        to_uint8(display_image(view, frame.image(view), exposure_of(frames[0], display), display.tone).pixels)
+        for frame in frames
     )
     return side_by_side(left, right, ("with importance", "without importance"), pair.table(), pair.sentences())
 

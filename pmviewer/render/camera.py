@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SettingError
-from pmviewer.scene.description import Camera, Scene, Vec3
+from pmviewer.scene.description import Camera, NamedCamera, Scene, Vec3
 from pmviewer.settings import CameraSettings
 
 Matrix = NDArray[np.float64]
@@ -189,14 +189,31 @@ class CameraPose:
 
 def size_only(settings: CameraSettings) -> CameraSettings:
     """The same picture size with the scene's own camera."""
-    return CameraSettings(width=settings.width, height=settings.height)
+    return CameraSettings(name=settings.name, width=settings.width, height=settings.height)
+
+
+def camera_of(scene: Scene, name: str) -> NamedCamera:
+    """The scene's camera with that name or number (from 1), for "auto" its own. Raises SettingError."""
+    own = NamedCamera("auto", scene.camera, scene.width, scene.height)
+    if name == "auto":
+        return own
+    for camera in scene.cameras:
+        if camera.name == name:
+            return camera
+    if name.isdecimal() and 1 <= int(name) <= len(scene.cameras):
+        return scene.cameras[int(name) - 1]
+    if not scene.cameras:
+        raise SettingError(f"camera.name = {name}: the scene's file has no camera. Use auto.")
+    known = ", ".join(camera.name for camera in scene.cameras[:20])
+    raise SettingError(f"camera.name = {name}: the scene has {len(scene.cameras)} cameras: {known}.")
 
 
 def resolve_camera(scene: Scene, settings: CameraSettings) -> CameraPose:
-    """The scene's camera with the settings' overrides."""
-    width = scene.width if settings.width == "auto" else int(settings.width)
-    height = scene.height if settings.height == "auto" else int(settings.height)
-    camera = scene.camera
+    """The chosen camera of the scene with the settings' overrides. Raises SettingError for one that is not there."""
+    chosen = camera_of(scene, settings.name)
+    width = chosen.width if settings.width == "auto" else int(settings.width)
+    height = chosen.height if settings.height == "auto" else int(settings.height)
+    camera = chosen.camera
     origin = camera.origin if settings.origin == "auto" else settings.origin
     target = camera.target if settings.target == "auto" else settings.target
     shift_x, shift_y = (

@@ -325,8 +325,12 @@ class Scene:
     dropped: Mapping[str, int] = field(default_factory=dict)
     instances: tuple[Instance, ...] = ()
     cameras: tuple[NamedCamera, ...] = ()
-    """All cameras of the file; `camera` is the first. Without any, `camera` is a makeshift until one is chosen
-    (`pmviewer.scene.completion`)."""
+    """All cameras of the file; `camera` is the first or the one that was asked for. Without any, `camera` is a
+    makeshift until one is chosen (`pmviewer.scene.completion`)."""
+    up: Literal["y", "z"] | None = None
+    """The vertical axis, where the file's format has one."""
+    exposure: float | None = 0.0
+    """Exposure in EV that the scene is meant to be shown with; None: to be chosen from the picture."""
 
     @property
     def groups(self) -> tuple[Group, ...]:

@@ -9,8 +9,10 @@ from pathlib import Path
 
 from pmviewer.errors import SceneError
 from pmviewer.resources import data_folder
+from pmviewer.scene.completion import completed
 from pmviewer.scene.description import Scene
 from pmviewer.scene.formats.mitsuba.load import load_mitsuba
+from pmviewer.scene.light_rigs import Rig
 from pmviewer.scene.tilt import leaning_mirrors
 
 MESH_ENDINGS = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -52,9 +54,20 @@ def bundled_scenes() -> list[BundledScene]:
 
 
 def load_scene(
+    path_or_name: str | Path,
+    parameters: Mapping[str, str] | None = None,
+    search_paths: Sequence[Path] = (),
+    rig: Rig = "auto",
+) -> Scene:
+    """Open a scene as `read_scene` does, with a camera and the lights of that rig. Raises SceneError."""
+    return completed(read_scene(path_or_name, parameters, search_paths), rig)
+
+
+def read_scene(
     path_or_name: str | Path, parameters: Mapping[str, str] | None = None, search_paths: Sequence[Path] = ()
 ) -> Scene:
-    """Open a bundled scene by name, a folder with scene.xml, or a file by its ending.
+    """What is in a bundled scene, a folder with scene.xml, or a file by its ending; its camera may be a makeshift and
+    it may have no light.
 
     Parameters
     ----------
@@ -74,7 +87,8 @@ def load_scene(
 def _read(path: Path, parameters: Mapping[str, str], search_paths: Sequence[Path]) -> Scene:
     ending = path.suffix.lower()
     if ending == ".xml":
-        return load_mitsuba(path, parameters, (*search_paths, *_search_paths))
+        scene = load_mitsuba(path, parameters, (*search_paths, *_search_paths))
+        return scene if _is_bundled(path) else replace(scene, exposure=None)
     if ending not in MESH_ENDINGS:
         what = (
             f"Files ending in '{path.suffix}' can't be opened."
@@ -91,7 +105,12 @@ def _read(path: Path, parameters: Mapping[str, str], search_paths: Sequence[Path
     ignored = tuple(
         f"Parameter '{name}' was given, but {ending} files {has}." for name in parameters if name not in known
     )
-    return replace(scene, warnings=scene.warnings + ignored)
+    return replace(scene, warnings=scene.warnings + ignored, exposure=None)
+
+
+def _is_bundled(path: Path) -> bool:
+    """Bundled scenes are made to be shown as they are."""
+    return path.resolve().is_relative_to(data_folder("scenes").resolve())
 
 
 def _find(path_or_name: str | Path) -> Path:

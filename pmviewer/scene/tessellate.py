@@ -68,7 +68,7 @@ def tessellate(scene: Scene) -> DrawGeometry:
 
 def _drawn(scene: Scene, shape: Shape) -> Drawn:
     """Corners, normals and albedo of a shape, (3n, 3) each."""
-    corners, corner_normals = _triangles(shape.geometry)
+    corners, corner_normals = triangles_of(shape.geometry)
     material = scene.materials[shape.material]
     colour = np.array(mean_colour(material, _colour))
     tint: Float = np.ones(3)
@@ -139,8 +139,8 @@ def _flat(corners: Float) -> tuple[Float, Float]:
     return corners, np.repeat(normal[:, None], 3, axis=1)
 
 
-def _triangles(g: object) -> tuple[Float, Float]:
-    """Corners and normals (n, 3, 3)."""
+def triangles_of(g: object, segments: int = SEGMENTS) -> tuple[Float, Float]:
+    """Corners and normals (n, 3, 3) of a shape's triangles, with that many segments around what is round."""
     if isinstance(g, Mesh):
         corners = g.vertices[g.faces]
         return _flat(corners) if g.normals is None else (corners, g.normals[g.faces])
@@ -148,8 +148,8 @@ def _triangles(g: object) -> tuple[Float, Float]:
         a, u, v = np.array(g.corner), np.array(g.edge_u), np.array(g.edge_v)
         return _flat(np.array([[a, a + u, a + u + v], [a, a + u + v, a + v]]))
     if isinstance(g, Sphere):
-        theta = np.linspace(0, math.pi, SEGMENTS // 2 + 1)
-        phi = np.linspace(0, 2 * math.pi, SEGMENTS + 1)
+        theta = np.linspace(0, math.pi, segments // 2 + 1)
+        phi = np.linspace(0, 2 * math.pi, segments + 1)
         unit = np.stack(
             [
                 np.sin(theta)[:, None] * np.cos(phi),
@@ -162,23 +162,23 @@ def _triangles(g: object) -> tuple[Float, Float]:
         return corners, -normals if g.flip_normals else normals
     if isinstance(g, Cylinder):
         axis = np.subtract(g.p1, g.p0)
-        ring = _ring(axis)
+        ring = _ring(axis, segments)
         rows = np.stack([np.array(g.p0) + g.radius * ring, np.array(g.p1) + g.radius * ring])
         corners, normals = _sheet(rows, np.stack([ring, ring]))
         return corners, -normals if g.flip_normals else normals
     assert isinstance(g, Disk)
-    ring = np.array(g.center) + g.radius * _ring(np.array(g.normal))
+    ring = np.array(g.center) + g.radius * _ring(np.array(g.normal), segments)
     center = np.broadcast_to(np.array(g.center), ring[:-1].shape)
     return _flat(np.stack([center, ring[:-1], ring[1:]], axis=1))
 
 
-def _ring(axis: Float) -> Float:
-    """Unit circle around the axis, (SEGMENTS + 1, 3), counter-clockwise seen from where the axis points."""
+def _ring(axis: Float, segments: int) -> Float:
+    """Unit circle around the axis, (segments + 1, 3), counter-clockwise seen from where the axis points."""
     w = axis / np.linalg.norm(axis)
     u = np.cross(w, np.eye(3)[np.argmin(np.abs(w))])
     u /= np.linalg.norm(u)
     v = np.cross(w, u)
-    phi = np.linspace(0, 2 * math.pi, SEGMENTS + 1)[:, None]
+    phi = np.linspace(0, 2 * math.pi, segments + 1)[:, None]
     return np.cos(phi) * u + np.sin(phi) * v
 
 

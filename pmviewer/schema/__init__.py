@@ -29,6 +29,7 @@ from pmviewer.schema.estimate import Estimate
 from pmviewer.schema.free_camera import FreeCamera
 from pmviewer.schema.image import CameraSettings, Direct, Gather, Render
 from pmviewer.schema.importance import Importance
+from pmviewer.schema.light import Light
 from pmviewer.schema.light_pass import Photons
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "Group",
     "Importance",
     "ImportonOverlay",
+    "Light",
     "LightOverlay",
     "Overlays",
     "PathOverlay",
@@ -66,6 +68,7 @@ __all__ = [
 class Settings(Group):
     """All settings of a session."""
 
+    light: Light = Field(default_factory=Light)
     photons: Photons = Field(default_factory=Photons)
     importance: Importance = Field(default_factory=Importance)
     estimate: Estimate = Field(default_factory=Estimate)

@@ -6,8 +6,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
-Scale = Literal["linear", "log", "integer", "choice", "switch", "vector"]
-Stage = Literal["photons", "maps", "image", "display", "stop"]
+Scale = Literal["linear", "log", "integer", "choice", "name", "switch", "vector"]
+Stage = Literal["scene", "photons", "maps", "image", "display", "stop"]
 Auto = Literal["auto"]
 Vec3 = tuple[float, float, float]
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import ConfigDict, Field
 
-from pmviewer.schema.base import Group, setting
+from pmviewer.schema.base import Auto, Group, setting
 
 
 class Display(Group):
@@ -53,8 +53,15 @@ class Display(Group):
         scale="choice",
         title="map of the view",
     )
-    exposure: float = setting(
-        0.0, "Exposure before the tone curve.", stage="display", scale="linear", unit="EV", ge=-20, le=20
+    exposure: float | Auto = setting(
+        "auto",
+        "Exposure before the tone curve. Automatic: the scene's own, 0 for the bundled ones; for files that have none "
+        "chosen by the first picture, so that surfaces look as bright as they are.",
+        stage="display",
+        scale="linear",
+        unit="EV",
+        ge=-20,
+        le=20,
     )
     tone: Literal["sRGB", "Reinhard", "filmic", "linear"] = setting(
         "sRGB", "Tone curve from radiance to the screen.", stage="display", scale="choice", title="tone curve"

@@ -307,6 +307,14 @@ class Render(Group):
 class CameraSettings(Group):
     """Camera"""
 
+    name: str = setting(
+        "auto",
+        "Which of the file's cameras, by its name or its number from 1; auto is the first. The settings below come on "
+        "top of it.",
+        stage="image",
+        scale="name",
+        title="camera",
+    )
     origin: Vec3 | Auto = setting("auto", "Eye point; auto is the scene file's.", stage="image", scale="vector")
     target: Vec3 | Auto = setting("auto", "Point in the image's centre.", stage="image", scale="vector")
     up: Vec3 | Auto = setting("auto", "Direction that is upright in the image.", stage="image", scale="vector")

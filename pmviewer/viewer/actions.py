@@ -121,7 +121,8 @@ class Commands:
 
     def _expose(self, step: float) -> None:
         info = SETTINGS["display.exposure"]
-        value = self.state.settings.display.exposure + step
+        exposure = self.state.settings.display.exposure
+        value = (self.state.resolved(info.path) or 0.0 if exposure == "auto" else float(exposure)) + step
         self.state.change({info.path: min(max(value, info.lower or 0.0), info.upper or 0.0)})
 
     def _next_tone(self) -> None:

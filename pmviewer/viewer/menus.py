@@ -113,6 +113,12 @@ class Menus:
         self._item("Resume" if self._state.session.paused else "Pause", "toggle_pause")
         self._item("Restart", "restart")
         self._item("Compare with and without importance", "compare_importance", self._state.gain.running)
+        if imgui.begin_menu("Light rig"):
+            rig = self._state.settings.light.rig
+            for choice in SETTINGS["light.rig"].choices:
+                if imgui.menu_item(choice.capitalize(), "", choice == rig)[0]:
+                    self._state.change({"light.rig": choice})
+            imgui.end_menu()
         imgui.separator()
         info = SETTINGS["render.method"]
         method = get(self._state.settings, info.path)

@@ -334,7 +334,7 @@ class Picture:
             plane=0,
             content=_CONTENT.get(display.view, 0),
             curve=_CURVE[display.tone],
-            scale=2.0**display.exposure,
+            scale=2.0 ** (0.0 if display.exposure == "auto" else float(display.exposure)),
             depth_range=self.depth_range,
             reference=REFERENCE_UNIT,
             colours=COLOUR_UNIT,

@@ -21,7 +21,7 @@ _OPEN = ("Light pass", "Density estimate", "Method")
 class SettingsPanel:
     def __init__(self, state: ViewerState) -> None:
         self.state = state
-        self.widgets = SettingWidgets(state.refused_view)
+        self.widgets = SettingWidgets(state.refused_view, state.choices)
         self.find = ""
         """Only settings that contain this are listed."""
         self._known: tuple[Settings, Any, dict[str, Any], dict[str, str | None]] | None = None
@@ -164,7 +164,7 @@ class SettingsPanel:
         imgui.separator()
         if imgui.menu_item(f"Reset to {value_text(info, info.default)}", "", False, value != info.default)[0]:
             self.state.change({info.path: info.default})
-        typed = info.scale not in ("switch", "choice", "vector") and resolved is not None
+        typed = info.scale not in ("switch", "choice", "name", "vector") and resolved is not None
         if typed and imgui.menu_item_simple("Type a value"):
             self.widgets.start_typing(info, resolved)
         if imgui.menu_item_simple("Copy as command-line option"):

@@ -123,7 +123,7 @@ def shot_job(
         if not match:
             raise SettingError(f"--pixel {pixel} is not a pixel: write X,Y, for example 120,80.")
         chosen = int(match[1]), int(match[2])
-    camera = resolve_camera(load_scene(job.scene, job.parameters), settings.camera)
+    camera = resolve_camera(load_scene(job.scene, job.parameters, rig=settings.light.rig), settings.camera)
     shot = Shot(output, chosen)
     picture_size = None if window else (camera.width, camera.height)
     make = partial(ViewerApp, remember=False, shot=shot, picture_size=picture_size, captions=captions)

@@ -13,15 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.frame import Frame, Level, Message
-from pmviewer.errors import PmviewerError
+from pmviewer.errors import PmviewerError, SettingError
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.free_camera import frustum_lines, resolve_view
 from pmviewer.render.planes import AOVS, TERMS
+from pmviewer.scene.description import Scene
 from pmviewer.settings import (
     CameraSettings,
     Display,
     FreeCamera,
+    SettingInfo,
     Settings,
     info_of,
     parse_assignments,
@@ -107,6 +109,8 @@ class ViewerState:
                     parsed |= parse_assignments([f"{path}={value.replace(',', '')}"])
                 else:
                     parsed[path] = value
+            if list(parsed) == ["camera.name"]:  # another camera as it is, not where this one was moved to
+                parsed |= dict.fromkeys(("camera.origin", "camera.target", "camera.up", "camera.fov"), "auto")
             settings = with_values(self.settings, parsed)
         except PmviewerError as error:
             self.say("error", str(error))
@@ -117,6 +121,10 @@ class ViewerState:
     def resolved(self, path: str) -> Any:
         """What "auto" means now for that setting, or None when it isn't known yet."""
         group, _, name = path.partition(".")
+        if path == "display.exposure":
+            return self.frame.exposure if self.frame is not None else None
+        if path == "camera.name":
+            return None
         if group in ("camera", "free_camera"):
             free = self.live_camera() if self.settings.free_camera.on else None
             pose = self.render_camera() if group == "camera" else free
@@ -141,13 +149,27 @@ class ViewerState:
     def shown_display(self) -> Display:
         """The display settings with the view that can be shown now: the reference while its key is held, the image when
         there is nothing to compare."""
-        display = self.settings.display
+        display = self._exposed(self.settings.display, self.frame)
         if self.flipped and self.refused_view("reference") is None:
             return display.model_copy(update={"view": "reference"})
         missing = display.view in DIAGNOSTICS and (self.frame is None or display.view not in self.frame.diagnostics)
         if missing or self.refused_view(display.view) is not None:
             return display.model_copy(update={"view": "beauty"})
         return display
+
+    @staticmethod
+    def _exposed(display: Display, frame: Frame | None) -> Display:
+        """The display settings with a number as exposure."""
+        if display.exposure != "auto":
+            return display
+        return display.model_copy(update={"exposure": frame.exposure if frame is not None else 0.0})
+
+    def choices(self, info: SettingInfo) -> tuple[str, ...]:
+        """What can be chosen; the cameras are those of the scene's file."""
+        if info.path != "camera.name":
+            return info.choices
+        names = [camera.name for camera in self.session.scene.cameras] if self.session.scene is not None else []
+        return ("auto", *(name if names.count(name) == 1 else str(i + 1) for i, name in enumerate(names)))
 
     def refused_view(self, view: str) -> str | None:
         """Why that view can't be shown now, or None."""
@@ -162,13 +184,23 @@ class ViewerState:
         if scene is None:
             return None
         if not self.settings.free_camera.on or geometry is None:
-            return resolve_camera(scene, self.settings.camera)
-        return resolve_view(scene, self.settings, geometry.center, float(geometry.radius))
+            return self._resolved(scene)
+        try:
+            return resolve_view(scene, self.settings, geometry.center, float(geometry.radius))
+        except SettingError:
+            return self._resolved(scene)
 
     def render_camera(self) -> CameraPose | None:
         """The camera that importance belongs to, by the newest settings."""
         scene = self.session.scene
-        return resolve_camera(scene, self.settings.camera) if scene is not None else None
+        return self._resolved(scene) if scene is not None else None
+
+    def _resolved(self, scene: Scene) -> CameraPose:
+        """The chosen camera; the scene's own if there is no such one, which the session says."""
+        try:
+            return resolve_camera(scene, self.settings.camera)
+        except SettingError:
+            return resolve_camera(scene, self.settings.camera.model_copy(update={"name": "auto"}))
 
     def frustum(self) -> NDArray[np.float64] | None:
         """Line ends (2n, 3) of the render camera's frustum while it is drawn."""
@@ -182,7 +214,7 @@ class ViewerState:
         frames = self.gain.frames()
         if frames is None:
             return None
-        display = self.settings.display
+        display = self._exposed(self.settings.display, frames[0])
         layer = display.view if display.view in LAYERS else "beauty"
         return frames, display.model_copy(update={"view": layer})
 

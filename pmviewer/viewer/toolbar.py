@@ -15,13 +15,15 @@ from pmviewer.viewer.viewport import is_data_view
 from pmviewer.viewer.widgets import SettingWidgets, icon_button, tooltip_text
 
 Actions = Mapping[str, Callable[[], None]]
+WIDE, MORE = 78.0, 11.0
+"""Width of the window in em from which the light's rig has room, and how much a choice of cameras takes."""
 
 
 class Toolbar:
     def __init__(self, state: ViewerState, actions: Actions) -> None:
         self._state = state
         self._actions = actions
-        self._widgets = SettingWidgets(state.refused_view)
+        self._widgets = SettingWidgets(state.refused_view, state.choices)
 
     def gui(self) -> None:
         paused = self._state.session.paused
@@ -32,6 +34,12 @@ class Toolbar:
         self._setting("render.method", "method", 7)
         self._setting("display.view", "view", 9)
         data = is_data_view(self._state.shown_display)
+        room = imgui.get_window_width() / imgui.get_font_size()
+        several = len(self._state.choices(SETTINGS["camera.name"])) > 2
+        if several and room > WIDE + MORE:  # else the panel has it
+            self._setting("camera.name", "camera", 6)
+        if room > WIDE:
+            self._setting("light.rig", "light", 5.5)
         self._setting("display.exposure", "exposure", 6, faded=data)
         self._setting("display.tone", "tone", 6, faded=data)
         self._gap()
@@ -68,7 +76,13 @@ class Toolbar:
         imgui.text_colored(imgui.ImVec4(*theme.DIM), label)
         imgui.same_line()
         imgui.begin_group()
-        new = self._widgets.edit(info, value, value, width=width_em * imgui.get_font_size())
+        resolved = self._state.resolved(path) if value == "auto" else value
+        new = self._widgets.edit(info, value, resolved, width=width_em * imgui.get_font_size())
+        if info.auto:
+            imgui.same_line(0, 2)
+            tip = "Automatic. Click to fix the present value." if value == "auto" else "Back to automatic"
+            if icon_button(fa.ICON_FA_WAND_MAGIC_SPARKLES, f"auto.{path}", tip, on=value == "auto"):
+                new = resolved if value == "auto" else "auto"
         imgui.end_group()
         imgui.pop_style_var()
         if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip) and not imgui.is_any_item_active():

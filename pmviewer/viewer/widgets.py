@@ -61,6 +61,8 @@ class SettingWidgets:
 
     refused_view: Callable[[str], str | None]
     """Why a choice of `display.view` can't be taken now, or None."""
+    choices: Callable[[SettingInfo], tuple[str, ...]] = lambda info: info.choices
+    """What can be chosen for a setting now."""
     typing: Typing | None = None
     _before: dict[str, Any] = field(default_factory=dict)
     """Values at the first click, for a double click to restore."""
@@ -75,7 +77,7 @@ class SettingWidgets:
         if info.scale == "switch":
             changed, new = imgui.checkbox(f"##{info.path}", value)
             return new if changed else None
-        if info.choices:
+        if info.scale in ("choice", "name"):
             return self._choice(info, value)
         if info.scale == "vector":
             return self._vector(info, value, resolved)
@@ -90,7 +92,7 @@ class SettingWidgets:
     def _choice(self, info: SettingInfo, value: str) -> str | None:
         chosen = None
         if imgui.begin_combo(f"##{info.path}", value):
-            for choice in info.choices:
+            for choice in self.choices(info):
                 refusal = self.refused_view(choice) if info.path == "display.view" else None
                 flags = imgui.SelectableFlags_.none if refusal is None else imgui.SelectableFlags_.disabled
                 if imgui.selectable(choice, choice == value, flags)[0]:

@@ -431,3 +431,54 @@ def test_loading_says_what_it_does_and_can_be_cancelled(session, tmp_path):
     session.open(tmp_path / "a.obj")
     until(lambda: session.scene is not None)
     assert session.loading == ""
+
+
+def thing_file(folder) -> str:
+    """A tetrahedron: neither camera nor light."""
+    path = folder / "thing.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    return str(path)
+
+
+def test_other_lights_do_not_read_the_file_again(tmp_path, monkeypatch):
+    from pmviewer.engine import opened
+
+    reads = []
+    read = opened.read_scene
+    monkeypatch.setattr(opened, "read_scene", lambda *a: reads.append(a) or read(*a))
+    small = {"camera.width": 32, "camera.height": 32, "photons.N": 1000, "render.passes": 2}
+    session = Session(threads=1, settings=with_values(Settings(), small))
+    try:
+        session.open(thing_file(tmp_path))
+        assert session.wait(timeout=120)
+        assert "light above" in [shape.name for shape in session.scene.shapes]
+        studio = session.frame.exposure
+        session.set(with_values(session.settings, {"light.rig": "headlight"}))
+        assert session.wait(timeout=120)
+        assert [light.name for light in session.scene.lights] == ["headlight"]
+        assert len(reads) == 1
+        assert session.frame.image().max() > 0
+        session.set(with_values(session.settings, {"light.rig": "studio"}))
+        assert session.wait(timeout=120)
+        assert session.frame.exposure == studio
+        session.set(with_values(session.settings, {"light.rig": "file"}))
+        assert session.wait(timeout=120)
+        assert any("light.rig asks for the file's alone" in message.text for message in session.take_messages())
+        assert "light above" in [shape.name for shape in session.scene.shapes]
+    finally:
+        session.close()
+
+
+def test_exposure_is_decided_once(tmp_path):
+    small = {"camera.width": 32, "camera.height": 32, "photons.N": 1000, "render.passes": 3, "light.rig": "headlight"}
+    session = Session(threads=1, settings=with_values(Settings(), small))
+    seen = set()
+    session.on_update = lambda: seen.add(session.frame.exposure) if session.frame else None
+    try:
+        session.open(thing_file(tmp_path))
+        assert session.wait(timeout=120)
+        session.set(with_values(session.settings, {"camera.origin": (3.0, 3.0, 3.0), "render.method": "path"}))
+        assert session.wait(timeout=120)
+        assert len(seen) == 1
+    finally:
+        session.close()

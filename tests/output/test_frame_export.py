@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -123,3 +125,16 @@ def test_what_only_the_window_draws_is_refused(tmp_path, frame):
     with pytest.raises(OutputError, match=r"'geometry' is drawn by the window alone. Choose one of beauty"):
         write_frame_png(tmp_path / "a.png", frame, "geometry")
     assert not list(tmp_path.iterdir())
+
+
+def test_automatic_exposure_is_that_of_the_frame(tmp_path, frame):
+    automatic = replace(frame, exposure=-2.0, settings=with_values(frame.settings, {"display.exposure": "auto"}))
+    write_frame_png(tmp_path / "a.png", automatic)
+    pixels, _ = read_png(tmp_path / "a.png")
+    expected = to_uint8(display_image("beauty", frame.image(), -2.0, "sRGB").pixels)
+    np.testing.assert_array_equal(pixels, expected)
+    assert frame_metadata(automatic)["view.exposure"] == -2.0
+    assert frame_metadata(frame)["view.exposure"] == -1.5  # as set, whatever the frame's
+    write_frame_exr(tmp_path / "a.exr", automatic)
+    layers, _ = read_exr(tmp_path / "a.exr")
+    assert layers[""].tobytes() == frame.image().tobytes()

@@ -20,6 +20,8 @@ def values_of(info: SettingInfo) -> st.SearchStrategy:
     """What the schema allows for one setting."""
     if info.choices:
         plain: st.SearchStrategy = st.sampled_from(info.choices)
+    elif info.scale == "name":
+        plain = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
     elif info.scale == "vector":
         plain = st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * 3)
     elif info.kind is bool:

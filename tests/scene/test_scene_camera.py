@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pmviewer.errors import SettingError
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.clean import clean_mesh
 from pmviewer.scene.description import Mesh, Scene
@@ -214,3 +215,31 @@ def test_broken_normals_are_replaced_by_the_faces() -> None:
     mesh = clean_mesh(Mesh(np.eye(3) * [1, 1, 0], np.array([[2, 0, 1]], np.int32), normals), Counter())
     assert mesh is not None
     assert mesh.normals == pytest.approx(np.tile([0, 0, 1], (3, 1)))
+
+
+def named_sensor(name: str, x: float) -> str:
+    return (
+        f'<sensor type="perspective" id="{name}"><transform name="to_world"><lookat origin="{x} 0 5" '
+        f'target="0 0 0" up="0 1 0"/></transform><film type="hdrfilm"><integer name="width" value="{10 + int(x)}"/>'
+        '<integer name="height" value="8"/></film></sensor>'
+    )
+
+
+def test_every_camera_of_the_file_can_be_chosen(tmp_path: Path) -> None:
+    scene = load(tmp_path, '<shape type="sphere"/>', named_sensor("front", 0), named_sensor("aside", 3), camera="")
+    assert [camera.name for camera in scene.cameras] == ["front", "aside"]
+    assert resolve_camera(scene, CameraSettings()).origin == (0, 0, 5)
+    for name in ("aside", "2"):
+        pose = resolve_camera(scene, CameraSettings(name=name))
+        assert (pose.origin, pose.width) == ((3, 0, 5), 13)
+    moved = resolve_camera(scene, CameraSettings(name="aside", origin=(1.0, 2.0, 3.0), width=50))
+    assert (moved.origin, moved.target, moved.width) == ((1, 2, 3), (0, 0, 0), 50)
+    for name in ("behind", "3", "0"):
+        with pytest.raises(SettingError, match=r"2 cameras: front, aside\."):
+            resolve_camera(scene, CameraSettings(name=name))
+
+
+def test_a_file_without_a_camera_has_none_to_choose(tmp_path: Path) -> None:
+    scene = load(tmp_path, '<shape type="sphere"/>', camera="")
+    with pytest.raises(SettingError, match="has no camera"):
+        resolve_camera(scene, CameraSettings(name="1"))

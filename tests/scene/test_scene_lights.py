@@ -138,8 +138,9 @@ def test_numbers_that_are_no_radiance_count_as_black(tmp_path: Path) -> None:
     assert light.pixels.min() == 0
     assert np.isfinite(light.pixels).all()
     sky_file(tmp_path, np.zeros((4, 4, 3), np.float32))
-    with pytest.raises(SceneError, match="no light"):
-        load(tmp_path, SHAPE, envmap(), sky="")
+    dark = load(tmp_path, SHAPE, envmap(), sky="")
+    assert dark.dropped == {"light of no power": 1}
+    assert any(w.startswith("The file has no light") for w in dark.warnings)
 
 
 def test_encoded_pictures_are_linear_radiance(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Scenes from mesh files: glTF, OBJ, PLY, STL. A camera and a light are added where the file has none."""
+"""Scenes from mesh files: glTF, OBJ, PLY, STL. Without a camera in the file theirs is a makeshift."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from pmviewer.scene.clean import check_camera, check_faces, check_size, clean_li
 from pmviewer.scene.description import (
     Camera,
     Mesh,
+    NamedCamera,
     Scene,
     Shape,
 )
@@ -28,13 +29,14 @@ from pmviewer.scene.formats.open_file import found_beside
 from pmviewer.scene.formats.ply import read_ply_file
 from pmviewer.scene.formats.stl import read_stl
 from pmviewer.scene.formats.texture_file import read_picture
-from pmviewer.scene.framing import framed
+from pmviewer.scene.framing import Up, framed
 from pmviewer.scene.instances import clean_instances, joint_bounds
-from pmviewer.scene.studio import studio_of
 from pmviewer.scene.texture import Bitmap
 
 T = TypeVar("T")
 SIDE = 512
+_UP: Mapping[str, Up] = {".stl": "z", ".glb": "y", ".gltf": "y"}
+"""What is up, in formats that have an answer."""
 
 
 def load_mesh_scene(path: Path, choices: Mapping[str, str] | None = None) -> Scene:
@@ -56,35 +58,35 @@ def load_mesh_scene(path: Path, choices: Mapping[str, str] | None = None) -> Sce
             "The file has no triangle that can be shown.", path, hint=diagnostics.left_out() or "Is it empty?"
         )
     lights = clean_lights(content.lights, diagnostics)
-    materials = list(content.materials)
-    up: Literal["y", "z"] = "z" if ending == ".stl" else "y"
+    up = _UP.get(ending)
     box = joint_bounds(shapes, instances)
-    camera = content.camera or framed((), up, box)
-    if content.camera is not None:
-        camera = _aimed(camera, box)
-    if not lights and not any(s.radiance for s in shapes):
-        diagnostics.warn("The file has no light: a soft light above it, a dim sky and a floor were added.")
-        studio = studio_of(box, up, len(materials))
-        lights, shapes = (studio.sky,), (*shapes, *studio.shapes)
-        materials += studio.materials
-    width, height = SIDE, SIDE
-    if content.camera is not None:
-        width = round(SIDE * content.aspect) if math.isfinite(content.aspect) else 0
-    check_camera(camera, path)
-    check_size(width, height, path)
+    cameras = tuple(_named(camera.camera, camera.aspect, camera.name, box, path) for camera in content.cameras)
+    if content.camera is None:
+        shown = NamedCamera("", framed((), up or "y", box), SIDE, SIDE)
+    else:
+        shown = _named(content.camera, content.aspect, "", box, path)
     return Scene(
         name=path.stem,
         path=path,
         shapes=shapes,
-        materials=tuple(materials),
+        materials=tuple(content.materials),
         lights=lights,
-        camera=camera,
-        width=width,
-        height=height,
+        camera=shown.camera,
+        width=shown.width,
+        height=shown.height,
         warnings=diagnostics.warnings(),
         dropped=dict(diagnostics.dropped),
         instances=instances,
+        cameras=cameras,
+        up=up,
     )
+
+
+def _named(camera: Camera, aspect: float, name: str, box: tuple[np.ndarray, np.ndarray], path: Path) -> NamedCamera:
+    width = round(SIDE * aspect) if math.isfinite(aspect) else 0
+    check_camera(camera, path)
+    check_size(width, SIDE, path)
+    return NamedCamera(name, _aimed(camera, box), width, SIDE)
 
 
 def read_single(path: Path) -> Mesh:

@@ -51,11 +51,6 @@ def load_mitsuba(path: Path, parameters: Mapping[str, str], search_paths: Sequen
             raise scene.failures[0]
         hint = diagnostics.left_out() or f"Add a <shape> of type {', '.join(SUPPORTED)}."
         raise diagnostics.error("The scene has no surface.", hint=hint)
-    if not lights and not any(s.radiance for s in shapes):
-        if len(scene.failures) == 1:
-            raise scene.failures[0]
-        hint = diagnostics.left_out() or 'Add an <emitter>, for example of type "area", "point" or "envmap".'
-        raise diagnostics.error("The scene has no light.", hint=hint)
     low, high = box = joint_bounds(shapes, instances)
     cameras, size = read_cameras(scene.sensors, document, box)
     seen = cameras[0] if cameras else NamedCamera("framed", framed((), box=box), *size)
