@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pmviewer.scene.description import Material, Scene
-from pmviewer.scene.load import load_scene
+from pmviewer.scene.load import read_scene
 
 TRIANGLE = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n"
 
@@ -18,7 +18,7 @@ TRIANGLE = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nuse
 def opened(folder: Path, statements: str) -> Scene:
     (folder / "a.mtl").write_text("newmtl m\n" + statements)
     (folder / "a.obj").write_text(TRIANGLE)
-    return load_scene(folder / "a.obj")
+    return read_scene(folder / "a.obj")
 
 
 def material(folder: Path, statements: str) -> Material:
@@ -77,7 +77,7 @@ def test_lights_by_ke_or_by_an_ambient_above_one(tmp_path: Path) -> None:
     assert opened(tmp_path, "Ka 20 20 20\n").shapes[0].radiance is None
     (tmp_path / "a.mtl").write_text("newmtl light\nKa 20 20 20\nnewmtl m\n")
     (tmp_path / "a.obj").write_text(TRIANGLE.replace("usemtl m", "usemtl light"))
-    scene = load_scene(tmp_path / "a.obj")
+    scene = read_scene(tmp_path / "a.obj")
     assert scene.shapes[0].radiance == (20, 20, 20)
     assert any("'light' has no Ke" in w for w in scene.warnings)
 
@@ -86,11 +86,11 @@ def test_lights_by_name_where_nothing_emits(tmp_path: Path) -> None:
     (tmp_path / "a.obj").write_text(TRIANGLE + "usemtl AreaLight\nf 1 2 3\nusemtl light wood\nf 1 2 3\n")
     mtl = "newmtl m\n{}newmtl AreaLight\nKd 1 0.5 0\nnewmtl light wood\n"
     (tmp_path / "a.mtl").write_text(mtl.format(""))
-    scene = load_scene(tmp_path / "a.obj")
+    scene = read_scene(tmp_path / "a.obj")
     assert [s.radiance for s in scene.shapes] == [None, (10, 5, 0), None]
     assert any("'AreaLight' does, for its name" in w for w in scene.warnings)
     (tmp_path / "a.mtl").write_text(mtl.format("Ke 1 1 1\n"))
-    assert [s.radiance for s in load_scene(tmp_path / "a.obj").shapes] == [(1, 1, 1), None, None]
+    assert [s.radiance for s in read_scene(tmp_path / "a.obj").shapes] == [(1, 1, 1), None, None]
 
 
 def picture(path: Path, mode: str, *colours: object) -> None:
@@ -142,18 +142,18 @@ def test_a_pipe_in_a_picture_s_place_does_not_hang(tmp_path: Path) -> None:
     assert any("is not a regular file" in w for w in scene.warnings)
     (tmp_path / "a.mtl").unlink()
     os.mkfifo(tmp_path / "a.mtl")
-    assert any("is not a regular file" in w for w in load_scene(tmp_path / "a.obj").warnings)
+    assert any("is not a regular file" in w for w in read_scene(tmp_path / "a.obj").warnings)
 
 
 def test_missing_and_odd_libraries(tmp_path: Path) -> None:
     (tmp_path / "a.obj").write_text(TRIANGLE.replace("a.mtl", "renamed.mtl"))
     (tmp_path / "a.mtl").write_text("\tnewmtl m\n  Kd 0.1\n")
-    scene = load_scene(tmp_path / "a.obj")
+    scene = read_scene(tmp_path / "a.obj")
     assert scene.materials[0].reflectance == (0.1, 0.1, 0.1)
     assert "'a.mtl' is taken for it" in scene.warnings[0]
     (tmp_path / "a.obj").write_text(TRIANGLE.replace("a.mtl", "gone.mtl a.mtl"))
-    scene = load_scene(tmp_path / "a.obj")
+    scene = read_scene(tmp_path / "a.obj")
     assert scene.materials[0].reflectance == (0.1, 0.1, 0.1)
     assert "'gone.mtl' does not exist" in scene.warnings[0]
     (tmp_path / "a.mtl").write_text("newmtl m\nKd nan 1 1\nKs\nNs 1e999\nillum x\nd\n")
-    assert math.isclose(np.max(load_scene(tmp_path / "a.obj").materials[0].reflectance), 0.7)
+    assert math.isclose(np.max(read_scene(tmp_path / "a.obj").materials[0].reflectance), 0.7)

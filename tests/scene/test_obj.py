@@ -9,7 +9,7 @@ import pytest
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.description import Mesh, Scene
-from pmviewer.scene.load import load_scene
+from pmviewer.scene.load import read_scene
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
@@ -18,7 +18,7 @@ def opened(folder: Path, text: str | bytes, **files: str) -> Scene:
     for name, content in files.items():
         (folder / f"{name}.mtl").write_text(content)
     (folder / "a.obj").write_bytes(text if isinstance(text, bytes) else text.encode())
-    return load_scene(folder / "a.obj")
+    return read_scene(folder / "a.obj")
 
 
 def meshes(scene: Scene) -> list[Mesh]:
@@ -138,9 +138,9 @@ def test_fifty_thousand_groups_take_seconds(tmp_path: Path) -> None:
     lines = [f"v {i} 0 0\nv {i} 1 0\nv {i} 0 1\ng part{i}\nusemtl m{i % 7}\nf -1 -2 -3" for i in range(n)]
     (tmp_path / "m.mtl").write_text("".join(f"newmtl m{i}\nKd 0.{i + 1} 0 0\n" for i in range(7)))
     (tmp_path / "a.obj").write_text("mtllib m.mtl\n" + "\n".join(lines))
-    load_scene(tmp_path / "a.obj")  # compiles
+    read_scene(tmp_path / "a.obj")  # compiles
     start = time.process_time()
-    scene = load_scene(tmp_path / "a.obj")
+    scene = read_scene(tmp_path / "a.obj")
     assert time.process_time() - start < 8
     assert sum(len(m.faces) for m in meshes(scene)) == n
 

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from pmviewer.scene.description import DirectionalLight, ImageEnvironment, PointLight, Scene, SpotLight
-from pmviewer.scene.load import load_scene
+from pmviewer.scene.load import read_scene
 from tests.scene.gltf_files import Gltf
 
 DOWN = [-math.sqrt(0.5), 0, 0, math.sqrt(0.5)]
@@ -19,7 +19,7 @@ def lit(folder: Path, lights: list, nodes: list) -> Scene:
     f = Gltf(extensions={"KHR_lights_punctual": {"lights": lights}})
     f.triangle()
     rows = [{**node, "extensions": {"KHR_lights_punctual": {"light": node["light"]}}} for node in nodes]
-    return load_scene(f.write(folder, nodes=[{"mesh": 0}, *rows]))
+    return read_scene(f.write(folder, nodes=[{"mesh": 0}, *rows]))
 
 
 def test_points_spots_and_suns(tmp_path: Path) -> None:
@@ -71,7 +71,7 @@ def surroundings(folder: Path, faces: list[np.ndarray], **light) -> Scene:
         f.header["images"].append({"bufferView": f.view(stream.getvalue())})
     row = {"specularImages": [list(range(6))], **light}
     name = "EXT_lights_image_based"
-    return load_scene(
+    return read_scene(
         f.write(
             folder, extensions={name: {"lights": [row]}}, scenes=[{"nodes": [0], "extensions": {name: {"light": 0}}}]
         )
