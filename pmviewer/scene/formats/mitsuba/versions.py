@@ -33,7 +33,6 @@ _TYPES: list[tuple[Version, dict[tuple[str, str], str]]] = [
     ),
     ((0, 4), {("film", "exrfilm"): "hdrfilm", ("film", "pngfilm"): "ldrfilm"}),
     ((0, 5), {("bsdf", "bump"): "bumpmap"}),
-    ((2, 0), {("shape", "shapeGroup"): "shapegroup"}),
 ]
 _NAMES: list[tuple[Version, dict[tuple[str, str, str], str]]] = [
     (
@@ -77,6 +76,8 @@ def upgrade(root: Element, diagnostics: Diagnostics) -> None:
         element = todo.pop()
         if version < (2,):
             _rename(element, version)
+        if element.tag == "shape" and "type" in element.attributes:
+            element.attributes["type"] = element.attributes["type"].lower()  # "shapeGroup", "Rectangle"
         _texture_scale(element)
         todo += element.children
 
