@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pmviewer.scene.description import Material, Principled
+from pmviewer.scene.description import Material, Mesh, Principled
 from pmviewer.scene.texture import Bitmap, Checkerboard
 from tests.scene.helpers import load
 
@@ -124,3 +124,16 @@ def test_colours_at_vertices(tmp_path: Path) -> None:
     found, warnings = material(tmp_path, coat, "plastic")
     assert (found.vertex_colours, found.specular) == (False, (1, 1, 1))
     assert "no effect here" in warnings[0]
+
+
+def test_colours_of_a_ply_file_as_mitsuba_writes_it(tmp_path: Path) -> None:
+    header = "ply\nformat ascii 1.0\nelement vertex 3\n"
+    columns = "".join(f"property float {n}\n" for n in ("x", "y", "z", "color_0", "color_1", "color_2"))
+    faces = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    rows = "0 0 0 1 0 0\n1 0 0 0 0.5 0\n0 1 0 0 0 0.25\n3 0 1 2\n"
+    (tmp_path / "a.ply").write_text(header + columns + faces + rows)
+    scene = load(tmp_path, '<shape type="ply"><string name="filename" value="a.ply"/></shape>')
+    mesh = scene.shapes[0].geometry
+    assert isinstance(mesh, Mesh)
+    assert mesh.colours is not None
+    assert mesh.colours[np.argsort(mesh.vertices @ [1, 2, 0])] == pytest.approx(np.diag([1, 0.5, 0.25]))

@@ -18,7 +18,12 @@ from pmviewer.scene.formats.ply_table import Column, Columns, ListColumn, read_c
 Ints = NDArray[np.int32]
 Float = NDArray[np.float64]
 _COORDINATES = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
-_COLOURS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
+_COLOURS = (
+    ("red", "green", "blue"),
+    ("r", "g", "b"),
+    ("diffuse_red", "diffuse_green", "diffuse_blue"),
+    ("color_0", "color_1", "color_2"),  # as Mitsuba 3 writes them
+)
 _FACE_LISTS = ("vertex_indices", "vertex_index")
 _FACE_ELEMENTS = ("face", "faces", "polygon", "triangle")
 
