@@ -46,8 +46,15 @@ def answer(mi: Any, request: dict[str, Any]) -> dict[str, Any]:
         adapted = _one_line(refused)
     if about["camera"] not in PROJECTIVE:
         return {"error": f"the camera '{about['camera']}' takes no picture to compare"}
+    # Its path tracer multiplies light samples on masked surfaces by the opacity twice.
+    masked = any(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null) for shape in scene.shapes() if shape.bsdf())
     integrator = mi.load_dict(
-        {"type": "path", "max_depth": request["max_depth"], "rr_depth": RR_DEPTH, "hide_emitters": about["hidden"]}
+        {
+            "type": "volpath" if masked else "path",
+            "max_depth": request["max_depth"],
+            "rr_depth": RR_DEPTH,
+            "hide_emitters": about["hidden"],
+        }
     )
     return {**about, "adapted": adapted, "means": _means(mi, scene, integrator, request)}
 

@@ -95,15 +95,18 @@ def _renderer(opened: Any, values: dict[str, Any], pool: Any) -> Any:
 def _seen(opened: Any, size: Any, passes: int, pool: Any) -> dict[str, Any]:
     from PIL import Image
 
+    from pmviewer.output.frame_export import exposure_of
     from pmviewer.output.tone import display_image, to_uint8
 
     renderer = _renderer(opened, {"camera.width": size[0], "camera.height": size[1]}, pool)
+    if opened.scene.exposure is None:
+        renderer.coarse_frame(0)  # as in the window it decides the exposure
     for _ in range(passes):
         renderer.step()
     frame = renderer.frame(1)
     radiance = frame.image().astype(np.float64)
     display = frame.settings.display
-    shown = display_image("beauty", frame.image(), display.exposure, display.tone).pixels
+    shown = display_image("beauty", frame.image(), exposure_of(frame, display), display.tone).pixels
     buffer = io.BytesIO()
     Image.fromarray(to_uint8(shown)).save(buffer, "PNG")
     return {
