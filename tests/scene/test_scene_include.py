@@ -191,3 +191,9 @@ def test_broken_meshes_are_one_warning(tmp_path: Path) -> None:
 def test_pipes_are_not_included(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.xml")
     assert "pipe.xml" in load(tmp_path, CUBE, '<include filename="pipe.xml"/>').warnings[0]
+
+
+def test_a_long_name_is_cut(tmp_path: Path) -> None:
+    (warning,) = load(tmp_path, CUBE, f'<include filename="{"a" * 5000}.xml"/>').warnings
+    assert len(warning) < 400
+    assert "aaaa.xml" in warning
