@@ -24,9 +24,9 @@ KEYS = (0.08, 0.4)
 """Lowest and highest log-average luminance of the picture, where 0.18 is the photographers' middle grey."""
 BLOCKS = 24
 """The picture is averaged over so many fields either way, where few samples a pixel leave most black."""
-WHITE_SHARE, MOST_LOWERED = 0.05, 2.0
+WHITE_SHARE, MOST_LOWERED = 0.05, 3.0
 """Share of the fields that may be white, and EV that this may cost."""
-DARKEST = 1e-4
+DARKEST = 2e-3
 """Of the brightest fields' luminance: what is darker counts as that, or black corners would decide."""
 STEP = 0.05
 

@@ -24,7 +24,7 @@ SKY_RADIANCE = 0.1
 FLOOR_RADIUS, FLOOR_GAP, FLOOR_ALBEDO = 2.5, 1e-3, 0.6
 GROUND = 0.6
 """Share of the scene's ground plan from which on surfaces near its lower end are a floor."""
-WINDOW_SKY, MOST_SKY = 0.5, 10.0
+WINDOW_SKY, MOST_SKY = 0.2, 2.0
 """Radiance, and the most power of such a sky, relative to that of the light under the ceiling."""
 CLOSED = 0.97
 """Share of the directions in which a room must have walls to do without a sky."""
