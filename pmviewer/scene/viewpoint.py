@@ -115,7 +115,15 @@ def _subjects(proxy: Proxy) -> list[Float]:
     whole = _within(proxy, np.concatenate([by_area, by_count]), 0.5, 0.4)
     detail = _within(proxy, by_count, 2.0, 0.1)
     smaller = np.linalg.norm(np.ptp(detail, axis=0)) < _DETAIL_SIZE * np.linalg.norm(np.ptp(whole, axis=0))
-    return [whole, detail] if smaller and len(detail) >= _MOST_DETAIL * 3 * len(proxy.areas) else [whole]
+    detailed = smaller and len(detail) >= _MOST_DETAIL * 3 * len(proxy.areas)
+    return [_outermost(whole), _outermost(detail)] if detailed else [_outermost(whole)]
+
+
+def _outermost(points: Float) -> Float:
+    """Those of the points (n, 3) that lie farthest in one of some 130 directions, which fill a picture as all do but
+    for a percent."""
+    ways = np.concatenate([np.eye(3), -np.eye(3), sphere_directions(128)])
+    return points[np.unique((ways @ points.T).argmax(axis=1))]
 
 
 def _within(proxy: Proxy, samples: Float, percent: float, beyond: float) -> Float:
