@@ -24,12 +24,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.instance import I_TO_LOCAL, find_instance, has_instances, stored_prim, transform_vector
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.quadric import QUADRIC_FLOATS
+from pmviewer.kernels.specialise import specialised
 from pmviewer.kernels.surface import surface_at
 from pmviewer.kernels.vector import add, along, basis, cross, dot, normalize, scale, sub
 
@@ -89,13 +89,9 @@ def footprint_importance(P):
 # --- how the normal changes -------------------------------------------------------------------------------------------
 
 
+@specialised
 def _quadric_scale(scene, prim):
     """Lengths in the quadric's own coordinates by lengths in the world, at most."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(_quadric_scale)
-def _overload_quadric_scale(scene, prim):
     if has_instances(scene):
 
         def copied(scene, prim):

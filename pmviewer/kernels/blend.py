@@ -8,7 +8,6 @@ photons are stored must not hang on the choice, for those who look them up choos
 from __future__ import annotations
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.material import beer_lambert
@@ -31,6 +30,7 @@ from pmviewer.kernels.scene import (
     ROUGH_DIELECTRIC,
     material_kind,
 )
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.kernels.texture import texture_value
 from pmviewer.kernels.uv import hit_uv
 from pmviewer.kernels.vector import dot
@@ -48,14 +48,10 @@ def hit_number(p, wo, prim, salt):
     return unit_float(hash3(h, _u4(salt), _u4(0xB1E2D)))
 
 
+@specialised
 def weight_at(scene, material, prim, b1, b2, p):
     """Share of a blend's second part at the point p of primitive `prim`, at its coordinates (b1, b2)."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(weight_at)
-def _weight_at(scene, material, prim, b1, b2, p):
-    if "textures" not in scene.fields:
+    if not has(scene, "textures"):
         return lambda scene, material, prim, b1, b2, p: load_f4(scene.materials, material * MATERIAL_COLUMNS + M_WEIGHT)
 
     def textured(scene, material, prim, b1, b2, p):

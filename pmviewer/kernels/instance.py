@@ -15,10 +15,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f8, load_i4, load_i8
+from pmviewer.kernels.specialise import specialised
 
 INSTANCE_FIELDS: list[tuple[str, str]] = [
     ("instances", "i8"),  # float64 (n, INSTANCE_COLUMNS)
@@ -121,25 +121,17 @@ def _through_instances(scene, prim):
     return stored_of(scene, find_instance(scene, prim), prim)
 
 
+@specialised
 def stored_prim(scene, prim):
     """Where the tables per primitive (vertices, materials, …) keep the primitive of this id."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(stored_prim)
-def _stored_prim(scene, prim):
     if has_instances(scene):
         return lambda scene, prim: _through_instances(scene, prim)
     return lambda scene, prim: np.int64(prim)
 
 
+@specialised
 def is_own(scene, prim):
     """Whether the primitive is one of the scene's own, not a copy's: only those are lights."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(is_own)
-def _is_own(scene, prim):
     if has_instances(scene):
         return lambda scene, prim: prim < scene.n_stored
     return lambda scene, prim: True

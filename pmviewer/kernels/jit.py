@@ -9,6 +9,7 @@ common, wherever they lie.
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import os
 import sys
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba import njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
@@ -152,4 +154,17 @@ def device(function: Callable[..., Any]) -> Any:
 
 def kernel(function: Callable[..., Any]) -> Any:
     """An entry point that Python calls: serial, without the GIL, on one tile or batch."""
+    if numba.config.DISABLE_JIT:
+        return functools.wraps(function)(lambda *arguments: function(*map(_readable, arguments)))
     return _cached(njit(**_OPTIONS)(function))
+
+
+def _readable(argument: Any) -> Any:
+    """An argument whose records have their fields as attributes, as they have in compiled code."""
+    if isinstance(argument, tuple):
+        return tuple(map(_readable, argument))
+    if isinstance(argument, np.ndarray) and argument.dtype.names:
+        return argument.view(np.recarray)
+    if isinstance(argument, np.void) and argument.dtype.names:
+        return argument.view(np.dtype((np.record, argument.dtype)))
+    return argument

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.distant import behind_scene, emit_directional, outside, sample_directional
 from pmviewer.kernels.environment import emit_image, image_pdf, image_radiance, sample_image
@@ -46,6 +45,7 @@ from pmviewer.kernels.scene import (
     light_vector,
     load3,
 )
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.kernels.spot import emit_spot, sample_spot
 from pmviewer.kernels.surface import gap_of, interpolated_normal, leave
 from pmviewer.kernels.table import find_interval
@@ -170,6 +170,7 @@ def sample_light(scene, x, u_pick, u, v):
     return wi, end, L, probability * pdf, findable
 
 
+@specialised
 def sample_one_light(scene, light, x, u, v):
     """A direction from the point x towards the light.
 
@@ -177,12 +178,7 @@ def sample_one_light(scene, light, x, u, v):
     solid angle (0: no contribution; for point lights and spots L/pdf is intensity/distance², for directional ones
     irradiance) and whether a BSDF sample could have found it (False for point, spot and directional lights).
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(sample_one_light)
-def _sample_one_light(scene, light, x, u, v):
-    if "more_lights" not in scene.fields:
+    if not has(scene, "more_lights"):
 
         def plain(scene, light, x, u, v):
             return _sample_plain(scene, light, x, u, v)
@@ -264,14 +260,10 @@ def emitted(scene, light, prim, p, ng, d):
     return _f4(0.0), _f4(0.0), _f4(0.0)
 
 
+@specialised
 def environment_radiance(scene, d):
     """Radiance that a ray in direction d brings when it leaves a scene that has an environment."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(environment_radiance)
-def _environment_radiance(scene, d):
-    if "more_lights" not in scene.fields:
+    if not has(scene, "more_lights"):
 
         def constant(scene, d):
             return light_vector(scene, scene.environment, L_RADIANCE)
@@ -292,14 +284,10 @@ def light_pdf(scene, light, x, p, ng, wi):
     return light_probability(scene, light) * one_light_pdf(scene, light, x, p, ng, wi)
 
 
+@specialised
 def one_light_pdf(scene, light, x, p, ng, wi):
     """The same for `sample_one_light`."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(one_light_pdf)
-def _one_light_pdf(scene, light, x, p, ng, wi):
-    if "more_lights" not in scene.fields:
+    if not has(scene, "more_lights"):
 
         def plain(scene, light, x, p, ng, wi):
             return _plain_pdf(scene, light, x, p, ng, wi)
@@ -341,14 +329,10 @@ def emit_photon(scene, u_pick, position, direction):
     return p, d, beta, light
 
 
+@specialised
 def emit_from(scene, light, position, direction):
     """Origin, unit direction and power of a photon that leaves that light; the power's luminance is 1."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(emit_from)
-def _emit_from(scene, light, position, direction):
-    if "more_lights" not in scene.fields:
+    if not has(scene, "more_lights"):
 
         def plain(scene, light, position, direction):
             return _emit_plain(scene, light, position, direction)

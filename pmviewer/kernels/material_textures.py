@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.instance import stored_prim
 from pmviewer.kernels.jit import device
@@ -21,6 +20,7 @@ from pmviewer.kernels.scene import (
     MATERIAL_COLUMNS,
     load3,
 )
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.kernels.texture import texture_rgb, texture_value
 from pmviewer.kernels.uv import hit_uv
 from pmviewer.kernels.vector import mul
@@ -28,26 +28,18 @@ from pmviewer.kernels.vector import mul
 _f4 = np.float32
 
 
+@specialised
 def is_tinted(scene, material):
     """Whether colours at a mesh's vertices multiply the material's reflectance."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(is_tinted)
-def _is_tinted(scene, material):
-    if "colours" not in scene.fields:
+    if not has(scene, "colours"):
         return lambda scene, material: False
     return lambda scene, material: load_f4(scene.materials, material * MATERIAL_COLUMNS + M_COLOURED) != _f4(0.0)
 
 
+@specialised
 def tinted(scene, material, prim, b1, b2, reflectance):
     """The reflectance times the colour that the vertices of primitive `prim` give its point (b1, b2)."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(tinted)
-def _tinted(scene, material, prim, b1, b2, reflectance):
-    if "colours" not in scene.fields:
+    if not has(scene, "colours"):
         return lambda scene, material, prim, b1, b2, reflectance: reflectance
 
     def coloured(scene, material, prim, b1, b2, reflectance):

@@ -2,15 +2,21 @@
 
 A kernel sees the scene as one record of addresses (`pmviewer.kernels.scene`). `load_f4(address, i)` reads element i of
 a float32 array that starts at `address`; Python keeps the array alive.
+
+Each has a twin in plain Python, which takes its place without the compiler (NUMBA_DISABLE_JIT=1). A pointer to scratch
+is then an int32 array.
 """
 
 from __future__ import annotations
 
+import ctypes
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import config, types
 from numba.core import errors
 from numba.extending import intrinsic
 
@@ -28,7 +34,20 @@ def aligned_empty(shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
     return raw[start : start + size].view(dtype).reshape(shape)
 
 
-@intrinsic
+def with_twin(twin: Callable[..., Any], **options: bool) -> Callable[[Callable[..., Any]], Any]:
+    """Decorates the code generator of an intrinsic; `twin` does the same in plain Python."""
+    if config.DISABLE_JIT:
+        return lambda generator: twin
+    return intrinsic(**options) if options else intrinsic
+
+
+def at_address(address: int, count: int, dtype: type) -> np.ndarray:
+    """The array (count,) that begins at an address; for twins."""
+    size = count * np.dtype(dtype).itemsize
+    return np.frombuffer((ctypes.c_char * size).from_address(int(address)), dtype)
+
+
+@with_twin(lambda x: np.float32(x).view(np.uint32))
 def bits_of_float(typingctx, x):
     """The bits of a float32 as uint32."""
     signature = types.uint32(types.float32)
@@ -39,7 +58,7 @@ def bits_of_float(typingctx, x):
     return signature, codegen
 
 
-@intrinsic
+@with_twin(lambda x: np.uint32(x).view(np.float32))
 def float_of_bits(typingctx, x):
     """The float32 whose bits are the given uint32."""
     signature = types.float32(types.uint32)
@@ -50,7 +69,7 @@ def float_of_bits(typingctx, x):
     return signature, codegen
 
 
-@intrinsic
+@with_twin(lambda mask: np.int32((int(mask) & -int(mask)).bit_length() - 1))
 def count_trailing_zeros(typingctx, mask):
     """Index of the lowest set bit of a non-zero int32."""
     signature = types.int32(types.int32)
@@ -61,8 +80,10 @@ def count_trailing_zeros(typingctx, mask):
     return signature, codegen
 
 
-def _loader(numba_type, llvm_type):
-    @intrinsic
+def _loader(numba_type, llvm_type, dtype):
+    size = np.dtype(dtype).itemsize
+
+    @with_twin(lambda address, index: at_address(int(address) + size * int(index), 1, dtype)[0])
     def load(typingctx, address, index):
         signature = numba_type(types.int64, types.int64)
 
@@ -75,14 +96,14 @@ def _loader(numba_type, llvm_type):
     return load
 
 
-load_f4 = _loader(types.float32, F32)
-load_i4 = _loader(types.int32, I32)
-load_u4 = _loader(types.uint32, I32)
-load_i8 = _loader(types.int64, I64)
-load_f8 = _loader(types.float64, F64)
+load_f4 = _loader(types.float32, F32, np.float32)
+load_i4 = _loader(types.int32, I32, np.int32)
+load_u4 = _loader(types.uint32, I32, np.uint32)
+load_i8 = _loader(types.int64, I64, np.int64)
+load_f8 = _loader(types.float64, F64, np.float64)
 
 
-@intrinsic
+@with_twin(lambda address: at_address(address, 1, np.int64)[0])
 def load_shared_i8(typingctx, address):
     """The int64 at a multiple of eight, whole even while another thread stores there (LLVM `monotonic`)."""
     signature = types.int64(types.int64)
@@ -93,7 +114,11 @@ def load_shared_i8(typingctx, address):
     return signature, codegen
 
 
-@intrinsic
+def _store_shared_i8(address, value):
+    at_address(address, 1, np.int64)[0] = value
+
+
+@with_twin(_store_shared_i8)
 def store_shared_i8(typingctx, address, value):
     """Stores an int64 at a multiple of eight, whole even while other threads load it (LLVM `monotonic`)."""
     signature = types.void(types.int64, types.int64)
@@ -105,7 +130,7 @@ def store_shared_i8(typingctx, address, value):
     return signature, codegen
 
 
-@intrinsic(prefer_literal=True)
+@with_twin(lambda count: np.zeros(count, np.int32), prefer_literal=True)
 def stack_i4(typingctx, count):
     """Pointer to `count` (a literal) uninitialised int32 on the stack, 64-byte aligned: scratch without a heap."""
     if not isinstance(count, types.IntegerLiteral):
@@ -122,8 +147,8 @@ def stack_i4(typingctx, count):
     return signature, codegen
 
 
-def _stack_access(numba_type, llvm_type):
-    @intrinsic
+def _stack_access(numba_type, llvm_type, dtype):
+    @with_twin(lambda pointer, index: pointer.view(dtype)[index])
     def get(typingctx, pointer, index):
         signature = numba_type(pointer, types.int64)
 
@@ -132,7 +157,10 @@ def _stack_access(numba_type, llvm_type):
 
         return signature, codegen
 
-    @intrinsic
+    def _put(pointer, index, value):
+        pointer.view(dtype)[index] = value
+
+    @with_twin(_put)
     def put(typingctx, pointer, index, value):
         signature = types.void(pointer, types.int64, numba_type)
 
@@ -146,6 +174,6 @@ def _stack_access(numba_type, llvm_type):
     return get, put
 
 
-stack_get_i4, stack_put_i4 = _stack_access(types.int32, I32)
-stack_get_f4, stack_put_f4 = _stack_access(types.float32, F32)
-stack_get_i8, stack_put_i8 = _stack_access(types.int64, I64)
+stack_get_i4, stack_put_i4 = _stack_access(types.int32, I32, np.int32)
+stack_get_f4, stack_put_f4 = _stack_access(types.float32, F32, np.float32)
+stack_get_i8, stack_put_i8 = _stack_access(types.int64, I64, np.int64)

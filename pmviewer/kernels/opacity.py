@@ -14,14 +14,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.core import types
-from numba.extending import overload
 
 from pmviewer.kernels.instance import I_TO_LOCAL, find_instance, has_instances, stored_of, transform_point
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import bits_of_float, load_f4, load_i4
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.scene import M_ALPHA_CUTOFF, M_OPACITY, M_OPACITY_MAP, MATERIAL_COLUMNS, material_of
+from pmviewer.kernels.specialise import has, is_a, specialised
 from pmviewer.kernels.texture import texture_value
 from pmviewer.kernels.uv import stored_uv
 from pmviewer.kernels.vector import scale
@@ -61,14 +60,9 @@ class VeiledInstances(NamedTuple):
     key: Any
 
 
-def lets_pass(record_type: object) -> bool:
-    """Does a numba type of a scene record hold surfaces that rays pass?"""
-    return "passable" in getattr(record_type, "fields", ())
-
-
-def is_a(kind: type, leaves: object) -> bool:
-    """Whether that is the numba type of one of the tuples above."""
-    return isinstance(leaves, types.BaseNamedTuple) and leaves.instance_class is kind
+def lets_pass(scene: Any) -> bool:
+    """Does a scene's record, or its type, hold surfaces that rays pass?"""
+    return has(scene, "passable")
 
 
 @device
@@ -78,15 +72,11 @@ def ray_key(ox, oy, oz, dx, dy, dz):
     return hash3(_u4(start ^ bits_of_float(dx)), bits_of_float(dy), bits_of_float(dz))
 
 
+@specialised
 def opacity_of(scene, material, stored, b1, b2, p):
     """Opacity of the stored primitive's material at a triangle's barycentric coordinates, or at a quadric's point p, in
     the coordinates that the primitive is stored in."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(opacity_of)
-def _opacity_of(scene, material, stored, b1, b2, p):
-    if "textures" not in scene.fields:
+    if not has(scene, "textures"):
         return lambda scene, material, stored, b1, b2, p: load_f4(
             scene.materials, material * MATERIAL_COLUMNS + M_OPACITY
         )
@@ -107,14 +97,10 @@ def _opacity_of(scene, material, stored, b1, b2, p):
     return textured
 
 
+@specialised
 def over_opacity(scene, prim, b1, b2, p, value):
     """A colour over the opacity of the primitive that was hit at p: of a ray's radiance or power, where as many rays
     as the opacity says stop, so that the mean is that of all."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(over_opacity)
-def _over_opacity(scene, prim, b1, b2, p, value):
     if not lets_pass(scene):
         return lambda scene, prim, b1, b2, p, value: value
 
@@ -126,13 +112,9 @@ def _over_opacity(scene, prim, b1, b2, p, value):
     return divided
 
 
+@specialised
 def as_stored(scene, prim, p):
     """The stored primitive of a hit, and its point in the coordinates that this is stored in."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(as_stored)
-def _as_stored(scene, prim, p):
     if not has_instances(scene):
         return lambda scene, prim, p: (_i8(prim), p)
 
@@ -156,14 +138,10 @@ def hit_counts(scene, key, ident, stored, b1, b2, px, py, pz):
     return unit_float(hash3(key, _u4(ident), _u4(0x0FAC17E))) < opacity
 
 
+@specialised
 def triangle_counts(leaves, triangle, u, v):
     """Whether a tree's triangle stops the ray at its barycentric coordinates (u, v)."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(triangle_counts)
-def _triangle_counts(leaves, triangle, u, v):
-    if is_a(Veil, leaves):
+    if is_a(leaves, Veil):
 
         def of_tree(leaves, triangle, u, v):
             zero = _f4(0.0)
@@ -172,7 +150,7 @@ def _triangle_counts(leaves, triangle, u, v):
             return hit_counts(leaves.scene, leaves.key, ident, stored, u, v, zero, zero, zero)
 
         return of_tree
-    if is_a(VeiledInstances, leaves):
+    if is_a(leaves, VeiledInstances):
 
         def own(leaves, triangle, u, v):
             zero = _f4(0.0)

@@ -20,7 +20,6 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.bsdf import fresnel_dielectric
 from pmviewer.kernels.jit import device
@@ -39,6 +38,7 @@ from pmviewer.kernels.scene import (
     M_SPEC_TRANS,
     MATERIAL_COLUMNS,
 )
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.kernels.texture import texture_value
 from pmviewer.kernels.uv import hit_uv
 from pmviewer.kernels.vector import dot, luminance, scale
@@ -80,14 +80,10 @@ class PrincipledParams(NamedTuple):
     coat_alpha: Any
 
 
+@specialised
 def metallic_at(scene, material, prim, b1, b2, p):
     """The material's metallic share at the point p of primitive `prim`, at its coordinates (b1, b2)."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(metallic_at)
-def _metallic_at(scene, material, prim, b1, b2, p):
-    if "textures" not in scene.fields:
+    if not has(scene, "textures"):
         return lambda scene, material, prim, b1, b2, p: load_f4(
             scene.materials, material * MATERIAL_COLUMNS + M_METALLIC
         )

@@ -12,7 +12,6 @@ any scale do: there is no absolute epsilon here, callers offset the origin or ch
 from __future__ import annotations
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.instance import (
     G_BLOCKS,
@@ -45,7 +44,6 @@ from pmviewer.kernels.opacity import (
     Veil,
     VeiledInstances,
     hit_counts,
-    is_a,
     lets_pass,
     ray_key,
     triangle_counts,
@@ -61,6 +59,7 @@ from pmviewer.kernels.simd import (
     hit_boxes,
     hit_triangles,
 )
+from pmviewer.kernels.specialise import is_a, specialised
 
 QUADRIC_BYTES = 4 * QUADRIC_FLOATS
 STACK_INTS = 1024  # 512 keys; a level pushes at most 7, and the build keeps trees below 72 levels
@@ -173,18 +172,14 @@ def _occluded_in_veiled_leaf(veiled, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
     return _occluded_in_tree(veil, nodes, blocks, n_blocks, px, py, pz, vx, vy, vz, tmin - start, tmax - start)
 
 
+@specialised
 def meet_leaf(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
     """(t, primitive, u, v) of the nearest hit with what is no block; t = tmax without one."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(meet_leaf)
-def _meet_leaf(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
-    if is_a(VeiledInstances, leaves):
+    if is_a(leaves, VeiledInstances):
         return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: _closest_in_veiled_leaf(
             leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax
         )
-    if is_a(Veil, leaves):
+    if is_a(leaves, Veil):
         return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: (
             _closest_veiled_quadric(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax),
             np.int32(leaves.n_triangles + leaf),
@@ -203,18 +198,14 @@ def _meet_leaf(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
     )
 
 
+@specialised
 def leaf_occludes(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
     """Whether the ray meets what is no block."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(leaf_occludes)
-def _leaf_occludes(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
-    if is_a(VeiledInstances, leaves):
+    if is_a(leaves, VeiledInstances):
         return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: _occluded_in_veiled_leaf(
             leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax
         )
-    if is_a(Veil, leaves):
+    if is_a(leaves, Veil):
         return lambda leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax: (
             _closest_veiled_quadric(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax) < tmax
         )
@@ -227,14 +218,10 @@ def _leaf_occludes(leaves, leaf, ox, oy, oz, dx, dy, dz, tmin, tmax):
     )
 
 
+@specialised
 def block_occludes(leaves, block, mask, scratch):
     """Whether one of the triangles that `hit_triangles` found in a block stops the ray."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(block_occludes)
-def _block_occludes(leaves, block, mask, scratch):
-    if not (is_a(Veil, leaves) or is_a(VeiledInstances, leaves)):
+    if not (is_a(leaves, Veil) or is_a(leaves, VeiledInstances)):
         return lambda leaves, block, mask, scratch: mask != 0
 
     def veiled(leaves, block, mask, scratch):
@@ -249,6 +236,7 @@ def _block_occludes(leaves, block, mask, scratch):
     return veiled
 
 
+@specialised
 def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     """(t, primitive, u, v) of the nearest hit; (tmax, -1, 0, 0) without one.
 
@@ -256,11 +244,6 @@ def closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     triangle's second and third vertex, 0 for quadrics. Negative tmin counts as 0. A ray with a non-finite number hits
     nothing.
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(closest_hit)
-def _closest_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     if lets_pass(scene) and has_instances(scene):
         return lambda scene, ox, oy, oz, dx, dy, dz, tmin, tmax: _closest_in_scene(
             VeiledInstances(scene, ray_key(ox, oy, oz, dx, dy, dz)), scene.bvh_nodes, scene.bvh_blocks,
@@ -361,13 +344,9 @@ def _closest(leaves, nodes, blocks, n_blocks, ox, oy, oz, dx, dy, dz, tmin, tmax
 _closest_in_tree, _closest_in_scene = device(_closest), device(_closest)
 
 
+@specialised
 def occluded(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     """Whether the ray meets anything; False for a ray with a non-finite number."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(occluded)
-def _any_hit(scene, ox, oy, oz, dx, dy, dz, tmin, tmax):
     if lets_pass(scene) and has_instances(scene):
         return lambda scene, ox, oy, oz, dx, dy, dz, tmin, tmax: _occluded_in_scene(
             VeiledInstances(scene, ray_key(ox, oy, oz, dx, dy, dz)), scene.bvh_nodes, scene.bvh_blocks,

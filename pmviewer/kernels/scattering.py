@@ -15,10 +15,9 @@ power; radiance is multiplied by the `compression` (n_i/n_t)² as well.
 from __future__ import annotations
 
 from types import ModuleType
+from typing import Any
 
 import numpy as np
-from numba.core import types
-from numba.extending import overload
 
 from pmviewer.kernels import lobes, principled_bsdf
 from pmviewer.kernels.blend import blend_keeps, chosen_part, inside_attenuation
@@ -37,6 +36,7 @@ from pmviewer.kernels.plain_bsdf import (
 from pmviewer.kernels.principled import metallic_at
 from pmviewer.kernels.random import draw1, draw4
 from pmviewer.kernels.scene import BLEND, material_kind
+from pmviewer.kernels.specialise import has, is_a, specialised
 from pmviewer.kernels.vector import dot, scale
 
 __all__ = [
@@ -67,14 +67,15 @@ _f4 = np.float32
 
 def is_plain(b: object) -> bool:
     """Whether the type of a BSDF in a kernel is that of simple scenes."""
-    return isinstance(b, types.BaseNamedTuple) and b.instance_class is PlainBsdf
+    return is_a(b, PlainBsdf)
 
 
-def _rich(b: types.Type) -> ModuleType:
+def _rich(b: Any) -> ModuleType:
     """The module that knows a BSDF's type in kernels of rich scenes."""
-    return principled_bsdf if b.instance_class is principled_bsdf.AnyBsdf else lobes
+    return principled_bsdf if is_a(b, principled_bsdf.AnyBsdf) else lobes
 
 
+@specialised
 def bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
     """The BSDF at the point p of primitive `prim`, at its coordinates (u, v), with normals ng and ns, seen from wo.
 
@@ -82,12 +83,7 @@ def bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
     or bits STORED and FOLLOWED) and `albedo` are for anyone to read. A black surface, or the back of a one-sided one,
     has no groups.
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(bsdf_at)
-def _bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
-    if "blends" in scene.fields:
+    if has(scene, "blends"):
 
         def blended(scene, prim, material, u, v, p, ng, ns, wo, glossy):
             part = chosen_part(scene, material, prim, u, v, p, wo)
@@ -97,17 +93,12 @@ def _bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
     return _unblended(scene, prim, material, u, v, p, ng, ns, wo, glossy)
 
 
-def unblended(scene, prim, material, u, v, p, ng, ns, wo, glossy):
-    """`bsdf_at` of a material that is no blend."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(unblended)
 def _unblended(scene, prim, material, u, v, p, ng, ns, wo, glossy):
-    if "principled" in scene.fields:
+    """`bsdf_at` of a material that is no blend."""
+    if has(scene, "principled"):
         return _with_principled(scene)
 
-    if "bsdfs" in scene.fields and "textures" in scene.fields:
+    if has(scene, "bsdfs") and has(scene, "textures"):
 
         def textured(scene, prim, material, u, v, p, ng, ns, wo, glossy):
             numbers = texture_params(scene, material, prim, u, v, p)
@@ -116,7 +107,7 @@ def _unblended(scene, prim, material, u, v, p, ng, ns, wo, glossy):
 
         return textured
 
-    if "bsdfs" in scene.fields:
+    if has(scene, "bsdfs"):
 
         def rich(scene, prim, material, u, v, p, ng, ns, wo, glossy):
             tangent = (_f4(0.0), _f4(0.0), _f4(0.0))
@@ -130,9 +121,12 @@ def _unblended(scene, prim, material, u, v, p, ng, ns, wo, glossy):
     return plain
 
 
+unblended = specialised(_unblended)
+
+
 def _with_principled(scene):
     """`unblended` for scenes with principled materials, by the type of the scene's record."""
-    if "textures" in scene.fields:
+    if has(scene, "textures"):
 
         def textured(scene, prim, material, u, v, p, ng, ns, wo, glossy):
             numbers = texture_params(scene, material, prim, u, v, p)
@@ -151,20 +145,17 @@ def _with_principled(scene):
     return untextured
 
 
+@specialised
 def keeps(scene, material, b, ng, wo, glossy):
     """The groups that photons are kept for at a hit seen from wo: STORED, and FOLLOWED where such lobes are no deltas.
 
     b is the BSDF there and ng the surface's normal, outwards. Of a blend, where b is that of one part, those of all.
     """
-    raise NotImplementedError("only for kernels")
 
-
-@overload(keeps)
-def _keeps(scene, material, b, ng, wo, glossy):
     def own(scene, material, b, ng, wo, glossy):
         return b.groups & STORED if is_delta(b) else b.groups
 
-    if "blends" not in scene.fields:
+    if not has(scene, "blends"):
         return own
 
     def blended(scene, material, b, ng, wo, glossy):
@@ -175,90 +166,62 @@ def _keeps(scene, material, b, ng, wo, glossy):
     return blended
 
 
+@specialised
 def bsdf_f(b, group, wo, wi):
     """Value of a group's lobes (red, green, blue); 0 for deltas."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(bsdf_f)
-def _bsdf_f(b, group, wo, wi):
     if not is_plain(b):
         f = _rich(b).bsdf_f
         return lambda b, group, wo, wi: f(b, group, wo, wi)
     return lambda b, group, wo, wi: plain_f(b, group, wo, wi)
 
 
+@specialised
 def bsdf_pdf(b, group, wo, wi):
     """Density per solid angle of `bsdf_sample` within the group; 0 for deltas."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(bsdf_pdf)
-def _bsdf_pdf(b, group, wo, wi):
     if not is_plain(b):
         f = _rich(b).bsdf_pdf
         return lambda b, group, wo, wi: f(b, group, wo, wi)
     return lambda b, group, wo, wi: plain_pdf(b, group, wo, wi)
 
 
+@specialised
 def bsdf_sample(scene, b, group, wo, u_lobe, u, v):
     """A direction from the group's lobes: (wi, f·|cos|/pdf, pdf, compression); the pdf of a delta is 0."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(bsdf_sample)
-def _bsdf_sample(scene, b, group, wo, u_lobe, u, v):
     if not is_plain(b):
         f = _rich(b).bsdf_sample
         return lambda scene, b, group, wo, u_lobe, u, v: f(b, group, wo, u_lobe, u, v)
     return lambda scene, b, group, wo, u_lobe, u, v: plain_sample(scene, b, group, wo, u_lobe, u, v)
 
 
+@specialised
 def same_side(b, group, ng, wo, wi):
     """1 when wi may leave the surface by the group: on the side of ng, which points to wo, or by transmission."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(same_side)
-def _same_side(b, group, ng, wo, wi):
     if not is_plain(b):
         f = _rich(b).sees_side
         return lambda b, group, ng, wo, wi: 1 if f(b, group, ng, wo, wi) else 0
     return lambda b, group, ng, wo, wi: 1 if group == FOLLOWED or dot(ng, wi) > _f4(0.0) else 0
 
 
+@specialised
 def shading_normal(b):
     """The normal that cosines are measured with."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(shading_normal)
-def _shading_normal(b):
     if not is_plain(b):
         return lambda b: b.n
     return lambda b: b.facing
 
 
+@specialised
 def followed_share(b, wo):
     """Probability with which a path that can take one group only takes FOLLOWED; 0 or 1 when there is but one."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(followed_share)
-def _followed_share(b, wo):
     if not is_plain(b):
         f = _rich(b).followed_share
         return lambda b, wo: f(b, wo)
     return lambda b, wo: _f4(1.0) if b.groups == FOLLOWED else _f4(0.0)
 
 
+@specialised
 def pick_group(b, wo, u):
     """A group for a path that can take one only: (group, one over its probability, a number to use again)."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(pick_group)
-def _pick_group(b, wo, u):
     if not is_plain(b):
         share_of = _rich(b).followed_share
 
@@ -273,68 +236,48 @@ def _pick_group(b, wo, u):
     return lambda b, wo, u: (b.groups, _f4(1.0), u)
 
 
+@specialised
 def transmits(b):
     """Whether the FOLLOWED lobes may transmit light."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(transmits)
-def _transmits(b):
     if not is_plain(b):
         f = _rich(b).bsdf_transmits
         return lambda b: f(b)
     return lambda b: False
 
 
+@specialised
 def compressed(b, wo, wi, f):
     """f for radiance from wi: times the `compression` (n_i/n_t)², given apart by `bsdf_sample`, if refracted."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(compressed)
-def _compressed(b, wo, wi, f):
     if not is_plain(b):
         factor = _rich(b).bsdf_compression
         return lambda b, wo, wi, f: scale(f, factor(b, wo, wi))
     return lambda b, wo, wi, f: f
 
 
+@specialised
 def is_delta(b):
     """Whether the FOLLOWED lobes are deltas."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(is_delta)
-def _is_delta(b):
     if not is_plain(b):
         return lambda b: b.delta
     return lambda b: True
 
 
+@specialised
 def is_lambertian(b):
     """Whether the STORED lobes are Lambertian, so that irradiance says everything."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(is_lambertian)
-def _is_lambertian(b):
     if not is_plain(b):
         f = _rich(b).bsdf_is_lambertian
         return lambda b: f(b)
     return lambda b: True
 
 
+@specialised
 def chain_numbers(scene, sequence, seed, index, dimension):
     """Four numbers for following a lobe: for the choice of lobe, two for the direction, one for roulette.
 
     Simple materials use the first of the direction's alone.
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(chain_numbers)
-def _chain_numbers(scene, sequence, seed, index, dimension):
-    if "bsdfs" in scene.fields:
+    if has(scene, "bsdfs"):
         return lambda scene, sequence, seed, index, dimension: draw4(sequence, seed, index, dimension)
 
     def one(scene, sequence, seed, index, dimension):
@@ -343,16 +286,12 @@ def _chain_numbers(scene, sequence, seed, index, dimension):
     return one
 
 
+@specialised
 def attenuation(scene, material, ng, d, t, beta):
     """beta after a ray of direction d and length t that ends on this material: less when it came through a dielectric
     that absorbs (Beer–Lambert)."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(attenuation)
-def _attenuation(scene, material, ng, d, t, beta):
-    if "blends" in scene.fields or "principled" in scene.fields:
+    if has(scene, "blends") or has(scene, "principled"):
         return lambda scene, material, ng, d, t, beta: inside_attenuation(scene, material, ng, d, t, beta)
-    if "bsdfs" in scene.fields:
+    if has(scene, "bsdfs"):
         return lambda scene, material, ng, d, t, beta: lobes.interior_attenuation(scene, material, ng, d, t, beta)
     return lambda scene, material, ng, d, t, beta: beta

@@ -11,11 +11,11 @@ Memory layouts (float32 unless noted, each row is eight lanes = 32 bytes, addres
 
 from __future__ import annotations
 
+import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 
-from pmviewer.kernels.memory import F32, I8, I32, I64
+from pmviewer.kernels.memory import F32, I8, I32, I64, at_address, with_twin
 
 LANES = 8
 ROW_BYTES = 4 * LANES
@@ -57,7 +57,23 @@ def _mask(builder, lanes):
     return builder.zext(builder.bitcast(lanes, I8), I32)
 
 
-@intrinsic
+def _bits(lanes):
+    return np.int32(np.packbits(lanes, bitorder="little")[0])
+
+
+def _hit_boxes(node, near_x, near_y, near_z, ox, oy, oz, ix, iy, iz, tmin, tmax, out):
+    enter, leave = np.full(LANES, tmin, np.float32), np.full(LANES, tmax, np.float32)
+    with np.errstate(invalid="ignore", over="ignore"):
+        for near, o, i in zip((near_x, near_y, near_z), (ox, oy, oz), (ix, iy, iz)):
+            t0 = (at_address(node + near, LANES, np.float32) - o) * i
+            t1 = (at_address(node + (near ^ ROW_BYTES), LANES, np.float32) - o) * i
+            enter, leave = np.where(t0 > enter, t0, enter), np.where(t1 < leave, t1, leave)
+        leave = leave * np.float32(FAR_FACTOR)
+        out.view(np.float32)[:LANES] = enter
+        return _bits(enter <= leave)
+
+
+@with_twin(_hit_boxes)
 def hit_boxes(typingctx, node, near_x, near_y, near_z, ox, oy, oz, ix, iy, iz, tmin, tmax, out):
     """Lanes of the node at address `node` whose boxes the ray meets in [tmin, tmax]; entry distances go to `out`.
 
@@ -87,7 +103,23 @@ def hit_boxes(typingctx, node, near_x, near_y, near_z, ox, oy, oz, ix, iy, iz, t
     return signature, codegen
 
 
-@intrinsic
+def _hit_triangles(block, ox, oy, oz, dx, dy, dz, tmin, tmax, out):
+    v0, e1, e2 = at_address(block, 9 * LANES, np.float32).reshape(3, 3, LANES)
+    d, o = np.array([dx, dy, dz], np.float32)[:, None], np.array([ox, oy, oz], np.float32)[:, None]
+    with np.errstate(all="ignore"):
+        p = np.cross(d, e2, axis=0)
+        inverse = np.float32(1.0) / (e1 * p).sum(axis=0)
+        s = o - v0
+        u = (s * p).sum(axis=0) * inverse
+        q = np.cross(s, e1, axis=0)
+        v = (d * q).sum(axis=0) * inverse
+        t = (e2 * q).sum(axis=0) * inverse
+        low, high = np.float32(-EDGE_TOLERANCE), np.float32(1.0 + EDGE_TOLERANCE)
+        out.view(np.float32)[: 3 * LANES] = np.concatenate([t, u, v])
+        return _bits((u >= low) & (v >= low) & (u + v <= high) & (t > tmin) & (t < tmax))
+
+
+@with_twin(_hit_triangles)
 def hit_triangles(typingctx, block, ox, oy, oz, dx, dy, dz, tmin, tmax, out):
     """Lanes of the block at address `block` whose triangles the ray meets with tmin < t < tmax.
 

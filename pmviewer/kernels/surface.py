@@ -9,7 +9,6 @@ by a constant: scenes of any size give the same picture, and a wide floor parall
 from __future__ import annotations
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.instance import (
     I_TO_LOCAL,
@@ -24,6 +23,7 @@ from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.quadric import quadric_normal, quadric_project
 from pmviewer.kernels.scene import load3
+from pmviewer.kernels.specialise import specialised
 from pmviewer.kernels.vector import cross, dot, normalize, sub
 
 _f4 = np.float32
@@ -48,13 +48,9 @@ def gap_of(n, size_x, size_y, size_z):
     return OFFSET * (abs(n[0]) * size_x + abs(n[1]) * size_y + abs(n[2]) * size_z)
 
 
+@specialised
 def surface_at(scene, prim, u, v, ox, oy, oz, dx, dy, dz, t):
     """The point hit, its geometric unit normal, its shading unit normal (same side), and the gap for `leave`."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(surface_at)
-def _surface_at(scene, prim, u, v, ox, oy, oz, dx, dy, dz, t):
     if has_instances(scene):
         return lambda scene, prim, u, v, ox, oy, oz, dx, dy, dz, t: _through_instances(
             scene, prim, u, v, ox, oy, oz, dx, dy, dz, t

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4, load_i4, load_i8
@@ -41,6 +40,7 @@ from pmviewer.kernels.scene import (
     light_number,
     light_vector,
 )
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.kernels.table import find_interval
 from pmviewer.kernels.texture import texture_rgb
 from pmviewer.kernels.uv import azimuth, barycentrics, disk_uv, hit_uv, in_frame, sphere_uv
@@ -58,56 +58,40 @@ def _setting(scene, light, column):
     return load_i8(scene.light_textures, light * LIGHT_TEXTURE_COLUMNS + column)
 
 
+@specialised
 def spread(scene, light, u, v):
     """Uniform numbers (u, v) as those that `light_point` shall get, and the density per area relative to a uniform one:
     (u, v, 1) for a light without texture."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(spread)
-def _spread(scene, light, u, v):
-    if "light_textures" not in scene.fields:
+    if not has(scene, "light_textures"):
         return lambda scene, light, u, v: (u, v, _f4(1.0))
     return lambda scene, light, u, v: _spread_by_table(scene, light, u, v)
 
 
+@specialised
 def area_density(scene, light, p):
     """The density that `spread` returns when `light_point` makes the point p."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(area_density)
-def _area_density(scene, light, p):
-    if "light_textures" not in scene.fields:
+    if not has(scene, "light_textures"):
         return lambda scene, light, p: _f4(1.0)
     return lambda scene, light, p: _density_by_table(scene, light, p)
 
 
+@specialised
 def radiance_from(scene, light, p, u, v):
     """Radiance that an area light emits at its point p = `light_point`(u, v), on the side that emits."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(radiance_from)
-def _radiance_from(scene, light, p, u, v):
-    if "light_textures" not in scene.fields:
+    if not has(scene, "light_textures"):
         return lambda scene, light, p, u, v: light_vector(scene, light, L_RADIANCE)
     return lambda scene, light, p, u, v: _textured_from(scene, light, p, u, v)
 
 
+@specialised
 def emission_at(scene, light, prim, p):
     """The radiance of what a ray has hit there, on the light's primitive `prim`: where the surface lets rays pass, the
     same over its opacity, because that many are stopped."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(emission_at)
-def _emission_at(scene, light, prim, p):
-    if lets_pass(scene) and "light_textures" not in scene.fields:
+    if lets_pass(scene) and not has(scene, "light_textures"):
         return lambda scene, light, prim, p: _uncovered(scene, prim, p, light_vector(scene, light, L_RADIANCE))
     if lets_pass(scene):
         return lambda scene, light, prim, p: _uncovered(scene, prim, p, _textured_at(scene, light, prim, p))
-    if "light_textures" not in scene.fields:
+    if not has(scene, "light_textures"):
         return lambda scene, light, prim, p: light_vector(scene, light, L_RADIANCE)
     return lambda scene, light, prim, p: _textured_at(scene, light, prim, p)
 

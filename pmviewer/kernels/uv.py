@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.instance import (
     I_TO_LOCAL,
@@ -24,6 +23,7 @@ from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.quadric import CYLINDER, QUADRIC_FLOATS, SPHERE
 from pmviewer.kernels.scene import load3
+from pmviewer.kernels.specialise import specialised
 from pmviewer.kernels.vector import basis, cross, dot, scale, sub
 
 _f4 = np.float32
@@ -65,13 +65,9 @@ def disk_uv(x, y, radius):
     return _f4(math.sqrt(x * x + y * y)) / radius, azimuth(x, y)
 
 
+@specialised
 def hit_uv(scene, prim, b1, b2, p):
     """Texture coordinates of the point p of primitive `prim`; (b1, b2) are a triangle's barycentric coordinates."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(hit_uv)
-def _hit_uv(scene, prim, b1, b2, p):
     if not has_instances(scene):
         return lambda scene, prim, b1, b2, p: stored_uv(scene, prim, b1, b2, p)
 
@@ -110,13 +106,9 @@ def stored_uv(scene, prim, b1, b2, p):
     return disk_uv(x, y, radius)
 
 
+@specialised
 def hit_tangents(scene, prim, p, ng):
     """∂p/∂u and ∂p/∂v there; two axes orthogonal to the normal where texture coordinates say nothing."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(hit_tangents)
-def _hit_tangents(scene, prim, p, ng):
     if not has_instances(scene):
         return lambda scene, prim, p, ng: _stored_tangents(scene, prim, p, ng)
 

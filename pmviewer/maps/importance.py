@@ -27,11 +27,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 
 from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.memory import float_of_bits, load_f4, load_u4, stack_get_i8, stack_i4, stack_put_f4
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.kernels.vector import basis, normalize
 from pmviewer.maps.hull import (
     DIRECTIONS,
@@ -217,18 +217,14 @@ def _nearest_importon(importance, p, n):
     return key & _i8(0xFFFFFFFF), float_of_bits(_u4(key >> 32))
 
 
+@specialised
 def importance_at(importance, p, n):
     """Importance Γ (float32, pixels per unit area) at the point p with unit normal n, for the normal's side.
 
     That of the nearest importon on this side, 0 beyond its reach: where nothing looks. `importance` is the record of
     an ImportanceMap, or that of NO_IMPORTANCE, which makes everything equally important (1).
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(importance_at)
-def _importance_at(importance, p, n):
-    if "none" in importance.fields:
+    if has(importance, "none"):
         return lambda importance, p, n: _f4(1.0)
 
     def at(importance, p, n):
@@ -241,18 +237,14 @@ def _importance_at(importance, p, n):
     return at
 
 
+@specialised
 def importance_sum(importance, p, n, k):
     """ΣW (float32, pixels): importance of the k nearest importons within `sum_radius` of the point p, on the side of
     its unit normal n, for the probability of depositing a photon (Keller and Wald §2.2). k: int32, 1 … MAX_K.
 
     1 for the record of NO_IMPORTANCE.
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(importance_sum)
-def _importance_sum(importance, p, n, k):
-    if "none" in importance.fields:
+    if has(importance, "none"):
         return lambda importance, p, n, k: _f4(1.0)
 
     def summed(importance, p, n, k):

@@ -11,7 +11,6 @@ a disc of a fixed radius are.
 from __future__ import annotations
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import (
@@ -25,6 +24,7 @@ from pmviewer.kernels.memory import (
     stack_put_f4,
     stack_put_i4,
 )
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.maps.grid import BLOCK_BYTES, ROW_BYTES, grid_ranges, lanes_between
 from pmviewer.maps.kdtree import KEYS
 from pmviewer.maps.nearest import nearest_disc
@@ -41,6 +41,7 @@ _i8 = np.int64
 _u4 = np.uint32
 
 
+@specialised
 def search(photons, eye, radius, p, n, class_mask, scratch):
     """Start a look-up around the point p with unit normal n.
 
@@ -55,12 +56,7 @@ def search(photons, eye, radius, p, n, class_mask, scratch):
     What `next_batch` needs to go on; the squared radius of the disc, float32; the place of the photon that ends it,
     int64, −1 with a fixed radius, where there are fewer than k, and in a part of the disc.
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(search)
-def _search(photons, eye, radius, p, n, class_mask, scratch):
-    if "planes" in photons.fields:
+    if has(photons, "planes"):
 
         def k_nearest(photons, eye, radius, p, n, class_mask, scratch):
             count, rim, r2 = nearest_disc(
@@ -91,6 +87,7 @@ def _search(photons, eye, radius, p, n, class_mask, scratch):
     return within
 
 
+@specialised
 def next_batch(photons, found, run, at, scratch):
     """Some more photons of a look-up; the first call has run = at = 0 (int64).
 
@@ -98,12 +95,7 @@ def next_batch(photons, found, run, at, scratch):
     (int32) and from element WIDTH on their squared distances (float32; with the k nearest in the metric of the
     flattened disc).
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(next_batch)
-def _next_batch(photons, found, run, at, scratch):
-    if "planes" in photons.fields:
+    if has(photons, "planes"):
 
         def of_keys(photons, found, run, at, scratch):
             some = min(found - at, _i8(WIDTH))
@@ -151,14 +143,10 @@ def _column(photons, place):
     return photons.blocks + (place // WIDTH) * BLOCK_BYTES + 4 * (place % WIDTH)
 
 
+@specialised
 def place_of(photons, place):
     """Position (x, y, z) of the photon at a place (int64)."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(place_of)
-def _place_of(photons, place):
-    if "planes" in photons.fields:
+    if has(photons, "planes"):
 
         def in_tree(photons, place):
             return load_f4(photons.x, place), load_f4(photons.y, place), load_f4(photons.z, place)
@@ -172,14 +160,10 @@ def _place_of(photons, place):
     return in_grid
 
 
+@specialised
 def power_of(photons, place):
     """Red, green, blue power of the photon at a place (int64), in units of the map's power."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(power_of)
-def _power_of(photons, place):
-    if "planes" in photons.fields:
+    if has(photons, "planes"):
 
         def in_tree(photons, place):
             return stored_power(photons, place)

@@ -6,13 +6,13 @@ Each coordinate or word of eight photons lies in eight successive elements, so t
 
 from __future__ import annotations
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
 
-from pmviewer.kernels.memory import F32, I8, I32
-from pmviewer.maps.record import EXPONENT_BASE
+from pmviewer.kernels.memory import F32, I8, I32, at_address, with_twin
+from pmviewer.maps.record import EXPONENT_BASE, decode_direction, decode_power
 
 WIDTH = 8
 _VECTOR = ir.VectorType(F32, WIDTH)
@@ -52,7 +52,21 @@ def _dot(builder, a, b):
     return total
 
 
-@intrinsic
+def _offsets(x_address, y_address, z_address, x, y, z):
+    return [at_address(a, WIDTH, np.float32) - c for a, c in ((x_address, x), (y_address, y), (z_address, z))]
+
+
+def _bits(lanes):
+    return np.int32(np.packbits(lanes, bitorder="little")[0])
+
+
+def _within8(x_address, y_address, z_address, x, y, z, r2, squared):
+    total = sum(d * d for d in _offsets(x_address, y_address, z_address, x, y, z))
+    squared.view(np.float32)[:WIDTH] = total
+    return _bits(total < r2)
+
+
+@with_twin(_within8)
 def within8(typingctx, x_address, y_address, z_address, x, y, z, r2, squared):
     """Which of eight photons lie closer than sqrt(r2) to (x, y, z).
 
@@ -83,7 +97,7 @@ def within8(typingctx, x_address, y_address, z_address, x, y, z, r2, squared):
     return signature, codegen
 
 
-@intrinsic
+@with_twin(lambda mask: np.int32((int(mask) & 0xFFFFFFFF).bit_count()))
 def count_bits(typingctx, mask):
     """Number of set bits of an int32."""
     signature = types.int32(types.int32)
@@ -94,7 +108,16 @@ def count_bits(typingctx, mask):
     return signature, codegen
 
 
-@intrinsic
+def _facing8(x_address, y_address, z_address, words, x, y, z, nx, ny, nz, height, class_mask):
+    n = (nx, ny, nz)
+    above = sum(d * c for d, c in zip(_offsets(x_address, y_address, z_address, x, y, z), n))
+    word = at_address(words, WIDTH, np.uint32)
+    wanted = (int(class_mask) >> (word >> 6 & 3).astype(np.int64)) & 1
+    front = [sum(d * c for d, c in zip(decode_direction(w), n)) > 0 for w in word]
+    return _bits((np.abs(above) <= height) & (wanted == 1) & front)
+
+
+@with_twin(_facing8)
 def facing8(typingctx, x_address, y_address, z_address, words, x, y, z, nx, ny, nz, height, class_mask):
     """Which of eight photons arrive from the side of the normal, within `height` of the tangent plane, on a path of a
     class in `class_mask`.
@@ -135,7 +158,16 @@ def facing8(typingctx, x_address, y_address, z_address, words, x, y, z, nx, ny, 
     return signature, codegen
 
 
-@intrinsic
+def _add_power8(rg_words, b_words, mask, weights, sums):
+    rg, b = at_address(rg_words, WIDTH, np.uint32), at_address(b_words, WIDTH, np.uint32)
+    partial, weight = sums.view(np.float32).reshape(-1, WIDTH), weights.view(np.float32)
+    for lane in range(WIDTH):
+        if mask >> lane & 1:
+            for channel, code in enumerate((rg[lane] & 0xFFFF, rg[lane] >> 16, b[lane] & 0xFFFF)):
+                partial[channel, lane] += decode_power(code) * weight[lane]
+
+
+@with_twin(_add_power8)
 def add_power8(typingctx, rg_words, b_words, mask, weights, sums):
     """Adds the weighted powers of those of eight photons whose bit is set in `mask`.
 

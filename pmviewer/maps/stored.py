@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import load_f4, load_u4
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.maps.record import decode_direction, decode_power
 
 ALL_CLASSES = 0b1111
@@ -17,17 +17,13 @@ _i4 = np.int32
 _u4 = np.uint32
 
 
+@specialised
 def arrives(photons, i, nx, ny, nz, class_mask):
     """Whether photon i comes from the side that the normal points to, on a path whose class has its bit set.
 
     Importons (`pmviewer.maps.importance`) have their surface's normal for a direction: it has to be similar.
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(arrives)
-def _arrives(photons, i, nx, ny, nz, class_mask):
-    if "importons" in photons.fields:
+    if has(photons, "importons"):
 
         def similar(photons, i, nx, ny, nz, class_mask):
             wx, wy, wz = decode_direction(load_u4(photons.payload, 3 * i))

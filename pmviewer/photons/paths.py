@@ -9,12 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import types
-from numba.extending import overload
 from numpy.typing import NDArray
 
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.memory import float_of_bits
+from pmviewer.kernels.specialise import absent, specialised
 from pmviewer.maps.record import encode_direction, encode_power
 
 MOST_VERTICES = 64
@@ -70,14 +69,10 @@ def _put(paths, i, p, wi, beta, flags, light):
     counts[i] = row + 1
 
 
+@specialised
 def begin_path(paths, i, p, d, beta, light):
     """Photon i of the pass leaves its light at p in direction d. `paths`: None, or `PhotonPaths.arguments`."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(begin_path)
-def _begin_path(paths, i, p, d, beta, light):
-    if isinstance(paths, types.NoneType):
+    if absent(paths):
 
         def nothing(paths, i, p, d, beta, light):
             pass
@@ -92,14 +87,10 @@ def _begin_path(paths, i, p, d, beta, light):
     return begin
 
 
+@specialised
 def extend_path(paths, i, prim, p, d, beta, flags, light):
     """It flew in direction d to the surface point p, or, where prim < 0, from p out of the scene."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(extend_path)
-def _extend_path(paths, i, prim, p, d, beta, flags, light):
-    if isinstance(paths, types.NoneType):
+    if absent(paths):
 
         def nothing(paths, i, prim, p, d, beta, flags, light):
             pass

@@ -21,13 +21,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.light import emit_from, emit_photon, light_point
 from pmviewer.kernels.memory import load_f4, load_i4
 from pmviewer.kernels.random import draw1
 from pmviewer.kernels.scene import DISK, L_KIND, L_RADIANCE, PARALLELOGRAM, light_number, light_vector
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.kernels.surface import leave
 from pmviewer.kernels.table import find_interval
 from pmviewer.kernels.vector import along, basis, dot, luminance, scale
@@ -90,17 +90,13 @@ def _from_curved_light(scene, light, position, d, u):
     return leave(p, n, gap, d[0], d[1], d[2]), d, beta, dot(front, d) > _f4(0.0) and u < abs(dot(n, d))
 
 
+@specialised
 def emission(scene, projection, i, sequence, seed, index, u_pick, position, direction):
     """A photon leaving a light: origin, unit direction, power of luminance 1, light, whether it is to be traced, and
     the factor by which its power counts in the units of the map. `projection` is one record of PROJECTION_DTYPE, of
     NO_PROJECTION, of strata (`pmviewer.photons.strata`) or of importons (`pmviewer.photons.scattered`); i is its
     trajectory's number in the pass; the rest as `emit_photon`."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(emission)
-def _emission(scene, projection, i, sequence, seed, index, u_pick, position, direction):
-    if "none" in projection.fields:
+    if has(projection, "none"):
 
         def everywhere(scene, projection, i, sequence, seed, index, u_pick, position, direction):
             p, d, beta, light = emit_photon(scene, u_pick, position, direction)
@@ -108,7 +104,7 @@ def _emission(scene, projection, i, sequence, seed, index, u_pick, position, dir
 
         return everywhere
 
-    if "strata" in projection.fields:
+    if has(projection, "strata"):
 
         def stratified(scene, projection, i, sequence, seed, index, u_pick, position, direction):
             p, d, beta, light, weight = emit_stratified(scene, projection, i, seed, index, u_pick, position, direction)
@@ -116,7 +112,7 @@ def _emission(scene, projection, i, sequence, seed, index, u_pick, position, dir
 
         return stratified
 
-    if "scattered" in projection.fields:
+    if has(projection, "scattered"):
 
         def scattered(scene, projection, i, sequence, seed, index, u_pick, position, direction):
             p, d, worth = emit_scattered(projection, i, direction)

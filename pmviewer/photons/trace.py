@@ -11,7 +11,6 @@ threads and any batch size (T2). Dimension set 0 is emission, set 1 + b the b-th
 from __future__ import annotations
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.light import is_delta_light
@@ -33,6 +32,7 @@ from pmviewer.kernels.scattering import (
     shading_normal,
 )
 from pmviewer.kernels.scene import material_of
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.kernels.surface import STRAIGHT, adjoint_cosines, face, leave, surface_at
 from pmviewer.kernels.vector import dot, is_good, luminance, mul, scale
 from pmviewer.maps.record import (
@@ -100,14 +100,10 @@ def _store(out, row, p, wi, beta, flags, light):
     out[row, 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
 
 
+@specialised
 def _on_the_way(scene, material, ng, d, t, beta, worth, counts, ledgers, book):
     """beta after the way to a surface (`attenuation`), what was lost on it booked; black when it is no number."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(_on_the_way)
-def _book_the_way(scene, material, ng, d, t, beta, worth, counts, ledgers, book):
-    if "bsdfs" not in scene.fields:
+    if not has(scene, "bsdfs"):
         return lambda scene, material, ng, d, t, beta, worth, counts, ledgers, book: beta
 
     def booked(scene, material, ng, d, t, beta, worth, counts, ledgers, book):

@@ -7,10 +7,10 @@ compiled for the cache or, given NO_CACHE, for the gather alone.
 from __future__ import annotations
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.plain_bsdf import INV_PI
 from pmviewer.kernels.scattering import STORED, bsdf_sample, is_lambertian, shading_normal
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.kernels.vector import dot, largest, mul, scale
 from pmviewer.maps.irradiance_cache import interpolate
 from pmviewer.render.cast import cast
@@ -21,16 +21,12 @@ from pmviewer.render.record import C_CACHED, C_GATHERED, C_RAYS
 _f4 = np.float32
 
 
+@specialised
 def cached(cache, eye, p, b, counts):
     """(irradiance, gather rays that are still to be cast) at the point p of a surface with the BSDF b.
 
     `cache` is the record of an IrradianceCache, or of NO_CACHE: always all rays."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(cached)
-def _cached(cache, eye, p, b, counts):
-    if "none" in cache.fields:
+    if has(cache, "none"):
         return lambda cache, eye, p, b, counts: (BLACK, eye.gather_rays)
 
     def from_records(cache, eye, p, b, counts):
@@ -45,6 +41,7 @@ def _cached(cache, eye, p, b, counts):
     return from_records
 
 
+@specialised
 def surface_rays(
     cache,
     known,
@@ -77,41 +74,7 @@ def surface_rays(
 ):
     """`pmviewer.render.gather.gather_rays` where `gather` rays are to be cast, else direct light by n rays and indirect
     light from the irradiance `known`. Both are sums over n rays."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(surface_rays)
-def _surface_rays(
-    cache,
-    known,
-    gather,
-    scene,
-    eye,
-    photons,
-    sites,
-    guides,
-    corner,
-    shadows,
-    caustic_map,
-    choice_map,
-    choice,
-    found,
-    guided,
-    m,
-    beta,
-    p,
-    ng,
-    gap,
-    b,
-    wo,
-    n,
-    u_lobe,
-    u,
-    v,
-    seed,
-    counts,
-):
-    if "none" in cache.fields:
+    if has(cache, "none"):
 
         def plain(
             cache,

@@ -12,11 +12,11 @@ Kernels compile it only where it is used: `corner` is a record of NO_CORNERS or 
 from __future__ import annotations
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.scattering import STORED, bsdf_sample
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.kernels.vector import add, dot, largest, mul
 from pmviewer.render.cast import cast
 from pmviewer.render.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near
@@ -33,30 +33,22 @@ LIGHT_SET, RAY_SET = np.array([0, 1], np.int64)
 """Dimension sets of the second gather, whose seed is its own."""
 
 
+@specialised
 def is_corner(corner, eye, length):
     """Whether a gather ray of that length gathers again where it lands."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(is_corner)
-def _is_corner(corner, eye, length):
-    if "none" in corner.fields:
+    if has(corner, "none"):
         return lambda corner, eye, length: False
     return lambda corner, eye, length: length < eye.corner
 
 
+@specialised
 def gather_again(corner, scene, eye, shadows, caustic_map, choice_map, b, q, ng, gap, wo, seed, index, counts, hit):
     """Radiance towards wo at the point q where a gather ray landed, by a gather of its own; ng on the side of wo.
 
     Returns the direct light and caustics, and of the ray that brings the rest its weight, direction and what it met
     (`cast`).
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(gather_again)
-def _gather_again(corner, scene, eye, shadows, caustic_map, choice_map, b, q, ng, gap, wo, seed, index, counts, hit):
-    if "none" in corner.fields:
+    if has(corner, "none"):
         return (
             lambda corner, scene, eye, shadows, caustic_map, choice_map, b, q, ng, gap, wo, seed, index, counts, hit: (
                 BLACK,

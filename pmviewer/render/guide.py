@@ -17,7 +17,6 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 
 from pmviewer.kernels.jit import device
@@ -32,6 +31,7 @@ from pmviewer.kernels.memory import (
 )
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.scattering import STORED, bsdf_f, bsdf_pdf, bsdf_sample, shading_normal
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.kernels.vector import basis, dot, luminance, normalize, scale
 from pmviewer.maps.grid import BLOCK_BYTES, RECORD, ROW_BYTES, PhotonGrid, grid_ranges, lanes_between
 from pmviewer.maps.record import decode_direction, decode_power
@@ -154,18 +154,14 @@ def concentration(found, m, n):
     return _f4(16.0) * _f4(pairs) / _f4(m * (m - 1)) - _f4(1.0)
 
 
+@specialised
 def aim(guides, eye, p, ng, b, wo, seed, found):
     """Number of guided rays, n_p, among the gather rays of the point p, whose guides are put into `found` (AIM_WORDS
     words): 0, or that of the eye record. ng is the geometric normal on the side of wo.
 
     Returns (n_p, photons); both are arguments of `gather_direction`.
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(aim)
-def _aim(guides, eye, p, ng, b, wo, seed, found):
-    if "unguided" in guides.fields:
+    if has(guides, "unguided"):
         return lambda guides, eye, p, ng, b, wo, seed, found: (_i8(0), _i8(0))
 
     def by_cones(guides, eye, p, ng, b, wo, seed, found):
@@ -181,35 +177,28 @@ def _aim(guides, eye, p, ng, b, wo, seed, found):
         fill_cells(found, 4 * MOST_IN_CELLS, m, b, wo)
         return _i8(eye.guided_rays), m
 
-    return by_cones if "cones" in guides.fields else by_cells
+    return by_cones if has(guides, "cones") else by_cells
 
 
+@specialised
 def guided_direction(guides, found, m, b, u, v, u_pick):
     """A direction that m photons guide to, and its density per solid angle."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(guided_direction)
-def _guided_direction(guides, found, m, b, u, v, u_pick):
-    if "cones" in guides.fields:
+    if has(guides, "cones"):
         return lambda guides, found, m, b, u, v, u_pick: cone_direction(found, m, u, v, u_pick)
     at = 4 * MOST_IN_CELLS
     return lambda guides, found, m, b, u, v, u_pick: cell_direction(found, at, b, u, v, u_pick)
 
 
+@specialised
 def guided_pdf(guides, found, m, b, wi):
     """Density with which `guided_direction` comes to wi."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(guided_pdf)
-def _guided_pdf(guides, found, m, b, wi):
-    if "cones" in guides.fields:
+    if has(guides, "cones"):
         return lambda guides, found, m, b, wi: cone_pdf(found, m, wi)
     at = 4 * MOST_IN_CELLS
     return lambda guides, found, m, b, wi: cell_pdf(found, at, b, wi)
 
 
+@specialised
 def gather_direction(scene, eye, guides, found, guided, m, b, wo, j, n, seed, u_lobe, u, v):
     """Direction of ray j of n by the STORED lobes of the BSDF b; `guided` and m are what `aim` returned.
 
@@ -217,11 +206,7 @@ def gather_direction(scene, eye, guides, found, guided, m, b, wo, j, n, seed, u_
     a guided ray: its emission is none of its business), the share by multiple importance sampling in gathered light, a
     number to use and the ray's index in its sequences. Without gather rays the direction is that of (u_lobe, u, v).
     """
-    raise NotImplementedError("only for kernels")
 
-
-@overload(gather_direction)
-def _gather_direction(scene, eye, guides, found, guided, m, b, wo, j, n, seed, u_lobe, u, v):
     def by_bsdf(scene, eye, guides, found, guided, m, b, wo, j, n, seed, u_lobe, u, v):
         sample, u_end = eye.index, _f4(0.0)
         if eye.gather_rays > 0:
@@ -230,7 +215,7 @@ def _gather_direction(scene, eye, guides, found, guided, m, b, wo, j, n, seed, u
         wi, weight, pdf, _ = bsdf_sample(scene, b, STORED, wo, u_lobe, u, v)
         return wi, weight, pdf, _f4(1.0), u_end, sample
 
-    if "unguided" in guides.fields:
+    if has(guides, "unguided"):
         return by_bsdf
 
     def by_both(scene, eye, guides, found, guided, m, b, wo, j, n, seed, u_lobe, u, v):

@@ -7,9 +7,9 @@ nobody compiles a search or an estimate that is not used.
 from __future__ import annotations
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.memory import stack_i4
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.maps.differential import checked_irradiance, reach
 from pmviewer.maps.estimate import irradiance_knn, irradiance_radius
 from pmviewer.maps.hull import hull_irradiance
@@ -21,32 +21,28 @@ _f4 = np.float32
 _i8 = np.int64
 
 
+@specialised
 def irradiance(photons, eye, radius, p, n, class_mask):
     """Irradiance (red, green, blue) at the point p with normal n from photons of the classes in `class_mask`.
 
     `photons` is the record of a grid or a kd-tree, `eye` an EYE_DTYPE record, `radius` the radius of the pass or the
     maximum radius of the search for neighbours.
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(irradiance)
-def _irradiance(photons, eye, radius, p, n, class_mask):
-    if "hull" in photons.fields:
+    if has(photons, "hull"):
 
         def by_hull(photons, eye, radius, p, n, class_mask):
             return hull_irradiance(photons, eye, radius, p, n, class_mask)
 
         return by_hull
 
-    if "differential" in photons.fields:
+    if has(photons, "differential"):
 
         def checked(photons, eye, radius, p, n, class_mask):
             return checked_irradiance(photons, eye, radius, p, n, class_mask)
 
         return checked
 
-    if "planes" in photons.fields:
+    if has(photons, "planes"):
 
         def nearest(photons, eye, radius, p, n, class_mask):
             r, g, b, _, _ = irradiance_knn(
@@ -90,18 +86,14 @@ def _irradiance(photons, eye, radius, p, n, class_mask):
     return within
 
 
+@specialised
 def looked_up(photons, eye, radius, p, n, class_mask):
     """Radius of a look-up as `irradiance` makes it, and photons in it.
 
     Of a convex hull, the disc in which its photons were searched. With differential checking the mean of the folds'
     discs (of their areas), and the photons summed.
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(looked_up)
-def _looked_up(photons, eye, radius, p, n, class_mask):
-    if "hull" in photons.fields:
+    if has(photons, "hull"):
 
         def searched(photons, eye, radius, p, n, class_mask):
             scratch = (stack_i4(FOUND_WORDS), stack_i4(SQUARED_WORDS), stack_i4(BATCH_WORDS))
@@ -118,14 +110,14 @@ def _looked_up(photons, eye, radius, p, n, class_mask):
 
         return searched
 
-    if "differential" in photons.fields:
+    if has(photons, "differential"):
 
         def checked(photons, eye, radius, p, n, class_mask):
             return reach(photons, eye, radius, p, n, class_mask)
 
         return checked
 
-    if "planes" in photons.fields:
+    if has(photons, "planes"):
 
         def nearest(photons, eye, radius, p, n, class_mask):
             _, _, _, count, r = irradiance_knn(
@@ -173,18 +165,14 @@ NO_SITES = np.zeros(1, np.dtype([("none", np.int32)]))
 """Stands for radiance photons where there are none."""
 
 
+@specialised
 def gathered_irradiance(photons, sites, eye, p, n):
     """Irradiance from photons of all classes where a gather ray ends, at p with normal n.
 
     `sites` is the record of a RadianceMap: that of the nearest radiance photon, made by the first ray that needs it,
     and where none is near a look-up of its own. Or that of NO_SITES: always a look-up of its own.
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(gathered_irradiance)
-def _gathered_irradiance(photons, sites, eye, p, n):
-    if "none" in sites.fields:
+    if has(sites, "none"):
 
         def plain(photons, sites, eye, p, n):
             return irradiance(photons, eye, eye.global_radius, p, n, np.int32(ALL_CLASSES))

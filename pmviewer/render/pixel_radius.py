@@ -19,10 +19,9 @@ Without the rule radii are None, and nothing of this is compiled.
 from __future__ import annotations
 
 import numpy as np
-from numba import types
-from numba.extending import overload
 from numpy.typing import NDArray
 
+from pmviewer.kernels.specialise import absent, specialised
 from pmviewer.render.lookup import looked_up
 
 OF_CAUSTIC, OF_GLOBAL = 0, 1
@@ -50,26 +49,18 @@ def shrink(radii: NDArray[np.float32], alpha: float, floor: float) -> None:
         radii[:, FOUND + which] = 0
 
 
+@specialised
 def own_radius(radii, which, pixel, radius):
     """The pixel's radius for a map, OF_CAUSTIC or OF_GLOBAL; `radius`, that of the pass, where `radii` is None."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(own_radius)
-def _own_radius(radii, which, pixel, radius):
-    if isinstance(radii, types.NoneType):
+    if absent(radii):
         return lambda radii, which, pixel, radius: radius
     return lambda radii, which, pixel, radius: radii[pixel, RADIUS + which]
 
 
+@specialised
 def count_found(radii, which, pixel, photons, eye, radius, p, n, class_mask):
     """Tell the pixel how many photons its look-up counted; arguments as for `pmviewer.render.lookup.irradiance`."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(count_found)
-def _count_found(radii, which, pixel, photons, eye, radius, p, n, class_mask):
-    if isinstance(radii, types.NoneType):
+    if absent(radii):
         return lambda radii, which, pixel, photons, eye, radius, p, n, class_mask: None
 
     def told(radii, which, pixel, photons, eye, radius, p, n, class_mask):

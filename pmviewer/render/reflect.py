@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba.extending import overload
 
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.plain_bsdf import INV_PI
 from pmviewer.kernels.scattering import FOLLOWED, STORED, is_lambertian, is_plain, shading_normal, transmits
+from pmviewer.kernels.specialise import has, specialised
 from pmviewer.kernels.surface import STRAIGHT
 from pmviewer.kernels.vector import add, dot, mul, scale
 from pmviewer.maps.glossy import radiance_knn, radiance_radius
@@ -37,9 +37,10 @@ def _by_nearest(photons, eye, radius, p, n, b, group, flags, wo, class_mask):
 
 def _photon_by_photon(photons):
     """The search for the kind of map that the type of its record says."""
-    return _by_nearest if "planes" in photons.fields else _by_radius
+    return _by_nearest if has(photons, "planes") else _by_radius
 
 
+@specialised
 def unfound(photons, eye, radius, p, n, b, wo):
     """Radiance towards wo by the FOLLOWED lobes of the BSDF b, which are no deltas, from those photons of the caustic
     map that stand for light which no path from the eye finds: from point, spot and directional lights over mirrors and
@@ -47,11 +48,6 @@ def unfound(photons, eye, radius, p, n, b, wo):
 
     Arguments as for `reflected`. Rough glass takes photons on both of its sides.
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(unfound)
-def _unfound(photons, eye, radius, p, n, b, wo):
     if is_plain(b):
         return lambda photons, eye, radius, p, n, b, wo: _BLACK
     each = _photon_by_photon(photons)
@@ -78,17 +74,13 @@ def _rich(photons):
     return any_bsdf
 
 
+@specialised
 def reflected(photons, eye, radius, p, n, b, wo, class_mask):
     """Radiance towards wo from the photons of a map around p, reflected by the STORED lobes of the BSDF b.
 
     `photons`, `eye`, `radius` and `class_mask` as for `pmviewer.render.lookup.irradiance`; n is the geometric normal on
     the side of wo.
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(reflected)
-def _reflected(photons, eye, radius, p, n, b, wo, class_mask):
     if not is_plain(b):
         return _rich(photons)
 
@@ -98,13 +90,9 @@ def _reflected(photons, eye, radius, p, n, b, wo, class_mask):
     return lambertian
 
 
+@specialised
 def gathered(photons, sites, eye, p, n, b, wo):
     """The same where a gather ray ends: from photons of all classes, or from radiance photons (`sites`)."""
-    raise NotImplementedError("only for kernels")
-
-
-@overload(gathered)
-def _gathered(photons, sites, eye, p, n, b, wo):
     if not is_plain(b):
 
         def any_bsdf(photons, sites, eye, p, n, b, wo):

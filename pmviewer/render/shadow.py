@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import types
-from numba.extending import overload
 
+from pmviewer.kernels.specialise import absent, has, specialised
 from pmviewer.maps.shadow import LIT, SHADOW, UNKNOWN, visibility
 
 __all__ = ["LIT", "NO_SHADOWS", "SHADOW", "UNKNOWN", "known_visibility"]
@@ -14,17 +13,13 @@ NO_SHADOWS = np.zeros(1, np.dtype([("none", np.int32)]))
 """Stands for shadow photons where there are none."""
 
 
+@specialised
 def known_visibility(shadows, p, n, light):
     """LIT, SHADOW or UNKNOWN: what is known of the light at the point p with normal n.
 
     `shadows` is the record of shadow photons, that of NO_SHADOWS, or None: with these, nothing is.
     """
-    raise NotImplementedError("only for kernels")
-
-
-@overload(known_visibility)
-def _known_visibility(shadows, p, n, light):
-    if isinstance(shadows, types.NoneType) or "none" in shadows.fields:
+    if absent(shadows) or has(shadows, "none"):
 
         def nothing(shadows, p, n, light):
             return UNKNOWN
