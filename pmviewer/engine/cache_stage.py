@@ -31,6 +31,7 @@ from pmviewer.maps.irradiance_cache import (
 )
 from pmviewer.render.cache_fill import fill_records
 from pmviewer.render.camera import CameraPose
+from pmviewer.render.given import PassData
 from pmviewer.render.record import N_COUNTS
 from pmviewer.schema import Gather
 
@@ -71,18 +72,9 @@ def lattices(width: int, height: int, seed: int, index: int) -> list[NDArray[np.
     return rounds
 
 
-def fill_cache(
-    scene: NDArray[np.void],
-    eye: NDArray[np.void],
-    global_map: NDArray[np.void],
-    sites: NDArray[np.void],
-    beyond: tuple[NDArray[np.void], ...],
-    how: NDArray[np.void],
-    pool: WorkPool,
-) -> tuple[IrradianceCache, NDArray[np.int64]]:
-    """The cache of a pass and the rays counted; `how` is the pass's recipe. `beyond` is for rays that gather
-    again: corners, shadow photons, caustic map and the map that chooses lights, as for the eye pass."""
-    camera = eye[0]
+def fill_cache(given: PassData, how: NDArray[np.void], pool: WorkPool) -> tuple[IrradianceCache, NDArray[np.int64]]:
+    """The cache of a pass and the rays counted; `how` is the pass's recipe."""
+    camera = given.eye[0]
     cache = build_cache(np.empty((0, ROW), np.float32), how)
     total = np.zeros(N_COUNTS, np.int64)
     batch = max(1, BATCH_RAYS // int(how["rings"][0] * how["sectors"][0]))
@@ -93,9 +85,7 @@ def fill_cache(
             def run() -> NDArray[np.int64]:
                 counts = np.zeros(N_COUNTS, np.int64)
                 last = min(first + batch, len(pixels))
-                fill_records(
-                    scene, eye, global_map, sites, *beyond, cache.record, pixels, rows, made, counts, first, last
-                )
+                fill_records(given._replace(cache=cache.record), pixels, rows, made, counts, first, last)
                 return counts
 
             return run
@@ -106,18 +96,11 @@ def fill_cache(
     return cache, total
 
 
-def prepare_cache(
-    scene: NDArray[np.void],
-    eye: NDArray[np.void],
-    global_map: NDArray[np.void],
-    sites: NDArray[np.void],
-    beyond: tuple[NDArray[np.void], ...],
-    how: NDArray[np.void],
-) -> IrradianceCache:
+def prepare_cache(given: PassData, how: NDArray[np.void]) -> IrradianceCache:
     """An empty cache, made by calling every kernel of this stage once, on nothing."""
     cache = _extended(build_cache(np.empty((0, ROW), np.float32), how), np.empty((0, ROW), np.float32))
     rows, made, counts = np.empty((0, ROW), np.float32), np.empty(0, bool), np.zeros(N_COUNTS, np.int64)
-    fill_records(scene, eye, global_map, sites, *beyond, cache.record, np.empty(0, np.int32), rows, made, counts, 0, 0)
+    fill_records(given._replace(cache=cache.record), np.empty(0, np.int32), rows, made, counts, 0, 0)
     cache_cloud(cache)
     return cache
 

@@ -29,6 +29,7 @@ from pmviewer.photons.trace import LIGHT_PASS_DTYPE, N_COUNTS, empty_ledger, tra
 from pmviewer.render.camera import resolve_camera
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
+from pmviewer.render.given import PassData
 from pmviewer.render.lookup import NO_SITES
 from pmviewer.render.path import path_pass
 from pmviewer.render.pixel_radius import first_radii
@@ -135,14 +136,12 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
             grid = build_grid(empty, 1.0, 1.0)
             shadows = shadow_record(build_grid(empty, 1.0), 1) if plan.shadows else NO_SHADOWS
             extra = gather_records(plan, grid)
-            cache = NO_CACHE
+            given = PassData(flat.record, eye, record, record, grid.record, sites, NO_CACHE, shadows, *extra)
             if plan.cache:
                 how = recipe(settings.gather, resolve_camera(scene.scene, settings.camera), 0)
-                beyond = extra[1], shadows, record, grid.record
-                cache = prepare_cache(flat.record, eye, record, sites, beyond, how).record
-            maps = record, record, grid.record, sites, cache, shadows, *extra
+                given = given._replace(cache=prepare_cache(given, how).record)
             radii = first_radii(1, 0.0, 0.0) if radii_of_pixels(settings, plan) else None
-            eye_pass(flat.record, eye, *maps, np.zeros(0, np.uint8), radii, film, eye_counts, 0, 0)
+            eye_pass(given, np.zeros(0, np.uint8), radii, film, eye_counts, 0, 0)
 
         steps.append(("eye pass", compile_eye))
     return steps

@@ -41,6 +41,7 @@ from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
 from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.gather_points import POINT_COLUMNS, gather_points
+from pmviewer.render.given import PassData
 from pmviewer.render.lookup import NO_SITES
 from pmviewer.render.outline import outline_pixels
 from pmviewer.render.path import path_pass
@@ -312,12 +313,15 @@ class Renderer:
         self.tally.rays += made.rays
         return made
 
-    def _eye_records(self) -> tuple[NDArray[np.void], ...]:
-        """What the eye pass looks up besides the pass's three maps."""
+    def _given(self, eye: NDArray[np.void], maps: tuple[NDArray[np.void], ...]) -> PassData:
+        """The pass as the eye pass is given it; maps: caustic, global, and the one that chooses lights."""
         sites = self.light.sites.record if self.light.sites else NO_SITES
         shadows = self._shadows.record if self._shadows else NO_SHADOWS
         cache = self._cache.record if self._cache else NO_CACHE
-        return sites, cache, shadows, *gather_records(self.plan, self.light.guides)
+        extra = gather_records(self.plan, self.light.guides)
+        caustic_map, global_map, choice_map = maps
+        found = caustic_map, global_map, choice_map, sites, cache, shadows
+        return PassData(self.scene.flat.record, eye, *found, *extra)
 
     def gather_points(self, x: int, y: int) -> NDArray[np.float32]:
         """The gather rays of a pixel in the last pass, (n, POINT_COLUMNS), see `pmviewer.render.gather_points`.
@@ -333,7 +337,7 @@ class Renderer:
         pixel, counts = np.int64(y * camera.width + x), np.zeros(N_COUNTS, np.int64)
 
         def replay() -> int:
-            return gather_points(self.scene.flat.record, eye, *maps, *self._eye_records(), pixel, counts, rows)
+            return gather_points(self._given(eye, maps), pixel, counts, rows)
 
         return rows[: self.pool.run([replay])[0]].copy()
 
@@ -347,18 +351,14 @@ class Renderer:
         self, eye: NDArray[np.void], maps: tuple[NDArray[np.void], ...], camera: CameraPose, index: int
     ) -> None:
         how = recipe(self.settings.gather, camera, index)
-        caustic_map, global_map, choice_map = maps
-        sites, _, shadows, _, corners = self._eye_records()
-        beyond = corners, shadows, caustic_map, choice_map
-        self._cache, counts = fill_cache(self.scene.flat.record, eye, global_map, sites, beyond, how, self.pool)
+        self._cache, counts = fill_cache(self._given(eye, maps), how, self.pool)
         self.tally.map_bytes += self._cache.bytes
         self.tally.records += self._cache.n
         self.tally.add_counts(counts)
 
     def _eye_pass(self, eye: NDArray[np.void], maps: tuple[NDArray[np.void], ...], film: Film) -> None:
         plan = self.plan
-        records = (*maps, *self._eye_records())
-        scene = self.scene.flat.record
+        given = self._given(eye, maps)
         outline = self._outline(film.width, film.height)
         pixels = len(film.sums)
         tile = tile_size(pixels, eye[0], self.pool.threads)
@@ -368,9 +368,9 @@ class Renderer:
                 counts = np.zeros(N_COUNTS, np.int64)
                 last = min(first + tile, pixels)
                 if plan.path:
-                    path_pass(scene, eye, film.sums, counts, first, last)
+                    path_pass(given.scene, eye, film.sums, counts, first, last)
                 else:
-                    eye_pass(scene, eye, *records, outline, film.radii, film.sums, counts, first, last)
+                    eye_pass(given, outline, film.radii, film.sums, counts, first, last)
                 return counts
 
             return run

@@ -152,6 +152,11 @@ def device(function: Callable[..., Any]) -> Any:
     return dispatcher
 
 
+def inlined(function: Callable[..., Any]) -> Any:
+    """A function whose statements take the place of a call to it, before types are known."""
+    return njit(inline="always", **_OPTIONS)(function)
+
+
 def kernel(function: Callable[..., Any]) -> Any:
     """An entry point that Python calls: serial, without the GIL, on one tile or batch."""
     if numba.config.DISABLE_JIT:

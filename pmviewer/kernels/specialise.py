@@ -14,8 +14,8 @@ made by one function, in compiled code and in plain Python (NUMBA_DISABLE_JIT=1)
 
         return from_records
 
-The choosing function sees types where code is compiled, and values in plain Python; it asks them with `has`, `absent`
-and `is_a` alone. What it returns takes arguments of the same names.
+The choosing function sees types where code is compiled, and values in plain Python; it asks them with `has`, `part`,
+`absent` and `is_a` alone. What it returns takes arguments of the same names.
 """
 
 from __future__ import annotations
@@ -44,6 +44,13 @@ def has(record: Any, field: str) -> bool:
     if isinstance(record, types.Record):
         return field in record.fields
     return field in (record.dtype.names or ())
+
+
+def part(argument: Any, name: str) -> Any:
+    """A field of a named tuple, or of its type."""
+    if isinstance(argument, types.BaseNamedTuple):
+        return argument.types[argument.fields.index(name)]
+    return getattr(argument, name)
 
 
 def absent(argument: Any) -> bool:

@@ -58,14 +58,16 @@ def reflected_share(b, group, n, wo, wi):
 
 
 @device
-def radiance_radius(grid, p, n, radius, flatness, class_mask, filter_kind, cone_k, b, group, flags, wo):
-    """Radiance towards wo scattered at p by a group of lobes from all photons closer than `radius`; arguments as for
-    `irradiance_radius`.
+def radiance_radius(grid, eye, radius, p, n, class_mask, b, group, flags, wo):
+    """Radiance towards wo scattered at p by a group of lobes from all photons closer than `radius`.
+
+    eye: EYE_DTYPE record (`flatness`, `filter`, `cone_k`); class_mask as for `irradiance_radius`.
 
     b is the BSDF of `pmviewer.kernels.scattering`; n the geometric normal on the side where photons arrive. Only
     photons that have all of the `flags` (`pmviewer.maps.record`) count.
     """
     radius = min(radius, grid.radius)
+    flatness, filter_kind, cone_k = eye.flatness, eye.filter, eye.cone_k
     r2 = radius * radius
     inverse_r2 = _f4(1.0) / r2
     ranges, squared = stack_i4(16), stack_i4(8)
@@ -106,11 +108,12 @@ def _scattered_power(tree, place, n, b, group, flags, wo):
 
 
 @device
-def radiance_knn(tree, p, n, k, max_radius, flatness, class_mask, filter_kind, cone_k, rim, share, b, group, flags, wo):
-    """The same from the k nearest photons, whatever their flags; arguments as for `irradiance_knn`."""
+def radiance_knn(tree, eye, max_radius, p, n, class_mask, b, group, flags, wo):
+    """The same from the `eye.k` nearest photons, whatever their flags."""
+    filter_kind, cone_k, rim = eye.filter, eye.cone_k, eye.rim
     keys = stack_i4(KEYS)
     count, rim_place, r2 = nearest_disc(
-        tree, p[0], p[1], p[2], n[0], n[1], n[2], k, max_radius, flatness, class_mask, share, keys
+        tree, p[0], p[1], p[2], n[0], n[1], n[2], eye.k, max_radius, eye.flatness, class_mask, eye.share, keys
     )
     red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
     for j in range(count):

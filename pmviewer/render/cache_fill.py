@@ -14,21 +14,9 @@ import numpy as np
 from pmviewer.kernels.jit import device, kernel
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.raycast import closest_hit
-from pmviewer.kernels.scattering import (
-    FOLLOWED,
-    NOTHING,
-    STORED,
-    attenuation,
-    bsdf_at,
-    bsdf_sample,
-    chain_numbers,
-    is_lambertian,
-    same_side,
-    shading_normal,
-)
-from pmviewer.kernels.scene import material_of
-from pmviewer.kernels.surface import face, leave, surface_at
-from pmviewer.kernels.vector import dot, largest, luminance, mul, scale
+from pmviewer.kernels.scattering import FOLLOWED, STORED, is_lambertian, shading_normal
+from pmviewer.kernels.surface import leave
+from pmviewer.kernels.vector import dot, largest, luminance
 from pmviewer.maps.hemisphere import cell_direction, irradiance_and_gradients
 from pmviewer.maps.irradiance_cache import (
     FOOTPRINT,
@@ -42,8 +30,10 @@ from pmviewer.maps.irradiance_cache import (
     reach_of,
 )
 from pmviewer.render.cast import cast
-from pmviewer.render.eye import CHAIN_SET, FORKS, PIXEL_SET, camera_ray, pixel_seed
+from pmviewer.render.chain import arrive, follow_camera_path
+from pmviewer.render.eye import PIXEL_SET, camera_ray, pixel_seed
 from pmviewer.render.gather import gather_light
+from pmviewer.render.given import opened
 from pmviewer.render.record import C_DROPPED, C_RAYS
 
 _f4 = np.float32
@@ -58,14 +48,15 @@ NO_HIT = (False, (_f4(0.0),) * 3, (_f4(0.0),) * 3, (_f4(0.0),) * 3, _f4(0.0), _f
 
 
 @device
-def uncovered_hit(scene, eye, cache, pixel, counts):
+def uncovered_hit(given, pixel, counts):
     """The first Lambertian surface on the pixel's chain where the cache says too little.
 
     Returns whether there is one, the point, its geometric and shading normal on the side of the eye, its gap and the
     size of a pixel there.
     """
-    seed, index = pixel_seed(eye, pixel), eye.index
-    ux, uy, _, _ = draw4(eye.sequence, seed, index, PIXEL_SET)
+    scene, eye, cache = given.scene, given.eye, given.cache
+    seed = pixel_seed(eye, pixel)
+    ux, uy, _, _ = draw4(eye.sequence, seed, eye.index, PIXEL_SET)
     o, d, near, far = camera_ray(eye, pixel, ux, uy)
     beta = (_f4(1.0), _f4(1.0), _f4(1.0))
     travelled = _f4(0.0)
@@ -75,43 +66,26 @@ def uncovered_hit(scene, eye, cache, pixel, counts):
         if prim < 0:
             break
         travelled += t
-        p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
-        wo = (-d[0], -d[1], -d[2])
-        material = material_of(scene, prim)
-        beta = attenuation(scene, material, ng, d, t, beta)
-        b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, eye.glossy)
-        if b.groups == NOTHING:
-            break
-        ng = face(ng, wo)
-        if b.groups & STORED != 0 and is_lambertian(b):
-            n = shading_normal(b)
-            _, weight = interpolate(cache, p, n)
+        _, si, beta = arrive(scene, eye, o, d, t, prim, u, v, beta)
+        if si.bsdf.groups & STORED != 0 and is_lambertian(si.bsdf):
+            n = shading_normal(si.bsdf)
+            _, weight = interpolate(cache, si.p, n)
             if weight < ENOUGH:
-                return True, p, ng, n, gap, cache.pixel_size + travelled * cache.pixel_angle
-        if b.groups & FOLLOWED == 0 or depth == eye.max_depth:
+                return True, si.p, si.ng, n, si.gap, cache.pixel_size + travelled * cache.pixel_angle
+        if si.bsdf.groups & FOLLOWED == 0 or depth == eye.max_depth:
             break
-        u_lobe, bu, bv, u_end = chain_numbers(scene, eye.sequence, seed, index, CHAIN_SET + depth)
-        d, weight, _, compression = bsdf_sample(scene, b, FOLLOWED, wo, u_lobe, bu, bv)
-        if same_side(b, FOLLOWED, ng, wo, d) == 0:
-            break
-        beta = scale(mul(beta, weight), compression)
-        if b.groups & STORED != 0 and depth >= FORKS:
-            survival = min(largest(beta), _f4(1.0))
-            if not u_end < survival:
-                break
-            beta = scale(beta, _f4(1.0) / survival)
+        d, beta, _ = follow_camera_path(given, si, beta, seed, depth)
         if not largest(beta) > _f4(0.0):
             break
-        o = leave(p, ng, gap, d[0], d[1], d[2])
+        o = leave(si.p, si.ng, si.gap, d[0], d[1], d[2])
         near, far = _f4(0.0), _INF
     return NO_HIT
 
 
 @device
-def gather_hemisphere(
-    scene, eye, photons, sites, corner, shadows, caustic_map, choice_map, cache, p, ng, n, gap, seed, cells, counts
-):
+def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
     """Fill `cells` (see `irradiance_and_gradients`) with what gather rays from p bring back."""
+    eye, cache = given.eye, given.cache
     for k in range(cache.sectors):
         for j in range(cache.rings):
             here = j + cache.rings * k
@@ -123,81 +97,31 @@ def gather_hemisphere(
             if dot(wi, ng) <= _f4(0.0):
                 continue
             counts[C_RAYS] += 1
-            hit = cast(scene, p, ng, gap, wi)
+            hit = cast(given.scene, p, ng, gap, wi)
             if hit[0] >= 0:
                 cells[here, 3] = hit[7]
-                L = gather_light(
-                    scene,
-                    eye,
-                    photons,
-                    sites,
-                    corner,
-                    shadows,
-                    caustic_map,
-                    choice_map,
-                    hit,
-                    wi,
-                    seed,
-                    _u4(here),
-                    counts,
-                )
-                cells[here, 0], cells[here, 1], cells[here, 2] = L
+                cells[here, 0], cells[here, 1], cells[here, 2] = gather_light(given, hit, wi, seed, _u4(here), counts)
 
 
 @kernel
-def fill_records(
-    scenes,
-    eyes,
-    global_maps,
-    site_maps,
-    corners,
-    shadow_maps,
-    caustic_maps,
-    choice_maps,
-    caches,
-    pixels,
-    rows,
-    made,
-    counts,
-    first,
-    last,
-):
+def fill_records(given, pixels, rows, made, counts, first, last):
     """Make the records of candidates first … last−1 that lack them, and tell in `made` which.
 
-    scenes, eyes, global_maps, site_maps, corners, shadow_maps, caustic_maps, choice_maps: as for the eye pass;
-    caches: RECORD (1,) of the cache so far; pixels: int32 (n,); rows: float32 (n, ROW); made: bool (n,); counts: int64
-    (N_COUNTS,).
+    given: as for the eye pass, with the cache so far; pixels: int32 (n,); rows: float32 (n, ROW); made: bool (n,);
+    counts: int64 (N_COUNTS,).
     """
-    scene, eye, cache = scenes[0], eyes[0], caches[0]
-    photons, sites = global_maps[0], site_maps[0]
-    corner, shadows, caustic_map, choice_map = corners[0], shadow_maps[0], caustic_maps[0], choice_maps[0]
+    given = opened(given)
+    eye, cache = given.eye, given.cache
     cells = np.empty((cache.rings * cache.sectors, 5), np.float32)
     E, rotation, translation = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     for i in range(first, last):
         pixel = pixels[i]
-        found, p, ng, n, gap, footprint = uncovered_hit(scene, eye, cache, pixel, counts)
+        found, p, ng, n, gap, footprint = uncovered_hit(given, pixel, counts)
         made[i] = found
         if not found:
             continue
         seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(0xCAC4E))
-        gather_hemisphere(
-            scene,
-            eye,
-            photons,
-            sites,
-            corner,
-            shadows,
-            caustic_map,
-            choice_map,
-            cache,
-            p,
-            ng,
-            n,
-            gap,
-            seed,
-            cells,
-            counts,
-        )
+        gather_hemisphere(given, p, ng, n, gap, seed, cells, counts)
         harmonic = irradiance_and_gradients(cells, cache.rings, cache.sectors, n, E, rotation, translation)
         if not (E[0] + E[1] + E[2] < _f8(np.inf) and harmonic > _f8(0.0)):
             counts[C_DROPPED] += 1

@@ -15,6 +15,7 @@ from pmviewer.kernels.scattering import bsdf_f, bsdf_pdf, compressed, same_side,
 from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.surface import leave
 from pmviewer.kernels.vector import add, dot, mul, scale, sub
+from pmviewer.render.chain import BLACK
 from pmviewer.render.choice import chosen_light, expected_samples
 from pmviewer.render.shadow import LIT, UNKNOWN, known_visibility
 
@@ -24,7 +25,6 @@ EXTRA_SET = np.int64(1000)
 """Dimension set of the second light sample; further ones follow."""
 BEFORE_LIGHT = _f4(1.0 - 2.0**-13)
 """Shadow rays end a little before the light's own surface."""
-BLACK = (_f4(0.0), _f4(0.0), _f4(0.0))
 
 
 @device
@@ -43,18 +43,19 @@ def visible(scene, p, ng, gap, wi, end):
 
 
 @device
-def light_samples(scene, shadows, p, ng, gap, b, group, wo, choice, n_bsdf, sequence, seed, index, u_pick, u, v):
-    """Radiance towards wo from the light samples of the choice, reflected at p by a group of the BSDF b's lobes.
+def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, u_pick, u, v):
+    """Radiance towards wo from the light samples of the choice, reflected by a group of the BSDF's lobes.
 
-    Each is weighted against n_bsdf BSDF samples of the group (0: no MIS). ng is the geometric normal on the side of wo.
-    (u_pick, u, v) are the first sample's numbers; further ones are drawn. `shadows` is for
-    `known_visibility`. Returns L, the shadow rays cast and those that shadow photons saved.
+    Each is weighted against n_bsdf BSDF samples of the group (0: no MIS). (u_pick, u, v) are the first sample's
+    numbers; the sampler draws further ones. `shadows` is for `known_visibility`. Returns L, the shadow
+    rays cast and those that shadow photons saved.
     """
+    p, ng, gap, b, wo = si.p, si.ng, si.gap, si.bsdf, si.wo
     total = BLACK
     rays, saved = 0, 0
     for s in range(choice[4]):
         if s > 0:
-            u_pick, u, v, _ = draw4(sequence, seed, index, EXTRA_SET + s)
+            u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, EXTRA_SET + s)
         light, m = chosen_light(scene, choice, s, u_pick)
         wi, end, L, pdf, findable = sample_one_light(scene, light, p, u, v)
         if not m * pdf > _f4(0.0) or same_side(b, group, ng, wo, wi) == 0:

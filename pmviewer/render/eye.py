@@ -18,25 +18,16 @@ from pmviewer.kernels.light import emitted, environment_radiance
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.raycast import closest_hit
-from pmviewer.kernels.scattering import (
-    FOLLOWED,
-    NOTHING,
-    STORED,
-    attenuation,
-    bsdf_at,
-    bsdf_sample,
-    chain_numbers,
-    is_delta,
-    same_side,
-    shading_normal,
-)
-from pmviewer.kernels.scene import light_of, material_of
+from pmviewer.kernels.scattering import FOLLOWED, NOTHING, STORED, is_delta, shading_normal
+from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.kernels.vector import add, dot, is_good, largest, mul, normalize, scale
 from pmviewer.maps.record import CAUSTIC as CAUSTIC_CLASS
 from pmviewer.render.cached import cached, surface_rays
+from pmviewer.render.chain import BLACK, arrive, follow_camera_path
 from pmviewer.render.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near
-from pmviewer.render.direct import BLACK, found_light, light_samples
+from pmviewer.render.direct import found_light, light_samples
+from pmviewer.render.given import Aim, Sampler, opened
 from pmviewer.render.guide import AIM_WORDS, aim
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius
 from pmviewer.render.record import C_CUT, C_DROPPED, C_RAYS, C_SAVED, C_SHADOW_RAYS
@@ -44,15 +35,14 @@ from pmviewer.render.reflect import reflected, unfound
 
 _f4 = np.float32
 _f8 = np.float64
+_i8 = np.int64
 _u4 = np.uint32
 _INF = _f4(np.inf)
 _CAUSTICS = np.int32(1 << CAUSTIC_CLASS)
 
 EMISSION, DIRECT, SPECULAR, CAUSTIC, INDIRECT = 0, 3, 6, 9, 12
 ALBEDO, NORMAL, DEPTH = 15, 18, 21
-PIXEL_SET, BSDF_SET, CHAIN_SET, CHAIN_LIGHT_SET, OUTLINE_SET = np.array([0, 1, 2, 4000, 5000], np.int64)
-FORKS = 3
-"""Chains that fork go on at least so deep before they are thinned out."""
+PIXEL_SET, BSDF_SET, CHAIN_LIGHT_SET, OUTLINE_SET = np.array([0, 1, 4000, 5000], np.int64)
 
 
 @device
@@ -121,45 +111,124 @@ def outline_emission(scene, eye, pixel, seed):
     return scale(total, _f4(1.0) / _f4(eye.outline_rays))
 
 
+@device
+def _direct(given, si, group, choice, n_bsdf, sampler, numbers, counts):
+    """Radiance by the light samples of the choice (`light_samples`), their rays counted."""
+    L, rays, saved = light_samples(
+        given.scene, given.shadows, si, group, choice, n_bsdf, sampler, numbers[0], numbers[1], numbers[2]
+    )
+    counts[C_RAYS] += rays
+    counts[C_SHADOW_RAYS] += rays
+    counts[C_SAVED] += saved
+    return L
+
+
+@device
+def _from_maps(given, si, beta, pixel, radii, film, counts, whole):
+    """What the maps show directly by the STORED lobes: caustics, and the terms that the method takes from the global
+    map. `whole`: at the camera ray's own surface, so that terms are told apart."""
+    eye = given.eye
+    if eye.caustic_mask != 0:
+        r = own_radius(radii, OF_CAUSTIC, pixel, eye.caustic_radius)
+        L = reflected(given.caustic_map, eye, r, si, eye.caustic_mask)
+        count_found(radii, OF_CAUSTIC, pixel, given.caustic_map, eye, r, si, eye.caustic_mask)
+        deposit(film, counts, pixel, CAUSTIC if whole else SPECULAR, mul(beta, L))
+    for k in range(3):  # a loop, so that the look-up is compiled once
+        mask, term = eye.global_mask, INDIRECT
+        if k == 1:
+            mask, term = eye.direct_mask, DIRECT
+        elif k == 2:
+            mask, term = eye.global_caustics, CAUSTIC
+        if mask != 0:
+            r = own_radius(radii, OF_GLOBAL, pixel, eye.global_radius)
+            L = reflected(given.global_map, eye, r, si, mask)
+            count_found(radii, OF_GLOBAL, pixel, given.global_map, eye, r, si, mask)
+            deposit(film, counts, pixel, term if whole else SPECULAR, mul(beta, L))
+
+
+@device
+def _stored(given, si, beta, pixel, place, scratch, radii, film, counts, whole):
+    """Light by the STORED lobes of a surface: direct light, what the maps show, gather rays. `place`: the pixel's two
+    numbers for the first light sample; scratch: lists of lights and of photons. Returns the choice of lights."""
+    eye = given.eye
+    seed = pixel_seed(eye, pixel)
+    u_pick, bu, bv, u_lobe = draw4(eye.sequence, seed, eye.index, BSDF_SET)
+    known, gather = cached(given, si, counts)
+    aimed = Aim(scratch[1], _i8(0), _i8(0))
+    if gather > 0:
+        aimed = aim(given, si, seed, scratch[1])
+    n_bsdf = _i8(0)
+    if eye.mis != 0:
+        n_bsdf = max(gather - aimed.rays, _i8(1))
+    choice = choose_by_power(scratch[0], eye.light_samples)
+    if eye.direct != 0:
+        if eye.choice != BY_POWER:
+            choice = choose_near(given.scene, eye, given.choice_map, si.p, si.ng, scratch[0])
+        sampler = Sampler(eye.sequence, seed, eye.index)
+        L = _direct(given, si, STORED, choice, n_bsdf, sampler, (u_pick, place[0], place[1]), counts)
+        deposit(film, counts, pixel, DIRECT if whole else SPECULAR, mul(beta, L))
+    _from_maps(given, si, beta, pixel, radii, film, counts, whole)
+    n = _i8(gather)
+    if eye.direct != 0:
+        n = max(n, n_bsdf)
+    if eye.gather_rays > 0:
+        n = max(n, _i8(1))
+    if n > 0:
+        numbers = (u_lobe, bu, bv)
+        direct, indirect = surface_rays(given, known, gather, si, beta, choice, aimed, n, numbers, seed, counts)
+        share = scale(beta, _f4(1.0) / _f4(n))
+        deposit(film, counts, pixel, DIRECT if whole else SPECULAR, mul(share, direct))
+        if eye.gather_rays > 0:
+            deposit(film, counts, pixel, INDIRECT if whole else SPECULAR, mul(share, indirect))
+    return choice
+
+
+@device
+def _followed(given, si, beta, pixel, depth, choice, lights, radii, film, counts):
+    """Light by FOLLOWED lobes that are no deltas, besides what following them finds. Returns the choice of lights."""
+    eye = given.eye
+    if eye.unfound != 0:
+        r = own_radius(radii, OF_CAUSTIC, pixel, eye.caustic_radius)
+        L = unfound(given.caustic_map, eye, r, si)
+        if si.bsdf.groups & STORED == 0:
+            count_found(radii, OF_CAUSTIC, pixel, given.caustic_map, eye, r, si, _CAUSTICS)
+        deposit(film, counts, pixel, SPECULAR, mul(beta, L))
+    if eye.followed_direct != 0:
+        choice = choose_by_power(lights, eye.light_samples)
+        sampler = Sampler(eye.sequence, pixel_seed(eye, pixel), eye.index)
+        u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, CHAIN_LIGHT_SET + depth)
+        L = _direct(given, si, FOLLOWED, choice, eye.mis, sampler, (u_pick, u, v), counts)
+        deposit(film, counts, pixel, SPECULAR, mul(beta, L))
+    return choice
+
+
+@device
+def _found(given, left, pdf, choice, prim, p, ng, d):
+    """Radiance of what a camera path meets: primitive `prim` at p with normal ng, or the sky (prim < 0). Light samples
+    at the last surface, `left` with the density pdf, may have found it too; pdf is 0 after a delta."""
+    scene, eye = given.scene, given.eye
+    if pdf > _f4(0.0):
+        return found_light(scene, left, d, pdf, eye.mis, choice, eye.biased, prim, p, ng)
+    if prim < 0:
+        return environment_radiance(scene, d)
+    return emitted(scene, light_of(scene, prim), prim, p, ng, d)
+
+
 @kernel
-def eye_pass(
-    scenes,
-    eyes,
-    caustic_maps,
-    global_maps,
-    choice_maps,
-    site_maps,
-    caches,
-    shadow_maps,
-    guide_maps,
-    corners,
-    outline,
-    radii,
-    film,
-    counts,
-    first,
-    last,
-):
+def eye_pass(given, outline, radii, film, counts, first, last):
     """Add one sample to each of the pixels first … last−1.
 
-    scenes: SCENE_DTYPE (1,); eyes: EYE_DTYPE (1,); caustic_maps, global_maps: records (1,) of grids or kd-trees;
-    choice_maps: record (1,) of the grid of photons that choose lights;
-    site_maps: record (1,) of the radiance photons, or NO_SITES; caches: of the irradiance cache, or NO_CACHE;
-    shadow_maps: of the shadow photons, or NO_SHADOWS;
-    guide_maps: record (1,) of the photons that guide gather rays, or NO_GUIDES; corners: CORNERS or NO_CORNERS;
-    outline: uint8 (pixels,), 1 where emission gets camera rays of its own (`pmviewer.render.outline`), or (0,);
-    radii: float32 (pixels, COLUMNS), look-up radii of the pixels (`pmviewer.render.pixel_radius`), or None;
-    film: float64 (pixels, CHANNELS), see `pmviewer.render.planes`; counts: int64 (N_COUNTS,).
+    given: PassData of arrays (1,); outline: uint8 (pixels,), 1 where emission gets camera rays of its own
+    (`pmviewer.render.outline`), or (0,); radii: float32 (pixels, COLUMNS), look-up radii of the pixels
+    (`pmviewer.render.pixel_radius`), or None; film: float64 (pixels, CHANNELS), see `pmviewer.render.planes`; counts:
+    int64 (N_COUNTS,).
     """
-    scene, eye = scenes[0], eyes[0]
-    caustic_map, global_map = caustic_maps[0], global_maps[0]
-    choice_map, sites, cache, shadows = choice_maps[0], site_maps[0], caches[0], shadow_maps[0]
-    guides, corner = guide_maps[0], corners[0]
+    given = opened(given)
+    scene, eye = given.scene, given.eye
     lights, found = stack_i4(LIST_WORDS), stack_i4(AIM_WORDS)
-    index = eye.index
     for pixel in range(first, last):
         seed = pixel_seed(eye, pixel)
-        ux, uy, lu, lv = draw4(eye.sequence, seed, index, PIXEL_SET)
+        ux, uy, lu, lv = draw4(eye.sequence, seed, eye.index, PIXEL_SET)
         o, d, near, far = camera_ray(eye, pixel, ux, uy)
         beta = (_f4(1.0), _f4(1.0), _f4(1.0))
         outlined = len(outline) > 0 and outline[pixel] != 0
@@ -174,170 +243,31 @@ def eye_pass(
             whole = depth == 0
             seen = EMISSION if whole else SPECULAR
             if prim < 0:
-                if scene.environment >= 0:
-                    L = environment_radiance(scene, d)
-                    if pdf > _f4(0.0):
-                        L = found_light(scene, left, d, pdf, eye.mis, choice, eye.biased, prim, o, d)
-                    if not (whole and outlined):
-                        deposit(film, counts, pixel, seen, mul(beta, L))
+                if scene.environment >= 0 and not (whole and outlined):
+                    deposit(film, counts, pixel, seen, mul(beta, _found(given, left, pdf, choice, prim, o, d, d)))
                 break
-            p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
-            wo = (-d[0], -d[1], -d[2])
-            material = material_of(scene, prim)
-            beta = attenuation(scene, material, ng, d, t, beta)
-            b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, eye.glossy)
+            ng, si, beta = arrive(scene, eye, o, d, t, prim, u, v, beta)
+            b = si.bsdf
             if whole:
-                properties(scene, film, eye, pixel, b.albedo, face(shading_normal(b), wo), p)
-            light = light_of(scene, prim)
-            if light >= 0 and not (whole and outlined):
-                L = emitted(scene, light, prim, p, ng, d)
-                if pdf > _f4(0.0):
-                    L = found_light(scene, left, d, pdf, eye.mis, choice, eye.biased, prim, p, ng)
-                deposit(film, counts, pixel, seen, mul(beta, L))
+                properties(scene, film, eye, pixel, b.albedo, face(shading_normal(b), si.wo), si.p)
+            if light_of(scene, prim) >= 0 and not (whole and outlined):
+                deposit(film, counts, pixel, seen, mul(beta, _found(given, left, pdf, choice, prim, si.p, ng, d)))
             if b.groups == NOTHING:
                 break
-            ng = face(ng, wo)
             if b.groups & STORED != 0:
-                u_pick, bu, bv, u_lobe = draw4(eye.sequence, seed, index, BSDF_SET)
-                known, gather = cached(cache, eye, p, b, counts)
-                guided, m = 0, 0
-                if gather > 0:
-                    guided, m = aim(guides, eye, p, ng, b, wo, seed, found)
-                n_bsdf = 0
-                if eye.mis != 0:
-                    n_bsdf = max(gather - guided, 1)
-                choice = choose_by_power(lights, eye.light_samples)
-                if eye.direct != 0:
-                    if eye.choice != BY_POWER:
-                        choice = choose_near(scene, eye, choice_map, p, ng, lights)
-                    L, rays, saved = light_samples(
-                        scene,
-                        shadows,
-                        p,
-                        ng,
-                        gap,
-                        b,
-                        STORED,
-                        wo,
-                        choice,
-                        n_bsdf,
-                        eye.sequence,
-                        seed,
-                        index,
-                        u_pick,
-                        lu,
-                        lv,
-                    )
-                    counts[C_RAYS] += rays
-                    counts[C_SHADOW_RAYS] += rays
-                    counts[C_SAVED] += saved
-                    deposit(film, counts, pixel, DIRECT if whole else SPECULAR, mul(beta, L))
-                if eye.caustic_mask != 0:
-                    r = own_radius(radii, OF_CAUSTIC, pixel, eye.caustic_radius)
-                    L = reflected(caustic_map, eye, r, p, ng, b, wo, eye.caustic_mask)
-                    count_found(radii, OF_CAUSTIC, pixel, caustic_map, eye, r, p, ng, eye.caustic_mask)
-                    deposit(film, counts, pixel, CAUSTIC if whole else SPECULAR, mul(beta, L))
-                for k in range(3):  # a loop, so that the look-up is compiled once
-                    mask, term = eye.global_mask, INDIRECT
-                    if k == 1:
-                        mask, term = eye.direct_mask, DIRECT
-                    elif k == 2:
-                        mask, term = eye.global_caustics, CAUSTIC
-                    if mask != 0:
-                        r = own_radius(radii, OF_GLOBAL, pixel, eye.global_radius)
-                        L = reflected(global_map, eye, r, p, ng, b, wo, mask)
-                        count_found(radii, OF_GLOBAL, pixel, global_map, eye, r, p, ng, mask)
-                        deposit(film, counts, pixel, term if whole else SPECULAR, mul(beta, L))
-                n = gather
-                if eye.direct != 0:
-                    n = max(n, n_bsdf)
-                if eye.gather_rays > 0:
-                    n = max(n, 1)
-                if n > 0:
-                    direct, indirect = surface_rays(
-                        cache,
-                        known,
-                        gather,
-                        scene,
-                        eye,
-                        global_map,
-                        sites,
-                        guides,
-                        corner,
-                        shadows,
-                        caustic_map,
-                        choice_map,
-                        choice,
-                        found,
-                        guided,
-                        m,
-                        beta,
-                        p,
-                        ng,
-                        gap,
-                        b,
-                        wo,
-                        n,
-                        u_lobe,
-                        bu,
-                        bv,
-                        seed,
-                        counts,
-                    )
-                    share = scale(beta, _f4(1.0) / _f4(n))
-                    deposit(film, counts, pixel, DIRECT if whole else SPECULAR, mul(share, direct))
-                    if eye.gather_rays > 0:
-                        deposit(film, counts, pixel, INDIRECT if whole else SPECULAR, mul(share, indirect))
+                choice = _stored(given, si, beta, pixel, (lu, lv), (lights, found), radii, film, counts, whole)
             if b.groups & FOLLOWED == 0:
                 break
             if depth == eye.max_depth:
                 counts[C_CUT] += 1
                 break
-            u_lobe, bu, bv, u_end = chain_numbers(scene, eye.sequence, seed, index, CHAIN_SET + depth)
-            if not is_delta(b) and eye.unfound != 0:
-                r = own_radius(radii, OF_CAUSTIC, pixel, eye.caustic_radius)
-                L = unfound(caustic_map, eye, r, p, ng, b, wo)
-                if b.groups & STORED == 0:
-                    count_found(radii, OF_CAUSTIC, pixel, caustic_map, eye, r, p, ng, _CAUSTICS)
-                deposit(film, counts, pixel, SPECULAR, mul(beta, L))
-            if not is_delta(b) and eye.followed_direct != 0:
-                choice = choose_by_power(lights, eye.light_samples)
-                u_pick, cu, cv, _ = draw4(eye.sequence, seed, index, CHAIN_LIGHT_SET + depth)
-                L, rays, saved = light_samples(
-                    scene,
-                    shadows,
-                    p,
-                    ng,
-                    gap,
-                    b,
-                    FOLLOWED,
-                    wo,
-                    choice,
-                    eye.mis,
-                    eye.sequence,
-                    seed,
-                    index,
-                    u_pick,
-                    cu,
-                    cv,
-                )
-                counts[C_RAYS] += rays
-                counts[C_SHADOW_RAYS] += rays
-                counts[C_SAVED] += saved
-                deposit(film, counts, pixel, SPECULAR, mul(beta, L))
-            d, weight, pdf, compression = bsdf_sample(scene, b, FOLLOWED, wo, u_lobe, bu, bv)
+            if not is_delta(b):
+                choice = _followed(given, si, beta, pixel, depth, choice, lights, radii, film, counts)
+            d, beta, pdf = follow_camera_path(given, si, beta, seed, depth)
             if eye.followed_direct == 0:
                 pdf = _f4(0.0)
-            beta = scale(mul(beta, weight), compression)
-            if same_side(b, FOLLOWED, ng, wo, d) == 0:  # the lobe of a shading normal may dip below the surface
-                break
-            if b.groups & STORED != 0 and depth >= FORKS:
-                survival = min(largest(beta), _f4(1.0))
-                if not u_end < survival:
-                    break
-                beta = scale(beta, _f4(1.0) / survival)
             if not largest(beta) > _f4(0.0):
                 break
-            left = p
-            o = leave(p, ng, gap, d[0], d[1], d[2])
+            left = si.p
+            o = leave(si.p, si.ng, si.gap, d[0], d[1], d[2])
             near, far = _f4(0.0), _INF

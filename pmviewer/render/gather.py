@@ -15,17 +15,17 @@ from pmviewer.kernels.scattering import (
     STORED,
     attenuation,
     bsdf_at,
-    bsdf_sample,
     chain_numbers,
     followed_share,
-    same_side,
 )
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face
 from pmviewer.kernels.vector import add, dot, largest, mul, scale
 from pmviewer.render.cast import cast
+from pmviewer.render.chain import BLACK, follow
 from pmviewer.render.corner import gather_again, is_corner
-from pmviewer.render.direct import BLACK, found_light
+from pmviewer.render.direct import found_light
+from pmviewer.render.given import SurfaceInteraction
 from pmviewer.render.guide import gather_direction
 from pmviewer.render.record import C_RAYS
 from pmviewer.render.reflect import gathered
@@ -37,12 +37,13 @@ LEAST_SURVIVAL = np.float32(0.05)
 
 
 @device
-def gather_light(scene, eye, photons, sites, corner, shadows, caustic_map, choice_map, hit, d, seed, index, counts):
+def gather_light(given, hit, d, seed, index, counts):
     """Radiance that a gather ray of direction d brings back from what it met (`cast`): that of the global map at the
     first surface that stores photons, or of a second gather there (`pmviewer.render.corner`).
 
     Lobes that are followed (mirrors, glass) add nothing unless the map holds what they reflect (`gather_specular`).
     """
+    scene, eye = given.scene, given.eye
     beta = (_f4(1.0), _f4(1.0), _f4(1.0))
     total = BLACK
     length = _f4(0.0)
@@ -58,21 +59,19 @@ def gather_light(scene, eye, photons, sites, corner, shadows, caustic_map, choic
         b = bsdf_at(scene, prim, material, u, v, q, nq, sq, wo, eye.glossy)
         if b.groups == NOTHING:
             break
-        follow = eye.gather_specular != 0 and b.groups & FOLLOWED != 0
+        si = SurfaceInteraction(q, face(nq, wo), gap, b, wo)
+        follows = eye.gather_specular != 0 and b.groups & FOLLOWED != 0
         if b.groups & STORED != 0:
-            ng = face(nq, wo)
-            if not again and is_corner(corner, eye, length):
+            if not again and is_corner(given, length):
                 again = True
-                L, weight, onward, hit = gather_again(
-                    corner, scene, eye, shadows, caustic_map, choice_map, b, q, ng, gap, wo, seed, index, counts, hit
-                )
+                L, weight, onward, hit = gather_again(given, si, seed, index, counts, hit)
                 total = add(total, mul(beta, L))
                 survival = _f4(1.0)
-                if follow:  # one of both chains goes on
+                if follows:  # one of both chains goes on
                     survival = _f4(1.0) - followed_share(b, wo)
                     _, _, _, u_end = chain_numbers(scene, eye.sequence, seed, index, GATHER_FORK_SET)
-                    follow = not u_end < survival
-                if not follow:
+                    follows = not u_end < survival
+                if not follows:
                     beta = scale(mul(beta, weight), _f4(1.0) / survival)
                     d = onward
                     if not largest(beta) > _f4(0.0):
@@ -80,14 +79,11 @@ def gather_light(scene, eye, photons, sites, corner, shadows, caustic_map, choic
                     continue
                 beta = scale(beta, _f4(1.0) / (_f4(1.0) - survival))
             else:
-                total = add(total, mul(beta, gathered(photons, sites, eye, q, ng, b, wo)))
-        if not follow:
+                total = add(total, mul(beta, gathered(given, si)))
+        if not follows:
             break
         u_lobe, bu, bv, u_end = chain_numbers(scene, eye.sequence, seed, index, GATHER_CHAIN_SET + depth)
-        d, weight, _, compression = bsdf_sample(scene, b, FOLLOWED, wo, u_lobe, bu, bv)
-        if same_side(b, FOLLOWED, face(nq, wo), wo, d) == 0:
-            break
-        beta = scale(mul(beta, weight), compression)
+        d, beta, _ = follow(scene, si, beta, u_lobe, bu, bv)
         if b.groups & STORED != 0:  # the chain forks: thin it out
             survival = min(followed_share(b, wo), _f4(1.0))
             if not u_end < survival:
@@ -110,45 +106,17 @@ def gather_survival(eye, beta, weight, share):
 
 
 @device
-def gather_rays(
-    scene,
-    eye,
-    photons,
-    sites,
-    guides,
-    corner,
-    shadows,
-    caustic_map,
-    choice_map,
-    choice,
-    found,
-    guided,
-    m,
-    beta,
-    p,
-    ng,
-    gap,
-    b,
-    wo,
-    n,
-    u_lobe,
-    u,
-    v,
-    seed,
-    counts,
-):
-    """n rays by the STORED lobes of the BSDF b at p: direct light that they find, and light that they gather.
+def gather_rays(given, si, beta, choice, aimed, n, numbers, seed, counts):
+    """n rays by the STORED lobes of the BSDF: direct light that they find, and light that they gather.
 
-    (found, guided, m) are what `pmviewer.render.guide.aim` returned for the point, beta is the path's throughput up to
-    it. (u_lobe, u, v) serve the ray when it is one of the BSDF alone; gather rays draw their own. Returns two radiances
-    towards wo, summed over the rays and not yet divided by n.
+    beta is the path's throughput up to the surface. `numbers` serve the ray when it is one of the BSDF alone; gather
+    rays draw their own. Returns two radiances towards wo, summed over the rays and not yet divided by n.
     """
+    scene, eye = given.scene, given.eye
     direct, indirect = BLACK, BLACK
     for j in range(n):
-        wi, weight, pdf, share, u_end, sample = gather_direction(
-            scene, eye, guides, found, guided, m, b, wo, j, n, seed, u_lobe, u, v
-        )
-        if dot(wi, ng) <= _f4(0.0) or not largest(weight) > _f4(0.0):
+        wi, weight, pdf, share, u_end, sample = gather_direction(given, aimed, si, j, n, seed, numbers)
+        if dot(wi, si.ng) <= _f4(0.0) or not largest(weight) > _f4(0.0):
             continue
         if eye.gather_rays > 0:
             survival = gather_survival(eye, beta, weight, share)
@@ -156,13 +124,11 @@ def gather_rays(
                 continue
             weight = scale(weight, _f4(1.0) / survival)
         counts[C_RAYS] += 1
-        hit = cast(scene, p, ng, gap, wi)
+        hit = cast(scene, si.p, si.ng, si.gap, wi)
         if eye.direct != 0 and eye.mis != 0 and pdf > _f4(0.0):
-            L = found_light(scene, p, wi, pdf, n - guided, choice, eye.biased, hit[0], hit[3], hit[4])
+            L = found_light(scene, si.p, wi, pdf, n - aimed.rays, choice, eye.biased, hit[0], hit[3], hit[4])
             direct = add(direct, mul(weight, L))
         if eye.gather_rays > 0:
-            L = gather_light(
-                scene, eye, photons, sites, corner, shadows, caustic_map, choice_map, hit, wi, seed, sample, counts
-            )
+            L = gather_light(given, hit, wi, seed, sample, counts)
             indirect = add(indirect, scale(mul(weight, L), share))
     return direct, indirect

@@ -31,13 +31,14 @@ from pmviewer.kernels.memory import (
 )
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.scattering import STORED, bsdf_f, bsdf_pdf, bsdf_sample, shading_normal
-from pmviewer.kernels.specialise import has, specialised
+from pmviewer.kernels.specialise import has, part, specialised
 from pmviewer.kernels.vector import basis, dot, luminance, normalize, scale
 from pmviewer.maps.grid import BLOCK_BYTES, RECORD, ROW_BYTES, PhotonGrid, grid_ranges, lanes_between
 from pmviewer.maps.record import decode_direction, decode_power
 from pmviewer.maps.simd import WIDTH, facing8, within8
 from pmviewer.render.cones import cone_direction, cone_pdf
 from pmviewer.render.direct import power_heuristic
+from pmviewer.render.given import Aim
 from pmviewer.render.hemicells import CELLS, cell_direction, cell_pdf, fill_cells
 
 Directions = Literal["photon cones", "hemisphere grid"]
@@ -155,92 +156,102 @@ def concentration(found, m, n):
 
 
 @specialised
-def aim(guides, eye, p, ng, b, wo, seed, found):
-    """Number of guided rays, n_p, among the gather rays of the point p, whose guides are put into `found` (AIM_WORDS
-    words): 0, or that of the eye record. ng is the geometric normal on the side of wo.
-
-    Returns (n_p, photons); both are arguments of `gather_direction`.
-    """
+def aim(given, si, seed, found):
+    """What photons tell the gather rays of a point (`Aim`), their directions in `found` (AIM_WORDS words). They guide
+    no rays, or as many as the eye record says."""
+    guides = part(given, "guides")
     if has(guides, "unguided"):
-        return lambda guides, eye, p, ng, b, wo, seed, found: (_i8(0), _i8(0))
-
-    def by_cones(guides, eye, p, ng, b, wo, seed, found):
-        m = photons_near(guides, eye.guide_mask, p, ng, hash3(seed, eye.index, GUIDED_SET), MOST_CONES, found)
-        if m < FEWEST or concentration(found, m, shading_normal(b)) < CONCENTRATED:
-            return _i8(0), _i8(0)
-        return _i8(eye.guided_rays), m
-
-    def by_cells(guides, eye, p, ng, b, wo, seed, found):
-        m = photons_near(guides, eye.guide_mask, p, ng, hash3(seed, eye.index, GUIDED_SET), MOST_IN_CELLS, found)
-        if m < FEWEST or concentration(found, m, shading_normal(b)) < CONCENTRATED_CELLS:
-            return _i8(0), _i8(0)
-        fill_cells(found, 4 * MOST_IN_CELLS, m, b, wo)
-        return _i8(eye.guided_rays), m
-
-    return by_cones if has(guides, "cones") else by_cells
-
-
-@specialised
-def guided_direction(guides, found, m, b, u, v, u_pick):
-    """A direction that m photons guide to, and its density per solid angle."""
+        return lambda given, si, seed, found: Aim(found, _i8(0), _i8(0))
     if has(guides, "cones"):
-        return lambda guides, found, m, b, u, v, u_pick: cone_direction(found, m, u, v, u_pick)
-    at = 4 * MOST_IN_CELLS
-    return lambda guides, found, m, b, u, v, u_pick: cell_direction(found, at, b, u, v, u_pick)
+        return _aim_by_cones
+    return _aim_by_cells
+
+
+def _aim_by_cones(given, si, seed, found):
+    eye = given.eye
+    m = photons_near(given.guides, eye.guide_mask, si.p, si.ng, hash3(seed, eye.index, GUIDED_SET), MOST_CONES, found)
+    if m < FEWEST or concentration(found, m, shading_normal(si.bsdf)) < CONCENTRATED:
+        return Aim(found, _i8(0), _i8(0))
+    return Aim(found, _i8(eye.guided_rays), m)
+
+
+def _aim_by_cells(given, si, seed, found):
+    eye = given.eye
+    m = photons_near(
+        given.guides, eye.guide_mask, si.p, si.ng, hash3(seed, eye.index, GUIDED_SET), MOST_IN_CELLS, found
+    )
+    if m < FEWEST or concentration(found, m, shading_normal(si.bsdf)) < CONCENTRATED_CELLS:
+        return Aim(found, _i8(0), _i8(0))
+    fill_cells(found, 4 * MOST_IN_CELLS, m, si.bsdf, si.wo)
+    return Aim(found, _i8(eye.guided_rays), m)
 
 
 @specialised
-def guided_pdf(guides, found, m, b, wi):
+def guided_direction(guides, aimed, b, u, v, u_pick):
+    """A direction that photons guide to, and its density per solid angle."""
+    if has(guides, "cones"):
+        return lambda guides, aimed, b, u, v, u_pick: cone_direction(aimed.found, aimed.photons, u, v, u_pick)
+    at = 4 * MOST_IN_CELLS
+    return lambda guides, aimed, b, u, v, u_pick: cell_direction(aimed.found, at, b, u, v, u_pick)
+
+
+@specialised
+def guided_pdf(guides, aimed, b, wi):
     """Density with which `guided_direction` comes to wi."""
     if has(guides, "cones"):
-        return lambda guides, found, m, b, wi: cone_pdf(found, m, wi)
+        return lambda guides, aimed, b, wi: cone_pdf(aimed.found, aimed.photons, wi)
     at = 4 * MOST_IN_CELLS
-    return lambda guides, found, m, b, wi: cell_pdf(found, at, b, wi)
+    return lambda guides, aimed, b, wi: cell_pdf(aimed.found, at, b, wi)
 
 
 @specialised
-def gather_direction(scene, eye, guides, found, guided, m, b, wo, j, n, seed, u_lobe, u, v):
-    """Direction of ray j of n by the STORED lobes of the BSDF b; `guided` and m are what `aim` returned.
+def gather_direction(given, aimed, si, j, n, seed, numbers):
+    """Direction of ray j of n by the STORED lobes of the BSDF.
 
     Returns wi, weight = f·cos/pdf (times n/n_b or n/n_p where there are two kinds), the density of BSDF samples (0 for
     a guided ray: its emission is none of its business), the share by multiple importance sampling in gathered light, a
-    number to use and the ray's index in its sequences. Without gather rays the direction is that of (u_lobe, u, v).
+    number to use and the ray's index in its sequences. Without gather rays the direction is that of `numbers`: one for
+    the lobe, two for the direction.
     """
+    if has(part(given, "guides"), "unguided"):
+        return _by_bsdf
+    return _by_both
 
-    def by_bsdf(scene, eye, guides, found, guided, m, b, wo, j, n, seed, u_lobe, u, v):
-        sample, u_end = eye.index, _f4(0.0)
-        if eye.gather_rays > 0:
-            sample = _u4(eye.index * _u4(eye.gather_rays) + _u4(j))
-            u, v, u_lobe, u_end = draw4(eye.sequence, seed, sample, GATHER_SET)
-        wi, weight, pdf, _ = bsdf_sample(scene, b, STORED, wo, u_lobe, u, v)
-        return wi, weight, pdf, _f4(1.0), u_end, sample
 
-    if has(guides, "unguided"):
-        return by_bsdf
-
-    def by_both(scene, eye, guides, found, guided, m, b, wo, j, n, seed, u_lobe, u, v):
-        # Guides are for gather rays alone, so that n = eye.gather_rays here.
+def _by_bsdf(given, aimed, si, j, n, seed, numbers):
+    scene, eye = given.scene, given.eye
+    u_lobe, u, v = numbers
+    sample, u_end = eye.index, _f4(0.0)
+    if eye.gather_rays > 0:
         sample = _u4(eye.index * _u4(eye.gather_rays) + _u4(j))
-        n_b = n - guided
-        if j < n_b:
-            place, dimensions = sample, GATHER_SET
-            if guided > 0:
-                place, dimensions = _u4(eye.index * _u4(n_b) + _u4(j)), BESIDE_SET
-            u, v, u_lobe, u_end = draw4(eye.sequence, seed, place, dimensions)
-            wi, weight, pdf, _ = bsdf_sample(scene, b, STORED, wo, u_lobe, u, v)
-            share = _f4(1.0)
-            if guided > 0:
-                share = power_heuristic(_f4(n_b), pdf, _f4(guided), guided_pdf(guides, found, m, b, wi))
-                weight = scale(weight, _f4(n) / _f4(n_b))
-            return wi, weight, pdf, share, u_end, sample
-        place = _u4(eye.index * _u4(guided) + _u4(j - n_b))
-        u, v, u_pick, u_end = draw4(eye.sequence, seed, place, GUIDED_SET)
-        wi, q = guided_direction(guides, found, m, b, u, v, u_pick)
-        cos = dot(wi, shading_normal(b))
-        weight, share = (_f4(0.0), _f4(0.0), _f4(0.0)), _f4(0.0)
-        if cos > _f4(0.0) and q > _f4(0.0):
-            share = power_heuristic(_f4(guided), q, _f4(n_b), bsdf_pdf(b, STORED, wo, wi))
-            weight = scale(bsdf_f(b, STORED, wo, wi), cos / q * (_f4(n) / _f4(guided)))
-        return wi, weight, _f4(0.0), share, u_end, sample
+        u, v, u_lobe, u_end = draw4(eye.sequence, seed, sample, GATHER_SET)
+    wi, weight, pdf, _ = bsdf_sample(scene, si.bsdf, STORED, si.wo, u_lobe, u, v)
+    return wi, weight, pdf, _f4(1.0), u_end, sample
 
-    return by_both
+
+def _by_both(given, aimed, si, j, n, seed, numbers):
+    # Guides are for gather rays alone, so that n = eye.gather_rays here.
+    scene, eye, guides, b, wo = given.scene, given.eye, given.guides, si.bsdf, si.wo
+    guided = aimed.rays
+    sample = _u4(eye.index * _u4(eye.gather_rays) + _u4(j))
+    n_b = n - guided
+    if j < n_b:
+        place, dimensions = sample, GATHER_SET
+        if guided > 0:
+            place, dimensions = _u4(eye.index * _u4(n_b) + _u4(j)), BESIDE_SET
+        u, v, u_lobe, u_end = draw4(eye.sequence, seed, place, dimensions)
+        wi, weight, pdf, _ = bsdf_sample(scene, b, STORED, wo, u_lobe, u, v)
+        share = _f4(1.0)
+        if guided > 0:
+            share = power_heuristic(_f4(n_b), pdf, _f4(guided), guided_pdf(guides, aimed, b, wi))
+            weight = scale(weight, _f4(n) / _f4(n_b))
+        return wi, weight, pdf, share, u_end, sample
+    place = _u4(eye.index * _u4(guided) + _u4(j - n_b))
+    u, v, u_pick, u_end = draw4(eye.sequence, seed, place, GUIDED_SET)
+    wi, q = guided_direction(guides, aimed, b, u, v, u_pick)
+    cos = dot(wi, shading_normal(b))
+    weight, share = (_f4(0.0), _f4(0.0), _f4(0.0)), _f4(0.0)
+    if cos > _f4(0.0) and q > _f4(0.0):
+        share = power_heuristic(_f4(guided), q, _f4(n_b), bsdf_pdf(b, STORED, wo, wi))
+        weight = scale(bsdf_f(b, STORED, wo, wi), cos / q * (_f4(n) / _f4(guided)))
+    return wi, weight, _f4(0.0), share, u_end, sample

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.memory import stack_i4
-from pmviewer.kernels.specialise import has, specialised
+from pmviewer.kernels.specialise import has, part, specialised
 from pmviewer.maps.differential import checked_irradiance, reach
 from pmviewer.maps.estimate import irradiance_knn, irradiance_radius
 from pmviewer.maps.hull import hull_irradiance
@@ -166,27 +166,28 @@ NO_SITES = np.zeros(1, np.dtype([("none", np.int32)]))
 
 
 @specialised
-def gathered_irradiance(photons, sites, eye, p, n):
+def gathered_irradiance(given, p, n):
     """Irradiance from photons of all classes where a gather ray ends, at p with normal n.
 
-    `sites` is the record of a RadianceMap: that of the nearest radiance photon, made by the first ray that needs it,
-    and where none is near a look-up of its own. Or that of NO_SITES: always a look-up of its own.
+    Where the pass has radiance photons, that of the nearest one, made by the first ray that needs it, and where none is
+    near a look-up of its own; without them always that.
     """
-    if has(sites, "none"):
+    if has(part(given, "sites"), "none"):
 
-        def plain(photons, sites, eye, p, n):
-            return irradiance(photons, eye, eye.global_radius, p, n, np.int32(ALL_CLASSES))
+        def plain(given, p, n):
+            return irradiance(given.global_map, given.eye, given.eye.global_radius, p, n, np.int32(ALL_CLASSES))
 
         return plain
 
-    def through_sites(photons, sites, eye, p, n):
+    def through_sites(given, p, n):
+        sites, eye = given.sites, given.eye
         site = nearest_site(sites, p, n, eye.site_radius, eye.flatness, eye.site_similarity)
         if site >= 0:
             word = site_slot(sites, site)
             if word != UNKNOWN:
                 return site_irradiance(sites, word)
             p, n = site_place(sites, site)
-        E = irradiance(photons, eye, eye.global_radius, p, n, np.int32(ALL_CLASSES))
+        E = irradiance(given.global_map, eye, eye.global_radius, p, n, np.int32(ALL_CLASSES))
         if site < 0:
             return E
         # What was stored, not E: it must not matter who comes first.

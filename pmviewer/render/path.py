@@ -43,6 +43,7 @@ from pmviewer.render.eye import (
     pixel_seed,
     properties,
 )
+from pmviewer.render.given import Sampler, SurfaceInteraction
 from pmviewer.render.record import C_CUT, C_RAYS, C_SHADOW_RAYS
 
 _f4 = np.float32
@@ -122,9 +123,9 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 stored += 1
             if group == STORED or not is_delta(b):
                 u_pick, lu, lv, _ = draw4(eye.sequence, seed, index, FIRST_SET + 1 + 2 * depth)
-                L, rays, _ = light_samples(
-                    scene, None, p, ng, gap, b, group, wo, choice, eye.mis, eye.sequence, seed, index, u_pick, lu, lv
-                )
+                si = SurfaceInteraction(p, ng, gap, b, wo)
+                sampler = Sampler(eye.sequence, seed, index)
+                L, rays, _ = light_samples(scene, None, si, group, choice, eye.mis, sampler, u_pick, lu, lv)
                 counts[C_RAYS] += rays
                 counts[C_SHADOW_RAYS] += rays
                 term = term_of(eye, mirrored, stored, by_chain)

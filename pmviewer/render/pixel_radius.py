@@ -58,13 +58,13 @@ def own_radius(radii, which, pixel, radius):
 
 
 @specialised
-def count_found(radii, which, pixel, photons, eye, radius, p, n, class_mask):
+def count_found(radii, which, pixel, photons, eye, radius, si, class_mask):
     """Tell the pixel how many photons its look-up counted; arguments as for `pmviewer.render.lookup.irradiance`."""
     if absent(radii):
-        return lambda radii, which, pixel, photons, eye, radius, p, n, class_mask: None
+        return lambda radii, which, pixel, photons, eye, radius, si, class_mask: None
 
-    def told(radii, which, pixel, photons, eye, radius, p, n, class_mask):
-        _, found = looked_up(photons, eye, radius, p, n, class_mask)
+    def told(radii, which, pixel, photons, eye, radius, si, class_mask):
+        _, found = looked_up(photons, eye, radius, si.p, si.ng, class_mask)
         radii[pixel, FOUND + which] += found
 
     return told

@@ -7,7 +7,7 @@ import numpy as np
 from pmviewer.kernels.jit import device
 from pmviewer.kernels.plain_bsdf import INV_PI
 from pmviewer.kernels.scattering import FOLLOWED, STORED, is_lambertian, is_plain, shading_normal, transmits
-from pmviewer.kernels.specialise import has, specialised
+from pmviewer.kernels.specialise import has, part, specialised
 from pmviewer.kernels.surface import STRAIGHT
 from pmviewer.kernels.vector import add, dot, mul, scale
 from pmviewer.maps.glossy import radiance_knn, radiance_radius
@@ -24,15 +24,13 @@ _CAUSTICS = np.int32(1 << CAUSTIC)
 
 
 @device
-def _by_radius(photons, eye, radius, p, n, b, group, flags, wo, class_mask):
-    how = eye.filter, eye.cone_k
-    return radiance_radius(photons, p, n, radius, eye.flatness, class_mask, how[0], how[1], b, group, flags, wo)
+def _by_radius(photons, eye, radius, si, n, group, flags, class_mask):
+    return radiance_radius(photons, eye, radius, si.p, n, class_mask, si.bsdf, group, flags, si.wo)
 
 
 @device
-def _by_nearest(photons, eye, radius, p, n, b, group, flags, wo, class_mask):
-    how = eye.filter, eye.cone_k, eye.rim, eye.share
-    return radiance_knn(photons, p, n, eye.k, radius, eye.flatness, class_mask, *how, b, group, flags, wo)
+def _by_nearest(photons, eye, radius, si, n, group, flags, class_mask):
+    return radiance_knn(photons, eye, radius, si.p, n, class_mask, si.bsdf, group, flags, si.wo)
 
 
 def _photon_by_photon(photons):
@@ -41,68 +39,62 @@ def _photon_by_photon(photons):
 
 
 @specialised
-def unfound(photons, eye, radius, p, n, b, wo):
-    """Radiance towards wo by the FOLLOWED lobes of the BSDF b, which are no deltas, from those photons of the caustic
-    map that stand for light which no path from the eye finds: from point, spot and directional lights over mirrors and
+def unfound(photons, eye, radius, si):
+    """Radiance towards wo by the FOLLOWED lobes of the BSDF, which are no deltas, from those photons of the caustic map
+    that stand for light which no path from the eye finds: from point, spot and directional lights over mirrors and
     clear glass alone. Light samples at p see through neither, and no ray from p meets such a light.
 
     Arguments as for `reflected`. Rough glass takes photons on both of its sides.
     """
-    if is_plain(b):
-        return lambda photons, eye, radius, p, n, b, wo: _BLACK
+    if is_plain(part(si, "bsdf")):
+        return lambda photons, eye, radius, si: _BLACK
     each = _photon_by_photon(photons)
 
-    def from_both_sides(photons, eye, radius, p, n, b, wo):
-        L = each(photons, eye, radius, p, n, b, FOLLOWED, _u4(UNFOUND), wo, _CAUSTICS)
-        if transmits(b):
-            behind = scale(n, _f4(-1.0))
-            L = add(L, each(photons, eye, radius, p, behind, b, FOLLOWED, _u4(UNFOUND), wo, _CAUSTICS))
+    def from_both_sides(photons, eye, radius, si):
+        L = each(photons, eye, radius, si, si.ng, FOLLOWED, _u4(UNFOUND), _CAUSTICS)
+        if transmits(si.bsdf):
+            behind = scale(si.ng, _f4(-1.0))
+            L = add(L, each(photons, eye, radius, si, behind, FOLLOWED, _u4(UNFOUND), _CAUSTICS))
         return L
 
     return from_both_sides
 
 
-def _rich(photons):
-    """`reflected` for materials of all kinds, by the type of the map's record."""
+@specialised
+def reflected(photons, eye, radius, si, class_mask):
+    """Radiance towards wo from the photons of a map around p, reflected by the STORED lobes of the BSDF.
+
+    `photons`, `eye`, `radius` and `class_mask` as for `pmviewer.render.lookup.irradiance`.
+    """
+    if is_plain(part(si, "bsdf")):
+
+        def lambertian(photons, eye, radius, si, class_mask):
+            return scale(mul(si.bsdf.albedo, irradiance(photons, eye, radius, si.p, si.ng, class_mask)), INV_PI)
+
+        return lambertian
     each = _photon_by_photon(photons)
 
-    def any_bsdf(photons, eye, radius, p, n, b, wo, class_mask):
-        if is_lambertian(b) and dot(shading_normal(b), n) > STRAIGHT:
-            return scale(mul(b.albedo, irradiance(photons, eye, radius, p, n, class_mask)), INV_PI)
-        return each(photons, eye, radius, p, n, b, STORED, _u4(0), wo, class_mask)
+    def any_bsdf(photons, eye, radius, si, class_mask):
+        if is_lambertian(si.bsdf) and dot(shading_normal(si.bsdf), si.ng) > STRAIGHT:
+            return scale(mul(si.bsdf.albedo, irradiance(photons, eye, radius, si.p, si.ng, class_mask)), INV_PI)
+        return each(photons, eye, radius, si, si.ng, STORED, _u4(0), class_mask)
 
     return any_bsdf
 
 
 @specialised
-def reflected(photons, eye, radius, p, n, b, wo, class_mask):
-    """Radiance towards wo from the photons of a map around p, reflected by the STORED lobes of the BSDF b.
+def gathered(given, si):
+    """The same where a gather ray ends: from photons of all classes, or from radiance photons."""
+    if is_plain(part(si, "bsdf")):
 
-    `photons`, `eye`, `radius` and `class_mask` as for `pmviewer.render.lookup.irradiance`; n is the geometric normal on
-    the side of wo.
-    """
-    if not is_plain(b):
-        return _rich(photons)
+        def lambertian(given, si):
+            return scale(mul(si.bsdf.albedo, gathered_irradiance(given, si.p, si.ng)), INV_PI)
 
-    def lambertian(photons, eye, radius, p, n, b, wo, class_mask):
-        return scale(mul(b.albedo, irradiance(photons, eye, radius, p, n, class_mask)), INV_PI)
+        return lambertian
 
-    return lambertian
+    def any_bsdf(given, si):
+        if is_lambertian(si.bsdf) and dot(shading_normal(si.bsdf), si.ng) > STRAIGHT:
+            return scale(mul(si.bsdf.albedo, gathered_irradiance(given, si.p, si.ng)), INV_PI)
+        return reflected(given.global_map, given.eye, given.eye.global_radius, si, np.int32(ALL_CLASSES))
 
-
-@specialised
-def gathered(photons, sites, eye, p, n, b, wo):
-    """The same where a gather ray ends: from photons of all classes, or from radiance photons (`sites`)."""
-    if not is_plain(b):
-
-        def any_bsdf(photons, sites, eye, p, n, b, wo):
-            if is_lambertian(b) and dot(shading_normal(b), n) > STRAIGHT:
-                return scale(mul(b.albedo, gathered_irradiance(photons, sites, eye, p, n)), INV_PI)
-            return reflected(photons, eye, eye.global_radius, p, n, b, wo, np.int32(ALL_CLASSES))
-
-        return any_bsdf
-
-    def lambertian(photons, sites, eye, p, n, b, wo):
-        return scale(mul(b.albedo, gathered_irradiance(photons, sites, eye, p, n)), INV_PI)
-
-    return lambertian
+    return any_bsdf

@@ -1,0 +1,74 @@
+"""What the kernels of an eye pass are given: the pass, a surface that a ray met, a pixel's random numbers."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from pmviewer.kernels.jit import inlined
+
+
+class PassData(NamedTuple):
+    """What is constant in a pass. Python holds arrays of one record each, kernels the records (`opened`).
+
+    scene: SCENE_DTYPE; eye: EYE_DTYPE; caustic_map, global_map: of grids or kd-trees; choice_map: of the grid of
+    photons that choose lights; sites: of the radiance photons, or NO_SITES; cache: of the irradiance cache, or
+    NO_CACHE; shadows: of the shadow photons, or NO_SHADOWS; guides: of the photons that guide gather rays, or
+    NO_GUIDES; corner:
+    CORNERS or NO_CORNERS.
+    """
+
+    scene: Any
+    eye: Any
+    caustic_map: Any
+    global_map: Any
+    choice_map: Any
+    sites: Any
+    cache: Any
+    shadows: Any
+    guides: Any
+    corner: Any
+
+
+class SurfaceInteraction(NamedTuple):
+    """A surface point seen from wo: p; ng, the geometric normal on the side of wo; gap, how far rays start off the
+    surface; bsdf, of `pmviewer.kernels.scattering`; wo, unit."""
+
+    p: Any
+    ng: Any
+    gap: Any
+    bsdf: Any
+    wo: Any
+
+
+class Sampler(NamedTuple):
+    """Where a pixel's random numbers come from: sequence, seed and the sample's index in it."""
+
+    sequence: Any
+    seed: Any
+    index: Any
+
+
+class Aim(NamedTuple):
+    """What photons tell gather rays of a point: the scratch that holds them, how many rays they guide, and how many
+    photons they are (`pmviewer.render.guide.aim`)."""
+
+    found: Any
+    rays: Any
+    photons: Any
+
+
+@inlined
+def opened(given):
+    """The pass with each array's record in its place. Inlined: compiled functions can't return records."""
+    return PassData(
+        given.scene[0],
+        given.eye[0],
+        given.caustic_map[0],
+        given.global_map[0],
+        given.choice_map[0],
+        given.sites[0],
+        given.cache[0],
+        given.shadows[0],
+        given.guides[0],
+        given.corner[0],
+    )
