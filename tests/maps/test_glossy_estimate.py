@@ -12,6 +12,7 @@ from pmviewer.maps.grid import build_grid
 from pmviewer.maps.kdtree import build_kdtree
 from pmviewer.maps.record import unpack
 from pmviewer.maps.stored import ALL_CLASSES
+from pmviewer.render.record import EYE_DTYPE
 from tests import naive_maps as naive
 
 f4, i4 = np.float32, np.int32
@@ -19,52 +20,39 @@ ANY = np.uint32(0)
 ALBEDO = (f4(0.8), f4(0.5), f4(0.25))
 
 
-@njit
-def _by_radius(records, p, n, ns, radius, flatness, kind, out):
-    for i in range(len(p)):
-        facing = (ns[i, 0], ns[i, 1], ns[i, 2])
-        b = PlainBsdf(STORED, ALBEDO, 0, facing, facing)
-        normal = (n[i, 0], n[i, 1], n[i, 2])
-        out[i] = radiance_radius(
-            records[0],
-            (p[i, 0], p[i, 1], p[i, 2]),
-            normal,
-            radius,
-            flatness,
-            i4(ALL_CLASSES),
-            kind,
-            f4(1.1),
-            b,
-            STORED,
-            ANY,
-            normal,
-        )
+def _estimate(**fields) -> np.ndarray:
+    eye = np.zeros(1, EYE_DTYPE)
+    for name, value in {"cone_k": 1.1, "share": 1, **fields}.items():
+        eye[name] = value
+    return eye
 
 
 @njit
-def _by_knn(records, p, n, ns, k, radius, flatness, kind, rim, out):
+def _radius(records, eyes, p, n, ns, radius, out):
     for i in range(len(p)):
         facing = (ns[i, 0], ns[i, 1], ns[i, 2])
         b = PlainBsdf(STORED, ALBEDO, 0, facing, facing)
         normal = (n[i, 0], n[i, 1], n[i, 2])
         point = (p[i, 0], p[i, 1], p[i, 2])
-        out[i] = radiance_knn(
-            records[0],
-            point,
-            normal,
-            k,
-            radius,
-            flatness,
-            i4(ALL_CLASSES),
-            kind,
-            f4(1.1),
-            rim,
-            f4(1.0),
-            b,
-            STORED,
-            ANY,
-            normal,
-        )
+        out[i] = radiance_radius(records[0], eyes[0], radius, point, normal, i4(ALL_CLASSES), b, STORED, ANY, normal)
+
+
+def _by_radius(records, p, n, ns, radius, flatness, kind, out):
+    _radius(records, _estimate(flatness=flatness, filter=kind), p, n, ns, radius, out)
+
+
+@njit
+def _knn(records, eyes, p, n, ns, radius, out):
+    for i in range(len(p)):
+        facing = (ns[i, 0], ns[i, 1], ns[i, 2])
+        b = PlainBsdf(STORED, ALBEDO, 0, facing, facing)
+        normal = (n[i, 0], n[i, 1], n[i, 2])
+        point = (p[i, 0], p[i, 1], p[i, 2])
+        out[i] = radiance_knn(records[0], eyes[0], radius, point, normal, i4(ALL_CLASSES), b, STORED, ANY, normal)
+
+
+def _by_knn(records, p, n, ns, k, radius, flatness, kind, rim, out):
+    _knn(records, _estimate(flatness=flatness, filter=kind, k=k, rim=rim), p, n, ns, radius, out)
 
 
 @pytest.fixture(scope="module")
