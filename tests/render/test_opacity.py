@@ -38,8 +38,10 @@ def lamp_scene(lamp, radiance=(2.0, 1.0, 0.5), emission=None, camera=None, size=
     return Scene("lamp", None, shapes, (diffuse(albedo=(0.8,) * 3), lamp), (), camera, size, size)
 
 
-@pytest.mark.parametrize("method", ["path", "progressive", "gather"])
-@pytest.mark.parametrize("kind", ["constant", "texture", "both textures"])
+@pytest.mark.parametrize(
+    ("kind", "method"),
+    [("constant", "path"), ("constant", "progressive"), ("texture", "path"), ("both textures", "path")],
+)
 def test_a_lights_opacity_dims_it(method, kind):
     """Seen by itself and by what it shines on, it is a light of its radiance times its opacity."""
     if kind == "constant":
