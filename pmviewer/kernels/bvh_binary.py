@@ -14,11 +14,10 @@ from functools import partial
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from pmviewer.kernels.jit import device, kernel
-from pmviewer.kernels.memory import aligned_empty
+from pmviewer.kernels.memory import aligned_empty, at_address, with_twin
 from pmviewer.kernels.simd import LANES, ROW_BYTES, V8, V8I
 from pmviewer.progress import check, grown
 
@@ -146,7 +145,30 @@ def _shrink(builder, address, other):
     builder.store(smaller, builder.inttoptr(address, V8.as_pointer())).align = ROW_BYTES
 
 
-@intrinsic
+def _lanes(address):
+    return at_address(address, LANES, np.float32)
+
+
+def _shrink_row(address, other):
+    row = _lanes(address)
+    row[:] = np.where(other < row, other, row)
+
+
+def _center_row(box, other):
+    row = _lanes(other)
+    with np.errstate(invalid="ignore"):
+        _shrink_row(box, row - np.concatenate([row[4:], row[:4]]))
+
+
+def _copy_row(box, to):
+    _lanes(to)[:] = _lanes(box)
+
+
+def _clear_row(box):
+    _lanes(box)[:] = np.inf
+
+
+@with_twin(lambda box, other: _shrink_row(box, _lanes(other)))
 def _grow(typingctx, box, other):
     """The box at one address grows by that at the other."""
     signature = types.void(types.int64, types.int64)
@@ -158,7 +180,7 @@ def _grow(typingctx, box, other):
     return signature, codegen
 
 
-@intrinsic
+@with_twin(_center_row)
 def _grow_by_center(typingctx, box, other):
     """The box at one address grows by twice the centre of that at the other."""
     signature = types.void(types.int64, types.int64)
@@ -174,7 +196,7 @@ def _grow_by_center(typingctx, box, other):
     return signature, codegen
 
 
-@intrinsic
+@with_twin(_copy_row)
 def _copy(typingctx, box, to):
     """Copy the row at one address to the other."""
     signature = types.void(types.int64, types.int64)
@@ -187,7 +209,7 @@ def _copy(typingctx, box, to):
     return signature, codegen
 
 
-@intrinsic
+@with_twin(_clear_row)
 def _clear(typingctx, box):
     """The row at the address becomes a box around nothing."""
     signature = types.void(types.int64)

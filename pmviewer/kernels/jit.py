@@ -167,7 +167,8 @@ def kernel(function: Callable[..., Any]) -> Any:
 def _readable(argument: Any) -> Any:
     """An argument whose records have their fields as attributes, as they have in compiled code."""
     if isinstance(argument, tuple):
-        return tuple(map(_readable, argument))
+        fields = map(_readable, argument)
+        return type(argument)(*fields) if hasattr(argument, "_fields") else tuple(fields)
     if isinstance(argument, np.ndarray) and argument.dtype.names:
         return argument.view(np.recarray)
     if isinstance(argument, np.void) and argument.dtype.names:

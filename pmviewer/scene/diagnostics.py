@@ -54,10 +54,10 @@ class Diagnostics:
         if not names:
             return self._sentences[key]
         more = f" and {len(names) - _SHOWN_NAMES} more" if len(names) > _SHOWN_NAMES else ""
-        return self._sentences[key].replace("{names}", ", ".join(map(_short, names[:_SHOWN_NAMES])) + more)
+        return self._sentences[key].replace("{names}", ", ".join(map(shortened, names[:_SHOWN_NAMES])) + more)
 
 
-def _short(name: str) -> str:
+def shortened(name: str) -> str:
     """Both ends of a name that is longer than anybody reads."""
     return name if len(name) <= _LONGEST_NAME else f"{name[: _LONGEST_NAME // 2]}…{name[-_LONGEST_NAME // 2 :]}"
 

@@ -108,7 +108,7 @@ class Document:
 
     def missing(self, name: str, element: Element) -> None:
         """Put a file that was not found on the list of the one warning about them."""
-        self.diagnostics.warn_of(name[-80:], MISSING, element.line, element.file)
+        self.diagnostics.warn_of(name, MISSING, element.line, element.file)
 
     def circular(self, element: Element) -> bool:
         """Does the object contain itself, over references?"""

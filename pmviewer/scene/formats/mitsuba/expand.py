@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from pmviewer.errors import SceneError
-from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.diagnostics import Diagnostics, shortened
 from pmviewer.scene.formats.mitsuba.folders import Folders
 from pmviewer.scene.formats.mitsuba.versions import upgrade
 from pmviewer.scene.formats.mitsuba.xml import MAX_ATTRIBUTE, MAX_ELEMENTS, MAX_FILE_BYTES, Element, read_xml
@@ -121,11 +121,13 @@ class Expansion:
         name = element.attributes.get("value", "")
         folder = self.folders.folder(name, element.file.parent if element.file else self.folders.home)
         if folder is None:
-            self._warn(f"The folder {name[-80:]!r} that <path> names does not exist: it was ignored.", element)
+            self._warn(f"The folder '{shortened(name)}' that <path> names does not exist: it was ignored.", element)
         elif not at_root:
             self._warn("<path> counts only directly inside <scene>: it was ignored.", element)
         elif self.folders.too_wide(folder):
-            sentence = f"<path> names {name[-80:]!r}, which holds all files of this machine or user: it was refused."
+            sentence = (
+                f"<path> names '{shortened(name)}', which holds all files of this machine or user: it was refused."
+            )
             self._warn(sentence, element)
         else:
             self.folders.add(folder)
@@ -137,7 +139,7 @@ class Expansion:
         path = self.folders.file(name, near)
         if not self.folders.allowed(path) if path else self.folders.leads_out(name, near):
             self._warn(
-                f"<include> of {name[-80:]!r} was refused: {path.resolve() if path else 'it'} lies outside of the "
+                f"<include> of '{shortened(name)}' was refused: {path.resolve() if path else 'it'} lies outside of the "
                 "scene's folder. If you trust it, name its folder with <path> or --search-path.",
                 element,
             )
