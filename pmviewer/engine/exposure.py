@@ -50,8 +50,9 @@ def metered(planes: NDArray[np.float32]) -> float:
     seen = albedo[surface & (albedo > 0)]
     key = KEY * math.exp(float(np.log(np.maximum(seen, 0.01)).mean())) if len(seen) else 0.18
     exposure = math.log2(min(max(key, KEYS[0]), KEYS[1]) / mean)
-    bright = math.log2(float(np.quantile(values, 1 - WHITE_SHARE, method="lower")))
-    exposure -= min(max(exposure + bright, 0.0), MOST_LOWERED)
+    bright = float(np.quantile(values, 1 - WHITE_SHARE, method="lower"))
+    if bright > 0:  # else what shines is next to nothing of the picture
+        exposure -= min(max(exposure + math.log2(bright), 0.0), MOST_LOWERED)
     return min(max(round(round(exposure / STEP) * STEP, 2), -20.0), 20.0)
 
 

@@ -33,6 +33,16 @@ def test_light_of_any_strength_gives_the_same_picture():
         assert metered(planes(light * 2.0**stops)) == pytest.approx(base - stops, abs=0.051)
 
 
+def test_light_in_one_spot_alone_is_metered():
+    """Most of the picture is black, so that its brightest percent is not bright at all."""
+    light = np.zeros((240, 240))
+    light[:2, :2] = 1.0
+    assert np.isfinite(metered(planes(light, size=240)))
+    glow = np.zeros((240, 240))
+    glow[0, 0] = 5.0
+    assert np.isfinite(metered(planes(0.0, glow=glow, size=240)))
+
+
 def test_dark_things_stay_darker_than_bright_ones():
     """Under the same light, irradiance π/2 everywhere, the same exposure."""
     assert metered(planes(0.35, albedo=0.7)) == pytest.approx(metered(planes(0.1, albedo=0.2)), abs=0.06)

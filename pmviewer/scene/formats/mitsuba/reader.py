@@ -48,8 +48,17 @@ class Reader:
                 self._emitter(element)
         elif element.tag == "sensor":
             self.sensors.append(element)
+        elif element.tag == "integrator":
+            self._integrator(element)
         elif element.tag not in _SILENT:
             self.document.ignore(element)
+
+    def _integrator(self, element: Element) -> None:
+        """The program has its own; what the file's would leave out of the picture is said."""
+        hidden = (c for c in element.children if c.attributes.get("name") in ("hide_emitters", "hideEmitters"))
+        if any(c.attributes.get("value", "").strip().lower() == "true" for c in hidden):
+            what = f"{element} hides lights and the sky from the camera: they are shown here."
+            self.document.warn(what, element)
 
     def _failed(self, element: Element, error: SceneError, instead: str) -> None:
         """Say what was left out and why."""

@@ -31,6 +31,9 @@ def read_daylight(p: Properties, name: str, turn: Float) -> list[Light]:
     """The lights of an emitter of `TYPES`, whose `to_world` turns by `turn` (3, 3). Version 0.x has y up."""
     old = p.type in ("sky", "sun") or p.document.root.attributes.get("version", "3").strip().startswith("0")
     p.known("resolution", "complex_sun")
+    if old:
+        what = f"{p.element} of version 0.x has y up, as Mitsuba 0.6 has it; Mitsuba 3 takes z for up there."
+        p.document.warn(what, p.element)
     if p.type == "timed_sunsky":
         _freeze(p)
     scale = max(p.number("scale", 1.0), 0.0)
