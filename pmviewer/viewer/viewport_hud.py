@@ -29,6 +29,8 @@ _UNITS = {"albedo": "", "normal": "", "depth": "m"} | {view: how.unit for view, 
 
 LEGEND_EMS = 9.0
 """Width that captions leave to legends, in font sizes."""
+_CENTRED_SHARE = 0.8
+"""Of the viewport's width, that a centred text fills at most."""
 
 
 def draw_hud(viewport: Viewport, hovered: bool) -> None:
@@ -273,10 +275,13 @@ def _caption(
     anchor: float = 0.0,
     colour: theme.Colour = theme.TEXT,
 ) -> None:
-    """Text on a translucent ground, in lines that leave room for a legend; `anchor` 0.5 centres it on the position."""
+    """Text on a translucent ground, in lines that leave room for a legend; `anchor` 0.5 centres it on the position, in
+    lines that fit into the viewport."""
     text = theme.drawable(text)
     room = viewport.size[0] - position[0] - LEGEND_EMS * imgui.get_font_size()
-    wrap = room if anchor == 0.0 and room > 0 else 0.0
+    if anchor:
+        room = _CENTRED_SHARE * viewport.size[0]
+    wrap = room if room > 0 and (anchor == 0.0 or imgui.calc_text_size(text).x > room) else 0.0
     size = imgui.calc_text_size(text, wrap_width=wrap or -1.0)
     x, y = viewport.origin[0] + position[0] - anchor * size.x, viewport.origin[1] + position[1]
     draw = imgui.get_window_draw_list()
