@@ -220,7 +220,7 @@ def report(folder: Path, rows: list[Row], found: dict[Path, Survey], seconds: fl
     ]  # fmt: skip
     if compared:
         agree = sum(row.judgement == "agrees" for row in compared)
-        note = f"{agree} within 2 % of Mitsuba 3, {len(right) - agree} with a warning that says what is missing, "
+        note = f"{agree} within 2 % of Mitsuba 3, {len(right) - agree} that warn of something (read the rows), "
         note += f"of {len(compared)} that both render; {len(both) - len(compared)} too noisy to tell"
         targets.append(Target("files right", len(right) / len(compared), RIGHT, "", True, note))
     targets.append(
