@@ -1,6 +1,6 @@
 """`python -m pmviewer`."""
 
-from pmviewer.cli import main
+from pmviewer.commands.cli import main
 
 if __name__ == "__main__":
     main()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pmviewer.errors import OutputError, SettingError
 from pmviewer.output.session_file import read_session
-from pmviewer.settings import Settings, parse_assignments, with_values
+from pmviewer.settings.access import Settings, parse_assignments, with_values
 
 DEFAULT_PASSES = 64
 

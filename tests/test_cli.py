@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pmviewer.cli import main
+from pmviewer.commands.cli import main
 from pmviewer.output.exr import read_exr
 from pmviewer.output.png import read_png
 from pmviewer.output.session_file import write_session
-from pmviewer.settings import SETTINGS, Settings, with_values
+from pmviewer.settings.access import SETTINGS, Settings, with_values
 
 QUICK = ["--passes", "2", "--size", "24x16", "--set", "photons.N=2000"]
 

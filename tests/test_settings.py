@@ -7,7 +7,7 @@ import typing
 import pytest
 
 from pmviewer.errors import SettingError
-from pmviewer.settings import (
+from pmviewer.settings.access import (
     SETTINGS,
     Scale,
     Settings,

@@ -15,7 +15,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from pmviewer.errors import PmviewerError
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.compile.jit import kernel
 
 _I8, _I32, _F32 = ir.IntType(8), ir.IntType(32), ir.FloatType()
 _POINTER = _I8.as_pointer()

@@ -38,7 +38,7 @@ def _child(job: Mapping[str, Any]) -> tuple[dict[str, NDArray[Any]] | None, str]
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "result.npz"
         text = json.dumps({**job, "out": str(out)})
-        command = [sys.executable, "-m", "pmviewer.bench.mitsuba_child"]
+        command = [sys.executable, "-m", "pmviewer.bench.measures.mitsuba_child"]
         done = subprocess.run(command, input=text, capture_output=True, text=True, errors="replace")
         if done.returncode == 0 and out.is_file():
             with np.load(out) as arrays:

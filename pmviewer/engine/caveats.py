@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pmviewer.engine.energy import Energy
 from pmviewer.engine.tally import Tally
-from pmviewer.settings import Settings
+from pmviewer.settings.access import Settings
 
 CUT_PATHS = 1e-3
 """Share of the paths from the camera that may end at the depth allowed before a sentence says so."""

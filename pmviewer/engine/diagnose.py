@@ -14,26 +14,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.convergence import convergence_plane
-from pmviewer.engine.deposition import Rules
-from pmviewer.engine.importance import ImportanceMaps
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.method import Plan
 from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.stages.convergence import convergence_plane
+from pmviewer.engine.stages.deposition import Rules
+from pmviewer.engine.stages.importance import ImportanceMaps
 from pmviewer.importance.view import CHANNELS as IMPORTANCE_CHANNELS
 from pmviewer.importance.view import importance_view, probability_view
-from pmviewer.maps.grid import PhotonGrid, build_grid
 from pmviewer.maps.importance import NO_IMPORTANCE
 from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import neighbourhood
-from pmviewer.maps.stored import ALL_CLASSES
+from pmviewer.maps.search.grid import PhotonGrid, build_grid
+from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
-from pmviewer.photons.deposition import SMALLEST_EPSILON
-from pmviewer.photons.lightpass import PhotonMaps
-from pmviewer.render.density import WIDEST, counting_eye, counting_tree, density_view
-from pmviewer.render.diagnostics import FAMILY_CHANNELS, lookup_view, shadow_view, site_view
+from pmviewer.photons.deposition.rules import SMALLEST_EPSILON
+from pmviewer.photons.light_pass.light_pass import PhotonMaps
+from pmviewer.render.diagnostics.density import WIDEST, counting_eye, counting_tree, density_view
+from pmviewer.render.diagnostics.diagnostics import FAMILY_CHANNELS, lookup_view, shadow_view, site_view
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL
-from pmviewer.settings import Importance, Settings
+from pmviewer.settings.access import Importance, Settings
 
 TILE = 2048
 OF_A_MAP = ("look-up", "importance", "density", "storing")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from pmviewer.engine.comparison.without_importance import refusal
 from pmviewer.engine.diagnose import OF_A_MAP, judges, refused_view
 from pmviewer.engine.method import Plan, plan_of
-from pmviewer.engine.without_importance import refusal
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.scene.analysis import SceneTraits
-from pmviewer.settings import Settings
+from pmviewer.settings.access import Settings
 
 _KDTREE_ONLY = ("estimate.k", "estimate.rim", "estimate.max_radius", "estimate.black_level")
 _GRID_ONLY = ("estimate.radius", "estimate.caustic_radius")

@@ -16,12 +16,12 @@ from pmviewer.engine.inspection import Inspection
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.planes import beauty_of, view_of
-from pmviewer.settings import Settings
+from pmviewer.settings.access import Settings
 
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
-    from pmviewer.photons.deposition import Deposited
-    from pmviewer.photons.light_importance import LightImportance
-    from pmviewer.photons.projection import ProjectionMap
+    from pmviewer.photons.deposition.rules import Deposited
+    from pmviewer.photons.emission.light_importance import LightImportance
+    from pmviewer.photons.projection.projection import ProjectionMap
 
 State = Literal["empty", "loading", "preparing", "rendering", "paused", "finished", "failed"]
 Level = Literal["info", "warning", "error"]

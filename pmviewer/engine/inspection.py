@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from pmviewer.output.diagnostic_views import Family
 
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
-    from pmviewer.photons.light_importance import LightImportance
-    from pmviewer.photons.paths import PhotonPaths
+    from pmviewer.photons.emission.light_importance import LightImportance
+    from pmviewer.photons.light_pass.paths import PhotonPaths
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class Wanted:
 @dataclass(frozen=True, eq=False)
 class Inspection:
     """`planes` by view, (h, w, channels) float32, see `pmviewer.output.diagnostic_views`; `gathered`: the gather rays
-    of the pixel, (n, 10) float32, see `pmviewer.render.gather_points`; `fates`: photons (n, 6) float32, see
-    `pmviewer.photons.fates`; `lights`: importance of the lights as photons tell it."""
+    of the pixel, (n, 10) float32, see `pmviewer.render.gather.gather_points`; `fates`: photons (n, 6) float32, see
+    `pmviewer.photons.deposition.fates`; `lights`: importance of the lights as photons tell it."""
 
     wanted: Wanted = Wanted()
     planes: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)

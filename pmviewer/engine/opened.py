@@ -7,17 +7,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from pmviewer.engine.hidden_lights import hidden_lights
 from pmviewer.engine.memory import check_scene_memory
-from pmviewer.photons.projection import Projection
+from pmviewer.engine.stages.hidden_lights import hidden_lights
+from pmviewer.photons.projection.projection import Projection
 from pmviewer.scene.analysis import SceneTraits, analyse
-from pmviewer.scene.completion import completed
-from pmviewer.scene.covered_emission import ignored_opacity, without_unseen_lights
+from pmviewer.scene.arrays.covered_emission import ignored_opacity, without_unseen_lights
+from pmviewer.scene.arrays.flatten import FlatScene, flatten
+from pmviewer.scene.defaults.completion import completed
+from pmviewer.scene.defaults.light_rigs import Rig
 from pmviewer.scene.description import Scene
-from pmviewer.scene.flatten import FlatScene, flatten
-from pmviewer.scene.light_rigs import Rig
 from pmviewer.scene.load import read_scene
-from pmviewer.scene.recentre import recentred
+from pmviewer.scene.meshes.recentre import recentred
 
 _uids = itertools.count(1)
 
@@ -25,7 +25,7 @@ _uids = itertools.count(1)
 @dataclass(frozen=True)
 class OpenScene:
     """`source` is what the user named; `uid` tells scenes apart in caches. `projections` keeps projection maps by how
-    they were asked for (`pmviewer.engine.projection`)."""
+    they were asked for (`pmviewer.engine.stages.projection`)."""
 
     scene: Scene
     flat: FlatScene

@@ -6,27 +6,28 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pmviewer.engine.cache_stage import prepare_cache, recipe
-from pmviewer.engine.convergence import prepare_convergence
-from pmviewer.engine.guides import gather_records
-from pmviewer.engine.importance import prepare_importance
 from pmviewer.engine.method import estimator_of, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.projection import projection_for
 from pmviewer.engine.radius import radii_of_pixels
-from pmviewer.kernels.raycast import cast_closest
-from pmviewer.maps.grid import build_grid
+from pmviewer.engine.stages.cache_stage import prepare_cache, recipe
+from pmviewer.engine.stages.convergence import prepare_convergence
+from pmviewer.engine.stages.guides import gather_records
+from pmviewer.engine.stages.importance import prepare_importance
+from pmviewer.engine.stages.projection import projection_for
+from pmviewer.kernels.accel.raycast import cast_closest
+from pmviewer.maps.estimate.variant import marked
 from pmviewer.maps.irradiance_cache import NO_CACHE
-from pmviewer.maps.kdtree import build_kdtree
 from pmviewer.maps.radiance import build_sites
+from pmviewer.maps.search.grid import build_grid
+from pmviewer.maps.search.kdtree import build_kdtree
 from pmviewer.maps.shadow import shadow_record
-from pmviewer.maps.variant import marked
-from pmviewer.photons.deposition import prepare_rules
-from pmviewer.photons.projected import NO_PROJECTION
-from pmviewer.photons.strata import STRATA_DTYPE
-from pmviewer.photons.trace import LIGHT_PASS_DTYPE, N_COUNTS, empty_ledger, trace_photons
+from pmviewer.photons.deposition.rules import prepare_rules
+from pmviewer.photons.emission.strata import STRATA_DTYPE
+from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE, N_COUNTS, empty_ledger, trace_photons
+from pmviewer.photons.projection.projected import NO_PROJECTION
 from pmviewer.render.camera import resolve_camera
+from pmviewer.render.direct.shadow import NO_SHADOWS
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
 from pmviewer.render.given import PassData
@@ -35,8 +36,7 @@ from pmviewer.render.path import path_pass
 from pmviewer.render.pixel_radius import first_radii
 from pmviewer.render.record import EYE_DTYPE
 from pmviewer.render.record import N_COUNTS as N_EYE_COUNTS
-from pmviewer.render.shadow import NO_SHADOWS
-from pmviewer.settings import Settings
+from pmviewer.settings.access import Settings
 
 Step = tuple[str, Callable[[], object]]
 Tell = Callable[[str, float | None], None]

@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from pmviewer.engine.method import Plan
-from pmviewer.kernels.raycast import cast_closest
-from pmviewer.maps.nearest import shrunk
+from pmviewer.kernels.accel.raycast import cast_closest
+from pmviewer.maps.estimate.nearest import shrunk
 from pmviewer.maps.radius import progressive_radius
 from pmviewer.render.camera import CameraPose
-from pmviewer.scene.flatten import FlatScene
-from pmviewer.settings import Estimate, Settings
+from pmviewer.scene.arrays.flatten import FlatScene
+from pmviewer.settings.access import Estimate, Settings
 
 FOOTPRINTS, GATHER_FOOTPRINTS = 4.0, 3.0
 """Radius in pixel footprints: maps shown directly need a calm estimate; gather rays average it anyway, so that theirs
@@ -48,7 +48,7 @@ def first_radius(scene: FlatScene, camera: CameraPose, estimate: Estimate, gathe
 
 def pass_neighbours(index: int, estimate: Estimate) -> tuple[int, float]:
     """Neighbours that a k-nearest look-up of pass `index` searches, and the share of their disc's area that it uses: in
-    all the share r²ᵢ/r²₁ of the area that `estimate.k` fill (`pmviewer.maps.nearest`)."""
+    all the share r²ᵢ/r²₁ of the area that `estimate.k` fill (`pmviewer.maps.estimate.nearest`)."""
     return shrunk(estimate.k, progressive_radius(1.0, index + 1, estimate.alpha) ** 2)
 
 

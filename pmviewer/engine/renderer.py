@@ -15,43 +15,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.cache import StageCache
-from pmviewer.engine.cache_stage import cache_cloud, fill_cache, recipe
 from pmviewer.engine.caveats import caveats
 from pmviewer.engine.diagnose import Looked, diagnostic_planes, wanted_of
 from pmviewer.engine.exposure import metered
 from pmviewer.engine.frame import Frame, PhotonCloud, Statistics
-from pmviewer.engine.guides import gather_records
-from pmviewer.engine.importance import ImportanceStage
 from pmviewer.engine.inspection import Inspection, Wanted
-from pmviewer.engine.light_stage import CACHED_PASSES, LightStage
 from pmviewer.engine.memory import check_memory
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import first_radius, radii_of_pixels
-from pmviewer.engine.shadows import ShadowMap, shadows_of
+from pmviewer.engine.stages.cache_stage import cache_cloud, fill_cache, recipe
+from pmviewer.engine.stages.guides import gather_records
+from pmviewer.engine.stages.importance import ImportanceStage
+from pmviewer.engine.stages.light_stage import CACHED_PASSES, LightStage
+from pmviewer.engine.stages.shadows import ShadowMap, shadows_of
 from pmviewer.engine.tally import Tally
 from pmviewer.maps.importance import NO_IMPORTANCE
 from pmviewer.maps.irradiance_cache import NO_CACHE, REACH, IrradianceCache
-from pmviewer.photons.lightpass import trace_pass, trajectories
-from pmviewer.photons.paths import PhotonPaths, empty_paths
+from pmviewer.photons.light_pass.light_pass import trace_pass, trajectories
+from pmviewer.photons.light_pass.paths import PhotonPaths, empty_paths
 from pmviewer.render.camera import CameraPose, resolve_camera
-from pmviewer.render.choice import CHOICES
+from pmviewer.render.direct.choice import CHOICES
+from pmviewer.render.direct.outline import outline_pixels
+from pmviewer.render.direct.shadow import NO_SHADOWS
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
 from pmviewer.render.free_camera import resolve_view
-from pmviewer.render.gather_points import POINT_COLUMNS, gather_points
+from pmviewer.render.gather.gather_points import POINT_COLUMNS, gather_points
 from pmviewer.render.given import PassData
 from pmviewer.render.lookup import NO_SITES
-from pmviewer.render.outline import outline_pixels
 from pmviewer.render.path import path_pass
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, RADIUS, first_radii, shrink
 from pmviewer.render.record import (
     N_COUNTS,
     eye_record,
 )
-from pmviewer.render.shadow import NO_SHADOWS
-from pmviewer.settings import Settings
+from pmviewer.settings.access import Settings
 
 MOST_POINTS = 1024
 """Most gather rays of a pixel that are told of."""
@@ -324,7 +324,7 @@ class Renderer:
         return PassData(self.scene.flat.record, eye, *found, *extra)
 
     def gather_points(self, x: int, y: int) -> NDArray[np.float32]:
-        """The gather rays of a pixel in the last pass, (n, POINT_COLUMNS), see `pmviewer.render.gather_points`.
+        """The gather rays of a pixel in the last pass, (n, POINT_COLUMNS), see `pmviewer.render.gather.gather_points`.
 
         None with methods that don't gather, before the first pass, and for pixels outside the image.
         """

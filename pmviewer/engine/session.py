@@ -25,9 +25,9 @@ from pmviewer.engine.renderer import Renderer
 from pmviewer.errors import PmviewerError
 from pmviewer.progress import stage, watched
 from pmviewer.scene.analysis import SceneTraits
+from pmviewer.scene.arrays.tessellate import DrawGeometry, tessellate
 from pmviewer.scene.description import Scene
-from pmviewer.scene.tessellate import DrawGeometry, tessellate
-from pmviewer.settings import Settings, changed_stages
+from pmviewer.settings.access import Settings, changed_stages
 
 Source = str | Path | Scene
 

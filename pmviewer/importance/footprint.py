@@ -25,11 +25,11 @@ import math
 
 import numpy as np
 
-from pmviewer.kernels.instance import I_TO_LOCAL, find_instance, has_instances, stored_prim, transform_vector
-from pmviewer.kernels.jit import device
+from pmviewer.kernels.accel.instance import I_TO_LOCAL, find_instance, has_instances, stored_prim, transform_vector
+from pmviewer.kernels.accel.quadric import QUADRIC_FLOATS
+from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.memory import load_f4
-from pmviewer.kernels.quadric import QUADRIC_FLOATS
-from pmviewer.kernels.specialise import specialised
 from pmviewer.kernels.surface import surface_at
 from pmviewer.kernels.vector import add, along, basis, cross, dot, normalize, scale, sub
 

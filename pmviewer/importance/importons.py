@@ -20,7 +20,7 @@ from pmviewer.importance.trace import (
     trace_importons,
 )
 from pmviewer.maps.importance import Importons
-from pmviewer.scene.flatten import FlatScene
+from pmviewer.scene.arrays.flatten import FlatScene
 
 Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pmviewer.importance.rules import density_of
 from pmviewer.maps.importance import ImportanceMap
 from pmviewer.maps.power import luminances
-from pmviewer.photons.light_importance import LightImportance
+from pmviewer.photons.emission.light_importance import LightImportance
 
 Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 Arrived = tuple[NDArray[np.float32], NDArray[np.uint32], float, ImportanceMap]

@@ -36,11 +36,8 @@ from pmviewer.importance.footprint import (
     start,
     travel,
 )
-from pmviewer.kernels.jit import device, kernel
-from pmviewer.kernels.memory import float_of_bits
-from pmviewer.kernels.random import SOBOL, draw4
-from pmviewer.kernels.raycast import closest_hit
-from pmviewer.kernels.scattering import (
+from pmviewer.kernels.accel.raycast import closest_hit
+from pmviewer.kernels.bsdf.scattering import (
     FOLLOWED,
     NOTHING,
     STORED,
@@ -52,6 +49,9 @@ from pmviewer.kernels.scattering import (
     same_side,
     shading_normal,
 )
+from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.memory import float_of_bits
+from pmviewer.kernels.random import SOBOL, draw4
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.kernels.vector import add, along, dot, luminance, mul, scale

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.importance.rules import NEAREST
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.importance import importance_at, importance_sum
-from pmviewer.render.diagnostics import stored_hit
+from pmviewer.render.diagnostics.diagnostics import stored_hit
 
 CHANNELS = 2
 """Importance in pixels, and photons required, per unit area."""
@@ -36,8 +36,8 @@ def importance_view(scenes, eyes, maps, M_r, constant, out, first, last):
 
 @kernel
 def probability_view(scenes, eyes, maps, f, epsilon, discard, out, first, last):
-    """Probability with which `pmviewer.photons.deposition.KellerWald` stores a photon that arrives at the first surface
-    seen through the middle of pixels first … last−1 that stores photons; −1 where there is none.
+    """Probability with which `pmviewer.photons.deposition.rules.KellerWald` stores a photon that arrives at the first
+    surface seen through the middle of pixels first … last−1 that stores photons; −1 where there is none.
 
     f: float32, by pixel; epsilon: float32, the cut-off, below which the probability is epsilon or, with `discard`, 0;
     out: float32 (pixels, 1); the rest as for `importance_view`.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.jit import device
+from pmviewer.kernels.compile.jit import device
 
 INDEPENDENT, SOBOL = 0, 1
 

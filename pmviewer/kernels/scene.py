@@ -1,16 +1,16 @@
 """How kernels see the scene: one record of addresses, lengths and a few numbers, and accessors that read through it.
 
-A record by reference is faster than passing twenty arrays, and compiles once. `pmviewer.scene.flatten` fills it and
-keeps the arrays alive.
+A record by reference is faster than passing twenty arrays, and compiles once. `pmviewer.scene.arrays.flatten` fills it
+and keeps the arrays alive.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.bvh import BVH_FIELDS
-from pmviewer.kernels.instance import INSTANCE_FIELDS, is_own, stored_prim
-from pmviewer.kernels.jit import device
+from pmviewer.kernels.accel.bvh import BVH_FIELDS
+from pmviewer.kernels.accel.instance import INSTANCE_FIELDS, is_own, stored_prim
+from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.memory import load_f4, load_i4
 
 _f4 = np.float32
@@ -45,7 +45,7 @@ BLEND_FIELDS: list[tuple[str, str]] = [("blends", "i8")]
 LIGHT_FIELDS: list[tuple[str, str]] = [
     ("more_lights", "i8"),  # 1; its presence says that there are spot, directional or image environment lights
     ("sky_texels", "i8"),  # float32 (sky_height, sky_width, 3): radiance of the image environment
-    ("sky_rows", "i8"),  # float32 (sky_height − 1,): its distribution, see `pmviewer.kernels.environment`
+    ("sky_rows", "i8"),  # float32 (sky_height − 1,): its distribution, see `pmviewer.kernels.lights.environment`
     ("sky_cells", "i8"),  # float32 (sky_height − 1, sky_width)
     ("sky_width", "i8"),
     ("sky_height", "i8"),
@@ -57,7 +57,7 @@ TEXTURE_FIELDS: list[tuple[str, str]] = [
     ("texel_starts", "i8"),  # int64 (n_textures,): a bitmap's first number in `texels`
     ("texels", "i8"),  # float32, all bitmaps row by row
     ("light_textures", "i8"),  # int64 (n_lights, LIGHT_TEXTURE_COLUMNS), or 0 when no light is textured
-    ("light_frames", "i8"),  # float32 (n_lights, 9): see `pmviewer.kernels.textured_light`
+    ("light_frames", "i8"),  # float32 (n_lights, 9): see `pmviewer.kernels.lights.textured_light`
     ("light_tables", "i8"),  # float32: distributions over textured lights
 ]
 """Of scenes with textures, or with materials that have a direction."""
@@ -66,7 +66,7 @@ COLOUR_FIELDS: list[tuple[str, str]] = [
 ]
 """Of scenes with colours at vertices; they have TEXTURE_FIELDS and BSDF_FIELDS, too."""
 OPACITY_FIELDS: list[tuple[str, str]] = [
-    ("passable", "i8"),  # 1; its presence says that rays pass some surfaces, see `pmviewer.kernels.opacity`
+    ("passable", "i8"),  # 1; its presence says that rays pass some surfaces, see `pmviewer.kernels.accel.opacity`
 ]
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.instance import (
+from pmviewer.kernels.accel.instance import (
     I_TO_LOCAL,
     I_TO_WORLD,
     find_instance,
@@ -19,11 +19,11 @@ from pmviewer.kernels.instance import (
     stored_of,
     transform_point,
 )
-from pmviewer.kernels.jit import device
+from pmviewer.kernels.accel.quadric import quadric_normal, quadric_project
+from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.memory import load_f4
-from pmviewer.kernels.quadric import quadric_normal, quadric_project
 from pmviewer.kernels.scene import load3
-from pmviewer.kernels.specialise import specialised
 from pmviewer.kernels.vector import cross, dot, normalize, sub
 
 _f4 = np.float32

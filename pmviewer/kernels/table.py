@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.jit import device
+from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.memory import load_f4
 
 

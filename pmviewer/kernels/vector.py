@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pmviewer.kernels.jit import device
+from pmviewer.kernels.compile.jit import device
 
 _f4 = np.float32
 

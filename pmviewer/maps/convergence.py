@@ -30,14 +30,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.vector import luminance
 from pmviewer.maps.density_control import FLATNESS, M, needs_of
-from pmviewer.maps.estimate import RIM_LEFT_OUT, irradiance_knn
-from pmviewer.maps.filters import CONSTANT
-from pmviewer.maps.kdtree import PhotonKdTree, build_kdtree
+from pmviewer.maps.estimate.estimate import RIM_LEFT_OUT, irradiance_knn
+from pmviewer.maps.estimate.filters import CONSTANT
 from pmviewer.maps.record import decode_directions, in_classes
-from pmviewer.maps.stored import ALL_CLASSES
+from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
+from pmviewer.maps.search.stored import ALL_CLASSES
 
 MORE, CONVERGED, DENSE = 0, 1, 2
 NO_CAUSTIC = -1

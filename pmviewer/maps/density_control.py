@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.jit import device, kernel
+from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.vector import normalize
 from pmviewer.maps.record import decode_direction, decode_power

@@ -21,7 +21,7 @@ import math
 
 import numpy as np
 
-from pmviewer.kernels.jit import device
+from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.vector import along, basis, scale
 
 _f4 = np.float32

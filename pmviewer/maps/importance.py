@@ -4,8 +4,8 @@ Importons are to the camera what photons are to the lights: places that the fina
 of the image's pixels that it stands for. The importance Γ at a place says how many pixels look at a unit of area there:
 
 - screen importance: the density of the importance that arrives, ΣΨ/A over the k nearest importons, A being the area
-  that they span (`pmviewer.maps.hull`): a disc over an edge would halve it, just where gather rays need the map most;
-- footprint importance: the mean of 1/A over the same importons, A being the area that one pixel sees there.
+  that they span (`pmviewer.maps.estimate.hull`): a disc over an edge would halve it, just where gather rays need the
+  map most; - footprint importance: the mean of 1/A over the same importons, A being the area that one pixel sees there.
 
 Both are in pixels per unit area, and the required density of photons is Γ·M_r/A_pix (`required_density`).
 
@@ -29,11 +29,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.jit import device, kernel
+from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.memory import float_of_bits, load_f4, load_u4, stack_get_i8, stack_i4, stack_put_f4
-from pmviewer.kernels.specialise import has, specialised
 from pmviewer.kernels.vector import basis, normalize
-from pmviewer.maps.hull import (
+from pmviewer.maps.estimate.hull import (
     DIRECTIONS,
     EDGE,
     FEWEST,
@@ -46,9 +46,9 @@ from pmviewer.maps.hull import (
     keep_farthest,
     share_of,
 )
-from pmviewer.maps.kdtree import KEYS, MAX_K, RECORD, PhotonKdTree, build_kdtree, nearest
 from pmviewer.maps.record import decode_direction, decode_directions, encode_power
-from pmviewer.maps.stored import ALL_CLASSES
+from pmviewer.maps.search.kdtree import KEYS, MAX_K, RECORD, PhotonKdTree, build_kdtree, nearest
+from pmviewer.maps.search.stored import ALL_CLASSES
 
 Kind = Literal["screen", "footprint", "average"]
 KINDS: tuple[Kind, ...] = ("screen", "footprint", "average")

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.jit import device, kernel
+from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import load_f4, load_i4
 from pmviewer.kernels.random import hash3
 from pmviewer.kernels.vector import add, cross, dot, scale, sub

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.jit import device, kernel
+from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import bits_of_float
 from pmviewer.kernels.random import hash3
 from pmviewer.maps.record import EXPONENT_BASE, decode_power

@@ -16,8 +16,8 @@ average. Beyond c, where t > T, the look-up around the ray's end misses T: m −
 ∫₀ᵀ e⁻ᵗ(1 + m − t) dt + e⁻ᵀ(m − T) = m. Black beyond the cut-off would lack the second term, and c > r/2 counts too
 many, by up to a tenth of m when few photons lie in a disc.
 
-The grid is that of photons (`pmviewer.maps.grid`): word 3 holds the normal, words 4 and 5 of a block of eight are eight
-64-bit slots of irradiance.
+The grid is that of photons (`pmviewer.maps.search.grid`): word 3 holds the normal, words 4 and 5 of a block of eight
+are eight 64-bit slots of irradiance.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.jit import device
+from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.memory import (
     count_trailing_zeros,
     load_f4,
@@ -40,9 +40,9 @@ from pmviewer.kernels.memory import (
     store_shared_i8,
 )
 from pmviewer.kernels.vector import normalize
-from pmviewer.maps.grid import BLOCK_BYTES, ROW_BYTES, PhotonGrid, build_grid, grid_ranges, lanes_between
 from pmviewer.maps.record import decode_direction, decode_power, encode_power
-from pmviewer.maps.simd import WIDTH, facing8, within8
+from pmviewer.maps.search.grid import BLOCK_BYTES, ROW_BYTES, PhotonGrid, build_grid, grid_ranges, lanes_between
+from pmviewer.maps.search.simd import WIDTH, facing8, within8
 
 Share = Literal["all", "1/4", "1/8"]
 SHARES: dict[Share, int] = {"all": 1, "1/4": 4, "1/8": 8}

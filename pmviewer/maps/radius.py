@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.record import decode_power
 
 _SAMPLE, _PROBES = 16384, 64

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.jit import device
+from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.memory import bits_of_float, float_of_bits
 
 BYTES_PER_PHOTON = 24

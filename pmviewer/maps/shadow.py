@@ -16,13 +16,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.jit import device
+from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.memory import count_trailing_zeros, load_u4, stack_get_i4, stack_i4
-from pmviewer.maps.grid import BLOCK_BYTES, ROW_BYTES, PhotonGrid, build_grid, grid_ranges, lanes_between
 from pmviewer.maps.radius import neighbourhood
 from pmviewer.maps.record import HAD_DIFFUSE
-from pmviewer.maps.simd import WIDTH, facing8, within8
-from pmviewer.maps.stored import ALL_CLASSES
+from pmviewer.maps.search.grid import BLOCK_BYTES, ROW_BYTES, PhotonGrid, build_grid, grid_ranges, lanes_between
+from pmviewer.maps.search.simd import WIDTH, facing8, within8
+from pmviewer.maps.search.stored import ALL_CLASSES
 
 SHADOW_FLAGS = HAD_DIFFUSE | 1
 """Flags of a photon in shadow: of another class than direct ones, one surface behind."""
@@ -40,7 +40,7 @@ _u4 = np.uint32
 
 def shadow_record(grid: PhotonGrid, fewest: int) -> NDArray[np.void]:
     """The grid's record (1,) for kernels, with the number of photons that it takes to decide; the field that tells it
-    from a plain map comes first, see `pmviewer.maps.variant`."""
+    from a plain map comes first, see `pmviewer.maps.estimate.variant`."""
     fields = [(name, field[0]) for name, field in grid.record.dtype.fields.items()]  # type: ignore[union-attr]
     record = np.zeros(1, np.dtype([("fewest", np.int32), *fields], align=True))
     for name, _ in fields:

@@ -16,7 +16,7 @@ from pmviewer.output.exr import BEAUTY, PREFIX, Value, write_exr
 from pmviewer.output.png import write_png
 from pmviewer.output.side_by_side import side_by_side
 from pmviewer.output.tone import display_image, to_uint8
-from pmviewer.settings import Display, Settings, flat
+from pmviewer.settings.access import Display, Settings, flat
 
 LAYERS = ("beauty", "emission", "direct", "specular", "caustic", "indirect", "albedo", "normal", "depth")
 """The beauty image, its terms in the order in which their sum gives it bit for bit, and the first hit's properties."""
@@ -167,7 +167,7 @@ def write_frame_png(
 
 
 class Pair(Protocol):
-    """What an exporter reads of `pmviewer.engine.importance_gain.Gain`."""
+    """What an exporter reads of `pmviewer.engine.comparison.importance_gain.Gain`."""
 
     def frames(self) -> tuple[Exportable, Exportable]: ...
     def table(self) -> list[tuple[str, str, str, str]]: ...

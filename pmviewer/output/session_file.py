@@ -32,7 +32,7 @@ from pmviewer import __version__
 from pmviewer.errors import PmviewerError, SceneError, SettingError
 from pmviewer.output.files import read_file, write_file
 from pmviewer.resources import data_folder
-from pmviewer.settings import SETTINGS, Settings, flat, with_values
+from pmviewer.settings.access import SETTINGS, Settings, flat, with_values
 
 FORMAT = 1
 SUFFIX = ".toml"

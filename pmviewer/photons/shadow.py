@@ -18,18 +18,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.jit import kernel
-from pmviewer.kernels.light import emit_photon
+from pmviewer.kernels.accel.raycast import closest_hit
+from pmviewer.kernels.bsdf.scattering import NOTHING, bsdf_at, keeps
+from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.lights.light import emit_photon
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import SOBOL, draw1, draw4
-from pmviewer.kernels.raycast import closest_hit
-from pmviewer.kernels.scattering import NOTHING, bsdf_at, keeps
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.maps.record import encode_direction, encode_power
 from pmviewer.maps.shadow import SHADOW_FLAGS
-from pmviewer.photons.lightpass import Runner
-from pmviewer.scene.flatten import FlatScene
+from pmviewer.photons.light_pass.light_pass import Runner
+from pmviewer.scene.arrays.flatten import FlatScene
 
 MOST_HITS = 16
 """Surfaces after which a photon is dropped: what lies behind so many is traced."""

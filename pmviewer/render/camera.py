@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pmviewer.errors import SettingError
 from pmviewer.scene.description import Camera, NamedCamera, Scene, Vec3
-from pmviewer.settings import CameraSettings
+from pmviewer.settings.access import CameraSettings
 
 Matrix = NDArray[np.float64]
 

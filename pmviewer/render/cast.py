@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.jit import device
-from pmviewer.kernels.raycast import closest_hit
+from pmviewer.kernels.accel.raycast import closest_hit
+from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.surface import leave, surface_at
 
 _f4 = np.float32

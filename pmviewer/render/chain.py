@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.jit import device
-from pmviewer.kernels.scattering import (
+from pmviewer.kernels.bsdf.scattering import (
     FOLLOWED,
     STORED,
     attenuation,
@@ -17,6 +16,7 @@ from pmviewer.kernels.scattering import (
     chain_numbers,
     same_side,
 )
+from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face, surface_at
 from pmviewer.kernels.vector import largest, mul, scale

@@ -2,8 +2,8 @@
 
 From the camera, mirrors, glass and smooth glossy lobes are followed. Wherever a surface has lobes that photons are
 stored for, direct light is sampled, caustics come from the caustic map, and indirect light from the global map: shown
-directly (`progressive`) or by a final gather (`gather`, see `pmviewer.render.gather`). A surface with lobes of both
-kinds does both, so that a chain may light up at every surface it meets.
+directly (`progressive`) or by a final gather (`gather`, see `pmviewer.render.gather.gather`). A surface with lobes of
+both kinds does both, so that a chain may light up at every surface it meets.
 
 Random numbers of a pixel are Owen-scrambled Sobol points over the passes, keyed by (seed, pixel): dimension set 0 is
 the place in the pixel and on the light, 1 the choice of light and the BSDF sample, 2 + d the lobe followed at depth d.
@@ -13,22 +13,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.jit import device, kernel
-from pmviewer.kernels.light import emitted, environment_radiance
+from pmviewer.kernels.accel.raycast import closest_hit
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, shading_normal
+from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.lights.light import emitted, environment_radiance
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4, hash3
-from pmviewer.kernels.raycast import closest_hit
-from pmviewer.kernels.scattering import FOLLOWED, NOTHING, STORED, is_delta, shading_normal
 from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.kernels.vector import add, dot, is_good, largest, mul, normalize, scale
 from pmviewer.maps.record import CAUSTIC as CAUSTIC_CLASS
-from pmviewer.render.cached import cached, surface_rays
 from pmviewer.render.chain import BLACK, arrive, follow_camera_path
-from pmviewer.render.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near
-from pmviewer.render.direct import found_light, light_samples
+from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near
+from pmviewer.render.direct.direct import found_light, light_samples
+from pmviewer.render.gather.cached import cached, surface_rays
+from pmviewer.render.gather.guide import AIM_WORDS, aim
 from pmviewer.render.given import Aim, Sampler, opened
-from pmviewer.render.guide import AIM_WORDS, aim
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius
 from pmviewer.render.record import C_CUT, C_DROPPED, C_RAYS, C_SAVED, C_SHADOW_RAYS
 from pmviewer.render.reflect import reflected, unfound
@@ -219,7 +219,7 @@ def eye_pass(given, outline, radii, film, counts, first, last):
     """Add one sample to each of the pixels first … last−1.
 
     given: PassData of arrays (1,); outline: uint8 (pixels,), 1 where emission gets camera rays of its own
-    (`pmviewer.render.outline`), or (0,); radii: float32 (pixels, COLUMNS), look-up radii of the pixels
+    (`pmviewer.render.direct.outline`), or (0,); radii: float32 (pixels, COLUMNS), look-up radii of the pixels
     (`pmviewer.render.pixel_radius`), or None; film: float64 (pixels, CHANNELS), see `pmviewer.render.planes`; counts:
     int64 (N_COUNTS,).
     """

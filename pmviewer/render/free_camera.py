@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.scene.description import Scene, Vec3
-from pmviewer.settings import FreeCamera, Settings
+from pmviewer.settings.access import FreeCamera, Settings
 
 FOV = 45.0
 AZIMUTH, ELEVATION = math.radians(40), math.radians(50)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from pmviewer.kernels.jit import inlined
+from pmviewer.kernels.compile.jit import inlined
 
 
 class PassData(NamedTuple):
@@ -31,7 +31,7 @@ class PassData(NamedTuple):
 
 class SurfaceInteraction(NamedTuple):
     """A surface point seen from wo: p; ng, the geometric normal on the side of wo; gap, how far rays start off the
-    surface; bsdf, of `pmviewer.kernels.scattering`; wo, unit."""
+    surface; bsdf, of `pmviewer.kernels.bsdf.scattering`; wo, unit."""
 
     p: Any
     ng: Any
@@ -50,7 +50,7 @@ class Sampler(NamedTuple):
 
 class Aim(NamedTuple):
     """What photons tell gather rays of a point: the scratch that holds them, how many rays they guide, and how many
-    photons they are (`pmviewer.render.guide.aim`)."""
+    photons they are (`pmviewer.render.gather.guide.aim`)."""
 
     found: Any
     rays: Any

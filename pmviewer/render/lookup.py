@@ -1,21 +1,21 @@
 """One look-up for both kinds of map: a grid searches the pass's radius, a kd-tree the k nearest photons.
 
-Kernels are compiled for the kind of map they are given and for the mark it may bear (`pmviewer.maps.variant`), so that
-nobody compiles a search or an estimate that is not used.
+Kernels are compiled for the kind of map they are given and for the mark it may bear (`pmviewer.maps.estimate.variant`),
+so that nobody compiles a search or an estimate that is not used.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from pmviewer.kernels.compile.specialise import has, part, specialised
 from pmviewer.kernels.memory import stack_i4
-from pmviewer.kernels.specialise import has, part, specialised
-from pmviewer.maps.differential import checked_irradiance, reach
-from pmviewer.maps.estimate import irradiance_knn, irradiance_radius
-from pmviewer.maps.hull import hull_irradiance
-from pmviewer.maps.neighbours import BATCH_WORDS, FOUND_WORDS, SQUARED_WORDS, next_batch, search
+from pmviewer.maps.estimate.differential import checked_irradiance, reach
+from pmviewer.maps.estimate.estimate import irradiance_knn, irradiance_radius
+from pmviewer.maps.estimate.hull import hull_irradiance
+from pmviewer.maps.estimate.neighbours import BATCH_WORDS, FOUND_WORDS, SQUARED_WORDS, next_batch, search
 from pmviewer.maps.radiance import UNKNOWN, nearest_site, site_irradiance, site_place, site_slot, store_irradiance
-from pmviewer.maps.stored import ALL_CLASSES
+from pmviewer.maps.search.stored import ALL_CLASSES
 
 _f4 = np.float32
 _i8 = np.int64

@@ -1,20 +1,17 @@
 """A plain path tracer, the yardstick (R12): next-event estimation with MIS, Russian roulette, no photons.
 
 Its samples are sorted into the same terms as the photon methods': a path is a caustic when it leaves the first diffuse
-surface over followed lobes (mirrors, glass, see `pmviewer.kernels.scattering`) and reaches the light over these alone,
-or with `photons.indirect_caustics` whatever it meets after them; indirect when it meets another diffuse surface else.
+surface over followed lobes (mirrors, glass, see `pmviewer.kernels.bsdf.scattering`) and reaches the light over these
+alone, or with `photons.indirect_caustics` whatever it meets after them; indirect when it meets another diffuse surface
+else.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.jit import device, kernel
-from pmviewer.kernels.light import emitted, environment_radiance, light_pdf
-from pmviewer.kernels.memory import stack_i4
-from pmviewer.kernels.random import draw4
-from pmviewer.kernels.raycast import closest_hit
-from pmviewer.kernels.scattering import (
+from pmviewer.kernels.accel.raycast import closest_hit
+from pmviewer.kernels.bsdf.scattering import (
     FOLLOWED,
     NOTHING,
     STORED,
@@ -26,11 +23,15 @@ from pmviewer.kernels.scattering import (
     same_side,
     shading_normal,
 )
+from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.lights.light import emitted, environment_radiance, light_pdf
+from pmviewer.kernels.memory import stack_i4
+from pmviewer.kernels.random import draw4
 from pmviewer.kernels.scene import light_of, material_of
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.kernels.vector import largest, mul, scale
-from pmviewer.render.choice import LIST_WORDS, choose_by_power
-from pmviewer.render.direct import light_samples, power_heuristic
+from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power
+from pmviewer.render.direct.direct import light_samples, power_heuristic
 from pmviewer.render.eye import (
     CAUSTIC,
     DIRECT,

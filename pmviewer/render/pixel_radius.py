@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.specialise import absent, specialised
+from pmviewer.kernels.compile.specialise import absent, specialised
 from pmviewer.render.lookup import looked_up
 
 OF_CAUSTIC, OF_GLOBAL = 0, 1

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.random import SOBOL
-from pmviewer.maps.filters import FILTERS
+from pmviewer.maps.estimate.filters import FILTERS
 from pmviewer.render.camera import CameraPose
-from pmviewer.settings import Settings
+from pmviewer.settings.access import Settings
 
 EYE_DTYPE = np.dtype(
     [
@@ -28,7 +28,7 @@ EYE_DTYPE = np.dtype(
         ("followed_direct", "i4"),  # and at those that are followed
         ("light_samples", "i4"),
         ("mis", "i4"),
-        ("choice", "i4"),  # of lights: index into `pmviewer.render.choice.CHOICES`
+        ("choice", "i4"),  # of lights: index into `pmviewer.render.direct.choice.CHOICES`
         ("con_samples", "i4"),
         ("noncon_samples", "i4"),
         ("biased", "i4"),  # whether lights without photons near are left out

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.jit import device
-from pmviewer.kernels.plain_bsdf import INV_PI
-from pmviewer.kernels.scattering import FOLLOWED, STORED, is_lambertian, is_plain, shading_normal, transmits
-from pmviewer.kernels.specialise import has, part, specialised
+from pmviewer.kernels.bsdf.plain import INV_PI
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian, is_plain, shading_normal, transmits
+from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import has, part, specialised
 from pmviewer.kernels.surface import STRAIGHT
 from pmviewer.kernels.vector import add, dot, mul, scale
-from pmviewer.maps.glossy import radiance_knn, radiance_radius
+from pmviewer.maps.estimate.glossy import radiance_knn, radiance_radius
 from pmviewer.maps.record import CAUSTIC, UNFOUND
-from pmviewer.maps.stored import ALL_CLASSES
+from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.render.lookup import gathered_irradiance, irradiance
 
 _f4 = np.float32

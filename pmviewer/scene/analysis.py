@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pmviewer.scene.description import DirectionalLight, Environment, PointLight, Scene, SpotLight
-from pmviewer.scene.material_lobes import (
+from pmviewer.scene.arrays.material_lobes import (
     always_followed,
     glossy_roughness,
     has_diffuse_lobe,
     is_delta,
     is_rough_glass,
 )
-from pmviewer.scene.material_row import is_rich, used_materials
+from pmviewer.scene.arrays.material_row import is_rich, used_materials
+from pmviewer.scene.description import DirectionalLight, Environment, PointLight, Scene, SpotLight
 
 
 @dataclass(frozen=True)

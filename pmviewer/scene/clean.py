@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.mesh import FLAT, NOT_FINITE, WHOLE, judge, number_used
+from pmviewer.kernels.meshes.mesh import FLAT, NOT_FINITE, WHOLE, judge, number_used
 from pmviewer.progress import parallel
 from pmviewer.scene.description import (
     Camera,
@@ -181,7 +181,7 @@ def _flat(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def _mended(mesh: Mesh) -> NDArray[np.float64]:
     """Unit vertex normals; those that are NaN or zero are computed anew."""
-    from pmviewer.scene.primitives import unit, with_smooth_normals
+    from pmviewer.scene.arrays.primitives import unit, with_smooth_normals
 
     assert mesh.normals is not None
     finite = np.isfinite(mesh.normals)

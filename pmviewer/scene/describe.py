@@ -7,7 +7,8 @@ from collections import Counter
 
 import numpy as np
 
-from pmviewer.scene.blends import blend_text
+from pmviewer.scene.arrays.blends import blend_text
+from pmviewer.scene.arrays.instances import joint_bounds
 from pmviewer.scene.description import (
     RGB,
     ConstantEnvironment,
@@ -25,7 +26,6 @@ from pmviewer.scene.description import (
     SpotLight,
 )
 from pmviewer.scene.emission import emitted_power
-from pmviewer.scene.instances import joint_bounds
 
 _LISTED = 8
 _LIGHT_KINDS = {

@@ -326,7 +326,7 @@ class Scene:
     instances: tuple[Instance, ...] = ()
     cameras: tuple[NamedCamera, ...] = ()
     """All cameras of the file; `camera` is the first or the one that was asked for. Without any, `camera` is a
-    makeshift until one is chosen (`pmviewer.scene.completion`)."""
+    makeshift until one is chosen (`pmviewer.scene.defaults.completion`)."""
     up: Literal["y", "z"] | None = None
     """The vertical axis, where the file's format has one."""
     exposure: float | None = 0.0

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.scene.arrays.sky_table import sky_integral
 from pmviewer.scene.description import ConstantEnvironment, DirectionalLight, Light, PointLight, SpotLight
-from pmviewer.scene.sky_table import sky_integral
 
 RGBArray = NDArray[np.float64]
 

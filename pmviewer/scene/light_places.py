@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels import scene as K
-from pmviewer.scene.flatten import FlatScene
+from pmviewer.scene.arrays.flatten import FlatScene
 
 NOWHERE = (K.DIRECTIONAL, K.ENVIRONMENT, K.IMAGE)
 

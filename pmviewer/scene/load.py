@@ -9,11 +9,11 @@ from pathlib import Path
 
 from pmviewer.errors import SceneError
 from pmviewer.resources import data_folder
-from pmviewer.scene.completion import completed
+from pmviewer.scene.defaults.completion import completed
+from pmviewer.scene.defaults.light_rigs import Rig
 from pmviewer.scene.description import Scene
 from pmviewer.scene.formats.mitsuba.load import load_mitsuba
-from pmviewer.scene.light_rigs import Rig
-from pmviewer.scene.tilt import leaning_mirrors
+from pmviewer.scene.meshes.tilt import leaning_mirrors
 
 MESH_ENDINGS = (".glb", ".gltf", ".obj", ".ply", ".stl")
 ENDINGS = (".xml", *MESH_ENDINGS)

@@ -11,12 +11,12 @@ from imgui_bundle import hello_imgui
 
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.free_camera import as_perspective, plan_pose
-from pmviewer.settings import SETTINGS, get
-from pmviewer.viewer import controls
-from pmviewer.viewer.dialogs import FileDialogs
-from pmviewer.viewer.exports import Exports, default_path, fresh_path
+from pmviewer.settings.access import SETTINGS, get
+from pmviewer.viewer.dialogs.dialogs import FileDialogs
+from pmviewer.viewer.dialogs.exports import Exports, default_path, fresh_path
 from pmviewer.viewer.state import ViewerState
-from pmviewer.viewer.viewport import VIEWPORT, Fit, Viewport
+from pmviewer.viewer.viewport import controls
+from pmviewer.viewer.viewport.viewport import VIEWPORT, Fit, Viewport
 
 COMPARISON = "Comparison"
 """The panel's label."""

@@ -14,28 +14,28 @@ import numpy as np
 from imgui_bundle.glfw_utils import glfw_window_hello_imgui
 
 from pmviewer.errors import PmviewerError
-from pmviewer.settings import Settings
+from pmviewer.settings.access import Settings
 from pmviewer.viewer import layout
 from pmviewer.viewer.actions import Commands
-from pmviewer.viewer.dialogs import FileDialogs
-from pmviewer.viewer.error_panel import ErrorPanel
-from pmviewer.viewer.gain_panel import GainPanel
-from pmviewer.viewer.help_overlay import draw_help
-from pmviewer.viewer.importance_panel import ImportancePanel
-from pmviewer.viewer.log_panel import LogPanel, draw_toasts
-from pmviewer.viewer.menus import Menus
-from pmviewer.viewer.overlay_panel import OverlayPanel
-from pmviewer.viewer.picture import Picture
-from pmviewer.viewer.recent import RecentFiles
+from pmviewer.viewer.dialogs.dialogs import FileDialogs
+from pmviewer.viewer.dialogs.recent import RecentFiles
+from pmviewer.viewer.overlays.overlay_panel import OverlayPanel
+from pmviewer.viewer.panels.error_panel import ErrorPanel
+from pmviewer.viewer.panels.gain_panel import GainPanel
+from pmviewer.viewer.panels.help_overlay import draw_help
+from pmviewer.viewer.panels.importance_panel import ImportancePanel
+from pmviewer.viewer.panels.log_panel import LogPanel, draw_toasts
+from pmviewer.viewer.panels.menus import Menus
+from pmviewer.viewer.panels.settings_panel import SettingsPanel
+from pmviewer.viewer.panels.statistics_panel import StatisticsPanel
+from pmviewer.viewer.panels.status_bar import draw_status_bar
+from pmviewer.viewer.panels.toolbar import Toolbar
 from pmviewer.viewer.session_link import SessionLike
-from pmviewer.viewer.settings_panel import SettingsPanel
 from pmviewer.viewer.shortcuts import FLIP_KEY, is_held, run_shortcuts
 from pmviewer.viewer.shot import Shot
 from pmviewer.viewer.state import InactiveReason, ViewerState
-from pmviewer.viewer.statistics_panel import StatisticsPanel
-from pmviewer.viewer.status_bar import draw_status_bar
-from pmviewer.viewer.toolbar import Toolbar
-from pmviewer.viewer.viewport import Viewport
+from pmviewer.viewer.viewport.picture import Picture
+from pmviewer.viewer.viewport.viewport import Viewport
 
 
 def _always_active(path: str, settings: Settings, traits: Any) -> str | None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from pmviewer.engine.frame import Frame, Level
 from pmviewer.render.camera import CameraPose, resolve_camera, size_only
 from pmviewer.scene.description import Scene
-from pmviewer.settings import SETTINGS, flat
+from pmviewer.settings.access import SETTINGS, flat
 from pmviewer.viewer.format import grouped
 from pmviewer.viewer.jobs import Jobs
 from pmviewer.viewer.session_link import SessionLike

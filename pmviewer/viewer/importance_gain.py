@@ -10,11 +10,11 @@ from pmviewer.engine.frame import Frame, Level
 from pmviewer.errors import PmviewerError
 from pmviewer.render.camera import CameraPose
 from pmviewer.scene.description import Scene
-from pmviewer.settings import Settings
+from pmviewer.settings.access import Settings
 from pmviewer.viewer.session_link import SessionLike
 
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
-    from pmviewer.engine.importance_gain import Gain, Truth
+    from pmviewer.engine.comparison.importance_gain import Gain, Truth
     from pmviewer.engine.pool import WorkPool
 
 NOT_COMPARED = ("compare.", "display.", "overlays.", "free_camera.", "render.passes", "render.time_limit")
@@ -49,7 +49,7 @@ class GainRun:
         traits = self._session.traits
         if traits is None or self._session.opened_scene is None:
             return "Open a scene first."
-        from pmviewer.engine.without_importance import refusal
+        from pmviewer.engine.comparison.without_importance import refusal
 
         return refusal(self._session.settings, traits)
 
@@ -70,7 +70,7 @@ class GainRun:
         self._thread.start()
 
     def _run(self, ticket: int, opened: Any, settings: Settings, pool: WorkPool, truth: Truth | None) -> None:
-        from pmviewer.engine.importance_gain import compare
+        from pmviewer.engine.comparison.importance_gain import compare
         from pmviewer.engine.pool import Cancelled, lower_priority
         from pmviewer.engine.session import unexpected
 
@@ -136,7 +136,7 @@ class GainRun:
         """Settings that are no longer those of the result."""
         if self.settings is None:
             return []
-        from pmviewer.settings import flat
+        from pmviewer.settings.access import flat
 
         now, then = flat(self._session.settings), flat(self.settings)
         return [path for path, value in now.items() if value != then[path] and not path.startswith(NOT_COMPARED)]

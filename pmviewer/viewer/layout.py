@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from imgui_bundle import hello_imgui, imgui
 
 from pmviewer.viewer import theme
-from pmviewer.viewer.viewport import VIEWPORT
+from pmviewer.viewer.viewport.viewport import VIEWPORT
 
 Draw = Callable[[], None]
 PANELS = ("Settings", "Overlays", "Statistics", "Importance", "Error", "Comparison", "Log")

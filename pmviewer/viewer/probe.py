@@ -14,7 +14,7 @@ import sys
 import time
 from typing import Any
 
-from pmviewer.settings import Settings, with_values
+from pmviewer.settings.access import Settings, with_values
 from pmviewer.viewer.app import ViewerApp
 from pmviewer.viewer.start import start_viewer
 

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 from pmviewer.engine.frame import Frame, Message, Status
 from pmviewer.scene.description import Scene
-from pmviewer.settings import Settings
+from pmviewer.settings.access import Settings
 
 
 class SessionLike(Protocol):

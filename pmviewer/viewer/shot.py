@@ -21,12 +21,12 @@ from pmviewer.errors import PmviewerError, SceneError, SettingError, WindowError
 from pmviewer.job import Job, check_output, overrides
 from pmviewer.output.png import write_png
 from pmviewer.render.camera import resolve_camera
-from pmviewer.settings import with_values
+from pmviewer.settings.access import with_values
 
 if TYPE_CHECKING:
     from pmviewer.engine.frame import Frame
     from pmviewer.viewer.state import ViewerState
-    from pmviewer.viewer.viewport import Viewport
+    from pmviewer.viewer.viewport.viewport import Viewport
 
 SETTLING = 4
 """Window frames without a change before the picture is taken: panels take two to find their places."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import glfw
 
 from pmviewer.errors import WindowError
-from pmviewer.settings import Settings
+from pmviewer.settings.access import Settings
 from pmviewer.viewer.session_link import SessionLike, SessionLink
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.free_camera import frustum_lines, resolve_view
 from pmviewer.render.planes import AOVS, TERMS
 from pmviewer.scene.description import Scene
-from pmviewer.settings import (
+from pmviewer.settings.access import (
     CameraSettings,
     Display,
     FreeCamera,
@@ -30,11 +30,11 @@ from pmviewer.settings import (
     with_values,
 )
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
-from pmviewer.viewer.controls import camera_values
+from pmviewer.viewer.dialogs.recent import RecentFiles
 from pmviewer.viewer.importance_gain import GainRun
 from pmviewer.viewer.jobs import Jobs
-from pmviewer.viewer.recent import RecentFiles
 from pmviewer.viewer.session_link import SessionLike
+from pmviewer.viewer.viewport.controls import camera_values
 
 InactiveReason = Callable[[str, Settings, Any], str | None]
 LAYERS = ("beauty", *TERMS, *AOVS)

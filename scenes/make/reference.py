@@ -27,7 +27,7 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.output.exr import read_exr, write_exr
-from pmviewer.settings import Settings, with_values
+from pmviewer.settings.access import Settings, with_values
 
 CHUNK = 64
 """Samples per pixel at once."""

@@ -18,7 +18,7 @@ from pmviewer.bench.agree.generate import PROFILES, needs_particles, scene_of
 from pmviewer.bench.agree.tree import from_json, to_json, written_out
 from pmviewer.bench.agree.trial import HARMLESS
 from pmviewer.bench.agree.xml import number, scene_text, write_scene
-from pmviewer.scene.flatten import flatten
+from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.load import load_scene
 
 EXPECTED = """

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from pmviewer.bench.emission_bound import Seen, best_saving
-from pmviewer.photons.strata import Strata
-from tests.naive_maps import pack
+from pmviewer.bench.measures.emission_bound import Seen, best_saving
+from pmviewer.photons.emission.strata import Strata
+from tests.support.naive_maps import pack
 
 
 def strata(power):

@@ -9,7 +9,8 @@ import sys
 
 import pytest
 
-from pmviewer.bench import error, peer
+from pmviewer.bench import peer
+from pmviewer.bench.measures import error
 from pmviewer.errors import PmviewerError
 
 FAKE = """

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from pmviewer.bench import unused
+from pmviewer.bench.measures import unused
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.resources import data_folder

@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.raycast import cast_closest
+from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.output.frame_export import frame_metadata
 from pmviewer.output.session_file import read_session, write_session
 from pmviewer.render.camera import CameraPose, resolve_camera
+from pmviewer.render.direct.outline import outline_pixels
 from pmviewer.render.free_camera import as_perspective, frustum_lines
-from pmviewer.render.outline import outline_pixels
 from pmviewer.scene.analysis import analyse
+from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.clean import check_camera
 from pmviewer.scene.describe import describe
 from pmviewer.scene.description import Camera, Parallelogram, Scene, Shape, Sphere
-from pmviewer.scene.flatten import flatten
-from pmviewer.settings import CameraSettings, Settings, with_values
-from pmviewer.viewer import controls
+from pmviewer.settings.access import CameraSettings, Settings, with_values
+from pmviewer.viewer.viewport import controls
 from tests.importance.paths import SHOWN, traced
-from tests.scenes_for_tests import diffuse, diffuse_box, rendered, settings_of
+from tests.support.scenes import diffuse, diffuse_box, rendered, settings_of
 
 ORTHOGRAPHIC = CameraPose(
     (1, 2, 3), (0.5, 0, -1), (0, 1, 0), 50.0, 64, 40, projection="orthographic", view_width=3.0, shift=(0.1, -0.3)

@@ -10,7 +10,7 @@ import pytest
 from pmviewer.engine.opened import open_scene
 from pmviewer.maps.record import unpack
 from pmviewer.scene.description import Camera, Parallelogram, PointLight, Scene, Shape, Sphere
-from tests.scenes_for_tests import MIRROR, box_camera, box_walls, cornell_box, diffuse, panel, rendered, settings_of
+from tests.support.scenes import MIRROR, box_camera, box_walls, cornell_box, diffuse, panel, rendered, settings_of
 
 METHODS = ("progressive", "gather")
 RULES = {

@@ -12,8 +12,8 @@ from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
-from pmviewer.scene.flatten import LUMINANCE
-from tests.scenes_for_tests import cornell_box, rendered, settings_of
+from pmviewer.scene.arrays.flatten import LUMINANCE
+from tests.support.scenes import cornell_box, rendered, settings_of
 
 SEEDS, PASSES = 12, 3
 RULES = {
@@ -79,9 +79,9 @@ from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.opened import open_scene
-from pmviewer.viewer.statistics_panel import photon_rows
-from tests.scenes_for_tests import cornell_box, rendered, settings_of
-import pmviewer.maps.convergence as c, pmviewer.maps.density_control as d, pmviewer.photons.deposition as p
+from pmviewer.viewer.panels.statistics_panel import photon_rows
+from tests.support.scenes import cornell_box, rendered, settings_of
+import pmviewer.maps.convergence as c, pmviewer.maps.density_control as d, pmviewer.photons.deposition.rules as p
 import pmviewer.maps.importance as i, pmviewer.importance.trace as t, pmviewer.importance.view as v
 
 scene = open_scene(cornell_box(size=8))

@@ -14,7 +14,7 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.scene.description import Parallelogram, Scene
-from tests.scenes_for_tests import MIRROR, box_walls, cornell_box, diffuse, panel, rendered, settings_of
+from tests.support.scenes import MIRROR, box_walls, cornell_box, diffuse, panel, rendered, settings_of
 
 SIZE = 16
 VARIANTS = ("Peter-Pietrek", "Christensen discard", "Christensen keep")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import pmviewer.engine.importance as importance_stage
-import pmviewer.engine.light_stage as light_stage
+import pmviewer.engine.stages.importance as importance_stage
+import pmviewer.engine.stages.light_stage as light_stage
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.opened import open_scene
@@ -17,8 +17,8 @@ from pmviewer.job import load_job
 from pmviewer.output.session_file import read_session, write_session
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.free_camera import frustum_lines, plan_pose, resolve_view
-from pmviewer.settings import SETTINGS, FreeCamera, Settings, changed_stages, with_values
-from tests.scenes_for_tests import cornell_box, rendered, settings_of
+from pmviewer.settings.access import SETTINGS, FreeCamera, Settings, changed_stages, with_values
+from tests.support.scenes import cornell_box, rendered, settings_of
 
 SIZE = 24
 

@@ -5,20 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pmviewer.commands.gain_job import gain_job, table
+from pmviewer.engine.comparison.importance_gain import LONGER, compare
+from pmviewer.engine.comparison.without_importance import plain, refusal
 from pmviewer.engine.effects import inactive_reason
-from pmviewer.engine.importance_gain import LONGER, compare
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import Cancelled, WorkPool
-from pmviewer.engine.without_importance import plain, refusal
 from pmviewer.errors import OutputError, SettingError
-from pmviewer.gain_job import gain_job, table
 from pmviewer.job import load_job
 from pmviewer.output.frame_export import gain_sheet
 from pmviewer.output.metric import metrics
 from pmviewer.output.png import read_png
 from pmviewer.scene.description import Camera, Parallelogram, Scene, Shape
-from pmviewer.settings import Importance, Settings, with_values
-from tests.scenes_for_tests import cornell_box, diffuse, panel, rendered, settings_of
+from pmviewer.settings.access import Importance, Settings, with_values
+from tests.support.scenes import cornell_box, diffuse, panel, rendered, settings_of
 
 SIZE = 24
 

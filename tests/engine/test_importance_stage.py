@@ -15,7 +15,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.maps.record import unpack
 from pmviewer.scene.description import Scene
-from tests.scenes_for_tests import MIRROR, box_walls, cornell_box, diffuse, panel, rendered, settings_of
+from tests.support.scenes import MIRROR, box_walls, cornell_box, diffuse, panel, rendered, settings_of
 
 SIZE = 16
 

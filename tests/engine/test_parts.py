@@ -18,9 +18,9 @@ from pmviewer.errors import SettingError
 from pmviewer.maps.record import CAUSTIC, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.scene.analysis import analyse
+from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Camera
-from pmviewer.scene.flatten import flatten
-from tests.scenes_for_tests import GLASS, MIRROR, ball_in_environment, cornell_box, diffuse_box, settings_of
+from tests.support.scenes import GLASS, MIRROR, ball_in_environment, cornell_box, diffuse_box, settings_of
 
 
 @pytest.fixture

@@ -43,7 +43,7 @@ def test_a_process_that_is_nicer_than_that_stays_so():
 
 def test_rendering_to_a_file_makes_a_pool_of_normal_priority(monkeypatch, tmp_path):
     """What `pmviewer render` runs its tasks at, asked of the tasks themselves."""
-    from pmviewer import cli
+    from pmviewer.commands import cli
 
     seen: set[int] = set()
     guarded = WorkPool._guarded

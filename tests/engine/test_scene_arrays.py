@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.raycast import cast_closest
+from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.scene.analysis import analyse
+from pmviewer.scene.arrays.flatten import bounding_sphere, flatten
+from pmviewer.scene.arrays.tessellate import tessellate
 from pmviewer.scene.description import (
     ConstantEnvironment,
     Cylinder,
@@ -21,9 +23,7 @@ from pmviewer.scene.description import (
     Shape,
     Sphere,
 )
-from pmviewer.scene.flatten import bounding_sphere, flatten
-from pmviewer.scene.tessellate import tessellate
-from tests.scenes_for_tests import (
+from tests.support.scenes import (
     GLASS,
     LIGHTS,
     MIRROR,

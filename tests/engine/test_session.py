@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.engine import light_stage
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.session import Session
+from pmviewer.engine.stages import light_stage
 from pmviewer.scene.description import Scene
-from pmviewer.settings import Settings, with_values
-from tests.scenes_for_tests import cornell_box, diffuse_box, rendered, settings_of
+from pmviewer.settings.access import Settings, with_values
+from tests.support.scenes import cornell_box, diffuse_box, rendered, settings_of
 
 PATIENCE = 120.0
 """Seconds that nothing here takes, compiling included."""

@@ -12,7 +12,7 @@ from pmviewer.maps.importance import build_importance, importances
 from pmviewer.render.camera import resolve_camera
 from pmviewer.render.record import eye_record
 from pmviewer.scene.description import PointLight
-from pmviewer.settings import Settings
+from pmviewer.settings.access import Settings
 
 SHOWN = Rule(caustic=False, global_=True, gather=False, gather_specular=False, corner=0.0, glossy=0.2, max_depth=32)
 GATHER = Rule(caustic=True, global_=True, gather=True, gather_specular=False, corner=0.0, glossy=0.2, max_depth=32)

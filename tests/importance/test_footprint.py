@@ -12,7 +12,7 @@ from pmviewer.importance.importons import IMPORTON_COLUMNS, IMPORTON_PASS_DTYPE,
 from pmviewer.importance.trace import trace_importons
 from pmviewer.scene.description import Camera, Cylinder, Group, Instance, Mesh, Scene, Shape, Sphere
 from tests.importance.paths import GATHER, SHOWN, traced
-from tests.scenes_for_tests import GLASS, MIRROR, box_walls, diffuse, diffuse_box
+from tests.support.scenes import GLASS, MIRROR, box_walls, diffuse, diffuse_box
 
 STEP = 0.05
 """Pixels that the place in the image is moved."""

@@ -13,7 +13,7 @@ from pmviewer.importance.importons import joined
 from pmviewer.maps.importance import build_importance
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.description import Camera, Material, Parallelogram, Scene, Shape, Sphere
-from pmviewer.settings import Settings
+from pmviewer.settings.access import Settings
 from tests.importance.paths import (
     GATHER,
     SHOWN,
@@ -26,7 +26,7 @@ from tests.importance.paths import (
     to_cube,
     traced,
 )
-from tests.scenes_for_tests import GLASS, GREY, MIRROR, box_camera, box_walls, cornell_box, diffuse, diffuse_box
+from tests.support.scenes import GLASS, GREY, MIRROR, box_camera, box_walls, cornell_box, diffuse, diffuse_box
 
 STAR = np.array(
     [(-1.5, -0.5), (-0.3, -0.4), (0.0, -1.6), (0.5, -0.3), (1.7, -0.2), (0.4, 0.4), (0.1, 1.8), (-0.5, 0.2)]

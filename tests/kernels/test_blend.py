@@ -9,17 +9,17 @@ import pytest
 from scipy import stats
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.blend import chosen_part, hit_number, inside_attenuation
-from pmviewer.kernels.jit import kernel
-from pmviewer.kernels.scattering import bsdf_at, keeps
+from pmviewer.kernels.bsdf.blend import chosen_part, hit_number, inside_attenuation
+from pmviewer.kernels.bsdf.scattering import bsdf_at, keeps
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.scene.analysis import analyse
-from pmviewer.scene.blends import DEEPEST
+from pmviewer.scene.arrays.blends import DEEPEST
+from pmviewer.scene.arrays.flatten import flatten
+from pmviewer.scene.arrays.material_row import material_table
 from pmviewer.scene.describe import describe
 from pmviewer.scene.description import Material, Principled, Shape
-from pmviewer.scene.flatten import flatten
-from pmviewer.scene.material_row import material_table
 from pmviewer.scene.texture import Bitmap
-from tests.scenes_for_tests import GLASS, MIRROR, box_walls, diffuse, diffuse_box
+from tests.support.scenes import GLASS, MIRROR, box_walls, diffuse, diffuse_box
 
 STORED, FOLLOWED = 1, 2
 N = 1 << 18

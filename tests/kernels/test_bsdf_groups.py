@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.kernels.bsdf import scatter_specular
-from pmviewer.kernels.fresnel import fresnel_channel
-from pmviewer.kernels.jit import kernel
-from pmviewer.kernels.material import beer_lambert, interior_attenuation
+from pmviewer.kernels.bsdf.fresnel import fresnel_channel
+from pmviewer.kernels.bsdf.material import beer_lambert, interior_attenuation
+from pmviewer.kernels.bsdf.specular import scatter_specular
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.scene.analysis import analyse
+from pmviewer.scene.arrays.flatten import flatten
+from pmviewer.scene.arrays.material_row import inner_reflectance
 from pmviewer.scene.description import Group, Instance, Material, Shape, Sphere
-from pmviewer.scene.flatten import flatten
-from pmviewer.scene.material_row import inner_reflectance
-from tests.bsdf_probe import EVERYTHING_STORED, FOLLOWED, STORED, Probe
-from tests.scenes_for_tests import diffuse_box
+from tests.support.bsdf_probe import EVERYTHING_STORED, FOLLOWED, STORED, Probe
+from tests.support.scenes import diffuse_box
 
 WHITE = (1.0, 1.0, 1.0)
 BOTH = STORED | FOLLOWED

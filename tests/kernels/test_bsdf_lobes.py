@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from pmviewer.scene.description import Material
-from tests.bsdf_probe import EVERYTHING_FOLLOWED, EVERYTHING_STORED, FOLLOWED, STORED, Grid, Probe
+from tests.support.bsdf_probe import EVERYTHING_FOLLOWED, EVERYTHING_STORED, FOLLOWED, STORED, Grid, Probe
 
 N = 1_000_000
 WHITE = (1.0, 1.0, 1.0)

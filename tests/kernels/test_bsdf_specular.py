@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.kernels.bsdf import fresnel_dielectric, scatter_specular
-from pmviewer.kernels.jit import kernel
-from pmviewer.kernels.plain_bsdf import FOLLOWED, NOTHING, plain_bsdf
+from pmviewer.kernels.bsdf.plain import FOLLOWED, NOTHING, plain_bsdf
+from pmviewer.kernels.bsdf.specular import fresnel_dielectric, scatter_specular
+from pmviewer.kernels.compile.jit import kernel
+from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Material
-from pmviewer.scene.flatten import flatten
-from tests.scenes_for_tests import GLASS, MIRROR, diffuse, diffuse_box
+from tests.support.scenes import GLASS, MIRROR, diffuse, diffuse_box
 
 ETA = 1.5
 TINTED = Material("tinted", "dielectric", (0.9, 0.8, 0.7), (0.6, 0.5, 0.4), eta=1.33)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.kernels import bvh, bvh_binary
+from pmviewer.kernels.accel import bvh, bvh_binary
 from pmviewer.progress import Cancelled, watched
 
 N = 3 * bvh_binary.ALONE

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from pmviewer.kernels import cache_folder, jit
-from pmviewer.kernels.cache_folder import KEPT_CACHES, KEPT_DAYS, claim
+from pmviewer.kernels.compile import cache_folder, jit
+from pmviewer.kernels.compile.cache_folder import KEPT_CACHES, KEPT_DAYS, claim
 
 pytest.importorskip("fcntl", reason="the system has no locks that end with their process")
 
-HOLD = "import sys; from pathlib import Path; from pmviewer.kernels.cache_folder import claim; "
+HOLD = "import sys; from pathlib import Path; from pmviewer.kernels.compile.cache_folder import claim; "
 HOLD += "print(claim(Path(sys.argv[1]), sys.argv[2]), flush=True); sys.stdin.read()"
 
 

@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from pmviewer.kernels import sources
-from pmviewer.kernels.jit import CACHE_FOLDER, _OneFileEach, user_cache_root
+from pmviewer.kernels.compile import sources
+from pmviewer.kernels.compile.jit import CACHE_FOLDER, _OneFileEach, user_cache_root
 from pmviewer.kernels.vector import dot
 
 
@@ -25,15 +25,17 @@ def test_compiled_code_depends_on_what_its_module_imports_and_on_nothing_else():
     eye = {
         path.relative_to(sources.PACKAGE).as_posix() for path in sources.sources_of(sources.PACKAGE / "render/eye.py")
     }
-    assert {"render/eye.py", "kernels/bvh.py", "maps/grid.py", "kernels/jit.py"} <= eye
-    assert not {"render/path.py", "photons/trace.py", "viewer/app.py"} & eye
+    assert {"render/eye.py", "kernels/accel/bvh.py", "maps/search/grid.py", "kernels/compile/jit.py"} <= eye
+    assert not {"render/path.py", "photons/light_pass/trace.py", "viewer/app.py"} & eye
 
 
 def test_an_edit_in_an_imported_source_makes_compiled_code_stale(tmp_path):
     package = tmp_path / "pmviewer"
     shutil.copytree(sources.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
-    code = "from pathlib import Path; from pmviewer.kernels.sources import stamp, PACKAGE as p; "
-    code += "print(stamp(p / 'render/eye.py'), stamp(p / 'photons/trace.py'), stamp(p / 'kernels/vector.py'))"
+    code = "from pathlib import Path; from pmviewer.kernels.compile.sources import stamp, PACKAGE as p; "
+    code += (
+        "print(stamp(p / 'render/eye.py'), stamp(p / 'photons/light_pass/trace.py'), stamp(p / 'kernels/vector.py'))"
+    )
 
     def stamps() -> list[str]:
         run = subprocess.run(
@@ -57,7 +59,7 @@ def test_unwritable_cache_falls_back_to_the_temporary_folder(tmp_path):
     blocked = tmp_path / "file"
     blocked.touch()
     run = subprocess.run(
-        [sys.executable, "-c", "from pmviewer.kernels.jit import CACHE_FOLDER as c; print(c)"],
+        [sys.executable, "-c", "from pmviewer.kernels.compile.jit import CACHE_FOLDER as c; print(c)"],
         env={**os.environ, "PMVIEWER_CACHE": str(blocked), "TMPDIR": str(tmp_path)},
         capture_output=True,
         text=True,

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from pmviewer.kernels.random import INDEPENDENT
+from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.scene.description import Mesh, Shape
-from pmviewer.scene.flatten import LUMINANCE, flatten
 from tests.kernels.test_light_sampling import emit, look, sample, uniform_sphere
-from tests.scenes_for_tests import light_scene
+from tests.support.scenes import light_scene
 
 RADIANCE = (2.0, 1.5, 1.0)
 CORNERS = np.array([[-0.5, 1.0, -0.4], [0.6, 1.1, -0.3], [0.0, 1.3, 0.7]])

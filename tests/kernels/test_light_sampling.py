@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pmviewer.kernels.jit import kernel
-from pmviewer.kernels.light import emit_photon, emitted, light_pdf, sample_light
+from pmviewer.kernels.accel.raycast import closest_hit
+from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.lights.light import emit_photon, emitted, light_pdf, sample_light
 from pmviewer.kernels.random import INDEPENDENT, SOBOL, draw1, draw4
-from pmviewer.kernels.raycast import closest_hit
 from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.surface import surface_at
-from pmviewer.photons.trace import LIGHT_CHOICE_SET
-from pmviewer.scene.flatten import LUMINANCE, flatten
-from tests.scenes_for_tests import LIGHTS, light_scene
+from pmviewer.photons.light_pass.trace import LIGHT_CHOICE_SET
+from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
+from tests.support.scenes import LIGHTS, light_scene
 
 MANY = 1_000_000
 """Samples of the chi-square tests."""

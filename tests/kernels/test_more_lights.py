@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pmviewer.kernels.jit import kernel
-from pmviewer.kernels.light import environment_radiance, one_light_pdf
+from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.lights.light import environment_radiance, one_light_pdf
 from pmviewer.kernels.random import INDEPENDENT
+from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.scene.description import DirectionalLight, ImageEnvironment, SpotLight
 from pmviewer.scene.emission import emitted_power
-from pmviewer.scene.flatten import LUMINANCE, flatten
 from pmviewer.scene.formats.mitsuba.transform import rotation
 from tests.kernels.test_light_sampling import axes_of, emit, p_uniform, sample, turn
-from tests.scenes_for_tests import LIGHTS, light_scene
+from tests.support.scenes import LIGHTS, light_scene
 
 MANY = 1_000_000
 TURN = rotation((0.48, 0.64, -0.6), 70.0)[:3, :3]

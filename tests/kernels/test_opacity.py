@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.kernels import raycast
+from pmviewer.kernels.accel import raycast
+from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Group, Instance, Material, Mesh, Parallelogram, Shape, Sphere
-from pmviewer.scene.flatten import flatten
 from pmviewer.scene.texture import Bitmap, Checkerboard
-from tests.scenes_for_tests import diffuse, diffuse_box
+from tests.support.scenes import diffuse, diffuse_box
 
 N = 100_000
 

@@ -37,7 +37,7 @@ from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
-from pmviewer.settings import Settings, with_values
+from pmviewer.settings.access import Settings, with_values
 
 path, out, *pairs = sys.argv[1:]
 values = {"camera.width": 10, "camera.height": 10, "photons.N": 200, "estimate.radius": 0.1, "gather.rays": 2,

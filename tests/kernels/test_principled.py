@@ -11,10 +11,10 @@ import pytest
 from scipy import stats
 
 from pmviewer.scene.analysis import analyse
+from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Material, Principled
-from pmviewer.scene.flatten import flatten
-from tests.bsdf_probe import EVERYTHING_FOLLOWED, EVERYTHING_STORED, FOLLOWED, STORED, Grid, PrincipledProbe
-from tests.scenes_for_tests import diffuse_box
+from tests.support.bsdf_probe import EVERYTHING_FOLLOWED, EVERYTHING_STORED, FOLLOWED, STORED, Grid, PrincipledProbe
+from tests.support.scenes import diffuse_box
 
 EXPECTED = json.loads(Path(__file__).with_name("principled").joinpath("expected.json").read_text("utf-8"))["materials"]
 N = 400_000

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 from scipy.stats import qmc
 
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.random import INDEPENDENT, SOBOL, draw1, draw4, hash3, owen, reverse_bits, sobol_reversed
 
 SEQUENCES = {"independent": INDEPENDENT, "sobol": SOBOL}

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from pmviewer.kernels import bvh, raycast
-from pmviewer.kernels.jit import kernel
-from pmviewer.kernels.quadric import CYLINDER, DISK, QUADRIC_FLOATS, SPHERE, quadric_normal, quadric_project
-from tests import naive_rays
+from pmviewer.kernels.accel import bvh, raycast
+from pmviewer.kernels.accel.quadric import CYLINDER, DISK, QUADRIC_FLOATS, SPHERE, quadric_normal, quadric_project
+from pmviewer.kernels.compile.jit import kernel
+from tests.support import naive_rays
 
 NO_TRIANGLES = np.empty((0, 3, 3), np.float32)
 NO_QUADRICS = np.empty((0, QUADRIC_FLOATS), np.float32)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from pmviewer.kernels.jit import kernel
-from pmviewer.kernels.plain_bsdf import STORED, PlainBsdf
+from pmviewer.kernels.bsdf.plain import STORED, PlainBsdf
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.surface import adjoint_cosines
-from pmviewer.maps.glossy import reflected_share
+from pmviewer.maps.estimate.glossy import reflected_share
 
 
 @kernel

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from pmviewer.kernels.specialise import absent, has, is_a, specialised
+from pmviewer.kernels.compile.specialise import absent, has, is_a, specialised
 
 PLAIN = np.zeros(1, np.dtype([("scale", np.float32)]))
 SHIFTED = np.zeros(1, np.dtype([("shift", np.float32), ("scale", np.float32)]))

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.kernels.jit import kernel
-from pmviewer.kernels.raycast import closest_hit
+from pmviewer.kernels.accel.raycast import closest_hit
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.surface import leave, surface_at
 from pmviewer.kernels.vector import dot
+from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Disk, Mesh, Parallelogram, Scene, Shape, Sphere
-from pmviewer.scene.flatten import flatten
-from tests.scenes_for_tests import ball_mesh, box_camera, diffuse
+from tests.support.scenes import ball_mesh, box_camera, diffuse
 
 SCALES = (1e-4, 1.0, 1e5)
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pmviewer.kernels.text import numbers
+from pmviewer.kernels.meshes.text import numbers
 
 
 def read(text: str, n: int) -> np.ndarray:

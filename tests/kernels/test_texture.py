@@ -8,18 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.kernels.jit import kernel
-from pmviewer.kernels.material_textures import texture_params
-from pmviewer.kernels.normal_map import LOWEST, reflecting_normal, shading_frame
-from pmviewer.kernels.raycast import closest_hit
+from pmviewer.kernels.accel.raycast import closest_hit
+from pmviewer.kernels.bsdf.material_textures import texture_params
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import surface_at
-from pmviewer.kernels.texture import texture_gradient, texture_rgb
-from pmviewer.kernels.uv import barycentrics, hit_tangents, hit_uv
+from pmviewer.kernels.textures.normal_map import LOWEST, reflecting_normal, shading_frame
+from pmviewer.kernels.textures.texture import texture_gradient, texture_rgb
+from pmviewer.kernels.textures.uv import barycentrics, hit_tangents, hit_uv
+from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Cylinder, Disk, Material, Mesh, Parallelogram, Shape, Sphere
-from pmviewer.scene.flatten import flatten
 from pmviewer.scene.texture import LUMINANCE, Bitmap, Checkerboard, evaluate
-from tests.scenes_for_tests import diffuse_box
+from tests.support.scenes import diffuse_box
 
 RNG = np.random.default_rng(5)
 COLOURS = RNG.random((5, 7, 3), dtype=np.float32)

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pmviewer.kernels.jit import kernel
-from pmviewer.kernels.light import emit_photon, emitted, light_pdf, light_point, sample_light
+from pmviewer.kernels.accel.raycast import closest_hit
+from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.lights.light import emit_photon, emitted, light_pdf, light_point, sample_light
+from pmviewer.kernels.lights.textured_light import area_density, radiance_from, spread
 from pmviewer.kernels.random import INDEPENDENT, draw1, draw4
-from pmviewer.kernels.raycast import closest_hit
 from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.surface import surface_at
-from pmviewer.kernels.textured_light import area_density, radiance_from, spread
-from pmviewer.photons.trace import LIGHT_CHOICE_SET
+from pmviewer.photons.light_pass.trace import LIGHT_CHOICE_SET
+from pmviewer.scene.arrays.flatten import flatten
+from pmviewer.scene.arrays.texture_coordinates import rectangle_of, square_uv
 from pmviewer.scene.description import LUMINANCE, Cylinder, Disk, Mesh, Parallelogram, Shape, Sphere
-from pmviewer.scene.flatten import flatten
 from pmviewer.scene.texture import Bitmap, evaluate
-from pmviewer.scene.texture_coordinates import rectangle_of, square_uv
-from tests.scenes_for_tests import diffuse_box
+from tests.support.scenes import diffuse_box
 
 RNG = np.random.default_rng(8)
 _SPOTS = RNG.random((12, 20, 3), dtype=np.float32) ** 6 * 8

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from pmviewer.kernels import warp
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.vector import basis, from_basis, is_good, luminance, normalize
 
 N = 100_000

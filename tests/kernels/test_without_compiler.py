@@ -16,7 +16,7 @@ import numpy as np
 from pmviewer.kernels import bsdf, random, vector, warp
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
 
-from tests.device import from_python
+from tests.support.device import from_python
 
 def callable_from_python(module, names):
     return SimpleNamespace(**{name: from_python(getattr(module, name)) for name in names.split()})

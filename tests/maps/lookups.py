@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.jit import kernel
-from pmviewer.maps.filters import FILTERS
-from pmviewer.maps.stored import ALL_CLASSES
-from pmviewer.maps.variant import marked
+from pmviewer.kernels.compile.jit import kernel
+from pmviewer.maps.estimate.filters import FILTERS
+from pmviewer.maps.estimate.variant import marked
+from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.render.lookup import irradiance
 from pmviewer.render.record import EYE_DTYPE
 

@@ -23,7 +23,7 @@ from pmviewer.maps.convergence import (
 from pmviewer.maps.record import DIRECT
 from pmviewer.output.diagnostic_views import CLASS_COLOURS, GREY, coloured
 from tests.maps.test_density_control import in_order, plane
-from tests.scenes_for_tests import cornell_box, rendered, settings_of
+from tests.support.scenes import cornell_box, rendered, settings_of
 
 f4 = np.float32
 UP = np.array([[0.0, 0.0, 1.0]], f4)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.pool import WorkPool
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.maps.density_control import CAPACITY, COSINE, NEAREST, STEP, Around, DensityControl, M
 from pmviewer.maps.record import unpack
-from tests.naive_maps import pack
+from tests.support.naive_maps import pack
 
 f4, f8, u4 = np.float32, np.float64, np.uint32
 UP = u4(2047 << 20 | 2047 << 8)

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from numba import njit
 
-from pmviewer.kernels.plain_bsdf import STORED, PlainBsdf
-from pmviewer.maps.estimate import irradiance_at_knn, irradiance_at_radius
-from pmviewer.maps.filters import FILTERS
-from pmviewer.maps.glossy import GRAZING, radiance_knn, radiance_radius
-from pmviewer.maps.grid import build_grid
-from pmviewer.maps.kdtree import build_kdtree
+from pmviewer.kernels.bsdf.plain import STORED, PlainBsdf
+from pmviewer.maps.estimate.estimate import irradiance_at_knn, irradiance_at_radius
+from pmviewer.maps.estimate.filters import FILTERS
+from pmviewer.maps.estimate.glossy import GRAZING, radiance_knn, radiance_radius
 from pmviewer.maps.record import unpack
-from pmviewer.maps.stored import ALL_CLASSES
+from pmviewer.maps.search.grid import build_grid
+from pmviewer.maps.search.kdtree import build_kdtree
+from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.render.record import EYE_DTYPE
-from tests import naive_maps as naive
+from tests.support import naive_maps as naive
 
 f4, i4 = np.float32, np.int32
 ANY = np.uint32(0)

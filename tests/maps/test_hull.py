@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from pmviewer.maps.grid import build_grid
-from pmviewer.maps.hull import DIRECTIONS, FEWEST
-from pmviewer.maps.kdtree import build_kdtree
-from tests import naive_maps as naive
+from pmviewer.maps.estimate.hull import DIRECTIONS, FEWEST
+from pmviewer.maps.search.grid import build_grid
+from pmviewer.maps.search.kdtree import build_kdtree
 from tests.maps.lookups import UP, estimate
+from tests.support import naive_maps as naive
 
 CENTRE = np.zeros((1, 3))
 

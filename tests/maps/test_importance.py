@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pmviewer.importance.rules import density_beyond
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.importance import (
     NO_IMPORTANCE,
     Importons,

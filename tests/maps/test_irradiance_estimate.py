@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from pmviewer.maps.estimate import RIM_HALF, RIM_LEFT_OUT, irradiance_at_knn, irradiance_at_radius
-from pmviewer.maps.filters import FILTERS, filter_disc_mean, filter_weight
-from pmviewer.maps.grid import build_grid
-from pmviewer.maps.kdtree import build_kdtree
-from pmviewer.maps.stored import ALL_CLASSES
-from tests import naive_maps as naive
-from tests.device import from_python
+from pmviewer.maps.estimate.estimate import RIM_HALF, RIM_LEFT_OUT, irradiance_at_knn, irradiance_at_radius
+from pmviewer.maps.estimate.filters import FILTERS, filter_disc_mean, filter_weight
+from pmviewer.maps.search.grid import build_grid
+from pmviewer.maps.search.kdtree import build_kdtree
+from pmviewer.maps.search.stored import ALL_CLASSES
+from tests.support import naive_maps as naive
+from tests.support.device import from_python
 
 f4, i4 = np.float32, np.int32
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.hemisphere import cell_direction, irradiance_and_gradients, strata
 
 RADIANCE = np.array([1.0, 0.5, 2.0])

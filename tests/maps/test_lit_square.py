@@ -6,12 +6,12 @@ The true irradiance is 1 everywhere. Run with `-rP` to see the figures.
 import numpy as np
 import pytest
 
-from pmviewer.maps.estimate import RIM_HALF, RIM_LEFT_OUT
-from pmviewer.maps.filters import FILTERS
-from pmviewer.maps.grid import build_grid
-from pmviewer.maps.kdtree import build_kdtree
-from tests import naive_maps as naive
+from pmviewer.maps.estimate.estimate import RIM_HALF, RIM_LEFT_OUT
+from pmviewer.maps.estimate.filters import FILTERS
+from pmviewer.maps.search.grid import build_grid
+from pmviewer.maps.search.kdtree import build_kdtree
 from tests.maps.lookups import estimate
+from tests.support import naive_maps as naive
 
 SIDE = 200
 N = SIDE * SIDE

@@ -5,10 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pmviewer.maps.kdtree import build_kdtree
 from pmviewer.maps.radius import automatic_radius, largest_power, progressive_radius
-from tests import naive_maps as naive
+from pmviewer.maps.search.kdtree import build_kdtree
 from tests.maps.test_irradiance_estimate import UP, by_knn
+from tests.support import naive_maps as naive
 
 f4 = np.float32
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pmviewer.errors import PmviewerError
-from pmviewer.maps.grid import build_grid, count_in_radius
-from tests import naive_maps as naive
+from pmviewer.maps.search.grid import build_grid, count_in_radius
+from tests.support import naive_maps as naive
 
 f4 = np.float32
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from pmviewer.errors import PmviewerError
-from pmviewer.maps.kdtree import MAX_K, build_kdtree, knn
-from tests import naive_maps as naive
+from pmviewer.maps.search.kdtree import MAX_K, build_kdtree, knn
+from tests.support import naive_maps as naive
 
 f4 = np.float32
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pmviewer.maps import record
-from tests import naive_maps as naive
-from tests.device import from_python
+from tests.support import naive_maps as naive
+from tests.support.device import from_python
 
 encode_direction, decode_direction = from_python(record.encode_direction), from_python(record.decode_direction)
 encode_power, decode_power = from_python(record.encode_power), from_python(record.decode_power)

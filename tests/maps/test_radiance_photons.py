@@ -11,7 +11,7 @@ from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.radiance import (
     SHARES,
     build_sites,
@@ -25,7 +25,7 @@ from pmviewer.maps.radiance import (
 from pmviewer.maps.record import decode_directions, encode_direction, unpack
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.description import Camera, Parallelogram, Scene, Shape
-from tests.scenes_for_tests import (
+from tests.support.scenes import (
     closed_sphere,
     cornell_box,
     diffuse,

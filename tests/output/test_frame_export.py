@@ -15,7 +15,7 @@ from pmviewer.output.png import read_png
 from pmviewer.output.tone import display_image, to_uint8
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.planes import AOVS, CHANNELS, TERMS
-from pmviewer.settings import SETTINGS, Settings, flat, with_values
+from pmviewer.settings.access import SETTINGS, Settings, flat, with_values
 
 
 @pytest.fixture

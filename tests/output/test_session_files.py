@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from pmviewer.errors import OutputError, PmviewerError, SceneError, SettingError
 from pmviewer.output.session_file import read_session, write_session
-from pmviewer.settings import SETTINGS, SettingInfo, Settings, with_values
+from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, with_values
 
 
 def values_of(info: SettingInfo) -> st.SearchStrategy:

@@ -9,7 +9,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.maps.density_control import COSINE, STEP
 from pmviewer.maps.power import LARGEST, encode_powers
 from pmviewer.maps.record import unpack
-from pmviewer.photons.deposition import (
+from pmviewer.photons.deposition.rules import (
     FIRST_WEIGHT,
     Density,
     Deposition,
@@ -18,10 +18,10 @@ from pmviewer.photons.deposition import (
     rounds,
     weight_histogram,
 )
-from pmviewer.photons.lightpass import trace_pass
-from pmviewer.scene.flatten import LUMINANCE, flatten
-from pmviewer.settings import Photons
-from tests.scenes_for_tests import diffuse_box
+from pmviewer.photons.light_pass.light_pass import trace_pass
+from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
+from pmviewer.settings.access import Photons
+from tests.support.scenes import diffuse_box
 
 ALL = 0b1111
 N = 10_000

@@ -14,15 +14,15 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.importance.lights import importance_of_lights
 from pmviewer.maps.record import unpack
-from pmviewer.photons.deposition import DISCARDED, REDISTRIBUTED, REJECTED, STORED
-from pmviewer.photons.fates import FATE_BITS
+from pmviewer.photons.deposition.fates import FATE_BITS
+from pmviewer.photons.deposition.rules import DISCARDED, REDISTRIBUTED, REJECTED, STORED
+from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Scene
-from pmviewer.scene.flatten import flatten
 from pmviewer.scene.light_places import light_places
-from pmviewer.viewer.light_list import light_rows, top_lights
-from pmviewer.viewer.lines import light_points
-from pmviewer.viewer.overlays import fate_counts, light_mask
-from tests.scenes_for_tests import box_camera, box_walls, cornell_box, diffuse, light_scene, panel, settings_of
+from pmviewer.viewer.gl.lines import light_points
+from pmviewer.viewer.overlays.overlays import fate_counts, light_mask
+from pmviewer.viewer.panels.light_list import light_rows, top_lights
+from tests.support.scenes import box_camera, box_walls, cornell_box, diffuse, light_scene, panel, settings_of
 
 RULES = {
     "clamp": {"deposition": "Keller-Wald", "epsilon": 0.3, "f": 0.3},

@@ -8,15 +8,25 @@ import pytest
 
 from pmviewer.engine.pool import WorkPool
 from pmviewer.maps.record import unpack
-from pmviewer.photons.deposition import Deposition, Homogeneous
-from pmviewer.photons.guided import ENOUGH, Guidance, Known, _at_least, beside, discard, estimated, keep, peter_pietrek
-from pmviewer.photons.lightpass import guided_emission_of, trace_pass
-from pmviewer.photons.strata import Strata, strata_of
-from pmviewer.photons.tested import Sought
+from pmviewer.photons.deposition.rules import Deposition, Homogeneous
+from pmviewer.photons.emission.guided import (
+    ENOUGH,
+    Guidance,
+    Known,
+    _at_least,
+    beside,
+    discard,
+    estimated,
+    keep,
+    peter_pietrek,
+)
+from pmviewer.photons.emission.strata import Strata, strata_of
+from pmviewer.photons.emission.tested import Sought
+from pmviewer.photons.light_pass.light_pass import guided_emission_of, trace_pass
+from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.scene.description import DirectionalLight, PointLight, SpotLight
-from pmviewer.scene.flatten import LUMINANCE, flatten
-from pmviewer.settings import Photons
-from tests.scenes_for_tests import box_walls, diffuse_box, light_scene
+from pmviewer.settings.access import Photons
+from tests.support.scenes import box_walls, diffuse_box, light_scene
 
 ALL = 0b1111
 VARIANTS = ("Peter-Pietrek", "Christensen discard", "Christensen keep")

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.energy import ENTRIES, Energy, EnergyBooks
-from pmviewer.photons.lightpass import trace_pass
-from pmviewer.photons.projection import projection_of
-from pmviewer.photons.roulette import RULES
-from pmviewer.photons.trace import E_DROPPED, E_EMITTED, E_STORED
+from pmviewer.photons.light_pass.light_pass import trace_pass
+from pmviewer.photons.light_pass.roulette import RULES
+from pmviewer.photons.light_pass.trace import E_DROPPED, E_EMITTED, E_STORED
+from pmviewer.photons.projection.projection import projection_of
 from pmviewer.scene.analysis import analyse
+from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Parallelogram, PointLight, Scene, Shape, Sphere
-from pmviewer.scene.flatten import flatten
-from pmviewer.settings import Photons
-from tests.scenes_for_tests import (
+from pmviewer.settings.access import Photons
+from tests.support.scenes import (
     GLASS,
     MIRROR,
     ball_in_environment,

@@ -11,13 +11,13 @@ import pytest
 from pmviewer.engine.pool import WorkPool
 from pmviewer.errors import SettingError
 from pmviewer.maps.record import BYTES_PER_PHOTON, unpack
-from pmviewer.photons import lightpass
-from pmviewer.photons.lightpass import trace_pass, trajectories
-from pmviewer.photons.trace import E_ABSORBED, E_EMITTED, E_ESCAPED, E_STORED, E_TERMINATED
+from pmviewer.photons.light_pass import light_pass as lightpass
+from pmviewer.photons.light_pass.light_pass import trace_pass, trajectories
+from pmviewer.photons.light_pass.trace import E_ABSORBED, E_EMITTED, E_ESCAPED, E_STORED, E_TERMINATED
 from pmviewer.scene.analysis import analyse
-from pmviewer.scene.flatten import LUMINANCE, flatten
-from pmviewer.settings import Photons
-from tests.scenes_for_tests import (
+from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
+from pmviewer.settings.access import Photons
+from tests.support.scenes import (
     GLASS,
     LIGHTS,
     ball_in_environment,

@@ -6,12 +6,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.kernels.raycast import cast_closest
+from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC, unpack
-from pmviewer.photons.lightpass import trace_pass
-from pmviewer.scene.flatten import flatten
-from pmviewer.settings import Photons
-from tests.scenes_for_tests import cornell_box
+from pmviewer.photons.light_pass.light_pass import trace_pass
+from pmviewer.scene.arrays.flatten import flatten
+from pmviewer.settings.access import Photons
+from tests.support.scenes import cornell_box
 
 GLASS, MIRROR = 4, 3  # shapes' materials in cornell_box
 BALLS = {MIRROR: np.array([-0.45, -0.6, -0.4]), GLASS: np.array([0.45, -0.6, 0.1])}

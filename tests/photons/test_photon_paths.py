@@ -7,11 +7,11 @@ import pytest
 
 from pmviewer.engine.opened import open_scene
 from pmviewer.maps.record import BOUNCES, unpack
-from pmviewer.photons.lightpass import trace_pass
-from pmviewer.photons.paths import MOST_VERTICES, empty_paths
-from pmviewer.settings import Settings
-from pmviewer.viewer.lines import flights
-from tests.scenes_for_tests import cornell_box, light_scene
+from pmviewer.photons.light_pass.light_pass import trace_pass
+from pmviewer.photons.light_pass.paths import MOST_VERTICES, empty_paths
+from pmviewer.settings.access import Settings
+from pmviewer.viewer.gl.lines import flights
+from tests.support.scenes import cornell_box, light_scene
 
 N, M = 3000, 200
 

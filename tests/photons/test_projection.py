@@ -9,24 +9,24 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.opened import open_scene
-from pmviewer.engine.projection import projection_for
-from pmviewer.kernels.jit import kernel
+from pmviewer.engine.stages.projection import projection_for
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.random import INDEPENDENT
 from pmviewer.maps.record import CAUSTIC, INDIRECT_CAUSTIC, unpack
-from pmviewer.photons import lightpass
-from pmviewer.photons.bounds import MOST_SPHERES, enclosing, spheres_of
-from pmviewer.photons.lightpass import trace_pass
-from pmviewer.photons.projected import concentric_from_polar
-from pmviewer.photons.projection import projection_of
-from pmviewer.photons.trace import E_ABSORBED, E_EMITTED, E_ESCAPED, E_TERMINATED
+from pmviewer.photons.light_pass import light_pass as lightpass
+from pmviewer.photons.light_pass.light_pass import trace_pass
+from pmviewer.photons.light_pass.trace import E_ABSORBED, E_EMITTED, E_ESCAPED, E_TERMINATED
+from pmviewer.photons.projection.bounds import MOST_SPHERES, enclosing, spheres_of
+from pmviewer.photons.projection.projected import concentric_from_polar
+from pmviewer.photons.projection.projection import projection_of
+from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.scene.description import Disk, Parallelogram, PointLight, Shape, Sphere
-from pmviewer.scene.flatten import LUMINANCE, flatten
-from pmviewer.settings import Photons
-from tests.device import from_python
+from pmviewer.settings.access import Photons
 from tests.kernels.test_leaning_light import LEANING
 from tests.kernels.test_light_sampling import emit
 from tests.kernels.test_more_lights import MORE
-from tests.scenes_for_tests import GLASS, LIGHTS, ball_mesh, diffuse_box, light_scene, settings_of
+from tests.support.device import from_python
+from tests.support.scenes import GLASS, LIGHTS, ball_mesh, diffuse_box, light_scene, settings_of
 
 BALL = Sphere((-0.2, 0.25, 0.15), 0.12)
 ALL = {**LIGHTS, **MORE, "leaning mesh": LEANING}

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.pool import WorkPool
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.record import unpack
-from pmviewer.photons.lightpass import trace_pass
-from pmviewer.photons.roulette import MOST_COPIES, RULES, copies, survival_probability
-from pmviewer.photons.trace import E_ABSORBED, E_EMITTED, E_ESCAPED, E_STORED, E_TERMINATED
+from pmviewer.photons.light_pass.light_pass import trace_pass
+from pmviewer.photons.light_pass.roulette import MOST_COPIES, RULES, copies, survival_probability
+from pmviewer.photons.light_pass.trace import E_ABSORBED, E_EMITTED, E_ESCAPED, E_STORED, E_TERMINATED
 from pmviewer.scene.analysis import analyse
-from pmviewer.scene.flatten import LUMINANCE, flatten
-from pmviewer.settings import Photons
-from tests.scenes_for_tests import cornell_box, diffuse_box, rendered, settings_of
+from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
+from pmviewer.settings.access import Photons
+from tests.support.scenes import cornell_box, diffuse_box, rendered, settings_of
 
 
 def trace(scene, rule, N=60_000, **settings):

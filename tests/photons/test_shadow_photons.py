@@ -8,14 +8,14 @@ from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.record import unpack
 from pmviewer.maps.shadow import LIT, SHADOW, SHADOW_FLAGS, UNKNOWN, build_shadows, shadow_record, visibility
 from pmviewer.photons.shadow import shadow_pass
 from pmviewer.scene.description import Camera, Parallelogram, PointLight, Scene, Shape
-from pmviewer.settings import Settings, with_values
-from tests import naive_maps as naive
-from tests.scenes_for_tests import diffuse
+from pmviewer.settings.access import Settings, with_values
+from tests.support import naive_maps as naive
+from tests.support.scenes import diffuse
 
 ON = {"direct.shadow_photons": True}
 

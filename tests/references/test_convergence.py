@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.bench.error import reference
+from pmviewer.bench.measures.error import reference
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.output.metric import loglog_slope, metrics, z_test
-from pmviewer.settings import Settings, with_values
+from pmviewer.settings.access import Settings, with_values
 
 OWN_ERROR = {"cornell_diffuse": 2.0e-5, "cornell_caustic": 6.5e-5}
 """relMSE of the references themselves."""

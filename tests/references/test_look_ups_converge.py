@@ -6,15 +6,15 @@ On a floor under a lamp, whose light is known, and in the box. Figures with -s.
 import numpy as np
 import pytest
 
-from pmviewer.bench.error import reference
+from pmviewer.bench.measures.error import reference
 from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.output.metric import loglog_slope, metrics
 from pmviewer.scene.description import Camera, Parallelogram, PointLight, Scene, Shape
-from pmviewer.settings import Settings, with_values
-from tests.scenes_for_tests import diffuse
+from pmviewer.settings.access import Settings, with_values
+from tests.support.scenes import diffuse
 
 ALBEDO = 0.5
 PASSES = (16, 64, 256)

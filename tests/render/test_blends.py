@@ -13,7 +13,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.scene.description import Material, PointLight, Principled, Scene, Shape, Sphere
 from pmviewer.scene.texture import Bitmap, Checkerboard
-from tests.scenes_for_tests import GLASS, MIRROR, box_camera, box_walls, diffuse, panel, rendered, settings_of
+from tests.support.scenes import GLASS, MIRROR, box_camera, box_walls, diffuse, panel, rendered, settings_of
 
 METAL = Material("metal", "rough conductor", (0.9, 0.7, 0.5), alpha=(0.4, 0.4), two_sided=True)
 SMOOTHER = replace(METAL, name="smoother", alpha=(0.1, 0.1))

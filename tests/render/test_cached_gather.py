@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.cache import StageCache
-from pmviewer.engine.cache_stage import lattices, recipe
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.stages.cache_stage import lattices, recipe
 from pmviewer.maps.record import unpack
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.analysis import analyse
-from tests.scenes_for_tests import closed_sphere, cornell_box, diffuse_box, rendered, settings_of
+from tests.support.scenes import closed_sphere, cornell_box, diffuse_box, rendered, settings_of
 
 ON = {"cache": "on", "cache_samples": 32}
 

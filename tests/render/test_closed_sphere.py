@@ -9,7 +9,7 @@ import pytest
 
 from pmviewer.render.planes import TERMS
 from pmviewer.scene.description import Mesh
-from tests.scenes_for_tests import ball_mesh, closed_sphere, rendered, settings_of
+from tests.support.scenes import ball_mesh, closed_sphere, rendered, settings_of
 
 # About 30 000 stored photons reach the part of the sphere that is seen, and they carry half of the radiance: the
 # standard error of the mean is 0.3 % at most, that of a path-traced image lower still.

@@ -15,9 +15,9 @@ from pmviewer.importance.rules import probability_of
 from pmviewer.maps.record import unpack
 from pmviewer.output.diagnostic_views import coloured, view_scale
 from pmviewer.output.falsecolour import DIVERGING
-from tests import naive_maps as naive
 from tests.render.test_diagnostics import hits
-from tests.scenes_for_tests import cornell_box, diffuse_box, settings_of
+from tests.support import naive_maps as naive
+from tests.support.scenes import cornell_box, diffuse_box, settings_of
 
 SIZE = 16
 

@@ -13,8 +13,8 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.maps.record import decode_directions, unpack
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
-from pmviewer.settings import Settings, with_values
-from tests.scenes_for_tests import diffuse_box, settings_of
+from pmviewer.settings.access import Settings, with_values
+from tests.support.scenes import diffuse_box, settings_of
 
 SIZE = 16
 GATHER = {"render.method": "gather", "gather.radiance_photons": "1/4"}

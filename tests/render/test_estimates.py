@@ -8,7 +8,7 @@ from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
-from pmviewer.settings import Settings, with_values
+from pmviewer.settings.access import Settings, with_values
 
 SMALL = {"camera.width": 32, "camera.height": 32, "estimate.alpha": 1.0}
 

@@ -12,7 +12,7 @@ from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
-from pmviewer.settings import Settings, with_values
+from pmviewer.settings.access import Settings, with_values
 
 HEAD = """<scene version="3.0.0"><sensor type="perspective"><float name="fov" value="{fov}"/><transform name="to_world">
 <lookat origin="{origin}" target="{target}" up="0,0,1"/></transform><film type="hdrfilm">

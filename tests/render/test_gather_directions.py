@@ -9,15 +9,15 @@ from scipy.stats import chi2
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.bsdf.plain import STORED, PlainBsdf
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.memory import stack_i4, stack_put_f4
-from pmviewer.kernels.plain_bsdf import STORED, PlainBsdf
-from pmviewer.render.cones import ONE_MINUS_COS, cone_direction, cone_pdf
-from pmviewer.render.guide import AIM_WORDS, MOST_IN_CELLS, concentration
-from pmviewer.render.hemicells import cell_direction, cell_pdf, fill_cells
+from pmviewer.render.gather.cones import ONE_MINUS_COS, cone_direction, cone_pdf
+from pmviewer.render.gather.guide import AIM_WORDS, MOST_IN_CELLS, concentration
+from pmviewer.render.gather.hemicells import cell_direction, cell_pdf, fill_cells
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.description import Parallelogram, Scene, Shape
-from tests.scenes_for_tests import box_camera, box_walls, closed_sphere, diffuse, rendered, settings_of
+from tests.support.scenes import box_camera, box_walls, closed_sphere, diffuse, rendered, settings_of
 
 _f4 = np.float32
 _AT = 4 * MOST_IN_CELLS

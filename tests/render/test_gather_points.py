@@ -9,7 +9,7 @@ from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
-from tests.scenes_for_tests import cornell_box, diffuse_box, settings_of
+from tests.support.scenes import cornell_box, diffuse_box, settings_of
 
 CASES = {
     "plain": {},

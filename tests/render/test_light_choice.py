@@ -10,12 +10,12 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.errors import SceneError
-from pmviewer.kernels.jit import kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.memory import stack_i4
-from pmviewer.maps.grid import build_grid
 from pmviewer.maps.radius import neighbourhood
+from pmviewer.maps.search.grid import build_grid
 from pmviewer.output.metric import z_test
-from pmviewer.render.choice import (
+from pmviewer.render.direct.choice import (
     BY_PHOTONS,
     CHOICES,
     DEFENSIVE,
@@ -29,11 +29,11 @@ from pmviewer.render.choice import (
 )
 from pmviewer.render.eye import DIRECT
 from pmviewer.render.record import EYE_DTYPE
+from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Camera, Parallelogram, PointLight, Scene, Shape, Sphere
-from pmviewer.scene.flatten import flatten
-from pmviewer.settings import SETTINGS
-from tests.naive_maps import pack
-from tests.scenes_for_tests import box_walls, diffuse, rendered, settings_of
+from pmviewer.settings.access import SETTINGS
+from tests.support.naive_maps import pack
+from tests.support.scenes import box_walls, diffuse, rendered, settings_of
 
 SIZE, SEEDS = 16, 40
 N_LIGHTS = 8

@@ -17,7 +17,7 @@ from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
-from tests.scenes_for_tests import settings_of
+from tests.support.scenes import settings_of
 
 FOLDER = Path(__file__).parents[1] / "scene" / "mitsuba_conventions"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text("utf-8"))

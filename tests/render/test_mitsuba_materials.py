@@ -27,7 +27,7 @@ from pmviewer.scene.description import (
     Shape,
     Sphere,
 )
-from tests.scenes_for_tests import settings_of
+from tests.support.scenes import settings_of
 
 FILE = Path(__file__).with_name("mitsuba_materials") / "expected.json"
 SCENES = {row["name"]: row for row in json.loads(FILE.read_text("utf-8"))["scenes"]}

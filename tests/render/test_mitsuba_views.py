@@ -18,7 +18,7 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from tests.render.mitsuba_views.scenes import VIEWS, description
-from tests.scenes_for_tests import settings_of
+from tests.support.scenes import settings_of
 
 EXPECTED = json.loads((Path(__file__).parent / "mitsuba_views" / "expected.json").read_text("utf-8"))
 RUNS = 6

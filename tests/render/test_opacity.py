@@ -21,7 +21,7 @@ from pmviewer.scene.description import (
     Sphere,
 )
 from pmviewer.scene.texture import Bitmap, Checkerboard
-from tests.scenes_for_tests import diffuse, rendered, settings_of
+from tests.support.scenes import diffuse, rendered, settings_of
 
 BLACK = diffuse("black", (0.0, 0.0, 0.0))
 FIELDS = Checkerboard((1.0,) * 3, (0.25,) * 3, (2.0, 0, 0, 0, 2.0, 0))

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from pmviewer.kernels.raycast import cast_closest
+from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.render.camera import resolve_camera
-from pmviewer.render.outline import outline_pixels
+from pmviewer.render.direct.outline import outline_pixels
 from pmviewer.render.planes import PLANES
+from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Camera, Cylinder, Disk, Mesh, Parallelogram, Scene, Shape, Sphere
-from pmviewer.scene.flatten import flatten
-from pmviewer.settings import CameraSettings
-from tests.scenes_for_tests import diffuse, diffuse_box, rendered, settings_of
+from pmviewer.settings.access import CameraSettings
+from tests.support.scenes import diffuse, diffuse_box, rendered, settings_of
 
 f4 = np.float32
 BALL = trimesh.creation.icosphere(subdivisions=2, radius=0.6)

@@ -10,7 +10,7 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.render.pixel_radius import COUNTED, FOUND, OF_CAUSTIC, OF_GLOBAL, RADIUS, first_radii, shrink
-from pmviewer.settings import Settings, with_values
+from pmviewer.settings.access import Settings, with_values
 
 PIXEL = {"estimate.radius_rule": "pixel"}
 SMALL = {"camera.width": 32, "camera.height": 32, "photons.N": 4000, "render.method": "progressive"}

@@ -13,7 +13,7 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.scene.description import Material, Mesh, Scene, Shape, Sphere
-from tests.scenes_for_tests import GLASS, MIRROR, box_camera, box_walls, diffuse, panel, rendered, settings_of
+from tests.support.scenes import GLASS, MIRROR, box_camera, box_walls, diffuse, panel, rendered, settings_of
 
 COPPER = ((0.2, 0.9, 1.1), (3.9, 2.4, 2.2))
 MATERIALS = {

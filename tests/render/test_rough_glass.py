@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pmviewer.scene.description import Camera, ConstantEnvironment, Material, Parallelogram, Scene, Shape
-from tests.scenes_for_tests import rendered, settings_of
+from tests.support.scenes import rendered, settings_of
 
 ALPHA = 0.3
 

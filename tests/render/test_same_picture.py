@@ -12,7 +12,7 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.scene.description import Sphere
-from tests.scenes_for_tests import cornell_box, rendered, settings_of
+from tests.support.scenes import cornell_box, rendered, settings_of
 
 METHODS = ["progressive", "gather", "path", "global map", "caustic map"]
 

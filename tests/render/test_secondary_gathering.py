@@ -11,7 +11,7 @@ from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.opened import open_scene
 from pmviewer.render.planes import TERMS
 from pmviewer.scene.analysis import analyse
-from tests.scenes_for_tests import box_walls, closed_sphere, cornell_box, diffuse_box, rendered, settings_of
+from tests.support.scenes import box_walls, closed_sphere, cornell_box, diffuse_box, rendered, settings_of
 
 EVERYWHERE = {"estimate": {"radius": 0.1, "alpha": 1.0}, "gather": {"rays": 2, "secondary": 20.0}}
 """A threshold longer than the scene: every gather ray gathers again."""

@@ -11,7 +11,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.render.planes import TERMS
 from pmviewer.scene.description import Camera, Parallelogram, Scene, Shape
-from tests.scenes_for_tests import cornell_box, diffuse, panel, rendered, settings_of
+from tests.support.scenes import cornell_box, diffuse, panel, rendered, settings_of
 
 
 def pass_means(method, passes=24, **groups):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pmviewer.scene.description import Shape
-from tests.scenes_for_tests import GLASS, MIRROR, ball_in_environment, ball_mesh, rendered, settings_of
+from tests.support.scenes import GLASS, MIRROR, ball_in_environment, ball_mesh, rendered, settings_of
 
 
 @pytest.mark.parametrize("method", ["path", "progressive", "gather"])

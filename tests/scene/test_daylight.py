@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pmviewer.scene.arrays.sky_table import sky_integral
 from pmviewer.scene.daylight import models
 from pmviewer.scene.daylight.image import sky_image
 from pmviewer.scene.daylight.models import SUN_HALF_APERTURE, sky_model
 from pmviewer.scene.daylight.position import Moment, sun_angles
 from pmviewer.scene.daylight.preetham import Preetham
+from pmviewer.scene.defaults.sky_sum import looked_up
 from pmviewer.scene.description import DirectionalLight, ImageEnvironment, Light
-from pmviewer.scene.sky_sum import looked_up
-from pmviewer.scene.sky_table import sky_integral
 from tests.scene.helpers import load
 
 installed = pytest.mark.skipif(models._mitsuba_tables() is None, reason="its tables come with Mitsuba")

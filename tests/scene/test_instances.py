@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.jit import kernel
-from pmviewer.kernels.raycast import cast_closest, cast_occluded, closest_hit
+from pmviewer.kernels.accel.raycast import cast_closest, cast_occluded, closest_hit
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.scene import light_of, material_of, scene_dtype
 from pmviewer.kernels.surface import leave, surface_at
 from pmviewer.scene.analysis import analyse
+from pmviewer.scene.arrays.flatten import bounding_sphere, flatten
+from pmviewer.scene.arrays.primitives import transformed, with_smooth_normals
 from pmviewer.scene.description import Disk, Group, Instance, Parallelogram, Scene, Shape, Sphere
-from pmviewer.scene.flatten import bounding_sphere, flatten
-from pmviewer.scene.primitives import transformed, with_smooth_normals
-from tests.scenes_for_tests import GLASS, MIRROR, ball_mesh, cube_mesh, diffuse, diffuse_box, rendered, settings_of
+from tests.support.scenes import GLASS, MIRROR, ball_mesh, cube_mesh, diffuse, diffuse_box, rendered, settings_of
 
 SCALES = (1e-4, 1.0, 1e5)
 

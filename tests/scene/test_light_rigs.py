@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from pmviewer.errors import SceneError
-from pmviewer.scene import primitives
-from pmviewer.scene.completion import completed
+from pmviewer.scene.arrays import primitives
+from pmviewer.scene.arrays.primitives import transformed
+from pmviewer.scene.defaults.completion import completed
 from pmviewer.scene.description import (
     Camera,
     DirectionalLight,
@@ -23,7 +24,6 @@ from pmviewer.scene.description import (
     Shape,
 )
 from pmviewer.scene.formats.mitsuba.transform import scaling, translation
-from pmviewer.scene.primitives import transformed
 from pmviewer.scene.texture import Bitmap
 from tests.scene.test_viewpoint import GREY, ball, scene_of, turned, walls
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.opened import open_scene
+from pmviewer.scene.arrays.flatten import bounding_sphere
 from pmviewer.scene.description import (
     Cylinder,
     Disk,
@@ -19,9 +20,8 @@ from pmviewer.scene.description import (
     Sphere,
     SpotLight,
 )
-from pmviewer.scene.flatten import bounding_sphere
-from pmviewer.scene.recentre import FAR, recentred
-from tests.scenes_for_tests import LIGHTS, box_camera, cornell_box, cube_mesh, light_scene, panel
+from pmviewer.scene.meshes.recentre import FAR, recentred
+from tests.support.scenes import LIGHTS, box_camera, cornell_box, cube_mesh, light_scene, panel
 
 OFFSET = np.array([3e5, -2e6, 4e4])
 

@@ -12,7 +12,7 @@ from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.describe import describe, description_text
 from pmviewer.scene.description import Cylinder, Mesh, Parallelogram, Sphere
 from pmviewer.scene.load import bundled_scenes, load_scene, reference_of
-from pmviewer.settings import CameraSettings
+from pmviewer.settings.access import CameraSettings
 
 NAMES = ("cornell_caustic", "cornell_diffuse", "ring_caustic", "rooms_10x10")
 

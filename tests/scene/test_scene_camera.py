@@ -11,7 +11,7 @@ from pmviewer.errors import SettingError
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.clean import clean_mesh
 from pmviewer.scene.description import Mesh, Scene
-from pmviewer.settings import CameraSettings
+from pmviewer.settings.access import CameraSettings
 from tests.scene.helpers import load
 
 

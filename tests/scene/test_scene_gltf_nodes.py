@@ -10,7 +10,7 @@ from pmviewer.errors import SceneError
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.formats.gltf.shared import _condition
 from pmviewer.scene.load import load_scene
-from pmviewer.settings import CameraSettings
+from pmviewer.settings.access import CameraSettings
 from tests.scene.gltf_files import TRIANGLE, Gltf, corners, meshes
 
 HALF = math.sqrt(0.5)

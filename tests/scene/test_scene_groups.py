@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from pmviewer.errors import SceneError
+from pmviewer.scene.arrays.flatten import bounding_sphere, flatten
+from pmviewer.scene.arrays.tessellate import tessellate
 from pmviewer.scene.describe import describe
-from pmviewer.scene.displacement import Fractal
-from pmviewer.scene.flatten import bounding_sphere, flatten
 from pmviewer.scene.load import load_scene
-from pmviewer.scene.tessellate import tessellate
+from pmviewer.scene.meshes.displacement import Fractal
 from tests.scene.helpers import CAMERA, load, xml_file
 
 CUBE = '<shape type="shapegroup" id="one"><shape type="cube"/></shape>'
@@ -140,7 +140,7 @@ def test_window_draws_instances_where_they_are(tmp_path):
 
 
 def test_window_simplifies_what_is_too_much(tmp_path, monkeypatch):
-    monkeypatch.setattr("pmviewer.scene.tessellate.INSTANCE_BUDGET", 3000)
+    monkeypatch.setattr("pmviewer.scene.arrays.tessellate.INSTANCE_BUDGET", 3000)
     ball = '<shape type="shapegroup" id="one"><shape type="sphere"/></shape>'
     scene = load(tmp_path, ball, *[instance(transform=f'<translate value="{3 * i} 0 0"/>') for i in range(4)])
     drawn = tessellate(scene)

@@ -16,8 +16,8 @@ from pmviewer.scene.describe import describe
 from pmviewer.scene.description import DirectionalLight, ImageEnvironment, SpotLight
 from pmviewer.scene.emission import emitted_power, spot_solid_angle
 from pmviewer.scene.formats.hdr import read_hdr
+from pmviewer.scene.formats.sky_image import read_sky
 from pmviewer.scene.formats.texture_file import read_picture
-from pmviewer.scene.sky_image import read_sky
 from tests.scene.helpers import load
 
 SHAPE = '<shape type="sphere"/>'

@@ -12,7 +12,7 @@ from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.description import BLACK, Mesh, Parallelogram, Scene
 from pmviewer.scene.formats.ply import read_ply
 from pmviewer.scene.load import load_scene, read_scene
-from pmviewer.settings import CameraSettings
+from pmviewer.settings.access import CameraSettings
 from tests.scene.helpers import load
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)

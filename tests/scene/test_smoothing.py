@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pmviewer.scene.arrays.primitives import cube, sphere
 from pmviewer.scene.description import Mesh
-from pmviewer.scene.primitives import cube, sphere
-from pmviewer.scene.smoothing import smoothed
+from pmviewer.scene.meshes.smoothing import smoothed
 from tests.scene.helpers import load
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from pmviewer.scene.description import Material, Mesh
 from pmviewer.scene.load import bundled_scenes, load_scene
-from pmviewer.scene.tilt import leaning_share
+from pmviewer.scene.meshes.tilt import leaning_share
 
 TETRAHEDRON = """v 1 1 1\nv 1 -1 -1\nv -1 1 -1\nv -1 -1 1\nf 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n"""
 SCENE = """<scene version="3.0.0"><emitter type="constant"/>

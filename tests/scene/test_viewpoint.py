@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from pmviewer.render.camera import resolve_camera
-from pmviewer.scene import primitives
-from pmviewer.scene.completion import completed, upright
+from pmviewer.scene.arrays import primitives
+from pmviewer.scene.arrays.primitives import transformed
+from pmviewer.scene.defaults.completion import completed, upright
+from pmviewer.scene.defaults.framing import direction, fitted
+from pmviewer.scene.defaults.proxy import proxy_of
+from pmviewer.scene.defaults.viewpoint import chosen_viewpoint
 from pmviewer.scene.description import Camera, Material, Mesh, Scene, Shape
 from pmviewer.scene.formats.mitsuba.transform import scaling, translation
-from pmviewer.scene.framing import direction, fitted
-from pmviewer.scene.primitives import transformed
-from pmviewer.scene.proxy import proxy_of
-from pmviewer.scene.viewpoint import chosen_viewpoint
-from pmviewer.settings import CameraSettings
+from pmviewer.settings.access import CameraSettings
 
 GREY = Material("grey", "diffuse", two_sided=True)
 

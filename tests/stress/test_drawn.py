@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from pmviewer.bench.stress import drawn
 from pmviewer.bench.stress.drawn import PLAIN, STRUCTURAL, STRUCTURES, Spec, check, drawable, scene_of, value_of
-from pmviewer.settings import SETTINGS
+from pmviewer.settings.access import SETTINGS
 
 UNIT = st.floats(0, 1)
 VALUES = st.fixed_dictionaries({info.path: UNIT.map(lambda u, info=info: value_of(info, u)) for info in drawable()})

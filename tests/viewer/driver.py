@@ -11,7 +11,7 @@ from imgui_bundle import ImVec2, hello_imgui, imgui
 from imgui_bundle.immapp import testing
 
 from pmviewer.viewer.app import ViewerApp
-from pmviewer.viewer.recent import RecentFiles
+from pmviewer.viewer.dialogs.recent import RecentFiles
 
 Context = Any
 Pixels = np.ndarray

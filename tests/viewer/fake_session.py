@@ -14,7 +14,7 @@ from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.planes import CHANNELS, PLANES
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.scene.description import Camera, Scene
-from pmviewer.settings import Settings
+from pmviewer.settings.access import Settings
 
 SIZE = 64
 N_PHOTONS = 4000

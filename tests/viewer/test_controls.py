@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pmviewer.render.camera import CameraPose
-from pmviewer.viewer import controls
+from pmviewer.viewer.viewport import controls
 
 POSE = CameraPose((0.3, 1.2, 5.0), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0), 50.0, 640, 480)
 POSES = [POSE, replace(POSE, mirrored=True), replace(POSE, up=(0.2, -0.3, 1.0))]

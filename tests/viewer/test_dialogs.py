@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from imgui_bundle import imgui
 
-from pmviewer.viewer import dialogs
-from pmviewer.viewer.file_browser import Entry, list_folder
+from pmviewer.viewer.dialogs import dialogs
+from pmviewer.viewer.dialogs.file_browser import Entry, list_folder
 from tests.viewer.driver import chord, drive, make_app
 from tests.viewer.fake_session import FakeSession
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pmviewer.viewer import statistics_panel
+from pmviewer.viewer.panels import statistics_panel
 from tests.viewer.driver import drive, make_app
 from tests.viewer.fake_session import FakeSession
 

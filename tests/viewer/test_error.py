@@ -12,9 +12,9 @@ from pmviewer.output.exr import write_exr
 from pmviewer.output.falsecolour import ERROR_SCALE, false_colour
 from pmviewer.output.metric import relmse, squared_error
 from pmviewer.output.tone import to_uint8, tone_map
-from pmviewer.settings import with_values
+from pmviewer.settings.access import with_values
 from pmviewer.viewer.comparison import EARLIER_RUNS, next_mark, run_of
-from pmviewer.viewer.error_panel import log_limits
+from pmviewer.viewer.panels.error_panel import log_limits
 from tests.viewer.driver import chord, drive, make_app, on_window_thread, viewport_pixels
 from tests.viewer.fake_session import SIZE, FakeSession
 

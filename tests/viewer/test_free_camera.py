@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from imgui_bundle import icons_fontawesome_6 as fa
 
-from pmviewer.settings import FreeCamera, Settings, with_values
+from pmviewer.settings.access import FreeCamera, Settings, with_values
 from pmviewer.viewer import theme
 from tests.viewer.driver import drag_picture, drive, make_app, on_window_thread, viewport_pixels
 from tests.viewer.fake_session import FakeSession

@@ -11,20 +11,20 @@ import pytest
 from pmviewer.engine.energy import Energy
 from pmviewer.errors import OutputError
 from pmviewer.maps.record import unpack
-from pmviewer.photons import deposition as photons
-from pmviewer.photons.deposition import Deposited, weight_histogram
+from pmviewer.photons.deposition import rules as photons
+from pmviewer.photons.deposition.rules import Deposited, weight_histogram
 from pmviewer.render.camera import resolve_camera
-from pmviewer.settings import Settings, with_values
+from pmviewer.settings.access import Settings, with_values
 from pmviewer.viewer import format as fmt
-from pmviewer.viewer.importance_panel import FIRST_WEIGHT, bias_row, deposition_rows, histogram_of, weight_text
+from pmviewer.viewer.dialogs.recent import LENGTH, RecentFiles
 from pmviewer.viewer.jobs import Jobs
-from pmviewer.viewer.overlays import FATES, brightest_channel, even_thinning
-from pmviewer.viewer.recent import LENGTH, RecentFiles
+from pmviewer.viewer.overlays.overlays import FATES, brightest_channel, even_thinning
+from pmviewer.viewer.panels.importance_panel import FIRST_WEIGHT, bias_row, deposition_rows, histogram_of, weight_text
+from pmviewer.viewer.panels.statistics_panel import energy_rows
 from pmviewer.viewer.session_link import SessionLink
-from pmviewer.viewer.statistics_panel import energy_rows
 from pmviewer.viewer.theme import drawable
-from pmviewer.viewer.viewport_hud import projected, tick_text
-from tests.scenes_for_tests import diffuse_box
+from pmviewer.viewer.viewport.hud import projected, tick_text
+from tests.support.scenes import diffuse_box
 from tests.viewer.fake_session import FakeSession, photons_at, wall_photons
 
 

@@ -12,7 +12,7 @@ from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.session import Session
 from pmviewer.output.png import read_png
 from pmviewer.output.tone import to_uint8, tone_map
-from pmviewer.settings import Settings, with_values
+from pmviewer.settings.access import Settings, with_values
 from tests.viewer.driver import chord, drag, drive, item, make_app, on_window_thread, viewport_pixels
 
 K = imgui.Key

@@ -13,13 +13,13 @@ from pmviewer.output.exr import read_exr
 from pmviewer.output.falsecolour import COLOURS
 from pmviewer.output.frame_export import layer_name
 from pmviewer.output.tone import to_uint8
-from pmviewer.photons.projection import ProjectionMap
-from pmviewer.settings import Settings, get, with_values
-from pmviewer.viewer.cells import cell_corners
-from pmviewer.viewer.light_list import top_lights
-from pmviewer.viewer.lines import circles, directions, encoded, gather_lines
-from pmviewer.viewer.overlays import FATE_PALETTE, LIGHT_PALETTE, LIT_COLOUR, SHADOW_COLOUR
-from tests import naive_maps as naive
+from pmviewer.photons.projection.projection import ProjectionMap
+from pmviewer.settings.access import Settings, get, with_values
+from pmviewer.viewer.gl.lines import circles, directions, encoded, gather_lines
+from pmviewer.viewer.overlays.cells import cell_corners
+from pmviewer.viewer.overlays.overlays import FATE_PALETTE, LIGHT_PALETTE, LIT_COLOUR, SHADOW_COLOUR
+from pmviewer.viewer.panels.light_list import top_lights
+from tests.support import naive_maps as naive
 from tests.viewer.driver import chord, drive, make_app, on_window_thread, overlay_item, viewport_pixels
 from tests.viewer.test_real_session import wait_until
 

@@ -12,7 +12,7 @@ from pmviewer.output.exr import read_exr
 from pmviewer.output.png import read_png
 from pmviewer.output.session_file import read_session
 from pmviewer.output.tone import to_uint8, tone_map
-from pmviewer.settings import SETTINGS, Settings, get, with_values
+from pmviewer.settings.access import SETTINGS, Settings, get, with_values
 from tests.viewer.driver import (
     chord,
     drag,
@@ -454,6 +454,6 @@ def test_files_on_the_recent_list_that_are_gone_are_taken_off(app, session, tmp_
     assert app.state.recent.is_missing(str(gone))
     assert not app.state.recent.is_missing("cornell_caustic")
     Path(tmp_path / "recent.txt").write_bytes(b"\xff\xfe broken")
-    from pmviewer.viewer.recent import RecentFiles
+    from pmviewer.viewer.dialogs.recent import RecentFiles
 
     assert RecentFiles(tmp_path / "recent.txt").entries == []

@@ -15,7 +15,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.render.planes import PLANES, TERMS
-from pmviewer.settings import Settings, with_values
+from pmviewer.settings.access import Settings, with_values
 
 METHODS: Mapping[str, Mapping[str, object]] = {
     "path": {"render.method": "path"},

@@ -85,7 +85,7 @@ def _renderer(opened: Any, values: dict[str, Any], pool: Any) -> Any:
     from pmviewer.engine.cache import StageCache
     from pmviewer.engine.prepare import prepare
     from pmviewer.engine.renderer import Renderer
-    from pmviewer.settings import Settings, with_values
+    from pmviewer.settings.access import Settings, with_values
 
     settings = with_values(Settings(), values)
     prepare(opened, settings, pool, lambda text, share: None)

@@ -26,7 +26,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.scene.description import Material, PointLight, Scene, Shape, Sphere
-from pmviewer.settings import SETTINGS, SettingInfo, Settings, with_values
+from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, with_values
 
 STRUCTURAL = {
     "render.method",

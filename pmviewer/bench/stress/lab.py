@@ -21,7 +21,7 @@ from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.errors import PmviewerError
 from pmviewer.scene.description import Scene
-from pmviewer.settings import Settings, with_values
+from pmviewer.settings.access import Settings, with_values
 
 SIGNIFICANCE = 1e-5
 """Below this a mean is not the expected one. Of some hundred and fifty means chance makes one fail in 700 seeds."""

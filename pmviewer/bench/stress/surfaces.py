@@ -24,7 +24,7 @@ from pmviewer.bench.stress.scenes import (
     room,
 )
 from pmviewer.maps.record import INDIRECT_CAUSTIC, unpack
-from pmviewer.photons.trace import E_ABSORBED, E_EMITTED, E_STORED, E_TERMINATED
+from pmviewer.photons.light_pass.trace import E_ABSORBED, E_EMITTED, E_STORED, E_TERMINATED
 from pmviewer.scene.description import (
     LUMINANCE,
     Material,

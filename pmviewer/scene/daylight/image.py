@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.scene.arrays.sky_table import sky_integral
 from pmviewer.scene.daylight.models import SkyModel
-from pmviewer.scene.sky_table import sky_integral
 
 Float = NDArray[np.float64]
 _SKY_ROWS = 257

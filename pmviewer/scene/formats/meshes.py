@@ -12,7 +12,9 @@ import numpy as np
 
 from pmviewer.errors import SceneError
 from pmviewer.progress import Cancelled, stage
+from pmviewer.scene.arrays.instances import clean_instances, joint_bounds
 from pmviewer.scene.clean import check_camera, check_faces, check_size, clean_lights, clean_shapes
+from pmviewer.scene.defaults.framing import Up, framed
 from pmviewer.scene.description import (
     Camera,
     Mesh,
@@ -29,8 +31,6 @@ from pmviewer.scene.formats.open_file import found_beside
 from pmviewer.scene.formats.ply import read_ply_file
 from pmviewer.scene.formats.stl import read_stl
 from pmviewer.scene.formats.texture_file import read_picture
-from pmviewer.scene.framing import Up, framed
-from pmviewer.scene.instances import clean_instances, joint_bounds
 from pmviewer.scene.texture import Bitmap
 
 T = TypeVar("T")

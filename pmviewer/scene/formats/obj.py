@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.corners import add_normals, compact, merge
-from pmviewer.kernels.polygons import count_triangles, triangulate
+from pmviewer.kernels.meshes.corners import add_normals, compact, merge
+from pmviewer.kernels.meshes.polygons import count_triangles, triangulate
 from pmviewer.progress import stage
+from pmviewer.scene.arrays.primitives import unit
 from pmviewer.scene.description import Mesh, Shape
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.meshfile import DEFAULT_MATERIAL, MeshFile
@@ -19,7 +20,6 @@ from pmviewer.scene.formats.mtl import MtlMaterial, read_libraries
 from pmviewer.scene.formats.obj_text import MISSING, ObjText, read_text
 from pmviewer.scene.formats.open_file import read_regular
 from pmviewer.scene.formats.texture_file import linear
-from pmviewer.scene.primitives import unit
 
 Ints = NDArray[np.int32]
 Float = NDArray[np.float64]

@@ -11,8 +11,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.jit import device, kernel
-from pmviewer.kernels.text import HASH, ends_line, next_line, number, skip_blanks, skip_word
+from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.meshes.text import HASH, ends_line, next_line, number, skip_blanks, skip_word
 from pmviewer.progress import parallel
 
 _PIECE = 1 << 22

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.polygons import count_triangles, triangulate
-from pmviewer.kernels.rows import strips
+from pmviewer.kernels.meshes.polygons import count_triangles, triangulate
+from pmviewer.kernels.meshes.rows import strips
 from pmviewer.scene.description import Mesh
 from pmviewer.scene.formats.open_file import read_regular
 from pmviewer.scene.formats.ply_table import Column, Columns, ListColumn, read_columns, read_header

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.rows import count_words, gather, walk_bytes, walk_numbers
-from pmviewer.kernels.text import numbers
+from pmviewer.kernels.meshes.rows import count_words, gather, walk_bytes, walk_numbers
+from pmviewer.kernels.meshes.text import numbers
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",

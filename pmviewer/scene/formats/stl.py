@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.rows import text_facets, weld
+from pmviewer.kernels.meshes.rows import text_facets, weld
 from pmviewer.progress import stage
 from pmviewer.scene.description import Mesh
 from pmviewer.scene.diagnostics import Diagnostics

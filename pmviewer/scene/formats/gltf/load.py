@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pmviewer.errors import SceneError
+from pmviewer.scene.arrays.primitives import transformed
 from pmviewer.scene.description import Mesh, Shape
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.gltf.accessors import Accessors
@@ -24,7 +25,6 @@ from pmviewer.scene.formats.gltf.pose import Pose, joint_matrices, pose_at_start
 from pmviewer.scene.formats.gltf.primitive import Decoded, Primitives, numbers_of
 from pmviewer.scene.formats.gltf.shared import SharedMeshes
 from pmviewer.scene.formats.meshfile import MeshFile
-from pmviewer.scene.primitives import transformed
 
 CHOICES = ("scene", "camera", "variant")
 """What a user can choose in a glTF file, by name or number from 0 on."""

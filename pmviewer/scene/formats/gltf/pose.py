@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
+from pmviewer.scene.arrays.primitives import unit
 from pmviewer.scene.description import Mesh
 from pmviewer.scene.formats.gltf.accessors import Accessors, Float
 from pmviewer.scene.formats.gltf.document import Document, is_index
-from pmviewer.scene.primitives import unit
 
 Pose = dict[int, dict[str, list[float]]]
 """By node, what an animation sets: "translation", "rotation", "scale", "weights"."""

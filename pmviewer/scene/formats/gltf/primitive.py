@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
+from pmviewer.scene.arrays.primitives import unit
 from pmviewer.scene.description import Mesh
 from pmviewer.scene.formats.gltf.accessors import Accessors, Float
 from pmviewer.scene.formats.gltf.buffers import Buffers
 from pmviewer.scene.formats.gltf.compression import DracoMesh, decode_draco
 from pmviewer.scene.formats.gltf.document import DAMAGED, Document, Json, extension, is_index
-from pmviewer.scene.primitives import unit
 
 Faces = NDArray[np.int64]
 TRIANGLES, STRIP, FAN = 4, 5, 6

@@ -6,9 +6,9 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 
+from pmviewer.scene.arrays.instances import LARGEST_CONDITION
 from pmviewer.scene.description import Group, Instance, Shape
 from pmviewer.scene.formats.mitsuba.transform import Matrix
-from pmviewer.scene.instances import LARGEST_CONDITION
 
 FEWEST_SAVED = 20_000
 """Triangles that instances must save: below that, written out, they take few megabytes."""

@@ -169,7 +169,7 @@ def _plastic(p: Properties, name: str) -> Material:
 
 
 def _schlick(p: Properties, name: str) -> Material:
-    """Not Mitsuba's: `alpha` from 1, diffuse, to 0, specular (`pmviewer.kernels.schlick`)."""
+    """Not Mitsuba's: `alpha` from 1, diffuse, to 0, specular (`pmviewer.kernels.bsdf.schlick`)."""
     factor = math.sqrt(alpha(p, "alpha", most=1.0))
     colour = p.bounded_colour("reflectance", 0.5, 1)
     specular = p.bounded_colour("specular_reflectance", 1.0, 1) if "specular_reflectance" in p else colour
@@ -177,7 +177,7 @@ def _schlick(p: Properties, name: str) -> Material:
 
 
 def _ward(p: Properties, name: str) -> Material:
-    """As in Mitsuba 0.6, always in the form whose albedo is bounded (`pmviewer.kernels.ward`)."""
+    """As in Mitsuba 0.6, always in the form whose albedo is bounded (`pmviewer.kernels.bsdf.ward`)."""
     specular = p.bounded_colour("specular_reflectance", 0.2, 1)
     diffuse = older.cut_diffuse(p, p.bounded_colour("diffuse_reflectance", 0.5, 1), specular)
     p.known("variant")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pmviewer.scene.description import Geometry
-from pmviewer.scene.displacement import MOST_TRIANGLES, Fractal, Height, Waves, displaced, n_displaced
 from pmviewer.scene.formats.mitsuba.document import Properties
+from pmviewer.scene.meshes.displacement import MOST_TRIANGLES, Fractal, Height, Waves, displaced, n_displaced
 
 FINEST = 4096
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pmviewer.errors import SceneError
+from pmviewer.scene.defaults.sky_sum import sum_of_skies
 from pmviewer.scene.description import (
     RGB,
     ConstantEnvironment,
@@ -24,8 +25,7 @@ from pmviewer.scene.formats.mitsuba.interface import bounded
 from pmviewer.scene.formats.mitsuba.sky import TYPES as DAYLIGHT
 from pmviewer.scene.formats.mitsuba.sky import read_daylight
 from pmviewer.scene.formats.mitsuba.transform import Matrix
-from pmviewer.scene.sky_image import read_sky
-from pmviewer.scene.sky_sum import sum_of_skies
+from pmviewer.scene.formats.sky_image import read_sky
 
 CUTOFF = 20.0
 """Mitsuba's default in degrees; the beam width's is three quarters of the cut-off."""

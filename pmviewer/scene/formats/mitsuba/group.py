@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.scene.arrays.instances import singular
 from pmviewer.scene.clean import clean_shapes
 from pmviewer.scene.description import Group, Instance, Shape
 from pmviewer.scene.formats.mitsuba.document import Document, Properties
 from pmviewer.scene.formats.mitsuba.transform import Matrix
 from pmviewer.scene.formats.mitsuba.xml import Element
-from pmviewer.scene.instances import singular
 
 GROUP, INSTANCE = "shapegroup", "instance"
 MOST_INSTANCES = 1 << 20

@@ -11,7 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from pmviewer.scene.arrays.instances import joint_bounds
 from pmviewer.scene.clean import clean_lights, clean_shapes, on_a_surface
+from pmviewer.scene.defaults.framing import framed
 from pmviewer.scene.description import NamedCamera, Scene
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.mitsuba.camera import read_cameras
@@ -21,8 +23,6 @@ from pmviewer.scene.formats.mitsuba.folders import Folders
 from pmviewer.scene.formats.mitsuba.reader import Reader
 from pmviewer.scene.formats.mitsuba.shape import SUPPORTED
 from pmviewer.scene.formats.mitsuba.xml import read_xml
-from pmviewer.scene.framing import framed
-from pmviewer.scene.instances import joint_bounds
 
 
 def load_mitsuba(path: Path, parameters: Mapping[str, str], search_paths: Sequence[Path] = ()) -> Scene:

@@ -6,14 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from pmviewer.errors import SceneError
-from pmviewer.scene import primitives
+from pmviewer.scene.arrays import primitives
 from pmviewer.scene.clean import check_faces
 from pmviewer.scene.description import Mesh
 from pmviewer.scene.formats.mitsuba.document import Properties
 from pmviewer.scene.formats.mitsuba.transform import Matrix, mirrors
 from pmviewer.scene.formats.ply import read_ply
 from pmviewer.scene.formats.serialized import read_serialized
-from pmviewer.scene.smoothing import smoothed
+from pmviewer.scene.meshes.smoothing import smoothed
 
 MESH_FILES = ("obj", "ply", "serialized")
 _KEPT_FACES = 20_000

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from pmviewer.scene import primitives
+from pmviewer.scene.arrays import primitives
+from pmviewer.scene.arrays.texture_coordinates import orthonormal
 from pmviewer.scene.description import Cylinder, Disk, Frame, Geometry, Parallelogram, Sphere, Vec3
 from pmviewer.scene.formats.mitsuba.displacement import displacement
 from pmviewer.scene.formats.mitsuba.document import Properties
 from pmviewer.scene.formats.mitsuba.mesh_file import MESH_FILES, mesh_file
 from pmviewer.scene.formats.mitsuba.transform import Matrix, apply, mirrors, similar_columns
-from pmviewer.scene.texture_coordinates import orthonormal
 
 SUPPORTED = (*MESH_FILES, "rectangle", "cube", "sphere", "disk", "cylinder")
 

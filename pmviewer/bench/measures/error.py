@@ -1,0 +1,200 @@
+"""Error against time: every method on every bundled scene against its reference (P1–P5).
+
+relMSE over all pixels; CPU seconds of rendering alone, summed over threads, scene loaded and kernels compiled.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pmviewer.bench import peer
+from pmviewer.bench.report import BenchResult, Target
+from pmviewer.engine.cache import StageCache
+from pmviewer.engine.opened import OpenScene, open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.prepare import prepare
+from pmviewer.engine.renderer import Renderer
+from pmviewer.output.exr import read_exr
+from pmviewer.output.metric import loglog_slope, metrics
+from pmviewer.resources import data_folder
+from pmviewer.settings.access import Settings, with_values
+
+SCENES = ("cornell_diffuse", "cornell_caustic", "ring_caustic", "rooms_10x10")
+METHODS = ("progressive", "gather", "path")
+TARGETS = (
+    ("P1", "cornell_caustic", 1e-2, 0.4),
+    ("P2", "cornell_caustic", 1e-3, 20.0),
+    ("P3", "cornell_diffuse", 1e-2, 0.25),
+    ("P4", "cornell_diffuse", 1e-3, 2.8),
+    ("P5a", "ring_caustic", 5e-3, 1.5),
+    ("P5b", "rooms_10x10", 1e-2, 10.0),
+)
+BUDGETS = {"cornell_diffuse": 8.0, "cornell_caustic": 24.0, "ring_caustic": 8.0, "rooms_10x10": 16.0}
+"""CPU seconds a curve: somewhat more than the slowest target of the scene."""
+QUICK_SHARE = 0.1
+PEER_BUDGET = 2.5
+"""Mitsuba's budget over ours: its time to a target must be found where it is twice ours."""
+PEER = "Mitsuba 3 path"
+PEER_SHARE = 0.5
+"""Our time over Mitsuba's to the same error, in the same run."""
+FIRST_STEP = ("progressive", "cornell_caustic", 1e-2, 1.0)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Error of one method on one scene at passes 1, 2, 4 … `slope` is that of log error against log passes over the
+    second half of the points."""
+
+    scene: str
+    method: str
+    passes: list[int]
+    cpu: list[float]
+    error: list[float]
+    ratio: list[float]
+
+    @property
+    def slope(self) -> float:
+        half = len(self.passes) // 2
+        return loglog_slope(self.passes[half:], self.error[half:]) if len(self.passes) - half > 1 else math.nan
+
+    def time_to(self, error: float) -> float:
+        """CPU seconds at which the error falls to that value, by log-log interpolation; inf if it never does."""
+        for i, value in enumerate(self.error):
+            if value <= error:
+                if i == 0:
+                    return self.cpu[0]
+                a, b = math.log(self.error[i - 1]), math.log(value)
+                share = (a - math.log(error)) / (a - b)
+                return math.exp((1 - share) * math.log(self.cpu[i - 1]) + share * math.log(self.cpu[i]))
+        return math.inf
+
+
+def reference(scene: str) -> np.ndarray:
+    """The scene's converged reference image (h, w, 3) float64."""
+    layers, _ = read_exr(data_folder("scenes") / scene / "reference.exr")
+    return layers[""].astype(np.float64)
+
+
+def measure(
+    opened: OpenScene,
+    method: str,
+    budget: float,
+    threads: int | None = None,
+    limit: int = 4096,
+    values: dict[str, Any] | None = None,
+) -> Curve:
+    """Render until `budget` CPU seconds are spent; the error is taken at passes 1, 2, 4, … and at the end. `values` are
+    further settings."""
+    settings = with_values(Settings(), {"render.method": method, "render.passes": limit, **(values or {})})
+    pool = WorkPool(threads)
+    target = reference(opened.scene.name)
+    curve = Curve(opened.scene.name, method, [], [], [], [])
+    try:
+        prepare(opened, settings, pool, lambda text, share: None)
+        Renderer(opened, settings, pool, StageCache(0)).step()
+        renderer = Renderer(opened, settings, pool, StageCache(0))
+        while not renderer.finished:
+            renderer.step()
+            spent = renderer.tally.cpu_seconds
+            last = spent >= budget or renderer.finished
+            if last or renderer.passes & (renderer.passes - 1) == 0:
+                image = renderer.frame(0).image().astype(np.float64)
+                measured = metrics(image, target)
+                curve.passes.append(renderer.passes)
+                curve.cpu.append(spent)
+                curve.error.append(measured.relmse_all)
+                curve.ratio.append(measured.mean_ratio)
+            if last:
+                break
+    finally:
+        pool.close()
+    return curve
+
+
+def measure_peer(scene: str, budget: float) -> Curve:
+    """Mitsuba's path integrator on the same file, its samples per pixel in place of passes. Raises PmviewerError."""
+    spp, cpu, images = peer.error_images(scene, budget)
+    found = [metrics(image.astype(np.float64), reference(scene)) for image in images]
+    return Curve(scene, PEER, spp, cpu, [m.relmse_all for m in found], [m.mean_ratio for m in found])
+
+
+def against_peer(curves: list[Curve], peers: list[Curve]) -> list[Target]:
+    """Our best time over Mitsuba's for each target; where its budget ran out first, an upper bound of the ratio."""
+    targets = []
+    for target, scene, error, _ in TARGETS:
+        ours = min(c.time_to(error) for c in curves if c.scene == scene)
+        curve = next(c for c in peers if c.scene == scene)
+        theirs = curve.time_to(error)
+        note = f"of Mitsuba 3's time to relMSE {error:g} on {scene}"
+        if not math.isfinite(theirs):
+            theirs, note = curve.cpu[-1], note + f", which it did not reach within {curve.cpu[-1]:.3g} CPU s"
+        targets.append(Target(f"{target} peer", ours / theirs, PEER_SHARE, "", False, note))
+    return targets
+
+
+def run(quick: bool = False) -> BenchResult:
+    """Measure all curves, Mitsuba's too if it is installed; also writes a plot when matplotlib is installed."""
+    share = QUICK_SHARE if quick else 1.0
+    budgets = {scene: share * seconds for scene, seconds in BUDGETS.items()}
+    started = time.perf_counter()
+    curves = [measure(open_scene(scene), method, budgets[scene]) for scene in SCENES for method in METHODS]
+    notes = ["CPU s a curve: " + ", ".join(f"{scene} {budgets[scene]:.3g}" for scene in SCENES)]
+    peers: list[Curve] = []
+    if peer.installed():
+        peers = [measure_peer(scene, PEER_BUDGET * budgets[scene]) for scene in SCENES]
+        notes.append(f"{PEER}: {peer.variant()}, samples per pixel as passes, {PEER_BUDGET:g} times the CPU seconds")
+    else:
+        notes.append(peer.MISSING)
+    rows: list[list[str | float | int]] = []
+    for curve in sorted(curves + peers, key=lambda c: SCENES.index(c.scene)):
+        for n, cpu, error, ratio in zip(curve.passes, curve.cpu, curve.error, curve.ratio, strict=True):
+            slope = curve.slope if n == curve.passes[-1] else ""
+            rows.append([curve.scene, curve.method, n, cpu, error, f"{ratio:.4f}", slope])
+    targets = []
+    for target, scene, error, bound in TARGETS:
+        best = min((c for c in curves if c.scene == scene), key=lambda c: c.time_to(error))
+        note = f"{scene} to relMSE {error:g}, best method: {best.method}"
+        targets.append(Target(target, best.time_to(error), bound, "CPU s", False, note))
+    method, scene, error, bound = FIRST_STEP
+    curve = next(c for c in curves if (c.method, c.scene) == (method, scene))
+    targets.append(Target("P1", curve.time_to(error), bound, "CPU s", False, f"first step: {method} on {scene}"))
+    if peers:
+        targets += against_peer(curves, peers)
+    notes.append(f"{time.perf_counter() - started:.0f} s in all")
+    notes.append(plot(curves + peers, Path("bench-error.png")))
+    columns = ["scene", "method", "passes", "CPU s", "relMSE", "mean ratio", "slope"]
+    return BenchResult("Error against time", columns, rows, targets, notes)
+
+
+def plot(curves: list[Curve], path: Path) -> str:
+    """Write the curves as a picture; a sentence saying where, or why not."""
+    try:
+        import matplotlib
+    except ImportError:
+        return "no plot: install the bench extra for matplotlib"
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(2, 2, figsize=(11, 8), sharey=True, layout="constrained")
+    for axis, scene in zip(axes.flat, SCENES, strict=True):
+        for curve in curves:
+            if curve.scene == scene:
+                axis.loglog(
+                    curve.cpu, curve.error, marker="o", markersize=3, label=f"{curve.method} ({curve.slope:.2f})"
+                )
+        for target, of_scene, error, bound in TARGETS:
+            if of_scene == scene:
+                axis.plot(bound, error, "x", color="black")
+                axis.annotate(target, (bound, error), textcoords="offset points", xytext=(5, 5))
+        axis.set(title=scene, xlabel="CPU seconds", ylabel="relMSE")
+        axis.grid(alpha=0.3)
+        axis.legend(title="method (slope)")
+    figure.savefig(path, dpi=120)
+    pyplot.close(figure)
+    return f"plot written to {path}"

@@ -1,0 +1,133 @@
+"""Guided emission of a pass (I6): from settings and the pass's importance maps to its light pass."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pmviewer.engine.method import Plan
+from pmviewer.engine.stages.deposition import SEED, Rules, importance_of, sampled_classes
+from pmviewer.engine.stages.importance import ImportanceStage
+from pmviewer.importance.rules import full_importance, relative_importance
+from pmviewer.maps.importance import ImportanceMap, Importons, build_importance
+from pmviewer.maps.power import luminances
+from pmviewer.maps.record import CAUSTIC, DIRECT
+from pmviewer.photons.deposition.rules import Deposition, Homogeneous, Rule
+from pmviewer.photons.emission.guided import Guidance, Guided, Known
+from pmviewer.photons.emission.scattered import FIRST
+from pmviewer.photons.emission.tested import Sought
+from pmviewer.photons.light_pass.light_pass import PhotonMaps, guided_emission_of, scattered_photons, trace_pass
+from pmviewer.settings.access import Settings
+
+MOST_SCATTERED = 1 << 15
+"""Importons that are scattered on."""
+SCATTERED_NEIGHBOURS = 50
+LEAST = 0.2
+"""Importance of places for storing photons: look-ups at the border of what is seen reach across it."""
+SCATTER_SEED = 0x5CA77E
+
+
+def emission_key(settings: Settings, plan: Plan, importance: ImportanceStage) -> tuple[Any, ...]:
+    """What guided emission depends on besides the pass and the light pass's own settings; () while it is off."""
+    maps, how = importance.latest, settings.importance
+    if plan.emission == "off" or maps is None:
+        return ()
+    key = "emission", plan.emission, importance.key, maps.traced, how.tests, how.important
+    return (*key, how.caustic_M_r / how.M_r)
+
+
+def guidance_of(settings: Settings, plan: Plan, importance: ImportanceStage) -> Guidance | None:
+    """What the pass's photons are sent for; None where nothing is important.
+
+    A photon of the caustic map counts as many as more of it are wanted (`importance.caustic_M_r` over `M_r`).
+    """
+    maps, how = importance.latest, settings.importance
+    if plan.emission == "off" or maps is None or maps.n == 0:
+        return None
+    sought, first = [], 1 << DIRECT | 1 << CAUSTIC
+    if classes := plan.caustic_classes:
+        made = importance_of(maps, "caustic")
+        weight = how.caustic_M_r / how.M_r if plan.global_classes else 1.0
+        evaluate = relative_importance(made, full_importance(made))
+        sought.append(Sought("caustic", evaluate, classes, classes, weight))
+    if classes := plan.global_classes:
+        made = importance_of(maps, "global")
+        full, further = full_importance(made), _scattered(settings, importance, made)
+        sought.append(Sought("global", relative_importance(made, full), classes & first, classes))
+        sought.append(Sought("global", relative_importance(further, full, np.inf), first, 0))
+    return Guidance(plan.emission, sought, how.tests, how.important)
+
+
+def _scattered(settings: Settings, importance: ImportanceStage, made: ImportanceMap) -> ImportanceMap:
+    """Importance to photons that are scattered on: of the importons of the map, and how many are wanted of them."""
+    stage, scene = importance, importance.scene.flat
+    assert stage.latest is not None
+
+    def make() -> ImportanceMap:
+        places = np.empty((made.n, 7), np.float32)
+        places[:, :3], places[:, 3:6] = made.positions, made.normals
+        mean = float(made.weights.mean()) if made.n else 1.0
+        places[:, 6] = FIRST * made.weights / mean
+        places = np.ascontiguousarray(places[:: -(-made.n // MOST_SCATTERED)] if made.n else places)
+        photons, normals = np.empty((0, 6), np.float32), np.empty(0, np.uint32)
+        if len(places):
+            seed = settings.render.seed ^ SCATTER_SEED
+            photons, normals = scattered_photons(scene, settings.photons, seed, places, stage.pool.run)
+        weights = np.empty(len(photons), np.float32)
+        luminances(photons.view(np.uint32), weights)
+        weights *= np.float32(mean * made.n / max(len(places), 1))
+        positions = np.ascontiguousarray(photons[:, :3])
+        further = Importons(positions, normals, weights, np.zeros(len(photons), np.float32))
+        return build_importance(further, "screen", scene.radius, SCATTERED_NEIGHBOURS, False, stage.pool.run)
+
+    key = "scattered importance", stage.key, settings.photons, stage.latest.traced
+    return stage.cache.get(key, make, lambda map_: map_.bytes)
+
+
+def guided_photons(
+    guidance: Guidance,
+    rules: Rules,
+    settings: Settings,
+    plan: Plan,
+    importance: ImportanceStage,
+    index: int,
+    N: int,
+    before: Known | None,
+) -> PhotonMaps | None:
+    """The light pass of N trajectories with guided emission; None where they are too few to test all lights. `before`
+    is what the passes before know.
+
+    Without deposition rules, those of Christensen's emission are used with it (`Homogeneous`).
+    """
+    scene, run, photons = importance.scene.flat, importance.pool.run, settings.photons
+    seed, caustics = settings.render.seed, bool(plan.caustic_classes)
+    guided = guided_emission_of(scene, photons, seed, index * N, N, caustics, guidance, run, before)
+    if guided is None:
+        return None
+    deposition = rules.deposition or storage(guidance, guided, settings, plan)
+    return trace_pass(scene, photons, seed, index * N, N, caustics, run, deposition=deposition, guided=guided)
+
+
+def storage(guidance: Guidance, guided: Guided, settings: Settings, plan: Plan) -> Deposition:
+    """The rules of Christensen's emission; Peter and Pietrek's stores all photons."""
+    rules: dict[str, Rule] = {}
+    if guidance.variant != "Peter-Pietrek":
+        for goal in guidance.sought:
+            if goal.places:
+                seed = settings.render.seed ^ SEED ^ (goal.photons == "global")
+                rules[goal.photons] = Homogeneous(goal.importance, LEAST, guided.smallest, seed)
+    classes = plan.caustic_classes, plan.global_classes
+    return Deposition(rules.get("caustic"), rules.get("global"), *classes, sampled_classes(plan))
+
+
+def note_of(plan: Plan, photons: PhotonMaps, guidance: Guidance | None) -> tuple[str, ...]:
+    """Sentences for the log about the emission of a pass."""
+    if photons.guided is not None:
+        return photons.guided.notes
+    if plan.emission == "off" or guidance is None:
+        return ()
+    return (
+        f"Guided emission: {photons.emitted:,} photons are too few to test all lights, so they leave by power. More "
+        "photons (photons.N) or fewer test photons (importance.tests) are needed.",
+    )

@@ -1,0 +1,28 @@
+"""Which projection maps (T7) a scene and its settings use, made once and kept with the scene."""
+
+from __future__ import annotations
+
+from pmviewer.engine.method import plan_of
+from pmviewer.engine.opened import OpenScene
+from pmviewer.photons.light_pass.light_pass import trajectories
+from pmviewer.photons.projection.projection import Projection, projection_of
+from pmviewer.settings.access import Settings
+
+MOST_LIGHTS = 64
+"""Of more lights, `auto` makes no maps: they would take longer than they spare."""
+
+
+def projection_for(scene: OpenScene, settings: Settings) -> Projection | None:
+    """The maps for these settings; None where photons start everywhere."""
+    wanted, plan = settings.photons.projection, plan_of(settings, scene.traits)
+    if wanted == "off" or not plan.photons or plan.emission != "off":
+        return None
+    if wanted == "auto" and len(scene.flat.light_names) > MOST_LIGHTS:
+        return None
+    traced, filling, _ = trajectories(settings.photons, settings.photons.N, bool(plan.caustic_classes))
+    key = (wanted, traced > filling)
+    if key not in scene.projections:
+        made = projection_of(scene.flat, wanted == "on", traced > filling)
+        useful = made.surface_power > 0 and (wanted == "on" or made.spares)  # else no photon would start at all
+        scene.projections[key] = made if useful else None
+    return scene.projections[key]

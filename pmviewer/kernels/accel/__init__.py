@@ -1,0 +1,1 @@
+"""The bounding volume hierarchy and casting rays through it: triangles, quadrics, instances, holes."""

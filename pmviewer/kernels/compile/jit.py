@@ -1,0 +1,176 @@
+"""The two decorators that every compiled function of pmviewer uses, and where compiled code is kept.
+
+Numba decides whether a cached function is stale by looking at that function's own file alone, so an edit in a module
+that a cached function *calls* would go unnoticed. Here compiled code lies in a folder named after all sources that its
+module imports, directly or not: an edit elsewhere recompiles nothing, and copies of the package share what they have in
+common, wherever they lie.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numba import njit
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
+from numba.core.registry import CPUDispatcher
+
+from pmviewer.kernels.compile.cache_folder import claim
+from pmviewer.kernels.compile.sources import PACKAGE, stamp
+
+FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
+"""Never `nnan`/`ninf`: they delete the checks for non-finite numbers."""
+
+
+def _versions() -> str:
+    """Names the cache under this Python and numba."""
+    what = f"{sys.version_info[:2]}{numba.__version__}"
+    return hashlib.sha256(what.encode()).hexdigest()[:16]
+
+
+def user_cache_root() -> Path:
+    """The folder for files that can be made again, by the platform's custom."""
+    if override := os.environ.get("PMVIEWER_CACHE"):
+        return Path(override)
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "pmviewer" / "Cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "pmviewer"
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "pmviewer"
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / f".probe{os.getpid()}"
+        probe.touch()
+        probe.unlink()
+    except OSError:
+        return False
+    return True
+
+
+def _choose_cache() -> Path:
+    name = _versions()
+    root = user_cache_root() / "kernels"
+    if not _writable(root):
+        root = Path(tempfile.gettempdir()) / f"pmviewer-kernels-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
+        if not _writable(root):
+            root = Path(tempfile.mkdtemp(prefix="pmviewer-kernels-"))
+    return claim(root, name)
+
+
+CACHE_FOLDER = _choose_cache()
+numba.config.CACHE_DIR = str(CACHE_FOLDER)
+
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": FASTMATH}
+
+
+class _Locator(UserProvidedCacheLocator):
+    """One folder for each module and state of the sources that it depends on."""
+
+    def __init__(self, py_func: Any, py_file: str) -> None:
+        super().__init__(py_func, py_file)
+        source = Path(py_file).resolve()
+        module = source.relative_to(PACKAGE).with_suffix("") if source.is_relative_to(PACKAGE) else Path(source.stem)
+        self._cache_path = str(CACHE_FOLDER / f"{'.'.join(module.parts)}-{stamp(source)}")
+
+    def ensure_cache_path(self) -> None:
+        super().ensure_cache_path()
+        os.utime(self._cache_path)
+
+    def get_source_stamp(self) -> str:
+        return stamp(Path(self._py_file).resolve())
+
+
+class _KernelCacheImpl(CompileResultCacheImpl):
+    _locator_classes = (_Locator,)
+
+
+class _OneFileEach(IndexDataCacheFile):
+    """Compiled code in a file named after its signature. Numba's index of numbered files loses what two processes
+    save at the same time, and can hand one signature the other's code."""
+
+    def _name(self, key: Any) -> str:
+        return self._data_name_pattern.format(number=int(hashlib.sha256(str(key).encode()).hexdigest()[:15], 16))
+
+    def flush(self) -> None:
+        for file in Path(self._cache_path).glob(self._data_name_pattern.replace("{number:d}", "*")):
+            file.unlink(missing_ok=True)
+
+    def save(self, key: Any, data: Any) -> None:
+        # Not kept is no error: the code runs all the same where the disk is full or somebody emptied the cache.
+        with contextlib.suppress(OSError):
+            Path(self._cache_path).mkdir(parents=True, exist_ok=True)
+            self._save_data(self._name(key), (key, data))
+
+    def load(self, key: Any) -> Any:
+        try:
+            saved, data = self._load_data(self._name(key))
+        except OSError:
+            return None
+        return data if saved == key else None
+
+
+class _KernelCache(FunctionCache):
+    _impl_class = _KernelCacheImpl
+
+    def __init__(self, py_func: Callable[..., Any]) -> None:
+        super().__init__(py_func)
+        impl = self._impl
+        self._cache_file = _OneFileEach(self._cache_path, impl.filename_base, impl.locator.get_source_stamp())
+
+
+def _cached(dispatcher: Any) -> Any:
+    if not numba.config.DISABLE_JIT:
+        dispatcher._cache = _KernelCache(dispatcher.py_func)
+    return dispatcher
+
+
+class _DeviceDispatcher(CPUDispatcher):
+    """Without a wrapper numba would jump to address 0."""
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        raise TypeError(f"{self.py_func.__name__} is a device function: call it from a kernel.")
+
+
+def device(function: Callable[..., Any]) -> Any:
+    """A function that kernels call. It has no wrapper for Python, which halves the time to compile; a call from Python
+    raises TypeError."""
+    dispatcher = _cached(njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function))
+    if not numba.config.DISABLE_JIT:
+        dispatcher.__class__ = _DeviceDispatcher
+    return dispatcher
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """A function whose statements take the place of a call to it, before types are known."""
+    return njit(inline="always", **_OPTIONS)(function)
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """An entry point that Python calls: serial, without the GIL, on one tile or batch."""
+    if numba.config.DISABLE_JIT:
+        return functools.wraps(function)(lambda *arguments: function(*map(_readable, arguments)))
+    return _cached(njit(**_OPTIONS)(function))
+
+
+def _readable(argument: Any) -> Any:
+    """An argument whose records have their fields as attributes, as they have in compiled code."""
+    if isinstance(argument, tuple):
+        fields = map(_readable, argument)
+        return type(argument)(*fields) if hasattr(argument, "_fields") else tuple(fields)
+    if isinstance(argument, np.ndarray) and argument.dtype.names:
+        return argument.view(np.recarray)
+    if isinstance(argument, np.void) and argument.dtype.names:
+        return argument.view(np.dtype((np.record, argument.dtype)))
+    return argument

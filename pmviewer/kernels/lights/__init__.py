@@ -1,0 +1,1 @@
+"""Lights: one interface (`light`), one file for each further kind."""

@@ -1,0 +1,1 @@
+"""Compiled passes over meshes and their files, for loaders."""

@@ -1,0 +1,97 @@
+"""Passes over all triangles of a mesh: which of them can be shown, what box they fill, what they use."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.compile.jit import device, kernel
+
+WHOLE, NOT_FINITE, FLAT = 0, 1, 2
+"""What is wrong with a triangle."""
+
+
+@device
+def _usable(vertices, i, largest):
+    # A comparison with a NaN fails.
+    return abs(vertices[i, 0]) <= largest and abs(vertices[i, 1]) <= largest and abs(vertices[i, 2]) <= largest
+
+
+@device
+def _rounded(x):
+    return np.float64(np.float32(x))
+
+
+@device
+def _edge(vertices, a, b):
+    """From vertex a to vertex b, both rounded to float32."""
+    return (
+        _rounded(vertices[b, 0]) - _rounded(vertices[a, 0]),
+        _rounded(vertices[b, 1]) - _rounded(vertices[a, 1]),
+        _rounded(vertices[b, 2]) - _rounded(vertices[a, 2]),
+    )
+
+
+@kernel
+def judge(vertices, faces, begin, end, largest, flattest, verdict):
+    """For the faces [begin, end): NOT_FINITE where a coordinate of vertices (V, 3) float64 is no number up to `largest`
+    in size, FLAT where the height of what float32 makes of the triangle is `flattest` of its longest edge or less.
+    Returns how many are not WHOLE."""
+    bad = 0
+    for f in range(begin, end):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        verdict[f] = WHOLE
+        if not (_usable(vertices, a, largest) and _usable(vertices, b, largest) and _usable(vertices, c, largest)):
+            verdict[f] = NOT_FINITE
+            bad += 1
+            continue
+        px, py, pz = _edge(vertices, a, b)
+        qx, qy, qz = _edge(vertices, a, c)
+        rx, ry, rz = qx - px, qy - py, qz - pz
+        longest = max(px * px + py * py + pz * pz, qx * qx + qy * qy + qz * qz, rx * rx + ry * ry + rz * rz)
+        nx, ny, nz = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
+        area = np.sqrt(nx * nx + ny * ny + nz * nz)
+        if not (area > flattest * longest and longest > 0):
+            verdict[f] = FLAT
+            bad += 1
+    return bad
+
+
+@kernel
+def number_used(faces, number):
+    """number (V,) int32 becomes 0, 1, 2 … for the vertices that faces use, in their own order, −1 for the others;
+    returns how many are used."""
+    number[:] = -1
+    for f in range(len(faces)):
+        for k in range(3):
+            number[faces[f, k]] = 0
+    used = np.int32(0)
+    for i in range(len(number)):
+        if number[i] == 0:
+            number[i] = used
+            used += 1
+    return used
+
+
+@kernel
+def bounds_of(vertices, faces, low, high):
+    """Lowest and highest corner (3,) of the box around the vertices that the faces use."""
+    low[:], high[:] = np.inf, -np.inf
+    for f in range(len(faces)):
+        for k in range(3):
+            i = faces[f, k]
+            for axis in range(3):
+                low[axis] = min(low[axis], vertices[i, axis])
+                high[axis] = max(high[axis], vertices[i, axis])
+
+
+@kernel
+def face_normals(vertices, faces, out):
+    """The unit normal of each face three times over, (F, 3, 3) float32; zero where the face has no area."""
+    for f in range(len(faces)):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        px, py, pz = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2]
+        qx, qy, qz = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2]
+        nx, ny, nz = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
+        length = max(np.sqrt(nx * nx + ny * ny + nz * nz), 1e-300)
+        for k in range(3):
+            out[f, k, 0], out[f, k, 1], out[f, k, 2] = nx / length, ny / length, nz / length

@@ -1,0 +1,1 @@
+"""Guided emission: strata of the lights, test photons, shares."""

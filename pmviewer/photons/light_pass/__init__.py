@@ -1,0 +1,1 @@
+"""The light pass: photons traced in batches, and what they leave behind."""

@@ -1,0 +1,1 @@
+"""Projection maps: where photons have to be emitted to meet certain surfaces."""

@@ -1,0 +1,300 @@
+"""Projection maps (T7): from which places and in which directions a light's photons can meet certain surfaces.
+
+The surfaces are covered by spheres. Conservative means: a ray that leaves the light and meets one of the spheres
+belongs to a cell that is on.
+
+- Directions. Let the light lie within the ball (a, r) and a sphere be (c, s), D = |c − a|. A ray from a point of the
+  light that meets the sphere passes, moved by at most r so that it starts in a, within r + s of c. So its direction is
+  at most α = asin((r + s)/D) off c − a, or anything when D ≤ r + s. A cell of polar angles θ₀ … θ₁ and azimuths of
+  width Δφ around its middle m lies within ρ = (θ₁ − θ₀)/2 + max(sin θ)·Δφ/2 of m: one way along the meridian and one
+  along the parallel. It is on when the angle between m and c − a is at most α + ρ.
+- Places on a disc: the same with distances in the plane.
+
+`SLACK` covers rounding and the gap by which photons start off a surface.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.kernels import scene as K
+from pmviewer.photons.projection.bounds import enclosing, spheres_of
+from pmviewer.photons.projection.projected import (
+    COLUMNS,
+    DIRECTIONS,
+    DISC,
+    PLACES,
+    PROJECTION_DTYPE,
+    ROWS,
+    WHOLE,
+    WORLD,
+)
+from pmviewer.scene.arrays.flatten import FlatScene
+from pmviewer.scene.description import LUMINANCE, DirectionalLight, Environment, PointLight, SpotLight
+from pmviewer.scene.emission import spot_solid_angle
+
+Float = NDArray[np.float64]
+SLACK = 1e-4
+"""Radians; also of the scene's size."""
+MODES = {WHOLE: "whole", DIRECTIONS: "directions", PLACES: "places", WORLD: "world directions", DISC: "disc"}
+WORTHWHILE = 0.7
+"""`auto` uses maps that cover less than this share of the power."""
+
+
+@dataclass(frozen=True)
+class ProjectionMap:
+    """One light's map, for overlays.
+
+    `on` (ROWS, COLUMNS) bool: rows are polar angles (or radii) with edges `edges` (ROWS + 1,) in radians (or scene
+    units), columns azimuths from 0 to 2π in the frame `axes` (3, 3), whose rows are the two axes across and the axis
+    θ = 0 (or the direction of light). `origin` is the light's middle, or the disc's. `share` is the covered share of
+    the light's power. Without cells (modes "whole" and "disc") all of `on` is True.
+    """
+
+    light: str
+    mode: str
+    on: NDArray[np.bool_]
+    edges: Float
+    axes: Float
+    origin: Float
+    share: float
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Maps of all lights for the trajectories that fill the global map (`surfaces`), and for the others (`caustic`).
+
+    `surface_power` and `caustic_power` are the luminances in watts that they cover; 0 when nothing can be met.
+    `records` is for kernels.
+    """
+
+    records: NDArray[np.void]
+    arrays: tuple[NDArray, ...]
+    surfaces: tuple[ProjectionMap, ...]
+    caustic: tuple[ProjectionMap, ...]
+    surface_power: float
+    caustic_power: float
+
+    @property
+    def maps(self) -> dict[str, tuple[ProjectionMap, ...]]:
+        """By what they show."""
+        return {"surfaces": self.surfaces, "caustic": self.caustic}
+
+    @property
+    def spares(self) -> bool:
+        """Whether any light's photons are confined."""
+        return any(m.mode != MODES[WHOLE] for m in self.surfaces + self.caustic)
+
+
+def projection_of(scene: FlatScene, always: bool = True, with_caustics: bool = True) -> Projection:
+    """Projection maps of the scene's lights. Unless `always`, those that spare little are replaced by none at all;
+    `with_caustics` says whether there are trajectories for the caustic map alone."""
+    records = np.zeros(2, PROJECTION_DTYPE)
+    arrays: list[NDArray] = []
+    made: list[tuple[tuple[ProjectionMap, ...], float]] = []
+    total = scene.total_luminance
+    for record, for_caustics in zip(records, (False, True), strict=True):
+        spheres = spheres_of(scene.owner, for_caustics)
+        if with_caustics or not for_caustics:
+            maps = [_map_of(scene, light, spheres) for light in range(len(scene.light_names))]
+        else:
+            maps = [_whole(scene, light) for light in range(len(scene.light_names))]
+        powers = scene.light_power @ LUMINANCE * [c for _, c in maps]
+        if not always and powers.sum() > WORTHWHILE * total:
+            maps = [_whole(scene, light) for light in range(len(maps))]
+            powers = scene.light_power @ LUMINANCE
+        cells = [np.flatnonzero(m.on) if m.mode in _CELLED else np.zeros(0, np.int64) for m, _ in maps]
+        mode_of = {name: mode for mode, name in MODES.items()}
+        tables = {
+            "cdf": np.concatenate([[0.0], np.cumsum(powers) / max(powers.sum(), 1e-300)]).astype(np.float32),
+            "modes": np.array([mode_of[m.mode] for m, _ in maps], np.int32),
+            "first": np.concatenate([[0], np.cumsum([len(c) for c in cells])]).astype(np.int32),
+            "cells": np.concatenate(cells).astype(np.int32),
+        }
+        for name, array in tables.items():
+            arrays.append(array)
+            record[name] = array.ctypes.data
+        if len(spheres):
+            center, radius = enclosing(spheres)
+            record["center_x"], record["center_y"], record["center_z"] = center
+            record["radius"] = radius + _slack(scene)
+        made.append((tuple(m for m, _ in maps), float(powers.sum())))
+    (surfaces, surface_power), (caustic, caustic_power) = made
+    return Projection(records, tuple(arrays), surfaces, caustic, surface_power, caustic_power)
+
+
+_CELLED = ("directions", "places", "world directions")
+
+
+def _slack(scene: FlatScene) -> float:
+    """Photons start a little off the surfaces, by a share of their coordinates."""
+    return SLACK * (scene.radius + float(np.abs(scene.center).max()))
+
+
+def _whole(scene: FlatScene, light: int) -> tuple[ProjectionMap, float]:
+    on = np.ones((ROWS, COLUMNS), np.bool_)
+    edges = np.linspace(0, math.pi, ROWS + 1)
+    return ProjectionMap(scene.light_names[light], MODES[WHOLE], on, edges, np.eye(3), scene.center, 1.0), 1.0
+
+
+def _map_of(scene: FlatScene, light: int, spheres: Float) -> tuple[ProjectionMap, float]:
+    """A light's map and c, its power's factor for candidates."""
+    name, kind = scene.light_names[light], int(scene.lights[light, K.L_KIND])
+    described = _described(scene, light)
+    if not len(spheres):
+        nothing = np.zeros((ROWS, COLUMNS), np.bool_)
+        empty = ProjectionMap(name, MODES[WORLD], nothing, np.zeros(ROWS + 1), np.eye(3), scene.center, 0.0)
+        return empty, 0.0
+    u = np.linspace(0, 1, ROWS + 1)
+    if isinstance(described, Environment):
+        center, radius = enclosing(spheres)
+        radius += _slack(scene)
+        if radius >= scene.radius:
+            return _whole(scene, light)
+        share = (radius / scene.radius) ** 2
+        on = np.ones((ROWS, COLUMNS), np.bool_)
+        return ProjectionMap(name, MODES[DISC], on, np.sqrt(u) * radius, np.eye(3), center, share), share
+    if isinstance(described, DirectionalLight):
+        axes = frame_of(np.array(described.direction))
+        edges = np.sqrt(u) * scene.radius
+        on = _places(spheres, scene.center, axes, edges, _slack(scene))
+        return _celled(scene, light, PLACES, on, edges, axes, scene.center, 1.0)
+    origin, reach, axis = _extent(scene, light)
+    reach += _slack(scene) if reach else 0.0
+    if kind in (K.PARALLELOGRAM, K.DISK):
+        edges = np.arcsin(np.sqrt(u))
+    elif isinstance(described, SpotLight):
+        edges = spot_edges(described, u)
+    else:
+        edges = np.arccos(1 - 2 * u)
+    mode = WORLD if kind in (K.SPHERE, K.CYLINDER, K.MESH) else DIRECTIONS
+    if mode == WORLD and _textured(scene, light):
+        return _whole(scene, light)
+    axes = frame_of(axis)
+    on = _directions(spheres, origin, reach, axes, edges)
+    return _celled(scene, light, mode, on, edges, axes, origin, 4.0 if mode == WORLD else 1.0)
+
+
+def _celled(
+    scene: FlatScene,
+    light: int,
+    mode: int,
+    on: NDArray[np.bool_],
+    edges: Float,
+    axes: Float,
+    origin: Float,
+    factor: float,
+) -> tuple[ProjectionMap, float]:
+    share = float(on.mean())
+    if factor * share >= 1:
+        return _whole(scene, light)
+    return ProjectionMap(scene.light_names[light], MODES[mode], on, edges, axes, origin, share), factor * share
+
+
+def _described(scene: FlatScene, light: int) -> object:
+    """The light's description when it has no surface; lights with one come first in the table."""
+    index = light - (len(scene.light_names) - len(scene.owner.lights))
+    return scene.owner.lights[index] if index >= 0 else None
+
+
+def _textured(scene: FlatScene, light: int) -> bool:
+    """Is it a shape whose places do not all emit alike?"""
+    lit = [s for s in scene.owner.shapes if s.radiance is not None and any(c > 0 for c in s.radiance)]
+    return light < len(lit) and lit[light].emission is not None
+
+
+def _extent(scene: FlatScene, light: int) -> tuple[Float, float, Float]:
+    """Middle and radius of a ball around the light, and the axis that its directions are counted from."""
+    described = _described(scene, light)
+    if isinstance(described, PointLight):
+        return np.array(described.position, float), 0.0, np.array([0.0, 0.0, 1.0])
+    if isinstance(described, SpotLight):
+        return np.array(described.position, float), 0.0, np.array(described.axis)
+    row = scene.lights[light].astype(float)
+    a, b, c = row[K.L_A : K.L_A + 3], row[K.L_B : K.L_B + 3], row[K.L_C : K.L_C + 3]
+    if row[K.L_KIND] == K.PARALLELOGRAM:
+        normal = np.cross(b, c)
+        reach = max(np.linalg.norm(b + c), np.linalg.norm(b - c)) / 2
+        return a + (b + c) / 2, float(reach), normal / np.linalg.norm(normal)
+    z = np.array([0.0, 0.0, 1.0])
+    if row[K.L_KIND] == K.DISK:
+        return a, float(row[K.L_RADIUS]), b
+    if row[K.L_KIND] == K.SPHERE:
+        return a, float(row[K.L_RADIUS]), z
+    if row[K.L_KIND] == K.CYLINDER:
+        half = row[K.L_LENGTH] / 2
+        return a + half * b, float(math.hypot(half, row[K.L_RADIUS])), z
+    first, count = int(row[K.L_FIRST]), int(row[K.L_COUNT])
+    points = scene.light_corners[first : first + count].reshape(-1, 3).astype(float)
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    return middle, float(np.linalg.norm(points - middle, axis=1).max()), z
+
+
+def frame_of(n: Float) -> Float:
+    """Rows: the two axes of `pmviewer.kernels.vector.basis`, and n."""
+    sign = math.copysign(1.0, np.float32(n[2]))
+    a = -1 / (sign + n[2])
+    b = n[0] * n[1] * a
+    return np.array([[1 + sign * n[0] ** 2 * a, sign * b, -sign * n[0]], [b, sign + n[1] ** 2 * a, -n[1]], n])
+
+
+def spot_edges(light: SpotLight, u: Float) -> Float:
+    """The angles below which these shares of a spot's power lie (the kernel's `spot_angle`), by bisection."""
+    cutoff, beam = math.radians(light.cutoff), math.radians(light.beam)
+    low, high = np.zeros_like(u), np.full_like(u, cutoff)
+    whole = spot_solid_angle(light) / (2 * math.pi)
+    for _ in range(60):
+        theta = (low + high) / 2
+        w = cutoff - theta
+        width = max(cutoff - beam, 1e-300)
+        outside = (w * np.cos(theta) + np.sin(theta) - math.sin(cutoff)) / width
+        below = np.where(theta <= beam, 2 * np.sin(theta / 2) ** 2, whole - outside)
+        low, high = np.where(below < u * whole, theta, low), np.where(below < u * whole, high, theta)
+    edges = (low + high) / 2
+    edges[0], edges[-1] = 0.0, cutoff
+    return edges
+
+
+def _azimuths() -> tuple[Float, Float]:
+    phi = (np.arange(COLUMNS) + 0.5) * (2 * math.pi / COLUMNS)
+    return np.cos(phi), np.sin(phi)
+
+
+def _directions(spheres: Float, origin: Float, reach: float, axes: Float, edges: Float) -> NDArray[np.bool_]:
+    """Cells (ROWS, COLUMNS) of directions that can lead from the ball (origin, reach) to a sphere."""
+    offset = (spheres[:, :3] - origin) @ axes.T
+    distance = np.linalg.norm(offset, axis=1)
+    wide = spheres[:, 3] + reach
+    if np.any(distance <= wide):
+        return np.ones((ROWS, COLUMNS), np.bool_)
+    alpha = np.arcsin(wide / distance)
+    middle, half = (edges[1:] + edges[:-1]) / 2, np.diff(edges) / 2
+    holds_equator = (edges[:-1] <= math.pi / 2) & (edges[1:] >= math.pi / 2)
+    widest = np.where(holds_equator, 1.0, np.maximum(np.sin(edges[:-1]), np.sin(edges[1:])))
+    rho = half + widest * (math.pi / COLUMNS) + SLACK
+    x, y = _azimuths()
+    on = np.zeros((ROWS, COLUMNS), np.bool_)
+    for row in range(ROWS):
+        r = math.sin(middle[row])
+        m = np.stack([r * x, r * y, np.full(COLUMNS, math.cos(middle[row]))], axis=1)
+        least = np.cos(np.minimum(alpha + rho[row], math.pi))
+        on[row] = np.any(m @ (offset / distance[:, None]).T >= least, axis=1)
+    return on
+
+
+def _places(spheres: Float, center: Float, axes: Float, edges: Float, slack: float) -> NDArray[np.bool_]:
+    """Cells of the disc across the last of `axes` from which parallel rays can meet a sphere."""
+    across = (spheres[:, :3] - center) @ axes[:2].T
+    middle = (edges[1:] + edges[:-1]) / 2
+    rho = np.diff(edges) / 2 + edges[1:] * (math.pi / COLUMNS) + slack
+    x, y = _azimuths()
+    on = np.zeros((ROWS, COLUMNS), np.bool_)
+    for row in range(ROWS):
+        m = middle[row] * np.stack([x, y], axis=1)
+        gap = np.linalg.norm(m[:, None] - across[None], axis=2)
+        on[row] = np.any(gap <= spheres[:, 3] + rho[row], axis=1)
+    return on

@@ -1,0 +1,1 @@
+"""Direct light: which lights are sampled, and which shadow rays are spared."""

@@ -1,0 +1,96 @@
+"""Direct light on a surface: light samples, and the other half of multiple importance sampling (R2).
+
+Which lights are sampled, and how often, is `pmviewer.render.direct.choice`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.accel.raycast import occluded
+from pmviewer.kernels.bsdf.scattering import bsdf_f, bsdf_pdf, compressed, same_side, shading_normal
+from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.lights.light import emitted, environment_radiance, one_light_pdf, sample_one_light
+from pmviewer.kernels.random import draw4
+from pmviewer.kernels.scene import light_of
+from pmviewer.kernels.surface import leave
+from pmviewer.kernels.vector import add, dot, mul, scale, sub
+from pmviewer.render.chain import BLACK
+from pmviewer.render.direct.choice import chosen_light, expected_samples
+from pmviewer.render.direct.shadow import LIT, UNKNOWN, known_visibility
+
+_f4 = np.float32
+_u4 = np.uint32
+EXTRA_SET = np.int64(1000)
+"""Dimension set of the second light sample; further ones follow."""
+BEFORE_LIGHT = _f4(1.0 - 2.0**-13)
+"""Shadow rays end a little before the light's own surface."""
+
+
+@device
+def power_heuristic(n_this, pdf_this, n_other, pdf_other):
+    """Weight of a sample of one technique among two, β = 2 (Veach 1997)."""
+    a, b = n_this * pdf_this, n_other * pdf_other
+    return a * a / (a * a + b * b)
+
+
+@device
+def visible(scene, p, ng, gap, wi, end):
+    """Whether nothing stands between the surface point p and the point `end`, seen from p in direction wi."""
+    o = leave(p, ng, gap, wi[0], wi[1], wi[2])
+    d = sub(end, o)
+    return not occluded(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), BEFORE_LIGHT)
+
+
+@device
+def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, u_pick, u, v):
+    """Radiance towards wo from the light samples of the choice, reflected by a group of the BSDF's lobes.
+
+    Each is weighted against n_bsdf BSDF samples of the group (0: no MIS). (u_pick, u, v) are the first sample's
+    numbers; the sampler draws further ones. `shadows` is for `known_visibility`. Returns L, the shadow
+    rays cast and those that shadow photons saved.
+    """
+    p, ng, gap, b, wo = si.p, si.ng, si.gap, si.bsdf, si.wo
+    total = BLACK
+    rays, saved = 0, 0
+    for s in range(choice[4]):
+        if s > 0:
+            u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, EXTRA_SET + s)
+        light, m = chosen_light(scene, choice, s, u_pick)
+        wi, end, L, pdf, findable = sample_one_light(scene, light, p, u, v)
+        if not m * pdf > _f4(0.0) or same_side(b, group, ng, wo, wi) == 0:
+            continue
+        f = compressed(b, wo, wi, bsdf_f(b, group, wo, wi))
+        cos = abs(dot(wi, shading_normal(b)))
+        if f[0] + f[1] + f[2] > _f4(0.0) and cos > _f4(0.0):
+            known = known_visibility(shadows, p, ng, light)
+            if known == UNKNOWN:
+                rays += 1
+            else:
+                saved += 1
+            if known == LIT or (known == UNKNOWN and visible(scene, p, ng, gap, wi, end)):
+                weight = cos / (m * pdf)
+                if findable and n_bsdf > 0:
+                    weight *= power_heuristic(m, pdf, _f4(n_bsdf), bsdf_pdf(b, group, wo, wi))
+                total = add(total, scale(mul(f, L), weight))
+    return total, rays, saved
+
+
+@device
+def found_light(scene, p, wi, pdf_bsdf, n_bsdf, choice, biased, prim, q, nq):
+    """A BSDF sample from p in direction wi found primitive `prim` at q with geometric normal nq (prim < 0: nothing).
+
+    Its emission (radiance), weighted against the light samples of the choice, where `pdf_bsdf` is the density of the
+    BSDF sample; a biased choice leaves the lights that it does not sample out of both halves.
+    """
+    light = scene.environment if prim < 0 else light_of(scene, prim)
+    if light < 0:
+        return BLACK
+    L = environment_radiance(scene, wi) if prim < 0 else emitted(scene, light, prim, q, nq, wi)
+    if not L[0] + L[1] + L[2] > _f4(0.0):
+        return BLACK
+    m = expected_samples(scene, choice, light)
+    if biased != 0 and not m > _f4(0.0):
+        return BLACK
+    pdf = one_light_pdf(scene, light, p, q, nq, wi)
+    return scale(L, power_heuristic(_f4(n_bsdf), pdf_bsdf, m, pdf))

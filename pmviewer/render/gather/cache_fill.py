@@ -1,0 +1,159 @@
+"""Making records of the irradiance cache: where pixels find none, a stratified hemisphere of gather rays (R6).
+
+A candidate is a pixel. The eye pass's own sample of it is followed to the surfaces with Lambertian lobes that it meets,
+through mirrors and glass as well, and at the first one where the cache says too little a record is made. A record is a
+pure function of pixel, pass and the cache as it was given, so that it does not matter which thread makes it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pmviewer.kernels.accel.raycast import closest_hit
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian, shading_normal
+from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.random import draw4, hash3
+from pmviewer.kernels.surface import leave
+from pmviewer.kernels.vector import dot, largest, luminance
+from pmviewer.maps.hemisphere import cell_direction, irradiance_and_gradients
+from pmviewer.maps.irradiance_cache import (
+    FOOTPRINT,
+    HARMONIC,
+    IRRADIANCE,
+    LEVEL,
+    REACH,
+    ROTATION,
+    TRANSLATION,
+    interpolate,
+    reach_of,
+)
+from pmviewer.render.cast import cast
+from pmviewer.render.chain import arrive, follow_camera_path
+from pmviewer.render.eye import PIXEL_SET, camera_ray, pixel_seed
+from pmviewer.render.gather.gather import gather_light
+from pmviewer.render.given import opened
+from pmviewer.render.record import C_DROPPED, C_RAYS
+
+_f4 = np.float32
+_f8 = np.float64
+_u4 = np.uint32
+_INF = _f4(np.inf)
+HEMISPHERE_SET = np.int64(5000)
+ENOUGH = _f4(0.25)
+"""Sum of weights from which a point needs no record of its own: one of error 0.8, say. Less than that would do for the
+eye pass; the overlap hides the rims."""
+NO_HIT = (False, (_f4(0.0),) * 3, (_f4(0.0),) * 3, (_f4(0.0),) * 3, _f4(0.0), _f4(0.0))
+
+
+@device
+def uncovered_hit(given, pixel, counts):
+    """The first Lambertian surface on the pixel's chain where the cache says too little.
+
+    Returns whether there is one, the point, its geometric and shading normal on the side of the eye, its gap and the
+    size of a pixel there.
+    """
+    scene, eye, cache = given.scene, given.eye, given.cache
+    seed = pixel_seed(eye, pixel)
+    ux, uy, _, _ = draw4(eye.sequence, seed, eye.index, PIXEL_SET)
+    o, d, near, far = camera_ray(eye, pixel, ux, uy)
+    beta = (_f4(1.0), _f4(1.0), _f4(1.0))
+    travelled = _f4(0.0)
+    for depth in range(eye.max_depth + 1):
+        t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], near, far)
+        counts[C_RAYS] += 1
+        if prim < 0:
+            break
+        travelled += t
+        _, si, beta = arrive(scene, eye, o, d, t, prim, u, v, beta)
+        if si.bsdf.groups & STORED != 0 and is_lambertian(si.bsdf):
+            n = shading_normal(si.bsdf)
+            _, weight = interpolate(cache, si.p, n)
+            if weight < ENOUGH:
+                return True, si.p, si.ng, n, si.gap, cache.pixel_size + travelled * cache.pixel_angle
+        if si.bsdf.groups & FOLLOWED == 0 or depth == eye.max_depth:
+            break
+        d, beta, _ = follow_camera_path(given, si, beta, seed, depth)
+        if not largest(beta) > _f4(0.0):
+            break
+        o = leave(si.p, si.ng, si.gap, d[0], d[1], d[2])
+        near, far = _f4(0.0), _INF
+    return NO_HIT
+
+
+@device
+def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
+    """Fill `cells` (see `irradiance_and_gradients`) with what gather rays from p bring back."""
+    eye, cache = given.eye, given.cache
+    for k in range(cache.sectors):
+        for j in range(cache.rings):
+            here = j + cache.rings * k
+            u, v, _, _ = draw4(eye.sequence, seed, _u4(here), HEMISPHERE_SET)
+            wi = cell_direction(n, cache.rings, cache.sectors, j, k, u, v)
+            cos = dot(wi, n)
+            cells[here, 0] = cells[here, 1] = cells[here, 2] = _f4(0.0)
+            cells[here, 3], cells[here, 4] = _INF, _f4(1.0) - cos * cos
+            if dot(wi, ng) <= _f4(0.0):
+                continue
+            counts[C_RAYS] += 1
+            hit = cast(given.scene, p, ng, gap, wi)
+            if hit[0] >= 0:
+                cells[here, 3] = hit[7]
+                cells[here, 0], cells[here, 1], cells[here, 2] = gather_light(given, hit, wi, seed, _u4(here), counts)
+
+
+@kernel
+def fill_records(given, pixels, rows, made, counts, first, last):
+    """Make the records of candidates first … last−1 that lack them, and tell in `made` which.
+
+    given: as for the eye pass, with the cache so far; pixels: int32 (n,); rows: float32 (n, ROW); made: bool (n,);
+    counts: int64 (N_COUNTS,).
+    """
+    given = opened(given)
+    eye, cache = given.eye, given.cache
+    cells = np.empty((cache.rings * cache.sectors, 5), np.float32)
+    E, rotation, translation = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    for i in range(first, last):
+        pixel = pixels[i]
+        found, p, ng, n, gap, footprint = uncovered_hit(given, pixel, counts)
+        made[i] = found
+        if not found:
+            continue
+        seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(0xCAC4E))
+        gather_hemisphere(given, p, ng, n, gap, seed, cells, counts)
+        harmonic = irradiance_and_gradients(cells, cache.rings, cache.sectors, n, E, rotation, translation)
+        if not (E[0] + E[1] + E[2] < _f8(np.inf) and harmonic > _f8(0.0)):
+            counts[C_DROPPED] += 1
+            made[i] = False
+            continue
+        harmonic = limit_gradient(cache, harmonic, footprint, E, translation)
+        row = rows[i]
+        row[:] = _f4(0.0)
+        for axis in range(3):
+            row[axis], row[3 + axis] = p[axis], n[axis]
+            row[IRRADIANCE + axis] = E[axis]
+            for c in range(3):
+                row[ROTATION + 3 * c + axis] = rotation[c, axis]
+                row[TRANSLATION + 3 * c + axis] = translation[c, axis]
+        row[HARMONIC], row[FOOTPRINT], row[LEVEL] = harmonic, footprint, _f4(0.0)
+        row[REACH] = reach_of(row[HARMONIC], footprint, cache.error, cache.least, cache.most)
+
+
+@device
+def limit_gradient(cache, harmonic, footprint, E, translation):
+    """The harmonic distance R, lowered to that over which the translational gradient uses the irradiance up; where that
+    is below the least reach, the gradient is lowered instead, in place (Křivánek and others 2005)."""
+    squared = _f8(0.0)
+    for axis in range(3):
+        slope = luminance((translation[0, axis], translation[1, axis], translation[2, axis]))
+        squared += slope * slope
+    steep = math.sqrt(squared)
+    if steep > _f8(0.0):
+        harmonic = min(harmonic, luminance((E[0], E[1], E[2])) / steep)
+    least = _f8(cache.least) * _f8(footprint) / _f8(cache.error)
+    if harmonic < least:
+        for c in range(3):
+            for axis in range(3):
+                translation[c, axis] *= harmonic / least
+    return harmonic

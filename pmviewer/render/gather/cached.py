@@ -1,0 +1,68 @@
+"""The final gather where there is an irradiance cache: interpolated where records say enough, else cast (R6).
+
+Only irradiance of Lambertian lobes is cached, and only indirect light; direct light is sampled everywhere. Kernels are
+compiled for the cache or, given NO_CACHE, for the gather alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.bsdf.plain import INV_PI
+from pmviewer.kernels.bsdf.scattering import STORED, bsdf_sample, is_lambertian, shading_normal
+from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.vector import dot, largest, mul, scale
+from pmviewer.maps.irradiance_cache import interpolate
+from pmviewer.render.cast import cast
+from pmviewer.render.chain import BLACK
+from pmviewer.render.direct.direct import found_light
+from pmviewer.render.gather.gather import gather_rays
+from pmviewer.render.record import C_CACHED, C_GATHERED, C_RAYS
+
+_f4 = np.float32
+
+
+@specialised
+def cached(given, si, counts):
+    """(irradiance, gather rays that are still to be cast) at a surface: all rays where there is no cache."""
+    if has(part(given, "cache"), "none"):
+        return lambda given, si, counts: (BLACK, given.eye.gather_rays)
+
+    def from_records(given, si, counts):
+        if is_lambertian(si.bsdf):
+            E, weight = interpolate(given.cache, si.p, shading_normal(si.bsdf))
+            if weight > _f4(0.0):
+                counts[C_CACHED] += 1
+                return E, np.int32(0)
+        counts[C_GATHERED] += 1
+        return BLACK, given.eye.gather_rays
+
+    return from_records
+
+
+@specialised
+def surface_rays(given, known, gather, si, beta, choice, aimed, n, numbers, seed, counts):
+    """`pmviewer.render.gather.gather.gather_rays` where `gather` rays are to be cast, else direct light by n rays and
+    indirect light from the irradiance `known`. Both are sums over n rays."""
+    if has(part(given, "cache"), "none"):
+
+        def plain(given, known, gather, si, beta, choice, aimed, n, numbers, seed, counts):
+            return gather_rays(given, si, beta, choice, aimed, n, numbers, seed, counts)
+
+        return plain
+
+    def with_cache(given, known, gather, si, beta, choice, aimed, n, numbers, seed, counts):
+        if gather > 0:
+            return gather_rays(given, si, beta, choice, aimed, n, numbers, seed, counts)
+        scene, eye = given.scene, given.eye
+        direct = BLACK
+        if eye.direct != 0 and eye.mis != 0:
+            wi, weight, pdf, _ = bsdf_sample(scene, si.bsdf, STORED, si.wo, numbers[0], numbers[1], numbers[2])
+            if dot(wi, si.ng) > _f4(0.0) and largest(weight) > _f4(0.0):
+                counts[C_RAYS] += 1
+                hit = cast(scene, si.p, si.ng, si.gap, wi)
+                L = found_light(scene, si.p, wi, pdf, n, choice, eye.biased, hit[0], hit[3], hit[4])
+                direct = mul(weight, L)
+        return direct, scale(mul(si.bsdf.albedo, known), INV_PI)
+
+    return with_cache

@@ -1,0 +1,1 @@
+"""From descriptions to the arrays and records that kernels read."""

@@ -1,0 +1,155 @@
+"""The light table: rows, powers and distributions of all lights, as kernels read them (`pmviewer.kernels.scene`)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.errors import SceneError
+from pmviewer.kernels import scene as K
+from pmviewer.scene.arrays.sky_table import sky_table
+from pmviewer.scene.description import (
+    LUMINANCE,
+    ConstantEnvironment,
+    Cylinder,
+    DirectionalLight,
+    Disk,
+    Environment,
+    ImageEnvironment,
+    Light,
+    Mesh,
+    Parallelogram,
+    PointLight,
+    Scene,
+    Sphere,
+    SpotLight,
+)
+from pmviewer.scene.emission import emitted_power
+
+Float = NDArray[np.float32]
+BRIGHTEST = 1e32
+"""Radiance or intensity, a factor of a million from the end of float32: squares of small distances divide it."""
+
+
+class LightTable:
+    """Emitting shapes in order, then the scene's other lights.
+
+    `more` tells whether there are lights of the kinds that need LIGHT_FIELDS, `sky` is the image environment.
+    """
+
+    def __init__(self, scene: Scene, vertices: Float, shape_of_prim: NDArray[np.integer], radius: float) -> None:
+        self.of_shape = np.full(len(scene.shapes), -1, np.int64)
+        self.environment = -1
+        rows: list[list[float]] = []
+        powers: list[NDArray[np.float64]] = []
+        names: list[str] = []
+        triangles: list[NDArray[np.int64]] = [np.zeros(0, np.int64)]
+        cdfs: list[NDArray[np.float64]] = [np.zeros(0)]
+        listed = 0
+        shape_of_triangle = shape_of_prim[: len(vertices)]  # in ascending order
+        for index, shape in enumerate(scene.shapes):
+            if shape.radiance is None or not any(c > 0 for c in shape.radiance):
+                continue
+            row = [0.0] * K.LIGHT_COLUMNS
+            row[K.L_RADIANCE : K.L_RADIANCE + 3] = shape.radiance
+            if isinstance(shape.geometry, Mesh):
+                own = np.arange(*np.searchsorted(shape_of_triangle, (index, index + 1)))
+                corners = vertices[own].astype(float)
+                cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+                areas = np.linalg.norm(cross, axis=1) / 2
+                area = float(areas.sum())
+                row[K.L_KIND], row[K.L_FIRST], row[K.L_COUNT] = K.MESH, listed, len(own)
+                triangles.append(own)
+                cdfs.append(np.cumsum(areas) / area)
+                listed += len(own)
+            else:
+                area = _fill_shape(row, shape.geometry)
+            row[K.L_AREA] = area
+            self.of_shape[index] = len(rows)
+            rows.append(row)
+            powers.append(math.pi * area * np.array(shape.radiance))
+            names.append(shape.name)
+        self.sky: ImageEnvironment | None = None
+        self.more = False
+        for light in scene.lights:
+            if isinstance(light, Environment):
+                self.environment = len(rows)
+            if isinstance(light, ImageEnvironment):
+                self.sky, self._sky_table = light, sky_table(light.pixels)
+            self.more = self.more or isinstance(light, SpotLight | DirectionalLight | ImageEnvironment)
+            rows.append(self._row(light))
+            powers.append(emitted_power(light, radius))
+            names.append(light.name)
+        if not rows or not any(p.max() > 0 for p in powers):
+            raise SceneError("The scene has no light.", scene.path, hint="Add an emitter, or open it with one.")
+        for name, row in zip(names, rows, strict=True):
+            brightest = max(row[K.L_RADIANCE : K.L_RADIANCE + 3])
+            if not brightest < BRIGHTEST:
+                what = f"The light '{name}' is too bright: {brightest:g}, where {BRIGHTEST:g} is the most."
+                raise SceneError(what, scene.path, hint="Scale all lights down alike.")
+        self.rows = np.array(rows, np.float32)
+        self.power = np.array(powers)
+        self.names = tuple(names)
+        share = np.cumsum(self.power @ LUMINANCE)
+        self.cdf = np.concatenate([[0.0], share / share[-1]]).astype(np.float32)
+        self.triangles = np.concatenate(triangles).astype(np.int32)
+        self.triangle_cdf = np.concatenate(cdfs).astype(np.float32)
+
+    def sky_arrays(self) -> dict[str, NDArray]:
+        """The image environment's arrays by the record's field; none without one."""
+        if self.sky is None:
+            return {}
+        return {"sky_texels": self.sky.pixels, "sky_rows": self._sky_table.rows, "sky_cells": self._sky_table.cells}
+
+    def _row(self, light: Light) -> list[float]:
+        """Row of a light without a surface."""
+        row = [0.0] * K.LIGHT_COLUMNS
+        colour, a, b = slice(K.L_RADIANCE, K.L_RADIANCE + 3), slice(K.L_A, K.L_A + 3), slice(K.L_B, K.L_B + 3)
+        if isinstance(light, PointLight):
+            row[K.L_KIND], row[colour], row[a] = K.POINT, light.intensity, light.position
+        elif isinstance(light, SpotLight):
+            row[K.L_KIND], row[colour], row[a], row[b] = K.SPOT, light.intensity, light.position, light.axis
+            row[K.L_CUTOFF], row[K.L_BEAM] = math.radians(light.cutoff), math.radians(light.beam)
+        elif isinstance(light, DirectionalLight):
+            row[K.L_KIND], row[colour], row[b] = K.DIRECTIONAL, light.irradiance, light.direction
+        elif isinstance(light, ConstantEnvironment):
+            row[K.L_KIND], row[colour] = K.ENVIRONMENT, light.radiance
+        else:
+            row[K.L_KIND], row[K.L_AREA] = K.IMAGE, 1 / self._sky_table.total
+            row[K.L_A : K.L_A + 9] = light.to_world.T.ravel().tolist()
+        return row
+
+
+def _fill_shape(row: list[float], g: object) -> float:
+    """Write an analytic light's geometry into its row; its area."""
+    if isinstance(g, Parallelogram):
+        row[K.L_KIND] = K.PARALLELOGRAM
+        row[K.L_A : K.L_A + 3], row[K.L_B : K.L_B + 3], row[K.L_C : K.L_C + 3] = g.corner, g.edge_u, g.edge_v
+        return float(np.linalg.norm(np.cross(g.edge_u, g.edge_v)))
+    if isinstance(g, Disk):
+        row[K.L_KIND], row[K.L_RADIUS] = K.DISK, g.radius
+        row[K.L_A : K.L_A + 3], row[K.L_B : K.L_B + 3] = g.center, g.normal
+        return math.pi * g.radius**2
+    if isinstance(g, Sphere):
+        row[K.L_KIND], row[K.L_RADIUS], row[K.L_FLIP] = K.SPHERE, g.radius, side_of(g)
+        row[K.L_A : K.L_A + 3] = g.center
+        return 4 * math.pi * g.radius**2
+    assert isinstance(g, Cylinder)
+    axis, length = axis_of(g)
+    row[K.L_KIND], row[K.L_RADIUS], row[K.L_FLIP], row[K.L_LENGTH] = K.CYLINDER, g.radius, side_of(g), length
+    row[K.L_A : K.L_A + 3], row[K.L_B : K.L_B + 3] = g.p0, axis
+    return 2 * math.pi * g.radius * length
+
+
+def side_of(g: Sphere | Cylinder) -> float:
+    """1, or −1 when the normals are flipped."""
+    return -1.0 if g.flip_normals else 1.0
+
+
+def axis_of(g: Cylinder) -> tuple[NDArray[np.float64], float]:
+    """Unit vector from `p0` to `p1`, and their distance."""
+    offset = np.subtract(g.p1, g.p0)
+    length = float(np.linalg.norm(offset))
+    return offset / length, length

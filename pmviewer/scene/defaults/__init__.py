@@ -1,0 +1,1 @@
+"""What a file leaves out: cameras, light, exposure's first guess."""

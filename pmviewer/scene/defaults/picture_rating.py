@@ -1,0 +1,67 @@
+"""How much there is to see in a camera's picture: see `pmviewer.scene.defaults.viewpoint`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.scene.defaults.proxy import Proxy
+from pmviewer.scene.description import Camera
+
+Float = NDArray[np.float64]
+SIDE = 32
+"""A candidate's picture has so many rays either way."""
+_BACK = 0.5
+"""What the back of a surface counts."""
+
+
+@dataclass(frozen=True)
+class Rated:
+    """A camera and what its picture is worth."""
+
+    camera: Camera
+    rating: float
+    front: float
+    """Share of the surfaces in the picture that show their front."""
+    cover: float
+    """Share of the picture with a surface in it."""
+
+
+def picture_rays(camera: Camera, side: int = SIDE) -> Float:
+    """Unit directions (side², 3) through the middles of a square picture's pixels."""
+    forward = np.subtract(camera.target, camera.origin, dtype=np.float64)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, camera.up)
+    right /= np.linalg.norm(right)
+    top = np.cross(right, forward)
+    at = ((np.arange(side) + 0.5) / side * 2 - 1) * math.tan(math.radians(camera.fov) / 2)
+    x, y = np.meshgrid(at, -at)
+    rays = forward + x.reshape(-1, 1) * right + y.reshape(-1, 1) * top
+    return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+
+def rated_pictures(proxy: Proxy, cameras: list[Camera], close: float, *, inside: bool) -> list[Rated]:
+    """How much there is to see in each camera's picture; see the module. What is nearer than `close` is in the way."""
+    rays = np.concatenate([picture_rays(camera) for camera in cameras])
+    eyes = np.repeat(np.array([camera.origin for camera in cameras]), SIDE * SIDE, axis=0)
+    hits = proxy.closest(eyes, rays)
+    found = []
+    for i, camera in enumerate(cameras):
+        here = slice(i * SIDE * SIDE, (i + 1) * SIDE * SIDE)
+        met = hits.met[here]
+        if not met.any():
+            found.append(Rated(camera, 0.0, 0.0, 0.0))
+            continue
+        _, number = np.unique(hits.triangle[here][met], return_counts=True)
+        share = number / met.sum()
+        entropy = -float((share * np.log(share)).sum()) + 1.0
+        front = float(hits.front[here][met].mean())
+        cover = float(met.mean())
+        near = float((hits.distance[here][met] < close).mean())
+        filled = min(1.0, cover / 0.6) if inside else min(1.0, 0.1 + cover / 0.4)
+        rating = entropy * (_BACK + (1 - _BACK) * front) * filled * (1 - near) ** 2
+        found.append(Rated(camera, rating, front, cover))
+    return found

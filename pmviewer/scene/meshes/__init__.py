@@ -1,0 +1,1 @@
+"""Meshes as arrays before kernels see them: displacement, smoothing, bounds, places."""

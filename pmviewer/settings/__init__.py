@@ -1,0 +1,1 @@
+"""Every setting: the schema, and access to it by name."""

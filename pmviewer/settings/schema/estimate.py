@@ -1,0 +1,145 @@
+"""Settings of the density estimate."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pmviewer.settings.schema.base import Auto, Group, setting
+
+
+class Estimate(Group):
+    """Density estimate"""
+
+    radius: float | Auto = setting(
+        "auto",
+        "Look-up radius of the first pass, relative to the scene's bounding-sphere radius. Automatic: a few pixel "
+        "footprints at the typical distance of what the camera sees.",
+        stage="maps",
+        scale="log",
+        unit="× scene",
+        ge=1e-7,
+        le=10.0,
+    )
+    caustic_radius: float = setting(
+        0.5,
+        "Radius of caustic look-ups relative to that of global ones: caustics are sharper and their map is denser.",
+        stage="maps",
+        scale="log",
+        unit="× radius",
+        ge=0.05,
+        le=2.0,
+    )
+    radius_rule: Literal["pass", "pixel"] = setting(
+        "pass",
+        "One radius for all look-ups of a pass, or each pixel's own at the surfaces that it sees, shrunk by the "
+        "photons found there (Hachisuka and others 2008): not at all in the dark. Gather rays keep that of the pass.",
+        stage="image",
+        scale="choice",
+        title="radius by",
+    )
+    alpha: float = setting(
+        2.0 / 3.0,
+        "How fast look-ups shrink from pass to pass, r²ᵢ₊₁ = r²ᵢ·(i+α)/(i+1); with look-up 'nearest' it is k that "
+        "shrinks like r². 1 keeps them (and their bias).",
+        stage="maps",
+        scale="linear",
+        ge=0.0,
+        le=1.0,
+    )
+    floor: float = setting(
+        1e-5,
+        "No pass uses a smaller radius than this, relative to the scene's bounding-sphere radius.",
+        stage="maps",
+        scale="log",
+        unit="× scene",
+        ge=1e-7,
+        le=0.1,
+    )
+    lookup: Literal["radius", "nearest"] = setting(
+        "radius",
+        "Photons within the radius of the pass, or the k nearest ones (up to the maximum radius).",
+        section="Look-up",
+        stage="maps",
+        scale="choice",
+    )
+    k: int = setting(
+        50,
+        "Photons in a k-nearest estimate of the first pass; later ones take fewer, see alpha.",
+        stage="maps",
+        scale="log",
+        unit="photons",
+        ge=1,
+        le=1000,
+    )
+    rim: Literal["left out", "half", "whole"] = setting(
+        "left out",
+        "How the k-th photon, which sets the radius, counts: leaving it out is exact for independently scattered "
+        "photons, half suits stratified ones, whole is too bright.",
+        stage="image",
+        scale="choice",
+    )
+    max_radius: float | Auto = setting(
+        "auto",
+        "Largest radius of a k-nearest search, relative to the scene; it shrinks with k from pass to pass. Automatic: "
+        "where k of the brightest photons would still be darker than the black level (course guide §5.2).",
+        stage="maps",
+        scale="log",
+        unit="× scene",
+        ge=1e-7,
+        le=10.0,
+    )
+    black_level: float = setting(
+        0.05,
+        "Radiance below which the automatic maximum radius may lose detail.",
+        stage="maps",
+        scale="log",
+        unit="W/(m² sr)",
+        ge=1e-6,
+        le=10.0,
+    )
+    filter: Literal["constant", "cone", "gaussian", "simpson", "epanechnikov"] = setting(
+        "constant",
+        "Kernel that weighs photons by their distance.",
+        section="Kernel and area",
+        stage="image",
+        scale="choice",
+    )
+    cone_k: float = setting(
+        1.1, "Slope of the cone filter: its weight is 1 − d/(k·r).", stage="image", scale="linear", ge=1.0, le=10.0
+    )
+    flatness: float = setting(
+        0.2,
+        "Half-thickness of the search disc relative to the radius: photons further off the tangent plane are another "
+        "surface's. 1 searches a sphere.",
+        stage="image",
+        scale="linear",
+        unit="× radius",
+        ge=0.01,
+        le=1.0,
+    )
+    area: Literal["disc", "convex hull"] = setting(
+        "disc",
+        "Area that the photons' power is divided by. disc: of the look-up disc, too large over the edge of a surface, "
+        "which comes out dark. convex hull: what the photons span, right at edges and in corners.",
+        stage="image",
+        scale="choice",
+    )
+    boundary: float = setting(
+        0.0,
+        "Share of the power of photons on the convex hull's boundary that counts: 0 is exact for independently "
+        "scattered photons, 0.2 suits stratified ones (course guide §5.5.4).",
+        stage="image",
+        scale="linear",
+        ge=0.0,
+        le=1.0,
+        title="boundary share",
+    )
+    differential: bool = setting(
+        False,
+        "Differential checking: a disc that would get darker and darker (or brighter) as it grows stops growing, and "
+        "one over an edge has the area that its photons span. Edges of surfaces aren't dark; those of caustics stay "
+        "sharp and get noisier.",
+        stage="image",
+        scale="switch",
+        title="differential checking",
+    )

@@ -1,0 +1,91 @@
+"""Settings of the light pass."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pmviewer.settings.schema.base import Group, setting
+
+
+class Photons(Group):
+    """Light pass"""
+
+    N: int = setting(
+        150_000,
+        "Photon trajectories emitted in each pass.",
+        stage="photons",
+        scale="log",
+        unit="photons",
+        ge=1,
+        le=50_000_000,
+    )
+    q: float = setting(
+        1.0,
+        "Share of the trajectories that fill the global map; the caustic map gets all of them (Keller and Wald §2.4).",
+        stage="photons",
+        scale="log",
+        ge=0.001,
+        le=1.0,
+    )
+    q_rule: Literal["trajectories", "photons"] = setting(
+        "trajectories",
+        "How q thins the global map: only the first q·N trajectories fill it, or every trajectory's photon is stored "
+        "with probability q and power divided by q.",
+        stage="photons",
+        scale="choice",
+        title="q rule",
+    )
+    indirect_caustics: bool = setting(
+        True,
+        "Photons last scattered by a specular surface go to the caustic map even after a diffuse bounce "
+        "(Keller and Wald §2.3). Off: they belong to the global map alone.",
+        stage="photons",
+        scale="switch",
+    )
+    renew: Literal["each pass", "once"] = setting(
+        "each pass",
+        "New photons for each pass, with a radius that shrinks: the image converges to the right one. Or one photon "
+        "map for all passes, at the first radius: the classical method, whose image converges to what that map says.",
+        stage="photons",
+        scale="choice",
+        title="new photons",
+    )
+    glossy: float = setting(
+        0.2,
+        "Roughness from which glossy reflection stores photons and is looked up in the maps. Smoother lobes are "
+        "followed ray by ray, as mirrors are.",
+        stage="photons",
+        scale="linear",
+        ge=0.0,
+        le=1.0,
+        title="glossy from",
+    )
+    sequence: Literal["sobol", "independent"] = setting(
+        "sobol",
+        "Random numbers of the photons: Owen-scrambled Sobol points, or independent ones.",
+        stage="photons",
+        scale="choice",
+    )
+    projection: Literal["auto", "on", "off"] = setting(
+        "auto",
+        "Projection maps: photons start only where they can meet a surface, and those for the caustic map alone (q "
+        "below 1) only where they can meet mirrors or glass. auto: where that spares at least a third of them.",
+        stage="photons",
+        scale="choice",
+        title="projection maps",
+    )
+    roulette: Literal["luminance", "channel maximum", "equal"] = setting(
+        "luminance",
+        "Chance of surviving a scattering: by the ratio of the power's luminance or of its largest channel after and "
+        "before, or by rejection sampling, so that all photons have exactly the same luminance.",
+        stage="photons",
+        scale="choice",
+    )
+    max_bounces: int = setting(
+        64,
+        "Scatterings after which a photon is dropped; Russian roulette ends nearly all of them earlier.",
+        stage="photons",
+        scale="integer",
+        ge=1,
+        le=1000,
+    )

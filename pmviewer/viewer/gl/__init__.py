@@ -1,0 +1,1 @@
+"""OpenGL objects that several parts of the window use."""

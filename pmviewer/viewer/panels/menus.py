@@ -1,0 +1,127 @@
+"""The menu bar."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from imgui_bundle import hello_imgui, imgui
+
+from pmviewer.settings.access import SETTINGS, get
+from pmviewer.viewer import theme
+from pmviewer.viewer.overlays.overlay_panel import OVERLAYS
+from pmviewer.viewer.panels.toolbar import Actions
+from pmviewer.viewer.shortcuts import keys_of
+from pmviewer.viewer.state import ViewerState
+
+
+class Menus:
+    def __init__(self, state: ViewerState, actions: Actions, panels: tuple[str, ...]) -> None:
+        self._state = state
+        self._actions = actions
+        self._panels = panels
+
+    def gui(self) -> None:
+        if imgui.begin_menu("File"):
+            self._file()
+            imgui.end_menu()
+        if imgui.begin_menu("View"):
+            self._view()
+            imgui.end_menu()
+        if imgui.begin_menu("Render"):
+            self._render()
+            imgui.end_menu()
+        if imgui.begin_menu("Overlays"):
+            for name in OVERLAYS:
+                shown = get(self._state.settings, f"overlays.{name}.show")
+                self._item(SETTINGS[f"overlays.{name}.show"].group.capitalize(), f"toggle_{name}", shown)
+            imgui.end_menu()
+        if imgui.begin_menu("Help"):
+            self._item("Keys and mouse", "toggle_help", self._state.help_open)
+            imgui.end_menu()
+
+    def _item(self, text: str, action: str, selected: bool = False, enabled: bool = True) -> None:
+        if imgui.menu_item(text, keys_of(action), selected, enabled)[0]:
+            self._actions[action]()
+
+    def _file(self) -> None:
+        self._item("Open …", "open")
+        self._item("Load reference …", "load_reference")
+        if imgui.begin_menu("Open recent", bool(self._state.recent.entries)):
+            for entry in list(self._state.recent.entries):
+                self._recent(entry)
+            imgui.separator()
+            if imgui.menu_item_simple("Clear the list"):
+                self._state.recent.clear()
+            imgui.end_menu()
+        imgui.separator()
+        self._item("Save session …", "save_session")
+        imgui.separator()
+        self._item("Export PNG …", "export_png")
+        self._item("Export PNG with overlays …", "export_png_overlays")
+        self._item("Export EXR, 32-bit float …", "export_exr")
+        self._item("Export EXR, 16-bit half …", "export_exr_half")
+        self._item("Screenshot of the picture", "screenshot_picture")
+        self._item("Screenshot of the window", "screenshot")
+        imgui.separator()
+        self._item("Quit", "quit")
+
+    def _recent(self, entry: str) -> None:
+        missing = self._state.recent.is_missing(entry)
+        name = f"{Path(entry).parent.name}/{Path(entry).name}" if Path(entry).is_absolute() else entry
+        if imgui.menu_item(f"{name}{'  (missing)' if missing else ''}##{entry}", "", False)[0]:
+            if missing:
+                self._state.recent.remove(entry)
+                self._state.say("error", f"{entry}: the file is gone; it was taken off the list.")
+            else:
+                self._state.open(entry)
+        imgui.set_item_tooltip(entry)
+
+    def _view(self) -> None:
+        view = self._state.settings.display.view
+        for number, name in enumerate(SETTINGS["display.view"].choices):
+            refusal = self._state.refused_view(name)
+            key = str((number + 1) % 10) if number < 10 else ""
+            if imgui.menu_item(name.capitalize(), key, name == view, refusal is None)[0]:
+                self._state.change({"display.view": name})
+            if refusal is not None and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+                imgui.set_tooltip(theme.drawable(refusal))
+        imgui.separator()
+        self._item("Frame the whole scene", "frame_all")
+        self._item("Reset the camera", "reset_camera")
+        self._item("Fly", "toggle_fly", self._state.flying)
+        self._item("Fit the picture", "fit_picture")
+        if imgui.begin_menu("Free camera"):
+            free = self._state.settings.free_camera
+            self._item("Free camera", "toggle_free", free.on)
+            if imgui.menu_item("Frustum of the render camera", "", free.frustum, free.on)[0]:
+                self._state.change({"free_camera.frustum": not free.frustum})
+            imgui.separator()
+            self._item("From above", "free_from_above")
+            self._item("Go to the render camera", "free_to_render")
+            self._item("Take this view as render camera", "free_becomes_render", enabled=free.on)
+            imgui.end_menu()
+        imgui.separator()
+        params = hello_imgui.get_runner_params()
+        for label in self._panels:
+            window = params.docking_params.dockable_window_of_name(label)
+            _, window.is_visible = imgui.menu_item(label, "", window.is_visible)
+        self._item("Hide the panels", "toggle_panels", self._state.panels_hidden)
+        if imgui.menu_item_simple("Reset the layout"):
+            params.docking_params.layout_reset = True
+
+    def _render(self) -> None:
+        self._item("Resume" if self._state.session.paused else "Pause", "toggle_pause")
+        self._item("Restart", "restart")
+        self._item("Compare with and without importance", "compare_importance", self._state.gain.running)
+        if imgui.begin_menu("Light rig"):
+            rig = self._state.settings.light.rig
+            for choice in SETTINGS["light.rig"].choices:
+                if imgui.menu_item(choice.capitalize(), "", choice == rig)[0]:
+                    self._state.change({"light.rig": choice})
+            imgui.end_menu()
+        imgui.separator()
+        info = SETTINGS["render.method"]
+        method = get(self._state.settings, info.path)
+        for choice in info.choices:
+            if imgui.menu_item(choice.capitalize(), "", choice == method)[0]:
+                self._state.change({info.path: choice})

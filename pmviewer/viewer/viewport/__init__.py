@@ -1,0 +1,1 @@
+"""The panel of the picture: drawing it, moving in it, what lies over it."""

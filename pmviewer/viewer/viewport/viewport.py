@@ -1,0 +1,307 @@
+"""The picture's panel: fits it into the panel, redraws it when something changed, and turns mouse and keys into camera
+moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import moderngl
+import numpy as np
+from imgui_bundle import imgui
+
+from pmviewer.engine.frame import Frame
+from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.render.camera import CameraPose
+from pmviewer.settings.access import Display
+from pmviewer.viewer.shortcuts import INSPECT_KEY, K, is_held
+from pmviewer.viewer.state import ViewerState
+from pmviewer.viewer.viewport import controls
+from pmviewer.viewer.viewport.hud import draw_hud
+from pmviewer.viewer.viewport.picture import Picture, Target
+
+VIEWPORT = "Viewport"
+MOST_ZOOM = 64.0
+SPLIT_REACH = 8.0
+"""Points from the line between compared pictures at which a drag moves it."""
+_FLY_AXES = {K.d: (1, 0, 0), K.a: (-1, 0, 0), K.e: (0, 1, 0), K.q: (0, -1, 0), K.w: (0, 0, 1), K.s: (0, 0, -1)}
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How the picture lies in the panel: `zoom` 1 shows all of it, `center` is the picture's point (0 to 1) in the
+    panel's middle."""
+
+    zoom: float = 1.0
+    center: tuple[float, float] = (0.5, 0.5)
+
+    def rectangle(self, panel: tuple[float, float], aspect: float) -> tuple[float, float, float, float]:
+        """Left, top, width and height of a picture of that width/height ratio."""
+        width = min(panel[0], panel[1] * aspect) * self.zoom
+        height = width / aspect
+        return panel[0] / 2 - self.center[0] * width, panel[1] / 2 - self.center[1] * height, width, height
+
+
+class Viewport:
+    """`gui` lays out and handles the mouse; `render` runs before the next frame and draws when something changed."""
+
+    def __init__(self, state: ViewerState) -> None:
+        self.state = state
+        self.picture: Picture | None = None
+        self.fit = Fit()
+        self.inspected: tuple[int, int] | None = None
+        """The pixel whose gather rays are drawn."""
+        self.alone = False
+        """Whether the picture fills the window."""
+        self.captions = True
+        """Whether views are named in the picture."""
+        self.redraws = 0
+        """How often the picture was drawn: an idle window draws nothing."""
+        self.origin = (0.0, 0.0)
+        self.size = (0.0, 0.0)
+        self._ratio = 1.0
+        self._texture: moderngl.Texture | None = None
+        self._drawn_key: Any = None
+        self._flew_with_right = False
+        self._splitting = False
+        self.draw_toasts: Callable[[], None] = lambda: None
+
+    # drawing ----------------------------------------------------------------------------------------------------
+
+    def shown_camera(self) -> CameraPose | None:
+        """The frame's camera, so that points lie on the picture; the newest one when only geometry is shown."""
+        pair = self.state.gain.frames()
+        if pair is not None:
+            return pair[0].camera
+        frame = self.state.frame
+        if frame is None or self.state.shown_display.view == "geometry":
+            return self.state.live_camera() if self.state.session.geometry is not None else None
+        return frame.camera
+
+    def rectangle(self) -> tuple[float, float, float, float]:
+        """The picture's left, top, width and height in the panel, in points."""
+        camera = self.shown_camera()
+        aspect = camera.width / camera.height if camera else 1.0
+        return self.fit.rectangle(self.size, aspect)
+
+    def target(self) -> Target:
+        """The panel in pixels."""
+        left, top, width, height = (round(v * self._ratio) for v in self.rectangle())
+        size = round(self.size[0] * self._ratio), round(self.size[1] * self._ratio)
+        return Target(size, (left, top, max(width, 1), max(height, 1)), self._ratio)
+
+    def render(self) -> None:
+        """Bring the picture's texture up to date, if anything it shows has changed."""
+        picture = self.picture
+        if picture is None or min(self.size) < 1:
+            return
+        if self.state.scene_changed():
+            picture.forget_frame()
+            self.inspected = None
+            self.fit = Fit()
+        settings, frame = self.state.settings, self.state.frame
+        changed = picture.upload_geometry(self.state.session.geometry)
+        overlays, display = settings.overlays, self.state.shown_display
+        reference = self.state.comparison.reference
+        changed |= picture.reference.upload(reference.image if reference is not None else None)
+        if frame is not None:
+            shown = {name: style.show for name, style in overlays.by_map().items()}
+            changed |= picture.upload_frame(frame, display.view, shown)
+            changed |= picture.upload_paths(frame.inspection.paths, overlays.paths)
+            changed |= picture.upload_gathered(frame.inspection.gathered, overlays.gather)
+            changed |= picture.upload_circles(frame.clouds.get("cache"), overlays.cache)
+            changed |= picture.upload_cells(frame.projections, overlays.projection)
+            changed |= picture.upload_fates(frame.inspection.fates, overlays.fates)
+            changed |= picture.upload_lights(frame.known_lights, frame.light_places, overlays.lights)
+        changed |= picture.frustum.upload(self.state.frustum())
+        pair, split = self.state.shown_pair(), None
+        if pair is not None:
+            display, split = pair[1], settings.compare.split
+        changed |= picture.pair.upload(pair[0] if pair is not None else None, display.view)
+        camera, target = self.shown_camera(), self.target()
+        navigating = self.state.navigating and picture.software
+        key = (camera, target, display, overlays, navigating, split)
+        if changed or key != self._drawn_key:
+            self._texture = picture.draw(
+                "window", target, camera, display, overlays, navigating=navigating, split=split
+            )
+            self._drawn_key = key
+            self.redraws += 1
+
+    def capture(self, *, overlays: bool) -> np.ndarray | None:
+        """(height, width, 3) uint8: the picture at its own resolution, with or without the points."""
+        picture, camera = self.picture, self.shown_camera()
+        if picture is None or camera is None:
+            return None
+        settings = self.state.settings
+        size = camera.width, camera.height
+        target = Target(size, (0, 0, *size))
+        picture.draw("capture", target, camera, self.state.shown_display, settings.overlays if overlays else None)
+        return picture.read("capture")
+
+    # interface --------------------------------------------------------------------------------------------------
+
+    def gui(self) -> None:
+        """The window with the picture in it."""
+        flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
+        if self._texture is not None:
+            flags |= imgui.WindowFlags_.no_background  # the picture covers it
+        if self.alone:
+            area = imgui.get_main_viewport()
+            imgui.set_next_window_pos(area.pos)
+            imgui.set_next_window_size(area.size)
+            flags |= imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_saved_settings
+        imgui.push_style_var(imgui.StyleVar_.window_padding, (0, 0))
+        shown, _ = imgui.begin(VIEWPORT, None, flags | imgui.WindowFlags_.no_collapse)
+        imgui.pop_style_var()
+        if shown:
+            self._contents()
+        imgui.end()
+
+    def _contents(self) -> None:
+        available, corner = imgui.get_content_region_avail(), imgui.get_cursor_screen_pos()
+        self.size = max(available.x, 1.0), max(available.y, 1.0)
+        self.origin = corner.x, corner.y
+        self._ratio = imgui.get_io().display_framebuffer_scale.x or 1.0
+        if self._texture is not None:
+            imgui.image(imgui.ImTextureRef(self._texture.glo), self.size, (0, 1), (1, 0))
+        imgui.set_cursor_screen_pos(corner)
+        buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_middle
+        imgui.invisible_button("##picture", self.size, buttons | imgui.ButtonFlags_.mouse_button_right)
+        hovered, active = imgui.is_item_hovered(), imgui.is_item_active()
+        if hovered:
+            imgui.set_item_key_owner(imgui.Key.mouse_wheel_y)
+        if hovered and self.state.settings.overlays.gather.show and is_held(INSPECT_KEY):
+            self._inspect()
+        pose = self.state.live_camera() if hovered or active or self.state.flying else None
+        if self._drags_split(hovered, active):
+            pose = None
+        if pose is not None:
+            self._handle(pose, hovered, active)
+        draw_hud(self, hovered and not self.alone)
+        self.draw_toasts()
+
+    def split_x(self) -> float | None:
+        """Where the line between the compared pictures is, in points from the panel's left edge; None without."""
+        if self.state.gain.frames() is None:
+            return None
+        left, _, width, _ = self.rectangle()
+        return left + self.state.settings.compare.split * width
+
+    def _drags_split(self, hovered: bool, active: bool) -> bool:
+        """Move the line between the compared pictures with the mouse. True while the mouse does that."""
+        x, mouse = self.split_x(), imgui.get_mouse_pos()
+        if x is None:
+            self._splitting = False
+            return False
+        near = hovered and abs(mouse.x - self.origin[0] - x) < SPLIT_REACH
+        if near and imgui.is_mouse_clicked(imgui.MouseButton_.left):
+            self._splitting = True
+        self._splitting = self._splitting and active
+        if near or self._splitting:
+            imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
+        if self._splitting:
+            left, _, width, _ = self.rectangle()
+            share = (mouse.x - self.origin[0] - left) / max(width, 1.0)
+            self.state.change({"compare.split": min(max(share, 0.0), 1.0)})
+        return self._splitting
+
+    def frame_at(self, pixel: tuple[int, int]) -> Frame | None:
+        """The frame that is shown at a pixel of the image."""
+        pair = self.state.gain.frames()
+        if pair is None:
+            return self.state.frame
+        return pair[0 if pixel[0] + 0.5 < self.state.settings.compare.split * pair[0].camera.width else 1]
+
+    def _handle(self, pose: CameraPose, hovered: bool, active: bool) -> None:
+        io = imgui.get_io()
+        before = pose
+        geometry = self.state.session.geometry
+        radius = float(geometry.radius) if geometry is not None else 1.0
+        if geometry is not None and self._target_is_automatic():
+            pose = controls.with_pivot(pose, geometry.center, radius)
+            before = pose
+        height = max(self.rectangle()[3], 1.0)
+        dx, dy = io.mouse_delta.x / height, io.mouse_delta.y / height
+        right = active and imgui.is_mouse_down(imgui.MouseButton_.right)
+        if hovered and io.mouse_wheel and io.key_ctrl:
+            self._magnify(io.mouse_wheel)
+        elif hovered and io.mouse_wheel:
+            pose = controls.zoom(pose, io.mouse_wheel, radius)
+        if active and io.key_ctrl:
+            self._shift(io.mouse_delta.x, io.mouse_delta.y)
+        elif active and (dx or dy):
+            pose = self._drag(pose, dx, dy, right, radius)
+        if not right:
+            self._flew_with_right = False
+        if (self.state.flying or right) and not io.want_text_input and not io.key_ctrl:
+            pose = self._fly(pose, radius, right)
+        if pose != before:
+            self.state.move_camera(pose)
+
+    def _target_is_automatic(self) -> bool:
+        """Whether the target is the scene file's, which may lie anywhere. An automatic free camera's is well placed."""
+        settings = self.state.settings
+        return settings.camera.target == "auto" and not settings.free_camera.on
+
+    def _drag(self, pose: CameraPose, dx: float, dy: float, right: bool, radius: float) -> CameraPose:
+        if imgui.is_mouse_down(imgui.MouseButton_.middle) or (imgui.get_io().key_shift and not self.state.flying):
+            return controls.pan(pose, dx, dy)
+        if self.state.flying or self._flew_with_right:
+            return controls.look(pose, dx, dy)
+        if right:
+            return controls.zoom(pose, (dx - dy) * 12, radius)
+        return controls.orbit(pose, dx, dy)
+
+    def _fly(self, pose: CameraPose, radius: float, right: bool) -> CameraPose:
+        axes = np.sum([axis for key, axis in _FLY_AXES.items() if imgui.is_key_down(key)] or [(0, 0, 0)], axis=0)
+        if not np.any(axes):
+            return pose
+        self._flew_with_right = self._flew_with_right or right
+        io = imgui.get_io()
+        step = 0.5 * radius * min(io.delta_time, 0.1) * (4 if io.key_shift else 1)
+        across, up, ahead = (float(a) for a in axes)
+        return controls.fly(pose, across, up, ahead, step)
+
+    def _magnify(self, notches: float) -> None:
+        """Zoom into the pixels, keeping the point under the mouse where it is."""
+        mouse = imgui.get_mouse_pos()
+        x, y = mouse.x - self.origin[0], mouse.y - self.origin[1]
+        left, top, width, height = self.rectangle()
+        u, v = (x - left) / width, (y - top) / height
+        zoom = min(max(self.fit.zoom * 1.25**notches, 1.0), MOST_ZOOM)
+        grown = zoom / self.fit.zoom
+        center = u + (self.fit.center[0] - u) / grown, v + (self.fit.center[1] - v) / grown
+        self.fit = Fit() if zoom == 1.0 else Fit(zoom, center)
+
+    def _shift(self, dx: float, dy: float) -> None:
+        if self.fit.zoom > 1:
+            _, _, width, height = self.rectangle()
+            u, v = self.fit.center
+            self.fit = replace(self.fit, center=(min(max(u - dx / width, 0), 1), min(max(v - dy / height, 0), 1)))
+
+    def _inspect(self) -> None:
+        """Ask for the gather rays of the pixel under the mouse."""
+        pixel = self.pixel_under_mouse()
+        if pixel is not None and pixel != self.inspected:
+            self.inspected = pixel
+            self.state.session.inspect(pixel)
+
+    def pixel_under_mouse(self) -> tuple[int, int] | None:
+        """Pixel (x, y) of the image, or None when the mouse is elsewhere."""
+        frame = self.state.frame
+        if frame is None:
+            return None
+        mouse = imgui.get_mouse_pos()
+        left, top, width, height = self.rectangle()
+        u = (mouse.x - self.origin[0] - left) / width
+        v = (mouse.y - self.origin[1] - top) / height
+        if not (0 <= u < 1 and 0 <= v < 1):
+            return None
+        return int(u * frame.camera.width), int(v * frame.camera.height)
+
+
+def is_data_view(display: Display) -> bool:
+    """True for views that exposure and tone curve leave alone."""
+    return display.view in ("albedo", "normal", "depth", "geometry", "error", *DIAGNOSTICS)
