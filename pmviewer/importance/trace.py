@@ -17,8 +17,7 @@ Weights are those of eye paths, so that ΣΨL over importons is the sum of the p
 by (n_i/n_t)², which a photon's power is not. Roulette goes by luminance without that factor: it cancels where a path
 leaves the glass again, and paths inside must not die of it.
 
-Random numbers of an importon are keyed by (seed, index, dimension set): set 0 is the place in the image, 1 + b the b-th
-scattering.
+Random numbers of an importon are keyed by (seed, index, dimension), see `pmviewer.kernels.dimensions`.
 """
 
 from __future__ import annotations
@@ -50,6 +49,7 @@ from pmviewer.kernels.bsdf.scattering import (
     shading_normal,
 )
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.dimensions import IMAGE_PLACE, IMPORTON_SCATTER
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import SOBOL, draw4
 from pmviewer.kernels.scene import material_of
@@ -58,7 +58,6 @@ from pmviewer.kernels.vector import add, along, dot, luminance, mul, scale
 from pmviewer.maps.record import encode_direction
 
 _f4 = np.float32
-_i8 = np.int64
 _u4 = np.uint32
 _INF = _f4(np.inf)
 
@@ -130,7 +129,7 @@ def trace_importons(scenes, eyes, passes, i0, i1, caustic_out, global_out, count
     for i in range(i0, i1):
         if counts[C_CAUSTIC] + most > len(caustic_out) or counts[C_GLOBAL] + most > len(global_out):
             return i
-        x, y, _, _ = draw4(SOBOL, pass_.seed, _u4(i), _i8(0))
+        x, y, _, _ = draw4(SOBOL, pass_.seed, _u4(i), IMAGE_PLACE)
         o, d, P, D, near, far = image_ray(eye, pass_.left + x * pass_.across, pass_.top + y * pass_.down)
         beta, compressed = (one, one, one), one
         bounced, again, length = False, False, _f4(0.0)
@@ -185,7 +184,7 @@ def trace_importons(scenes, eyes, passes, i0, i1, caustic_out, global_out, count
                 elif pass_.gather == 0:  # one importance serves both maps
                     _store(global_out, counts[C_GLOBAL], p, ng, weight, of_pixel)
                     counts[C_GLOBAL] += 1
-            u_lobe, bu, bv, u_end = draw4(SOBOL, pass_.seed, _u4(i), _i8(1 + bounces))
+            u_lobe, bu, bv, u_end = draw4(SOBOL, pass_.seed, _u4(i), IMPORTON_SCATTER + bounces)
             bounces += 1
             share, group = one, STORED
             if may_store and may_follow:

@@ -17,14 +17,13 @@ from pmviewer.kernels.bsdf.scattering import (
     same_side,
 )
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.dimensions import CHAIN
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face, surface_at
 from pmviewer.kernels.vector import largest, mul, scale
 from pmviewer.render.given import SurfaceInteraction
 
 _f4 = np.float32
-CHAIN_SET = np.int64(2)
-"""Dimension set of the lobe that is followed at the camera ray's first surface; deeper ones follow."""
 FORKS = 3
 """Chains that fork go on at least so deep before they are thinned out."""
 BLACK = (_f4(0.0), _f4(0.0), _f4(0.0))
@@ -58,7 +57,7 @@ def follow(scene, si, beta, u_lobe, u, v):
 def follow_camera_path(given, si, beta, seed, depth):
     """`follow` at the surface number `depth` of a path from the camera, which is thinned out where it forks often."""
     eye = given.eye
-    u_lobe, u, v, u_end = chain_numbers(given.scene, eye.sequence, seed, eye.index, CHAIN_SET + depth)
+    u_lobe, u, v, u_end = chain_numbers(given.scene, eye.sequence, seed, eye.index, CHAIN + depth)
     wi, beta, pdf = follow(given.scene, si, beta, u_lobe, u, v)
     if si.bsdf.groups & STORED != 0 and depth >= FORKS:
         survival = min(largest(beta), _f4(1.0))

@@ -5,8 +5,8 @@ stored for, direct light is sampled, caustics come from the caustic map, and ind
 directly (`progressive`) or by a final gather (`gather`, see `pmviewer.render.gather.gather`). A surface with lobes of
 both kinds does both, so that a chain may light up at every surface it meets.
 
-Random numbers of a pixel are Owen-scrambled Sobol points over the passes, keyed by (seed, pixel): dimension set 0 is
-the place in the pixel and on the light, 1 the choice of light and the BSDF sample, 2 + d the lobe followed at depth d.
+Random numbers of a pixel are Owen-scrambled Sobol points over the passes, keyed by (seed, pixel); their dimensions are
+in `pmviewer.kernels.dimensions`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, shading_normal
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.dimensions import BSDF, CHAIN_LIGHT, OUTLINE, PIXEL, PIXEL_SALT
 from pmviewer.kernels.lights.light import emitted, environment_radiance
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4, hash3
@@ -42,12 +43,11 @@ _CAUSTICS = np.int32(1 << CAUSTIC_CLASS)
 
 EMISSION, DIRECT, SPECULAR, CAUSTIC, INDIRECT = 0, 3, 6, 9, 12
 ALBEDO, NORMAL, DEPTH = 15, 18, 21
-PIXEL_SET, BSDF_SET, CHAIN_LIGHT_SET, OUTLINE_SET = np.array([0, 1, 4000, 5000], np.int64)
 
 
 @device
 def pixel_seed(eye, pixel):
-    return hash3(eye.seed, _u4(pixel), _u4(0xE7E))
+    return hash3(eye.seed, _u4(pixel), _u4(PIXEL_SALT))
 
 
 @device
@@ -99,7 +99,7 @@ def outline_emission(scene, eye, pixel, seed):
     """Mean radiance that camera rays through the pixel meet at lights and the environment."""
     total = BLACK
     for j in range(eye.outline_rays):
-        ux, uy, _, _ = draw4(eye.sequence, seed, _u4(eye.index * _u4(eye.outline_rays) + _u4(j)), OUTLINE_SET)
+        ux, uy, _, _ = draw4(eye.sequence, seed, _u4(eye.index * _u4(eye.outline_rays) + _u4(j)), OUTLINE)
         o, d, near, far = camera_ray(eye, pixel, ux, uy)
         t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], near, far)
         if prim < 0:
@@ -152,7 +152,7 @@ def _stored(given, si, beta, pixel, place, scratch, radii, film, counts, whole):
     numbers for the first light sample; scratch: lists of lights and of photons. Returns the choice of lights."""
     eye = given.eye
     seed = pixel_seed(eye, pixel)
-    u_pick, bu, bv, u_lobe = draw4(eye.sequence, seed, eye.index, BSDF_SET)
+    u_pick, bu, bv, u_lobe = draw4(eye.sequence, seed, eye.index, BSDF)
     known, gather = cached(given, si, counts)
     aimed = Aim(scratch[1], _i8(0), _i8(0))
     if gather > 0:
@@ -196,7 +196,7 @@ def _followed(given, si, beta, pixel, depth, choice, lights, radii, film, counts
     if eye.followed_direct != 0:
         choice = choose_by_power(lights, eye.light_samples)
         sampler = Sampler(eye.sequence, pixel_seed(eye, pixel), eye.index)
-        u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, CHAIN_LIGHT_SET + depth)
+        u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, CHAIN_LIGHT + depth)
         L = _direct(given, si, FOLLOWED, choice, eye.mis, sampler, (u_pick, u, v), counts)
         deposit(film, counts, pixel, SPECULAR, mul(beta, L))
     return choice
@@ -228,7 +228,7 @@ def eye_pass(given, outline, radii, film, counts, first, last):
     lights, found = stack_i4(LIST_WORDS), stack_i4(AIM_WORDS)
     for pixel in range(first, last):
         seed = pixel_seed(eye, pixel)
-        ux, uy, lu, lv = draw4(eye.sequence, seed, eye.index, PIXEL_SET)
+        ux, uy, lu, lv = draw4(eye.sequence, seed, eye.index, PIXEL)
         o, d, near, far = camera_ray(eye, pixel, ux, uy)
         beta = (_f4(1.0), _f4(1.0), _f4(1.0))
         outlined = len(outline) > 0 and outline[pixel] != 0

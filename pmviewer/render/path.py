@@ -24,6 +24,7 @@ from pmviewer.kernels.bsdf.scattering import (
     shading_normal,
 )
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.dimensions import PATH_LIGHT, PATH_SCATTER, PATH_STRIDE, PIXEL
 from pmviewer.kernels.lights.light import emitted, environment_radiance, light_pdf
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4
@@ -37,7 +38,6 @@ from pmviewer.render.eye import (
     DIRECT,
     EMISSION,
     INDIRECT,
-    PIXEL_SET,
     SPECULAR,
     camera_ray,
     deposit,
@@ -50,7 +50,6 @@ from pmviewer.render.record import C_CUT, C_RAYS, C_SHADOW_RAYS
 _f4 = np.float32
 _INF = _f4(np.inf)
 ROULETTE_DEPTH = 8
-FIRST_SET = np.int64(2)
 
 
 @device
@@ -72,7 +71,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
     choice = choose_by_power(stack_i4(LIST_WORDS), eye.light_samples)
     for pixel in range(first, last):
         seed = pixel_seed(eye, pixel)
-        ux, uy, _, _ = draw4(eye.sequence, seed, index, PIXEL_SET)
+        ux, uy, _, _ = draw4(eye.sequence, seed, index, PIXEL)
         o, d, near, far = camera_ray(eye, pixel, ux, uy)
         beta = (_f4(1.0), _f4(1.0), _f4(1.0))
         stored = 0  # how often the path took lobes that photons are stored for
@@ -114,7 +113,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 counts[C_CUT] += 1
                 break
             ng = face(ng, wo)
-            u0, u1, u_lobe, u3 = draw4(eye.sequence, seed, index, FIRST_SET + 2 * depth)
+            u0, u1, u_lobe, u3 = draw4(eye.sequence, seed, index, PATH_SCATTER + PATH_STRIDE * depth)
             group, share, u_lobe = pick_group(b, wo, u_lobe)
             beta = scale(beta, share)
             if group == FOLLOWED:
@@ -123,7 +122,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
             else:
                 stored += 1
             if group == STORED or not is_delta(b):
-                u_pick, lu, lv, _ = draw4(eye.sequence, seed, index, FIRST_SET + 1 + 2 * depth)
+                u_pick, lu, lv, _ = draw4(eye.sequence, seed, index, PATH_LIGHT + PATH_STRIDE * depth)
                 si = SurfaceInteraction(p, ng, gap, b, wo)
                 sampler = Sampler(eye.sequence, seed, index)
                 L, rays, _ = light_samples(scene, None, si, group, choice, eye.mis, sampler, u_pick, lu, lv)

@@ -21,6 +21,7 @@ from pmviewer.kernels.bsdf.scattering import (
     shading_normal,
 )
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.dimensions import BSDF, PIXEL
 from pmviewer.kernels.lights.light import sample_one_light
 from pmviewer.kernels.memory import bits_of_float, stack_i4
 from pmviewer.kernels.random import draw4, hash3
@@ -32,7 +33,7 @@ from pmviewer.maps.record import encode_direction
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near, chosen_light
 from pmviewer.render.direct.shadow import UNKNOWN, known_visibility
-from pmviewer.render.eye import BSDF_SET, PIXEL_SET, camera_ray, pixel_seed
+from pmviewer.render.eye import camera_ray, pixel_seed
 from pmviewer.render.lookup import irradiance, looked_up
 from pmviewer.render.pixel_radius import own_radius
 
@@ -173,8 +174,8 @@ def shadow_view(scenes, eyes, choice_maps, shadow_maps, out, first, last):
         for round_ in range((FEWEST_SAMPLES + choice[4] - 1) // choice[4]):
             for s in range(choice[4]):
                 index = _u4(round_ * choice[4] + s)
-                _, _, lu, lv = draw4(eye.sequence, seed, index, PIXEL_SET)
-                u_pick, _, _, _ = draw4(eye.sequence, seed, index, BSDF_SET)
+                _, _, lu, lv = draw4(eye.sequence, seed, index, PIXEL)
+                u_pick, _, _, _ = draw4(eye.sequence, seed, index, BSDF)
                 light, m = chosen_light(scene, choice, s, u_pick)
                 wi, _, _, pdf, _ = sample_one_light(scene, light, p, lu, lv)
                 if not m * pdf > _f4(0.0) or same_side(b, STORED, ng, wo, wi) == 0:

@@ -10,6 +10,7 @@ import numpy as np
 from pmviewer.kernels.accel.raycast import occluded
 from pmviewer.kernels.bsdf.scattering import bsdf_f, bsdf_pdf, compressed, same_side, shading_normal
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.dimensions import FURTHER_LIGHT
 from pmviewer.kernels.lights.light import emitted, environment_radiance, one_light_pdf, sample_one_light
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.scene import light_of
@@ -21,8 +22,6 @@ from pmviewer.render.direct.shadow import LIT, UNKNOWN, known_visibility
 
 _f4 = np.float32
 _u4 = np.uint32
-EXTRA_SET = np.int64(1000)
-"""Dimension set of the second light sample; further ones follow."""
 BEFORE_LIGHT = _f4(1.0 - 2.0**-13)
 """Shadow rays end a little before the light's own surface."""
 
@@ -55,7 +54,7 @@ def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, u_pick, u,
     rays, saved = 0, 0
     for s in range(choice[4]):
         if s > 0:
-            u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, EXTRA_SET + s)
+            u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, FURTHER_LIGHT + s)
         light, m = chosen_light(scene, choice, s, u_pick)
         wi, end, L, pdf, findable = sample_one_light(scene, light, p, u, v)
         if not m * pdf > _f4(0.0) or same_side(b, group, ng, wo, wi) == 0:

@@ -14,6 +14,7 @@ import numpy as np
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian, shading_normal
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.dimensions import CACHE_SALT, HEMISPHERE, PIXEL
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.surface import leave
 from pmviewer.kernels.vector import dot, largest, luminance
@@ -31,7 +32,7 @@ from pmviewer.maps.irradiance_cache import (
 )
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import arrive, follow_camera_path
-from pmviewer.render.eye import PIXEL_SET, camera_ray, pixel_seed
+from pmviewer.render.eye import camera_ray, pixel_seed
 from pmviewer.render.gather.gather import gather_light
 from pmviewer.render.given import opened
 from pmviewer.render.record import C_DROPPED, C_RAYS
@@ -40,7 +41,6 @@ _f4 = np.float32
 _f8 = np.float64
 _u4 = np.uint32
 _INF = _f4(np.inf)
-HEMISPHERE_SET = np.int64(5000)
 ENOUGH = _f4(0.25)
 """Sum of weights from which a point needs no record of its own: one of error 0.8, say. Less than that would do for the
 eye pass; the overlap hides the rims."""
@@ -56,7 +56,7 @@ def uncovered_hit(given, pixel, counts):
     """
     scene, eye, cache = given.scene, given.eye, given.cache
     seed = pixel_seed(eye, pixel)
-    ux, uy, _, _ = draw4(eye.sequence, seed, eye.index, PIXEL_SET)
+    ux, uy, _, _ = draw4(eye.sequence, seed, eye.index, PIXEL)
     o, d, near, far = camera_ray(eye, pixel, ux, uy)
     beta = (_f4(1.0), _f4(1.0), _f4(1.0))
     travelled = _f4(0.0)
@@ -89,7 +89,7 @@ def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
     for k in range(cache.sectors):
         for j in range(cache.rings):
             here = j + cache.rings * k
-            u, v, _, _ = draw4(eye.sequence, seed, _u4(here), HEMISPHERE_SET)
+            u, v, _, _ = draw4(eye.sequence, seed, _u4(here), HEMISPHERE)
             wi = cell_direction(n, cache.rings, cache.sectors, j, k, u, v)
             cos = dot(wi, n)
             cells[here, 0] = cells[here, 1] = cells[here, 2] = _f4(0.0)
@@ -120,7 +120,7 @@ def fill_records(given, pixels, rows, made, counts, first, last):
         made[i] = found
         if not found:
             continue
-        seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(0xCAC4E))
+        seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(CACHE_SALT))
         gather_hemisphere(given, p, ng, n, gap, seed, cells, counts)
         harmonic = irradiance_and_gradients(cells, cache.rings, cache.sectors, n, E, rotation, translation)
         if not (E[0] + E[1] + E[2] < _f8(np.inf) and harmonic > _f8(0.0)):

@@ -15,6 +15,7 @@ import numpy as np
 
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_sample
 from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.dimensions import SECOND_GATHER_SALT, SECOND_LIGHT, SECOND_RAY
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import add, dot, largest, mul
@@ -31,8 +32,6 @@ _u4 = np.uint32
 
 NO_CORNERS = np.zeros(1, np.dtype([("none", np.int32)]))
 CORNERS = np.zeros(1, np.dtype([("corners", np.int32)]))
-LIGHT_SET, RAY_SET = np.array([0, 1], np.int64)
-"""Dimension sets of the second gather, whose seed is its own."""
 
 
 @specialised
@@ -57,8 +56,8 @@ def gather_again(given, si, seed, index, counts, hit):
 
 def _again(given, si, seed, index, counts, hit):
     scene, eye = given.scene, given.eye
-    sampler = Sampler(eye.sequence, hash3(seed, _u4(0x5EC0), _u4(0)), index)
-    u_pick, u, v, _ = draw4(eye.sequence, sampler.seed, index, LIGHT_SET)
+    sampler = Sampler(eye.sequence, hash3(seed, _u4(SECOND_GATHER_SALT), _u4(0)), index)
+    u_pick, u, v, _ = draw4(eye.sequence, sampler.seed, index, SECOND_LIGHT)
     lights = stack_i4(LIST_WORDS)
     choice = choose_by_power(lights, eye.light_samples)
     if eye.choice != BY_POWER:
@@ -69,7 +68,7 @@ def _again(given, si, seed, index, counts, hit):
     counts[C_SAVED] += saved
     if eye.caustic_mask != 0:
         L = add(L, reflected(given.caustic_map, eye, eye.caustic_radius, si, eye.caustic_mask))
-    u, v, u_lobe, _ = draw4(eye.sequence, sampler.seed, index, RAY_SET)
+    u, v, u_lobe, _ = draw4(eye.sequence, sampler.seed, index, SECOND_RAY)
     d, weight, pdf, _ = bsdf_sample(scene, si.bsdf, STORED, si.wo, u_lobe, u, v)
     if dot(d, si.ng) <= _f4(0.0) or not largest(weight) > _f4(0.0):
         return L, BLACK, d, hit

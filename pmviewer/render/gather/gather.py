@@ -18,6 +18,7 @@ from pmviewer.kernels.bsdf.scattering import (
     followed_share,
 )
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.dimensions import GATHER_CHAIN, GATHER_FORK
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face
 from pmviewer.kernels.vector import add, dot, largest, mul, scale
@@ -31,7 +32,6 @@ from pmviewer.render.record import C_RAYS
 from pmviewer.render.reflect import gathered
 
 _f4 = np.float32
-GATHER_CHAIN_SET, GATHER_FORK_SET = np.array([3000, 2999], np.int64)
 LEAST_SURVIVAL = np.float32(0.05)
 """Roulette lets this share of the weakest rays live, so that none of them counts more than twenty times."""
 
@@ -69,7 +69,7 @@ def gather_light(given, hit, d, seed, index, counts):
                 survival = _f4(1.0)
                 if follows:  # one of both chains goes on
                     survival = _f4(1.0) - followed_share(b, wo)
-                    _, _, _, u_end = chain_numbers(scene, eye.sequence, seed, index, GATHER_FORK_SET)
+                    _, _, _, u_end = chain_numbers(scene, eye.sequence, seed, index, GATHER_FORK)
                     follows = not u_end < survival
                 if not follows:
                     beta = scale(mul(beta, weight), _f4(1.0) / survival)
@@ -82,7 +82,7 @@ def gather_light(given, hit, d, seed, index, counts):
                 total = add(total, mul(beta, gathered(given, si)))
         if not follows:
             break
-        u_lobe, bu, bv, u_end = chain_numbers(scene, eye.sequence, seed, index, GATHER_CHAIN_SET + depth)
+        u_lobe, bu, bv, u_end = chain_numbers(scene, eye.sequence, seed, index, GATHER_CHAIN + depth)
         d, beta, _ = follow(scene, si, beta, u_lobe, bu, bv)
         if b.groups & STORED != 0:  # the chain forks: thin it out
             survival = min(followed_share(b, wo), _f4(1.0))

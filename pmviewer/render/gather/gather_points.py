@@ -7,13 +7,14 @@ import numpy as np
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.dimensions import PIXEL
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.surface import leave
 from pmviewer.kernels.vector import dot, largest, mul, scale
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import arrive, follow_camera_path
-from pmviewer.render.eye import PIXEL_SET, camera_ray, pixel_seed
+from pmviewer.render.eye import camera_ray, pixel_seed
 from pmviewer.render.gather.gather import gather_light, gather_survival
 from pmviewer.render.gather.guide import AIM_WORDS, aim, gather_direction
 from pmviewer.render.given import opened
@@ -62,7 +63,7 @@ def gather_points(given, pixel, counts, rows):
     given = opened(given)
     scene, eye = given.scene, given.eye
     seed = pixel_seed(eye, pixel)
-    ux, uy, _, _ = draw4(eye.sequence, seed, eye.index, PIXEL_SET)
+    ux, uy, _, _ = draw4(eye.sequence, seed, eye.index, PIXEL)
     o, d, near, far = camera_ray(eye, pixel, ux, uy)
     beta = (_f4(1.0), _f4(1.0), _f4(1.0))
     row = _i8(0)
