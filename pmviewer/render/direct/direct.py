@@ -42,16 +42,17 @@ def visible(scene, p, ng, gap, wi, end):
 
 
 @device
-def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, u_pick, u, v):
+def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, numbers):
     """Radiance towards wo from the light samples of the choice, reflected by a group of the BSDF's lobes.
 
-    Each is weighted against n_bsdf BSDF samples of the group (0: no MIS). (u_pick, u, v) are the first sample's
-    numbers; the sampler draws further ones. `shadows` is for `known_visibility`. Returns L, the shadow
-    rays cast and those that shadow photons saved.
+    Each is weighted against n_bsdf BSDF samples of the group (0: no MIS). `numbers`, three, are for the first sample:
+    choice of light and place; the sampler draws further ones. `shadows` is for `known_visibility`. Returns L, the
+    shadow rays cast and those that shadow photons saved.
     """
     p, ng, gap, b, wo = si.p, si.ng, si.gap, si.bsdf, si.wo
     total = BLACK
     rays, saved = 0, 0
+    u_pick, u, v = numbers
     for s in range(choice[4]):
         if s > 0:
             u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, FURTHER_LIGHT + s)
@@ -76,20 +77,20 @@ def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, u_pick, u,
 
 
 @device
-def found_light(scene, p, wi, pdf_bsdf, n_bsdf, choice, biased, prim, q, nq):
-    """A BSDF sample from p in direction wi found primitive `prim` at q with geometric normal nq (prim < 0: nothing).
+def found_light(scene, p, wi, pdf_bsdf, n_bsdf, choice, biased, hit):
+    """Radiance that was emitted by what a BSDF sample from p in direction wi met (`pmviewer.render.cast.Hit`).
 
-    Its emission (radiance), weighted against the light samples of the choice, where `pdf_bsdf` is the density of the
-    BSDF sample; a biased choice leaves the lights that it does not sample out of both halves.
+    It is weighted against the light samples of the choice, where `pdf_bsdf` is the density of the BSDF sample; a biased
+    choice leaves the lights that it does not sample out of both halves.
     """
-    light = scene.environment if prim < 0 else light_of(scene, prim)
+    light = scene.environment if hit.prim < 0 else light_of(scene, hit.prim)
     if light < 0:
         return BLACK
-    L = environment_radiance(scene, wi) if prim < 0 else emitted(scene, light, prim, q, nq, wi)
+    L = environment_radiance(scene, wi) if hit.prim < 0 else emitted(scene, light, hit.prim, hit.p, hit.ng, wi)
     if not L[0] + L[1] + L[2] > _f4(0.0):
         return BLACK
     m = expected_samples(scene, choice, light)
     if biased != 0 and not m > _f4(0.0):
         return BLACK
-    pdf = one_light_pdf(scene, light, p, q, nq, wi)
+    pdf = one_light_pdf(scene, light, p, hit.p, hit.ng, wi)
     return scale(L, power_heuristic(_f4(n_bsdf), pdf_bsdf, m, pdf))

@@ -19,7 +19,7 @@ from pmviewer.kernels.dimensions import SECOND_GATHER_SALT, SECOND_LIGHT, SECOND
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import add, dot, largest, mul
-from pmviewer.render.cast import cast
+from pmviewer.render.cast import cast, leaving
 from pmviewer.render.chain import BLACK
 from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near
 from pmviewer.render.direct.direct import found_light, light_samples
@@ -62,7 +62,7 @@ def _again(given, si, seed, index, counts, hit):
     choice = choose_by_power(lights, eye.light_samples)
     if eye.choice != BY_POWER:
         choice = choose_near(scene, eye, given.choice_map, si.p, si.ng, lights)
-    L, rays, saved = light_samples(scene, given.shadows, si, STORED, choice, eye.mis, sampler, u_pick, u, v)
+    L, rays, saved = light_samples(scene, given.shadows, si, STORED, choice, eye.mis, sampler, (u_pick, u, v))
     counts[C_RAYS] += rays
     counts[C_SHADOW_RAYS] += rays
     counts[C_SAVED] += saved
@@ -73,8 +73,7 @@ def _again(given, si, seed, index, counts, hit):
     if dot(d, si.ng) <= _f4(0.0) or not largest(weight) > _f4(0.0):
         return L, BLACK, d, hit
     counts[C_RAYS] += 1
-    hit = cast(scene, si.p, si.ng, si.gap, d)
+    hit = cast(scene, leaving(si, d))
     if eye.mis != 0:
-        found = found_light(scene, si.p, d, pdf, eye.mis, choice, eye.biased, hit[0], hit[3], hit[4])
-        L = add(L, mul(weight, found))
+        L = add(L, mul(weight, found_light(scene, si.p, d, pdf, eye.mis, choice, eye.biased, hit)))
     return L, weight, d, hit

@@ -206,33 +206,33 @@ def guided_pdf(guides, aimed, b, wi):
 
 
 @specialised
-def gather_direction(given, aimed, si, j, n, seed, numbers):
-    """Direction of ray j of n by the STORED lobes of the BSDF.
+def gather_direction(given, rays, si, j):
+    """Direction of ray j of a surface's `GatherRays` by the STORED lobes of the BSDF.
 
     Returns wi, weight = f·cos/pdf (times n/n_b or n/n_p where there are two kinds), the density of BSDF samples (0 for
     a guided ray: its emission is none of its business), the share by multiple importance sampling in gathered light, a
-    number to use and the ray's index in its sequences. Without gather rays the direction is that of `numbers`: one for
-    the lobe, two for the direction.
+    number to use and the ray's index in its sequences. Without gather rays the direction is that of `rays.numbers`: one
+    for the lobe, two for the direction.
     """
     if has(part(given, "guides"), "unguided"):
         return _by_bsdf
     return _by_both
 
 
-def _by_bsdf(given, aimed, si, j, n, seed, numbers):
-    scene, eye = given.scene, given.eye
-    u_lobe, u, v = numbers
+def _by_bsdf(given, rays, si, j):
+    eye = given.eye
+    u_lobe, u, v = rays.numbers
     sample, u_end = eye.index, _f4(0.0)
     if eye.gather_rays > 0:
         sample = _u4(eye.index * _u4(eye.gather_rays) + _u4(j))
-        u, v, u_lobe, u_end = draw4(eye.sequence, seed, sample, GATHER)
-    wi, weight, pdf, _ = bsdf_sample(scene, si.bsdf, STORED, si.wo, u_lobe, u, v)
+        u, v, u_lobe, u_end = draw4(eye.sequence, rays.seed, sample, GATHER)
+    wi, weight, pdf, _ = bsdf_sample(given.scene, si.bsdf, STORED, si.wo, u_lobe, u, v)
     return wi, weight, pdf, _f4(1.0), u_end, sample
 
 
-def _by_both(given, aimed, si, j, n, seed, numbers):
+def _by_both(given, rays, si, j):
     # Guides are for gather rays alone, so that n = eye.gather_rays here.
-    scene, eye, guides, b, wo = given.scene, given.eye, given.guides, si.bsdf, si.wo
+    eye, aimed, b, wo, n = given.eye, rays.aimed, si.bsdf, si.wo, rays.n
     guided = aimed.rays
     sample = _u4(eye.index * _u4(eye.gather_rays) + _u4(j))
     n_b = n - guided
@@ -240,16 +240,16 @@ def _by_both(given, aimed, si, j, n, seed, numbers):
         place, dimension = sample, GATHER
         if guided > 0:
             place, dimension = _u4(eye.index * _u4(n_b) + _u4(j)), GATHER_BESIDE
-        u, v, u_lobe, u_end = draw4(eye.sequence, seed, place, dimension)
-        wi, weight, pdf, _ = bsdf_sample(scene, b, STORED, wo, u_lobe, u, v)
+        u, v, u_lobe, u_end = draw4(eye.sequence, rays.seed, place, dimension)
+        wi, weight, pdf, _ = bsdf_sample(given.scene, b, STORED, wo, u_lobe, u, v)
         share = _f4(1.0)
         if guided > 0:
-            share = power_heuristic(_f4(n_b), pdf, _f4(guided), guided_pdf(guides, aimed, b, wi))
+            share = power_heuristic(_f4(n_b), pdf, _f4(guided), guided_pdf(given.guides, aimed, b, wi))
             weight = scale(weight, _f4(n) / _f4(n_b))
         return wi, weight, pdf, share, u_end, sample
     place = _u4(eye.index * _u4(guided) + _u4(j - n_b))
-    u, v, u_pick, u_end = draw4(eye.sequence, seed, place, GATHER_GUIDED)
-    wi, q = guided_direction(guides, aimed, b, u, v, u_pick)
+    u, v, u_pick, u_end = draw4(eye.sequence, rays.seed, place, GATHER_GUIDED)
+    wi, q = guided_direction(given.guides, aimed, b, u, v, u_pick)
     cos = dot(wi, shading_normal(b))
     weight, share = (_f4(0.0), _f4(0.0), _f4(0.0)), _f4(0.0)
     if cos > _f4(0.0) and q > _f4(0.0):
