@@ -1,4 +1,4 @@
-"""Secondary final gathering: short gather rays gather again where they land (R5; Kilauea, course guide §6.2).
+"""Secondary final gathering: short gather rays gather again where they land (R5; course guide §6.2).
 
 Near a corner many gather rays end within a look-up radius of the edge, where the map's estimate is cut off by the other
 wall. A ray shorter than a threshold does there what the eye pass does at a first surface, with one ray for its own

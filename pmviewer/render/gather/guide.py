@@ -108,7 +108,7 @@ def photons_near(grid, class_mask, p, n, seed, most, found):
                 lane = count_trailing_zeros(mask)
                 mask &= mask - _i4(1)
                 at, seen = seen, seen + _i8(1)
-                if at >= most:  # Vitter's algorithm R
+                if at >= most:  # algorithm R of Vitter 1985
                     state = _u4(_u4(state * _u4(1664525)) + _u4(1013904223))
                     at = (_i8(state) * seen) >> 32
                 if at < most:
