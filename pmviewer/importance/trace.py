@@ -41,7 +41,7 @@ from pmviewer.kernels.dimensions import IMAGE_PLACE, IMPORTON_SCATTER
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import SOBOL, draw4
 from pmviewer.kernels.surface import face
-from pmviewer.kernels.vector import add, along, dot, luminance, mul, scale
+from pmviewer.kernels.vector import add, along, dot, luminance, scale
 from pmviewer.maps.record import encode_direction
 from pmviewer.render.cast import Ray, cast, leaving
 from pmviewer.render.chain import WHITE, arrive, scatter
@@ -183,8 +183,8 @@ def _trace(scene, pass_, i, ray, P, D, out, counts):
         group, share, u_lobe = _pick(si, may_store, not bounced or pass_.gather_specular != 0, u_lobe)
         if groups & group == 0:
             break
-        wi, f, pdf, compression = scatter(scene, si, group, u_lobe, u, v)
-        after = scale(mul(beta, f), share)
+        wi, after, pdf, compression = scatter(scene, si, group, beta, u_lobe, u, v)
+        after = scale(after, share)
         survival = min(luminance(after) / before, _f4(1.0))
         if not u_end < survival:
             break

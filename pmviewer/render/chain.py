@@ -45,20 +45,20 @@ def arrive(scene, glossy, d, hit, beta):
 
 
 @device
-def scatter(scene, si, group, u_lobe, u, v):
-    """A direction by a group of the BSDF's lobes: (wi, f·|cos|/pdf, pdf, compression), see `bsdf_sample`. The weight is
-    black where the lobe of a shading normal dips below the surface."""
+def scatter(scene, si, group, beta, u_lobe, u, v):
+    """A direction by a group of the BSDF's lobes: (wi, beta·f·|cos|/pdf, pdf, compression), see `bsdf_sample`. beta is
+    black after it where the path ends, as where the lobe of a shading normal dips below the surface."""
     wi, weight, pdf, compression = bsdf_sample(scene, si.bsdf, group, si.wo, u_lobe, u, v)
     if same_side(si.bsdf, group, si.ng, si.wo, wi) == 0:
-        weight = BLACK
-    return wi, weight, pdf, compression
+        return wi, BLACK, pdf, compression
+    return wi, mul(beta, weight), pdf, compression
 
 
 @device
 def follow(scene, si, beta, u_lobe, u, v):
     """The ray by the FOLLOWED lobes, beta after them (black where the path ends), and the density (0 of a delta)."""
-    wi, weight, pdf, compression = scatter(scene, si, FOLLOWED, u_lobe, u, v)
-    return leaving(si, wi), scale(mul(beta, weight), compression), pdf
+    wi, beta, pdf, compression = scatter(scene, si, FOLLOWED, beta, u_lobe, u, v)
+    return leaving(si, wi), scale(beta, compression), pdf
 
 
 @device

@@ -112,8 +112,8 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 counts[C_RAYS] += rays
                 counts[C_SHADOW_RAYS] += rays
                 deposit(pixel, term_of(eye, mirrored, stored, by_chain), mul(beta, L))
-            wi, weight, pdf, compression = scatter(scene, si, group, u_lobe, u, v)
-            beta = scale(mul(beta, weight), compression)
+            wi, beta, pdf, compression = scatter(scene, si, group, beta, u_lobe, u, v)
+            beta = scale(beta, compression)
             if not largest(beta) > _f4(0.0):
                 break
             if depth >= ROULETTE_DEPTH:
