@@ -16,16 +16,14 @@ import numpy as np
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import BSDF, CHAIN_LIGHT, OUTLINE
-from pmviewer.kernels.lights.light import emitted, environment_radiance
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4
-from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.vector import add, largest, mul, scale
 from pmviewer.maps.record import CAUSTIC as CAUSTIC_CLASS
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow_camera_path
 from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near
-from pmviewer.render.direct.direct import found_light, light_samples
+from pmviewer.render.direct.direct import found_light, light_samples, met_light, radiance_of
 from pmviewer.render.gather.cached import cached, surface_rays
 from pmviewer.render.gather.guide import AIM_WORDS, aim
 from pmviewer.render.given import Aim, GatherRays, Sampler, opened
@@ -60,11 +58,9 @@ def outline_emission(scene, eye, pixel):
         ux, uy, _, _ = draw4(eye.sequence, pixel.seed, index, OUTLINE)
         ray = camera_ray(eye, pixel.number, ux, uy)
         hit = cast(scene, ray)
-        if hit.prim < 0:
-            if scene.environment >= 0:
-                total = add(total, environment_radiance(scene, ray.d))
-        elif light_of(scene, hit.prim) >= 0:
-            total = add(total, emitted(scene, light_of(scene, hit.prim), hit.prim, hit.p, hit.ng, ray.d))
+        light = met_light(scene, hit)
+        if light >= 0:
+            total = add(total, radiance_of(scene, light, hit, ray.d))
     return scale(total, _f4(1.0) / _f4(eye.outline_rays))
 
 
@@ -162,9 +158,7 @@ def _emission(given, left, pdf, choice, hit, d):
     scene, eye = given.scene, given.eye
     if pdf > _f4(0.0):
         return found_light(scene, left, d, pdf, eye.mis, choice, eye.biased, hit)
-    if hit.prim < 0:
-        return environment_radiance(scene, d)
-    return emitted(scene, light_of(scene, hit.prim), hit.prim, hit.p, hit.ng, d)
+    return radiance_of(scene, met_light(scene, hit), hit, d)
 
 
 @kernel
@@ -195,13 +189,13 @@ def eye_pass(given, outline, radii, film, counts, first, last):
             whole = depth == 0
             seen = EMISSION if whole else SPECULAR
             if hit.prim < 0:
-                if scene.environment >= 0 and not (whole and outlined):
+                if met_light(scene, hit) >= 0 and not (whole and outlined):
                     deposit(pixel, seen, mul(beta, _emission(given, left, pdf, choice, hit, ray.d)))
                 break
             si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
             if whole:
                 properties(eye, pixel, si)
-            if light_of(scene, hit.prim) >= 0 and not (whole and outlined):
+            if met_light(scene, hit) >= 0 and not (whole and outlined):
                 deposit(pixel, seen, mul(beta, _emission(given, left, pdf, choice, hit, ray.d)))
             groups = si.bsdf.groups
             if groups == NOTHING:

@@ -13,15 +13,14 @@ import numpy as np
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, pick_group
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import PATH_LIGHT, PATH_SCATTER, PATH_STRIDE
-from pmviewer.kernels.lights.light import emitted, environment_radiance, light_pdf
+from pmviewer.kernels.lights.light import light_pdf
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4
-from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.vector import largest, mul, scale
 from pmviewer.render.cast import cast, leaving
-from pmviewer.render.chain import BLACK, WHITE, arrive, scatter
+from pmviewer.render.chain import WHITE, arrive, scatter
 from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power
-from pmviewer.render.direct.direct import light_samples, power_heuristic
+from pmviewer.render.direct.direct import light_samples, met_light, power_heuristic, radiance_of
 from pmviewer.render.given import Sampler
 from pmviewer.render.pixel import (
     CAUSTIC,
@@ -51,20 +50,6 @@ def term_of(eye, mirrored, stored, by_chain):
     return DIRECT if stored == 1 else INDIRECT
 
 
-@device
-def _emission(scene, eye, origin, pdf, hit, d):
-    """Radiance that what a ray of direction d met sends back, and its weight against light samples at `origin`, where d
-    was sampled with the density pdf: 0 there for a delta and for camera rays, which nothing competes with."""
-    light = scene.environment if hit.prim < 0 else light_of(scene, hit.prim)
-    if light < 0 or (pdf > _f4(0.0) and eye.mis == 0):
-        return BLACK, _f4(0.0)
-    L = environment_radiance(scene, d) if hit.prim < 0 else emitted(scene, light, hit.prim, hit.p, hit.ng, d)
-    if not pdf > _f4(0.0):
-        return L, _f4(1.0)
-    other = light_pdf(scene, light, origin, hit.p, hit.ng, d)
-    return L, power_heuristic(_f4(1.0), pdf, _f4(eye.light_samples), other)
-
-
 @kernel
 def path_pass(scenes, eyes, film, counts, first, last):
     """Add one path to each of the pixels first … last−1; arguments as in `pmviewer.render.eye.eye_pass`."""
@@ -86,9 +71,17 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 term = term_of(eye, mirrored, stored, by_chain)
             if hit.prim >= 0:
                 si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
-            L, weight = _emission(scene, eye, origin, pdf, hit, ray.d)
-            if largest(L) > _f4(0.0) and weight > _f4(0.0):
-                deposit(pixel, term, scale(mul(beta, L), weight))
+            light = met_light(scene, hit)
+            if light >= 0:
+                L = radiance_of(scene, light, hit, ray.d)
+                weight = _f4(1.0)
+                if pdf > _f4(0.0):
+                    weight = _f4(0.0)
+                    if eye.mis != 0:
+                        other = light_pdf(scene, light, origin, hit.p, hit.ng, ray.d)
+                        weight = power_heuristic(_f4(1.0), pdf, _f4(eye.light_samples), other)
+                if largest(L) > _f4(0.0) and weight > _f4(0.0):
+                    deposit(pixel, term, scale(mul(beta, L), weight))
             if hit.prim < 0:
                 break
             if depth == 0:

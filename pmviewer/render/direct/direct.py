@@ -34,6 +34,18 @@ def power_heuristic(n_this, pdf_this, n_other, pdf_other):
 
 
 @device
+def met_light(scene, hit):
+    """The light that a ray met, −1 for none; the environment where it met nothing."""
+    return scene.environment if hit.prim < 0 else light_of(scene, hit.prim)
+
+
+@device
+def radiance_of(scene, light, hit, d):
+    """Radiance that the light which a ray of direction d met sends back along it."""
+    return environment_radiance(scene, d) if hit.prim < 0 else emitted(scene, light, hit.prim, hit.p, hit.ng, d)
+
+
+@device
 def visible(scene, p, ng, gap, wi, end):
     """Whether nothing stands between the surface point p and the point `end`, seen from p in direction wi."""
     o = leave(p, ng, gap, wi[0], wi[1], wi[2])
@@ -83,10 +95,10 @@ def found_light(scene, p, wi, pdf_bsdf, n_bsdf, choice, biased, hit):
     It is weighted against the light samples of the choice, where `pdf_bsdf` is the density of the BSDF sample; a biased
     choice leaves the lights that it does not sample out of both halves.
     """
-    light = scene.environment if hit.prim < 0 else light_of(scene, hit.prim)
+    light = met_light(scene, hit)
     if light < 0:
         return BLACK
-    L = environment_radiance(scene, wi) if hit.prim < 0 else emitted(scene, light, hit.prim, hit.p, hit.ng, wi)
+    L = radiance_of(scene, light, hit, wi)
     if not L[0] + L[1] + L[2] > _f4(0.0):
         return BLACK
     m = expected_samples(scene, choice, light)
