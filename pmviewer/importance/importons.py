@@ -19,6 +19,7 @@ from pmviewer.importance.trace import (
     N_COUNTS,
     trace_importons,
 )
+from pmviewer.kernels.dimensions import IMPORTON_SALT
 from pmviewer.maps.importance import Importons
 from pmviewer.scene.arrays.flatten import FlatScene
 
@@ -26,8 +27,6 @@ Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 
 BATCH = 2048
 """Importons a task: fixed, so that the result does not depend on the number of threads."""
-SEED = 0x1347
-"""Keeps the importons' random numbers apart from those of photons and pixels."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,7 @@ def trace(scene: FlatScene, eye: NDArray[np.void], rule: Rule, seed: int, first:
     part = (0, 0, camera["width"], camera["height"]) if rule.pixel is None else (*rule.pixel, 1, 1)
     record = np.zeros(1, IMPORTON_PASS_DTYPE)
     record[0] = (
-        (seed ^ SEED) & 0xFFFFFFFF,
+        (seed ^ IMPORTON_SALT) & 0xFFFFFFFF,
         rule.max_depth,
         rule.glossy,
         rule.caustic,

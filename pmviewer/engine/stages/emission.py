@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from pmviewer.engine.method import Plan
-from pmviewer.engine.stages.deposition import SEED, Rules, importance_of, sampled_classes
+from pmviewer.engine.stages.deposition import Rules, importance_of, sampled_classes
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.importance.rules import full_importance, relative_importance
+from pmviewer.kernels.dimensions import ROUNDING_SALT, SCATTERED_SALT
 from pmviewer.maps.importance import ImportanceMap, Importons, build_importance
 from pmviewer.maps.power import luminances
 from pmviewer.maps.record import CAUSTIC, DIRECT
@@ -25,7 +26,6 @@ MOST_SCATTERED = 1 << 15
 SCATTERED_NEIGHBOURS = 50
 LEAST = 0.2
 """Importance of places for storing photons: look-ups at the border of what is seen reach across it."""
-SCATTER_SEED = 0x5CA77E
 
 
 def emission_key(settings: Settings, plan: Plan, importance: ImportanceStage) -> tuple[Any, ...]:
@@ -72,7 +72,7 @@ def _scattered(settings: Settings, importance: ImportanceStage, made: Importance
         places = np.ascontiguousarray(places[:: -(-made.n // MOST_SCATTERED)] if made.n else places)
         photons, normals = np.empty((0, 6), np.float32), np.empty(0, np.uint32)
         if len(places):
-            seed = settings.render.seed ^ SCATTER_SEED
+            seed = settings.render.seed ^ SCATTERED_SALT
             photons, normals = scattered_photons(scene, settings.photons, seed, places, stage.pool.run)
         weights = np.empty(len(photons), np.float32)
         luminances(photons.view(np.uint32), weights)
@@ -115,7 +115,7 @@ def storage(guidance: Guidance, guided: Guided, settings: Settings, plan: Plan) 
     if guidance.variant != "Peter-Pietrek":
         for goal in guidance.sought:
             if goal.places:
-                seed = settings.render.seed ^ SEED ^ (goal.photons == "global")
+                seed = settings.render.seed ^ ROUNDING_SALT ^ (goal.photons == "global")
                 rules[goal.photons] = Homogeneous(goal.importance, LEAST, guided.smallest, seed)
     classes = plan.caustic_classes, plan.global_classes
     return Deposition(rules.get("caustic"), rules.get("global"), *classes, sampled_classes(plan))

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.kernels.dimensions import SHADOW_SALT
 from pmviewer.maps.search.grid import PhotonGrid
 from pmviewer.maps.shadow import build_shadows, shadow_record
 from pmviewer.photons.light_pass.light_pass import Runner
 from pmviewer.photons.shadow import shadow_pass
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import Direct
-
-SEED = 0x5AD0
-"""Keeps their random numbers apart from those of the light pass."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,7 @@ class ShadowMap:
 
 def shadows_of(flat: FlatScene, direct: Direct, glossy: float, seed: int, index: int, run: Runner) -> ShadowMap:
     """Trace and sort the shadow photons that the settings ask for, those of pass `index`."""
-    traced = shadow_pass(flat, seed ^ SEED, index * direct.shadow_N, direct.shadow_N, glossy, run)
+    traced = shadow_pass(flat, seed ^ SHADOW_SALT, index * direct.shadow_N, direct.shadow_N, glossy, run)
     radius = None if direct.shadow_radius == "auto" else float(direct.shadow_radius) * flat.radius
     photons = traced.photons
     grid = run([lambda: build_shadows(photons, direct.shadow_fewest, radius, flat.radius)])[0]

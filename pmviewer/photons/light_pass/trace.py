@@ -4,8 +4,8 @@ Weights stay nearly equal: lights are picked by power, and roulette decides abou
 (`pmviewer.photons.light_pass.roulette`). Photons of guided emission (`pmviewer.photons.emission.strata`) carry a factor
 for their power that roulette does not see, so that the same paths survive.
 
-Random numbers of a photon are keyed by (seed, its index over all passes, dimension): the same photons for any number of
-threads and any batch size (T2). Dimension set 0 is emission, set 1 + b the b-th scattering.
+Random numbers of a photon are keyed by (seed, its index over all passes, dimension), see
+`pmviewer.kernels.dimensions`: the same photons for any number of threads and any batch size (T2).
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from pmviewer.kernels.bsdf.scattering import (
 )
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
+from pmviewer.kernels.dimensions import COPIES, EMISSION, EMITTER, FURTHER_PHOTONS_SALT, PHOTON_SCATTER, STORE
 from pmviewer.kernels.lights.light import is_delta_light
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import draw1, draw4, hash3
@@ -52,9 +53,7 @@ from pmviewer.photons.projection.projected import emission
 _f4 = np.float32
 _f8 = np.float64
 _u4 = np.uint32
-_i8 = np.int64
 _INF = _f4(np.inf)
-LIGHT_CHOICE_SET, STORE_SET, COPIES_SET = _i8(0xE817), _i8(0x10000), _i8(0x20000)
 
 LIGHT_PASS_DTYPE = np.dtype(
     [
@@ -144,9 +143,9 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
         place = np.int64(pass_.first_index) + np.int64(i)
         index, seed = _u4(place), pass_.seed
         if place >> 32 != 0:  # a Sobol set has 2³² points; the next photons use other sets
-            seed = hash3(seed, _u4(place >> 32), _u4(LIGHT_CHOICE_SET))
-        u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, _i8(0))
-        u_pick = draw1(pass_.sequence, seed, index, LIGHT_CHOICE_SET)
+            seed = hash3(seed, _u4(place >> 32), _u4(FURTHER_PHOTONS_SALT))
+        u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, EMISSION)
+        u_pick = draw1(pass_.sequence, seed, index, EMITTER)
         projection = projections[0 if to_global else 1]
         p, d, beta, light, kept, worth = emission(
             scene, projection, i, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1)
@@ -182,7 +181,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                 ledgers[book, E_ABSORBED] += _f8(luminance(beta) * worth)
                 break
             ng = face(ng, wi)
-            u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
+            u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, PHOTON_SCATTER + bounces)
             unfound = deltas and bounces > 0 and kept & FOLLOWED != 0
             if kept & STORED != 0 or unfound:
                 path_class = np.int32(flags >> _u4(6))
@@ -192,7 +191,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                 is_caustic = path_class == CAUSTIC or (path_class == INDIRECT_CAUSTIC and pass_.indirect_caustics != 0)
                 times, stored = 1, beta
                 if pass_.roulette == EQUAL:
-                    times, factor = copies(beta, draw1(pass_.sequence, seed, index, COPIES_SET + bounces))
+                    times, factor = copies(beta, draw1(pass_.sequence, seed, index, COPIES + bounces))
                     stored = scale(beta, factor)
                 # As many photons as the opacity says meet the surface; looked up, it is taken to be there.
                 stored = over_opacity(scene, prim, u, v, p, scale(stored, worth))
@@ -210,7 +209,7 @@ def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, 
                     and kept & STORED != 0
                     and (
                         pass_.store_probability >= _f4(1.0)
-                        or draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
+                        or draw1(pass_.sequence, seed, index, STORE + bounces) < pass_.store_probability
                     )
                 ):
                     for _ in range(times):

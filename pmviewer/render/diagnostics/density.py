@@ -56,7 +56,7 @@ def density_view(scenes, eyes, trees, widest, out, first, last):
     """
     scene, eye, tree = scenes[0], eyes[0], trees[0]
     for pixel in range(first, last):
-        prim, _, _, p, ng, _, _, _ = stored_hit(scene, eye, pixel)
+        hit, ng, _ = stored_hit(scene, eye, pixel)
         out[pixel, 0] = _f4(-1.0)
-        if prim >= 0:
-            out[pixel, 0], _, _ = hull_irradiance(tree, eye, widest, p, ng, _i4(ALL_CLASSES))
+        if hit.prim >= 0:
+            out[pixel, 0], _, _ = hull_irradiance(tree, eye, widest, hit.p, ng, _i4(ALL_CLASSES))
