@@ -24,6 +24,7 @@ from numba import njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
 
+from pmviewer.kernels.compile import collector, library
 from pmviewer.kernels.compile.cache_folder import claim
 from pmviewer.kernels.compile.sources import PACKAGE, stamp
 
@@ -71,6 +72,9 @@ def _choose_cache() -> Path:
 
 CACHE_FOLDER = _choose_cache()
 numba.config.CACHE_DIR = str(CACHE_FOLDER)
+if not numba.config.DISABLE_JIT:
+    library.install()
+    collector.install()
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": FASTMATH}
 
@@ -161,7 +165,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     """An entry point that Python calls: serial, without the GIL, on one tile or batch."""
     if numba.config.DISABLE_JIT:
         return functools.wraps(function)(lambda *arguments: function(*map(_readable, arguments)))
-    return _cached(njit(**_OPTIONS)(function))
+    return _cached(njit(no_cfunc_wrapper=True, **_OPTIONS)(function))
 
 
 def _readable(argument: Any) -> Any:
