@@ -19,7 +19,7 @@ from pmviewer.viewer import layout
 from pmviewer.viewer.actions import Commands
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.recent import RecentFiles
-from pmviewer.viewer.overlays.overlay_panel import OverlayPanel
+from pmviewer.viewer.overlays.panel import OverlayPanel
 from pmviewer.viewer.panels.error_panel import ErrorPanel
 from pmviewer.viewer.panels.gain_panel import GainPanel
 from pmviewer.viewer.panels.help_overlay import draw_help

@@ -9,14 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pmviewer.engine.frame import Frame, Level, Message
 from pmviewer.errors import PmviewerError, SettingError
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose, resolve_camera
-from pmviewer.render.free_camera import frustum_lines, resolve_view
+from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.planes import AOVS, TERMS
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import (
@@ -201,13 +198,6 @@ class ViewerState:
             return resolve_camera(scene, self.settings.camera)
         except SettingError:
             return resolve_camera(scene, self.settings.camera.model_copy(update={"name": "auto"}))
-
-    def frustum(self) -> NDArray[np.float64] | None:
-        """Line ends (2n, 3) of the render camera's frustum while it is drawn."""
-        free, geometry, camera = self.settings.free_camera, self.session.geometry, self.render_camera()
-        if not (free.on and free.frustum) or geometry is None or camera is None:
-            return None
-        return frustum_lines(camera, free.length * float(geometry.radius))
 
     def shown_pair(self) -> tuple[tuple[Frame, Frame], Display] | None:
         """The frames with and without importance while the viewport compares them, with a view that both have."""

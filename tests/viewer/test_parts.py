@@ -17,13 +17,16 @@ from pmviewer.render.camera import resolve_camera
 from pmviewer.settings.access import Settings, with_values
 from pmviewer.viewer import format as fmt
 from pmviewer.viewer.dialogs.recent import LENGTH, RecentFiles
+from pmviewer.viewer.gl.points import even_thinning
+from pmviewer.viewer.gl.records import brightest_channel
 from pmviewer.viewer.jobs import Jobs
-from pmviewer.viewer.overlays.overlays import FATES, brightest_channel, even_thinning
+from pmviewer.viewer.overlays.fates import FATES
+from pmviewer.viewer.overlays.light_importance import projected
 from pmviewer.viewer.panels.importance_panel import FIRST_WEIGHT, bias_row, deposition_rows, histogram_of, weight_text
 from pmviewer.viewer.panels.statistics_panel import energy_rows
 from pmviewer.viewer.session_link import SessionLink
 from pmviewer.viewer.theme import drawable
-from pmviewer.viewer.viewport.hud import projected, tick_text
+from pmviewer.viewer.viewport.hud import tick_text
 from tests.support.scenes import diffuse_box
 from tests.viewer.fake_session import FakeSession, photons_at, wall_photons
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.viewer.comparison import COMPARED_VIEWS
+from pmviewer.viewer.overlays.layers import any_shown
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport.viewport import Viewport
 
@@ -38,7 +39,7 @@ class Exports:
     def png(self, path: Path, *, overlays: bool) -> None:
         """The picture at its own resolution as it is shown, with or without the points over it."""
         settings, frame = self._state.settings, self._state.frame
-        points = overlays and (settings.overlays.any_shown or self._state.frustum() is not None)
+        points = overlays and any_shown(settings)
         display = self._state.shown_display
         pair, gain = self._state.shown_pair(), self._state.gain.gain
         if pair is not None and gain is not None:
