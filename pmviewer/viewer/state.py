@@ -26,10 +26,10 @@ from pmviewer.settings.access import (
     parse_assignments,
     with_values,
 )
+from pmviewer.viewer.background import Background
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.dialogs.recent import RecentFiles
 from pmviewer.viewer.importance_gain import GainRun
-from pmviewer.viewer.jobs import Jobs
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.viewport.controls import camera_values
 
@@ -72,9 +72,9 @@ class ViewerState:
         self.session = session
         self.inactive_reason = inactive_reason
         self.recent = recent
-        self.jobs = Jobs(self.say)
-        self.comparison = Comparison(session, self.jobs, self.say)
-        self.gain = GainRun(session, self.say)
+        self.background = Background(self.say)
+        self.comparison = Comparison(session, self.background, self.say)
+        self.gain = GainRun(session, self.background, self.say)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
         self._said: deque[Message] = deque()
@@ -274,6 +274,12 @@ class ViewerState:
         self.log.append(message)
         if message.level == "error":
             self.toasts.append(Toast(message))
+
+    def unread_errors(self) -> list[str]:
+        """What went wrong after the last window frame."""
+        messages = [*self.session.take_messages(), *self._said]
+        self._said.clear()
+        return [message.text for message in messages if message.level == "error"]
 
     def poll(self) -> None:
         """Once per window frame: collect the messages."""

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.viewer.background import FILES
 from pmviewer.viewer.comparison import COMPARED_VIEWS
 from pmviewer.viewer.overlays.layers import any_shown
 from pmviewer.viewer.state import ViewerState
@@ -51,7 +52,7 @@ class Exports:
                 write_png(path, gain_sheet(gain, pair[1]))
                 return f"wrote {path.absolute()}"
 
-            self._state.jobs.start("writing PNG", sheet)
+            self._state.background.start(FILES, "writing PNG", sheet)
             return
         if frame is not None and not points and display.view not in ("geometry", *COMPARED_VIEWS):
             # The same code as `pmviewer render` uses, so that both write the same picture.
@@ -62,7 +63,7 @@ class Exports:
                 write_frame_png(path, frame, display=display)
                 return f"wrote {path.absolute()}"
 
-            self._state.jobs.start("writing PNG", work)
+            self._state.background.start(FILES, "writing PNG", work)
             return
         pixels = self._viewport.capture(overlays=overlays)
         if pixels is None:
@@ -79,7 +80,7 @@ class Exports:
             write_png(path, pixels)
             return f"wrote {path.absolute()}"
 
-        self._state.jobs.start("writing PNG", work)
+        self._state.background.start(FILES, "writing PNG", work)
 
     def exr(self, path: Path, *, half: bool = False) -> None:
         """Every layer of the newest frame."""
@@ -94,7 +95,7 @@ class Exports:
             write_frame_exr(path, frame, half)
             return f"wrote {path.absolute()}"
 
-        self._state.jobs.start("writing EXR", work)
+        self._state.background.start(FILES, "writing EXR", work)
 
     def session(self, path: Path) -> None:
         """Settings and scene, so that the file reopens to the same picture."""
@@ -112,4 +113,4 @@ class Exports:
             write_session(path, settings, scene, passes, parameters)
             return f"wrote {path.absolute()}"
 
-        state.jobs.start("saving the session", work)
+        state.background.start(FILES, "saving the session", work)

@@ -71,6 +71,12 @@ class Viewport:
 
     # drawing ----------------------------------------------------------------------------------------------------
 
+    def release(self) -> None:
+        """Free what lies on the GPU; nothing is drawn any more."""
+        if self.picture is not None:
+            self.picture.release()
+        self.picture = self._texture = None
+
     def source(self) -> Source:
         """What overlays take their data from."""
         state = self.state
