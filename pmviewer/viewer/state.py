@@ -9,14 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pmviewer.engine.frame import Frame, Level, Message
 from pmviewer.errors import PmviewerError, SettingError
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose, resolve_camera
-from pmviewer.render.free_camera import frustum_lines, resolve_view
+from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.planes import AOVS, TERMS
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import (
@@ -29,10 +26,10 @@ from pmviewer.settings.access import (
     parse_assignments,
     with_values,
 )
+from pmviewer.viewer.background import Background
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.dialogs.recent import RecentFiles
 from pmviewer.viewer.importance_gain import GainRun
-from pmviewer.viewer.jobs import Jobs
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.viewport.controls import camera_values
 
@@ -75,9 +72,9 @@ class ViewerState:
         self.session = session
         self.inactive_reason = inactive_reason
         self.recent = recent
-        self.jobs = Jobs(self.say)
-        self.comparison = Comparison(session, self.jobs, self.say)
-        self.gain = GainRun(session, self.say)
+        self.background = Background(self.say)
+        self.comparison = Comparison(session, self.background, self.say)
+        self.gain = GainRun(session, self.background, self.say)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
         self._said: deque[Message] = deque()
@@ -202,13 +199,6 @@ class ViewerState:
         except SettingError:
             return resolve_camera(scene, self.settings.camera.model_copy(update={"name": "auto"}))
 
-    def frustum(self) -> NDArray[np.float64] | None:
-        """Line ends (2n, 3) of the render camera's frustum while it is drawn."""
-        free, geometry, camera = self.settings.free_camera, self.session.geometry, self.render_camera()
-        if not (free.on and free.frustum) or geometry is None or camera is None:
-            return None
-        return frustum_lines(camera, free.length * float(geometry.radius))
-
     def shown_pair(self) -> tuple[tuple[Frame, Frame], Display] | None:
         """The frames with and without importance while the viewport compares them, with a view that both have."""
         frames = self.gain.frames()
@@ -284,6 +274,12 @@ class ViewerState:
         self.log.append(message)
         if message.level == "error":
             self.toasts.append(Toast(message))
+
+    def unread_errors(self) -> list[str]:
+        """What went wrong after the last window frame."""
+        messages = [*self.session.take_messages(), *self._said]
+        self._said.clear()
+        return [message.text for message in messages if message.level == "error"]
 
     def poll(self) -> None:
         """Once per window frame: collect the messages."""

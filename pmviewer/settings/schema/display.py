@@ -288,21 +288,7 @@ class Overlays(Group):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
-    def by_map(self) -> dict[str, PointOverlay]:
-        """Name in a frame's clouds → how its points are drawn."""
-        maps = {"caustic": self.caustic, "global": self.global_, "radiance": self.radiance}
-        own = {"cache": self.cache, "shadow": self.shadow, "importons": self.importons}
-        return {**maps, **own, "fates": self.fates, "lights": self.lights}
-
-    @property
-    def any_shown(self) -> bool:
-        """Whether anything is drawn over the picture."""
-        others = self.paths.show or self.gather.show or self.projection.show
-        return others or any(style.show for style in self.by_map().values())
-
-    @property
-    def tests_depth(self) -> bool:
-        """Whether surfaces hide any of it."""
-        ways = self.paths, self.gather, self.projection
-        points = any(style.show and style.depth for style in self.by_map().values())
-        return points or any(way.show and way.depth for way in ways)
+    def styles(self) -> dict[str, Group]:
+        """How each overlay is drawn, by its name in the settings' paths."""
+        fields = type(self).model_fields
+        return {field.alias or name: getattr(self, name) for name, field in fields.items()}

@@ -15,11 +15,13 @@ from pmviewer.engine.frame import Frame
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose
 from pmviewer.settings.access import Display
+from pmviewer.viewer.overlays.overlay import Source
 from pmviewer.viewer.shortcuts import INSPECT_KEY, K, is_held
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport import controls
 from pmviewer.viewer.viewport.hud import draw_hud
-from pmviewer.viewer.viewport.picture import Picture, Target
+from pmviewer.viewer.viewport.picture import Picture
+from pmviewer.viewer.viewport.target import Target
 
 VIEWPORT = "Viewport"
 MOST_ZOOM = 64.0
@@ -69,6 +71,20 @@ class Viewport:
 
     # drawing ----------------------------------------------------------------------------------------------------
 
+    def release(self) -> None:
+        """Free what lies on the GPU; nothing is drawn any more."""
+        if self.picture is not None:
+            self.picture.release()
+        self.picture = self._texture = None
+
+    def source(self) -> Source:
+        """What overlays take their data from."""
+        state = self.state
+        geometry = state.session.geometry
+        radius = float(geometry.radius) if geometry is not None else 1.0
+        camera = state.render_camera if geometry is not None else lambda: None
+        return Source(state.settings, state.frame, radius, camera, self.inspected)
+
     def shown_camera(self) -> CameraPose | None:
         """The frame's camera, so that points lie on the picture; the newest one when only geometry is shown."""
         pair = self.state.gain.frames()
@@ -101,30 +117,22 @@ class Viewport:
             self.inspected = None
             self.fit = Fit()
         settings, frame = self.state.settings, self.state.frame
-        changed = picture.upload_geometry(self.state.session.geometry)
-        overlays, display = settings.overlays, self.state.shown_display
-        reference = self.state.comparison.reference
-        changed |= picture.reference.upload(reference.image if reference is not None else None)
+        changed = picture.surfaces.upload(self.state.session.geometry)
+        display, reference = self.state.shown_display, self.state.comparison.reference
+        changed |= picture.planes.reference.upload(reference.image if reference is not None else None)
         if frame is not None:
-            shown = {name: style.show for name, style in overlays.by_map().items()}
-            changed |= picture.upload_frame(frame, display.view, shown)
-            changed |= picture.upload_paths(frame.inspection.paths, overlays.paths)
-            changed |= picture.upload_gathered(frame.inspection.gathered, overlays.gather)
-            changed |= picture.upload_circles(frame.clouds.get("cache"), overlays.cache)
-            changed |= picture.upload_cells(frame.projections, overlays.projection)
-            changed |= picture.upload_fates(frame.inspection.fates, overlays.fates)
-            changed |= picture.upload_lights(frame.known_lights, frame.light_places, overlays.lights)
-        changed |= picture.frustum.upload(self.state.frustum())
+            changed |= picture.planes.upload(frame, display.view)
+        changed |= picture.layers.upload(self.source())
         pair, split = self.state.shown_pair(), None
         if pair is not None:
             display, split = pair[1], settings.compare.split
-        changed |= picture.pair.upload(pair[0] if pair is not None else None, display.view)
+        changed |= picture.planes.pair.upload(pair[0] if pair is not None else None, display.view)
         camera, target = self.shown_camera(), self.target()
         navigating = self.state.navigating and picture.software
-        key = (camera, target, display, overlays, navigating, split)
+        key = (camera, target, display, settings.overlays, settings.free_camera, navigating, split)
         if changed or key != self._drawn_key:
             self._texture = picture.draw(
-                "window", target, camera, display, overlays, navigating=navigating, split=split
+                "window", target, camera, display, settings, navigating=navigating, split=split
             )
             self._drawn_key = key
             self.redraws += 1
@@ -137,8 +145,8 @@ class Viewport:
         settings = self.state.settings
         size = camera.width, camera.height
         target = Target(size, (0, 0, *size))
-        picture.draw("capture", target, camera, self.state.shown_display, settings.overlays if overlays else None)
-        return picture.read("capture")
+        picture.draw("capture", target, camera, self.state.shown_display, settings if overlays else None)
+        return picture.framebuffers.read("capture")
 
     # interface --------------------------------------------------------------------------------------------------
 
