@@ -10,10 +10,10 @@ from pmviewer.engine.method import estimator_of, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import radii_of_pixels
-from pmviewer.engine.stages.cache_stage import prepare_cache, recipe
 from pmviewer.engine.stages.convergence import prepare_convergence
-from pmviewer.engine.stages.guides import gather_records
+from pmviewer.engine.stages.gather_guides import gather_records
 from pmviewer.engine.stages.importance import prepare_importance
+from pmviewer.engine.stages.irradiance_cache import prepare_cache, recipe
 from pmviewer.engine.stages.projection import projection_for
 from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.maps.estimate.variant import marked

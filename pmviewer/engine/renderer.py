@@ -14,7 +14,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.caveats import caveats
 from pmviewer.engine.diagnose import Looked, diagnostic_planes, wanted_of
 from pmviewer.engine.exposure import metered
@@ -25,11 +24,12 @@ from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import first_radius, radii_of_pixels
-from pmviewer.engine.stages.cache_stage import cache_cloud, fill_cache, recipe
-from pmviewer.engine.stages.guides import gather_records
+from pmviewer.engine.stages.gather_guides import gather_records
 from pmviewer.engine.stages.importance import ImportanceStage
-from pmviewer.engine.stages.light_stage import CACHED_PASSES, LightStage
-from pmviewer.engine.stages.shadows import ShadowMap, shadows_of
+from pmviewer.engine.stages.irradiance_cache import cache_cloud, fill_cache, recipe
+from pmviewer.engine.stages.light import KEPT_PASSES, LightStage
+from pmviewer.engine.stages.shadow_photons import ShadowMap, shadows_of
+from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.maps.importance import NO_IMPORTANCE
 from pmviewer.maps.irradiance_cache import NO_CACHE, REACH, IrradianceCache
@@ -69,10 +69,10 @@ class Renderer:
     """
 
     def __init__(
-        self, scene: OpenScene, settings: Settings, pool: WorkPool, cache: StageCache, version: int = 0
+        self, scene: OpenScene, settings: Settings, pool: WorkPool, store: StageStore, version: int = 0
     ) -> None:
         """Raises SettingError when the camera is impossible or the image can't fit into memory."""
-        self.scene, self.settings, self.pool, self.cache, self.version = scene, settings, pool, cache, version
+        self.scene, self.settings, self.pool, self.store, self.version = scene, settings, pool, store, version
         self.render_camera = resolve_camera(scene.scene, settings.camera)
         self.camera = resolve_view(scene.scene, settings, scene.flat.center, scene.flat.radius)
         check_memory(self.camera.width, self.camera.height, settings.photons.N)
@@ -84,9 +84,9 @@ class Renderer:
             else 0.0
         )
         self.tally = Tally()
-        self.light = LightStage(scene, settings, self.plan, pool, cache, self.tally)
+        self.light = LightStage(scene, settings, self.plan, pool, store, self.tally)
         self.importance = ImportanceStage(
-            scene, settings, self.plan, self.render_camera, self.first_radius, pool, cache, self.tally
+            scene, settings, self.plan, self.render_camera, self.first_radius, pool, store, self.tally
         )
         self._cache: IrradianceCache | None = None
         self._shadows: ShadowMap | None = None
@@ -121,7 +121,7 @@ class Renderer:
         small = CameraPose(**{**pose.__dict__, "width": -(-pose.width // shrink), "height": -(-pose.height // shrink)})
         film = Film(small.width, small.height)
         N = min(self.settings.photons.N, COARSE_PHOTONS)
-        quick = Renderer(self.scene, self.settings, self.pool, self.cache, self.version)
+        quick = Renderer(self.scene, self.settings, self.pool, self.store, self.version)
         quick.first_radius = self.first_radius * min(2.0, (self.settings.photons.N / N) ** 0.25)
         quick._pass(film, small, 0, N)
         film.passes = 1
@@ -309,7 +309,7 @@ class Renderer:
         make = partial(shadows_of, self.scene.flat, direct, glossy, seed, index, self.pool.run)
         shape = direct.shadow_N, direct.shadow_fewest, direct.shadow_radius
         key = ("shadows", self.scene.uid, seed, index, *shape, glossy)
-        made = make() if index >= CACHED_PASSES else self.cache.get(key, make, lambda shadows: shadows.bytes)
+        made = make() if index >= KEPT_PASSES else self.store.get(key, make, lambda shadows: shadows.bytes)
         self.tally.rays += made.rays
         return made
 
@@ -386,7 +386,7 @@ class Renderer:
         if (width, height) != (camera.width, camera.height):
             camera = replace(camera, width=width, height=height)
         key = ("outline", self.scene.uid, camera)
-        return self.cache.get(key, lambda: outline_pixels(self.scene.scene, camera), lambda pixels: pixels.nbytes)
+        return self.store.get(key, lambda: outline_pixels(self.scene.scene, camera), lambda pixels: pixels.nbytes)
 
 
 def tile_size(pixels: int, eye: np.void, threads: int) -> int:

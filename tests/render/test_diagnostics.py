@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.maps.record import decode_directions, unpack
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.settings.access import Settings, with_values
@@ -34,7 +34,7 @@ def box():
 
 def stepped(box, pool, values, passes=2):
     settings = with_values(settings_of(photons={"N": 3000}, estimate={"radius": 0.1}), values)
-    renderer = Renderer(box, settings, pool, StageCache(0))
+    renderer = Renderer(box, settings, pool, StageStore(0))
     for _ in range(passes):
         renderer.step()
     return renderer

@@ -82,7 +82,7 @@ def _scattered(settings: Settings, importance: ImportanceStage, made: Importance
         return build_importance(further, "screen", scene.radius, SCATTERED_NEIGHBOURS, False, stage.pool.run)
 
     key = "scattered importance", stage.key, settings.photons, stage.latest.traced
-    return stage.cache.get(key, make, lambda map_: map_.bytes)
+    return stage.store.get(key, make, lambda map_: map_.bytes)
 
 
 def guided_photons(

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.frame import PhotonCloud
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.importance.importons import Rule, Traced, joined, trace
 from pmviewer.maps.importance import NO_IMPORTANCE, ImportanceMap, Importons, build_importance
@@ -99,12 +99,12 @@ class ImportanceStage:
         camera: CameraPose,
         first_radius: float,
         pool: WorkPool,
-        cache: StageCache,
+        store: StageStore,
         tally: Tally,
     ) -> None:
         self.scene, self.settings, self.plan, self.camera = scene, settings, plan, camera
         self.first_radius = first_radius
-        self.pool, self.cache, self.tally = pool, cache, tally
+        self.pool, self.store, self.tally = pool, store, tally
         self.latest: ImportanceMaps | None = None
         self._parts: list[Traced] = []
 
@@ -168,7 +168,7 @@ class ImportanceStage:
             def more(first: int = first) -> Traced:
                 return trace(self.scene.flat, eye, rule, s.render.seed, first, N, self.pool.run)
 
-            part = self.cache.get((*key, "importons", first), more, lambda made: made.bytes)
+            part = self.store.get((*key, "importons", first), more, lambda made: made.bytes)
             self._parts.append(part)
             self.tally.rays += part.rays
             if part.dropped:
@@ -182,7 +182,7 @@ class ImportanceStage:
                 return ImportanceMaps(both if plan.caustic_classes else None, both, count * N)
             return ImportanceMaps(self._build(caustic, even=True) if plan.caustic_classes else None, both, count * N)
 
-        return self.cache.get((*key, "maps", count), build, lambda made: made.bytes)
+        return self.store.get((*key, "maps", count), build, lambda made: made.bytes)
 
     def _build(self, importons: Importons, even: bool) -> ImportanceMap:
         how = self.settings.importance
@@ -197,7 +197,7 @@ def prepare_importance(scene: OpenScene, settings: Settings, plan: Plan, camera:
         pool = WorkPool(1)
         try:
             few = settings.model_copy(update={"importance": settings.importance.model_copy(update={"N": 4})})
-            stage = ImportanceStage(scene, few, plan, camera, 0.0, pool, StageCache(0), Tally())
+            stage = ImportanceStage(scene, few, plan, camera, 0.0, pool, StageStore(0), Tally())
             stage.run(0)
             one = np.ones(1, np.float32)
             build_importance(Importons(np.zeros((1, 3), np.float32), np.zeros(1, np.uint32), one, one), "screen", 1.0)

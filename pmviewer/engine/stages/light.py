@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.method import Plan, estimator_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import pass_neighbours, pass_radius
 from pmviewer.engine.stages.deposition import Rules, rules_of
 from pmviewer.engine.stages.emission import emission_key, guidance_of, guided_photons, note_of, storage
-from pmviewer.engine.stages.guides import GUIDING_PHOTONS, guide_grid, guide_radius
+from pmviewer.engine.stages.gather_guides import GUIDING_PHOTONS, guide_grid, guide_radius
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.projection import projection_for
-from pmviewer.engine.stages.sites import median_radius, sites_of
+from pmviewer.engine.stages.radiance_photons import median_radius, sites_of
+from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.importance.lights import importance_of_lights
 from pmviewer.maps.estimate.variant import marked
@@ -40,7 +40,7 @@ from pmviewer.scene.arrays.flatten import LUMINANCE
 from pmviewer.scene.light_places import light_places
 from pmviewer.settings.access import Settings
 
-CACHED_PASSES = 4
+KEPT_PASSES = 4
 """Photons and maps of the first passes are kept, so that a new camera or radius starts from them."""
 
 SHOWN_TRAJECTORIES = 50_000
@@ -57,10 +57,10 @@ class LightStage:
     """
 
     def __init__(
-        self, scene: OpenScene, settings: Settings, plan: Plan, pool: WorkPool, cache: StageCache, tally: Tally
+        self, scene: OpenScene, settings: Settings, plan: Plan, pool: WorkPool, store: StageStore, tally: Tally
     ) -> None:
         self.scene, self.settings, self.plan = scene, settings, plan
-        self.pool, self.cache, self.tally = pool, cache, tally
+        self.pool, self.store, self.tally = pool, store, tally
         self.projection = projection_for(scene, settings)
         self.choice_radius: float | None = None
         self.guide_radius: float | None = None
@@ -211,9 +211,9 @@ class LightStage:
                 deposition=self.rules.deposition,
             )
 
-        if index >= CACHED_PASSES:
+        if index >= KEPT_PASSES:
             return make(), key
-        return self.cache.get(key, make, lambda photons: photons.bytes), key
+        return self.store.get(key, make, lambda photons: photons.bytes), key
 
     def _maps(
         self,
@@ -265,9 +265,9 @@ class LightStage:
                 nearest,
                 *((estimate,) if nearest else (radii[name], reach[name])),
             )
-            if index >= CACHED_PASSES:
+            if index >= KEPT_PASSES:
                 return build(name)
-            return self.cache.get(map_key, lambda: build(name), lambda m: m[0].bytes if m else 0)
+            return self.store.get(map_key, lambda: build(name), lambda m: m[0].bytes if m else 0)
 
         built = self._timed("maps", lambda: self._build_both(cached, index))
         records, estimator = [], estimator_of(self.settings)
@@ -303,7 +303,7 @@ class LightStage:
         return tuple(records)
 
     def _build_both(self, cached: Callable[[str], Any], index: int) -> list[Any]:
-        if index < CACHED_PASSES:  # the cache belongs to one thread
+        if index < KEPT_PASSES:  # the cache belongs to one thread
             return [self.pool.run([partial(cached, name)])[0] for name in ("caustic", "global")]
         return self.pool.run([partial(cached, name) for name in ("caustic", "global")])
 
@@ -315,10 +315,10 @@ class LightStage:
         def make() -> tuple[RadianceMap, float]:
             return self.pool.run([lambda: sites_of(photons, structure, radius, settings, eye)])[0]
 
-        if index >= CACHED_PASSES:
+        if index >= KEPT_PASSES:
             return make()
         sites_key = ("sites", key, settings.estimate, settings.gather.radiance_photons, settings.gather.cutoff, radius)
-        return self.cache.get(sites_key, make, lambda made: made[0].bytes)
+        return self.store.get(sites_key, make, lambda made: made[0].bytes)
 
     def _build_guides(self, photons: PhotonMaps, key: tuple, index: int) -> PhotonGrid:
         """The pass's photons that guide gather rays, with the radius of the first pass: it blurs nothing."""
@@ -329,10 +329,10 @@ class LightStage:
             radius = self.guide_radius or guide_radius(some, asked, self.scene.flat.radius)
             return guide_grid(some, photons.global_unit, radius)
 
-        if index >= CACHED_PASSES:
+        if index >= KEPT_PASSES:
             return build()
         guides_key = ("guides", key, self.plan.guide_mask, asked, self.guide_radius)
-        return self.cache.get(guides_key, build, lambda grid: grid.bytes)
+        return self.store.get(guides_key, build, lambda grid: grid.bytes)
 
     def _typical_radius(self, eye: np.void, photons: PhotonMaps, structure: Any, radius: float) -> float:
         """Of look-ups in the global map: that of the pass, or the median of k-nearest ones."""
@@ -360,9 +360,9 @@ class LightStage:
             return build_grid(primary, self.choice_radius, photons.global_unit)
 
         def make() -> PhotonGrid:
-            if index >= CACHED_PASSES:
+            if index >= KEPT_PASSES:
                 return build()
-            return self.cache.get(("light choice", key, asked, self.choice_radius), build, lambda grid: grid.bytes)
+            return self.store.get(("light choice", key, asked, self.choice_radius), build, lambda grid: grid.bytes)
 
         chooser = self._timed("maps", lambda: self.pool.run([make])[0])
         self.choice_radius = self.tally.radius["light choice"] = chooser.radius
@@ -375,7 +375,7 @@ class LightStage:
             nearest = self.settings.estimate.lookup == "nearest"
         empty = np.empty((0, 6), np.float32)
         make = (lambda: build_kdtree(empty, 1.0)) if nearest else (lambda: build_grid(empty, 1.0, 1.0))
-        return self.cache.get(("empty", nearest), make, lambda _: 0)
+        return self.store.get(("empty", nearest), make, lambda _: 0)
 
     def _brightest(self, name: str, photons: NDArray[np.float32], unit: float) -> float:
         """Luminance of the brightest photon of a map, in watts. Of photons stored with a probability it is that before:
