@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from pmviewer.engine.diagnose import wanted_of
 from pmviewer.engine.frame import Frame, Level, Message, State, Status
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import OpenScene, open_scene, relit
@@ -22,6 +21,7 @@ from pmviewer.engine.pool import Cancelled, WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
+from pmviewer.engine.wanted import wanted_of
 from pmviewer.errors import PmviewerError
 from pmviewer.progress import stage, watched
 from pmviewer.scene.analysis import SceneTraits
@@ -350,11 +350,7 @@ class Session:
         return wanted if wanted.lacks(frame.inspection.wanted) else None
 
     def _is_finished(self) -> bool:
-        renderer = self._renderer
-        if renderer is None:
-            return True
-        render = self._settings.render
-        return renderer.passes >= render.passes or 0 < render.time_limit <= renderer.tally.seconds
+        return self._renderer is None or self._renderer.stops_by(self._settings)
 
     def _adopt(self, opened: OpenScene, geometry: DrawGeometry, settings: Settings | None) -> None:
         """Make a loaded scene the open one."""

@@ -92,7 +92,7 @@ for method in ("progressive", "gather", "global map"):
     pool.close()
     renderer = rendered(scene, settings, 2)
     statistics = renderer.frame(1).statistics
-    assert renderer.importance.latest is None and renderer.light.rules.deposition is None
+    assert renderer.importance.latest is None and renderer.light.latest.rules.deposition is None
     assert not statistics.deposited and not statistics.importons and not statistics.warnings
     assert not {"importance", "deposition"} & set(statistics.stage_seconds)
     assert not [row for row in photon_rows(statistics) if "onverged" in row[0]]

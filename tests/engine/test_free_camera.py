@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pmviewer.engine.stages.importance as importance_stage
-import pmviewer.engine.stages.light as light
+import pmviewer.engine.stages.tracer as tracer
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
@@ -59,7 +59,7 @@ def test_moving_it_traces_nothing(monkeypatch):
                 raise AssertionError("traced again")
 
             monkeypatch.setattr(importance_stage, "trace", refused)
-            monkeypatch.setattr(light, "trace_pass", refused)
+            monkeypatch.setattr(tracer, "trace_pass", refused)
         moved = settings(on=True).model_copy(update={"camera": settings_of(camera={"origin": (0, 0, 0.5)}).camera})
         with pytest.raises(AssertionError, match="traced again"):
             Renderer(scene, moved, pool, cache).step()

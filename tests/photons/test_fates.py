@@ -62,7 +62,7 @@ def test_fates_are_those_of_the_pass_and_add_up(scene, pool, rule):
     """The second pass, so that its own photons and rules are meant: counts as in the books, stored ones where the map
     has them."""
     renderer = stepped(scene, pool, passes=2, **RULES[rule])
-    assert (renderer.light.emission is not None) == (rule in ("guided", "Christensen"))
+    assert (renderer.light.latest.lights is not None) == (rule in ("guided", "Christensen"))
     rows = renderer.inspect(Wanted(fates=1_000_000)).fates
     found = unpack(rows, 1.0)
     fates, maps = found["light"] & 7, found["light"] >> FATE_BITS

@@ -102,7 +102,7 @@ def test_statistics_and_cloud():
     assert (inwards > 0).mean() > 0.9
     assert named["Phi"].min() >= 0
     assert named["Phi"].max() > 0
-    assert statistics.map_bytes > renderer._cache.bytes > 128 * statistics.cache_records
+    assert statistics.map_bytes > renderer.latest.cache.bytes > 128 * statistics.cache_records
 
 
 def test_the_candidates_of_all_rounds_are_a_lattice():

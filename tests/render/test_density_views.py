@@ -124,7 +124,7 @@ def test_probability_is_that_of_the_rule(box, pool, cut_off):
     how = {"map": "average", "neighbours": 20, "f": 0.4, "epsilon": 0.3, "cut_off": cut_off}
     renderer = stepped(box, pool, deposition="Keller-Wald", **how)
     shown = renderer.inspect(Wanted("storing", "global")).planes["storing probability"].reshape(-1)
-    rule = renderer.light.rules.deposition.global_
+    rule = renderer.light.latest.rules.deposition.global_
     p, n = hits(renderer.camera)
     some = ~np.isnan(p[:, 0])
     asked = rule.probability(p[some].astype(np.float32), encode_normals(n[some]))

@@ -101,7 +101,7 @@ def test_a_wide_radius_is_not_cut_off(opened, pool):
     widest = renderer.film.radii[:, RADIUS + OF_GLOBAL].max()
     assert widest == pytest.approx(first, rel=1e-6)
     assert renderer.tally.radius["global"] < 0.9 * first
-    structure = renderer.light._keep[0][1][0]
+    structure = renderer.latest.maps.global_.structure
     assert structure.radius >= widest
 
 

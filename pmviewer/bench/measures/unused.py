@@ -35,7 +35,7 @@ WIDTH = 160
 """Of the pictures; a run must be short, or too few pairs fit into the time."""
 PHOTONS = 60_000
 PASSES = 4
-CACHE_BYTES = 64 << 20
+STORE_BYTES = 64 << 20
 BOUND = 1.02
 EXACT = 0.004
 """The median's standard error at which a scene is done."""
@@ -116,10 +116,7 @@ class Side:
         prepare(opened, settings, pool, lambda text, share: None)
 
     def renderer(self) -> Renderer:
-        made = Renderer(self.opened, self.settings, self.pool, StageStore(CACHE_BYTES))
-        if self.plan is not None:
-            made.plan = self.plan
-        return made
+        return Renderer(self.opened, self.settings, self.pool, StageStore(STORE_BYTES), plan=self.plan)
 
     def picture(self) -> np.ndarray:
         renderer = self.renderer()
