@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.energy import ENTRIES
 from pmviewer.engine.frame import Frame, Statistics
@@ -19,6 +18,7 @@ from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.errors import SceneError, SettingError
 from pmviewer.job import Job, check_output, overrides
 from pmviewer.output.compare import ERROR_COLUMNS, Reference, error_row, load_reference
@@ -67,7 +67,7 @@ def render_job(
     view = _view(settings, opened)
     pool = WorkPool(threads)
     try:
-        renderer = Renderer(opened, settings, pool, StageCache(0))
+        renderer = Renderer(opened, settings, pool, StageStore(0))
         if opened.scene.exposure is None and settings.display.exposure == "auto":
             renderer.coarse_frame(0)  # as in the window it decides the exposure
         _run(renderer, pool, None if target is None else partial(_print_error, target))

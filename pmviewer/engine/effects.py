@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pmviewer.engine.comparison.without_importance import refusal
-from pmviewer.engine.diagnose import OF_A_MAP, judges, refused_view
 from pmviewer.engine.method import Plan, plan_of
+from pmviewer.engine.wanted import OF_A_MAP, judges, refused_view
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings

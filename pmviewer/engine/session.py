@@ -14,14 +14,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from pmviewer.engine.cache import StageCache
-from pmviewer.engine.diagnose import wanted_of
 from pmviewer.engine.frame import Frame, Level, Message, State, Status
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import OpenScene, open_scene, relit
 from pmviewer.engine.pool import Cancelled, WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
+from pmviewer.engine.wanted import wanted_of
 from pmviewer.errors import PmviewerError
 from pmviewer.progress import stage, watched
 from pmviewer.scene.analysis import SceneTraits
@@ -61,7 +61,7 @@ class Session:
         self._warned: set[str] = set()
         self._changed = threading.Condition()
         self._pool = WorkPool(threads, behind_window=True)
-        self._cache = StageCache()
+        self._store = StageStore()
         self._renderer: Renderer | None = None
         self._worker = threading.Thread(target=self._work, name="pmviewer session", daemon=True)
         self._worker.start()
@@ -318,7 +318,7 @@ class Session:
             except PmviewerError as error:
                 self._fail(str(error))
             except MemoryError:
-                self._cache.clear()
+                self._store.clear()
                 self._fail("Not enough memory for these settings: lower N or the image size.")
             except Exception as error:
                 self._fail(unexpected(error))
@@ -350,15 +350,11 @@ class Session:
         return wanted if wanted.lacks(frame.inspection.wanted) else None
 
     def _is_finished(self) -> bool:
-        renderer = self._renderer
-        if renderer is None:
-            return True
-        render = self._settings.render
-        return renderer.passes >= render.passes or 0 < render.time_limit <= renderer.tally.seconds
+        return self._renderer is None or self._renderer.stops_by(self._settings)
 
     def _adopt(self, opened: OpenScene, geometry: DrawGeometry, settings: Settings | None) -> None:
         """Make a loaded scene the open one."""
-        self._cache.clear()
+        self._store.clear()
         self._opened, self.geometry, self._renderer, self._pixel = opened, geometry, None, None
         if settings is not None:
             self._settings = settings
@@ -398,7 +394,7 @@ class Session:
             self._first_picture, self._attempt = True, version
         try:
             prepare(self._opened, settings, self._pool, lambda text, share: self._tell("preparing", text, share))
-            renderer = Renderer(self._opened, settings, self._pool, self._cache, version)
+            renderer = Renderer(self._opened, settings, self._pool, self._store, version)
             self._tell("rendering", "first picture")
             frame = renderer.coarse_frame(self._serial + 1, self._wanted(renderer))
             self._publish(frame)

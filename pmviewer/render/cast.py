@@ -11,6 +11,7 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.surface import leave, surface_at
 
 _f4 = np.float32
+_i8 = np.int64
 _INF = _f4(np.inf)
 
 
@@ -42,7 +43,8 @@ class Hit(NamedTuple):
 def cast(scene, ray):
     """What the ray meets, a Hit."""
     o, d = ray.o, ray.d
-    t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], ray.near, ray.far)
+    t, found, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], ray.near, ray.far)
+    prim = _i8(found)  # One type for every kind of scene.
     if prim < 0:
         return Hit(prim, u, v, t, o, d, d, _f4(0.0))
     p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.importance.lights import importance_of_lights
 from pmviewer.maps.record import unpack
 from pmviewer.photons.deposition.fates import FATE_BITS
@@ -51,7 +51,7 @@ def scene():
 def stepped(scene, pool, method="progressive", passes=1, N=20_000, **importance):
     how = {"map": "screen", "N": 1500, "neighbours": 20, **importance}
     settings = settings_of(render={"method": method}, photons={"N": N, "q": 0.5}, importance=how)
-    renderer = Renderer(scene, settings, pool, StageCache(0))
+    renderer = Renderer(scene, settings, pool, StageStore(0))
     for _ in range(passes):
         renderer.step()
     return renderer
@@ -62,7 +62,7 @@ def test_fates_are_those_of_the_pass_and_add_up(scene, pool, rule):
     """The second pass, so that its own photons and rules are meant: counts as in the books, stored ones where the map
     has them."""
     renderer = stepped(scene, pool, passes=2, **RULES[rule])
-    assert (renderer.light.emission is not None) == (rule in ("guided", "Christensen"))
+    assert (renderer.light.latest.lights is not None) == (rule in ("guided", "Christensen"))
     rows = renderer.inspect(Wanted(fates=1_000_000)).fates
     found = unpack(rows, 1.0)
     fates, maps = found["light"] & 7, found["light"] >> FATE_BITS

@@ -162,4 +162,4 @@ def factors(
                 notes += [note] if note and note not in notes else []
         return f, notes
 
-    return stage.cache.get(("deposition f", stage.key, maps.traced), make, lambda made: 0)
+    return stage.store.get(("deposition f", stage.key, maps.traced), make, lambda made: 0)

@@ -9,6 +9,7 @@ import numpy as np
 from pmviewer.engine.method import Plan
 from pmviewer.engine.stages.deposition import Rules, importance_of, sampled_classes
 from pmviewer.engine.stages.importance import ImportanceStage
+from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.importance.rules import full_importance, relative_importance
 from pmviewer.kernels.dimensions import ROUNDING_SALT, SCATTERED_SALT
 from pmviewer.maps.importance import ImportanceMap, Importons, build_importance
@@ -18,7 +19,7 @@ from pmviewer.photons.deposition.rules import Deposition, Homogeneous, Rule
 from pmviewer.photons.emission.guided import Guidance, Guided, Known
 from pmviewer.photons.emission.scattered import FIRST
 from pmviewer.photons.emission.tested import Sought
-from pmviewer.photons.light_pass.light_pass import PhotonMaps, guided_emission_of, scattered_photons, trace_pass
+from pmviewer.photons.light_pass.light_pass import PhotonMaps, scattered_photons
 from pmviewer.settings.access import Settings
 
 MOST_SCATTERED = 1 << 15
@@ -82,31 +83,22 @@ def _scattered(settings: Settings, importance: ImportanceStage, made: Importance
         return build_importance(further, "screen", scene.radius, SCATTERED_NEIGHBOURS, False, stage.pool.run)
 
     key = "scattered importance", stage.key, settings.photons, stage.latest.traced
-    return stage.cache.get(key, make, lambda map_: map_.bytes)
+    return stage.store.get(key, make, lambda map_: map_.bytes)
 
 
 def guided_photons(
-    guidance: Guidance,
-    rules: Rules,
-    settings: Settings,
-    plan: Plan,
-    importance: ImportanceStage,
-    index: int,
-    N: int,
-    before: Known | None,
+    tracer: Tracer, guidance: Guidance, rules: Rules, index: int, N: int, before: Known | None
 ) -> PhotonMaps | None:
     """The light pass of N trajectories with guided emission; None where they are too few to test all lights. `before`
     is what the passes before know.
 
     Without deposition rules, those of Christensen's emission are used with it (`Homogeneous`).
     """
-    scene, run, photons = importance.scene.flat, importance.pool.run, settings.photons
-    seed, caustics = settings.render.seed, bool(plan.caustic_classes)
-    guided = guided_emission_of(scene, photons, seed, index * N, N, caustics, guidance, run, before)
+    guided = tracer.guided_emission(index, N, guidance, before)
     if guided is None:
         return None
-    deposition = rules.deposition or storage(guidance, guided, settings, plan)
-    return trace_pass(scene, photons, seed, index * N, N, caustics, run, deposition=deposition, guided=guided)
+    deposition = rules.deposition or storage(guidance, guided, tracer.settings, tracer.plan)
+    return tracer.trace(index, N, deposition=deposition, guided=guided)
 
 
 def storage(guidance: Guidance, guided: Guided, settings: Settings, plan: Plan) -> Deposition:

@@ -96,13 +96,13 @@ def fill_cache(given: PassData, how: NDArray[np.void], pool: WorkPool) -> tuple[
     return cache, total
 
 
-def prepare_cache(given: PassData, how: NDArray[np.void]) -> IrradianceCache:
-    """An empty cache, made by calling every kernel of this stage once, on nothing."""
-    cache = _extended(build_cache(np.empty((0, ROW), np.float32), how), np.empty((0, ROW), np.float32))
+def prepare_cache(given: PassData) -> None:
+    """Call every kernel of this stage once, on nothing."""
+    none = np.empty((0, ROW), np.float32)
+    cache = _extended(build_cache(none, np.zeros(1, RECORD)), none)
     rows, made, counts = np.empty((0, ROW), np.float32), np.empty(0, bool), np.zeros(N_COUNTS, np.int64)
     fill_records(given._replace(cache=cache.record), np.empty(0, np.int32), rows, made, counts, 0, 0)
     cache_cloud(cache)
-    return cache
 
 
 def _extended(cache: IrradianceCache, rows: NDArray[np.float32]) -> IrradianceCache:

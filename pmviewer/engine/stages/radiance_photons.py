@@ -3,40 +3,44 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.stages.light_plan import LightPlan
+from pmviewer.engine.stages.pass_maps import LookUpMap
 from pmviewer.maps.estimate.estimate import irradiance_at_knn
+from pmviewer.maps.estimate.filters import FILTERS
 from pmviewer.maps.radiance import RadianceMap, build_sites
 from pmviewer.maps.record import decode_directions
 from pmviewer.maps.search.kdtree import PhotonKdTree
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.photons.light_pass.light_pass import PhotonMaps
-from pmviewer.settings.access import Settings
+from pmviewer.render.record import RIMS
+from pmviewer.settings.access import Estimate, Settings
 
 AUTOMATIC_CUTOFF, AUTOMATIC_CUTOFF_NEAREST = 0.5, 1.0
-"""In look-up radii. Half a radius keeps the mean exact (see `pmviewer.maps.radiance`). A disc of k photons holds sites
-at any density, so that a whole radius costs 0.2 % of bias and saves nearly all look-ups of the rays themselves."""
+"""In look-up radii. Half a radius keeps the mean exact (see `pmviewer.maps.radiance`). A disc of k photons holds
+radiance photons at any density, so that a whole radius costs 0.2 % of bias and saves nearly all look-ups of the rays
+themselves."""
 
 PROBES = 256
 """Photons at which the radius of k-nearest look-ups is measured."""
 
 
-def sites_of(
-    photons: PhotonMaps, structure: Any, radius: float, settings: Settings, eye: np.void
+def radiance_photons_of(
+    photons: PhotonMaps, global_: LookUpMap, settings: Settings, light: LightPlan
 ) -> tuple[RadianceMap, float]:
-    """Radiance photons in a grid or kd-tree of all global photons whose look-ups have (at most) that radius; `eye` as
-    for `median_radius`.
+    """Radiance photons of the pass, for look-ups in the map of all its global photons.
 
-    Returns the map, its irradiances not yet computed, and the largest distance at which a radiance photon is used.
+    Returns the map, its irradiances not yet computed, and the largest distance at which a radiance photon is used, in
+    scene units.
     """
-    share = settings.gather.radiance_photons
+    share, radius = settings.gather.radiance_photons, global_.radius
     assert share != "off"
     cutoff = AUTOMATIC_CUTOFF
-    if isinstance(structure, PhotonKdTree):
-        radius = median_radius(photons, structure, radius, eye)
+    if isinstance(global_.structure, PhotonKdTree):
+        radius = median_radius(photons, global_.structure, radius, settings.estimate, light)
         cutoff = AUTOMATIC_CUTOFF_NEAREST
     if settings.gather.cutoff != "auto":
         cutoff = float(settings.gather.cutoff)
@@ -45,8 +49,10 @@ def sites_of(
     return build_sites(photons.global_, photons.normals, share, cutoff, unit), cutoff
 
 
-def median_radius(photons: PhotonMaps, tree: PhotonKdTree, max_radius: float, eye: np.void) -> float:
-    """Median radius of the pass's k-nearest look-ups at photons spread evenly over the map; eye: EYE_DTYPE record."""
+def median_radius(
+    photons: PhotonMaps, tree: PhotonKdTree, max_radius: float, estimate: Estimate, light: LightPlan
+) -> float:
+    """Median radius, in scene units, of the pass's k-nearest look-ups at photons spread evenly over the map."""
     n = len(photons.global_)
     if n == 0:
         return max_radius
@@ -59,14 +65,14 @@ def median_radius(photons: PhotonMaps, tree: PhotonKdTree, max_radius: float, ey
         tree.record,
         points,
         normals,
-        eye["k"],
+        np.int32(light.neighbours),
         np.float32(max_radius),
-        eye["flatness"],
+        np.float32(estimate.flatness),
         np.int32(ALL_CLASSES),
-        eye["filter"],
-        eye["cone_k"],
-        eye["rim"],
-        eye["share"],
+        np.int32(FILTERS.index(estimate.filter)),
+        np.float32(estimate.cone_k),
+        np.int32(RIMS.index(estimate.rim)),
+        np.float32(light.share),
         0,
         m,
         E,

@@ -10,7 +10,7 @@ BUDGET = 1 << 30
 """Bytes of results that are kept; the ones unused for longest go first."""
 
 
-class StageCache:
+class StageStore:
     """A least-recently-used store with a budget in bytes. Not thread-safe: the session's worker owns it."""
 
     def __init__(self, budget: int = BUDGET) -> None:
