@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels import scene as K
 from pmviewer.kernels.accel.bvh import Bvh, build
 from pmviewer.kernels.accel.raycast import cast_closest, cast_occluded
+from pmviewer.kernels.meshes.cells import cell_means, spanning
 from pmviewer.scene.arrays.tessellate import triangles_of
 from pmviewer.scene.description import Mesh, Scene, Shape
 from pmviewer.scene.formats.mitsuba.transform import mirrors
@@ -146,7 +147,7 @@ def _parts(scene: Scene, keep: Bools) -> list[Part]:
                 parts.append((corners @ m[:3, :3].T + m[:3, 3], normals @ turned, shape))
     if sum(len(part[0]) for part in parts) > 2 * MOST_EXACT and scene.instances:
         corners, normals, shape = (np.concatenate(column) for column in zip(*parts))
-        faces = np.arange(3 * len(corners)).reshape(-1, 3)
+        faces = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
         return [_merged(corners.reshape(-1, 3), faces, shape, lambda kept: normals[kept])]
     return parts
 
@@ -200,12 +201,13 @@ def _merged(vertices: Float, faces: NDArray, shape_of: NDArray, fronts: Fronts, 
     if not size > 0:
         size = max(float(np.ptp(some, axis=0).max()) / cells, 1e-300)
     start = (low + high) / 2 - cells / 2 * size
-    cell = np.floor(np.clip((vertices - start) / size, -1, cells)).astype(np.int32) + 1
     side = cells + 2
-    key = (cell[:, 0] * side + cell[:, 1]) * side + cell[:, 2]
-    k = key[faces]
-    kept = np.flatnonzero((k[:, 0] != k[:, 1]) & (k[:, 1] != k[:, 2]) & (k[:, 2] != k[:, 0]))
-    k = k[kept].astype(np.int64)
+    key, mean = np.empty(len(vertices), np.int32), np.empty((side**3, 3))
+    cell_means(np.ascontiguousarray(vertices, np.float64), start, size, cells, key, mean)
+    faces = np.ascontiguousarray(faces)
+    kept = np.empty(len(faces), np.int64)
+    kept = kept[: spanning(faces, key, kept)]
+    k = key[faces[kept]].astype(np.int64)
     if len(k) > MOST_EXACT // 4:
         packed = np.sort(k, axis=1) @ np.array([side**6, side**3, 1])
         _, first = np.unique(packed, return_index=True)
@@ -216,6 +218,4 @@ def _merged(vertices: Float, faces: NDArray, shape_of: NDArray, fronts: Fronts, 
     finer = min(MOST_CELLS, int(cells * math.sqrt(MOST_EXACT / 2 / max(len(k), 1))))
     if cells == CELLS and finer > 1.3 * CELLS:
         return _merged(vertices, faces, shape_of, fronts, finer)
-    number = np.maximum(np.bincount(key, minlength=side**3), 1)
-    mean = np.stack([np.bincount(key, vertices[:, j], side**3) / number for j in range(3)], axis=1)
     return mean[k], fronts(kept), shape_of[kept]
