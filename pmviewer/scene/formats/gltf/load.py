@@ -242,7 +242,7 @@ class _Reader:
             self._result.camera, self._result.aspect = cameras[index].camera, cameras[index].aspect
 
     def _add_light(self, place: Placed) -> None:
-        number = extension(place.node, _LIGHTS).get("light")
+        number = extension(place.node, _LIGHTS).get("light") if "extensions" in place.node else None
         if number is None:
             return
         lights = self._document.extension(_LIGHTS).get("lights", [])
