@@ -22,8 +22,8 @@ from pmviewer.kernels.vector import add, largest, mul, scale
 from pmviewer.maps.record import CAUSTIC as CAUSTIC_CLASS
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow_camera_path
-from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near
-from pmviewer.render.direct.direct import found_light, light_samples, met_light, radiance_of
+from pmviewer.render.direct.choice import LIST_WORDS, choose, choose_by_power
+from pmviewer.render.direct.direct import direct_light, found_light, met_light, radiance_of
 from pmviewer.render.gather.cached import cached, surface_rays
 from pmviewer.render.gather.guide import AIM_WORDS, aim
 from pmviewer.render.given import Aim, GatherRays, Sampler, opened
@@ -40,7 +40,7 @@ from pmviewer.render.pixel import (
     sampled_ray,
 )
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius
-from pmviewer.render.record import C_CUT, C_RAYS, C_SAVED, C_SHADOW_RAYS
+from pmviewer.render.record import C_CUT, C_RAYS
 from pmviewer.render.reflect import reflected, unfound
 
 _f4 = np.float32
@@ -62,17 +62,6 @@ def outline_emission(scene, eye, pixel):
         if light >= 0:
             total = add(total, radiance_of(scene, light, hit, ray.d))
     return scale(total, _f4(1.0) / _f4(eye.outline_rays))
-
-
-@device
-def _direct(given, si, group, choice, n_bsdf, pixel, numbers):
-    """Radiance by the light samples of the choice (`light_samples`), their rays counted."""
-    sampler = Sampler(given.eye.sequence, pixel.seed, given.eye.index)
-    L, rays, saved = light_samples(given.scene, given.shadows, si, group, choice, n_bsdf, sampler, numbers)
-    pixel.counts[C_RAYS] += rays
-    pixel.counts[C_SHADOW_RAYS] += rays
-    pixel.counts[C_SAVED] += saved
-    return L
 
 
 @device
@@ -113,9 +102,9 @@ def _stored(given, si, beta, pixel, place, scratch, whole):
         n_bsdf = max(gather - aimed.rays, _i8(1))
     choice = choose_by_power(scratch[0], eye.light_samples)
     if eye.direct != 0:
-        if eye.choice != BY_POWER:
-            choice = choose_near(given.scene, eye, given.choice_map, si.p, si.ng, scratch[0])
-        L = _direct(given, si, STORED, choice, n_bsdf, pixel, (u_pick, place[0], place[1]))
+        choice = choose(given.scene, eye, given.choice_map, si.p, si.ng, scratch[0])
+        sampler, numbers = Sampler(eye.sequence, pixel.seed, eye.index), (u_pick, place[0], place[1])
+        L = direct_light(given, si, STORED, choice, n_bsdf, sampler, numbers, pixel.counts)
         deposit(pixel, DIRECT if whole else SPECULAR, mul(beta, L))
     _from_maps(given, si, beta, pixel, whole)
     n = _i8(gather)
@@ -146,7 +135,8 @@ def _followed(given, si, beta, pixel, depth, choice, lights):
     if eye.followed_direct != 0:
         choice = choose_by_power(lights, eye.light_samples)
         u_pick, u, v, _ = draw4(eye.sequence, pixel.seed, eye.index, CHAIN_LIGHT + depth)
-        L = _direct(given, si, FOLLOWED, choice, eye.mis, pixel, (u_pick, u, v))
+        sampler = Sampler(eye.sequence, pixel.seed, eye.index)
+        L = direct_light(given, si, FOLLOWED, choice, eye.mis, sampler, (u_pick, u, v), pixel.counts)
         deposit(pixel, SPECULAR, mul(beta, L))
     return choice
 

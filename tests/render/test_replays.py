@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.scene.description import Scene, Shape, Sphere
 from pmviewer.scene.texture import Bitmap
 from tests.support.scenes import GLASS, MIRROR, box_camera, box_walls, diffuse, settings_of
@@ -49,7 +49,7 @@ def rendered(**gather):
     settings = settings_of(
         render={"method": "gather", "outline_rays": 0}, photons={"N": 2000}, gather={"rays": 2, **gather}
     )
-    renderer = Renderer(open_scene(box()), settings, pool, StageCache(0))
+    renderer = Renderer(open_scene(box()), settings, pool, StageStore(0))
     renderer.step()
     frame = renderer.frame(1)
     directly, met = frame.image("emission"), frame.image("emission") + frame.image("specular")

@@ -41,9 +41,9 @@ def counting_tree(photons: NDArray[np.float32]) -> PhotonKdTree:
 
 def counting_eye(eye: NDArray[np.void]) -> NDArray[Any]:
     """The eye record (1,) with the look-up of `density_view`."""
-    made = eye.copy()
-    made["k"], made["share"], made["flatness"], made["boundary"] = NEAREST, 1.0, FLATNESS, 0.0
-    return made
+    counting = eye.copy()
+    counting["k"], counting["share"], counting["flatness"], counting["boundary"] = NEAREST, 1.0, FLATNESS, 0.0
+    return counting
 
 
 @kernel

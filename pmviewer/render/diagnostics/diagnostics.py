@@ -21,7 +21,7 @@ from pmviewer.maps.record import encode_direction
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.render.cast import Hit, cast
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow
-from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near, chosen_light
+from pmviewer.render.direct.choice import LIST_WORDS, choose, chosen_light
 from pmviewer.render.direct.shadow import UNKNOWN, known_visibility
 from pmviewer.render.lookup import irradiance, looked_up
 from pmviewer.render.pixel import camera_ray, pixel_seed
@@ -135,9 +135,7 @@ def site_view(scenes, eyes, maps, site_maps, cell_maps, out, first, last):
 def known_share(scene, eye, choice_map, shadows, si, pixel, lights):
     """Light samples at a surface that count, and how many of them shadow photons decide. `lights`: LIST_WORDS words of
     scratch; the rest as for `shadow_view`."""
-    choice = choose_by_power(lights, eye.light_samples)
-    if eye.choice != BY_POWER:
-        choice = choose_near(scene, eye, choice_map, si.p, si.ng, lights)
+    choice = choose(scene, eye, choice_map, si.p, si.ng, lights)
     samples = choice[4]
     seed = pixel_seed(eye, pixel)
     counted, known = _i8(0), _i8(0)

@@ -19,6 +19,7 @@ from pmviewer.kernels.vector import add, dot, mul, scale, sub
 from pmviewer.render.chain import BLACK
 from pmviewer.render.direct.choice import chosen_light, expected_samples
 from pmviewer.render.direct.shadow import LIT, UNKNOWN, known_visibility
+from pmviewer.render.record import C_RAYS, C_SAVED, C_SHADOW_RAYS
 
 _f4 = np.float32
 _u4 = np.uint32
@@ -86,6 +87,16 @@ def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, numbers):
                     weight *= power_heuristic(m, pdf, _f4(n_bsdf), bsdf_pdf(b, group, wo, wi))
                 total = add(total, scale(mul(f, L), weight))
     return total, rays, saved
+
+
+@device
+def direct_light(given, si, group, choice, n_bsdf, sampler, numbers, counts):
+    """L of `light_samples` in a pass (PassData), its rays counted."""
+    L, rays, saved = light_samples(given.scene, given.shadows, si, group, choice, n_bsdf, sampler, numbers)
+    counts[C_RAYS] += rays
+    counts[C_SHADOW_RAYS] += rays
+    counts[C_SAVED] += saved
+    return L
 
 
 @device

@@ -98,10 +98,10 @@ def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
 
 
 @kernel
-def fill_records(given, pixels, rows, made, counts, first, last):
-    """Make the records of candidates first … last−1 that lack them, and tell in `made` which.
+def fill_records(given, pixels, rows, filled, counts, first, last):
+    """Make the records of candidates first … last−1 that lack them, and tell in `filled` which.
 
-    given: as for the eye pass, with the cache so far; pixels: int32 (n,); rows: float32 (n, ROW); made: bool (n,);
+    given: as for the eye pass, with the cache so far; pixels: int32 (n,); rows: float32 (n, ROW); filled: bool (n,);
     counts: int64 (N_COUNTS,).
     """
     given = opened(given)
@@ -111,7 +111,7 @@ def fill_records(given, pixels, rows, made, counts, first, last):
     for i in range(first, last):
         pixel = pixels[i]
         found, p, ng, n, gap, footprint = uncovered_hit(given, pixel, counts)
-        made[i] = found
+        filled[i] = found
         if not found:
             continue
         seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(CACHE_SALT))
@@ -119,7 +119,7 @@ def fill_records(given, pixels, rows, made, counts, first, last):
         harmonic = irradiance_and_gradients(cells, cache.rings, cache.sectors, n, E, rotation, translation)
         if not (E[0] + E[1] + E[2] < _f8(np.inf) and harmonic > _f8(0.0)):
             counts[C_DROPPED] += 1
-            made[i] = False
+            filled[i] = False
             continue
         harmonic = limit_gradient(cache, harmonic, footprint, E, translation)
         row = rows[i]

@@ -21,10 +21,10 @@ from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import add, dot, largest, mul
 from pmviewer.render.cast import cast, leaving
 from pmviewer.render.chain import BLACK
-from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near
-from pmviewer.render.direct.direct import found_light, light_samples
+from pmviewer.render.direct.choice import LIST_WORDS, choose
+from pmviewer.render.direct.direct import direct_light, found_light
 from pmviewer.render.given import Sampler
-from pmviewer.render.record import C_RAYS, C_SAVED, C_SHADOW_RAYS
+from pmviewer.render.record import C_RAYS
 from pmviewer.render.reflect import reflected
 
 _f4 = np.float32
@@ -58,14 +58,8 @@ def _again(given, si, seed, index, counts, hit):
     scene, eye = given.scene, given.eye
     sampler = Sampler(eye.sequence, hash3(seed, _u4(SECOND_GATHER_SALT), _u4(0)), index)
     u_pick, u, v, _ = draw4(eye.sequence, sampler.seed, index, SECOND_LIGHT)
-    lights = stack_i4(LIST_WORDS)
-    choice = choose_by_power(lights, eye.light_samples)
-    if eye.choice != BY_POWER:
-        choice = choose_near(scene, eye, given.choice_map, si.p, si.ng, lights)
-    L, rays, saved = light_samples(scene, given.shadows, si, STORED, choice, eye.mis, sampler, (u_pick, u, v))
-    counts[C_RAYS] += rays
-    counts[C_SHADOW_RAYS] += rays
-    counts[C_SAVED] += saved
+    choice = choose(scene, eye, given.choice_map, si.p, si.ng, stack_i4(LIST_WORDS))
+    L = direct_light(given, si, STORED, choice, eye.mis, sampler, (u_pick, u, v), counts)
     if eye.caustic_mask != 0:
         L = add(L, reflected(given.caustic_map, eye, eye.caustic_radius, si, eye.caustic_mask))
     u, v, u_lobe, _ = draw4(eye.sequence, sampler.seed, index, SECOND_RAY)
