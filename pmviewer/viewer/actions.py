@@ -79,6 +79,14 @@ class Commands:
     def _open(self) -> None:
         self.dialogs.open("Open a scene or session", "Scenes and sessions", SCENE_PATTERNS, self.state.open)
 
+    def locate_scene(self) -> None:
+        """Once per window frame: ask where the scene is that a session file misses."""
+        if self.state.lost is None or self.dialogs.is_open:
+            return
+        (session, scene), self.state.lost = self.state.lost, None
+        title = f"Where is {Path(scene).name} now?"
+        self.dialogs.open(title, "Scenes", SCENE_PATTERNS, lambda found: self.state.open(session, scene=found))
+
     def _load_reference(self) -> None:
         self.dialogs.open("Load a reference", "OpenEXR pictures", ["*.exr"], self.load_reference)
 

@@ -177,6 +177,7 @@ class ViewerApp:
         if not self.dialogs.is_open:
             run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying)
         self.state.flipped = not self.dialogs.is_open and is_held(FLIP_KEY)
+        self.commands.locate_scene()
         self.dialogs.poll()
         draw_help(self.state)
 

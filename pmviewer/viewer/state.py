@@ -36,18 +36,19 @@ from pmviewer.viewer.viewport.controls import camera_values
 InactiveReason = Callable[[str, Settings, Any], str | None]
 LAYERS = ("beauty", *TERMS, *AOVS)
 LOG_LINES = 2000
-TOAST_SECONDS = 8.0
+TOAST_SECONDS = 12.0
+MOST_TOASTS = 2
 
 
 @dataclass
 class Toast:
-    """A message that floats over the picture until it is dismissed or, unless it is an error, grows old."""
+    """An error that floats over the picture until it is dismissed, or grows old; the log keeps it."""
 
     message: Message
     born: float = field(default_factory=time.monotonic)
 
     def is_over(self) -> bool:
-        return self.message.level != "error" and time.monotonic() - self.born > TOAST_SECONDS
+        return time.monotonic() - self.born > TOAST_SECONDS
 
 
 def _first_radius(frame: Frame, scene_radius: float) -> float | None:
@@ -65,6 +66,11 @@ def _first_radius(frame: Frame, scene_radius: float) -> float | None:
     return latest / shrunk / scene_radius
 
 
+def is_gone(scene: str | Path) -> bool:
+    """Whether that is a file which isn't there; bundled scenes have names."""
+    return Path(scene).is_absolute() and not Path(scene).exists()
+
+
 class ViewerState:
     """Lives as long as the window."""
 
@@ -77,6 +83,7 @@ class ViewerState:
         self.gain = GainRun(session, self.background, self.say)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
+        self._toasts_of = session.scene
         self._said: deque[Message] = deque()
         """What any thread said since the last frame."""
         self.flying = False
@@ -90,6 +97,8 @@ class ViewerState:
         self.parameters: dict[str, str] = {}
         """Values for the open scene file's `<default>` names."""
         self._opening: tuple[str, dict[str, str]] | None = None
+        self.lost: tuple[str, str] | None = None
+        """A session file that was to be opened and the scene that it misses, until somebody asks where that is."""
 
     # settings ---------------------------------------------------------------------------------------------------
 
@@ -221,10 +230,12 @@ class ViewerState:
         scene = self.session.scene
         if scene is self._scene:
             return False
-        self._scene = scene
+        before, self._scene = self._scene, scene
         if self._opening is not None:
             path, self.parameters = self._opening
             self.recent.add(path)
+            if before is not None and self.session.paused:
+                self.session.resume()  # it was the scene before that was to stand still
             self._opening = None
         frame = self.session.frame
         if frame is not None and scene is not None and frame.scene_name != scene.name:
@@ -242,8 +253,15 @@ class ViewerState:
 
     # files and messages -----------------------------------------------------------------------------------------
 
-    def open(self, path: str | Path, *, keep_camera: bool = False, parameters: Mapping[str, str] | None = None) -> None:
-        """Open a scene or a session file.
+    def open(
+        self,
+        path: str | Path,
+        *,
+        keep_camera: bool = False,
+        parameters: Mapping[str, str] | None = None,
+        scene: Path | None = None,
+    ) -> None:
+        """Open a scene or a session file, whose scene may lie elsewhere now (`scene`).
 
         Settings stay when it is a scene, but for the camera's: that was another scene's unless `keep_camera` says
         otherwise. `parameters` are values for the scene file's `<default>` names.
@@ -262,7 +280,11 @@ class ViewerState:
             except (PmviewerError, OSError) as error:
                 self.say("error", str(error))
                 return
-            source, settings, parameters = saved.scene, saved.settings, saved.parameters
+            source, settings, parameters = scene or saved.scene, saved.settings, saved.parameters
+            if is_gone(source):
+                self.say("error", f"{path}: its scene {source} is not there. Choose where it is now.")
+                self.lost = str(path), str(source)
+                return
         self._opening = str(path), dict(parameters or {})
         self.session.open(source, settings, parameters)
 
@@ -273,7 +295,8 @@ class ViewerState:
     def _take(self, message: Message) -> None:
         self.log.append(message)
         if message.level == "error":
-            self.toasts.append(Toast(message))
+            others = [toast for toast in self.toasts if toast.message.text != message.text]
+            self.toasts = [*others, Toast(message)][-MOST_TOASTS:]
 
     def unread_errors(self) -> list[str]:
         """What went wrong after the last window frame."""
@@ -282,7 +305,10 @@ class ViewerState:
         return [message.text for message in messages if message.level == "error"]
 
     def poll(self) -> None:
-        """Once per window frame: collect the messages."""
+        """Once per window frame: collect the messages. Errors of a scene that is gone float no longer."""
+        if self.session.scene is not self._toasts_of:
+            self._toasts_of = self.session.scene
+            self.toasts.clear()
         for message in self.session.take_messages():
             self._take(message)
         while self._said:
@@ -290,4 +316,4 @@ class ViewerState:
         parameters = self._opening[1] if self._opening is not None else self.parameters
         self.comparison.poll(self.frame, with_own=not parameters)
         self.gain.poll(self.live_camera())
-        self.toasts = [toast for toast in self.toasts if not toast.is_over()][-4:]
+        self.toasts = [toast for toast in self.toasts if not toast.is_over()]

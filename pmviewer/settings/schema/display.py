@@ -234,8 +234,8 @@ class GatherOverlay(Group):
         scale="switch",
     )
     size: float = setting(1.5, "Line width.", stage="display", scale="linear", title="width", unit="px", ge=1, le=8)
-    colour: Literal["brought", "source"] = setting(
-        "brought",
+    colour: Literal["contribution", "source"] = setting(
+        "contribution",
         "Colour by the radiance that a ray adds to the pixel, or by what chose its direction: the BSDF or photons.",
         stage="display",
         scale="choice",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -89,10 +90,14 @@ class Exports:
             self._state.say("error", "There is no picture to export yet: wait for the first pass.")
             return
 
+        now = self._state.settings  # what is drawn over the picture may have changed since the pass
+        update = {"display": now.display, "overlays": now.overlays}
+        shown = replace(frame, settings=frame.settings.model_copy(update=update))
+
         def work() -> str:
             from pmviewer.output.frame_export import write_frame_exr
 
-            write_frame_exr(path, frame, half)
+            write_frame_exr(path, shown, half)
             return f"wrote {path.absolute()}"
 
         self._state.background.start(FILES, "writing EXR", work)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 MOST_ENDS = 1 << 16
 """Most ends of gather rays that are drawn: all of them."""
-_COLOURINGS = {"brought": POWER, "source": LIGHTS}
+_COLOURINGS = {"contribution": POWER, "source": LIGHTS}
 
 
 def gather_lines(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
@@ -82,7 +82,9 @@ class GatherRays(Overlay):
 
     def annotate(self, viewport: Viewport, source: Source) -> None:
         """How to choose a pixel, until one is chosen."""
-        if source.pixel is None and source.frame is not None and not viewport.state.flying:
+        state = viewport.state
+        refusal = state.inactive_reason("overlays.gather.show", source.settings, state.session.traits)
+        if source.pixel is None and source.frame is not None and refusal is None and not state.flying:
             line = imgui.get_text_line_height()
             text = "hold I over the picture: gather rays of the pixel under the mouse"
             position = viewport.size[0] / 2, viewport.size[1] - 2.2 * line

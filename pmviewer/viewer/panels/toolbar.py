@@ -72,10 +72,10 @@ class Toolbar:
     def _setting(self, path: str, label: str, width_em: float, *, faded: bool = False) -> None:
         info, value = SETTINGS[path], get(self._state.settings, path)
         imgui.push_style_var(imgui.StyleVar_.alpha, 0.5 if faded else 1.0)
+        imgui.begin_group()
         imgui.align_text_to_frame_padding()
         imgui.text_colored(imgui.ImVec4(*theme.DIM), label)
         imgui.same_line()
-        imgui.begin_group()
         resolved = self._state.resolved(path) if value == "auto" else value
         new = self._widgets.edit(info, value, resolved, width=width_em * imgui.get_font_size())
         if info.auto:

@@ -54,7 +54,7 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         if viewport.captions:
             caption(viewport, text, (margin, margin))
     elif view != state.settings.display.view and not state.flipped:
-        refusal = state.refused_view(state.settings.display.view) or "is being made"
+        refusal = state.refused_view(state.settings.display.view) or "to come with the next pass"
         caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.WARNING)
     elif view != "beauty" and viewport.captions:
         caption(viewport, _title(viewport, view), (margin, margin))

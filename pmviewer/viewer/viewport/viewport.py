@@ -25,6 +25,8 @@ from pmviewer.viewer.viewport.target import Target
 
 VIEWPORT = "Viewport"
 MOST_ZOOM = 64.0
+DRAG_THRESHOLD = 4.0
+"""Points from where a button was pressed, from which on the mouse drags."""
 SPLIT_REACH = 8.0
 """Points from the line between compared pictures at which a drag moves it."""
 _FLY_AXES = {K.d: (1, 0, 0), K.a: (-1, 0, 0), K.e: (0, 1, 0), K.q: (0, -1, 0), K.w: (0, 0, 1), K.s: (0, 0, -1)}
@@ -231,14 +233,15 @@ class Viewport:
             pose = controls.with_pivot(pose, geometry.center, radius)
             before = pose
         height = max(self.rectangle()[3], 1.0)
-        dx, dy = io.mouse_delta.x / height, io.mouse_delta.y / height
+        moved = _dragged() if active else (0.0, 0.0)
+        dx, dy = moved[0] / height, moved[1] / height
         right = active and imgui.is_mouse_down(imgui.MouseButton_.right)
         if hovered and io.mouse_wheel and io.key_ctrl:
             self._magnify(io.mouse_wheel)
         elif hovered and io.mouse_wheel:
             pose = controls.zoom(pose, io.mouse_wheel, radius)
         if active and io.key_ctrl:
-            self._shift(io.mouse_delta.x, io.mouse_delta.y)
+            self._shift(*moved)
         elif active and (dx or dy):
             pose = self._drag(pose, dx, dy, right, radius)
         if not right:
@@ -308,6 +311,19 @@ class Viewport:
         if not (0 <= u < 1 and 0 <= v < 1):
             return None
         return int(u * frame.camera.width), int(v * frame.camera.height)
+
+
+def _dragged() -> tuple[float, float]:
+    """How far the mouse was dragged since the last call, in points: nothing until it is some points from where the
+    button was pressed, so that a click turns nothing."""
+    buttons = (imgui.MouseButton_.left, imgui.MouseButton_.right, imgui.MouseButton_.middle)
+    button = next((b for b in buttons if imgui.is_mouse_down(b)), None)
+    if button is None:
+        return 0.0, 0.0
+    moved = imgui.get_mouse_drag_delta(button, DRAG_THRESHOLD)
+    if moved.x or moved.y:
+        imgui.reset_mouse_drag_delta(button)
+    return moved.x, moved.y
 
 
 def is_data_view(display: Display) -> bool:
