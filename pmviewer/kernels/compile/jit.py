@@ -140,6 +140,11 @@ class _KernelCache(FunctionCache):
         self._cache_file = _OneFileEach(self._cache_path, impl.filename_base, impl.locator.get_source_stamp())
         self._held: list[int] = []
 
+    def has(self, sig: Any, target_context: Any) -> bool:
+        """Whether there is compiled code on disk."""
+        name = self._cache_file._name(self._index_key(sig, target_context.codegen()))
+        return Path(self._cache_path, name).is_file()
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Compiled code, or None when it is this process's turn to compile it: until `give_back`."""
         loaded = super().load_overload(sig, target_context)
@@ -167,6 +172,11 @@ class _KernelDispatcher(CPUDispatcher):
     """Compiles what no other process is compiling."""
 
     _cache: _KernelCache
+
+    def is_kept(self, *arguments: Any) -> bool:
+        """Whether code for such arguments is compiled already, by any process."""
+        types = tuple(self.typeof_pyval(argument) for argument in arguments)
+        return types in self.overloads or self._cache.has(types, self.targetctx)
 
     def compile(self, sig: Any) -> Any:
         before = self._cache.turns
