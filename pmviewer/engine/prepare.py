@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
@@ -35,6 +36,7 @@ from pmviewer.render.path import path_pass
 from pmviewer.render.pixel_radius import first_radii
 from pmviewer.render.record import EYE_DTYPE
 from pmviewer.render.record import N_COUNTS as N_EYE_COUNTS
+from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings
 
 Tell = Callable[[str, float | None], None]
@@ -55,6 +57,12 @@ class Step:
     def key(self) -> Hashable:
         """What kernels are compiled for: the function and the types of what it is given."""
         return f"{self.call.__module__}.{self.call.__qualname__}", types_of(self.arguments)
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether nothing is left to compile, as far as can be told without a call."""
+        told = getattr(self.call, "is_kept", None)
+        return told is not None and bool(told(*self.arguments))
 
     def run(self) -> None:
         """Make the call."""
@@ -93,7 +101,7 @@ def steps_of(scene: OpenScene, settings: Settings) -> list[Step]:
         steps.append(Step("importance", prepare_importance, (scene, settings)))
     if plan.photons:
         steps += _light_steps(scene, settings, plan)
-    return [*steps, *_eye_steps(scene, settings, plan)]
+    return [*steps, *eye_steps(scene.flat.record, scene.traits, settings, plan)]
 
 
 def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]:
@@ -120,11 +128,12 @@ def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]
     return [*steps, Step("photon grid", build_grid, (photons, 1.0, 1.0))]
 
 
-def _eye_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]:
+def eye_steps(record: NDArray[np.void], traits: SceneTraits, settings: Settings, plan: Plan) -> list[Step]:
+    """What the eye pass runs for a scene with such a `record`, whose contents don't count."""
     film, counts = np.zeros((1, 1)), np.zeros(N_EYE_COUNTS, np.int64)
     if plan.path:
-        return [Step("path tracer", path_pass, (scene.flat.record, np.zeros(1, EYE_DTYPE), film, counts, 0, 0))]
-    given, steps = blank_pass(scene.flat.record, settings, plan), []
+        return [Step("path tracer", path_pass, (record, np.zeros(1, EYE_DTYPE), film, counts, 0, 0))]
+    given, steps = blank_pass(record, settings, plan), []
     if plan.cache:
         steps.append(Step("irradiance cache", prepare_cache, (given,)))
     radii = first_radii(1, 0.0, 0.0) if radii_of_pixels(settings, plan) else None

@@ -5,6 +5,7 @@ Primitives are numbered triangles first, then quadrics (spheres, cylinders, disk
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -111,8 +112,9 @@ def _bounds(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.array(g.center) - g.radius, np.array(g.center) + g.radius
 
 
-def flatten(scene: Scene) -> FlatScene:
-    """Build arrays, acceleration structure and light table.
+def flatten(scene: Scene, on_type: Callable[[np.dtype], None] = lambda of_record: None) -> FlatScene:
+    """Build arrays, acceleration structure and light table. `on_type` hears of what type the record will be, before the
+    tree is built.
 
     Raises SceneError when the scene has no surface or no light that emits.
     """
@@ -158,6 +160,7 @@ def flatten(scene: Scene) -> FlatScene:
     r = record[0]
     for name in {"principled", "blends"}.intersection(record.dtype.names):
         r[name] = 1
+    on_type(record.dtype)
     stage(f"building the tree over {len(vertices):,} triangles")
     if groups:
         bvh, shown = build_instanced(scene, groups, vertices, quadrics, shape_of_prim, r)
