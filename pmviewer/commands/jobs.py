@@ -238,22 +238,7 @@ def scene_report(job: Job) -> str:
     scene = recentred(load_scene(job.scene, job.parameters, rig=job.settings.light.rig))
     plan = plan_of(job.settings, analyse(scene))
     rows = describe(scene)
-    needed = [
-        name
-        for name, runs in (
-            ("light pass", plan.photons),
-            ("caustic map", plan.caustic_classes),
-            ("global map", plan.global_classes),
-            ("direct light", plan.direct),
-            ("light choice by photons", plan.choice != "power"),
-            ("final gather", plan.gather),
-            ("irradiance cache", plan.cache),
-            ("importance", plan.importance),
-            ("path tracer", plan.path),
-        )
-        if runs
-    ]
-    rows.append((f"stages ({job.settings.render.method})", ", ".join(needed) or "none"))
+    rows.append((f"stages ({job.settings.render.method})", ", ".join(plan.running) or "none"))
     rows += [(f"skips {stage}", reason) for stage, reason in plan.skipped]
     width = max(len(label) for label, _ in rows)
     return "\n".join(f"{label:{width}s}  {text}" for label, text in rows)

@@ -28,6 +28,7 @@ from pmviewer.scene.analysis import SceneTraits
 from pmviewer.scene.arrays.tessellate import DrawGeometry, tessellate
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import Settings, changed_stages
+from pmviewer.settings.needs import Facts
 
 Source = str | Path | Scene
 
@@ -339,7 +340,7 @@ class Session:
 
     def _wanted(self, renderer: Renderer) -> Wanted:
         """What the display asks for now."""
-        return wanted_of(self._settings, renderer.plan, self._pixel)
+        return wanted_of(Facts(self._settings, renderer.plan, renderer.scene.traits), self._pixel)
 
     def _unseen(self) -> Wanted | None:
         """What the display asks for, if the newest frame lacks it. The pass that follows a coarse frame brings it."""

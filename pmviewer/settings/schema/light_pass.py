@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
+from pmviewer.settings.needs import FOLLOWED, GLOBAL_MAP, PHOTONS, Need, Needs
 from pmviewer.settings.schema.base import Group, setting
+
+GLOSSY = Need(lambda f: f.traits.glossy_roughness, "No glossy surface in this scene.")
+PLAIN_EMISSION = Need(
+    lambda f: f.plan.emission == "off",
+    "Guided emission finds where photons start by test photons (importance.emission).",
+)
+PLAIN_EMISSION_FOR_Q = Need(
+    lambda f: f.plan.emission == "off", "With guided emission q is the probability of storing a global photon."
+)
 
 
 class Photons(Group):
     """Light pass"""
+
+    needs: ClassVar[Needs] = (PHOTONS,)
 
     N: int = setting(
         150_000,
@@ -34,6 +46,10 @@ class Photons(Group):
         stage="photons",
         scale="choice",
         title="q rule",
+        needs=(
+            PLAIN_EMISSION_FOR_Q,
+            GLOBAL_MAP,
+        ),
     )
     indirect_caustics: bool = setting(
         True,
@@ -41,6 +57,7 @@ class Photons(Group):
         "(Keller and Wald §2.3). Off: they belong to the global map alone.",
         stage="photons",
         scale="switch",
+        needs=(FOLLOWED,),
     )
     renew: Literal["each pass", "once"] = setting(
         "each pass",
@@ -59,6 +76,7 @@ class Photons(Group):
         ge=0.0,
         le=1.0,
         title="glossy from",
+        needs=(GLOSSY,),
     )
     sequence: Literal["sobol", "independent"] = setting(
         "sobol",
@@ -73,6 +91,7 @@ class Photons(Group):
         stage="photons",
         scale="choice",
         title="projection maps",
+        needs=(PLAIN_EMISSION,),
     )
     roulette: Literal["luminance", "channel maximum", "equal"] = setting(
         "luminance",
