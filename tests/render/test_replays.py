@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pmviewer.engine.store import StageStore
 
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
