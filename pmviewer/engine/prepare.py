@@ -137,6 +137,6 @@ def eye_steps(record: NDArray[np.void], traits: SceneTraits, settings: Settings,
     given, steps = blank_pass(record, settings, plan), []
     if plan.cache:
         steps.append(Step("irradiance cache", prepare_cache, (given,)))
-    radii = first_radii(1, 0.0, 0.0) if radii_of_pixels(Facts(settings, plan, scene.traits)) else None
+    radii = first_radii(1, 0.0, 0.0) if radii_of_pixels(Facts(settings, plan, traits)) else None
     outline = np.zeros(0, np.uint8)
     return [*steps, Step("eye pass", eye_pass, (given, outline, radii, film, counts, 0, 0))]
