@@ -38,6 +38,7 @@ from pmviewer.render.record import EYE_DTYPE
 from pmviewer.render.record import N_COUNTS as N_EYE_COUNTS
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings
+from pmviewer.settings.needs import Facts
 
 Tell = Callable[[str, float | None], None]
 
@@ -136,6 +137,6 @@ def eye_steps(record: NDArray[np.void], traits: SceneTraits, settings: Settings,
     given, steps = blank_pass(record, settings, plan), []
     if plan.cache:
         steps.append(Step("irradiance cache", prepare_cache, (given,)))
-    radii = first_radii(1, 0.0, 0.0) if radii_of_pixels(settings, plan) else None
+    radii = first_radii(1, 0.0, 0.0) if radii_of_pixels(Facts(settings, plan, traits)) else None
     outline = np.zeros(0, np.uint8)
     return [*steps, Step("eye pass", eye_pass, (given, outline, radii, film, counts, 0, 0))]

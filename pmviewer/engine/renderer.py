@@ -38,6 +38,7 @@ from pmviewer.render.gather.gather_points import POINT_COLUMNS
 from pmviewer.render.given import PassData
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, RADIUS, first_radii, shrink
 from pmviewer.settings.access import Settings
+from pmviewer.settings.needs import Facts
 
 COARSE_SHRINK = 4
 COARSE_PHOTONS = 40_000
@@ -68,6 +69,7 @@ class Renderer:
         self.camera = resolve_view(scene.scene, settings, scene.flat.center, scene.flat.radius)
         check_memory(self.camera.width, self.camera.height, settings.photons.N)
         self.plan: Plan = plan or plan_of(settings, scene.traits)
+        self.facts = Facts(settings, self.plan, scene.traits)
         self.film = Film(self.camera.width, self.camera.height)
         self.first_radius = (
             first_radius(scene.flat, self.render_camera, settings.estimate, self.plan.gather)
@@ -122,7 +124,7 @@ class Renderer:
         film.passes = 1
         if self.scene.scene.exposure is None:
             self.scene.exposures.setdefault(self.settings.camera.name, metered(film.planes()))
-        wanted = replace(wanted or wanted_of(self.settings, self.plan), pixel=None)  # its pixels are others
+        wanted = replace(wanted or wanted_of(self.facts), pixel=None)  # its pixels are others
         return quick._frame(serial, film, True, wanted)
 
     def frame(self, serial: int, wanted: Wanted | None = None) -> Frame:
@@ -144,7 +146,7 @@ class Renderer:
 
     def _frame(self, serial: int, film: Film, coarse: bool, wanted: Wanted | None) -> Frame:
         looked = self._looked(film)
-        inspection = inspected(wanted or wanted_of(self.settings, self.plan), looked, self.pool)
+        inspection = inspected(wanted or wanted_of(self.facts), looked, self.pool)
         return replace(frame_of(looked, self.tally, inspection), serial=serial, version=self.version, coarse=coarse)
 
     def _looked(self, film: Film) -> Looked:
@@ -177,7 +179,7 @@ class Renderer:
 
     def _radii_of_pixels(self, film: Film, index: int) -> dict[str, float]:
         """Gives the pixels the radii of pass `index`; returns the largest by map. None without the rule."""
-        if not radii_of_pixels(self.settings, self.plan):
+        if not radii_of_pixels(self.facts):
             return {}
         estimate = self.settings.estimate
         if film.radii is None:

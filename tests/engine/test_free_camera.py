@@ -7,13 +7,13 @@ import pytest
 
 import pmviewer.engine.stages.importance as importance_stage
 import pmviewer.engine.stages.tracer as tracer
+from pmviewer.commands.job import load_job
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.errors import SettingError
-from pmviewer.job import load_job
 from pmviewer.output.session_file import read_session, write_session
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.free_camera import frustum_lines, plan_pose, resolve_view

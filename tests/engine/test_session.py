@@ -279,7 +279,7 @@ def test_a_scene_that_fails_to_open_keeps_the_old_one(session):
     session.wait(passes=1, timeout=PATIENCE)
     session.take_messages()
     session.open("no/such/scene.xml")
-    until(lambda: session._loading_done == 2)
+    until(lambda: session._loader.done == 2)
     assert len(found := errors(session)) == 1
     assert "no/such/scene.xml" in found[0]
     passes = session.frame.statistics.passes

@@ -112,7 +112,7 @@ def test_required_density_is_the_rules(box, pool):
     np.testing.assert_allclose(share, third.settings.importance.M_r * growth, rtol=1e-4)
     p, n = hits(third.camera)
     some = np.flatnonzero(~np.isnan(p[:, 0]))[::9]
-    rule = third.light.rules.required["global"](p[some].astype(np.float32), encode_normals(n[some]))
+    rule = third.light.latest.rules.required["global"](p[some].astype(np.float32), encode_normals(n[some]))
     shown = planes["required density"].reshape(-1)[some]
     assert np.isclose(rule, shown, rtol=1e-3).mean() > 0.9, (
         "rays and formulas differ by rounding, at an importon's edge"

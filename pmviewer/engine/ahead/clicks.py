@@ -6,14 +6,14 @@ from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pmviewer.engine.wanted import wanted_of
+from pmviewer.engine.effects import facts_of
 from pmviewer.engine.inspection import Wanted
-from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare, steps_of
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
+from pmviewer.engine.wanted import wanted_of
 from pmviewer.errors import PmviewerError
 from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, get, with_values
 
@@ -40,7 +40,7 @@ class Click:
         renderer = Renderer(opened, with_values(self.settings, small), pool, StageStore(0))
         renderer.coarse_frame(1)
         renderer.step()
-        renderer.frame(2, replace(wanted_of(self.settings, renderer.plan), pixel=(SIDE // 2, SIDE // 2)))
+        renderer.frame(2, replace(wanted_of(renderer.facts), pixel=(SIDE // 2, SIDE // 2)))
 
 
 def clicks(opened: OpenScene, settings: Settings) -> list[Click]:
@@ -60,11 +60,11 @@ def clicks(opened: OpenScene, settings: Settings) -> list[Click]:
 
 def _needs(opened: OpenScene, settings: Settings) -> Hashable:
     """What decides about the kernels that run."""
-    plan = plan_of(settings, opened.traits)
-    wanted = wanted_of(settings, plan)
+    facts = facts_of(settings, opened.traits)
+    wanted = wanted_of(facts)
     shown = replace(wanted, paths=min(wanted.paths, 1), fates=min(wanted.fates, 1))
     keys = frozenset(step.key for step in steps_of(opened, settings))
-    return replace(plan, skipped=(), warnings=()), keys, shown if shown != Wanted() else None
+    return replace(facts.plan, skipped=(), warnings=()), keys, shown if shown != Wanted() else None
 
 
 def _all(settings: Settings) -> Iterator[Click]:

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pmviewer.scene.description import RGB
+from pmviewer.scene.formats.mitsuba.bitmap import read_bitmap
 from pmviewer.scene.formats.mitsuba.spectrum import spectrum_object
-from pmviewer.scene.texture import LUMINANCE, Affine, Bitmap, Checkerboard, Texture, scaled
+from pmviewer.scene.formats.mitsuba.texture_place import to_uv
+from pmviewer.scene.texture import LUMINANCE, Bitmap, Checkerboard, Texture, scaled
 
 if TYPE_CHECKING:
     from pmviewer.scene.formats.mitsuba.document import Properties
@@ -34,8 +36,6 @@ def read_texture(p: Properties) -> Texture | None:
 
 
 def _read(p: Properties) -> Texture | None:
-    from pmviewer.scene.formats.mitsuba.bitmap import read_bitmap
-
     if p.type in _BITMAPS:
         return read_bitmap(p)
     if p.type == "checkerboard":
@@ -76,17 +76,6 @@ def squared_luminance(texture: Texture) -> Texture:
     colours = texture.pixels * np.array(texture.scale, np.float32)
     grey = (colours @ LUMINANCE.astype(np.float32))[..., None] ** 2
     return replace(texture, pixels=np.ascontiguousarray(grey, np.float32), scale=WHITE)
-
-
-def to_uv(p: Properties) -> Affine:
-    """How the texture's coordinates follow from the surface's: `to_uv`, or `uscale`, `uoffset`, … of version 0.x,
-    which count as s·(u + o), as Mitsuba 3 upgrades them."""
-    if "to_uv" in p:
-        matrix = p.transform("to_uv")
-        a, b, d, e = (float(x) for x in matrix[:2, :2].reshape(-1))
-        return (a, b, float(matrix[0, 3]), d, e, float(matrix[1, 3]))
-    su, sv = p.number("uscale", 1.0), p.number("vscale", 1.0)
-    return (su, 0.0, su * p.number("uoffset", 0.0), 0.0, sv, sv * p.number("voffset", 0.0))
 
 
 def has_vertex_colours(p: Properties, name: str) -> bool:
@@ -173,10 +162,8 @@ def _vertex_colours(p: Properties) -> Texture | None:
 
 def _volume(p: Properties) -> Texture | None:
     """The colour of a constant volume; grids are not read."""
-    from pmviewer.scene.formats.mitsuba.document import Properties
-
     for element in p.objects("volume"):
-        inner = Properties(element, p.document)
+        inner = type(p)(element, p.document)
         if inner.type == "constvolume":
             return constant(inner.bounded_colour("value", 1.0, None))
     p.document.warn(f"{p.element} is not supported: what it would colour keeps its default.", p.element)

@@ -1,14 +1,14 @@
-"""`pmviewer compare-importance`: the comparison with and without importance, from the command line."""
+"""The comparison with and without importance as a job, with a progress bar."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from pmviewer.commands.job import Job, check_output
+from pmviewer.commands.progress_bar import progress_bar
 from pmviewer.engine.comparison.importance_gain import Gain, compare
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
-from pmviewer.errors import OutputError
-from pmviewer.job import Job
 from pmviewer.output.compare import Reference, load_reference
 from pmviewer.output.frame_export import gain_sheet
 from pmviewer.output.png import write_png
@@ -17,7 +17,7 @@ from pmviewer.scene.load import reference_of
 from pmviewer.settings.access import Settings, with_values
 
 
-def gain_job(
+def compare_job(
     job: Job,
     output: Path | None,
     *,
@@ -31,10 +31,7 @@ def gain_job(
     reference: an EXR file; "auto": the scene's own where it fits, "none": a longer run. Raises PmviewerError.
     """
     if output is not None:
-        if output.suffix.lower() != ".png":
-            raise OutputError(f"{output}: unknown format '{output.suffix}'. Use .png.")
-        if not output.absolute().parent.is_dir():
-            raise OutputError(f"{output}: the folder {output.absolute().parent} does not exist. Create it first.")
+        check_output(output, (".png",))
     asked = {"compare.equal": equal, "compare.passes": passes}
     settings = with_values(job.settings, {path: value for path, value in asked.items() if value is not None})
     opened = open_scene(job.scene, job.parameters, settings.light.rig)
@@ -68,23 +65,11 @@ def _reference(opened: OpenScene, settings: Settings, source: str) -> Reference 
 
 
 def _compare(opened: OpenScene, settings: Settings, pool: WorkPool, target: Reference | None) -> Gain:
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=not console.is_terminal, redirect_stdout=False) as progress:
-        bar = progress.add_task("preparing", total=1.0)
-        truth = (
-            None if target is None else (target.image, f"the reference {target.path.parent.name}/{target.path.name}")
-        )
-        return compare(
-            opened,
-            settings,
-            pool,
-            lambda text, share: progress.update(bar, description=text, completed=share or 0.0),
-            truth,
-        )
+    truth = None
+    if target is not None:
+        truth = target.image, f"the reference {target.path.parent.name}/{target.path.name}"
+    with progress_bar() as bar:
+        return compare(opened, settings, pool, bar.update, truth)
 
 
 def table(gain: Gain) -> str:
