@@ -6,7 +6,6 @@ from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pmviewer.engine.wanted import wanted_of
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
@@ -14,6 +13,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare, steps_of
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
+from pmviewer.engine.wanted import wanted_of
 from pmviewer.errors import PmviewerError
 from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, get, with_values
 
