@@ -18,7 +18,8 @@ from pmviewer.viewer.dialogs.exports import Exports, default_path, fresh_path
 from pmviewer.viewer.overlays.registry import SWITCHED
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport import controls
-from pmviewer.viewer.viewport.viewport import VIEWPORT, Fit, Viewport
+from pmviewer.viewer.viewport.target import Fit
+from pmviewer.viewer.viewport.viewport import VIEWPORT, Viewport
 
 COMPARISON = "Comparison"
 """The panel's label."""

@@ -78,6 +78,7 @@ class ViewerApp:
         self.context: moderngl.Context | None = None
         self._title = ""
         self._running = False
+        self._shares = layout.Shares()
         self.viewport.draw_toasts = lambda: draw_toasts(self.state, *self.viewport.origin, self.viewport.size[0])
         self.params = layout.runner_params(self._callbacks(), remember=remember, alone=picture_size)
         self._shot, self.viewport.alone, self.viewport.captions = shot, picture_size is not None, captions
@@ -156,6 +157,7 @@ class ViewerApp:
     def _pre_new_frame(self) -> None:
         assert self.context is not None
         free_collected(self.context)
+        self._shares.keep()
         self.state.poll()
         try:
             self.viewport.render()

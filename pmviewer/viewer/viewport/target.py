@@ -1,4 +1,4 @@
-"""Where the picture lies in a framebuffer, and how deep the scene is."""
+"""Where the picture lies in the panel and in a framebuffer, and how deep the scene is."""
 
 from __future__ import annotations
 
@@ -8,6 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.render.camera import CameraPose
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How the picture lies in the panel: `zoom` 1 shows all of it, `center` is the picture's point (0 to 1) in the
+    panel's middle."""
+
+    zoom: float = 1.0
+    center: tuple[float, float] = (0.5, 0.5)
+
+    def rectangle(self, panel: tuple[float, float], aspect: float) -> tuple[float, float, float, float]:
+        """Left, top, width and height of a picture of that width/height ratio."""
+        width = min(panel[0], panel[1] * aspect) * self.zoom
+        height = width / aspect
+        return panel[0] / 2 - self.center[0] * width, panel[1] / 2 - self.center[1] * height, width, height
 
 
 @dataclass(frozen=True)
