@@ -72,7 +72,7 @@ def test_gather_rays_start_where_the_eye_pass_ended():
 def test_records_of_the_irradiance_cache_lie_where_the_eye_pass_ended():
     renderer, met, over_chain, pool = rendered(cache="on", cache_error=0.05)
     pool.close()
-    records = renderer._cache.rows[:, :3]
+    records = renderer.latest.cache.rows[:, :3]
     distance = np.abs(records[:, None, :] - met.reshape(1, -1, 3)).max(axis=-1)
     assert len(records) > 20
     assert distance.min(axis=1).max() < NEAR
