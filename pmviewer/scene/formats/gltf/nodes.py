@@ -167,13 +167,16 @@ class Nodes:
         numbers take long."""
         columns: list[Float] = []
         for key, default in _TRS:
-            values = [self._pose.get(i, _STILL).get(key, row.get(key, default)) for i, row in enumerate(self._rows)]
+            values = [row.get(key, default) for row in self._rows]
+            for i, moved in self._pose.items():
+                if key in moved and i < len(values):
+                    values[i] = moved[key]
             columns.append(_rows_of_numbers(values, len(default)))
         matrices = trs(*columns)
         given = [
             i
             for i, row in enumerate(self._rows)
-            if "matrix" in row and not any(key in self._pose.get(i, _STILL) for key, _ in _TRS)
+            if "matrix" in row and not (i in self._pose and any(key in self._pose[i] for key, _ in _TRS))
         ]
         if given:
             found = _rows_of_numbers([self._rows[i]["matrix"] for i in given], 16)
@@ -208,7 +211,6 @@ class Nodes:
 
 
 _TRS = (("translation", (0, 0, 0)), ("rotation", (0, 0, 0, 1)), ("scale", (1, 1, 1)))
-_STILL: dict[str, list[float]] = {}
 _IDENTITY = np.eye(4)
 
 

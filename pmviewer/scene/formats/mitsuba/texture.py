@@ -14,13 +14,14 @@ from pmviewer.scene.formats.mitsuba.texture_place import to_uv
 from pmviewer.scene.texture import LUMINANCE, Bitmap, Checkerboard, Texture, scaled
 
 if TYPE_CHECKING:
-    from pmviewer.scene.formats.mitsuba.document import Properties
+    from pmviewer.scene.formats.mitsuba.document import Document, Properties
     from pmviewer.scene.formats.mitsuba.xml import Element
 
 _SPECTRA = frozenset(("rgb", "srgb", "uniform", "d65", "regular", "irregular", "blackbody", "spectrum", "rawconstant"))
 _BITMAPS = frozenset(("bitmap", "ldrtexture", "exrtexture", "hdrtexture"))
 _VERTEX_COLOURS = frozenset(("mesh_attribute", "vertexcolors"))
-_ATTRIBUTE = "vertex_color"
+_ATTRIBUTE, _FACE_ATTRIBUTE = "vertex_color", "face_color"
+_DEEPEST = 8
 _MOST_GRID = 1024
 WHITE: RGB = (1.0, 1.0, 1.0)
 
@@ -79,21 +80,35 @@ def squared_luminance(texture: Texture) -> Texture:
 
 
 def has_vertex_colours(p: Properties, name: str) -> bool:
-    """Does the value of that name come from a mesh's vertices, whatever scales it?"""
+    """Does the value of that name come from a mesh's vertices or faces, whatever scales it?"""
     element = p.values.get(name)
-    return element is not None and element.tag == "texture" and _from_vertices(element, p, 0)
+    return element is not None and element.tag == "texture" and _from_mesh(element, p.document, 0)
 
 
-def _from_vertices(element: Element, p: Properties, depth: int) -> bool:
+def _from_mesh(element: Element, document: Document, depth: int) -> bool:
     kind = element.attributes.get("type")
     if kind in _VERTEX_COLOURS:
-        return _attribute_of(element) == _ATTRIBUTE
-    if kind != "scale" or depth > 8:
+        return _attribute_of(element) in (_ATTRIBUTE, _FACE_ATTRIBUTE)
+    if kind != "scale" or depth > _DEEPEST:
         return False
-    ids = p.document.ids
-    inside = (ids.get(c.attributes.get("id", "")) if c.tag == "ref" else c for c in element.children)
-    first = next((c for c in inside if c is not None and c.tag == "texture"), None)
-    return first is not None and _from_vertices(first, p, depth + 1)
+    first = next((c for c in _inside(element, document) if c.tag == "texture"), None)
+    return first is not None and _from_mesh(first, document, depth + 1)
+
+
+def _inside(element: Element, document: Document) -> list[Element]:
+    """The elements inside, those that are referred to in their references' place."""
+    found = (document.ids.get(c.attributes.get("id", "")) if c.tag == "ref" else c for c in element.children)
+    return [c for c in found if c is not None]
+
+
+def reads_face_colours(shape: Element, document: Document) -> bool:
+    """Does a BSDF of the shape take its colours from the mesh's faces?"""
+    level = [c for c in _inside(shape, document) if c.tag == "bsdf"]
+    for _ in range(_DEEPEST):
+        level = [c for e in level for c in _inside(e, document) if c.tag in ("bsdf", "texture")]
+        if any(c.attributes.get("type") in _VERTEX_COLOURS and _attribute_of(c) == _FACE_ATTRIBUTE for c in level):
+            return True
+    return False
 
 
 def _attribute_of(element: Element) -> str:
@@ -148,12 +163,12 @@ def _scale(p: Properties) -> Texture | None:
 
 
 def _vertex_colours(p: Properties) -> Texture | None:
-    """White, which the colours at the vertices multiply (`Material.vertex_colours`)."""
+    """White, which the colours at the corners of the triangles multiply (`Material.vertex_colours`)."""
     attribute = _attribute_of(p.element)
     p.known("name")
     factor = p.number("scale", 1.0)
     p.warn_unused()
-    if attribute == _ATTRIBUTE:
+    if attribute in (_ATTRIBUTE, _FACE_ATTRIBUTE):
         return constant((factor, factor, factor))
     what = f"The attribute '{attribute[:40]}' of {p.element} is not read: what it would colour keeps its default."
     p.document.warn(what, p.element)
