@@ -22,14 +22,14 @@ from pmviewer.engine.stages.deposition import Rules
 from pmviewer.engine.stages.importance import ImportanceMaps
 from pmviewer.importance.view import CHANNELS as IMPORTANCE_CHANNELS
 from pmviewer.importance.view import importance_view, probability_view
-from pmviewer.maps.importance import NO_IMPORTANCE
+from pmviewer.maps.importance.importance_map import NO_IMPORTANCE
 from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import neighbourhood
 from pmviewer.maps.search.grid import PhotonGrid, build_grid
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.photons.deposition.rules import SMALLEST_EPSILON
-from pmviewer.photons.light_pass.light_pass import PhotonMaps
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.diagnostics.density import WIDEST, counting_eye, counting_tree, density_view
 from pmviewer.render.diagnostics.diagnostics import FAMILY_CHANNELS, lookup_view, shadow_view, site_view
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL

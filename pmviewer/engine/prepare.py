@@ -22,9 +22,9 @@ from pmviewer.maps.radiance import build_sites
 from pmviewer.maps.search.grid import build_grid
 from pmviewer.maps.search.kdtree import build_kdtree
 from pmviewer.maps.shadow import shadow_record
-from pmviewer.photons.deposition.rules import prepare_rules
+from pmviewer.photons.deposition.depositor import prepare_rules
 from pmviewer.photons.emission.strata import STRATA_DTYPE
-from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE, N_COUNTS, empty_ledger, trace_photons
+from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE, N_COUNTS, PhotonBuffers, empty_ledger, trace_photons
 from pmviewer.photons.projection.projected import NO_PROJECTION
 from pmviewer.render.camera import resolve_camera
 from pmviewer.render.direct.shadow import NO_SHADOWS
@@ -109,7 +109,13 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
             (
                 "light pass",
                 lambda: trace_photons(
-                    flat.record, light_pass, projections, 0, 0, empty, (code, code), empty, counts, ledger, None
+                    flat.record,
+                    light_pass,
+                    projections,
+                    0,
+                    0,
+                    PhotonBuffers(empty, empty, code, code, counts, ledger),
+                    None,
                 ),
             ),
             ("kd-tree" if nearest else "photon grid", lambda: photon_map(empty)),

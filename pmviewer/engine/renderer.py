@@ -31,10 +31,11 @@ from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.light_stage import CACHED_PASSES, LightStage
 from pmviewer.engine.stages.shadows import ShadowMap, shadows_of
 from pmviewer.engine.tally import Tally
-from pmviewer.maps.importance import NO_IMPORTANCE
+from pmviewer.maps.importance.importance_map import NO_IMPORTANCE
 from pmviewer.maps.irradiance_cache import NO_CACHE, REACH, IrradianceCache
-from pmviewer.photons.light_pass.light_pass import trace_pass, trajectories
+from pmviewer.photons.light_pass.light_pass import trace_pass
 from pmviewer.photons.light_pass.paths import PhotonPaths, empty_paths
+from pmviewer.photons.light_pass.plan import trajectories
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.direct.choice import CHOICES
 from pmviewer.render.direct.outline import outline_pixels
@@ -191,7 +192,7 @@ class Renderer:
             caustics,
             self.pool.run,
             projection=self.light.projection,
-            paths=paths,
+            watch=paths,
             guided=guided,
         )
         return replace(paths, power_unit=photons.global_unit)

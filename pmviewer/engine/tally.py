@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.energy import EnergyBooks
 from pmviewer.engine.pool import WorkPool
-from pmviewer.photons.deposition.rules import Deposited
-from pmviewer.photons.light_pass.light_pass import PhotonMaps
+from pmviewer.photons.deposition.deposited import Deposited
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.record import C_CACHED, C_CUT, C_DROPPED, C_GATHERED, C_RAYS, C_SAVED, C_SHADOW_RAYS
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +17,9 @@ from pmviewer.importance.trace import (
     N_COUNTS,
     trace_importons,
 )
-from pmviewer.maps.importance import Importons
+from pmviewer.maps.importance.importance_map import Importons
 from pmviewer.scene.arrays.flatten import FlatScene
-
-Runner = Callable[[list[Callable[[], Any]]], list[Any]]
+from pmviewer.tasks import Runner
 
 BATCH = 2048
 """Importons a task: fixed, so that the result does not depend on the number of threads."""

@@ -55,7 +55,7 @@ from pmviewer.kernels.random import SOBOL, draw4
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.kernels.vector import add, along, dot, luminance, mul, scale
-from pmviewer.maps.record import encode_direction
+from pmviewer.maps.photon_words import encode_direction
 
 _f4 = np.float32
 _i8 = np.int64

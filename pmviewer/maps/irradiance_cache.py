@@ -23,7 +23,7 @@ from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import load_f4, load_i4
 from pmviewer.kernels.random import hash3
 from pmviewer.kernels.vector import add, cross, dot, scale, sub
-from pmviewer.maps.record import encode_direction, encode_power
+from pmviewer.maps.photon_words import encode_direction, encode_power
 
 ROW = 32
 """Floats of a record."""

@@ -12,9 +12,12 @@ from pmviewer.kernels.compile.specialise import has, part, specialised
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.maps.estimate.differential import checked_irradiance, reach
 from pmviewer.maps.estimate.estimate import irradiance_knn, irradiance_radius
+from pmviewer.maps.estimate.filters import Filter
 from pmviewer.maps.estimate.hull import hull_irradiance
+from pmviewer.maps.estimate.nearest import Neighbours
 from pmviewer.maps.estimate.neighbours import BATCH_WORDS, FOUND_WORDS, SQUARED_WORDS, next_batch, search
 from pmviewer.maps.radiance import UNKNOWN, nearest_site, site_irradiance, site_place, site_slot, store_irradiance
+from pmviewer.maps.search.disc import Place
 from pmviewer.maps.search.stored import ALL_CLASSES
 
 _f4 = np.float32
@@ -47,20 +50,9 @@ def irradiance(photons, eye, radius, p, n, class_mask):
         def nearest(photons, eye, radius, p, n, class_mask):
             r, g, b, _, _ = irradiance_knn(
                 photons,
-                p[0],
-                p[1],
-                p[2],
-                n[0],
-                n[1],
-                n[2],
-                eye.k,
-                radius,
-                eye.flatness,
-                class_mask,
-                eye.filter,
-                eye.cone_k,
-                eye.rim,
-                eye.share,
+                Place(p, n, eye.flatness, class_mask),
+                Neighbours(eye.k, radius, eye.rim, eye.share),
+                Filter(eye.filter, eye.cone_k),
             )
             return r, g, b
 
@@ -68,18 +60,7 @@ def irradiance(photons, eye, radius, p, n, class_mask):
 
     def within(photons, eye, radius, p, n, class_mask):
         r, g, b, _ = irradiance_radius(
-            photons,
-            p[0],
-            p[1],
-            p[2],
-            n[0],
-            n[1],
-            n[2],
-            radius,
-            eye.flatness,
-            class_mask,
-            eye.filter,
-            eye.cone_k,
+            photons, Place(p, n, eye.flatness, class_mask), radius, Filter(eye.filter, eye.cone_k)
         )
         return r, g, b
 
@@ -122,20 +103,9 @@ def looked_up(photons, eye, radius, p, n, class_mask):
         def nearest(photons, eye, radius, p, n, class_mask):
             _, _, _, count, r = irradiance_knn(
                 photons,
-                p[0],
-                p[1],
-                p[2],
-                n[0],
-                n[1],
-                n[2],
-                eye.k,
-                radius,
-                eye.flatness,
-                class_mask,
-                eye.filter,
-                eye.cone_k,
-                eye.rim,
-                eye.share,
+                Place(p, n, eye.flatness, class_mask),
+                Neighbours(eye.k, radius, eye.rim, eye.share),
+                Filter(eye.filter, eye.cone_k),
             )
             return r, _f4(count)
 
@@ -143,18 +113,7 @@ def looked_up(photons, eye, radius, p, n, class_mask):
 
     def within(photons, eye, radius, p, n, class_mask):
         _, _, _, count = irradiance_radius(
-            photons,
-            p[0],
-            p[1],
-            p[2],
-            n[0],
-            n[1],
-            n[2],
-            radius,
-            eye.flatness,
-            class_mask,
-            eye.filter,
-            eye.cone_k,
+            photons, Place(p, n, eye.flatness, class_mask), radius, Filter(eye.filter, eye.cone_k)
         )
         return min(radius, photons.radius), _f4(count)
 

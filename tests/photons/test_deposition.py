@@ -6,18 +6,11 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.pool import WorkPool
-from pmviewer.maps.density_control import COSINE, STEP
+from pmviewer.maps.density.control import COSINE, STEP
 from pmviewer.maps.power import LARGEST, encode_powers
 from pmviewer.maps.record import unpack
-from pmviewer.photons.deposition.rules import (
-    FIRST_WEIGHT,
-    Density,
-    Deposition,
-    KellerWald,
-    constant,
-    rounds,
-    weight_histogram,
-)
+from pmviewer.photons.deposition.deposited import FIRST_WEIGHT, weight_histogram
+from pmviewer.photons.deposition.rules import Density, Deposition, KellerWald, constant, rounds
 from pmviewer.photons.light_pass.light_pass import trace_pass
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.settings.access import Photons

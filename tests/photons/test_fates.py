@@ -14,8 +14,8 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.importance.lights import importance_of_lights
 from pmviewer.maps.record import unpack
+from pmviewer.photons.deposition.depositor import DISCARDED, REDISTRIBUTED, REJECTED, STORED
 from pmviewer.photons.deposition.fates import FATE_BITS
-from pmviewer.photons.deposition.rules import DISCARDED, REDISTRIBUTED, REJECTED, STORED
 from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Scene
 from pmviewer.scene.light_places import light_places

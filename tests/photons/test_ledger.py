@@ -54,7 +54,7 @@ def shares(scene, N=8000, projected=False, **settings):
         maps = trace(flat, scene, seed, N, projection, **settings)
         row = maps.energy / flat.total_luminance
         assert row[1:].sum() == pytest.approx(row[0], rel=1e-5)
-        assert maps.books.sum() > 0
+        assert maps.ledgers.sum() > 0
         rows.append(row)
     rows = np.array(rows)
     return rows.mean(axis=0), rows.std(axis=0, ddof=1) / math.sqrt(len(rows))
@@ -155,10 +155,10 @@ def test_trajectories_for_the_caustic_map_do_not_change_the_books(rule, q):
     assert (
         abs(mean[ABSORBED] - expected[ABSORBED]) <= 4.5 * math.hypot(error[ABSORBED], expected_error[ABSORBED]) + 1e-5
     )
-    books = trace(flat, scene, 1, round(4000 / q), q=q, indirect_caustics=False).books
-    assert books[:, E_EMITTED] == pytest.approx([4000, round(4000 / q) - 4000], abs=1)
-    ended = np.delete(books, [E_EMITTED, E_STORED], axis=1).sum(axis=1)
-    assert ended == pytest.approx(books[:, E_EMITTED], rel=1e-6)
+    ledgers = trace(flat, scene, 1, round(4000 / q), q=q, indirect_caustics=False).ledgers
+    assert ledgers[:, E_EMITTED] == pytest.approx([4000, round(4000 / q) - 4000], abs=1)
+    ended = np.delete(ledgers, [E_EMITTED, E_STORED], axis=1).sum(axis=1)
+    assert ended == pytest.approx(ledgers[:, E_EMITTED], rel=1e-6)
 
 
 def test_what_becomes_infinite_is_dropped_with_what_it_had():
@@ -169,7 +169,7 @@ def test_what_becomes_infinite_is_dropped_with_what_it_had():
     row[4:7] = 3e38  # M_REFLECTANCE
     maps = trace(flat, scene, 1, 2000)
     assert maps.dropped > 0
-    assert np.isfinite(maps.books).all()
+    assert np.isfinite(maps.ledgers).all()
     ledger = maps.ledger
     assert ledger[E_DROPPED] != 0
     ended = ledger.sum() - ledger[E_EMITTED] - ledger[E_STORED]

@@ -12,7 +12,7 @@ from pmviewer.engine.energy import Energy
 from pmviewer.errors import OutputError
 from pmviewer.maps.record import unpack
 from pmviewer.photons.deposition import rules as photons
-from pmviewer.photons.deposition.rules import Deposited, weight_histogram
+from pmviewer.photons.deposition.deposited import Deposited, weight_histogram
 from pmviewer.render.camera import resolve_camera
 from pmviewer.settings.access import Settings, with_values
 from pmviewer.viewer import format as fmt

@@ -35,7 +35,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.output.metric import EPSILON, block_means, relmse, z_test
-from pmviewer.photons.deposition.rules import Deposited
+from pmviewer.photons.deposition.deposited import Deposited
 from pmviewer.scene.arrays.flatten import LUMINANCE
 from pmviewer.settings.access import Settings, with_values
 

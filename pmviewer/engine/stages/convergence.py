@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +10,10 @@ from numpy.typing import NDArray
 from pmviewer.engine.stages.deposition import Rules
 from pmviewer.maps.convergence import NO_CAUSTIC, Convergence, Criterion, other_light
 from pmviewer.maps.record import decode_directions
-from pmviewer.photons.light_pass.light_pass import PhotonMaps
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.diagnostics.diagnostics import seen_places
+from pmviewer.tasks import Runner
 
-Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 TILE = 2048
 
 

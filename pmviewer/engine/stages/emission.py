@@ -10,14 +10,16 @@ from pmviewer.engine.method import Plan
 from pmviewer.engine.stages.deposition import SEED, Rules, importance_of, sampled_classes
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.importance.rules import full_importance, relative_importance
-from pmviewer.maps.importance import ImportanceMap, Importons, build_importance
+from pmviewer.maps.importance.build import build_importance
+from pmviewer.maps.importance.importance_map import ImportanceMap, Importons
 from pmviewer.maps.power import luminances
 from pmviewer.maps.record import CAUSTIC, DIRECT
 from pmviewer.photons.deposition.rules import Deposition, Homogeneous, Rule
 from pmviewer.photons.emission.guided import Guidance, Guided, Known
 from pmviewer.photons.emission.scattered import FIRST
 from pmviewer.photons.emission.tested import Sought
-from pmviewer.photons.light_pass.light_pass import PhotonMaps, guided_emission_of, scattered_photons, trace_pass
+from pmviewer.photons.light_pass.light_pass import guided_emission_of, scattered_photons, trace_pass
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Settings
 
 MOST_SCATTERED = 1 << 15

@@ -34,7 +34,9 @@ from pmviewer.photons.deposition.fates import Fates
 from pmviewer.photons.deposition.rules import Deposition
 from pmviewer.photons.emission.guided import Guided, Known
 from pmviewer.photons.emission.light_importance import LightImportance
-from pmviewer.photons.light_pass.light_pass import PhotonMaps, guided_emission_of, trace_pass, trajectories
+from pmviewer.photons.light_pass.light_pass import guided_emission_of, trace_pass
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
+from pmviewer.photons.light_pass.plan import trajectories
 from pmviewer.render.direct.choice import CHOICES
 from pmviewer.scene.arrays.flatten import LUMINANCE
 from pmviewer.scene.light_places import light_places
@@ -166,7 +168,7 @@ class LightStage:
             projection=None if guided is not None else self.projection,
             deposition=deposition,
             guided=guided,
-            fates=fates,
+            watch=fates,
         )
 
     def _timed(self, stage: str, run: Callable[[], Any]) -> Any:

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from pmviewer.maps.search.grid import PhotonGrid
 from pmviewer.maps.shadow import build_shadows, shadow_record
-from pmviewer.photons.light_pass.light_pass import Runner
 from pmviewer.photons.shadow import shadow_pass
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import Direct
+from pmviewer.tasks import Runner
 
 SEED = 0x5AD0
 """Keeps their random numbers apart from those of the light pass."""

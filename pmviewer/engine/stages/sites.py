@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.maps.estimate.estimate import irradiance_at_knn
+from pmviewer.maps.estimate.filters import Filter
+from pmviewer.maps.estimate.nearest import Neighbours
 from pmviewer.maps.radiance import RadianceMap, build_sites
 from pmviewer.maps.record import decode_directions
 from pmviewer.maps.search.kdtree import PhotonKdTree
 from pmviewer.maps.search.stored import ALL_CLASSES
-from pmviewer.photons.light_pass.light_pass import PhotonMaps
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Settings
 
 AUTOMATIC_CUTOFF, AUTOMATIC_CUTOFF_NEAREST = 0.5, 1.0
@@ -59,14 +61,10 @@ def median_radius(photons: PhotonMaps, tree: PhotonKdTree, max_radius: float, ey
         tree.record,
         points,
         normals,
-        eye["k"],
-        np.float32(max_radius),
+        Neighbours(eye["k"], np.float32(max_radius), eye["rim"], eye["share"]),
         eye["flatness"],
         np.int32(ALL_CLASSES),
-        eye["filter"],
-        eye["cone_k"],
-        eye["rim"],
-        eye["share"],
+        Filter(eye["filter"], eye["cone_k"]),
         0,
         m,
         E,

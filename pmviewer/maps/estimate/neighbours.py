@@ -25,11 +25,12 @@ from pmviewer.kernels.memory import (
     stack_put_f4,
     stack_put_i4,
 )
-from pmviewer.maps.estimate.nearest import nearest_disc
-from pmviewer.maps.record import decode_power
-from pmviewer.maps.search.grid import BLOCK_BYTES, ROW_BYTES, grid_ranges, lanes_between
-from pmviewer.maps.search.kdtree import KEYS
-from pmviewer.maps.search.simd import WIDTH, facing8, within8
+from pmviewer.maps.estimate.nearest import Neighbours, nearest_disc
+from pmviewer.maps.photon_words import decode_powers
+from pmviewer.maps.search.disc import Disc, Place
+from pmviewer.maps.search.grid import counted_in_block, grid_ranges
+from pmviewer.maps.search.k_nearest import KEYS
+from pmviewer.maps.search.simd import BLOCK_BYTES, WIDTH
 from pmviewer.maps.search.stored import stored_power
 
 FOUND_WORDS, SQUARED_WORDS, BATCH_WORDS = KEYS, WIDTH, 2 * WIDTH
@@ -59,21 +60,8 @@ def search(photons, eye, radius, p, n, class_mask, scratch):
     if has(photons, "planes"):
 
         def k_nearest(photons, eye, radius, p, n, class_mask, scratch):
-            count, rim, r2 = nearest_disc(
-                photons,
-                p[0],
-                p[1],
-                p[2],
-                n[0],
-                n[1],
-                n[2],
-                eye.k,
-                radius,
-                eye.flatness,
-                class_mask,
-                eye.share,
-                scratch[0],
-            )
+            neighbours = Neighbours(eye.k, radius, eye.rim, eye.share)
+            count, rim, r2 = nearest_disc(photons, Place(p, n, eye.flatness, class_mask), neighbours, scratch[0])
             return count, r2, rim
 
         return k_nearest
@@ -82,7 +70,7 @@ def search(photons, eye, radius, p, n, class_mask, scratch):
         radius = min(radius, photons.radius)
         runs = grid_ranges(photons, p[0], p[1], p[2], radius, scratch[0])
         r2 = radius * radius
-        return (_i8(runs), p, n, r2, eye.flatness * radius, class_mask), r2, _i8(-1)
+        return (_i8(runs), Disc(p, n, r2, eye.flatness * radius, class_mask)), r2, _i8(-1)
 
     return within
 
@@ -108,7 +96,7 @@ def next_batch(photons, found, run, at, scratch):
         return of_keys
 
     def of_runs(photons, found, run, at, scratch):
-        runs, p, n, r2, height, class_mask = found
+        runs, disc = found
         ranges, squared, batch = scratch
         while run < runs:
             first, end = _i8(stack_get_i4(ranges, 2 * run)), _i8(stack_get_i4(ranges, 2 * run + 1))
@@ -118,11 +106,7 @@ def next_batch(photons, found, run, at, scratch):
                 at = _i8(0)
                 continue
             at = block + 1
-            x = photons.blocks + block * BLOCK_BYTES
-            y, z, words = x + ROW_BYTES, x + 2 * ROW_BYTES, x + 3 * ROW_BYTES
-            mask = _i4(within8(x, y, z, p[0], p[1], p[2], r2, squared) & lanes_between(first, end, block))
-            if mask != 0:
-                mask &= facing8(x, y, z, words, p[0], p[1], p[2], n[0], n[1], n[2], height, class_mask)
+            mask = counted_in_block(photons, block, first, end, disc, squared)
             some = _i8(0)
             while mask != 0:
                 lane = count_trailing_zeros(mask)
@@ -139,7 +123,7 @@ def next_batch(photons, found, run, at, scratch):
 
 @device
 def _column(photons, place):
-    """Address of the x of a photon of a grid, whose other words follow at multiples of ROW_BYTES."""
+    """Address of the x of a photon of a grid, whose other words follow at multiples of WIDTH."""
     return photons.blocks + (place // WIDTH) * BLOCK_BYTES + 4 * (place % WIDTH)
 
 
@@ -172,7 +156,6 @@ def power_of(photons, place):
 
     def in_grid(photons, place):
         at = _column(photons, place)
-        rg, b = load_u4(at, 4 * WIDTH), load_u4(at, 5 * WIDTH)
-        return decode_power(rg & _u4(0xFFFF)), decode_power(rg >> _u4(16)), decode_power(b & _u4(0xFFFF))
+        return decode_powers(load_u4(at, 4 * WIDTH), load_u4(at, 5 * WIDTH))
 
     return in_grid

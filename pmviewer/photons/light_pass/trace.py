@@ -10,6 +10,8 @@ threads and any batch size (T2). Dimension set 0 is emission, set 1 + b the b-th
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from pmviewer.kernels.accel.opacity import over_opacity
@@ -27,24 +29,15 @@ from pmviewer.kernels.bsdf.scattering import (
     same_side,
     shading_normal,
 )
-from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.compile.jit import device, inlined, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.lights.light import is_delta_light
-from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import STRAIGHT, adjoint_cosines, face, leave, surface_at
 from pmviewer.kernels.vector import dot, is_good, luminance, mul, scale
-from pmviewer.maps.record import (
-    BOUNCES,
-    CAUSTIC,
-    HAD_DIFFUSE,
-    INDIRECT_CAUSTIC,
-    LAST_SPECULAR,
-    UNFOUND,
-    encode_direction,
-    encode_power,
-)
+from pmviewer.maps.photon_words import encode_direction, write_photon
+from pmviewer.maps.record import BOUNCES, CAUSTIC, HAD_DIFFUSE, INDIRECT_CAUSTIC, LAST_SPECULAR, UNFOUND
 from pmviewer.photons.light_pass.paths import begin_path, extend_path
 from pmviewer.photons.light_pass.roulette import BY_LUMINANCE, EQUAL, MOST_COPIES, copies, survival_probability
 from pmviewer.photons.projection.projected import emission
@@ -81,7 +74,7 @@ C_GLOBAL, C_CAUSTIC, C_RAYS, C_DROPPED = range(N_COUNTS)
 N_LEDGER = 6
 E_EMITTED, E_STORED, E_ABSORBED, E_ESCAPED, E_TERMINATED, E_DROPPED = range(N_LEDGER)
 """Energy ledger: luminance of power in units of the map's. What roulette gives a survivor or takes from a victim counts
-as absorbed, so that the books always balance and each entry is right in the mean. E_STORED is what arrived where
+as absorbed, so that the ledger always balances and each entry is right in the mean. E_STORED is what arrived where
 photons are stored, as often as it arrived; the others after E_EMITTED are how a trajectory ends. A photon whose power
 becomes infinite or NaN is dropped with the power that it had before."""
 
@@ -91,167 +84,226 @@ def empty_ledger():
     return np.zeros((2, N_LEDGER))
 
 
+class PhotonBuffers(NamedTuple):
+    """What photons leave behind. global_out, caustic_out: float32 (capacity, 6), see `pmviewer.maps.record`;
+    global_normals, caustic_normals: uint32 (capacity,), receive codes of the surface normals on the side that each
+    photon came from, or (0,) when nobody needs them; counts: int64 (N_COUNTS,) and ledgers: float64 (2, N_LEDGER) are
+    added to, `counts[C_GLOBAL]` and `counts[C_CAUSTIC]` being the rows filled so far."""
+
+    global_out: Any
+    caustic_out: Any
+    global_normals: Any
+    caustic_normals: Any
+    counts: Any
+    ledgers: Any
+
+
+class Arrival(NamedTuple):
+    """A photon where it meets a surface that keeps it: point p, unit wi to where it came from, ng on that side, flags
+    and light as in `pmviewer.maps.record`."""
+
+    p: Any
+    wi: Any
+    ng: Any
+    flags: Any
+    light: Any
+
+
+@kernel
+def trace_photons(scenes, passes, projections, i0, i1, out, paths):
+    """Trace photons i0 … i1−1 of a pass.
+
+    scenes: SCENE_DTYPE (1,); passes: LIGHT_PASS_DTYPE (1,); projections: PROJECTION_DTYPE (2,), STRATA_DTYPE (2,),
+    SCATTERED_DTYPE (2,) or NO_PROJECTION, of the trajectories that fill the global map and of the others; out:
+    `PhotonBuffers`; paths: None, or where to write whole paths (`pmviewer.photons.light_pass.paths`).
+
+    Returns the index of the next photon to trace: less than i1 when a buffer may not hold another photon's path.
+    """
+    pass_, counts = passes[0], out.counts
+    most = pass_.max_bounces if pass_.roulette != EQUAL else MOST_COPIES * pass_.max_bounces
+    for i in range(i0, i1):
+        if counts[C_GLOBAL] + most > len(out.global_out) or counts[C_CAUSTIC] + most > len(out.caustic_out):
+            return i
+        kind = 0 if i < pass_.global_trajectories else 1
+        _trace_photon(scenes[0], pass_, projections[kind], i, out, out.ledgers[kind], paths)
+    return i1
+
+
 @device
-def _store(out, row, p, wi, beta, flags, light):
-    out[row, 0], out[row, 1], out[row, 2] = p
-    r, g, b = encode_power(beta[0]), encode_power(beta[1]), encode_power(beta[2])
-    out[row, 3] = float_of_bits(_u4(encode_direction(wi[0], wi[1], wi[2]) | _u4(flags)))
-    out[row, 4] = float_of_bits(_u4(r | _u4(g << _u4(16))))
-    out[row, 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
+def _trace_photon(scene, pass_, projection, i, out, ledger, paths):
+    """Photon i of the pass, from its light to its end."""
+    to_global, counts = i < pass_.global_trajectories, out.counts
+    seed, index = _stream(pass_, i)
+    u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, _i8(0))
+    u_pick = draw1(pass_.sequence, seed, index, LIGHT_CHOICE_SET)
+    p, d, beta, light, starts, factor = emission(
+        scene, projection, i, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1)
+    )
+    ledger[E_EMITTED] += _f8(factor)  # its luminance is 1
+    if not is_good(beta):
+        counts[C_DROPPED] += 1
+        ledger[E_DROPPED] += _f8(factor)
+        return
+    if not starts:
+        ledger[E_ESCAPED] += _f8(factor)
+        return
+    begin_path(paths, i, p, d, scale(beta, factor), light)
+    o, flags, bounces = p, _u4(0), 0
+    deltas = pass_.unfound != 0 and is_delta_light(scene, light)  # and nothing but deltas since the light
+    while True:
+        t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), _INF)
+        counts[C_RAYS] += 1
+        word = _u4(flags | _u4(min(bounces, BOUNCES)))
+        if prim < 0:
+            extend_path(paths, i, prim, o, d, scale(beta, factor), word, light)
+            ledger[E_ESCAPED] += _f8(luminance(beta) * factor)
+            return
+        p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
+        material = material_of(scene, prim)
+        beta = _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledger)
+        extend_path(paths, i, prim, p, d, scale(beta, factor), word, light)
+        wi = (-d[0], -d[1], -d[2])
+        b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
+        kept = keeps(scene, material, b, ng, wi, pass_.glossy)
+        before = luminance(beta)
+        if b.groups | kept == NOTHING or not before > _f4(0.0):
+            ledger[E_ABSORBED] += _f8(before * factor)
+            return
+        ng = face(ng, wi)
+        u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
+        unfound = deltas and bounces > 0 and kept & FOLLOWED != 0
+        if kept & STORED != 0 or unfound:
+            if unfound:
+                word = _u4(word | _u4(UNFOUND))
+            times, stored = _copies(pass_, beta, seed, index, bounces)
+            # As many photons as the opacity says meet the surface; looked up, it is taken to be there.
+            stored = over_opacity(scene, prim, u, v, p, scale(stored, factor))
+            arrival = Arrival(p, wi, ng, word, light)
+            _store_caustic(pass_, arrival, stored, times, out)
+            if to_global and kept & STORED != 0 and _is_chosen(pass_, seed, index, bounces):
+                _store_global(arrival, stored, times, out)
+            ledger[E_STORED] += _f8(before * factor)
+        if b.groups == NOTHING:  # a part of a blend that others keep photons for
+            ledger[E_ABSORBED] += _f8(before * factor)
+            return
+        group, share, u_lobe = pick_group(b, wi, u_lobe)
+        deltas = deltas and group == FOLLOWED and is_delta(b)
+        if group == FOLLOWED:
+            flags = _u4(flags | _u4(LAST_SPECULAR))
+        elif not to_global and pass_.only_direct != 0:
+            ledger[E_TERMINATED] += _f8(before * factor)
+            return
+        else:
+            flags = _u4(HAD_DIFFUSE)
+        d, weight = _scattered(scene, b, group, wi, ng, u_lobe, (u0, u1))
+        alive, beta = _after_roulette(pass_, beta, scale(mul(beta, weight), share), u2, factor, counts, ledger)
+        if not alive:
+            return
+        bounces += 1
+        if bounces >= pass_.max_bounces:
+            ledger[E_TERMINATED] += _f8(luminance(beta) * factor)
+            return
+        o = leave(p, ng, gap, d[0], d[1], d[2])
+
+
+@inlined
+def _stream(pass_, i):
+    """Seed and index of the random numbers of photon i."""
+    place = _i8(pass_.first_index) + _i8(i)
+    seed = pass_.seed
+    if place >> 32 != 0:  # a Sobol set has 2³² points; the next photons use other sets
+        seed = hash3(seed, _u4(place >> 32), _u4(LIGHT_CHOICE_SET))
+    return seed, _u4(place)
 
 
 @specialised
-def _on_the_way(scene, material, ng, d, t, beta, worth, counts, ledgers, book):
+def _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledger):
     """beta after the way to a surface (`attenuation`), what was lost on it booked; black when it is no number."""
     if not has(scene, "bsdfs"):
-        return lambda scene, material, ng, d, t, beta, worth, counts, ledgers, book: beta
+        return lambda scene, material, ng, d, t, beta, factor, counts, ledger: beta
 
-    def booked(scene, material, ng, d, t, beta, worth, counts, ledgers, book):
+    def booked(scene, material, ng, d, t, beta, factor, counts, ledger):
         before = luminance(beta)
         beta = attenuation(scene, material, ng, d, t, beta)
         if not is_good(beta):
             counts[C_DROPPED] += 1
-            ledgers[book, E_DROPPED] += _f8(before * worth)
+            ledger[E_DROPPED] += _f8(before * factor)
             return _f4(0.0), _f4(0.0), _f4(0.0)
-        ledgers[book, E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
+        ledger[E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * factor)
         return beta
 
     return booked
 
 
-@kernel
-def trace_photons(scenes, passes, projections, i0, i1, global_out, normals_out, caustic_out, counts, ledgers, paths):
-    """Trace photons i0 … i1−1 of a pass.
+@inlined
+def _copies(pass_, beta, seed, index, bounces):
+    """As how many photons the power beta is stored, and the power of each."""
+    if pass_.roulette != EQUAL:
+        return 1, beta
+    times, part = copies(beta, draw1(pass_.sequence, seed, index, COPIES_SET + bounces))
+    return times, scale(beta, part)
 
-    scenes: SCENE_DTYPE (1,); passes: LIGHT_PASS_DTYPE (1,); projections: PROJECTION_DTYPE (2,), STRATA_DTYPE (2,) or
-    NO_PROJECTION, of the trajectories that fill the global map and of the others; global_out, caustic_out: float32
-    (capacity, 6), see `pmviewer.maps.record`; normals_out: two arrays uint32 (capacity,), receive the surface normals
-    of global and of caustic photons, or (0,) when nobody needs them; counts: int64 (N_COUNTS,) and ledgers: float64
-    (2, N_LEDGER) are added to, `counts[C_GLOBAL]` and `counts[C_CAUSTIC]` being the rows filled so far; paths: None, or
-    where to write whole paths (`pmviewer.photons.light_pass.paths`).
 
-    Returns the index of the next photon to trace: less than i1 when a buffer may not hold another photon's path.
-    """
-    scene = scenes[0]
-    pass_ = passes[0]
-    max_bounces = pass_.max_bounces
-    most = max_bounces if pass_.roulette != EQUAL else MOST_COPIES * max_bounces
-    for i in range(i0, i1):
-        if counts[C_GLOBAL] + most > len(global_out) or counts[C_CAUSTIC] + most > len(caustic_out):
-            return i
-        to_global = i < pass_.global_trajectories
-        book = 0 if to_global else 1
-        place = np.int64(pass_.first_index) + np.int64(i)
-        index, seed = _u4(place), pass_.seed
-        if place >> 32 != 0:  # a Sobol set has 2³² points; the next photons use other sets
-            seed = hash3(seed, _u4(place >> 32), _u4(LIGHT_CHOICE_SET))
-        u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, _i8(0))
-        u_pick = draw1(pass_.sequence, seed, index, LIGHT_CHOICE_SET)
-        projection = projections[0 if to_global else 1]
-        p, d, beta, light, kept, worth = emission(
-            scene, projection, i, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1)
-        )
-        ledgers[book, E_EMITTED] += _f8(worth)  # its luminance is 1
-        if not is_good(beta):
-            counts[C_DROPPED] += 1
-            ledgers[book, E_DROPPED] += _f8(worth)
-            continue
-        if not kept:
-            ledgers[book, E_ESCAPED] += _f8(worth)
-            continue
-        begin_path(paths, i, p, d, scale(beta, worth), light)
-        o = p
-        flags = _u4(0)
-        bounces = 0
-        deltas = pass_.unfound != 0 and is_delta_light(scene, light)  # and nothing but deltas since the light
-        while True:
-            t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), _INF)
-            counts[C_RAYS] += 1
-            if prim < 0:
-                extend_path(paths, i, prim, o, d, scale(beta, worth), _u4(flags | _u4(min(bounces, BOUNCES))), light)
-                ledgers[book, E_ESCAPED] += _f8(luminance(beta) * worth)
-                break
-            p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
-            material = material_of(scene, prim)
-            beta = _on_the_way(scene, material, ng, d, t, beta, worth, counts, ledgers, book)
-            extend_path(paths, i, prim, p, d, scale(beta, worth), _u4(flags | _u4(min(bounces, BOUNCES))), light)
-            wi = (-d[0], -d[1], -d[2])
-            b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
-            kept = keeps(scene, material, b, ng, wi, pass_.glossy)
-            if b.groups | kept == NOTHING or not luminance(beta) > _f4(0.0):
-                ledgers[book, E_ABSORBED] += _f8(luminance(beta) * worth)
-                break
-            ng = face(ng, wi)
-            u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
-            unfound = deltas and bounces > 0 and kept & FOLLOWED != 0
-            if kept & STORED != 0 or unfound:
-                path_class = np.int32(flags >> _u4(6))
-                word = _u4(flags | _u4(min(bounces, BOUNCES)))
-                if unfound:
-                    word = _u4(word | _u4(UNFOUND))
-                is_caustic = path_class == CAUSTIC or (path_class == INDIRECT_CAUSTIC and pass_.indirect_caustics != 0)
-                times, stored = 1, beta
-                if pass_.roulette == EQUAL:
-                    times, factor = copies(beta, draw1(pass_.sequence, seed, index, COPIES_SET + bounces))
-                    stored = scale(beta, factor)
-                # As many photons as the opacity says meet the surface; looked up, it is taken to be there.
-                stored = over_opacity(scene, prim, u, v, p, scale(stored, worth))
-                if is_caustic and pass_.caustics != 0:
-                    in_caustic = scale(stored, pass_.direct_scale)
-                    if path_class == INDIRECT_CAUSTIC:
-                        in_caustic = scale(stored, pass_.indirect_scale)
-                    for _ in range(times):
-                        _store(caustic_out, counts[C_CAUSTIC], p, wi, in_caustic, word, light)
-                        if len(normals_out[1]) > 0:
-                            normals_out[1][counts[C_CAUSTIC]] = encode_direction(ng[0], ng[1], ng[2])
-                        counts[C_CAUSTIC] += 1
-                if (
-                    to_global
-                    and kept & STORED != 0
-                    and (
-                        pass_.store_probability >= _f4(1.0)
-                        or draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
-                    )
-                ):
-                    for _ in range(times):
-                        _store(global_out, counts[C_GLOBAL], p, wi, stored, word, light)
-                        if len(normals_out[0]) > 0:
-                            normals_out[0][counts[C_GLOBAL]] = encode_direction(ng[0], ng[1], ng[2])
-                        counts[C_GLOBAL] += 1
-                ledgers[book, E_STORED] += _f8(luminance(beta) * worth)
-            before = luminance(beta)
-            if b.groups == NOTHING:  # a part of a blend that others keep photons for
-                ledgers[book, E_ABSORBED] += _f8(before * worth)
-                break
-            group, share, u_lobe = pick_group(b, wi, u_lobe)
-            deltas = deltas and group == FOLLOWED and is_delta(b)
-            if group == FOLLOWED:
-                flags = _u4(flags | _u4(LAST_SPECULAR))
-            elif not to_global and pass_.only_direct != 0:
-                ledgers[book, E_TERMINATED] += _f8(before * worth)
-                break
-            else:
-                flags = _u4(HAD_DIFFUSE)
-            d, weight, _, _ = bsdf_sample(scene, b, group, wi, u_lobe, u0, u1)
-            if same_side(b, group, ng, wi, d) == 0:  # the lobe of a shading normal may dip below the surface
-                weight = (_f4(0.0), _f4(0.0), _f4(0.0))
-            elif abs(dot(shading_normal(b), ng)) < STRAIGHT:
-                weight = scale(weight, adjoint_cosines(shading_normal(b), ng, wi, d))
-            after = scale(mul(beta, weight), share)
-            if not is_good(after):
-                counts[C_DROPPED] += 1
-                ledgers[book, E_DROPPED] += _f8(before * worth)
-                break
-            survival = survival_probability(pass_.roulette, before, beta, after)
-            if not u2 < survival:
-                ledgers[book, E_ABSORBED] += _f8(before * worth)
-                break
-            beta = scale(after, _f4(1.0) / survival)
-            if pass_.roulette != BY_LUMINANCE or not survival < _f4(1.0):  # else it stays
-                ledgers[book, E_ABSORBED] += _f8(before * worth) - _f8(luminance(beta) * worth)
-            bounces += 1
-            if bounces >= max_bounces:
-                ledgers[book, E_TERMINATED] += _f8(luminance(beta) * worth)
-                break
-            o = leave(p, ng, gap, d[0], d[1], d[2])
-    return i1
+@inlined
+def _is_chosen(pass_, seed, index, bounces):
+    """Whether a photon is one of those that the global map stores."""
+    if pass_.store_probability >= _f4(1.0):
+        return True
+    return draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
+
+
+@inlined
+def _store_caustic(pass_, arrival, power, times, out):
+    """Keep a photon for the caustic map `times` times if it is one of its path classes."""
+    path_class = np.int32(arrival.flags >> _u4(6))
+    if pass_.caustics == 0 or not (
+        path_class == CAUSTIC or (path_class == INDIRECT_CAUSTIC and pass_.indirect_caustics != 0)
+    ):
+        return
+    power = scale(power, pass_.indirect_scale if path_class == INDIRECT_CAUSTIC else pass_.direct_scale)
+    for _ in range(times):
+        row, ng = out.counts[C_CAUSTIC], arrival.ng
+        write_photon(out.caustic_out, row, arrival.p, arrival.wi, power, arrival.flags, arrival.light)
+        if len(out.caustic_normals) > 0:
+            out.caustic_normals[row] = encode_direction(ng[0], ng[1], ng[2])
+        out.counts[C_CAUSTIC] += 1
+
+
+@inlined
+def _store_global(arrival, power, times, out):
+    """Keep a photon for the global map `times` times."""
+    for _ in range(times):
+        row, ng = out.counts[C_GLOBAL], arrival.ng
+        write_photon(out.global_out, row, arrival.p, arrival.wi, power, arrival.flags, arrival.light)
+        if len(out.global_normals) > 0:
+            out.global_normals[row] = encode_direction(ng[0], ng[1], ng[2])
+        out.counts[C_GLOBAL] += 1
+
+
+@inlined
+def _scattered(scene, b, group, wi, ng, u_lobe, u):
+    """A direction in which a group of lobes scatters, and the weight of the power that goes there."""
+    d, weight, _, _ = bsdf_sample(scene, b, group, wi, u_lobe, u[0], u[1])
+    if same_side(b, group, ng, wi, d) == 0:  # the lobe of a shading normal may dip below the surface
+        weight = (_f4(0.0), _f4(0.0), _f4(0.0))
+    elif abs(dot(shading_normal(b), ng)) < STRAIGHT:
+        weight = scale(weight, adjoint_cosines(shading_normal(b), ng, wi, d))
+    return d, weight
+
+
+@inlined
+def _after_roulette(pass_, beta, after, u, factor, counts, ledger):
+    """Whether a photon survives the scattering from power beta to `after`, and with which power."""
+    before = luminance(beta)
+    if not is_good(after):
+        counts[C_DROPPED] += 1
+        ledger[E_DROPPED] += _f8(before * factor)
+        return False, after
+    survival = survival_probability(pass_.roulette, before, beta, after)
+    if not u < survival:
+        ledger[E_ABSORBED] += _f8(before * factor)
+        return False, after
+    beta = scale(after, _f4(1.0) / survival)
+    if pass_.roulette != BY_LUMINANCE or not survival < _f4(1.0):  # else it stays
+        ledger[E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * factor)
+    return True, beta

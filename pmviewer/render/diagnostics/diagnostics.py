@@ -27,8 +27,8 @@ from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.kernels.vector import dot, largest
+from pmviewer.maps.photon_words import encode_direction
 from pmviewer.maps.radiance import nearest_site, site_place
-from pmviewer.maps.record import encode_direction
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near, chosen_light
 from pmviewer.render.direct.shadow import UNKNOWN, known_visibility

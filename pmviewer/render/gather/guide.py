@@ -33,9 +33,10 @@ from pmviewer.kernels.memory import (
 )
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import basis, dot, luminance, normalize, scale
-from pmviewer.maps.record import decode_direction, decode_power
-from pmviewer.maps.search.grid import BLOCK_BYTES, RECORD, ROW_BYTES, PhotonGrid, grid_ranges, lanes_between
-from pmviewer.maps.search.simd import WIDTH, facing8, within8
+from pmviewer.maps.photon_words import decode_direction, decode_powers
+from pmviewer.maps.search.disc import Disc
+from pmviewer.maps.search.grid import RECORD, PhotonGrid, counted_in_block, grid_ranges
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH
 from pmviewer.render.direct.direct import power_heuristic
 from pmviewer.render.gather.cones import cone_direction, cone_pdf
 from pmviewer.render.gather.hemicells import CELLS, cell_direction, cell_pdf, fill_cells
@@ -90,7 +91,7 @@ def photons_near(grid, class_mask, p, n, seed, most, found):
     """
     ranges, squared = stack_i4(16), stack_i4(8)
     radius = grid.radius
-    r2 = radius * radius
+    disc = Disc(p, n, radius * radius, radius, _i4(class_mask))
     runs = grid_ranges(grid, p[0], p[1], p[2], radius, ranges)
     candidates = _i8(0)
     for k in range(runs):
@@ -101,11 +102,8 @@ def photons_near(grid, class_mask, p, n, seed, most, found):
     for k in range(runs):
         first, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
         for block in range(first // WIDTH, (end - 1) // WIDTH + 1, step):
-            x = grid.blocks + block * BLOCK_BYTES
-            y, z, words = x + ROW_BYTES, x + 2 * ROW_BYTES, x + 3 * ROW_BYTES
-            mask = _i4(within8(x, y, z, p[0], p[1], p[2], r2, squared) & lanes_between(first, end, block))
-            if mask != 0:
-                mask &= facing8(x, y, z, words, p[0], p[1], p[2], n[0], n[1], n[2], radius, _i4(class_mask))
+            mask = counted_in_block(grid, block, first, end, disc, squared)
+            words = grid.blocks + block * BLOCK_BYTES + 3 * ROW_BYTES
             while mask != 0:
                 lane = count_trailing_zeros(mask)
                 mask &= mask - _i4(1)
@@ -115,9 +113,8 @@ def photons_near(grid, class_mask, p, n, seed, most, found):
                     at = (_i8(state) * seen) >> 32
                 if at < most:
                     w = normalize(decode_direction(load_u4(words, lane)))
-                    rg, b = load_u4(words + ROW_BYTES, lane), load_u4(words + 2 * ROW_BYTES, lane)
                     power = luminance(
-                        (decode_power(rg & _u4(0xFFFF)), decode_power(rg >> _u4(16)), decode_power(b & _u4(0xFFFF)))
+                        decode_powers(load_u4(words + ROW_BYTES, lane), load_u4(words + 2 * ROW_BYTES, lane))
                     )
                     for axis in range(3):
                         stack_put_f4(found, 4 * at + axis, w[axis])

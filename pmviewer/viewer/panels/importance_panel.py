@@ -19,7 +19,7 @@ from pmviewer.viewer.panels.statistics_panel import table
 from pmviewer.viewer.state import ViewerState
 
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
-    from pmviewer.photons.deposition.rules import Deposited
+    from pmviewer.photons.deposition.deposited import Deposited
 
 FIRST_WEIGHT = -10
 """Exponent of the histogram's first bin, as `pmviewer.photons.deposition.rules.FIRST_WEIGHT`."""
