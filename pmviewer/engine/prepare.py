@@ -16,12 +16,12 @@ from pmviewer.engine.stages.guides import gather_records
 from pmviewer.engine.stages.importance import prepare_importance
 from pmviewer.engine.stages.projection import projection_for
 from pmviewer.kernels.accel.raycast import cast_closest
-from pmviewer.maps.estimate.variant import marked
 from pmviewer.maps.irradiance_cache import NO_CACHE
 from pmviewer.maps.radiance import build_sites
 from pmviewer.maps.search.grid import build_grid
 from pmviewer.maps.search.kdtree import build_kdtree
 from pmviewer.maps.shadow import shadow_record
+from pmviewer.maps.variant import looked_up_by
 from pmviewer.photons.deposition.depositor import prepare_rules
 from pmviewer.photons.emission.strata import STRATA_DTYPE
 from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE, N_COUNTS, PhotonBuffers, empty_ledger, trace_photons
@@ -135,7 +135,7 @@ def _steps(scene: OpenScene, settings: Settings, nearest: bool) -> list[Step]:
 
         def compile_eye() -> None:
             built = photon_map(empty)
-            record = marked(built.record, estimator_of(settings))
+            record = looked_up_by(built.record, estimator_of(settings))
             sites = NO_SITES
             if plan.radiance:
                 sites = build_sites(empty, np.zeros(1, np.uint32), "all", 1.0, 1.0).record

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.jit import device, inlined
 from pmviewer.kernels.memory import bits_of_float, float_of_bits
 from pmviewer.maps.record import EXPONENT_BASE
 
@@ -69,7 +69,7 @@ def write_photon(rows, row, p, wi, power, flags, light):
     rows[row, 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
 
 
-@device
+@inlined
 def decode_powers(rg, b):
     """Words 4 and 5 of a photon → red, green, blue float32 in units of the map's power."""
     return decode_power(_u4(rg) & _u4(0xFFFF)), decode_power(_u4(rg) >> _u4(16)), decode_power(_u4(b) & _u4(0xFFFF))

@@ -24,6 +24,7 @@ from pmviewer.maps.search.disc import Disc
 from pmviewer.maps.search.grid import PhotonGrid, build_grid, counted_in_block, grid_ranges
 from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH
 from pmviewer.maps.search.stored import ALL_CLASSES
+from pmviewer.maps.variant import marked
 
 SHADOW_FLAGS = HAD_DIFFUSE | 1
 """Flags of a photon in shadow: of another class than direct ones, one surface behind."""
@@ -40,14 +41,8 @@ _u4 = np.uint32
 
 
 def shadow_record(grid: PhotonGrid, fewest: int) -> NDArray[np.void]:
-    """The grid's record (1,) for kernels, with the number of photons that it takes to decide; the field that tells it
-    from a plain map comes first, see `pmviewer.maps.estimate.variant`."""
-    fields = [(name, field[0]) for name, field in grid.record.dtype.fields.items()]  # type: ignore[union-attr]
-    record = np.zeros(1, np.dtype([("fewest", np.int32), *fields], align=True))
-    for name, _ in fields:
-        record[name] = grid.record[name]
-    record["fewest"] = fewest
-    return record
+    """The grid's record (1,) for kernels, with the number of photons that it takes to decide."""
+    return marked(grid.record, "fewest", fewest)
 
 
 def build_shadows(photons: NDArray[np.float32], fewest: int, radius: float | None, scene_radius: float) -> PhotonGrid:

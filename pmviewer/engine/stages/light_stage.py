@@ -24,12 +24,12 @@ from pmviewer.engine.stages.projection import projection_for
 from pmviewer.engine.stages.sites import median_radius, sites_of
 from pmviewer.engine.tally import Tally
 from pmviewer.importance.lights import importance_of_lights
-from pmviewer.maps.estimate.variant import marked
 from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import automatic_radius, largest_power, neighbourhood
 from pmviewer.maps.record import DIRECT, in_classes
 from pmviewer.maps.search.grid import PhotonGrid, build_grid
 from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
+from pmviewer.maps.variant import looked_up_by
 from pmviewer.photons.deposition.fates import Fates
 from pmviewer.photons.deposition.rules import Deposition
 from pmviewer.photons.emission.guided import Guided, Known
@@ -93,7 +93,7 @@ class LightStage:
         Returns the records of caustic map, global map and the map that chooses lights.
         """
         if not self.plan.photons:
-            record = marked(self._no_map().record, estimator_of(self.settings))
+            record = looked_up_by(self._no_map().record, estimator_of(self.settings))
             return record, record, self._no_map(nearest=False).record
         # Photons that are kept are those of the first pass, at its radius.
         kept = self.settings.photons.renew == "once"
@@ -276,10 +276,10 @@ class LightStage:
         self.tally.map_bytes = self.tally.map_photons = 0
         for name, made in zip(("caustic", "global"), built, strict=True):
             if made is None:
-                records.append(marked(self._no_map().record, estimator))
+                records.append(looked_up_by(self._no_map().record, estimator))
                 continue
             structure, look_up_radius = made
-            records.append(marked(structure.record, estimator))
+            records.append(looked_up_by(structure.record, estimator))
             eye[f"{name}_radius"] = look_up_radius
             self.tally.radius[name] = look_up_radius
             self.tally.map_bytes += structure.bytes

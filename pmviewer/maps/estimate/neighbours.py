@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.compile.specialise import has, specialised
+from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.memory import (
     count_trailing_zeros,
     float_of_bits,
@@ -32,6 +32,7 @@ from pmviewer.maps.search.grid import counted_in_block, grid_ranges
 from pmviewer.maps.search.k_nearest import KEYS
 from pmviewer.maps.search.simd import BLOCK_BYTES, WIDTH
 from pmviewer.maps.search.stored import stored_power
+from pmviewer.maps.variant import is_kdtree
 
 FOUND_WORDS, SQUARED_WORDS, BATCH_WORDS = KEYS, WIDTH, 2 * WIDTH
 """int32 elements of the three pieces of scratch of a look-up: what was found, eight squared distances, the batch."""
@@ -57,7 +58,7 @@ def search(photons, eye, radius, p, n, class_mask, scratch):
     What `next_batch` needs to go on; the squared radius of the disc, float32; the place of the photon that ends it,
     int64, −1 with a fixed radius, where there are fewer than k, and in a part of the disc.
     """
-    if has(photons, "planes"):
+    if is_kdtree(photons):
 
         def k_nearest(photons, eye, radius, p, n, class_mask, scratch):
             neighbours = Neighbours(eye.k, radius, eye.rim, eye.share)
@@ -83,7 +84,7 @@ def next_batch(photons, found, run, at, scratch):
     (int32) and from element WIDTH on their squared distances (float32; with the k nearest in the metric of the
     flattened disc).
     """
-    if has(photons, "planes"):
+    if is_kdtree(photons):
 
         def of_keys(photons, found, run, at, scratch):
             some = min(found - at, _i8(WIDTH))
@@ -130,7 +131,7 @@ def _column(photons, place):
 @specialised
 def place_of(photons, place):
     """Position (x, y, z) of the photon at a place (int64)."""
-    if has(photons, "planes"):
+    if is_kdtree(photons):
 
         def in_tree(photons, place):
             return load_f4(photons.x, place), load_f4(photons.y, place), load_f4(photons.z, place)
@@ -147,7 +148,7 @@ def place_of(photons, place):
 @specialised
 def power_of(photons, place):
     """Red, green, blue power of the photon at a place (int64), in units of the map's power."""
-    if has(photons, "planes"):
+    if is_kdtree(photons):
 
         def in_tree(photons, place):
             return stored_power(photons, place)

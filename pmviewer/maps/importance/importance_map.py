@@ -28,6 +28,7 @@ from pmviewer.kernels.vector import dot, normalize, sub
 from pmviewer.maps.photon_words import decode_direction, encode_power
 from pmviewer.maps.record import decode_directions
 from pmviewer.maps.search.kdtree import RECORD, PhotonKdTree
+from pmviewer.maps.variant import ABSENT, with_mark
 
 Kind = Literal["screen", "footprint", "average"]
 KINDS: tuple[Kind, ...] = ("screen", "footprint", "average")
@@ -35,17 +36,18 @@ KINDS: tuple[Kind, ...] = ("screen", "footprint", "average")
 OF_TWIN = np.float32(-1.0)
 """In place of the importance of an importon that takes another one's."""
 
-IMPORTON_FIELDS: list[tuple[str, Any]] = [
-    ("importons", np.int32),  # 1; first, because it tells the record from that of photons
-    *[(name, RECORD[name]) for name in RECORD.names or ()],
-    ("reach", np.int64),  # float32 (n,): how far the importance at an importon is used
-    ("weight", np.int64),  # float32 (n,): Ψ
-    ("farthest", np.float32),  # the largest reach
-    ("sum_radius", np.float32),  # of `importance_sum`
-]
-IMPORTON_DTYPE = np.dtype(IMPORTON_FIELDS, align=True)
+IMPORTON_DTYPE = with_mark(
+    RECORD,
+    "importons",
+    [
+        ("reach", np.int64),  # float32 (n,): how far the importance at an importon is used
+        ("weight", np.int64),  # float32 (n,): Ψ
+        ("farthest", np.float32),  # the largest reach
+        ("sum_radius", np.float32),  # of `importance_sum`
+    ],
+)
 """What kernels see of an importance map: a kd-tree whose payload is normal, Γ and footprint importance."""
-NO_IMPORTANCE = np.zeros(1, np.dtype([("none", np.int32)]))
+NO_IMPORTANCE = ABSENT
 """Stands for an importance map where there is none."""
 
 _f4 = np.float32

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device, kernel
-from pmviewer.kernels.compile.specialise import has, specialised
+from pmviewer.kernels.compile.specialise import absent, specialised
 from pmviewer.kernels.memory import float_of_bits, load_f4, stack_get_i8, stack_i4
 from pmviewer.maps.search.disc import Facing
 from pmviewer.maps.search.k_nearest import KEYS, nearest
@@ -45,7 +45,7 @@ def importance_at(importance, p, n):
     That of the nearest importon on this side, 0 outside of its reach: where nothing looks. `importance` is the record
     of an ImportanceMap, or that of NO_IMPORTANCE, which makes everything equally important (1).
     """
-    if has(importance, "none"):
+    if absent(importance):
         return lambda importance, p, n: _f4(1.0)
 
     def at(importance, p, n):
@@ -65,7 +65,7 @@ def importance_sum(importance, p, n, k):
 
     1 for the record of NO_IMPORTANCE.
     """
-    if has(importance, "none"):
+    if absent(importance):
         return lambda importance, p, n, k: _f4(1.0)
 
     def summed(importance, p, n, k):

@@ -9,7 +9,8 @@ of their own whose radius does not shrink: it blurs nothing. A pixel looks them 
 come from all around, about as evenly as the BSDF sends rays, they have nothing to tell but their noise, and all rays
 follow the BSDF.
 
-Kernels compile for the kind of guides they are given: `guides` is a record of NO_GUIDES or of one of GUIDE_DTYPES.
+Kernels compile for the kind of guides they are given: `guides` is a grid's record with a mark, or NO_GUIDES
+(`pmviewer.maps.variant`).
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_f, bsdf_pdf, bsdf_sample, shading_normal
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.memory import (
     count_trailing_zeros,
     load_u4,
@@ -35,8 +36,9 @@ from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import basis, dot, luminance, normalize, scale
 from pmviewer.maps.photon_words import decode_direction, decode_powers
 from pmviewer.maps.search.disc import Disc
-from pmviewer.maps.search.grid import RECORD, PhotonGrid, counted_in_block, grid_ranges
+from pmviewer.maps.search.grid import PhotonGrid, counted_in_block, grid_ranges
 from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH
+from pmviewer.maps.variant import ABSENT, Mark, marked
 from pmviewer.render.direct.direct import power_heuristic
 from pmviewer.render.gather.cones import cone_direction, cone_pdf
 from pmviewer.render.gather.hemicells import CELLS, cell_direction, cell_pdf, fill_cells
@@ -49,14 +51,9 @@ _i4 = np.int32
 _i8 = np.int64
 _u4 = np.uint32
 
-NO_GUIDES = np.zeros(1, np.dtype([("unguided", np.int32)]))
+NO_GUIDES = ABSENT
 """Stands for guides where rays follow the BSDF."""
-_GRID_FIELDS = [(name, RECORD[name]) for name in RECORD.names or ()]
-GUIDE_DTYPES: dict[Directions, np.dtype] = {
-    "photon cones": np.dtype([("cones", np.int32), *_GRID_FIELDS], align=True),
-    "hemisphere grid": np.dtype([("cells", np.int32), *_GRID_FIELDS], align=True),
-}
-"""A grid's record after a field that tells how its photons guide (first, see `pmviewer.maps.estimate.variant`)."""
+_MARKS: dict[Directions, Mark] = {"photon cones": "cones", "hemisphere grid": "cells"}
 
 MOST_CONES, MOST_IN_CELLS = 50, 128
 """Most photons that guide a pixel."""
@@ -76,10 +73,7 @@ GATHER_SET, BESIDE_SET, GUIDED_SET = np.array([2000, 2001, 2002], np.int64)
 
 def guides_of(grid: PhotonGrid, directions: Directions) -> NDArray[np.void]:
     """The record of a grid of photons that guide rays in that way; valid while the grid lives."""
-    record = np.zeros(1, GUIDE_DTYPES[directions])
-    for name in RECORD.names or ():
-        record[name] = grid.record[name]
-    return record
+    return marked(grid.record, _MARKS[directions])
 
 
 @device
@@ -157,7 +151,7 @@ def aim(given, si, seed, found):
     """What photons tell the gather rays of a point (`Aim`), their directions in `found` (AIM_WORDS words). They guide
     no rays, or as many as the eye record says."""
     guides = part(given, "guides")
-    if has(guides, "unguided"):
+    if absent(guides):
         return lambda given, si, seed, found: Aim(found, _i8(0), _i8(0))
     if has(guides, "cones"):
         return _aim_by_cones
@@ -210,7 +204,7 @@ def gather_direction(given, aimed, si, j, n, seed, numbers):
     number to use and the ray's index in its sequences. Without gather rays the direction is that of `numbers`: one for
     the lobe, two for the direction.
     """
-    if has(part(given, "guides"), "unguided"):
+    if absent(part(given, "guides")):
         return _by_bsdf
     return _by_both
 
