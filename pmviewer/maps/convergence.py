@@ -131,15 +131,17 @@ class Convergence:
     def states(self, points: Float, normals: Float, required: Float, own: bool, run: Runner) -> NDArray[np.int8]:
         """NO_CAUSTIC, MORE, CONVERGED or DENSE at points (n, 3) with unit normals (n, 3) and densities required (n,) in
         photons per unit area; own: whether each is the place of a photon of the map."""
-        how, n = self.criterion, len(points)
+        criterion, n = self.criterion, len(points)
         points, normals = np.ascontiguousarray(points, np.float32), np.ascontiguousarray(normals, np.float32)
         needs = needs_of(required)
-        states, widest = np.empty(n, np.int8), np.float32(WIDEST * how.scene_radius)
+        states, widest = np.empty(n, np.int8), np.float32(WIDEST * criterion.scene_radius)
         trees = self.tree.record, self.others.record
 
         def task(i0: int) -> Callable[[], None]:
             i1 = min(i0 + CHUNK, n)
-            return lambda: _classify(*trees, points, normals, needs, int(own), how.exponent, widest, i0, i1, states)
+            return lambda: _classify(
+                *trees, points, normals, needs, int(own), criterion.exponent, widest, i0, i1, states
+            )
 
         run([task(i0) for i0 in range(0, n, CHUNK)])
         return states

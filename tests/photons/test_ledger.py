@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.engine.energy import ENTRIES, Energy, EnergyBooks
+from pmviewer.engine.energy import ENTRIES, Energy, EnergyLedger
 from pmviewer.photons.light_pass.light_pass import trace_pass
 from pmviewer.photons.light_pass.roulette import RULES
 from pmviewer.photons.light_pass.trace import E_DROPPED, E_EMITTED, E_STORED
@@ -111,7 +111,7 @@ def lit_square(material, height=0.7, half=1.0):
 @pytest.mark.parametrize("rule", RULES)
 def test_open_scene_lets_its_share_escape(rule, projected):
     """A point over a square of albedo 0.4: what misses the square escapes, and of the rest the reflected part. With
-    projection maps no photon starts where it misses everything, and the books say the same."""
+    projection maps no photon starts where it misses everything, and the ledger says the same."""
     albedo = 0.4
     mean, error = shares(lit_square(diffuse(albedo=(albedo,) * 3)), projected=projected, roulette=rule)
     met = disc_view(0.7, 1.0)
@@ -162,7 +162,7 @@ def test_trajectories_for_the_caustic_map_do_not_change_the_books(rule, q):
 
 
 def test_what_becomes_infinite_is_dropped_with_what_it_had():
-    """A reflectance beyond float32's range is what no loader lets through; the books hold even then."""
+    """A reflectance beyond float32's range is what no loader lets through; the ledger holds even then."""
     scene = diffuse_box(albedo=0.5)
     flat = flatten(scene)
     row = flat.arrays[3][0]  # materials
@@ -198,12 +198,12 @@ def test_frames_tell_the_energy(emission):
 
 
 def test_books_are_means_with_standard_errors():
-    books = EnergyBooks()
-    assert books.close(False) is None
+    ledger = EnergyLedger()
+    assert ledger.close(False) is None
     rows = np.random.default_rng(1).uniform(0.1, 1.0, (5, 5))
     for row in rows:
-        books.add(row, 2.0)
-    energy = books.close(False)
+        ledger.add(row, 2.0)
+    energy = ledger.close(False)
     assert energy.watts == pytest.approx(rows.mean(axis=0))
     assert energy.errors == pytest.approx(rows.std(axis=0, ddof=1) / math.sqrt(5))
     assert energy.share("escaped") == pytest.approx(rows[:, 2].mean() / rows[:, 0].mean())

@@ -153,7 +153,7 @@ CLOSED = {"diffuse box": diffuse_box, "cornell box": cornell_box, "closed sphere
 @pytest.mark.parametrize("name", [*OPEN, *CLOSED])
 def test_energy_is_accounted_for(name):
     """Emitted = absorbed + escaped + terminated. Roulette keeps a survivor's luminance and a victim's is all absorbed,
-    so that the books balance to the last photon, not in the mean alone."""
+    so that the ledger balances to the last photon, not in the mean alone."""
     maps = trace((OPEN | CLOSED)[name](), N=40_000, max_bounces=12)
     ledger = maps.ledger
     ended = ledger[E_ABSORBED] + ledger[E_ESCAPED] + ledger[E_TERMINATED]

@@ -14,6 +14,10 @@ from pmviewer.maps.record import BYTES_PER_PHOTON
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
     from pmviewer.maps.convergence import Converged
 
+STORED, REJECTED, REDISTRIBUTED, DISCARDED = range(4)
+FATES = ("stored", "rejected", "redistributed", "discarded")
+"""What becomes of a photon that arrives: rejected ones are stood for by stored ones of more power, the power of
+redistributed ones is their neighbours', that of discarded ones is lost."""
 FIRST_WEIGHT, WEIGHTS = -10, 32
 """Histogram bins: weights around 2^FIRST_WEIGHT and so on, one a doubling; the outermost hold all below and above."""
 

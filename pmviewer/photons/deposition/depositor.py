@@ -15,7 +15,7 @@ from pmviewer.maps.density.control import Controlled, DensityControl
 from pmviewer.maps.photon_words import decode_powers
 from pmviewer.maps.power import encode_powers, luminances, write_power
 from pmviewer.maps.search.kdtree import PhotonKdTree
-from pmviewer.photons.deposition.deposited import Deposited, weight_histogram
+from pmviewer.photons.deposition.deposited import DISCARDED, REJECTED, STORED, Deposited, weight_histogram
 from pmviewer.photons.deposition.rules import (
     SMALLEST_EPSILON,
     Codes,
@@ -28,11 +28,6 @@ from pmviewer.photons.deposition.rules import (
 )
 from pmviewer.scene.description import LUMINANCE
 from pmviewer.tasks import Runner, in_turn
-
-STORED, REJECTED, REDISTRIBUTED, DISCARDED = range(4)
-FATES = ("stored", "rejected", "redistributed", "discarded")
-"""What becomes of a photon that arrives: rejected ones are stood for by stored ones of more power, the power of
-redistributed ones is their neighbours', that of discarded ones is lost."""
 
 _f4 = np.float32
 _f8 = np.float64

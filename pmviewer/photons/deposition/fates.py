@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.photons.deposition.depositor import REDISTRIBUTED, STORED, Depositor, Judged, judged, probabilities
+from pmviewer.photons.deposition.deposited import REDISTRIBUTED, STORED
+from pmviewer.photons.deposition.depositor import Depositor, Judged, judged, probabilities
 from pmviewer.photons.deposition.rules import Codes, Density, Deposition, Float, Homogeneous, KellerWald, Rule
 from pmviewer.tasks import Runner
 

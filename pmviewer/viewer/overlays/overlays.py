@@ -53,7 +53,7 @@ FATE_PALETTE: tuple[RGB, ...] = (
     (0.35, 0.60, 0.98),
     (0.98, 0.85, 0.25),
 )
-"""Of photons that are stored, rejected, redistributed and discarded (`pmviewer.photons.deposition.rules.FATES`)."""
+"""Of photons that are stored, rejected, redistributed and discarded (`pmviewer.photons.deposition.deposited.FATES`)."""
 FATES = ("stored", "rejected", "redistributed", "discarded")
 
 COLOUR_BY = {
