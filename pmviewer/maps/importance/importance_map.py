@@ -57,7 +57,7 @@ _i8 = np.int64
 @dataclass(frozen=True, eq=False)
 class Importons:
     """Importons as they were traced: `positions` (n, 3) float32; `normals` (n,) uint32, codes of
-    `pmviewer.maps.record.encode_direction` of the surface on the side seen; `weights` (n,) float32, Ψ in pixels;
+    `pmviewer.maps.photon_words.encode_direction` of the surface on the side seen; `weights` (n,) float32, Ψ in pixels;
     `footprints` (n,) float32, importance 1/A of the pixel's footprint A, 0 where it is not known."""
 
     positions: NDArray[np.float32]

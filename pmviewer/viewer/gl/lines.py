@@ -40,7 +40,7 @@ def flights(paths: PhotonPaths, first: int, length: int) -> NDArray[np.float32]:
 
 
 def encoded(values: NDArray[np.floating]) -> NDArray[np.uint32]:
-    """Stored powers' 16-bit codes of non-negative values, as `pmviewer.maps.record.encode_power`."""
+    """Stored powers' 16-bit codes of non-negative values, as `pmviewer.maps.photon_words.encode_power`."""
     bits = np.ascontiguousarray(values, np.float32).view(np.uint32).astype(np.int64)
     return np.clip((bits + 0x1000 - EXPONENT_BASE) >> 13, 0, 0xFFFF).astype(np.uint32)
 
