@@ -29,7 +29,7 @@ from pmviewer.kernels.bsdf.scattering import (
     same_side,
     shading_normal,
 )
-from pmviewer.kernels.compile.jit import device, inlined, kernel
+from pmviewer.kernels.compile.jit import inlined, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.lights.light import is_delta_light
 from pmviewer.kernels.random import draw1, draw4, hash3
@@ -119,91 +119,102 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
 
     Returns the index of the next photon to trace: less than i1 when a buffer may not hold another photon's path.
     """
-    pass_, counts = passes[0], out.counts
+    # Taken apart outside of the loop: counting references to arrays for each photon would take a quarter of the time.
+    global_out, caustic_out, global_normals, caustic_normals, counts, ledgers = out
+    scene, pass_ = scenes[0], passes[0]
     most = pass_.max_bounces if pass_.roulette != EQUAL else MOST_COPIES * pass_.max_bounces
     for i in range(i0, i1):
-        if counts[C_GLOBAL] + most > len(out.global_out) or counts[C_CAUSTIC] + most > len(out.caustic_out):
+        if counts[C_GLOBAL] + most > len(global_out) or counts[C_CAUSTIC] + most > len(caustic_out):
             return i
-        kind = 0 if i < pass_.global_trajectories else 1
-        _trace_photon(scenes[0], pass_, projections[kind], i, out, out.ledgers[kind], paths)
+        to_global = i < pass_.global_trajectories
+        kind = 0 if to_global else 1
+        seed, index = _stream(pass_, i)
+        p, d, beta, light, starts, factor = _emitted(scene, pass_, projections[kind], i, seed, index)
+        ledgers[kind, E_EMITTED] += _f8(factor)  # its luminance is 1
+        if not is_good(beta):
+            counts[C_DROPPED] += 1
+            ledgers[kind, E_DROPPED] += _f8(factor)
+            continue
+        if not starts:
+            ledgers[kind, E_ESCAPED] += _f8(factor)
+            continue
+        begin_path(paths, i, p, d, scale(beta, factor), light)
+        o, flags, bounces = p, _u4(0), 0
+        deltas = pass_.unfound != 0 and is_delta_light(scene, light)  # and nothing but deltas since the light
+        while True:
+            t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), _INF)
+            counts[C_RAYS] += 1
+            word = _u4(flags | _u4(min(bounces, BOUNCES)))
+            if prim < 0:
+                extend_path(paths, i, prim, o, d, scale(beta, factor), word, light)
+                ledgers[kind, E_ESCAPED] += _f8(luminance(beta) * factor)
+                break
+            p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
+            material = material_of(scene, prim)
+            beta = _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledgers, kind)
+            extend_path(paths, i, prim, p, d, scale(beta, factor), word, light)
+            wi = (-d[0], -d[1], -d[2])
+            b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
+            kept = keeps(scene, material, b, ng, wi, pass_.glossy)
+            before = luminance(beta)
+            if b.groups | kept == NOTHING or not before > _f4(0.0):
+                ledgers[kind, E_ABSORBED] += _f8(before * factor)
+                break
+            ng = face(ng, wi)
+            u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
+            unfound = deltas and bounces > 0 and kept & FOLLOWED != 0
+            if kept & STORED != 0 or unfound:
+                if unfound:
+                    word = _u4(word | _u4(UNFOUND))
+                times, stored = _copies(pass_, beta, seed, index, bounces)
+                # As many photons as the opacity says meet the surface; looked up, it is taken to be there.
+                stored = over_opacity(scene, prim, u, v, p, scale(stored, factor))
+                arrival = Arrival(p, wi, ng, word, light)
+                if _is_caustic(pass_, word):
+                    in_caustic = _in_caustic(pass_, word, stored)
+                    _store(caustic_out, caustic_normals, counts, C_CAUSTIC, arrival, in_caustic, times)
+                if to_global and kept & STORED != 0 and _is_chosen(pass_, seed, index, bounces):
+                    _store(global_out, global_normals, counts, C_GLOBAL, arrival, stored, times)
+                ledgers[kind, E_STORED] += _f8(before * factor)
+            if b.groups == NOTHING:  # a part of a blend that others keep photons for
+                ledgers[kind, E_ABSORBED] += _f8(before * factor)
+                break
+            group, share, u_lobe = pick_group(b, wi, u_lobe)
+            deltas = deltas and group == FOLLOWED and is_delta(b)
+            if group == FOLLOWED:
+                flags = _u4(flags | _u4(LAST_SPECULAR))
+            elif not to_global and pass_.only_direct != 0:
+                ledgers[kind, E_TERMINATED] += _f8(before * factor)
+                break
+            else:
+                flags = _u4(HAD_DIFFUSE)
+            d, weight = _scattered(scene, b, group, wi, ng, u_lobe, (u0, u1))
+            after = scale(mul(beta, weight), share)
+            if not is_good(after):
+                counts[C_DROPPED] += 1
+                ledgers[kind, E_DROPPED] += _f8(before * factor)
+                break
+            survival = survival_probability(pass_.roulette, before, beta, after)
+            if not u2 < survival:
+                ledgers[kind, E_ABSORBED] += _f8(before * factor)
+                break
+            beta = scale(after, _f4(1.0) / survival)
+            if pass_.roulette != BY_LUMINANCE or not survival < _f4(1.0):  # else it stays
+                ledgers[kind, E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * factor)
+            bounces += 1
+            if bounces >= pass_.max_bounces:
+                ledgers[kind, E_TERMINATED] += _f8(luminance(beta) * factor)
+                break
+            o = leave(p, ng, gap, d[0], d[1], d[2])
     return i1
 
 
-@device
-def _trace_photon(scene, pass_, projection, i, out, ledger, paths):
-    """Photon i of the pass, from its light to its end."""
-    to_global, counts = i < pass_.global_trajectories, out.counts
-    seed, index = _stream(pass_, i)
+@inlined
+def _emitted(scene, pass_, projection, i, seed, index):
+    """Photon i as it leaves its light, see `emission`."""
     u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, _i8(0))
     u_pick = draw1(pass_.sequence, seed, index, LIGHT_CHOICE_SET)
-    p, d, beta, light, starts, factor = emission(
-        scene, projection, i, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1)
-    )
-    ledger[E_EMITTED] += _f8(factor)  # its luminance is 1
-    if not is_good(beta):
-        counts[C_DROPPED] += 1
-        ledger[E_DROPPED] += _f8(factor)
-        return
-    if not starts:
-        ledger[E_ESCAPED] += _f8(factor)
-        return
-    begin_path(paths, i, p, d, scale(beta, factor), light)
-    o, flags, bounces = p, _u4(0), 0
-    deltas = pass_.unfound != 0 and is_delta_light(scene, light)  # and nothing but deltas since the light
-    while True:
-        t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), _INF)
-        counts[C_RAYS] += 1
-        word = _u4(flags | _u4(min(bounces, BOUNCES)))
-        if prim < 0:
-            extend_path(paths, i, prim, o, d, scale(beta, factor), word, light)
-            ledger[E_ESCAPED] += _f8(luminance(beta) * factor)
-            return
-        p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
-        material = material_of(scene, prim)
-        beta = _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledger)
-        extend_path(paths, i, prim, p, d, scale(beta, factor), word, light)
-        wi = (-d[0], -d[1], -d[2])
-        b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
-        kept = keeps(scene, material, b, ng, wi, pass_.glossy)
-        before = luminance(beta)
-        if b.groups | kept == NOTHING or not before > _f4(0.0):
-            ledger[E_ABSORBED] += _f8(before * factor)
-            return
-        ng = face(ng, wi)
-        u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
-        unfound = deltas and bounces > 0 and kept & FOLLOWED != 0
-        if kept & STORED != 0 or unfound:
-            if unfound:
-                word = _u4(word | _u4(UNFOUND))
-            times, stored = _copies(pass_, beta, seed, index, bounces)
-            # As many photons as the opacity says meet the surface; looked up, it is taken to be there.
-            stored = over_opacity(scene, prim, u, v, p, scale(stored, factor))
-            arrival = Arrival(p, wi, ng, word, light)
-            _store_caustic(pass_, arrival, stored, times, out)
-            if to_global and kept & STORED != 0 and _is_chosen(pass_, seed, index, bounces):
-                _store_global(arrival, stored, times, out)
-            ledger[E_STORED] += _f8(before * factor)
-        if b.groups == NOTHING:  # a part of a blend that others keep photons for
-            ledger[E_ABSORBED] += _f8(before * factor)
-            return
-        group, share, u_lobe = pick_group(b, wi, u_lobe)
-        deltas = deltas and group == FOLLOWED and is_delta(b)
-        if group == FOLLOWED:
-            flags = _u4(flags | _u4(LAST_SPECULAR))
-        elif not to_global and pass_.only_direct != 0:
-            ledger[E_TERMINATED] += _f8(before * factor)
-            return
-        else:
-            flags = _u4(HAD_DIFFUSE)
-        d, weight = _scattered(scene, b, group, wi, ng, u_lobe, (u0, u1))
-        alive, beta = _after_roulette(pass_, beta, scale(mul(beta, weight), share), u2, factor, counts, ledger)
-        if not alive:
-            return
-        bounces += 1
-        if bounces >= pass_.max_bounces:
-            ledger[E_TERMINATED] += _f8(luminance(beta) * factor)
-            return
-        o = leave(p, ng, gap, d[0], d[1], d[2])
+    return emission(scene, projection, i, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1))
 
 
 @inlined
@@ -217,19 +228,19 @@ def _stream(pass_, i):
 
 
 @specialised
-def _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledger):
+def _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledgers, kind):
     """beta after the way to a surface (`attenuation`), what was lost on it booked; black when it is no number."""
     if not has(scene, "bsdfs"):
-        return lambda scene, material, ng, d, t, beta, factor, counts, ledger: beta
+        return lambda scene, material, ng, d, t, beta, factor, counts, ledgers, kind: beta
 
-    def booked(scene, material, ng, d, t, beta, factor, counts, ledger):
+    def booked(scene, material, ng, d, t, beta, factor, counts, ledgers, kind):
         before = luminance(beta)
         beta = attenuation(scene, material, ng, d, t, beta)
         if not is_good(beta):
             counts[C_DROPPED] += 1
-            ledger[E_DROPPED] += _f8(before * factor)
+            ledgers[kind, E_DROPPED] += _f8(before * factor)
             return _f4(0.0), _f4(0.0), _f4(0.0)
-        ledger[E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * factor)
+        ledgers[kind, E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * factor)
         return beta
 
     return booked
@@ -253,31 +264,31 @@ def _is_chosen(pass_, seed, index, bounces):
 
 
 @inlined
-def _store_caustic(pass_, arrival, power, times, out):
-    """Keep a photon for the caustic map `times` times if it is one of its path classes."""
-    path_class = np.int32(arrival.flags >> _u4(6))
-    if pass_.caustics == 0 or not (
-        path_class == CAUSTIC or (path_class == INDIRECT_CAUSTIC and pass_.indirect_caustics != 0)
-    ):
-        return
-    power = scale(power, pass_.indirect_scale if path_class == INDIRECT_CAUSTIC else pass_.direct_scale)
-    for _ in range(times):
-        row, ng = out.counts[C_CAUSTIC], arrival.ng
-        write_photon(out.caustic_out, row, arrival.p, arrival.wi, power, arrival.flags, arrival.light)
-        if len(out.caustic_normals) > 0:
-            out.caustic_normals[row] = encode_direction(ng[0], ng[1], ng[2])
-        out.counts[C_CAUSTIC] += 1
+def _is_caustic(pass_, flags):
+    """Whether a photon with these flags is one for the caustic map."""
+    path_class = np.int32(flags >> _u4(6))
+    is_caustic = path_class == CAUSTIC or (path_class == INDIRECT_CAUSTIC and pass_.indirect_caustics != 0)
+    return is_caustic and pass_.caustics != 0
 
 
 @inlined
-def _store_global(arrival, power, times, out):
-    """Keep a photon for the global map `times` times."""
+def _in_caustic(pass_, flags, power):
+    """The power of a photon in the units of the caustic map."""
+    if np.int32(flags >> _u4(6)) == INDIRECT_CAUSTIC:
+        return scale(power, pass_.indirect_scale)
+    return scale(power, pass_.direct_scale)
+
+
+@inlined
+def _store(rows, normals, counts, which, arrival, power, times):
+    """Keep a photon `times` times in rows (capacity, 6), its surface's normal in `normals` unless that is empty;
+    counts[which] rows are filled."""
+    ng = arrival.ng
     for _ in range(times):
-        row, ng = out.counts[C_GLOBAL], arrival.ng
-        write_photon(out.global_out, row, arrival.p, arrival.wi, power, arrival.flags, arrival.light)
-        if len(out.global_normals) > 0:
-            out.global_normals[row] = encode_direction(ng[0], ng[1], ng[2])
-        out.counts[C_GLOBAL] += 1
+        write_photon(rows, counts[which], arrival.p, arrival.wi, power, arrival.flags, arrival.light)
+        if len(normals) > 0:
+            normals[counts[which]] = encode_direction(ng[0], ng[1], ng[2])
+        counts[which] += 1
 
 
 @inlined
@@ -289,21 +300,3 @@ def _scattered(scene, b, group, wi, ng, u_lobe, u):
     elif abs(dot(shading_normal(b), ng)) < STRAIGHT:
         weight = scale(weight, adjoint_cosines(shading_normal(b), ng, wi, d))
     return d, weight
-
-
-@inlined
-def _after_roulette(pass_, beta, after, u, factor, counts, ledger):
-    """Whether a photon survives the scattering from power beta to `after`, and with which power."""
-    before = luminance(beta)
-    if not is_good(after):
-        counts[C_DROPPED] += 1
-        ledger[E_DROPPED] += _f8(before * factor)
-        return False, after
-    survival = survival_probability(pass_.roulette, before, beta, after)
-    if not u < survival:
-        ledger[E_ABSORBED] += _f8(before * factor)
-        return False, after
-    beta = scale(after, _f4(1.0) / survival)
-    if pass_.roulette != BY_LUMINANCE or not survival < _f4(1.0):  # else it stays
-        ledger[E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * factor)
-    return True, beta

@@ -245,11 +245,10 @@ class _Arrays(NamedTuple):
 
 
 @device
-def _read_vertex(data, i, arrays, row):
+def _read_vertex(data, i, v, colours, row):
     """The numbers from i on into a row of v, and of colours if there are so many."""
-    colours = arrays.colours
     words = _words(data, i) if len(colours) > 0 else 0
-    _row(data, i, arrays.v, row, 3)
+    _row(data, i, v, row, 3)
     if words >= _COLOUR_WORDS:
         j = skip_blanks(data, i)
         for _ in range(words - 3 if words == _COLOUR_WORDS else 4):
@@ -258,13 +257,12 @@ def _read_vertex(data, i, arrays, row):
 
 
 @device
-def _read_face(data, i, arrays, corner, known):
+def _read_face(data, i, corners, corner_vt, corner_vn, corner, known):
     """The corners from i on into the rows from `corner` on; `known`: how many v, vt and vn precede. Returns the next
     row."""
-    corner_vt, corner_vn = arrays.corner_vt, arrays.corner_vn
     j = skip_blanks(data, i)
     while not ends_line(data[j]) and data[j] != HASH:
-        arrays.corners[corner], k = _index(data, j, known[0])
+        corners[corner], k = _index(data, j, known[0])
         t = n = np.int64(MISSING)
         if data[k] == 47:
             t, k = _index(data, k + 1, known[1])
@@ -284,24 +282,25 @@ def read_statements(data, begin, end, counts, line, arrays):
     """Fill the arrays from the lines of data[begin:end]; `counts` tells what precedes them."""
     n_v, n_vt, n_vn, n_face = counts[_V], counts[_VT], counts[_VN], counts[_FACE]
     n_event, n_corner = counts[_EVENT], counts[_CORNERS]
-    starts, events = arrays.starts, arrays.events
+    # Taken apart here: counting references to all of them would cost every statement.
+    v, vt, vn, colours, corners, corner_vt, corner_vn, starts, events = arrays
     i = begin
     while i < end:
         i = skip_blanks(data, i)
         kind = _kind(data, i)
         if kind == _V:
-            _read_vertex(data, i + 1, arrays, n_v)
+            _read_vertex(data, i + 1, v, colours, n_v)
             n_v += 1
         elif kind == _VT:
-            _row(data, i + 2, arrays.vt, n_vt, 2)
+            _row(data, i + 2, vt, n_vt, 2)
             n_vt += 1
         elif kind == _VN:
-            _row(data, i + 2, arrays.vn, n_vn, 3)
+            _row(data, i + 2, vn, n_vn, 3)
             n_vn += 1
         elif kind == _FACE:
             starts[n_face] = n_corner
             n_face += 1
-            n_corner = _read_face(data, i + 1, arrays, n_corner, (n_v, n_vt, n_vn))
+            n_corner = _read_face(data, i + 1, corners, corner_vt, corner_vn, n_corner, (n_v, n_vt, n_vn))
         elif kind == _EVENT:
             events[n_event, 0], events[n_event, 1], events[n_event, 2] = i, line, n_face
             n_event += 1
