@@ -244,52 +244,25 @@ class _Arrays(NamedTuple):
     events: Any
 
 
-@device
-def _read_vertex(data, i, v, colours, row):
-    """The numbers from i on into a row of v, and of colours if there are so many."""
-    words = _words(data, i) if len(colours) > 0 else 0
-    _row(data, i, v, row, 3)
-    if words >= _COLOUR_WORDS:
-        j = skip_blanks(data, i)
-        for _ in range(words - 3 if words == _COLOUR_WORDS else 4):
-            j = skip_blanks(data, _past(data, j))
-        _row(data, j, colours, row, 3)
-
-
-@device
-def _read_face(data, i, corners, corner_vt, corner_vn, corner, known):
-    """The corners from i on into the rows from `corner` on; `known`: how many v, vt and vn precede. Returns the next
-    row."""
-    j = skip_blanks(data, i)
-    while not ends_line(data[j]) and data[j] != HASH:
-        corners[corner], k = _index(data, j, known[0])
-        t = n = np.int64(MISSING)
-        if data[k] == 47:
-            t, k = _index(data, k + 1, known[1])
-            if data[k] == 47:
-                n, k = _index(data, k + 1, known[2])
-        if len(corner_vt) > 0:
-            corner_vt[corner] = t
-        if len(corner_vn) > 0:
-            corner_vn[corner] = n
-        corner += 1
-        j = skip_blanks(data, _past(data, j))
-    return corner
-
-
 @kernel
 def read_statements(data, begin, end, counts, line, arrays):
     """Fill the arrays from the lines of data[begin:end]; `counts` tells what precedes them."""
-    n_v, n_vt, n_vn, n_face = counts[_V], counts[_VT], counts[_VN], counts[_FACE]
-    n_event, n_corner = counts[_EVENT], counts[_CORNERS]
     # Taken apart here: counting references to all of them would cost every statement.
     v, vt, vn, colours, corners, corner_vt, corner_vn, starts, events = arrays
+    n_v, n_vt, n_vn, n_face = counts[_V], counts[_VT], counts[_VN], counts[_FACE]
+    n_event, n_corner = counts[_EVENT], counts[_CORNERS]
     i = begin
     while i < end:
         i = skip_blanks(data, i)
         kind = _kind(data, i)
         if kind == _V:
-            _read_vertex(data, i + 1, v, colours, n_v)
+            words = _words(data, i + 1) if len(colours) > 0 else 0
+            _row(data, i + 1, v, n_v, 3)
+            if words >= _COLOUR_WORDS:
+                j = skip_blanks(data, i + 1)
+                for _ in range(words - 3 if words == _COLOUR_WORDS else 4):
+                    j = skip_blanks(data, _past(data, j))
+                _row(data, j, colours, n_v, 3)
             n_v += 1
         elif kind == _VT:
             _row(data, i + 2, vt, n_vt, 2)
@@ -300,7 +273,20 @@ def read_statements(data, begin, end, counts, line, arrays):
         elif kind == _FACE:
             starts[n_face] = n_corner
             n_face += 1
-            n_corner = _read_face(data, i + 1, corners, corner_vt, corner_vn, n_corner, (n_v, n_vt, n_vn))
+            j = skip_blanks(data, i + 1)
+            while not ends_line(data[j]) and data[j] != HASH:
+                corners[n_corner], k = _index(data, j, n_v)
+                t = n = np.int64(MISSING)
+                if data[k] == 47:
+                    t, k = _index(data, k + 1, n_vt)
+                    if data[k] == 47:
+                        n, k = _index(data, k + 1, n_vn)
+                if len(corner_vt) > 0:
+                    corner_vt[n_corner] = t
+                if len(corner_vn) > 0:
+                    corner_vn[n_corner] = n
+                n_corner += 1
+                j = skip_blanks(data, _past(data, j))
         elif kind == _EVENT:
             events[n_event, 0], events[n_event, 1], events[n_event, 2] = i, line, n_face
             n_event += 1
