@@ -1,5 +1,5 @@
 #version 330 core
-// Cells of projection maps (pmviewer/viewer/cells.py).
+// Cells of projection maps (pmviewer/viewer/overlays/projection_maps.py).
 uniform mat4 view;
 uniform mat4 projection;
 

@@ -156,3 +156,22 @@ def test_without_a_screen_the_default_command_renders_to_a_file(tmp_path):
     assert "no display" in run.stderr
     assert (tmp_path / "cornell_diffuse.png").stat().st_size > 300
     assert (tmp_path / "cornell_diffuse.exr").exists()
+
+
+def test_the_table_of_commands_is_light():
+    """`--help` waits neither for the compiler nor for the window's libraries."""
+    heavy = "{'numba', 'numpy', 'pydantic', 'rich.progress', 'moderngl', 'glfw', 'imgui_bundle', 'scipy'}"
+    code = f"import sys, pmviewer.commands.cli; print(sorted({heavy} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_the_window_is_given_scene_settings_threads_and_parameters(monkeypatch):
+    given = {}
+
+    def run_viewer(scene, settings, threads, parameters):
+        given.update(scene=scene, N=settings.photons.N, threads=threads, parameters=dict(parameters))
+        return 0
+
+    monkeypatch.setattr("pmviewer.viewer.app.run_viewer", run_viewer)
+    assert call("a.xml", "--set", "photons.N=7", "--threads", "2", "-D", "res=64") == 0
+    assert given == {"scene": "a.xml", "N": 7, "threads": 2, "parameters": {"res": "64"}}

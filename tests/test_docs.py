@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pmviewer.job import load_job
+from pmviewer.commands.job import load_job
 from pmviewer.scene.load import bundled_scenes
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"

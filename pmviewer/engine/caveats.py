@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pmviewer.engine.energy import Energy
+from pmviewer.engine.method import Plan
 from pmviewer.engine.tally import Tally
 from pmviewer.settings.access import Settings
 
@@ -13,7 +14,7 @@ CUT_OFF = 0.01
 
 
 def caveats(
-    settings: Settings, tally: Tally, energy: Energy | None, scene_radius: float, pixels: int, passes: int
+    settings: Settings, plan: Plan, tally: Tally, energy: Energy | None, scene_radius: float, pixels: int, passes: int
 ) -> list[str]:
     """What to know about the passes so far. scene_radius: of the bounding sphere; pixels: of the picture."""
     said = [_dropped(place, count) for place, count in tally.dropped.items() if count]
@@ -35,7 +36,7 @@ def caveats(
         said.append(
             f"None of {tally.emitted:,} photons arrived on a surface that shows it: do the lights shine past it?"
         )
-    said += _too_few(settings, tally, scene_radius, pixels)
+    said += _too_few(settings, plan, tally, scene_radius, pixels)
     return said
 
 
@@ -46,7 +47,7 @@ def _dropped(place: str, count: int) -> str:
     )
 
 
-def _too_few(settings: Settings, tally: Tally, scene_radius: float, pixels: int) -> list[str]:
+def _too_few(settings: Settings, plan: Plan, tally: Tally, scene_radius: float, pixels: int) -> list[str]:
     """Look-ups that find next to nothing: a pass of them sees no light rather than noisy light."""
     estimate = settings.estimate
     if estimate.lookup == "nearest":
@@ -58,7 +59,7 @@ def _too_few(settings: Settings, tally: Tally, scene_radius: float, pixels: int)
         return []
     # Photons on surfaces of about the bounding sphere's area, (r/2R)² of them in a disc.
     found = photons * (radius / (2 * scene_radius)) ** 2
-    looks = pixels * (settings.gather.rays if settings.render.method == "gather" else 1)
+    looks = pixels * (settings.gather.rays if plan.gather else 1)
     if found * looks >= 0.1:  # in a whole pass
         return []
     seldom = 1 / max(found, 1e-300)

@@ -7,19 +7,23 @@ nothing; the session adds what is missing to the frame that is there.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.inspection import Wanted
+from pmviewer.engine.inspection import Inspection, Wanted
 from pmviewer.engine.method import Plan
+from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.stages.convergence import convergence_plane
-from pmviewer.engine.stages.deposition import Rules
-from pmviewer.engine.stages.importance import ImportanceMaps
+from pmviewer.engine.stages.eye import gather_rays_of
+from pmviewer.engine.stages.importance import ImportanceStage
+from pmviewer.engine.stages.light import LightStage
+from pmviewer.engine.stages.pass_data import RenderedPass
+from pmviewer.engine.stages.retrace import contributions_of, fates_of, paths_of
 from pmviewer.importance.view import CHANNELS as IMPORTANCE_CHANNELS
 from pmviewer.importance.view import importance_view, probability_view
 from pmviewer.maps.importance.importance_map import NO_IMPORTANCE
@@ -27,118 +31,69 @@ from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import neighbourhood
 from pmviewer.maps.search.grid import PhotonGrid, build_grid
 from pmviewer.maps.search.stored import ALL_CLASSES
-from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.photons.deposition.rules import SMALLEST_EPSILON
-from pmviewer.photons.light_pass.photon_maps import PhotonMaps
+from pmviewer.render.camera import CameraPose
 from pmviewer.render.diagnostics.density import WIDEST, counting_eye, counting_tree, density_view
 from pmviewer.render.diagnostics.diagnostics import FAMILY_CHANNELS, lookup_view, shadow_view, site_view
+from pmviewer.render.film import Film
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL
-from pmviewer.settings.access import Importance, Settings
+from pmviewer.settings.access import Settings
 
 TILE = 2048
-OF_A_MAP = ("look-up", "importance", "density", "storing")
-"""Families of views that show one of the maps."""
 CELL_NEIGHBOURS = 12
-Record = NDArray[np.void]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Looked:
-    """What the latest pass looked up, for kernels: the scene's and the eye's record and those of all maps."""
+    """What there is to be looked into: scene and settings, the stages behind the latest pass, and that pass itself,
+    None before the first. `camera` sees the full picture; the `film` may be smaller."""
 
-    scene: Record
-    eye: Record
-    caustic: Record
-    global_: Record
-    choice: Record
-    sites: Record
-    shadows: Record
-    radiance: RadianceMap | None
-    """What the record `sites` belongs to."""
-    width: int
-    height: int
-    importance: ImportanceMaps | None = None
-    how: Importance = field(default_factory=Importance)
-    rules: Rules = field(default_factory=Rules)
-    photons: PhotonMaps | None = None
-    """The pass's photons, and by which rules they were stored."""
-    stored: Callable[[str], NDArray[np.float32]] = lambda name: np.empty((0, 6), np.float32)
-    """The photons of the map of that name."""
-    scene_radius: float = 1.0
-    radii: NDArray[np.float32] | None = None
-    """Look-up radii of the pixels, where they have their own."""
+    scene: OpenScene
+    settings: Settings
+    plan: Plan
+    camera: CameraPose
+    film: Film
+    light: LightStage
+    importance: ImportanceStage
+    latest: RenderedPass | None
+
+    @property
+    def rendered(self) -> RenderedPass:
+        """The latest pass, where there is one."""
+        assert self.latest is not None
+        return self.latest
 
     def required(self, name: str) -> tuple[np.float32, np.float32]:
         """Photons wanted per pixel in the map of that name, and the density wanted everywhere instead, −1 for none."""
-        M_r = self.how.caustic_M_r if name == "caustic" else self.how.M_r
-        return np.float32(M_r * self.rules.growth), np.float32(self.rules.everywhere.get(name, -1.0))
+        how, rules = self.settings.importance, self.rendered.maps.rules
+        M_r = how.caustic_M_r if name == "caustic" else how.M_r
+        return np.float32(M_r * rules.growth), np.float32(rules.everywhere.get(name, -1.0))
 
 
-def wanted_of(settings: Settings, plan: Plan, pixel: tuple[int, int] | None = None) -> Wanted:
-    """What these settings show of what this plan makes, with `pixel` the one whose gather rays were asked for; what
-    can't be shown is not asked for."""
-    view = settings.display.view
-    wanted = Wanted()
-    if view in DIAGNOSTICS and refused_view(view, plan) is None:
-        family = DIAGNOSTICS[view].family
-        wanted = Wanted(family, looked_map(settings, plan) if family in OF_A_MAP else "")
-    if settings.overlays.paths.show and plan.photons:
-        wanted = replace(wanted, paths=settings.overlays.paths.count)
-    if settings.overlays.fates.show and judges(plan):
-        wanted = replace(wanted, fates=settings.overlays.fates.count)
-    if settings.overlays.lights.show and plan.importance:
-        wanted = replace(wanted, lights=True)
-    if settings.overlays.gather.show and plan.gather:
-        wanted = replace(wanted, pixel=pixel)
-    return wanted
+def inspected(wanted: Wanted, looked: Looked, pool: WorkPool) -> Inspection:
+    """What is wanted of the latest pass; nothing before the first."""
+    if looked.latest is None:
+        return Inspection()
+    tracer, maps, importance = looked.light.tracer, looked.latest.maps, looked.importance
+    return Inspection(
+        wanted,
+        planes=diagnostic_planes(wanted, looked, pool),
+        paths=paths_of(tracer, maps, wanted.paths) if wanted.paths else None,
+        gathered=gather_rays_of(looked.latest.given, *wanted.pixel, pool) if wanted.pixel else None,
+        fates=fates_of(tracer, maps, importance, wanted.fates) if wanted.fates else None,
+        lights=contributions_of(tracer, maps, importance) if wanted.lights else None,
+    )
 
 
-def judges(plan: Plan) -> bool:
-    """Whether a rule decides which photons are stored."""
-    return plan.deposition != "all" or plan.emission not in ("off", "Peter-Pietrek")
-
-
-def looked_map(settings: Settings, plan: Plan) -> str:
-    """The map whose look-ups are shown: the one asked for, or the other where there is only that."""
-    if settings.display.map == "caustic" and plan.caustic_classes:
-        return "caustic"
-    return "global" if plan.global_classes else "caustic"
-
-
-def refused_view(view: str, plan: Plan) -> str | None:
-    """Why a diagnostic view has nothing to show, None if it has."""
-    family = DIAGNOSTICS[view].family
-    if family == "look-up" and not plan.photons:
-        return "Nothing is looked up: this method uses no photons, or no surface stores them."
-    if family in ("importance", "density", "storing", "convergence") and not plan.photons:
-        return "No photons are stored: this method uses none, or no surface stores them."
-    if view in ("required density", "density ratio"):
-        if not plan.importance and plan.deposition != "constant density":
-            return "Only with importance (importance.map) or constant density (importance.deposition)."
-    elif family == "importance" and not plan.importance:
-        return "Only with importance (importance.map)."
-    if family == "storing" and plan.deposition != "Keller-Wald":
-        return "Only with the deposition rule 'Keller-Wald' (importance.deposition)."
-    if family == "convergence" and not plan.convergence:
-        return "Only with density control of a caustic map, and its criterion (importance.convergence)."
-    if family == "shadow rays" and not plan.shadows:
-        return "Only with shadow photons (direct.shadow_photons)."
-    if family == "radiance photons" and not plan.radiance:
-        return "Only with the method 'gather' and radiance photons (gather.radiance_photons)."
-    return None
-
-
-def diagnostic_planes(wanted: Wanted, looked: Looked, plan: Plan, pool: WorkPool) -> dict[str, NDArray[np.float32]]:
+def diagnostic_planes(wanted: Wanted, looked: Looked, pool: WorkPool) -> dict[str, NDArray[np.float32]]:
     """The planes of the family that is wanted, by view; none without one."""
     if wanted.family is None:
         return {}
     if wanted.family == "convergence":
-        assert looked.photons is not None
-        pixels = looked.width * looked.height
-        states = convergence_plane(looked.scene, looked.eye, pixels, looked.photons, looked.rules, pool.run)
-        return {"caustic convergence": states.reshape(looked.height, looked.width, 1)}
+        states = convergence_plane(looked.rendered, pool.run)
+        return {"caustic convergence": states.reshape(looked.film.height, looked.film.width, 1)}
     channels = {**FAMILY_CHANNELS, "importance": IMPORTANCE_CHANNELS, "density": 1, "storing": 1}
-    planes = _drawn(looked, channels[wanted.family], lambda out: _kernel(wanted, looked, plan, out), pool)
+    planes = _drawn(looked, channels[wanted.family], lambda out: _kernel(wanted, looked, out), pool)
 
     def plane(*channels: int) -> NDArray[np.float32]:
         return np.ascontiguousarray(planes[list(channels)].transpose(1, 2, 0))
@@ -147,11 +102,11 @@ def diagnostic_planes(wanted: Wanted, looked: Looked, plan: Plan, pool: WorkPool
         return {"look-up radius": plane(0), "photon count": plane(1)}
     if wanted.family == "shadow rays":
         return {"shadow rays skipped": plane(0)}
-    has_required = plan.importance or bool(looked.rules.everywhere)
+    has_required = looked.plan.importance or bool(looked.rendered.maps.rules.everywhere)
     if wanted.family == "importance":
         return (
             {"importance": plane(0), "required density": plane(1)}
-            if plan.importance
+            if looked.plan.importance
             else {"required density": plane(1)}
         )
     if wanted.family == "storing":
@@ -159,7 +114,7 @@ def diagnostic_planes(wanted: Wanted, looked: Looked, plan: Plan, pool: WorkPool
     if wanted.family == "density":
         made = {"achieved density": plane(0)}
         if has_required:
-            of_importance = partial(_kernel, replace(wanted, family="importance"), looked, plan)
+            of_importance = partial(_kernel, replace(wanted, family="importance"), looked)
             required = _drawn(looked, IMPORTANCE_CHANNELS, of_importance, pool)[1, ..., None]
             made["density ratio"] = ratio(made["achieved density"], required)
         return made
@@ -177,11 +132,12 @@ def _drawn(
     looked: Looked, channels: int, kernel: Callable[[NDArray[np.float32]], Callable[[int, int], Any]], pool: WorkPool
 ) -> NDArray[np.float32]:
     """(channels, h, w) of what a kernel, made for its output, writes tile by tile."""
-    pixels = looked.width * looked.height
+    film = looked.film
+    pixels = film.width * film.height
     out = np.empty((pixels, channels), np.float32)
     draw = kernel(out)
     pool.run([partial(draw, first, min(first + TILE, pixels)) for first in range(0, pixels, TILE)])
-    return np.ascontiguousarray(out.T).reshape(-1, looked.height, looked.width)
+    return np.ascontiguousarray(out.T).reshape(-1, film.height, film.width)
 
 
 def cells_of(sites: RadianceMap) -> PhotonGrid:
@@ -190,33 +146,43 @@ def cells_of(sites: RadianceMap) -> PhotonGrid:
     return build_grid(photons, max(neighbourhood(photons[:, :3], CELL_NEIGHBOURS), sites.grid.radius))
 
 
-def _kernel(wanted: Wanted, looked: Looked, plan: Plan, out: NDArray[np.float32]) -> Callable[[int, int], Any]:
+def _kernel(wanted: Wanted, looked: Looked, out: NDArray[np.float32]) -> Callable[[int, int], Any]:
+    """Draws pixels first … last−1 of the family into `out`."""
+    given = looked.rendered.given
+    scene, eye = given.scene, given.eye
     if wanted.family == "shadow rays":
-        return partial(shadow_view, looked.scene, looked.eye, looked.choice, looked.shadows, out)
+        return partial(shadow_view, scene, eye, given.choice_map, given.shadows, out)
     if wanted.family == "radiance photons":
-        assert looked.radiance is not None
-        cells = cells_of(looked.radiance)
-        draw = partial(site_view, looked.scene, looked.eye, looked.global_, looked.sites, cells.record, out)
+        radiance = looked.rendered.maps.radiance
+        assert radiance is not None
+        cells = cells_of(radiance)
+        draw = partial(site_view, scene, eye, given.global_map, given.sites, cells.record, out)
         return lambda first, last: (draw(first, last), cells)  # the grid lives as long as its record is used
-    by_caustic = wanted.map == "caustic"
+    latest, how = looked.importance.latest, looked.settings.importance
     if wanted.family == "importance":
-        importance = NO_IMPORTANCE if looked.importance is None else looked.importance.record(wanted.map)
-        return partial(importance_view, looked.scene, looked.eye, importance, *looked.required(wanted.map), out)
+        importance = NO_IMPORTANCE if latest is None else latest.record(wanted.map)
+        return partial(importance_view, scene, eye, importance, *looked.required(wanted.map), out)
     if wanted.family == "storing":
-        assert looked.importance is not None
-        importance, how = looked.importance.record(wanted.map), looked.how
-        f, epsilon = np.float32(looked.rules.f[wanted.map]), np.float32(max(how.epsilon, SMALLEST_EPSILON))
-        discard = how.cut_off == "discard"
-        return partial(probability_view, looked.scene, looked.eye, importance, f, epsilon, discard, out)
+        assert latest is not None
+        f = np.float32(looked.rendered.maps.rules.f[wanted.map])
+        epsilon, discard = np.float32(max(how.epsilon, SMALLEST_EPSILON)), how.cut_off == "discard"
+        return partial(probability_view, scene, eye, latest.record(wanted.map), f, epsilon, discard, out)
     if wanted.family == "density":
-        tree = counting_tree(looked.stored(wanted.map))
-        widest = np.float32(WIDEST * looked.scene_radius)
-        draw = partial(density_view, looked.scene, counting_eye(looked.eye), tree.record, widest, out)
+        tree = counting_tree(looked.light.stored(wanted.map))
+        widest = np.float32(WIDEST * looked.scene.flat.radius)
+        draw = partial(density_view, scene, counting_eye(eye), tree.record, widest, out)
         return lambda first, last: (draw(first, last), tree)  # the tree lives as long as its record is used
-    radius = looked.eye[0]["caustic_radius" if by_caustic else "global_radius"]
-    mask = np.int32((plan.caustic_classes if by_caustic else plan.global_classes) & ALL_CLASSES)
-    photons = looked.caustic if by_caustic else looked.global_
-    radii, which = looked.radii, OF_CAUSTIC if by_caustic else OF_GLOBAL
-    if not (by_caustic or plan.shown_directly):
+    return _lookup_kernel(wanted.map, looked, out)
+
+
+def _lookup_kernel(name: str, looked: Looked, out: NDArray[np.float32]) -> Callable[[int, int], Any]:
+    given, plan = looked.rendered.given, looked.plan
+    if name == "caustic":
+        photons, classes, which = given.caustic_map, plan.caustic_classes, OF_CAUSTIC
+    else:
+        photons, classes, which = given.global_map, plan.global_classes, OF_GLOBAL
+    radius, mask = given.eye[0][f"{name}_radius"], np.int32(classes & ALL_CLASSES)
+    radii = looked.film.radii
+    if name == "global" and not plan.shown_directly:
         radii = None  # gather rays look the map up, with the radius of the pass
-    return partial(lookup_view, looked.scene, looked.eye, photons, radii, which, radius, mask, out)
+    return partial(lookup_view, given.scene, given.eye, photons, radii, which, radius, mask, out)

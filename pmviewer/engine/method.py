@@ -63,6 +63,7 @@ class Plan:
 
     @property
     def caustic_classes(self) -> int:
+        """Path classes that the caustic map holds."""
         return self.caustic_mask | (1 << CAUSTIC if self.unfound else 0)
 
     @property
@@ -72,7 +73,34 @@ class Plan:
 
     @property
     def photons(self) -> bool:
+        """Whether any are traced."""
         return bool(self.caustic_classes or self.global_classes)
+
+    @property
+    def judges(self) -> bool:
+        """Whether a rule decides which photons are stored."""
+        return self.deposition != "all" or self.emission not in ("off", "Peter-Pietrek")
+
+    @property
+    def chooses_photons(self) -> bool:
+        """Whether there would be other photons without the group `importance` of the settings."""
+        return self.deposition != "all" or self.emission != "off"
+
+    @property
+    def running(self) -> tuple[str, ...]:
+        """Names of the stages that run."""
+        stages = {
+            "light pass": self.photons,
+            "caustic map": self.caustic_classes,
+            "global map": self.global_classes,
+            "direct light": self.direct,
+            "light choice by photons": self.choice != "power",
+            "final gather": self.gather,
+            "irradiance cache": self.cache,
+            "importance": self.importance,
+            "path tracer": self.path,
+        }
+        return tuple(name for name, runs in stages.items() if runs)
 
 
 def plan_of(settings: Settings, traits: SceneTraits) -> Plan:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+import numpy as np
 
 from pmviewer.engine.memory import check_scene_memory
 from pmviewer.engine.stages.hidden_lights import hidden_lights
@@ -19,7 +21,14 @@ from pmviewer.scene.description import Scene
 from pmviewer.scene.load import read_scene
 from pmviewer.scene.meshes.recentre import recentred
 
+OnType = Callable[[np.dtype, SceneTraits], None]
+"""Hears, while a scene is being opened, of what type its record will be and what is in it."""
+
 _uids = itertools.count(1)
+
+
+def _nobody(of_record: np.dtype, traits: SceneTraits) -> None:
+    return None
 
 
 @dataclass(frozen=True)
@@ -46,14 +55,19 @@ class OpenScene:
         return self.exposures.get(camera, 0.0) if own is None else own
 
 
-def open_scene(source: str | Path | Scene, parameters: Mapping[str, str] | None = None, rig: Rig = "auto") -> OpenScene:
+def open_scene(
+    source: str | Path | Scene,
+    parameters: Mapping[str, str] | None = None,
+    rig: Rig = "auto",
+    on_type: OnType = _nobody,
+) -> OpenScene:
     """Load, add the camera that the file lacks and the lights of the rig, check, move to the origin and flatten. A
     scene that is given instead of a file is taken as it is. Raises SceneError."""
     if isinstance(source, Scene):
-        return _opened(source, source.name, None, "auto")
+        return _opened(source, source.name, None, "auto", on_type)
     content = read_scene(source, parameters or {})
     check_scene_memory(content)
-    return _opened(completed(content, rig), str(source), content, rig)
+    return _opened(completed(content, rig), str(source), content, rig, on_type)
 
 
 def relit(opened: OpenScene, rig: Rig) -> OpenScene:
@@ -63,11 +77,12 @@ def relit(opened: OpenScene, rig: Rig) -> OpenScene:
     return _opened(completed(opened.content, rig), opened.source, opened.content, rig)
 
 
-def _opened(scene: Scene, source: str, content: Scene | None, rig: Rig) -> OpenScene:
+def _opened(scene: Scene, source: str, content: Scene | None, rig: Rig, on_type: OnType = _nobody) -> OpenScene:
     check_scene_memory(scene)
     scene = without_unseen_lights(recentred(scene))
-    flat = flatten(scene)
+    traits = analyse(scene)
+    flat = flatten(scene, lambda of_record: on_type(of_record, traits))
     said = (*hidden_lights(scene, flat), *ignored_opacity(scene))
     if said:
         scene = replace(scene, warnings=(*scene.warnings, *said))
-    return OpenScene(scene, flat, analyse(scene), source, content=content, rig=rig)
+    return OpenScene(scene, flat, traits, source, content=content, rig=rig)

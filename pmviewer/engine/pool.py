@@ -6,7 +6,7 @@ import contextlib
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
@@ -41,7 +41,7 @@ class WorkPool:
             self.threads, "pmviewer", initializer=lower_priority if behind_window else None
         )
 
-    def run(self, tasks: list[Task], on_done: Callable[[int], None] | None = None) -> list[Any]:
+    def run(self, tasks: Sequence[Task], on_done: Callable[[int], None] | None = None) -> list[Any]:
         """Results in the order of the tasks; `on_done` hears how many have finished.
 
         Raises Cancelled as soon as the running tasks are through when `cancel` is set, and whatever a task raises.

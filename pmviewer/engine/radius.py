@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from pmviewer.engine.method import Plan
 from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.maps.estimate.nearest import shrunk
 from pmviewer.maps.radius import progressive_radius
 from pmviewer.render.camera import CameraPose
 from pmviewer.scene.arrays.flatten import FlatScene
-from pmviewer.settings.access import Estimate, Settings
+from pmviewer.settings.access import Estimate, needs_of
+from pmviewer.settings.needs import Facts, unmet
 
 FOOTPRINTS, GATHER_FOOTPRINTS = 4.0, 3.0
 """Radius in pixel footprints: maps shown directly need a calm estimate; gather rays average it anyway, so that theirs
@@ -52,11 +52,10 @@ def pass_neighbours(index: int, estimate: Estimate) -> tuple[int, float]:
     return shrunk(estimate.k, progressive_radius(1.0, index + 1, estimate.alpha) ** 2)
 
 
-def radii_of_pixels(settings: Settings, plan: Plan) -> bool:
+def radii_of_pixels(facts: Facts) -> bool:
     """Whether each pixel has radii of its own (`pmviewer.render.pixel_radius`)."""
-    estimate = settings.estimate
-    shrinking = settings.photons.renew == "each pass" and estimate.lookup == "radius"
-    return shrinking and estimate.radius_rule == "pixel" and bool(plan.caustic_classes or plan.shown_directly)
+    asked = facts.settings.estimate.radius_rule == "pixel"
+    return asked and unmet(needs_of("estimate.radius_rule"), facts) is None
 
 
 def pass_radius(first: float, index: int, estimate: Estimate, scene_radius: float) -> float:

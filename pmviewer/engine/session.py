@@ -9,59 +9,55 @@ never show one.
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from pmviewer.engine.cache import StageCache
-from pmviewer.engine.diagnose import wanted_of
-from pmviewer.engine.frame import Frame, Level, Message, State, Status
+from pmviewer.engine.frame import Frame, Message, State, Status
+from pmviewer.engine.guarded import guarded
 from pmviewer.engine.inspection import Wanted
+from pmviewer.engine.loader import Loaded, Loader
 from pmviewer.engine.opened import OpenScene, open_scene, relit
-from pmviewer.engine.pool import Cancelled, WorkPool, lower_priority
+from pmviewer.engine.pool import WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
+from pmviewer.engine.published import Published
 from pmviewer.engine.renderer import Renderer
-from pmviewer.errors import PmviewerError
-from pmviewer.progress import stage, watched
+from pmviewer.engine.store import StageStore
+from pmviewer.engine.wanted import wanted_of
 from pmviewer.scene.analysis import SceneTraits
-from pmviewer.scene.arrays.tessellate import DrawGeometry, tessellate
+from pmviewer.scene.arrays.tessellate import DrawGeometry
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import Settings, changed_stages
+from pmviewer.settings.needs import Facts
 
 Source = str | Path | Scene
+NO_MEMORY = "Not enough memory for these settings: lower N or the image size."
 
 
 class Session:
-    """See the module. All public attributes may be read from any thread; frames and statuses are immutable. `loading`
-    says what the loader is doing ("ball.ply: building the tree …"), "" when nothing is being loaded."""
+    """See the module. All public attributes may be read from any thread."""
 
     def __init__(self, threads: int | None = None, settings: Settings | None = None) -> None:
-        self.on_update: Callable[[], None] | None = None
-        self.frame: Frame | None = None
-        self.status = Status()
         self.geometry: DrawGeometry | None = None
+        self._published = Published()
+        self._changed = self._published.changed
         self._opened: OpenScene | None = None
         self._settings = settings or Settings()
+        self._loader = Loader(
+            self._published, lambda: self._settings.light.rig, lambda: self._opened is not None, self._interrupt
+        )
         self._version = 0
-        self._loading = 0
-        self._loaded: tuple[OpenScene, DrawGeometry, Settings | None] | None = None
         self._restart = False
         self._pixel: tuple[int, int] | None = None
         self._paused = False
         self._closed = False
-        self._loading_done = 0
-        self._loading_cancelled = 0
-        self.loading = ""
         self._first_picture = False
         self._attempt = 0
         self._failed_version = -1
-        self._serial = 0
-        self._messages: list[Message] = []
         self._warned: set[str] = set()
-        self._changed = threading.Condition()
         self._pool = WorkPool(threads, behind_window=True)
-        self._cache = StageCache()
+        self._store = StageStore()
         self._renderer: Renderer | None = None
         self._worker = threading.Thread(target=self._work, name="pmviewer session", daemon=True)
         self._worker.start()
@@ -74,17 +70,13 @@ class Session:
         """Open a scene, with other settings if given. Until it is loaded the old one goes on; a failure becomes an
         error message and changes nothing."""
         with self._changed:
-            self._loading += 1
-            ticket = self._loading
             rig = (settings or self._settings).light.rig
-        name = source.name if isinstance(source, Scene) else str(source)
-        arguments = (ticket, lambda: open_scene(source, parameters or {}, rig), name, settings)
-        threading.Thread(target=self._load, args=arguments, name="pmviewer loader", daemon=True).start()
+            name = source.name if isinstance(source, Scene) else str(source)
+            self._loader.start(lambda: open_scene(source, parameters or {}, rig), name, settings)
 
     def cancel_loading(self) -> None:
         """Give up the scene that is being loaded; the old one stays."""
-        with self._changed:
-            self._loading_cancelled = self._loading
+        self._loader.cancel()
 
     def set(self, settings: Settings) -> int:
         """Use these settings from now on; returns the version that frames made with them will carry."""
@@ -101,12 +93,10 @@ class Session:
 
     def _relight(self, settings: Settings) -> None:
         """Open the open scene anew with other lights. A scene that is being loaded gets them anyway."""
-        opened = self._loaded[0] if self._loaded else self._opened
-        if opened is None or opened.content is None or self._pending_loads:
+        opened = self._loader.loaded.opened if self._loader.loaded else self._opened
+        if opened is None or opened.content is None or self._loader.pending:
             return
-        self._loading += 1
-        arguments = (self._loading, lambda: relit(opened, settings.light.rig), opened.source, None)
-        threading.Thread(target=self._load, args=arguments, name="pmviewer loader", daemon=True).start()
+        self._loader.start(lambda: relit(opened, settings.light.rig), opened.source, None)
 
     def restart(self) -> None:
         """Forget the film and begin with pass 0."""
@@ -127,6 +117,7 @@ class Session:
             self._settle()
 
     def resume(self) -> None:
+        """Go on after a pause."""
         with self._changed:
             self._paused = False
             self._settle()
@@ -135,6 +126,7 @@ class Session:
         """Stop the worker and its threads; returns when they are gone."""
         with self._changed:
             self._closed = True
+            self._loader.close()
             self._interrupt()
         self._worker.join()
         self._pool.close()
@@ -153,7 +145,7 @@ class Session:
         if renderer is not None and not self._is_stale():
             state: State = "finished" if self._is_finished() else "paused" if self._paused else "rendering"
             progress = min(1.0, renderer.passes / self._settings.render.passes)
-            self.status = Status(state, state, renderer.passes, progress)
+            self._published.status = Status(state, state, renderer.passes, progress)
         self._changed.notify_all()
 
     def _interrupt(self) -> None:
@@ -163,15 +155,42 @@ class Session:
     # state ------------------------------------------------------------------------------------------------------
 
     @property
+    def on_update(self) -> Callable[[], None] | None:
+        """Called from any thread when something has changed."""
+        return self._published.on_update
+
+    @on_update.setter
+    def on_update(self, listener: Callable[[], None] | None) -> None:
+        self._published.on_update = listener
+
+    @property
+    def frame(self) -> Frame | None:
+        """The newest one."""
+        return self._published.frame
+
+    @property
+    def status(self) -> Status:
+        """What goes on now."""
+        return self._published.status
+
+    @property
+    def loading(self) -> str:
+        """What the loader is doing ("ball.ply: building the tree …"), "" when nothing is being loaded."""
+        return self._loader.text
+
+    @property
     def settings(self) -> Settings:
+        """Those that are asked for."""
         return self._settings
 
     @property
     def paused(self) -> bool:
+        """Whether the user has paused."""
         return self._paused
 
     @property
     def scene(self) -> Scene | None:
+        """The open one."""
         return self._opened.scene if self._opened else None
 
     @property
@@ -181,6 +200,7 @@ class Session:
 
     @property
     def traits(self) -> SceneTraits | None:
+        """Of the open scene."""
         return self._opened.traits if self._opened else None
 
     @property
@@ -195,9 +215,7 @@ class Session:
 
     def take_messages(self) -> list[Message]:
         """Messages since the last call."""
-        with self._changed:
-            taken, self._messages = self._messages, []
-        return taken
+        return self._published.take_messages()
 
     def wait(self, passes: int | None = None, timeout: float | None = None) -> bool:
         """Wait for that many passes of the newest settings, or for the stop rule. False after `timeout` seconds or when
@@ -206,9 +224,10 @@ class Session:
         def reached() -> bool:
             if self._closed or self._has_failed():
                 return True
-            if self._pending_loads or self._loaded or self.frame is None or self.frame.version != self._version:
+            frame = self.frame
+            if self._load_waits() or frame is None or frame.version != self._version:
                 return False
-            done = self.frame.statistics.passes if not self.frame.coarse else 0
+            done = frame.statistics.passes if not frame.coarse else 0
             return self.status.state == "finished" or (passes is not None and done >= passes)
 
         with self._changed:
@@ -216,85 +235,17 @@ class Session:
 
     def _has_failed(self) -> bool:
         """Whether nothing more will come of the last request."""
-        if self._pending_loads or self._loaded:
+        if self._load_waits():
             return False
         if self._opened is None:
             return self.status.state == "failed"
         return self._failed_version == self._version
 
+    def _load_waits(self) -> bool:
+        """Whether a scene is being loaded or waits for the worker."""
+        return self._loader.pending or self._loader.loaded is not None
+
     # worker -----------------------------------------------------------------------------------------------------
-
-    def _load(self, ticket: int, load: Callable[[], OpenScene], name: str, settings: Settings | None) -> None:
-        """In a thread of its own: load, then hand over to the worker, unless another scene was asked for meanwhile."""
-        self._tell_loading(ticket, name)
-        try:
-            with watched(lambda text: self._tell_loading(ticket, name, text), lambda: self._is_unwanted(ticket)):
-                opened = load()
-                while True:
-                    stage("preparing the geometry view")
-                    if self._hand_over(ticket, opened, tessellate(opened.scene), settings):
-                        return
-                    opened = relit(opened, self._settings.light.rig)
-        except Cancelled:
-            self._load_cancelled(ticket, name)
-            return
-        except PmviewerError as error:
-            self._load_failed(ticket, str(error))
-            return
-        except MemoryError:
-            self._load_failed(ticket, f"{name}: not enough memory for this scene.")
-            return
-        except Exception as error:
-            self._load_failed(ticket, f"{name}: {unexpected(error)}")
-            return
-
-    def _hand_over(self, ticket: int, opened: OpenScene, geometry: DrawGeometry, settings: Settings | None) -> bool:
-        """Give the worker a loaded scene, if it is still asked for. False if other lights are asked for meanwhile."""
-        with self._changed:
-            if ticket != self._loading or self._closed:
-                return True
-            if settings is None and opened.content is not None and opened.rig != self._settings.light.rig:
-                return False
-            self._loaded = (opened, geometry, settings)
-            self._loading_done, self.loading = ticket, ""
-            self._interrupt()
-            return True
-
-    def _is_unwanted(self, ticket: int) -> bool:
-        """Has the load been cancelled, or another scene been asked for?"""
-        return self._closed or ticket != self._loading or ticket <= self._loading_cancelled
-
-    def _tell_loading(self, ticket: int, name: str, text: str = "") -> None:
-        """What the loader is doing: the state, where there is no picture yet, and beside it where there is."""
-        with self._changed:
-            if ticket != self._loading:
-                return
-            self.loading = f"{name}: {text}" if text else name
-        if self._opened is None:
-            self._tell("loading", f"loading {self.loading}")
-        else:
-            self._notify()
-
-    def _load_cancelled(self, ticket: int, name: str) -> None:
-        with self._changed:
-            asked_for = ticket == self._loading and not self._closed
-        if asked_for:
-            self._load_failed(ticket, f"{name}: loading was cancelled.", "info")
-
-    def _load_failed(self, ticket: int, text: str, level: Level = "error") -> None:
-        self._say(level, text)
-        with self._changed:
-            self._loading_done = max(self._loading_done, ticket)
-            if ticket == self._loading:
-                self.loading = ""
-            if self._opened is None:
-                self.status = Status("failed", text)
-            self._changed.notify_all()
-        self._notify()
-
-    @property
-    def _pending_loads(self) -> bool:
-        return self._loading_done < self._loading
 
     def _work(self) -> None:
         lower_priority()
@@ -304,27 +255,27 @@ class Session:
                 if self._closed:
                     return
                 self._pool.cancel.clear()
-                loaded, self._loaded = self._loaded, None
-                before = self._opened
-                if loaded:
-                    self._adopt(*loaded)
-            try:
-                if loaded:
-                    self._welcome(loaded[0], before)
-                else:
-                    self._advance()
-            except Cancelled:
-                self._renderer = None
-            except PmviewerError as error:
-                self._fail(str(error))
-            except MemoryError:
-                self._cache.clear()
-                self._fail("Not enough memory for these settings: lower N or the image size.")
-            except Exception as error:
-                self._fail(unexpected(error))
+                loaded, before = self._loader.take(), self._opened
+                if loaded is not None:
+                    self._adopt(loaded)
+            guarded(partial(self._turn, loaded, before), self._fail, self._drop, NO_MEMORY)
+
+    def _turn(self, loaded: Loaded | None, before: OpenScene | None) -> None:
+        if loaded is not None:
+            self._welcome(loaded.opened, before)
+            return
+        try:
+            self._advance()
+        except MemoryError:
+            self._store.clear()
+            raise
+
+    def _drop(self) -> None:
+        """What was being rendered is out of date."""
+        self._renderer = None
 
     def _has_work(self) -> bool:
-        if self._closed or self._loaded:
+        if self._closed or self._loader.loaded is not None:
             return True
         if self._opened is None:
             return False
@@ -339,7 +290,7 @@ class Session:
 
     def _wanted(self, renderer: Renderer) -> Wanted:
         """What the display asks for now."""
-        return wanted_of(self._settings, renderer.plan, self._pixel)
+        return wanted_of(Facts(self._settings, renderer.plan, renderer.scene.traits), self._pixel)
 
     def _unseen(self) -> Wanted | None:
         """What the display asks for, if the newest frame lacks it. The pass that follows a coarse frame brings it."""
@@ -350,18 +301,14 @@ class Session:
         return wanted if wanted.lacks(frame.inspection.wanted) else None
 
     def _is_finished(self) -> bool:
-        renderer = self._renderer
-        if renderer is None:
-            return True
-        render = self._settings.render
-        return renderer.passes >= render.passes or 0 < render.time_limit <= renderer.tally.seconds
+        return self._renderer is None or self._renderer.stops_by(self._settings)
 
-    def _adopt(self, opened: OpenScene, geometry: DrawGeometry, settings: Settings | None) -> None:
+    def _adopt(self, loaded: Loaded) -> None:
         """Make a loaded scene the open one."""
-        self._cache.clear()
-        self._opened, self.geometry, self._renderer, self._pixel = opened, geometry, None, None
-        if settings is not None:
-            self._settings = settings
+        self._store.clear()
+        self._opened, self.geometry, self._renderer, self._pixel = loaded.opened, loaded.geometry, None, None
+        if loaded.settings is not None:
+            self._settings = loaded.settings
         self._version += 1
 
     def _welcome(self, opened: OpenScene, before: OpenScene | None) -> None:
@@ -369,18 +316,20 @@ class Session:
         relit = before is not None and opened.content is not None and opened.content is before.content
         for warning in opened.scene.warnings:
             if not (relit and before is not None and warning in before.scene.warnings):
-                self._say("warning", warning)
+                self._published.say("warning", warning)
         if relit:
-            self._say("info", f"light rig: {opened.rig}")
+            self._published.say("info", f"light rig: {opened.rig}")
             return
         for reason, count in opened.scene.dropped.items():
-            self._say("warning", f"{count} × {reason} left out")
+            self._published.say("warning", f"{count} × {reason} left out")
         flat = opened.flat
-        self._say("info", f"opened {opened.source}: {flat.n_triangles:,} triangles, {flat.n_quadrics:,} round shapes")
+        self._published.say(
+            "info", f"opened {opened.source}: {flat.n_triangles:,} triangles, {flat.n_quadrics:,} round shapes"
+        )
         if flat.n_instances:
-            self._say("info", f"{flat.n_instances:,} instances show {flat.n_elements:,} elements")
+            self._published.say("info", f"{flat.n_instances:,} instances show {flat.n_elements:,} elements")
         if self.geometry is not None and self.geometry.note:
-            self._say("info", self.geometry.note)
+            self._published.say("info", self.geometry.note)
 
     def _advance(self) -> None:
         """A coarse frame for a new state, one pass for a known one."""
@@ -398,12 +347,12 @@ class Session:
             self._first_picture, self._attempt = True, version
         try:
             prepare(self._opened, settings, self._pool, lambda text, share: self._tell("preparing", text, share))
-            renderer = Renderer(self._opened, settings, self._pool, self._cache, version)
+            renderer = Renderer(self._opened, settings, self._pool, self._store, version)
             self._tell("rendering", "first picture")
-            frame = renderer.coarse_frame(self._serial + 1, self._wanted(renderer))
-            self._publish(frame)
+            frame = renderer.coarse_frame(self._published.serial + 1, self._wanted(renderer))
+            self._published.show(frame, self._version)
             for warning in set(frame.statistics.warnings) - self._warned:
-                self._say("warning", warning)
+                self._published.say("warning", warning)
             self._warned = set(frame.statistics.warnings)
         finally:
             with self._changed:
@@ -414,63 +363,31 @@ class Session:
 
     def _step(self, renderer: Renderer) -> None:
         renderer.step()
-        self._publish(renderer.frame(self._serial + 1, self._wanted(renderer)))
+        self._published.show(renderer.frame(self._published.serial + 1, self._wanted(renderer)), self._version)
         with self._changed:
             self._settle()
-        self._notify()
+        self._published.notify()
 
     def _look(self, renderer: Renderer, wanted: Wanted) -> None:
         """Add to the newest frame what the display asks for. The first time its kernels are compiled."""
         frame = self.frame
         assert frame is not None
         self._tell("rendering", "making what is shown")
-        self._publish(replace(frame, serial=self._serial + 1, inspection=renderer.inspect(wanted)))
+        inspection = renderer.inspect(wanted)
+        self._published.show(replace(frame, serial=self._published.serial + 1, inspection=inspection), self._version)
         with self._changed:
             self._settle()
-        self._notify()
-
-    def _publish(self, frame: Frame) -> None:
-        _ = frame.beauty  # added up here, so that the window does not wait for it
-        with self._changed:
-            self._serial = frame.serial
-            if frame.version == self._version or frame.coarse:
-                self.frame = frame
-            self._changed.notify_all()
-        self._notify()
+        self._published.notify()
 
     def _tell(self, state: State, text: str, progress: float | None = None) -> None:
-        with self._changed:
-            passes = self._renderer.passes if self._renderer else 0
-            self.status = Status(state, text, passes, progress)
-            self._changed.notify_all()
-        self._notify()
+        self._published.tell(state, text, self._renderer.passes if self._renderer else 0, progress)
 
     def _fail(self, text: str) -> None:
         """Report that the newest settings can't be rendered; the last frame stays, other settings may follow."""
-        self._say("error", text)
+        self._published.say("error", text)
         with self._changed:
             self._renderer = None
             self._failed_version = self._attempt
-            self.status = Status("failed", text)
+            self._published.status = Status("failed", text)
             self._changed.notify_all()
-        self._notify()
-
-    def _say(self, level: Level, text: str) -> None:
-        with self._changed:
-            self._messages.append(Message(level, text, time.time()))
-        self._notify()
-
-    def _notify(self) -> None:
-        """Tell the listener; one that fails is not told again, and rendering goes on."""
-        try:
-            if self.on_update:
-                self.on_update()
-        except Exception as error:
-            self.on_update = None
-            with self._changed:
-                self._messages.append(Message("error", unexpected(error)))
-
-
-def unexpected(error: Exception) -> str:
-    """Text for an error that is pmviewer's own fault."""
-    return f"Unexpected {type(error).__name__}: {error}. Please report it together with the scene and the settings."
+        self._published.notify()

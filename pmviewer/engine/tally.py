@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -60,6 +60,16 @@ class Tally:
         self.deposited = dict(photons.deposited)
         for name, count in self.stored_in_pass.items():
             self.stored[name] += count
+
+    def set_maps(self, radii: Mapping[str, float], size: int, photons: int) -> None:
+        """The maps of the latest pass: radii of look-ups by name, bytes, and photons in the photon maps."""
+        self.radius.update(radii)
+        self.map_bytes, self.map_photons = size, photons
+
+    def add_cache(self, records: int, size: int) -> None:
+        """An irradiance cache of so many records and bytes."""
+        self.records += records
+        self.map_bytes += size
 
     def add_counts(self, counts: NDArray[np.int64]) -> None:
         """Counts of an eye-pass kernel (`pmviewer.render.record`)."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +19,14 @@ from pmviewer.importance.trace import (
     N_COUNTS,
     trace_importons,
 )
+from pmviewer.kernels.dimensions import IMPORTON_SALT
 from pmviewer.maps.importance.importance_map import Importons
 from pmviewer.scene.arrays.flatten import FlatScene
-from pmviewer.tasks import Runner
+
+Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 
 BATCH = 2048
 """Importons a task: fixed, so that the result does not depend on the number of threads."""
-SEED = 0x1347
-"""Keeps the importons' random numbers apart from those of photons and pixels."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ def trace(scene: FlatScene, eye: NDArray[np.void], rule: Rule, seed: int, first:
     part = (0, 0, camera["width"], camera["height"]) if rule.pixel is None else (*rule.pixel, 1, 1)
     record = np.zeros(1, IMPORTON_PASS_DTYPE)
     record[0] = (
-        (seed ^ SEED) & 0xFFFFFFFF,
+        (seed ^ IMPORTON_SALT) & 0xFFFFFFFF,
         rule.max_depth,
         rule.glossy,
         rule.caustic,

@@ -17,8 +17,7 @@ Weights are those of eye paths, so that ΣΨL over importons is the sum of the p
 by (n_i/n_t)², which a photon's power is not. Roulette goes by luminance without that factor: it cancels where a path
 leaves the glass again, and paths inside must not die of it.
 
-Random numbers of an importon are keyed by (seed, index, dimension set): set 0 is the place in the image, 1 + b the b-th
-scattering.
+Random numbers of an importon are keyed by (seed, index, dimension), see `pmviewer.kernels.dimensions`.
 """
 
 from __future__ import annotations
@@ -36,29 +35,18 @@ from pmviewer.importance.footprint import (
     start,
     travel,
 )
-from pmviewer.kernels.accel.raycast import closest_hit
-from pmviewer.kernels.bsdf.scattering import (
-    FOLLOWED,
-    NOTHING,
-    STORED,
-    attenuation,
-    bsdf_at,
-    bsdf_sample,
-    is_delta,
-    pick_group,
-    same_side,
-    shading_normal,
-)
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, pick_group, shading_normal
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.dimensions import IMAGE_PLACE, IMPORTON_SCATTER
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import SOBOL, draw4
-from pmviewer.kernels.scene import material_of
-from pmviewer.kernels.surface import face, leave, surface_at
-from pmviewer.kernels.vector import add, along, dot, luminance, mul, scale
+from pmviewer.kernels.surface import face
+from pmviewer.kernels.vector import add, along, dot, luminance, scale
 from pmviewer.maps.photon_words import encode_direction
+from pmviewer.render.cast import Ray, cast, leaving
+from pmviewer.render.chain import WHITE, arrive, scatter
 
 _f4 = np.float32
-_i8 = np.int64
 _u4 = np.uint32
 _INF = _f4(np.inf)
 
@@ -89,8 +77,8 @@ C_CAUSTIC, C_GLOBAL, C_RAYS, C_DROPPED = range(N_COUNTS)
 
 @device
 def image_ray(eye, x, y):
-    """Through the place (x, y) of the image, in pixels: origin and unit direction, their changes with the image's
-    coordinates (`pmviewer.importance.footprint.start`), and the distances at which near and far planes are met."""
+    """The ray through the place (x, y) of the image, in pixels, from the near to the far plane, and the changes of its
+    place and direction with the image's coordinates (`pmviewer.importance.footprint.start`)."""
     o = (eye.x_eye, eye.y_eye, eye.z_eye)
     right = (eye.x_right, eye.y_right, eye.z_right)
     down = (eye.x_down, eye.y_down, eye.z_down)
@@ -98,20 +86,117 @@ def image_ray(eye, x, y):
     zero = (_f4(0.0), _f4(0.0), _f4(0.0))
     if eye.orthographic != 0:
         P, D = start(right, down, zero, zero)
-        return add(o, raw), (eye.x_forward, eye.y_forward, eye.z_forward), P, D, eye.near, eye.far
+        return Ray(add(o, raw), (eye.x_forward, eye.y_forward, eye.z_forward), eye.near, eye.far), P, D
     inv = _f4(1.0) / _f4(math.sqrt(dot(raw, raw)))
     d = scale(raw, inv)
     dx, dy = scale(along(right, d, -dot(right, d)), inv), scale(along(down, d, -dot(down, d)), inv)
     per_depth = _f4(1.0) / dot(d, (eye.x_forward, eye.y_forward, eye.z_forward))
     P, D = start(zero, zero, dx, dy)
-    return o, d, P, D, eye.near * per_depth, eye.far * per_depth
+    return Ray(o, d, eye.near * per_depth, eye.far * per_depth), P, D
 
 
 @device
-def _store(out, row, p, n, weight, footprint):
-    out[row, 0], out[row, 1], out[row, 2] = p
+def _kept(pass_, b, bounced, corner):
+    """Whether the caustic and whether the global importance map keep an importon at a surface with BSDF b. `bounced`:
+    after a STORED lobe; `corner`: where a gather ray gathers again."""
+    caustic, global_ = False, False
+    if b.groups & STORED != 0:
+        caustic = pass_.caustic != 0 and (corner or not bounced)
+        global_ = pass_.global_ != 0 and not corner and (bounced or pass_.gather == 0)
+    elif pass_.unfound != 0 and not bounced and b.groups & FOLLOWED != 0 and not is_delta(b):
+        caustic = pass_.caustic != 0
+        global_ = not caustic and pass_.gather == 0  # one importance serves both maps
+    return caustic, global_
+
+
+@device
+def _store(out, row, si, weight, footprint):
+    n = si.ng
+    out[row, 0], out[row, 1], out[row, 2] = si.p
     out[row, 3] = float_of_bits(_u4(encode_direction(n[0], n[1], n[2])))
     out[row, 4], out[row, 5] = weight, footprint
+
+
+@device
+def _pick(si, may_store, may_follow, u_lobe):
+    """The group by which the path goes on, NOTHING if by none; one over its probability; a number to use again."""
+    group, share = STORED, _f4(1.0)
+    if may_store and may_follow:
+        group, share, u_lobe = pick_group(si.bsdf, si.wo, u_lobe)
+    elif may_follow:
+        group = FOLLOWED
+    elif not may_store:
+        group = NOTHING
+    return group, share, u_lobe
+
+
+@device
+def _bounce(scene, hit, si, group, wi, pdf, compression, P, D):
+    """Changes of direction after a lobe of the group sent the ray to wi (`pmviewer.importance.footprint`)."""
+    bend = curvature(scene, hit.prim, hit.u, hit.v, hit.p, si.ng)
+    n = face(shading_normal(si.bsdf), hit.ns)  # on the side for which the curvature was taken
+    if group == STORED:
+        D = bounce_stored(bend, n, P, wi)
+    else:
+        transmitted = dot(si.ng, wi) < _f4(0.0)
+        D = bounce_specular(bend, n, P, D, si.wo, wi, transmitted, _f4(math.sqrt(compression)), is_delta(si.bsdf))
+    return spread(D, wi, pdf) if pdf > _f4(0.0) else D
+
+
+@device
+def _trace(scene, pass_, i, ray, P, D, out, counts):
+    """Trace importon i along `ray`, whose place and direction change by P and D over a pixel; the rest as for
+    `trace_importons`, `out` being both buffers."""
+    beta, compressed = WHITE, _f4(1.0)
+    bounced, again, length = False, False, _f4(0.0)
+    left = pass_.max_depth + 1
+    bounces = 0
+    while left > 0:
+        left -= 1
+        hit = cast(scene, ray)
+        counts[C_RAYS] += 1
+        if hit.prim < 0:
+            break
+        si, beta = arrive(scene, pass_.glossy, ray.d, hit, beta)
+        groups = si.bsdf.groups
+        if groups == NOTHING:
+            break
+        P = travel(P, D, ray.d, hit.t, hit.ng)
+        length += hit.t
+        before = luminance(beta)
+        weight = before * compressed
+        if not (weight > _f4(0.0) and weight < _INF):
+            counts[C_DROPPED] += 1
+            break
+        corner = groups & STORED != 0 and bounced and not again and length < pass_.corner
+        again = again or corner
+        to_caustic, to_global = _kept(pass_, si.bsdf, bounced, corner)
+        if to_caustic:
+            _store(out[0], counts[C_CAUSTIC], si, weight, footprint_importance(P))
+            counts[C_CAUSTIC] += 1
+        if to_global:
+            _store(out[1], counts[C_GLOBAL], si, weight, footprint_importance(P))
+            counts[C_GLOBAL] += 1
+        u_lobe, u, v, u_end = draw4(SOBOL, pass_.seed, _u4(i), IMPORTON_SCATTER + bounces)
+        bounces += 1
+        may_store = corner or (pass_.gather != 0 and not bounced)
+        group, share, u_lobe = _pick(si, may_store, not bounced or pass_.gather_specular != 0, u_lobe)
+        if groups & group == 0:
+            break
+        wi, after, pdf, compression = scatter(scene, si, group, beta, u_lobe, u, v)
+        after = scale(after, share)
+        survival = min(luminance(after) / before, _f4(1.0))
+        if not u_end < survival:
+            break
+        beta = scale(after, _f4(1.0) / survival)
+        compressed *= compression
+        D = _bounce(scene, hit, si, group, wi, pdf, compression, P, D)
+        if group == STORED:
+            if not bounced:
+                left = pass_.max_depth
+                length = _f4(0.0)
+            bounced = True
+        ray = leaving(si, wi)
 
 
 @kernel
@@ -126,104 +211,10 @@ def trace_importons(scenes, eyes, passes, i0, i1, caustic_out, global_out, count
     """
     scene, eye, pass_ = scenes[0], eyes[0], passes[0]
     most = 2 * pass_.max_depth + 2
-    one = _f4(1.0)
     for i in range(i0, i1):
         if counts[C_CAUSTIC] + most > len(caustic_out) or counts[C_GLOBAL] + most > len(global_out):
             return i
-        x, y, _, _ = draw4(SOBOL, pass_.seed, _u4(i), _i8(0))
-        o, d, P, D, near, far = image_ray(eye, pass_.left + x * pass_.across, pass_.top + y * pass_.down)
-        beta, compressed = (one, one, one), one
-        bounced, again, length = False, False, _f4(0.0)
-        left = pass_.max_depth + 1
-        bounces = 0
-        while left > 0:
-            left -= 1
-            t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], near, far)
-            counts[C_RAYS] += 1
-            if prim < 0:
-                break
-            p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
-            material = material_of(scene, prim)
-            beta = attenuation(scene, material, ng, d, t, beta)
-            wo = (-d[0], -d[1], -d[2])
-            b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, pass_.glossy)
-            if b.groups == NOTHING:
-                break
-            P = travel(P, D, d, t, ng)
-            length += t
-            ng = face(ng, wo)
-            before = luminance(beta)
-            weight = before * compressed
-            if not (weight > _f4(0.0) and weight < _INF):
-                counts[C_DROPPED] += 1
-                break
-            may_store = pass_.gather != 0 and not bounced
-            may_follow = not bounced or pass_.gather_specular != 0
-            if b.groups & STORED != 0:
-                of_pixel = footprint_importance(P)
-                if bounced and not again and length < pass_.corner:
-                    again = may_store = True
-                    if pass_.caustic != 0:
-                        _store(caustic_out, counts[C_CAUSTIC], p, ng, weight, of_pixel)
-                        counts[C_CAUSTIC] += 1
-                elif bounced:
-                    if pass_.global_ != 0:
-                        _store(global_out, counts[C_GLOBAL], p, ng, weight, of_pixel)
-                        counts[C_GLOBAL] += 1
-                else:
-                    if pass_.caustic != 0:
-                        _store(caustic_out, counts[C_CAUSTIC], p, ng, weight, of_pixel)
-                        counts[C_CAUSTIC] += 1
-                    if pass_.global_ != 0 and pass_.gather == 0:
-                        _store(global_out, counts[C_GLOBAL], p, ng, weight, of_pixel)
-                        counts[C_GLOBAL] += 1
-            elif pass_.unfound != 0 and not bounced and b.groups & FOLLOWED != 0 and not is_delta(b):
-                of_pixel = footprint_importance(P)
-                if pass_.caustic != 0:
-                    _store(caustic_out, counts[C_CAUSTIC], p, ng, weight, of_pixel)
-                    counts[C_CAUSTIC] += 1
-                elif pass_.gather == 0:  # one importance serves both maps
-                    _store(global_out, counts[C_GLOBAL], p, ng, weight, of_pixel)
-                    counts[C_GLOBAL] += 1
-            u_lobe, bu, bv, u_end = draw4(SOBOL, pass_.seed, _u4(i), _i8(1 + bounces))
-            bounces += 1
-            share, group = one, STORED
-            if may_store and may_follow:
-                group, share, u_lobe = pick_group(b, wo, u_lobe)
-            elif may_follow:
-                group = FOLLOWED
-            if b.groups & group == 0 or not (may_store or may_follow):
-                break
-            wi, f, pdf, compression = bsdf_sample(scene, b, group, wo, u_lobe, bu, bv)
-            if same_side(b, group, ng, wo, wi) == 0:
-                break
-            after = scale(mul(beta, f), share)
-            survival = min(luminance(after) / before, one)
-            if not u_end < survival:
-                break
-            beta = scale(after, one / survival)
-            compressed *= compression
-            bend = curvature(scene, prim, u, v, p, ng)
-            normal = shading_normal(b)
-            if group == STORED:
-                D = bounce_stored(bend, _like(normal, ns), P, wi)
-                if not bounced:
-                    left = pass_.max_depth
-                    length = _f4(0.0)
-                bounced = True
-            else:
-                through = dot(ng, wi) < _f4(0.0)
-                eta = _f4(math.sqrt(compression))
-                D = bounce_specular(bend, _like(normal, ns), P, D, wo, wi, through, eta, is_delta(b))
-            if pdf > _f4(0.0):
-                D = spread(D, wi, pdf)
-            o = leave(p, ng, gap, wi[0], wi[1], wi[2])
-            d = wi
-            near, far = _f4(0.0), _INF
+        x, y, _, _ = draw4(SOBOL, pass_.seed, _u4(i), IMAGE_PLACE)
+        ray, P, D = image_ray(eye, pass_.left + x * pass_.across, pass_.top + y * pass_.down)
+        _trace(scene, pass_, i, ray, P, D, (caustic_out, global_out), counts)
     return i1
-
-
-@device
-def _like(n, ns):
-    """n on the side of ns, for which the curvature was taken."""
-    return face(n, ns)

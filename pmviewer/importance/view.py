@@ -27,10 +27,10 @@ def importance_view(scenes, eyes, maps, M_r, constant, out, first, last):
     """
     scene, eye, importance = scenes[0], eyes[0], maps[0]
     for pixel in range(first, last):
-        prim, _, _, p, ng, _, _, _ = stored_hit(scene, eye, pixel)
+        hit, ng, _ = stored_hit(scene, eye, pixel)
         out[pixel, 0] = out[pixel, 1] = _f4(-1.0)
-        if prim >= 0:
-            gamma = importance_at(importance, p, ng)
+        if hit.prim >= 0:
+            gamma = importance_at(importance, hit.p, ng)
             out[pixel, 0], out[pixel, 1] = gamma, constant if constant >= _f4(0.0) else gamma * M_r
 
 
@@ -44,10 +44,10 @@ def probability_view(scenes, eyes, maps, f, epsilon, discard, out, first, last):
     """
     scene, eye, importance = scenes[0], eyes[0], maps[0]
     for pixel in range(first, last):
-        prim, _, _, p, ng, _, _, _ = stored_hit(scene, eye, pixel)
+        hit, ng, _ = stored_hit(scene, eye, pixel)
         out[pixel, 0] = _f4(-1.0)
-        if prim >= 0:
-            q = f * importance_sum(importance, p, ng, _i4(NEAREST))
+        if hit.prim >= 0:
+            q = f * importance_sum(importance, hit.p, ng, _i4(NEAREST))
             if not q >= epsilon:
                 q = _f4(0.0) if discard else epsilon
             out[pixel, 0] = min(q, _f4(1.0))

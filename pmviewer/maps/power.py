@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.dimensions import BLUE_SALT, ROUNDING_SALT
 from pmviewer.kernels.memory import bits_of_float
 from pmviewer.kernels.random import hash3
 from pmviewer.maps.photon_words import decode_powers
@@ -38,7 +39,7 @@ def round_power(x, noise):
 @device
 def write_power(words, row, red, green, blue, noise):
     """Replace the power of photon `row` of words (n, 6) uint32; its light stays. `noise` is a random uint32."""
-    more = hash3(noise, _u4(0x9E3779B9), _u4(row))
+    more = hash3(noise, _u4(BLUE_SALT), _u4(row))
     r, g = round_power(red, noise), round_power(green, _u4(noise >> _u4(16)))
     words[row, 4] = _u4(r | _u4(g << _u4(16)))
     words[row, 5] = _u4(round_power(blue, more) | _u4(words[row, 5] & _u4(0xFFFF0000)))
@@ -48,7 +49,7 @@ def write_power(words, row, red, green, blue, noise):
 def _write(words, powers, scale, seed):
     for i in range(len(words)):
         red, green, blue = _f4(powers[i, 0] * scale), _f4(powers[i, 1] * scale), _f4(powers[i, 2] * scale)
-        write_power(words, i, red, green, blue, hash3(seed, _u4(i), _u4(0xDE905)))
+        write_power(words, i, red, green, blue, hash3(seed, _u4(i), _u4(ROUNDING_SALT)))
 
 
 @kernel

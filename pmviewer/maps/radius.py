@@ -35,7 +35,7 @@ def automatic_radius(k: int, phi_max: float, threshold: float) -> float:
 
     Where k photons of the largest power Φ_max fill a disc of this radius, a white diffuse surface reflects the radiance
     L = k·Φ_max / (π·π·r²) = L_t; whatever needs a wider disc is darker than the threshold L_t (about 0.05 of display
-    white after exposure), and looking no further changes nothing that can be seen (Jensen et al. 2004, course notes).
+    white after exposure), and looking no further changes nothing that can be seen (course guide §5.2).
     0 for an empty map or a map without power.
     """
     return math.sqrt(k * phi_max / threshold) / math.pi

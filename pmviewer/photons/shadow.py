@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.bsdf.scattering import NOTHING, bsdf_at, keeps
 from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.dimensions import EMISSION, SHADOW_EMITTER
 from pmviewer.kernels.lights.light import emit_photon
 from pmviewer.kernels.random import SOBOL, draw1, draw4
 from pmviewer.kernels.scene import material_of
@@ -36,9 +37,7 @@ BATCH = 4096
 
 _f4 = np.float32
 _u4 = np.uint32
-_i8 = np.int64
 _INF = _f4(np.inf)
-_PICK_SET = _i8(1)
 
 
 @dataclass(frozen=True)
@@ -63,8 +62,8 @@ def trace_shadows(scenes, seed, glossy, i0, i1, out, counts):
     """
     scene = scenes[0]
     for i in range(i0, i1):
-        u0, u1, u2, u3 = draw4(SOBOL, seed, _u4(i), _i8(0))
-        p, d, beta, light = emit_photon(scene, draw1(SOBOL, seed, _u4(i), _PICK_SET), (u2, u3), (u0, u1))
+        u0, u1, u2, u3 = draw4(SOBOL, seed, _u4(i), EMISSION)
+        p, d, beta, light = emit_photon(scene, draw1(SOBOL, seed, _u4(i), SHADOW_EMITTER), (u2, u3), (u0, u1))
         wi = (-d[0], -d[1], -d[2])
         flags = _u4(0)
         for _ in range(MOST_HITS):

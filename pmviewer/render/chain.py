@@ -1,6 +1,8 @@
-"""The one walk over mirrors, glass and smooth gloss: from the camera, in replays of a pixel, and for gather rays.
+"""The one walk over mirrors, glass and smooth gloss: from the camera, in replays of a pixel, for gather rays, importons
+and the path tracer.
 
-Whoever walks asks the same functions with the same numbers, so that a replay meets what the picture met.
+Whoever walks casts a ray (`pmviewer.render.cast`), arrives, and follows or scatters. Replays of a pixel do so with the
+numbers of the eye pass (`follow_camera_path`), so that they meet what the picture met.
 """
 
 from __future__ import annotations
@@ -17,52 +19,57 @@ from pmviewer.kernels.bsdf.scattering import (
     same_side,
 )
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.dimensions import CHAIN
 from pmviewer.kernels.scene import material_of
-from pmviewer.kernels.surface import face, surface_at
+from pmviewer.kernels.surface import face
 from pmviewer.kernels.vector import largest, mul, scale
+from pmviewer.render.cast import leaving
 from pmviewer.render.given import SurfaceInteraction
 
 _f4 = np.float32
-CHAIN_SET = np.int64(2)
-"""Dimension set of the lobe that is followed at the camera ray's first surface; deeper ones follow."""
 FORKS = 3
 """Chains that fork go on at least so deep before they are thinned out."""
 BLACK = (_f4(0.0), _f4(0.0), _f4(0.0))
+WHITE = (_f4(1.0), _f4(1.0), _f4(1.0))
 
 
 @device
-def arrive(scene, eye, o, d, t, prim, u, v, beta):
-    """A ray from o in direction d met primitive `prim` at the distance t, there at (u, v).
-
-    Returns the geometric normal as the surface has it, the surface interaction, and beta after the way there.
-    """
-    p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
+def arrive(scene, glossy, d, hit, beta):
+    """A ray of direction d met a surface (`pmviewer.render.cast`): the SurfaceInteraction there, lobes being stored
+    from the roughness `glossy` on, and beta after the way."""
+    material = material_of(scene, hit.prim)
     wo = (-d[0], -d[1], -d[2])
-    material = material_of(scene, prim)
-    beta = attenuation(scene, material, ng, d, t, beta)
-    b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, eye.glossy)
-    return ng, SurfaceInteraction(p, face(ng, wo), gap, b, wo), beta
+    beta = attenuation(scene, material, hit.ng, d, hit.t, beta)
+    b = bsdf_at(scene, hit.prim, material, hit.u, hit.v, hit.p, hit.ng, hit.ns, wo, glossy)
+    return SurfaceInteraction(hit.p, face(hit.ng, wo), hit.gap, b, wo), beta
+
+
+@device
+def scatter(scene, si, group, beta, u_lobe, u, v):
+    """A direction by a group of the BSDF's lobes: (wi, beta·f·|cos|/pdf, pdf, compression), see `bsdf_sample`. beta is
+    black after it where the path ends, as where the lobe of a shading normal dips below the surface."""
+    wi, weight, pdf, compression = bsdf_sample(scene, si.bsdf, group, si.wo, u_lobe, u, v)
+    if same_side(si.bsdf, group, si.ng, si.wo, wi) == 0:
+        return wi, BLACK, pdf, compression
+    return wi, mul(beta, weight), pdf, compression
 
 
 @device
 def follow(scene, si, beta, u_lobe, u, v):
-    """A direction by the FOLLOWED lobes: (wi, beta after it, density; 0 of a delta). beta is black where the path ends,
-    as where the lobe of a shading normal dips below the surface."""
-    wi, weight, pdf, compression = bsdf_sample(scene, si.bsdf, FOLLOWED, si.wo, u_lobe, u, v)
-    if same_side(si.bsdf, FOLLOWED, si.ng, si.wo, wi) == 0:
-        return wi, BLACK, pdf
-    return wi, scale(mul(beta, weight), compression), pdf
+    """The ray by the FOLLOWED lobes, beta after them (black where the path ends), and the density (0 of a delta)."""
+    wi, beta, pdf, compression = scatter(scene, si, FOLLOWED, beta, u_lobe, u, v)
+    return leaving(si, wi), scale(beta, compression), pdf
 
 
 @device
 def follow_camera_path(given, si, beta, seed, depth):
     """`follow` at the surface number `depth` of a path from the camera, which is thinned out where it forks often."""
     eye = given.eye
-    u_lobe, u, v, u_end = chain_numbers(given.scene, eye.sequence, seed, eye.index, CHAIN_SET + depth)
-    wi, beta, pdf = follow(given.scene, si, beta, u_lobe, u, v)
+    u_lobe, u, v, u_end = chain_numbers(given.scene, eye.sequence, seed, eye.index, CHAIN + depth)
+    ray, beta, pdf = follow(given.scene, si, beta, u_lobe, u, v)
     if si.bsdf.groups & STORED != 0 and depth >= FORKS:
         survival = min(largest(beta), _f4(1.0))
         if not u_end < survival:
-            return wi, BLACK, pdf
+            return ray, BLACK, pdf
         beta = scale(beta, _f4(1.0) / survival)
-    return wi, beta, pdf
+    return ray, beta, pdf

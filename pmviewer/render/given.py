@@ -13,8 +13,7 @@ class PassData(NamedTuple):
     scene: SCENE_DTYPE; eye: EYE_DTYPE; caustic_map, global_map: of grids or kd-trees; choice_map: of the grid of
     photons that choose lights; sites: of the radiance photons, or NO_SITES; cache: of the irradiance cache, or
     NO_CACHE; shadows: of the shadow photons, or NO_SHADOWS; guides: of the photons that guide gather rays, or
-    NO_GUIDES; corner:
-    CORNERS or NO_CORNERS.
+    NO_GUIDES; corner: CORNERS or NO_CORNERS.
     """
 
     scene: Any
@@ -55,6 +54,18 @@ class Aim(NamedTuple):
     found: Any
     rays: Any
     photons: Any
+
+
+class GatherRays(NamedTuple):
+    """The rays that a surface casts by its STORED lobes: their number n; what guides them, an Aim; the choice of lights
+    that their emission is weighted against; the pixel's seed; three numbers for the ray that is of the BSDF alone,
+    where none gathers."""
+
+    n: Any
+    aimed: Any
+    choice: Any
+    seed: Any
+    numbers: Any
 
 
 @inlined

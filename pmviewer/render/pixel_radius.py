@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.compile.specialise import absent, specialised
+from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.render.lookup import looked_up
 
 OF_CAUSTIC, OF_GLOBAL = 0, 1
@@ -58,13 +58,14 @@ def own_radius(radii, which, pixel, radius):
 
 
 @specialised
-def count_found(radii, which, pixel, photons, eye, radius, si, class_mask):
-    """Tell the pixel how many photons its look-up counted; arguments as for `pmviewer.render.lookup.irradiance`."""
-    if absent(radii):
-        return lambda radii, which, pixel, photons, eye, radius, si, class_mask: None
+def count_found(pixel, which, photons, eye, radius, si, class_mask):
+    """Tell the pixel (`pmviewer.render.pixel.Pixel`) how many photons its look-up counted; the other arguments as for
+    `pmviewer.render.lookup.irradiance`."""
+    if absent(part(pixel, "radii")):
+        return lambda pixel, which, photons, eye, radius, si, class_mask: None
 
-    def told(radii, which, pixel, photons, eye, radius, si, class_mask):
+    def told(pixel, which, photons, eye, radius, si, class_mask):
         _, found = looked_up(photons, eye, radius, si.p, si.ng, class_mask)
-        radii[pixel, FOUND + which] += found
+        pixel.radii[pixel.number, FOUND + which] += found
 
     return told

@@ -1,7 +1,8 @@
 """What a pixel holds: the terms of the rendering equation's split and the properties of the first hit.
 
-The terms follow Jensen's split (J §4) at the first hit: light that the camera sees directly, direct light on a diffuse
-surface, everything seen through a specular surface, caustics, and multiple diffuse reflection. The image is their sum.
+The terms follow Jensen's split (Jensen 1996, §4) at the first hit: light that the camera sees directly, direct light on
+a diffuse surface, everything seen through a specular surface, caustics, and multiple diffuse reflection. The image is
+their sum.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, fields
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -69,18 +71,44 @@ because shadow photons know; with an irradiance cache, surface points that it se
 themselves; paths from the camera that `max_depth` ended."""
 
 
-def eye_record(camera: CameraPose, settings: Settings, index: int) -> NDArray[np.void]:
-    """The part of the record that camera and settings give; the engine fills in masks and radii for the method."""
+@dataclass(frozen=True)
+class Evaluation:
+    """How a pass evaluates the terms of the picture: what it samples, and what it looks up in which maps. Each field is
+    one of EYE_DTYPE by its name; radii and `corner` are in scene units. The defaults sample and look up nothing."""
+
+    direct: bool = False
+    followed_direct: bool = False
+    unfound: bool = False
+    caustic_mask: int = 0
+    global_mask: int = 0
+    direct_mask: int = 0
+    global_caustics: int = 0
+    indirect_caustics: bool = False
+    gather_rays: int = 0
+    gather_specular: bool = False
+    guided_rays: int = 0
+    guide_mask: int = 0
+    corner: float = 0.0
+    choice: int = 0
+    biased: bool = False
+    choice_radius: float = 0.0
+    k: int = 0
+    share: float = 0.0
+    caustic_radius: float = 0.0
+    global_radius: float = 0.0
+    site_radius: float = 0.0
+
+
+NOTHING_EVALUATED = Evaluation()
+
+
+def eye_record(
+    camera: CameraPose, settings: Settings, index: int, evaluation: Evaluation = NOTHING_EVALUATED
+) -> NDArray[np.void]:
+    """The record (1,) of EYE_DTYPE of pass `index`, complete: nobody writes to it afterwards."""
     record = np.zeros(1, EYE_DTYPE)
     r = record[0]
-    forward = camera.axes()[2]
-    near = forward if camera.near_normal is None else camera.near_normal
-    frame = np.concatenate([camera.ray_frame(), [forward, near]])
-    for part, vector in zip(("eye", "corner", "right", "down", "forward", "near"), frame, strict=True):
-        for axis, value in zip("xyz", vector, strict=True):
-            r[f"{axis}_{part}"] = value
-    r["near"], r["far"] = camera.near, camera.far
-    r["width"], r["height"], r["orthographic"] = camera.width, camera.height, camera.orthographic
+    _set_camera(r, camera)
     r["sequence"], r["seed"], r["index"] = SOBOL, settings.render.seed & 0xFFFFFFFF, index & 0xFFFFFFFF
     r["max_depth"] = settings.render.max_depth
     r["outline_rays"] = settings.render.outline_rays
@@ -89,8 +117,21 @@ def eye_record(camera: CameraPose, settings: Settings, index: int) -> NDArray[np
     r["light_samples"], r["mis"] = direct.samples, direct.mis
     r["con_samples"], r["noncon_samples"] = direct.con_samples, direct.noncon_samples
     estimate = settings.estimate
-    r["filter"], r["rim"], r["k"] = FILTERS.index(estimate.filter), RIMS.index(estimate.rim), estimate.k
+    r["filter"], r["rim"] = FILTERS.index(estimate.filter), RIMS.index(estimate.rim)
     r["cone_k"], r["flatness"], r["boundary"] = estimate.cone_k, estimate.flatness, estimate.boundary
     r["roulette"] = settings.gather.roulette
     r["site_similarity"] = settings.gather.similarity
+    for field in fields(evaluation):
+        r[field.name] = getattr(evaluation, field.name)
     return record
+
+
+def _set_camera(r: np.void, camera: CameraPose) -> None:
+    forward = camera.axes()[2]
+    near = forward if camera.near_normal is None else camera.near_normal
+    frame = np.concatenate([camera.ray_frame(), [forward, near]])
+    for part, vector in zip(("eye", "corner", "right", "down", "forward", "near"), frame, strict=True):
+        for axis, value in zip("xyz", vector, strict=True):
+            r[f"{axis}_{part}"] = value
+    r["near"], r["far"] = camera.near, camera.far
+    r["width"], r["height"], r["orthographic"] = camera.width, camera.height, camera.orthographic

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -332,12 +333,12 @@ class Scene:
     exposure: float | None = 0.0
     """Exposure in EV that the scene is meant to be shown with; None: to be chosen from the picture."""
 
-    @property
+    @cached_property
     def groups(self) -> tuple[Group, ...]:
         """The groups that instances show, each once, in the order of their first instance."""
         return tuple(dict.fromkeys(instance.group for instance in self.instances))
 
-    @property
+    @cached_property
     def all_shapes(self) -> tuple[Shape, ...]:
         """The scene's own shapes, then those of its groups: everything that is stored."""
         return self.shapes + tuple(shape for group in self.groups for shape in group.shapes)

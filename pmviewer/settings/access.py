@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Union, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from pmviewer.errors import SettingError
+from pmviewer.settings.needs import Needs
 from pmviewer.settings.schema import (
     CacheOverlay,
     CameraSettings,
@@ -19,6 +20,7 @@ from pmviewer.settings.schema import (
     FateOverlay,
     FreeCamera,
     GatherOverlay,
+    Group,
     Importance,
     ImportonOverlay,
     Light,
@@ -62,6 +64,7 @@ __all__ = [
     "from_tree",
     "get",
     "info_of",
+    "needs_of",
     "parse_assignments",
     "range_text",
     "with_values",
@@ -88,6 +91,10 @@ class SettingInfo:
     default: Any
     section: str
     """Heading within the group; empty for the settings before the first."""
+    needs: Needs
+    """What must hold for it to have an effect, in the order in which it is told."""
+    choice_needs: Mapping[str, Needs]
+    """What must hold for a choice to show something, of those that need something."""
 
 
 def _kind_of(annotation: Any) -> tuple[type, tuple[str, ...], bool]:
@@ -104,16 +111,17 @@ def _kind_of(annotation: Any) -> tuple[type, tuple[str, ...], bool]:
     return annotation, (), False
 
 
-def _infos(model: type[BaseModel], prefix: str, heading: str) -> Iterator[SettingInfo]:
+def _infos(model: type[Group], prefix: str, heading: str, needs: Needs) -> Iterator[SettingInfo]:
     section = ""
     for name, field in model.model_fields.items():
         public = field.alias or name
         path = f"{prefix}{public}"
-        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
-            inner = field.title or (field.annotation.__doc__ or public).strip()
-            yield from _infos(field.annotation, f"{path}.", inner)
-            continue
         extra: Any = field.json_schema_extra
+        if isinstance(field.annotation, type) and issubclass(field.annotation, Group):
+            inner = field.title or (field.annotation.__doc__ or public).strip()
+            of_group = (*needs, *field.annotation.needs, *(extra["needs"] if extra else ()))
+            yield from _infos(field.annotation, f"{path}.", inner, of_group)
+            continue
         kind, choices, auto = _kind_of(field.annotation)
         section = extra["section"] or section
         yield SettingInfo(
@@ -131,10 +139,12 @@ def _infos(model: type[BaseModel], prefix: str, heading: str) -> Iterator[Settin
             auto=auto,
             default=field.default,
             section=section,
+            needs=(*needs, *extra["needs"]),
+            choice_needs=extra["choice_needs"],
         )
 
 
-SETTINGS: dict[str, SettingInfo] = {info.path: info for info in _infos(Settings, "", "")}
+SETTINGS: dict[str, SettingInfo] = {info.path: info for info in _infos(Settings, "", "", ())}
 """Every setting by its full name, in the order of the schema."""
 
 
@@ -147,6 +157,14 @@ def info_of(path: str) -> SettingInfo:
     near = difflib.get_close_matches(path, SETTINGS, n=3, cutoff=0.4)
     hint = f" Did you mean {' or '.join(near)}?" if near else ""
     raise SettingError(f"There is no setting '{path}'.{hint}")
+
+
+def needs_of(path: str) -> Needs:
+    """What must hold for a setting to have an effect, or for a choice of it to show something
+    ("display.view=photon count"). Raises SettingError for an unknown setting."""
+    name, _, choice = path.partition("=")
+    info = info_of(name)
+    return (*info.needs, *info.choice_needs.get(choice, ())) if choice else info.needs
 
 
 def get(settings: Settings, path: str) -> Any:

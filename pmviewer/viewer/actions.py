@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,11 @@ from pmviewer.render.free_camera import as_perspective, plan_pose
 from pmviewer.settings.access import SETTINGS, get
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.exports import Exports, default_path, fresh_path
+from pmviewer.viewer.overlays.registry import SWITCHED
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport import controls
-from pmviewer.viewer.viewport.viewport import VIEWPORT, Fit, Viewport
+from pmviewer.viewer.viewport.target import Fit
+from pmviewer.viewer.viewport.viewport import VIEWPORT, Viewport
 
 COMPARISON = "Comparison"
 """The panel's label."""
@@ -51,17 +54,7 @@ class Commands:
             "exposure_up": lambda: self._expose(EXPOSURE_STEP),
             "exposure_down": lambda: self._expose(-EXPOSURE_STEP),
             "next_tone": self._next_tone,
-            "toggle_caustic": lambda: self._toggle("overlays.caustic.show"),
-            "toggle_global": lambda: self._toggle("overlays.global.show"),
-            "toggle_radiance": lambda: self._toggle("overlays.radiance.show"),
-            "toggle_cache": lambda: self._toggle("overlays.cache.show"),
-            "toggle_shadow": lambda: self._toggle("overlays.shadow.show"),
-            "toggle_importons": lambda: self._toggle("overlays.importons.show"),
-            "toggle_fates": lambda: self._toggle("overlays.fates.show"),
-            "toggle_lights": lambda: self._toggle("overlays.lights.show"),
-            "toggle_paths": lambda: self._toggle("overlays.paths.show"),
-            "toggle_gather": lambda: self._toggle("overlays.gather.show"),
-            "toggle_projection": lambda: self._toggle("overlays.projection.show"),
+            **{f"toggle_{o.name}": partial(self._toggle, f"overlays.{o.name}.show") for o in SWITCHED},
             "fit_picture": self._fit,
             "compare_importance": self._compare_importance,
             "toggle_fly": self._toggle_fly,
@@ -86,6 +79,14 @@ class Commands:
 
     def _open(self) -> None:
         self.dialogs.open("Open a scene or session", "Scenes and sessions", SCENE_PATTERNS, self.state.open)
+
+    def locate_scene(self) -> None:
+        """Once per window frame: ask where the scene is that a session file misses."""
+        if self.state.lost is None or self.dialogs.is_open:
+            return
+        (session, scene), self.state.lost = self.state.lost, None
+        title = f"Where is {Path(scene).name} now?"
+        self.dialogs.open(title, "Scenes", SCENE_PATTERNS, lambda found: self.state.open(session, scene=found))
 
     def _load_reference(self) -> None:
         self.dialogs.open("Load a reference", "OpenEXR pictures", ["*.exr"], self.load_reference)

@@ -17,9 +17,12 @@ from pmviewer.errors import PmviewerError
 from pmviewer.settings.access import Settings
 from pmviewer.viewer import layout
 from pmviewer.viewer.actions import Commands
+from pmviewer.viewer.background import FILES
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.recent import RecentFiles
-from pmviewer.viewer.overlays.overlay_panel import OverlayPanel
+from pmviewer.viewer.gl.framebuffers import Framebuffers
+from pmviewer.viewer.gl.freeing import free_collected
+from pmviewer.viewer.overlays.panel import OverlayPanel
 from pmviewer.viewer.panels.error_panel import ErrorPanel
 from pmviewer.viewer.panels.gain_panel import GainPanel
 from pmviewer.viewer.panels.help_overlay import draw_help
@@ -75,6 +78,7 @@ class ViewerApp:
         self.context: moderngl.Context | None = None
         self._title = ""
         self._running = False
+        self._shares = layout.Shares()
         self.viewport.draw_toasts = lambda: draw_toasts(self.state, *self.viewport.origin, self.viewport.size[0])
         self.params = layout.runner_params(self._callbacks(), remember=remember, alone=picture_size)
         self._shot, self.viewport.alone, self.viewport.captions = shot, picture_size is not None, captions
@@ -137,6 +141,8 @@ class ViewerApp:
 
     def _post_init(self) -> None:
         self.context = moderngl.create_context()
+        # Python's collector may run on any thread: what it finds is freed on this one, by `free_collected`.
+        self.context.gc_mode = "context_gc"
         self.viewport.picture = Picture(self.context)
         self.state.say("info", f"OpenGL {self.context.info['GL_VERSION']} on {self.context.info['GL_RENDERER']}")
         scale = hello_imgui.dpi_window_size_factor()
@@ -146,10 +152,12 @@ class ViewerApp:
         self._running = True
         self.state.session.on_update = self.wake
         self.state.gain.on_update = self.wake
-        self.state.jobs.on_done = self.state.comparison.measuring.on_done = self.wake
+        self.state.background.on_done = self.wake
 
     def _pre_new_frame(self) -> None:
         assert self.context is not None
+        free_collected(self.context)
+        self._shares.keep()
         self.state.poll()
         try:
             self.viewport.render()
@@ -171,6 +179,7 @@ class ViewerApp:
         if not self.dialogs.is_open:
             run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying)
         self.state.flipped = not self.dialogs.is_open and is_held(FLIP_KEY)
+        self.commands.locate_scene()
         self.dialogs.poll()
         draw_help(self.state)
 
@@ -185,21 +194,31 @@ class ViewerApp:
         """(height, width, 3) uint8 of the whole window."""
         assert self.context is not None
         width, height = glfw.get_framebuffer_size(glfw_window_hello_imgui())
-        copy = self.context.simple_framebuffer((width, height), 4)
+        copies = Framebuffers(self.context)
         screen = self.context.detect_framebuffer(0)
-        self.context.copy_framebuffer(copy, screen)
-        pixels = np.frombuffer(copy.read(components=3, alignment=1), np.uint8).reshape(height, width, 3)
-        copy.release()
+        self.context.copy_framebuffer(copies.get("window", (width, height)), screen)
+        pixels = copies.read("window")
+        copies.release()
         screen.use()
-        return np.ascontiguousarray(pixels[::-1])
+        return pixels
 
     def _before_exit(self) -> None:
+        """End what runs beside the window; what the user has asked for is finished first, without the window."""
         self._running = False
-        self.state.session.on_update = None
-        self.state.gain.finish()
-        for jobs in (self.state.jobs, self.state.comparison.measuring):
-            jobs.on_done = None
-            jobs.finish()
+        self.state.session.on_update = self.state.gain.on_update = None
+        self._release()
+        if self.state.background.running(FILES):
+            glfw.hide_window(glfw_window_hello_imgui())
+        self.state.background.finish()
+
+    def _release(self) -> None:
+        """Free everything that lies on the GPU, as long as it can be reached."""
+        if self.context is None:
+            return
+        self.viewport.release()
+        free_collected(self.context)
+        self.context.release()
+        self.context = None
 
 
 def run_viewer(
@@ -211,8 +230,9 @@ def run_viewer(
     """Open the window on a scene or session file (None: the Cornell box with a mirror and a glass sphere).
 
     `parameters` are values for the scene file's `<default>` names, `threads` the session's (None: all cores).
-    Returns 0 when the window was closed. Raises WindowError when there is no display or no OpenGL.
+    Returns 0 when the window was closed, or ends the process, if the engine is busy then: files that the user has asked
+    for are written by that time. Raises WindowError when there is no display or no OpenGL.
     """
     from pmviewer.viewer.start import start_viewer
 
-    return start_viewer(ViewerApp, source, settings, threads, parameters)
+    return start_viewer(ViewerApp, source, settings, threads, parameters, leave=True)

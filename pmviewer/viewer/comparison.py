@@ -11,8 +11,8 @@ from pmviewer.engine.frame import Frame, Level
 from pmviewer.render.camera import CameraPose, resolve_camera, size_only
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import SETTINGS, flat
+from pmviewer.viewer.background import MEASURING, READING, Background
 from pmviewer.viewer.format import grouped
-from pmviewer.viewer.jobs import Jobs
 from pmviewer.viewer.session_link import SessionLike
 
 if TYPE_CHECKING:  # brings OpenEXR and scipy along, which the window doesn't wait for
@@ -80,14 +80,13 @@ class Comparison:
     A reference shows what the scene's own camera sees: frames of another camera or size are not compared.
     """
 
-    def __init__(self, session: SessionLike, jobs: Jobs, say: Callable[[Level, str], None]) -> None:
+    def __init__(self, session: SessionLike, background: Background, say: Callable[[Level, str], None]) -> None:
         self.reference: Reference | None = None
         self.current: Run | None = None
         self.earlier: list[Run] = []
         """Curves of other settings, oldest first."""
-        self.measuring = Jobs(say)
         self._session = session
-        self._jobs = jobs
+        self._background = background
         self._say = say
         self._scene: Scene | None = None
         self._arrived: tuple[Scene, Reference] | None = None
@@ -111,7 +110,7 @@ class Comparison:
             self._arrived = scene, reference
             return f"comparing with {path}"
 
-        self._jobs.start("loading the reference", work)
+        self._background.start(READING, "loading the reference", work)
 
     def _load_own(self, scene: Scene) -> None:
         """The reference that lies beside the scene, if there is one. Silent: nobody asked for it."""
@@ -125,7 +124,7 @@ class Comparison:
                 self._arrived = scene, load_reference(path)
             return ""
 
-        self._jobs.start("loading the reference", work)
+        self._background.start(READING, "loading the reference", work)
 
     def problem(self, frame: Frame | None) -> str | None:
         """Why the frame can't be compared, and what to do about it; None when it can."""
@@ -175,7 +174,7 @@ class Comparison:
         passes = frame.statistics.passes
         done = run.points[-1].passes if run.points else 0
         last = self._session.status.state == "finished" and passes > done
-        if self.measuring.running or not (passes >= run.next_pass or last):
+        if self._background.running(MEASURING) or not (passes >= run.next_pass or last):
             return
         run.next_pass = next_mark(passes)
         reference = self.reference
@@ -187,7 +186,7 @@ class Comparison:
             run.points.append(Point(passes, frame.statistics.seconds, metrics(frame.image(), reference.image)))
             return ""
 
-        self.measuring.start("measuring the error", work)
+        self._background.start(MEASURING, "measuring the error", work)
 
     def _begin(self, frame: Frame) -> Run:
         """A new curve. The one before is kept when it is one (two points), and of other settings."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ from pmviewer.errors import PmviewerError
 from pmviewer.render.camera import CameraPose
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import Settings
+from pmviewer.viewer.background import COMPARING, Background, Work
 from pmviewer.viewer.session_link import SessionLike
 
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
@@ -22,11 +22,12 @@ NOT_COMPARED = ("compare.", "display.", "overlays.", "free_camera.", "render.pas
 
 
 class GainRun:
-    """At most one comparison at a time, on a thread and a pool of its own; `gain` is the latest result, `shown` whether
+    """At most one comparison at a time, with a pool of its own; `gain` is the latest result, `shown` whether
     the viewport shows it. Methods are for the window's thread."""
 
-    def __init__(self, session: SessionLike, say: Callable[[Level, str], None]) -> None:
+    def __init__(self, session: SessionLike, background: Background, say: Callable[[Level, str], None]) -> None:
         self._session = session
+        self._background = background
         self._say = say
         self.gain: Gain | None = None
         self.settings: Settings | None = None
@@ -36,13 +37,12 @@ class GainRun:
         self.on_update: Callable[[], None] | None = None
         self._scene: Scene | None = None
         self._ticket = 0
-        self._thread: threading.Thread | None = None
-        self._pool: WorkPool | None = None
+        self._work: Work | None = None
         self._arrived: tuple[int, Scene | None, Settings, Gain] | None = None
 
     @property
     def running(self) -> bool:
-        return self._thread is not None and self._thread.is_alive()
+        return self._work is not None and self._work.running
 
     def refusal(self) -> str | None:
         """Why there is nothing to compare now, None if there is."""
@@ -63,33 +63,29 @@ class GainRun:
         from pmviewer.engine.pool import WorkPool
 
         self._ticket += 1
-        self._pool = WorkPool(self._session.threads, behind_window=True)
         self.progress = "starting", None
-        arguments = self._ticket, self._session.opened_scene, self._session.settings, self._pool, truth
-        self._thread = threading.Thread(target=self._run, args=arguments, name="pmviewer comparison", daemon=True)
-        self._thread.start()
+        ticket, pool = self._ticket, WorkPool(self._session.threads, behind_window=True)
+        opened, settings = self._session.opened_scene, self._session.settings
+        self._work = self._background.start(
+            COMPARING,
+            "comparing with and without importance",
+            lambda: self._run(ticket, opened, settings, pool, truth),
+            stop=pool.cancel.set,
+        )
 
-    def _run(self, ticket: int, opened: Any, settings: Settings, pool: WorkPool, truth: Truth | None) -> None:
+    def _run(self, ticket: int, opened: Any, settings: Settings, pool: WorkPool, truth: Truth | None) -> str:
         from pmviewer.engine.comparison.importance_gain import compare
-        from pmviewer.engine.pool import Cancelled, lower_priority
-        from pmviewer.engine.session import unexpected
+        from pmviewer.engine.pool import lower_priority
 
         lower_priority()
         try:
             gain = compare(opened, settings, pool, self._tell, truth)
-            self._arrived = ticket, opened.scene, settings, gain
-            self._say("info", "The comparison with and without importance is finished.")
-        except Cancelled:
-            self._say("info", "The comparison was cancelled.")
-        except (PmviewerError, OSError) as error:
-            self._say("error", str(error))
         except MemoryError:
-            self._say("error", "Not enough memory for the comparison: lower N or the image size.")
-        except Exception as error:
-            self._say("error", unexpected(error))
+            raise PmviewerError("Not enough memory for the comparison: lower N or the image size.") from None
         finally:
             pool.close()
-            self._notify()
+        self._arrived = ticket, opened.scene, settings, gain
+        return "The comparison with and without importance is finished."
 
     def _tell(self, text: str, share: float | None) -> None:
         self.progress = text, share
@@ -101,15 +97,8 @@ class GainRun:
 
     def cancel(self) -> None:
         """Stop the one that is running; the result before stays."""
-        if self._pool is not None:
-            self._pool.cancel.set()
-
-    def finish(self) -> None:
-        """Stop and wait."""
-        self.on_update = None
-        self.cancel()
-        if self._thread is not None:
-            self._thread.join()
+        if self._work is not None:
+            self._work.cancel()
 
     def poll(self, camera: CameraPose | None) -> None:
         """Once per window frame: take over a result; forget it with its scene, hide it when the camera moves."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from imgui_bundle import hello_imgui, imgui
 
@@ -15,7 +16,7 @@ PANELS = ("Settings", "Overlays", "Statistics", "Importance", "Error", "Comparis
 _PLACE = {"Settings": "Left", "Overlays": "Right"}
 """Where panels are docked; the others at the bottom."""
 WINDOW_SIZE = (1440, 900)
-SMALLEST_WINDOW = (1000, 640)
+SMALLEST_WINDOW = (800, 600)
 FPS_MAX = 60
 FPS_IDLE = 2
 
@@ -115,3 +116,37 @@ def _dock(docking: hello_imgui.DockingParams, callbacks: Callbacks) -> None:
     places = {label: _PLACE.get(label, "Bottom") for label in PANELS}
     panels = [hello_imgui.DockableWindow(label, place, callbacks.panels[label]) for label, place in places.items()]
     docking.dockable_windows = [picture, *panels]
+
+
+class Shares:
+    """Panels keep their share of the window when it changes its size; by itself the picture alone would give way."""
+
+    def __init__(self) -> None:
+        self._size: tuple[float, float] | None = None
+
+    def keep(self) -> None:
+        """Between window frames."""
+        nodes = _dock_nodes()
+        root = next((node for node in nodes.values() if node.parent_node is None), None)
+        if root is None:
+            return
+        before, self._size = self._size, (root.size.x, root.size.y)
+        if before is None or before == self._size or min(before) < 1:
+            return
+        across, down = self._size[0] / before[0], self._size[1] / before[1]
+        for number, node in nodes.items():
+            if node is not root:
+                size = node.size.x * across, node.size.y * down
+                imgui.internal.dock_builder_set_node_size(number, size)
+
+
+def _dock_nodes() -> dict[int, Any]:
+    """The nodes in which the docked windows lie, and those that these are parts of, by number."""
+    nodes: dict[int, Any] = {}
+    for label in (VIEWPORT, *PANELS):
+        window = imgui.internal.find_window_by_name(label)
+        node = window.dock_node if window is not None else None
+        while node is not None:
+            nodes[node.id_] = node
+            node = node.parent_node
+    return nodes

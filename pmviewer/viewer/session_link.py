@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from pmviewer.engine.frame import Frame, Message, Status
+from pmviewer.errors import PmviewerError
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import Settings
+from pmviewer.viewer.background import ENGINE, Background
 
 
 class SessionLike(Protocol):
@@ -67,35 +69,34 @@ class SessionLink:
         self._source: tuple[str | Path | Scene, Settings | None, Mapping[str, str] | None] | None = None
         self._paused = False
         self._closed = False
-        self._messages: list[Message] = []
         self._status = Status("preparing", "starting the engine")
         self._lock = threading.Lock()
 
-    def connect(self) -> None:
+    def connect(self, background: Background) -> None:
         """Start making the session."""
-        threading.Thread(target=self._connect, name="pmviewer start", daemon=True).start()
+        background.start(ENGINE, "starting the engine", self._connect)
 
-    def _connect(self) -> None:
+    def _connect(self) -> str:
         try:
             session = self._make()
         except Exception as error:  # whatever it is, the window has to show it
             with self._lock:
-                self._messages.append(Message("error", f"The engine did not start: {error}"))
                 self._status = Status("failed", "the engine did not start")
             self._notify()
-            return
+            raise PmviewerError(f"The engine did not start: {error}") from error
         with self._lock:
             session.on_update = self._notify
             self._session = session
             if self._closed:
                 session.close()
-                return
+                return ""
             session.set(self._settings)
             if self._paused:
                 session.pause()
             if self._source is not None:
                 session.open(*self._source)
         self._notify()
+        return ""
 
     def _notify(self) -> None:
         if self.on_update:
@@ -208,6 +209,4 @@ class SessionLink:
         return self._session.paused if self._session else self._paused
 
     def take_messages(self) -> list[Message]:
-        with self._lock:
-            taken, self._messages = self._messages, []
-        return taken + (self._session.take_messages() if self._session else [])
+        return self._session.take_messages() if self._session else []

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
+from pmviewer.viewer.overlays.overlay import Switch
+from pmviewer.viewer.overlays.registry import OVERLAYS
+
 K = imgui.Key
 
 
@@ -23,6 +26,11 @@ class Binding:
     shift: bool = False
     repeat: bool = False
     alternative: imgui.Key | None = None
+
+
+def _switching(overlay: str, switch: Switch) -> Binding:
+    """The key that switches an overlay."""
+    return Binding("Picture", switch.keys, switch.text, f"toggle_{overlay}", switch.key, shift=switch.shift)
 
 
 BINDINGS: tuple[Binding, ...] = (
@@ -42,18 +50,8 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Picture", "Shift+E", "Exposure down by half a stop", "exposure_down", K.e, shift=True, repeat=True),
     Binding("Picture", "T", "Next tone curve", "next_tone", K.t),
     Binding("Picture", "V held", "The reference instead of the picture"),
-    Binding("Picture", "C", "Caustic photons on or off", "toggle_caustic", K.c),
-    Binding("Picture", "G", "Global photons on or off", "toggle_global", K.g),
-    Binding("Picture", "Shift+G", "Radiance photons on or off", "toggle_radiance", K.g, shift=True),
-    Binding("Picture", "Shift+C", "Shadow photons on or off", "toggle_shadow", K.c, shift=True),
-    Binding("Picture", "Shift+M", "Importons on or off", "toggle_importons", K.m, shift=True),
-    Binding("Picture", "Shift+F", "Photons by fate on or off", "toggle_fates", K.f, shift=True),
-    Binding("Picture", "L", "Importance of the lights on or off", "toggle_lights", K.l),
-    Binding("Picture", "P", "Photon paths on or off", "toggle_paths", K.p),
-    Binding("Picture", "Shift+I", "Irradiance cache on or off", "toggle_cache", K.i, shift=True),
-    Binding("Picture", "J", "Gather rays of a pixel on or off", "toggle_gather", K.j),
+    *(_switching(overlay.name, overlay.switch) for overlay in OVERLAYS if overlay.switch is not None),
     Binding("Picture", "I held", "Gather rays of the pixel under the mouse"),
-    Binding("Picture", "M", "Projection maps of the lights on or off", "toggle_projection", K.m),
     Binding("Picture", "Ctrl+wheel, Ctrl+drag", "Magnify the picture's pixels and move it"),
     Binding("Picture", "Z", "Fit the picture again", "fit_picture", K.z),
     Binding("Camera", "Left drag", "Orbit around the target"),

@@ -6,10 +6,8 @@ writes.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,11 +15,8 @@ import numpy as np
 from imgui_bundle import hello_imgui
 from numpy.typing import NDArray
 
-from pmviewer.errors import PmviewerError, SceneError, SettingError, WindowError
-from pmviewer.job import Job, check_output, overrides
+from pmviewer.errors import PmviewerError, SceneError, SettingError
 from pmviewer.output.png import write_png
-from pmviewer.render.camera import resolve_camera
-from pmviewer.settings.access import with_values
 
 if TYPE_CHECKING:
     from pmviewer.engine.frame import Frame
@@ -98,38 +93,3 @@ def _stored(frame: Frame | None) -> str:
             of = f" of {fate.arrived:,}" if fate is not None and fate.arrived != count else ""
             parts.append(f"{count:,}{of} {name} photons")
     return f" ({', '.join(parts)} in the last pass)" if parts else ""
-
-
-def shot_job(
-    job: Job,
-    output: Path,
-    passes: int | None,
-    size: str | None,
-    window: bool,
-    pixel: str | None,
-    captions: bool,
-    threads: int | None,
-) -> None:
-    """Take a picture of the window (`pmviewer.viewer.shot`). Raises PmviewerError; WindowError without a display."""
-    from pmviewer.scene.load import load_scene  # numba; the window itself comes up before
-    from pmviewer.viewer.app import ViewerApp
-    from pmviewer.viewer.start import start_viewer
-
-    check_output(output, (".png",))
-    settings = with_values(job.settings, overrides(passes, None, size, None, job.passes))
-    chosen = None
-    if pixel is not None:
-        match = re.fullmatch(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*", pixel)
-        if not match:
-            raise SettingError(f"--pixel {pixel} is not a pixel: write X,Y, for example 120,80.")
-        chosen = int(match[1]), int(match[2])
-    camera = resolve_camera(load_scene(job.scene, job.parameters, rig=settings.light.rig), settings.camera)
-    shot = Shot(output, chosen)
-    picture_size = None if window else (camera.width, camera.height)
-    make = partial(ViewerApp, remember=False, shot=shot, picture_size=picture_size, captions=captions)
-    start_viewer(make, job.scene, settings, threads, job.parameters)
-    if not shot.done:
-        raise shot.error or WindowError("The window was closed before the picture was taken.")
-    if shot.error is not None:
-        raise shot.error
-    print(f"wrote {output.absolute()}{shot.stored}")

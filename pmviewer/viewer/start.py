@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +13,7 @@ import glfw
 
 from pmviewer.errors import WindowError
 from pmviewer.settings.access import Settings
+from pmviewer.viewer.background import PATIENCE
 from pmviewer.viewer.session_link import SessionLike, SessionLink
 
 if TYPE_CHECKING:
@@ -77,15 +80,36 @@ def start_viewer(
     settings: Settings | None,
     threads: int | None,
     parameters: Mapping[str, str] | None,
+    *,
+    leave: bool = False,
 ) -> int:
-    """See `pmviewer.viewer.app.run_viewer`."""
+    """See `pmviewer.viewer.app.run_viewer`. With `leave` the process ends here when the window has closed while the
+    engine is busy: a kernel that is being compiled can't be interrupted, and there is nothing of it to keep."""
     check_screen()
     link = SessionLink(_make_session(threads, settings), settings)
     app = make_app(link, inactive_reason=_inactive_reason)
+    background = app.state.background
     app.state.open(source if source is not None else DEFAULT_SCENE, keep_camera=True, parameters=parameters)
-    app.params.callbacks.enqueue_post_init(link.connect)
+    app.params.callbacks.enqueue_post_init(lambda: link.connect(background))
     try:
         app.run()
-    finally:
+    except BaseException:
         link.close()
+        raise
+    for text in app.state.unread_errors():
+        print(f"pmviewer: {text}", file=sys.stderr)
+    if not leave:
+        link.close()
+    elif not _closed_soon(link) or background.running():
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)
     return 0
+
+
+def _closed_soon(link: SessionLink) -> bool:
+    """Close the session, and tell whether that was a matter of moments."""
+    closing = threading.Thread(target=link.close, name="pmviewer closing", daemon=True)
+    closing.start()
+    closing.join(PATIENCE)
+    return not closing.is_alive()

@@ -9,14 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pmviewer.engine.frame import Frame, Level, Message
 from pmviewer.errors import PmviewerError, SettingError
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose, resolve_camera
-from pmviewer.render.free_camera import frustum_lines, resolve_view
+from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.planes import AOVS, TERMS
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import (
@@ -29,28 +26,29 @@ from pmviewer.settings.access import (
     parse_assignments,
     with_values,
 )
+from pmviewer.viewer.background import Background
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.dialogs.recent import RecentFiles
 from pmviewer.viewer.importance_gain import GainRun
-from pmviewer.viewer.jobs import Jobs
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.viewport.controls import camera_values
 
 InactiveReason = Callable[[str, Settings, Any], str | None]
 LAYERS = ("beauty", *TERMS, *AOVS)
 LOG_LINES = 2000
-TOAST_SECONDS = 8.0
+TOAST_SECONDS = 12.0
+MOST_TOASTS = 2
 
 
 @dataclass
 class Toast:
-    """A message that floats over the picture until it is dismissed or, unless it is an error, grows old."""
+    """An error that floats over the picture until it is dismissed, or grows old; the log keeps it."""
 
     message: Message
     born: float = field(default_factory=time.monotonic)
 
     def is_over(self) -> bool:
-        return self.message.level != "error" and time.monotonic() - self.born > TOAST_SECONDS
+        return time.monotonic() - self.born > TOAST_SECONDS
 
 
 def _first_radius(frame: Frame, scene_radius: float) -> float | None:
@@ -68,6 +66,11 @@ def _first_radius(frame: Frame, scene_radius: float) -> float | None:
     return latest / shrunk / scene_radius
 
 
+def is_gone(scene: str | Path) -> bool:
+    """Whether that is a file which isn't there; bundled scenes have names."""
+    return Path(scene).is_absolute() and not Path(scene).exists()
+
+
 class ViewerState:
     """Lives as long as the window."""
 
@@ -75,11 +78,12 @@ class ViewerState:
         self.session = session
         self.inactive_reason = inactive_reason
         self.recent = recent
-        self.jobs = Jobs(self.say)
-        self.comparison = Comparison(session, self.jobs, self.say)
-        self.gain = GainRun(session, self.say)
+        self.background = Background(self.say)
+        self.comparison = Comparison(session, self.background, self.say)
+        self.gain = GainRun(session, self.background, self.say)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
+        self._toasts_of = session.scene
         self._said: deque[Message] = deque()
         """What any thread said since the last frame."""
         self.flying = False
@@ -93,6 +97,8 @@ class ViewerState:
         self.parameters: dict[str, str] = {}
         """Values for the open scene file's `<default>` names."""
         self._opening: tuple[str, dict[str, str]] | None = None
+        self.lost: tuple[str, str] | None = None
+        """A session file that was to be opened and the scene that it misses, until somebody asks where that is."""
 
     # settings ---------------------------------------------------------------------------------------------------
 
@@ -202,13 +208,6 @@ class ViewerState:
         except SettingError:
             return resolve_camera(scene, self.settings.camera.model_copy(update={"name": "auto"}))
 
-    def frustum(self) -> NDArray[np.float64] | None:
-        """Line ends (2n, 3) of the render camera's frustum while it is drawn."""
-        free, geometry, camera = self.settings.free_camera, self.session.geometry, self.render_camera()
-        if not (free.on and free.frustum) or geometry is None or camera is None:
-            return None
-        return frustum_lines(camera, free.length * float(geometry.radius))
-
     def shown_pair(self) -> tuple[tuple[Frame, Frame], Display] | None:
         """The frames with and without importance while the viewport compares them, with a view that both have."""
         frames = self.gain.frames()
@@ -231,10 +230,12 @@ class ViewerState:
         scene = self.session.scene
         if scene is self._scene:
             return False
-        self._scene = scene
+        before, self._scene = self._scene, scene
         if self._opening is not None:
             path, self.parameters = self._opening
             self.recent.add(path)
+            if before is not None and self.session.paused:
+                self.session.resume()  # it was the scene before that was to stand still
             self._opening = None
         frame = self.session.frame
         if frame is not None and scene is not None and frame.scene_name != scene.name:
@@ -252,8 +253,15 @@ class ViewerState:
 
     # files and messages -----------------------------------------------------------------------------------------
 
-    def open(self, path: str | Path, *, keep_camera: bool = False, parameters: Mapping[str, str] | None = None) -> None:
-        """Open a scene or a session file.
+    def open(
+        self,
+        path: str | Path,
+        *,
+        keep_camera: bool = False,
+        parameters: Mapping[str, str] | None = None,
+        scene: Path | None = None,
+    ) -> None:
+        """Open a scene or a session file, whose scene may lie elsewhere now (`scene`).
 
         Settings stay when it is a scene, but for the camera's: that was another scene's unless `keep_camera` says
         otherwise. `parameters` are values for the scene file's `<default>` names.
@@ -272,7 +280,11 @@ class ViewerState:
             except (PmviewerError, OSError) as error:
                 self.say("error", str(error))
                 return
-            source, settings, parameters = saved.scene, saved.settings, saved.parameters
+            source, settings, parameters = scene or saved.scene, saved.settings, saved.parameters
+            if is_gone(source):
+                self.say("error", f"{path}: its scene {source} is not there. Choose where it is now.")
+                self.lost = str(path), str(source)
+                return
         self._opening = str(path), dict(parameters or {})
         self.session.open(source, settings, parameters)
 
@@ -283,10 +295,20 @@ class ViewerState:
     def _take(self, message: Message) -> None:
         self.log.append(message)
         if message.level == "error":
-            self.toasts.append(Toast(message))
+            others = [toast for toast in self.toasts if toast.message.text != message.text]
+            self.toasts = [*others, Toast(message)][-MOST_TOASTS:]
+
+    def unread_errors(self) -> list[str]:
+        """What went wrong after the last window frame."""
+        messages = [*self.session.take_messages(), *self._said]
+        self._said.clear()
+        return [message.text for message in messages if message.level == "error"]
 
     def poll(self) -> None:
-        """Once per window frame: collect the messages."""
+        """Once per window frame: collect the messages. Errors of a scene that is gone float no longer."""
+        if self.session.scene is not self._toasts_of:
+            self._toasts_of = self.session.scene
+            self.toasts.clear()
         for message in self.session.take_messages():
             self._take(message)
         while self._said:
@@ -294,4 +316,4 @@ class ViewerState:
         parameters = self._opening[1] if self._opening is not None else self.parameters
         self.comparison.poll(self.frame, with_own=not parameters)
         self.gain.poll(self.live_camera())
-        self.toasts = [toast for toast in self.toasts if not toast.is_over()][-4:]
+        self.toasts = [toast for toast in self.toasts if not toast.is_over()]

@@ -22,10 +22,10 @@ from typing import Any
 
 import numpy as np
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.output.exr import read_exr, write_exr
 from pmviewer.settings.access import Settings, with_values
 
@@ -104,7 +104,7 @@ def _automatic_radius(path: Path) -> float:
     opened = open_scene(str(path), {})
     pool = WorkPool(1)
     settings = with_values(Settings(), {"render.method": "gather"})
-    radius = Renderer(opened, settings, pool, StageCache(0)).first_radius / opened.flat.radius
+    radius = Renderer(opened, settings, pool, StageStore(0)).first_radius / opened.flat.radius
     pool.close()
     return radius
 

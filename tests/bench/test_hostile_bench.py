@@ -8,7 +8,7 @@ from pmviewer.bench.hostile import bench
 from pmviewer.bench.hostile.bombs import BLOCK, zeros
 from pmviewer.bench.hostile.cases import case, honest
 from pmviewer.bench.hostile.judge import Finding, findings, internals
-from pmviewer.bench.hostile.special import specials
+from pmviewer.bench.hostile.specials import specials
 from pmviewer.errors import SettingError
 
 MORE = len(specials())

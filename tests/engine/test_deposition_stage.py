@@ -8,10 +8,10 @@ import sys
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.scene.arrays.flatten import LUMINANCE
 from tests.support.scenes import cornell_box, rendered, settings_of
 
@@ -55,10 +55,10 @@ def test_the_mean_over_passes_is_right(method):
 @pytest.mark.parametrize("changed", [{"caustic_radius": 0.3}, {"radius": 0.05}])
 def test_photons_kept_from_before_do_not_matter(changed):
     """The automatic constant density follows the radii of look-ups; photons stored for others are not taken."""
-    scene, pool, cache = open_scene(cornell_box(size=8)), WorkPool(1), StageCache(1 << 26)
+    scene, pool, cache = open_scene(cornell_box(size=8)), WorkPool(1), StageStore(1 << 26)
     made = []
     try:
-        for estimate, kept in ({}, cache), (changed, cache), (changed, StageCache(0)):
+        for estimate, kept in ({}, cache), (changed, cache), (changed, StageStore(0)):
             values = settings_of(
                 photons={"N": 20_000},
                 importance={"deposition": "constant density"},
@@ -100,7 +100,7 @@ for method in ("progressive", "gather", "global map"):
     pool.close()
     renderer = rendered(scene, settings, 2)
     statistics = renderer.frame(1).statistics
-    assert renderer.importance.latest is None and renderer.light.rules.deposition is None
+    assert renderer.importance.latest is None and renderer.light.latest.rules.deposition is None
     assert not statistics.deposited and not statistics.importons and not statistics.warnings
     assert not {"importance", "deposition"} & set(statistics.stage_seconds)
     assert not [row for row in photon_rows(statistics) if "onverged" in row[0]]

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.scene.description import Parallelogram, Scene
 from tests.support.scenes import MIRROR, box_walls, cornell_box, diffuse, panel, rendered, settings_of
 
@@ -68,7 +68,7 @@ def test_passes_are_the_same_whoever_asks(emission):
     scene = open_scene(cornell_box(size=SIZE))
     for more in ({}, {"deposition": "Keller-Wald"}, {"deposition": "density control"}):
         first = rendered(scene, settings(emission, **more), 2)
-        pool, cache = WorkPool(3), StageCache(1 << 28)
+        pool, cache = WorkPool(3), StageStore(1 << 28)
         try:
             for _ in range(2):
                 other = Renderer(scene, settings(emission, **more), pool, cache)
@@ -102,7 +102,7 @@ def test_paths_of_guided_photons():
     pool = WorkPool(2)
     try:
         scene = open_scene(cornell_box(size=SIZE))
-        renderer = Renderer(scene, settings("Christensen keep"), pool, StageCache(0))
+        renderer = Renderer(scene, settings("Christensen keep"), pool, StageStore(0))
         renderer.step()
         paths = renderer.inspect(Wanted(paths=50)).paths
     finally:

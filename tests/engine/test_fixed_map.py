@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from tests.support.scenes import diffuse_box, settings_of
 
 
 def renderer_of(pool, renew, cache_bytes, **groups):
     values = {"photons": {"N": 20_000, "renew": renew}, "render": {"method": "gather"}, "estimate": {"radius": 0.1}}
-    return Renderer(open_scene(diffuse_box(size=16)), settings_of(**(values | groups)), pool, StageCache(cache_bytes))
+    return Renderer(open_scene(diffuse_box(size=16)), settings_of(**(values | groups)), pool, StageStore(cache_bytes))
 
 
 @pytest.fixture

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import pmviewer.engine.stages.importance as importance_stage
-import pmviewer.engine.stages.light_stage as light_stage
-from pmviewer.engine.cache import StageCache
+import pmviewer.engine.stages.tracer as tracer
+from pmviewer.commands.job import load_job
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.errors import SettingError
-from pmviewer.job import load_job
 from pmviewer.output.session_file import read_session, write_session
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.free_camera import frustum_lines, plan_pose, resolve_view
@@ -47,7 +47,7 @@ def test_importance_photons_and_radii_are_the_render_cameras():
 
 
 def test_moving_it_traces_nothing(monkeypatch):
-    scene, pool, cache = open_scene(cornell_box(size=SIZE)), WorkPool(2), StageCache(1 << 28)
+    scene, pool, cache = open_scene(cornell_box(size=SIZE)), WorkPool(2), StageStore(1 << 28)
     try:
         for origin in ((0.0, 0.9, 0.9), (0.5, 0.5, 0.5), (0.0, 4.0, 0.1)):
             renderer = Renderer(scene, settings(on=True, origin=origin), pool, cache)
@@ -59,7 +59,7 @@ def test_moving_it_traces_nothing(monkeypatch):
                 raise AssertionError("traced again")
 
             monkeypatch.setattr(importance_stage, "trace", refused)
-            monkeypatch.setattr(light_stage, "trace_pass", refused)
+            monkeypatch.setattr(tracer, "trace_pass", refused)
         moved = settings(on=True).model_copy(update={"camera": settings_of(camera={"origin": (0, 0, 0.5)}).camera})
         with pytest.raises(AssertionError, match="traced again"):
             Renderer(scene, moved, pool, cache).step()

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.commands.gain_job import gain_job, table
+from pmviewer.commands.comparing import compare_job, table
+from pmviewer.commands.job import load_job
 from pmviewer.engine.comparison.importance_gain import LONGER, compare
 from pmviewer.engine.comparison.without_importance import plain, refusal
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import Cancelled, WorkPool
 from pmviewer.errors import OutputError, SettingError
-from pmviewer.job import load_job
 from pmviewer.output.frame_export import gain_sheet
 from pmviewer.output.metric import metrics
 from pmviewer.output.png import read_png
@@ -171,20 +171,20 @@ def test_command(tmp_path, capsys):
     """On a bundled scene: against its reference at its size, against a longer run at another."""
     values = ["importance.map=screen", "importance.deposition=Keller-Wald", "photons.N=2000", "importance.N=500"]
     job = load_job("cornell_diffuse", [*values, "camera.width=32", "camera.height=24"], [])
-    gain = gain_job(job, tmp_path / "a.png", passes=1, threads=2)
+    gain = compare_job(job, tmp_path / "a.png", passes=1, threads=2)
     assert gain.with_.passes == 1
     assert "another seed" in gain.truth
     printed = capsys.readouterr().out
     assert "photons stored" in printed
     assert read_png(tmp_path / "a.png")[0].shape[2] == 3
-    gain = gain_job(load_job("cornell_diffuse", values, []), None, passes=1, threads=2)
+    gain = compare_job(load_job("cornell_diffuse", values, []), None, passes=1, threads=2)
     assert gain.truth == "the reference cornell_diffuse/reference.exr"
     with pytest.raises(OutputError, match="unknown format"):
-        gain_job(job, tmp_path / "a.exr")
+        compare_job(job, tmp_path / "a.exr")
     with pytest.raises(OutputError, match="does not exist"):
-        gain_job(job, tmp_path / "no" / "a.png")
+        compare_job(job, tmp_path / "no" / "a.png")
     with pytest.raises(SettingError, match=r"compare\.equal"):
-        gain_job(job, None, equal="time")
+        compare_job(job, None, equal="time")
     assert with_values(Settings(), {"compare.equal": "error"}).compare.equal == "error"
 
 

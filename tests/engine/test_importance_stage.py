@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.maps.record import unpack
 from pmviewer.scene.description import Scene
 from tests.support.scenes import MIRROR, box_walls, cornell_box, diffuse, panel, rendered, settings_of
@@ -51,7 +51,7 @@ def test_passes_depend_on_their_number_alone(pool):
     one = rendered(scene, settings(), 1)
     four, six = rendered(scene, settings(), 4), rendered(scene, settings(), 6, threads=3)
     assert [r.importance.latest.traced for r in (one, four, six)] == [1500, 6000, 6000]
-    other = Renderer(scene, settings(), pool, StageCache(1 << 28))
+    other = Renderer(scene, settings(), pool, StageStore(1 << 28))
     other.coarse_frame(1)
     assert other.importance.latest is None
     for _ in range(4):
@@ -92,7 +92,7 @@ def test_cloud_and_statistics():
 
 @pytest.mark.parametrize("name", ["caustic", "global"])
 def test_views(name, pool):
-    renderer = Renderer(open_scene(cornell_box(size=SIZE)), settings(M_r=3.0, caustic_M_r=50.0), pool, StageCache(0))
+    renderer = Renderer(open_scene(cornell_box(size=SIZE)), settings(M_r=3.0, caustic_M_r=50.0), pool, StageStore(0))
     renderer.step()
     planes = renderer.inspect(Wanted("importance", name)).planes
     gamma, density = planes["importance"], planes["required density"]

@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.method import ALL, MANY_LIGHTS, plan_of
 from pmviewer.engine.pool import Cancelled, WorkPool
 from pmviewer.engine.radius import first_radius, pass_radius, typical_distance
+from pmviewer.engine.store import StageStore
 from pmviewer.errors import SettingError
 from pmviewer.maps.record import CAUSTIC, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.render.camera import CameraPose, resolve_camera
@@ -72,7 +72,7 @@ def test_pool_cancels_what_has_not_started(pool):
 
 
 def test_cache_forgets_what_was_unused_for_longest():
-    cache = StageCache(budget=100)
+    cache = StageStore(budget=100)
     made = []
 
     def get(key, size=30):

@@ -11,7 +11,7 @@ import pytest
 
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.session import Session
-from pmviewer.engine.stages import light_stage
+from pmviewer.engine.stages import tracer
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import Settings, with_values
 from tests.support.scenes import cornell_box, diffuse_box, rendered, settings_of
@@ -139,8 +139,8 @@ def test_a_slider_that_keeps_moving_shows_frames(session):
 
 def count_light_passes(monkeypatch):
     calls = []
-    trace = light_stage.trace_pass
-    monkeypatch.setattr(light_stage, "trace_pass", lambda *a, **k: calls.append(a) or trace(*a, **k))
+    trace = tracer.trace_pass
+    monkeypatch.setattr(tracer, "trace_pass", lambda *a, **k: calls.append(a) or trace(*a, **k))
     return calls
 
 
@@ -279,7 +279,7 @@ def test_a_scene_that_fails_to_open_keeps_the_old_one(session):
     session.wait(passes=1, timeout=PATIENCE)
     session.take_messages()
     session.open("no/such/scene.xml")
-    until(lambda: session._loading_done == 2)
+    until(lambda: session._loader.done == 2)
     assert len(found := errors(session)) == 1
     assert "no/such/scene.xml" in found[0]
     passes = session.frame.statistics.passes

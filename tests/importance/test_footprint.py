@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from pmviewer.importance.importons import IMPORTON_COLUMNS, IMPORTON_PASS_DTYPE, N_COUNTS, SEED
+from pmviewer.importance.importons import IMPORTON_COLUMNS, IMPORTON_PASS_DTYPE, N_COUNTS
 from pmviewer.importance.trace import trace_importons
+from pmviewer.kernels.dimensions import IMPORTON_SALT
 from pmviewer.scene.description import Camera, Cylinder, Group, Instance, Mesh, Scene, Shape, Sphere
 from tests.importance.paths import GATHER, SHOWN, traced
 from tests.support.scenes import GLASS, MIRROR, box_walls, diffuse, diffuse_box
@@ -38,7 +39,8 @@ def rows_of(opened, eye, rule, i, dx=0.0, dy=0.0):
         moved[f"{axis}_corner"] += np.float32(dx) * eye[f"{axis}_right"] + np.float32(dy) * eye[f"{axis}_down"]
     whole = 0, 0, eye["width"][0], eye["height"][0]
     record = np.zeros(1, IMPORTON_PASS_DTYPE)
-    record[0] = (1 ^ SEED, rule.max_depth, 0.2, rule.caustic, rule.global_, rule.gather, False, 0.0, False, *whole)
+    stored = rule.caustic, rule.global_, rule.gather
+    record[0] = (1 ^ IMPORTON_SALT, rule.max_depth, 0.2, *stored, False, 0.0, False, *whole)
     out = np.zeros((2, 80, IMPORTON_COLUMNS), np.float32)
     counts = np.zeros(N_COUNTS, np.int64)
     trace_importons(opened.flat.record, moved, record, i, i + 1, out[0], out[1], counts)

@@ -10,11 +10,11 @@ from scipy import stats
 
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.dimensions import EMITTER
 from pmviewer.kernels.lights.light import emit_photon, emitted, light_pdf, sample_light
 from pmviewer.kernels.random import INDEPENDENT, SOBOL, draw1, draw4
 from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.surface import surface_at
-from pmviewer.photons.light_pass.trace import LIGHT_CHOICE_SET
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from tests.support.scenes import LIGHTS, light_scene
 
@@ -29,7 +29,7 @@ def _emit_many(scenes, sequence, seed, position, direction, beta, light):
     for i in range(len(position)):
         index = np.uint32(i)
         u0, u1, u2, u3 = draw4(sequence, seed, index, 0)
-        u_pick = draw1(sequence, seed, index, LIGHT_CHOICE_SET)
+        u_pick = draw1(sequence, seed, index, EMITTER)
         position[i], direction[i], beta[i], light[i] = emit_photon(scenes[0], u_pick, (u2, u3), (u0, u1))
 
 

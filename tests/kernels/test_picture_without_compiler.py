@@ -33,7 +33,7 @@ SCENE = """<scene version="3.0.0">
 PROGRAM = """
 import sys
 import numpy as np
-from pmviewer.engine.cache import StageCache
+from pmviewer.engine.store import StageStore
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
@@ -43,7 +43,7 @@ path, out, *pairs = sys.argv[1:]
 values = {"camera.width": 10, "camera.height": 10, "photons.N": 200, "estimate.radius": 0.1, "gather.rays": 2,
           "render.max_depth": 3, "photons.max_bounces": 3, **dict(pair.split("=") for pair in pairs)}
 pool = WorkPool(1)
-renderer = Renderer(open_scene(path), with_values(Settings(), values), pool, StageCache(0))
+renderer = Renderer(open_scene(path), with_values(Settings(), values), pool, StageStore(0))
 renderer.step()
 np.save(out, renderer.film.planes())
 pool.close()

@@ -11,12 +11,12 @@ from scipy import stats
 
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.dimensions import EMITTER
 from pmviewer.kernels.lights.light import emit_photon, emitted, light_pdf, light_point, sample_light
 from pmviewer.kernels.lights.textured_light import area_density, radiance_from, spread
 from pmviewer.kernels.random import INDEPENDENT, draw1, draw4
 from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.surface import surface_at
-from pmviewer.photons.light_pass.trace import LIGHT_CHOICE_SET
 from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.arrays.texture_coordinates import rectangle_of, square_uv
 from pmviewer.scene.description import LUMINANCE, Cylinder, Disk, Mesh, Parallelogram, Shape, Sphere
@@ -58,7 +58,7 @@ def _spread_many(scenes, u, v, out, density, again, radiance):
 def _emit_many(scenes, seed, position, direction, beta):
     for i in range(len(position)):
         u0, u1, u2, u3 = draw4(INDEPENDENT, seed, np.uint32(i), 0)
-        pick = draw1(INDEPENDENT, seed, np.uint32(i), LIGHT_CHOICE_SET)
+        pick = draw1(INDEPENDENT, seed, np.uint32(i), EMITTER)
         position[i], direction[i], beta[i], _ = emit_photon(scenes[0], pick, (u2, u3), (u0, u1))
 
 

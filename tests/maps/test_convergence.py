@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.maps.convergence import (
     CONVERGED,
     DENSE,
@@ -127,7 +127,7 @@ def test_a_pass_goes_on_while_more_is_needed(box):
 def test_view(box):
     pool = WorkPool(2)
     try:
-        renderer = Renderer(box, settings("square", 20_000, 1.0, density=1.5e4), pool, StageCache(0))
+        renderer = Renderer(box, settings("square", 20_000, 1.0, density=1.5e4), pool, StageStore(0))
         renderer.step()
         plane = renderer.inspect(Wanted("convergence")).planes["caustic convergence"]
     finally:

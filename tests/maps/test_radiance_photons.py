@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.photon_words import encode_direction
 from pmviewer.maps.radiance import (
@@ -225,7 +225,7 @@ def test_caches_change_nothing():
     """Radiance photons that rays of another camera have computed are those that rays of this one would compute."""
     opened = open_scene(cornell_box())
     values = {"render": {"method": "gather"}, "photons": {"N": 20_000}, "gather": {"radiance_photons": "all"}}
-    pool, cache, films = WorkPool(1), StageCache(), []
+    pool, cache, films = WorkPool(1), StageStore(), []
     for camera in ({"fov": 50.0}, {}):
         renderer = Renderer(opened, settings_of(**values, camera=camera), pool, cache)
         for _ in range(3):

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.importance.lights import importance_of_lights
 from pmviewer.maps.record import unpack
 from pmviewer.photons.deposition.deposited import DISCARDED, REDISTRIBUTED, REJECTED, STORED
@@ -19,8 +19,8 @@ from pmviewer.photons.deposition.fates import FATE_BITS
 from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Scene
 from pmviewer.scene.light_places import light_places
-from pmviewer.viewer.gl.lines import light_points
-from pmviewer.viewer.overlays.overlays import fate_counts, light_mask
+from pmviewer.viewer.overlays.fates import Fates, fate_counts
+from pmviewer.viewer.overlays.light_importance import light_points
 from pmviewer.viewer.panels.light_list import light_rows, top_lights
 from tests.support.scenes import box_camera, box_walls, cornell_box, diffuse, light_scene, panel, settings_of
 
@@ -51,7 +51,7 @@ def scene():
 def stepped(scene, pool, method="progressive", passes=1, N=20_000, **importance):
     how = {"map": "screen", "N": 1500, "neighbours": 20, **importance}
     settings = settings_of(render={"method": method}, photons={"N": N, "q": 0.5}, importance=how)
-    renderer = Renderer(scene, settings, pool, StageCache(0))
+    renderer = Renderer(scene, settings, pool, StageStore(0))
     for _ in range(passes):
         renderer.step()
     return renderer
@@ -62,7 +62,7 @@ def test_fates_are_those_of_the_pass_and_add_up(scene, pool, rule):
     """The second pass, so that its own photons and rules are meant: counts as in the statistics, stored ones where the
     map has them."""
     renderer = stepped(scene, pool, passes=2, **RULES[rule])
-    assert (renderer.light.emission is not None) == (rule in ("guided", "Christensen"))
+    assert (renderer.light.latest.lights is not None) == (rule in ("guided", "Christensen"))
     rows = renderer.inspect(Wanted(fates=1_000_000)).fates
     found = unpack(rows, 1.0)
     fates, maps = found["light"] & 7, found["light"] >> FATE_BITS
@@ -108,7 +108,7 @@ def test_nothing_is_judged_again_unless_asked_for(scene, pool):
 )
 def test_choice_of_what_is_drawn(map_, only, drawn):
     style = settings_of(**{"overlays.fates": {"map": map_, "only": only}}).overlays.fates
-    assert {number for number in range(32) if light_mask(style) >> number & 1} == drawn
+    assert {number for number in range(32) if Fates.tags(style) >> number & 1} == drawn
 
 
 # --- lights -----------------------------------------------------------------------------------------------------------
@@ -138,7 +138,7 @@ def test_the_light_in_the_other_room_lights_nothing(pool, method):
     assert light_rows(lights, 5) == [("1: panel", "100.0%"), ("1 others", "0.0%")]
     frame = renderer.frame(1, Wanted(lights=True))
     assert frame.known_lights.names == lights.names
-    points = unpack(light_points(lights, frame.light_places).photons, 1.0)
+    points = unpack(light_points(lights, frame.light_places), 1.0)
     np.testing.assert_allclose(points["position"], [[0, 0.9, 0], [5, 0.9, 0]], atol=1e-6)
     np.testing.assert_allclose(points["Phi"][:, :2], [[1, 1], [0, 1]], rtol=1e-3)
 

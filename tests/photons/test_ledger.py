@@ -45,7 +45,7 @@ def trace(flat, scene, seed, N=8000, projection=None, **settings):
 
 
 def shares(scene, N=8000, projected=False, **settings):
-    """Means and standard errors (5,) of the entries relative to the lights' power, over independent seeds; the books
+    """Means and standard errors (5,) of the entries relative to the lights' power, over independent seeds; the ledgers
     of each pass balance to rounding."""
     flat = flatten(scene)
     projection = projection_of(flat) if projected else None

@@ -10,7 +10,7 @@ from pmviewer.maps.record import BOUNCES, unpack
 from pmviewer.photons.light_pass.light_pass import trace_pass
 from pmviewer.photons.light_pass.paths import MOST_VERTICES, empty_paths
 from pmviewer.settings.access import Settings
-from pmviewer.viewer.gl.lines import flights
+from pmviewer.viewer.overlays.photon_paths import flights
 from tests.support.scenes import cornell_box, light_scene
 
 N, M = 3000, 200

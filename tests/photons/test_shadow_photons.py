@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.record import unpack
 from pmviewer.maps.shadow import LIT, SHADOW, SHADOW_FLAGS, UNKNOWN, build_shadows, shadow_record, visibility
@@ -114,7 +114,7 @@ def picture(source, values, passes=2):
     try:
         opened = open_scene(source)
         small = {"camera.width": 48, "camera.height": 48, "photons.N": 1000}
-        renderer = Renderer(opened, with_values(Settings(), small | values), pool, StageCache(0))
+        renderer = Renderer(opened, with_values(Settings(), small | values), pool, StageStore(0))
         for _ in range(passes):
             renderer.step()
         return renderer, renderer.frame(0)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from pmviewer.bench.measures.error import reference
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.output.metric import loglog_slope, metrics, z_test
 from pmviewer.settings.access import Settings, with_values
 
@@ -26,7 +26,7 @@ def pool():
 
 def renderer_of(scene: str, pool: WorkPool, **settings: object) -> Renderer:
     values = {name.replace("__", "."): value for name, value in settings.items()}
-    return Renderer(open_scene(scene), with_values(Settings(), values), pool, StageCache(0))
+    return Renderer(open_scene(scene), with_values(Settings(), values), pool, StageStore(0))
 
 
 @pytest.mark.parametrize("method", ["progressive", "gather"])
@@ -77,7 +77,7 @@ def test_path_tracer_agrees_with_the_reference(scene, block, pool):
     images = []
     for seed in range(1, 25):
         settings = with_values(Settings(), {"render.method": "path", "render.seed": seed})
-        renderer = Renderer(opened, settings, pool, StageCache(0))
+        renderer = Renderer(opened, settings, pool, StageStore(0))
         for _ in range(8):
             renderer.step()
         images.append(renderer.frame(0).image().astype(float))

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from pmviewer.bench.measures.error import reference
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.output.metric import loglog_slope, metrics
 from pmviewer.scene.description import Camera, Parallelogram, PointLight, Scene, Shape
 from pmviewer.settings.access import Settings, with_values
@@ -60,7 +60,7 @@ NEAREST = {"lookup": "nearest", "k": 100, "max_radius": 2.0}
 def floor_errors(pool, **estimate):
     values = {f"estimate.{name}": value for name, value in estimate.items()}
     values |= {"render.method": "global map", "photons.N": 2000}
-    renderer = Renderer(open_scene(floor_under_a_lamp()), with_values(Settings(), values), pool, StageCache(0))
+    renderer = Renderer(open_scene(floor_under_a_lamp()), with_values(Settings(), values), pool, StageStore(0))
     truth = np.repeat(radiance_of_floor(0.9)[..., None], 3, axis=2)
     found = errors(renderer, truth, PASSES)
     slope = loglog_slope(PASSES, [m.relmse_all for m in found])
@@ -107,7 +107,7 @@ def test_in_the_box_as_look_ups_of_their_size_do(pool):
     relmse = {}
     for lookup, size in (("nearest", {"estimate.k": 20}), ("radius", {"estimate.radius": 0.053})):
         values = {"render.method": "progressive", "photons.N": 20_000, "estimate.lookup": lookup} | size
-        renderer = Renderer(open_scene("cornell_diffuse"), with_values(Settings(), values), pool, StageCache(0))
+        renderer = Renderer(open_scene("cornell_diffuse"), with_values(Settings(), values), pool, StageStore(0))
         found = errors(renderer, target, (16, 64))
         relmse[lookup] = [m.relmse_all for m in found]
         print(lookup, relmse[lookup], found[-1].mean_ratio)

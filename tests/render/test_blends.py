@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.scene.description import Material, PointLight, Principled, Scene, Shape, Sphere
 from pmviewer.scene.texture import Bitmap, Checkerboard
 from tests.support.scenes import GLASS, MIRROR, box_camera, box_walls, diffuse, panel, rendered, settings_of
@@ -37,7 +37,7 @@ def box(floor, ball=None, light=None, size=16):
 def pass_means(scene, passes, settings):
     """(passes, terms) means of the picture's terms, pass by pass."""
     pool = WorkPool(2)
-    renderer = Renderer(open_scene(scene), settings, pool, StageCache(0))
+    renderer = Renderer(open_scene(scene), settings, pool, StageStore(0))
     totals = []
     for _ in range(passes):
         renderer.step()

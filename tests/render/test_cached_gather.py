@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
-from pmviewer.engine.stages.cache_stage import lattices, recipe
+from pmviewer.engine.stages.irradiance_cache import lattices, recipe
+from pmviewer.engine.store import StageStore
 from pmviewer.maps.record import unpack
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.analysis import analyse
@@ -57,7 +57,7 @@ def test_threads_do_not_change_the_picture():
 
 def test_neither_coarse_frames_nor_other_cameras_change_the_picture():
     """A session's history: another camera, a coarse frame, then this one, all on one stage cache."""
-    opened, pool, stages = open_scene(cornell_box()), WorkPool(2), StageCache()
+    opened, pool, stages = open_scene(cornell_box()), WorkPool(2), StageStore()
     settings = settings_of(render={"method": "gather"}, photons={"N": 20_000}, gather=ON)
     moved = settings_of(
         render={"method": "gather"}, photons={"N": 20_000}, gather=ON, camera={"origin": (0.2, 0.1, 0.9)}
@@ -76,7 +76,7 @@ def test_neither_coarse_frames_nor_other_cameras_change_the_picture():
 def test_a_coarse_frame_has_few_records():
     opened, pool = open_scene(diffuse_box(size=256)), WorkPool(2)
     settings = settings_of(render={"method": "gather"}, photons={"N": 20_000}, gather=ON)
-    frame = Renderer(opened, settings, pool, StageCache(0)).coarse_frame(1)
+    frame = Renderer(opened, settings, pool, StageStore(0)).coarse_frame(1)
     pool.close()
     assert 0 < frame.statistics.cache_records < 0.25 * frame.planes.shape[0] * frame.planes.shape[1]
 
@@ -102,7 +102,7 @@ def test_statistics_and_cloud():
     assert (inwards > 0).mean() > 0.9
     assert named["Phi"].min() >= 0
     assert named["Phi"].max() > 0
-    assert statistics.map_bytes > renderer._cache.bytes > 128 * statistics.cache_records
+    assert statistics.map_bytes > renderer.latest.cache.bytes > 128 * statistics.cache_records
 
 
 def test_the_candidates_of_all_rounds_are_a_lattice():

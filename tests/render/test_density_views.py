@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.importance.rules import probability_of
 from pmviewer.maps.record import unpack
 from pmviewer.output.diagnostic_views import coloured, view_scale
@@ -42,7 +42,7 @@ def stepped(scene, pool, passes=1, method="global map", N=40_000, **importance):
     settings = settings_of(
         render={"method": method}, photons={"N": N}, importance={"N": 4000, **importance}, estimate={"radius": 0.1}
     )
-    renderer = Renderer(scene, settings, pool, StageCache(0))
+    renderer = Renderer(scene, settings, pool, StageStore(0))
     for _ in range(passes):
         renderer.step()
     return renderer
@@ -112,7 +112,7 @@ def test_required_density_is_the_rules(box, pool):
     np.testing.assert_allclose(share, third.settings.importance.M_r * growth, rtol=1e-4)
     p, n = hits(third.camera)
     some = np.flatnonzero(~np.isnan(p[:, 0]))[::9]
-    rule = third.light.rules.required["global"](p[some].astype(np.float32), encode_normals(n[some]))
+    rule = third.light.latest.rules.required["global"](p[some].astype(np.float32), encode_normals(n[some]))
     shown = planes["required density"].reshape(-1)[some]
     assert np.isclose(rule, shown, rtol=1e-3).mean() > 0.9, (
         "rays and formulas differ by rounding, at an importon's edge"
@@ -124,7 +124,7 @@ def test_probability_is_that_of_the_rule(box, pool, cut_off):
     how = {"map": "average", "neighbours": 20, "f": 0.4, "epsilon": 0.3, "cut_off": cut_off}
     renderer = stepped(box, pool, deposition="Keller-Wald", **how)
     shown = renderer.inspect(Wanted("storing", "global")).planes["storing probability"].reshape(-1)
-    rule = renderer.light.rules.deposition.global_
+    rule = renderer.light.latest.rules.deposition.global_
     p, n = hits(renderer.camera)
     some = ~np.isnan(p[:, 0])
     asked = rule.probability(p[some].astype(np.float32), encode_normals(n[some]))

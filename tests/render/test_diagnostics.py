@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.maps.record import decode_directions, unpack
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.settings.access import Settings, with_values
@@ -34,7 +34,7 @@ def box():
 
 def stepped(box, pool, values, passes=2):
     settings = with_values(settings_of(photons={"N": 3000}, estimate={"radius": 0.1}), values)
-    renderer = Renderer(box, settings, pool, StageCache(0))
+    renderer = Renderer(box, settings, pool, StageStore(0))
     for _ in range(passes):
         renderer.step()
     return renderer
@@ -122,7 +122,7 @@ def test_radiance_photons_are_the_nearest_and_nothing_is_filled_in(box, pool):
     np.testing.assert_array_equal(frame.clouds["radiance"].photons, before.clouds["radiance"].photons)
     cells = frame.image("radiance cells").reshape(-1)
     irradiance = frame.image("radiance photons").reshape(-1, 3)
-    sites = renderer.light.sites.grid.photons
+    sites = renderer.latest.maps.radiance.grid.photons
     normals = decode_directions(sites.view(np.uint32)[:, 3])
     found = {}
     for pixel, (p, n) in enumerate(zip(*hits(frame.camera), strict=True)):
@@ -131,7 +131,7 @@ def test_radiance_photons_are_the_nearest_and_nothing_is_filled_in(box, pool):
         similar = (normals @ n >= 0.9) & (np.abs((sites[:, :3] - p) @ n) < 0.01)
         distance = np.where(similar, np.linalg.norm(sites[:, :3] - p, axis=1), np.inf)
         nearest = int(distance.argmin())
-        assert (cells[pixel] % 1 == 0) == (distance[nearest] < renderer._last[0][0]["site_radius"])
+        assert (cells[pixel] % 1 == 0) == (distance[nearest] < renderer.latest.given.eye[0]["site_radius"])
         assert found.setdefault(int(cells[pixel]), nearest) == nearest, "one cell, one radiance photon"
         assert np.all(irradiance[pixel] >= 0)
     assert len(set(found.values())) == len(found) > 50

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.settings.access import Settings, with_values
 
 SMALL = {"camera.width": 32, "camera.height": 32, "estimate.alpha": 1.0}
@@ -21,7 +21,7 @@ def opened():
 @pytest.fixture(scope="module")
 def rendered(opened):
     pool, made = WorkPool(), {}
-    cache = StageCache(1 << 28)
+    cache = StageStore(1 << 28)
 
     def indirect(passes, N, **values):
         key = (passes, N, *sorted(values.items()))

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.settings.access import Settings, with_values
 
 HEAD = """<scene version="3.0.0"><sensor type="perspective"><float name="fov" value="{fov}"/><transform name="to_world">
@@ -45,7 +45,7 @@ def means(source: str, method: str, passes: int, **values) -> np.ndarray:
     opened = open_scene(source, {})
     values = {"render.method": method, "photons.N": 40_000, **values}
     pool = WorkPool(1)
-    renderer = Renderer(opened, with_values(Settings(), values), pool, StageCache(0))
+    renderer = Renderer(opened, with_values(Settings(), values), pool, StageStore(0))
     totals = []
     for _ in range(passes):
         renderer.step()
@@ -128,7 +128,7 @@ def test_caustics_of_a_point_light_on_rough_glass(tmp_path, height):
 def test_the_path_tracer_says_what_it_can_not_find(tmp_path):
     source = scene(tmp_path, FLOOR.format(bsdf=METAL.format(alpha=0.15)), MIRROR_BALL, POINT)
     pool = WorkPool(1)
-    renderer = Renderer(open_scene(source, {}), with_values(Settings(), {"render.method": "path"}), pool, StageCache(0))
+    renderer = Renderer(open_scene(source, {}), with_values(Settings(), {"render.method": "path"}), pool, StageStore(0))
     renderer.step()
     assert any("path tracer finds no light" in w for w in renderer.frame(0).statistics.warnings)
     pool.close()

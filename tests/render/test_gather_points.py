@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from tests.support.scenes import cornell_box, diffuse_box, settings_of
 
 CASES = {
@@ -26,7 +26,7 @@ def test_points_add_up_to_the_pixel(case):
     pool = WorkPool(1)
     scene = open_scene(cornell_box(size=16))
     settings = settings_of(render={"method": "gather"}, photons={"N": 20_000}, gather={"rays": 6, **CASES[case]})
-    renderer = Renderer(scene, settings, pool, StageCache(0))
+    renderer = Renderer(scene, settings, pool, StageStore(0))
     assert renderer.gather_points(3, 3).shape == (0, 10)
     renderer.step()
     frame = renderer.frame(1)
@@ -52,7 +52,7 @@ def test_points_lie_on_the_walls():
     pool = WorkPool(1)
     scene = open_scene(diffuse_box(size=16))
     settings = settings_of(render={"method": "gather"}, photons={"N": 20_000}, gather={"rays": 16})
-    renderer = Renderer(scene, settings, pool, StageCache(0))
+    renderer = Renderer(scene, settings, pool, StageStore(0))
     renderer.step()
     points = renderer.gather_points(8, 8)
     pool.close()
@@ -65,7 +65,7 @@ def test_points_lie_on_the_walls():
 
 def test_other_methods_have_none():
     pool = WorkPool(1)
-    renderer = Renderer(open_scene(diffuse_box(size=16)), settings_of(photons={"N": 1000}), pool, StageCache(0))
+    renderer = Renderer(open_scene(diffuse_box(size=16)), settings_of(photons={"N": 1000}), pool, StageStore(0))
     renderer.step()
     pool.close()
     assert renderer.gather_points(8, 8).shape == (0, 10)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.errors import SceneError
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.memory import stack_i4
@@ -79,7 +79,7 @@ def direct_light(opened, method, seeds=SEEDS, **direct):
     pool = WorkPool(1)
     for seed in range(1, seeds + 1):
         groups = {"render": {"method": method, "seed": seed}, "photons": {"N": 1500}, "direct": direct}
-        renderer = Renderer(opened, settings_of(**groups), pool, StageCache(0))
+        renderer = Renderer(opened, settings_of(**groups), pool, StageStore(0))
         renderer.step()
         renderer.step()
         assert renderer.tally.dropped == {"photons": 0, "samples": 0}
@@ -136,7 +136,7 @@ def test_many_lights_are_chosen_by_photons_and_one_is_not(rooms):
 
 def test_threads_and_caches_change_nothing(rooms):
     settings = settings_of(photons={"N": 20_000}, direct={"choice": "Keller-Wald"})
-    pool, cache, films = WorkPool(2), StageCache(), []
+    pool, cache, films = WorkPool(2), StageStore(), []
     for _ in range(2):
         renderer = Renderer(rooms, settings, pool, cache)
         for _ in range(6):

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from tests.support.scenes import settings_of
 
 FOLDER = Path(__file__).parents[1] / "scene" / "mitsuba_conventions"
@@ -38,7 +38,7 @@ def block_runs(name, method, passes):
     try:
         for seed in range(1, RUNS + 1):
             values = {"render": {"method": method, "seed": seed}, "estimate": {"radius": RADIUS}}
-            renderer = Renderer(opened, settings_of(**values), pool, StageCache(0))
+            renderer = Renderer(opened, settings_of(**values), pool, StageStore(0))
             for _ in range(passes):
                 renderer.step()
             image = renderer.frame(0).image().astype(np.float64)

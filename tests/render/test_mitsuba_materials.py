@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.scene.description import (
     Camera,
     ConstantEnvironment,
@@ -79,7 +79,7 @@ def channel_runs(row, method, passes):
     """(passes, 3) means of the picture's channels, pass by pass."""
     values = {"render": {"method": method, "max_depth": 32}, "photons": {"N": 40_000}, "estimate": {"radius": 0.01}}
     pool = WorkPool(2)
-    renderer = Renderer(open_scene(scene_of(row)), settings_of(**values), pool, StageCache(0))
+    renderer = Renderer(open_scene(scene_of(row)), settings_of(**values), pool, StageStore(0))
     totals = []
     for _ in range(passes):
         renderer.step()

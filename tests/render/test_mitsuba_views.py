@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from tests.render.mitsuba_views.scenes import VIEWS, description
 from tests.support.scenes import settings_of
 
@@ -31,7 +31,7 @@ def block_runs(name, method, passes):
     try:
         for seed in range(1, RUNS + 1):
             values = {"render": {"method": method, "seed": seed}, "estimate": {"radius": 0.01}}
-            renderer = Renderer(opened, settings_of(photons={"N": 30_000}, **values), pool, StageCache(0))
+            renderer = Renderer(opened, settings_of(photons={"N": 30_000}, **values), pool, StageStore(0))
             for _ in range(passes):
                 renderer.step()
             image = renderer.frame(0).image().astype(np.float64)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.render.pixel_radius import COUNTED, FOUND, OF_CAUSTIC, OF_GLOBAL, RADIUS, first_radii, shrink
 from pmviewer.settings.access import Settings, with_values
 
@@ -29,7 +29,7 @@ def pool():
 
 
 def stepped(opened, pool, values, passes=3):
-    renderer = Renderer(opened, with_values(Settings(), SMALL | values), pool, StageCache(0))
+    renderer = Renderer(opened, with_values(Settings(), SMALL | values), pool, StageStore(0))
     for _ in range(passes):
         renderer.step()
     return renderer
@@ -101,7 +101,7 @@ def test_a_wide_radius_is_not_cut_off(opened, pool):
     widest = renderer.film.radii[:, RADIUS + OF_GLOBAL].max()
     assert widest == pytest.approx(first, rel=1e-6)
     assert renderer.tally.radius["global"] < 0.9 * first
-    structure = renderer.light._keep[0][1][0]
+    structure = renderer.latest.maps.global_.structure
     assert structure.radius >= widest
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.scene.description import Material, Mesh, Scene, Shape, Sphere
 from tests.support.scenes import GLASS, MIRROR, box_camera, box_walls, diffuse, panel, rendered, settings_of
 
@@ -48,7 +48,7 @@ def pass_means(scene, method, passes, **groups):
     """(passes,) mean of the image, pass by pass."""
     values = {"render": {"method": method}, "photons": {"N": 60_000}, "estimate": {"radius": 0.02}} | groups
     pool = WorkPool(2)
-    renderer = Renderer(open_scene(scene), settings_of(**values), pool, StageCache(0))
+    renderer = Renderer(open_scene(scene), settings_of(**values), pool, StageStore(0))
     totals = []
     for _ in range(passes):
         renderer.step()

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.scene.description import Sphere
 from tests.support.scenes import cornell_box, rendered, settings_of
 
@@ -40,7 +40,7 @@ def test_caches_change_nothing():
     """The film is the same whether photons and maps were made for it or for another camera before."""
     opened = open_scene(cornell_box())
     pool = WorkPool(1)
-    cache = StageCache()
+    cache = StageStore()
     films = []
     for camera in ({"fov": 50.0}, {}, {}):
         renderer = Renderer(opened, settings_for("progressive", camera=camera), pool, cache)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.render.planes import TERMS
 from pmviewer.scene.description import Camera, Parallelogram, Scene, Shape
 from tests.support.scenes import cornell_box, diffuse, panel, rendered, settings_of
@@ -20,7 +20,7 @@ def pass_means(method, passes=24, **groups):
     opened = open_scene(cornell_box(size=32, light=0.75))
     totals = []
     pool = WorkPool(1)
-    renderer = Renderer(opened, settings_of(**values), pool, StageCache(0))
+    renderer = Renderer(opened, settings_of(**values), pool, StageStore(0))
     for _ in range(passes):
         renderer.step()
         totals.append(renderer.film.sums[:, :15].reshape(-1, 5, 3).mean(axis=(0, 2)))

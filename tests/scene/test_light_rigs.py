@@ -49,6 +49,32 @@ def test_what_stands_on_its_own_ground_gets_no_floor():
     assert names(completed(scene_of(ball(), ground)))[2:] == ["light above"]
 
 
+def test_the_bottom_of_a_thing_is_no_ground():
+    """Of a crate, of one that stands askew, of a tray with thick walls; a board on which things stand is one."""
+    crate, board = transformed(primitives.cube(), translation(0, 1, 0)), transformed(walls(), scaling(3, 0.01, 3))
+    tray = [
+        transformed(primitives.cube(), translation(x, 0, z) @ scaling(*size))
+        for x, z, size in ((0, 0, (1, 0.05, 1)), (0.9, 0, (0.1, 0.4, 1)), (-0.9, 0, (0.1, 0.4, 1)),
+                           (0, 0.9, (1, 0.4, 0.1)), (0, -0.9, (1, 0.4, 0.1)))
+    ]  # fmt: skip
+    for meshes, floor in (([crate], True), (tray, True), ([crate, board], False), ([walls(None, False)], True)):
+        assert ("floor" in names(completed(scene_of(*meshes), "studio"))) == floor
+
+
+def test_a_hole_in_a_block_is_no_room():
+    """A block with a hollow that opens in a small hole towards the camera is lit from outside."""
+    hollow = transformed(walls(5), translation(0, 0, 0.45) @ scaling(0.5, 0.5, 0.5))
+    front = [
+        transformed(primitives.cube(), translation(x, y, 0.96) @ scaling(*size))
+        for x, y, size in ((0.6, 0, (0.4, 1, 0.04)), (-0.6, 0, (0.4, 1, 0.04)), (0, 0.6, (0.2, 0.4, 0.04)),
+                           (0, -0.6, (0.2, 0.4, 0.04)))
+    ]  # fmt: skip
+    block = scene_of(walls(5, False), hollow, *front)
+    camera = Camera((0.4, 0.3, 6), (0, 0, 0), (0, 1, 0), 40.0)
+    scene = completed(replace(block, camera=camera, cameras=(NamedCamera("", camera, 64, 64),)))
+    assert "light above" in names(scene)
+
+
 @pytest.mark.parametrize("without", [None, 5])
 def test_a_room_is_lit_from_below_its_ceiling(without):
     scene = completed(scene_of(walls(without), *[ball((x, -0.75, 0.3), 0.2) for x in (-0.6, 0, 0.6)]))

@@ -116,10 +116,10 @@ def test_colours_at_vertices(tmp_path: Path) -> None:
     old = '<texture name="reflectance" type="scale"><float name="scale" value="0.5"/><texture type="vertexcolors"/>'
     found, warnings = material(tmp_path, f"{old}</texture>", "diffuse")
     assert (found.vertex_colours, found.reflectance, warnings) == (True, (0.5, 0.5, 0.5), ())
-    other = attribute.replace("vertex_color", "face_color").replace("base_color", "reflectance")
+    other = attribute.replace("vertex_color", "face_weight").replace("base_color", "reflectance")
     found, warnings = material(tmp_path, other, "diffuse")
     assert (found.vertex_colours, found.reflectance) == (False, (0.5, 0.5, 0.5))
-    assert "'face_color'" in warnings[0]
+    assert "'face_weight'" in warnings[0]
     coat = attribute.replace("base_color", "specular_reflectance")
     found, warnings = material(tmp_path, coat, "plastic")
     assert (found.vertex_colours, found.specular) == (False, (1, 1, 1))
@@ -137,3 +137,24 @@ def test_colours_of_a_ply_file_as_mitsuba_writes_it(tmp_path: Path) -> None:
     assert isinstance(mesh, Mesh)
     assert mesh.colours is not None
     assert mesh.colours[np.argsort(mesh.vertices @ [1, 2, 0])] == pytest.approx(np.diag([1, 0.5, 0.25]))
+
+
+@pytest.mark.parametrize(("attribute", "green"), [("vertex_color", 0.5), ("face_color", 0.25)])
+def test_colours_of_faces_where_vertices_have_some_too(tmp_path: Path, attribute: str, green: float) -> None:
+    """The attribute that the BSDF names counts, through a reference and inside another BSDF as well."""
+    vertex = "".join(f"property float {n}\n" for n in ("x", "y", "z", "color_0", "color_1", "color_2"))
+    face = "property list uchar int vertex_indices\n" + "".join(f"property float color_{k}\n" for k in range(3))
+    rows = "0 0 0 1 0.5 0\n1 0 0 1 0.5 0\n0 1 0 1 0.5 0\n3 0 1 2 0 0.25 1\n"
+    header = f"ply\nformat ascii 1.0\nelement vertex 3\n{vertex}element face 1\n{face}end_header\n"
+    (tmp_path / "a.ply").write_text(header + rows)
+    texture = f'<texture type="mesh_attribute" name="reflectance"><string name="name" value="{attribute}"/></texture>'
+    scene = load(
+        tmp_path,
+        f'<bsdf type="twosided" id="b"><bsdf type="diffuse">{texture}</bsdf></bsdf>'
+        '<shape type="ply"><string name="filename" value="a.ply"/><ref id="b"/></shape>',
+    )
+    mesh = scene.shapes[0].geometry
+    assert isinstance(mesh, Mesh)
+    assert mesh.colours is not None
+    assert mesh.colours[:, 1].tolist() == [green] * 3
+    assert scene.materials[scene.shapes[0].material].vertex_colours

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.scene.description import (
     Camera,
     ConstantEnvironment,
@@ -153,7 +153,7 @@ def rendered(scene, settings, passes, threads=1):
     opened = scene if isinstance(scene, OpenScene) else open_scene(scene)
     pool = WorkPool(threads)
     try:
-        renderer = Renderer(opened, settings, pool, StageCache(0))
+        renderer = Renderer(opened, settings, pool, StageStore(0))
         for _ in range(passes):
             renderer.step()
     finally:

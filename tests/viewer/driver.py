@@ -97,7 +97,7 @@ def viewport_pixels(context: Context, app: ViewerApp) -> Pixels:
     """(h, w, 3) uint8 of what the viewport shows now, inside the picture's rectangle."""
     picture = app.viewport.picture
     assert picture is not None
-    pixels = on_window_thread(context, lambda: picture.read("window"))
+    pixels = on_window_thread(context, lambda: picture.framebuffers.read("window"))
     left, top, width, height = app.viewport.target().picture
     return pixels[max(top, 0) : top + height, max(left, 0) : left + width]
 

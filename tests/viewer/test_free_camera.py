@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from pmviewer.render.free_camera import frustum_lines
 from pmviewer.settings.access import FreeCamera, Settings, with_values
 from pmviewer.viewer import theme
 from tests.viewer.driver import drag_picture, drive, make_app, on_window_thread, viewport_pixels
@@ -73,7 +74,8 @@ def test_the_frustum_is_drawn_behind_surfaces_and_before_them(app, session):
         app.state.change({**FROM, "free_camera.length": 1.0, "display.view": "geometry"})
         c.yield_(4)
         shots["with"] = on_window_thread(c, lambda: app.viewport.capture(overlays=True))
-        shots["camera"], shots["ends"] = app.viewport.shown_camera(), app.state.frustum()
+        shots["camera"] = app.viewport.shown_camera()
+        shots["ends"] = frustum_lines(app.state.render_camera(), session.geometry.radius)
         app.state.change({"free_camera.frustum": False})
         c.yield_(4)
         shots["without"] = on_window_thread(c, lambda: app.viewport.capture(overlays=True))

@@ -57,7 +57,7 @@ def test_one_click_shows_both_and_leaves_the_session_alone(app, tmp_path):
         assert session.settings is before[0]
         assert session.frame is before[1]
         gain = app.state.gain.gain
-        seen["window"] = on_window_thread(c, lambda: app.viewport.picture.read("window"))
+        seen["window"] = on_window_thread(c, lambda: app.viewport.picture.framebuffers.read("window"))
         seen["place"], seen["gain"] = app.viewport.target().picture, gain
 
         x, (ox, oy), (_, height) = app.viewport.split_x(), app.viewport.origin, app.viewport.size
@@ -73,7 +73,7 @@ def test_one_click_shows_both_and_leaves_the_session_alone(app, tmp_path):
         assert app.viewport.frame_at((SIZE - 1, 1)) is gain.without.frame
 
         app.commands.exports.png(tmp_path / "sheet.png", overlays=False)
-        wait_until(c, lambda: (tmp_path / "sheet.png").exists() and not app.state.jobs.running)
+        wait_until(c, lambda: (tmp_path / "sheet.png").exists() and not app.state.background.running())
         app.state.change({"importance.epsilon": 0.5})
         assert app.state.gain.changed_since() == ["importance.epsilon"]
         assert app.state.gain.shown

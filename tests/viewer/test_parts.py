@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.energy import Energy
-from pmviewer.errors import OutputError
 from pmviewer.maps.record import unpack
-from pmviewer.photons.deposition import deposited as photons
 from pmviewer.photons.deposition.deposited import Deposited, weight_histogram
 from pmviewer.render.camera import resolve_camera
 from pmviewer.settings.access import Settings, with_values
 from pmviewer.viewer import format as fmt
+from pmviewer.viewer.background import Background
 from pmviewer.viewer.dialogs.recent import LENGTH, RecentFiles
-from pmviewer.viewer.jobs import Jobs
-from pmviewer.viewer.overlays.overlays import FATES, brightest_channel, even_thinning
+from pmviewer.viewer.gl.points import even_thinning
+from pmviewer.viewer.gl.records import brightest_channel
+from pmviewer.viewer.overlays.light_importance import projected
 from pmviewer.viewer.panels.importance_panel import bias_row, deposition_rows, histogram_of, weight_text
 from pmviewer.viewer.panels.statistics_panel import energy_rows
 from pmviewer.viewer.session_link import SessionLink
 from pmviewer.viewer.theme import drawable
-from pmviewer.viewer.viewport.hud import projected, tick_text
+from pmviewer.viewer.viewport.hud import tick_text
 from tests.support.scenes import diffuse_box
 from tests.viewer.fake_session import FakeSession, photons_at, wall_photons
 
@@ -102,28 +102,6 @@ def test_recent_files_are_capped_unique_and_kept(tmp_path):
     store.parent.chmod(0o700)
 
 
-def test_jobs_report_results_and_errors():
-    said = []
-    jobs = Jobs(lambda level, text: said.append((level, text)))
-
-    def fail():
-        raise OutputError("picture.exr: the disk is full. Free some space.")
-
-    def crash():
-        raise ValueError("odd")
-
-    jobs.start("writing EXR", lambda: "wrote picture.exr")
-    jobs.start("writing EXR", fail)
-    jobs.start("writing EXR", crash)
-    jobs.finish()
-    assert said == [
-        ("info", "wrote picture.exr"),
-        ("error", "picture.exr: the disk is full. Free some space."),
-        ("error", "writing EXR: unexpected ValueError: odd"),
-    ]
-    assert jobs.running == []
-
-
 def test_the_link_hands_everything_over_once_the_session_is_there():
     fake, ready = FakeSession(), threading.Event()
 
@@ -138,7 +116,7 @@ def test_the_link_hands_everything_over_once_the_session_is_there():
     link.open("box", Settings())
     link.set(changed)
     link.pause()
-    link.connect()
+    link.connect(Background(print))
     assert link.status.state == "preparing"
     assert link.settings == changed
     assert link.frame is None
@@ -153,17 +131,19 @@ def test_the_link_hands_everything_over_once_the_session_is_there():
 
 
 def test_a_session_that_does_not_start_is_an_error_in_the_log():
-    failed = threading.Event()
+    said, failed = [], threading.Event()
 
     def make():
         raise OSError("no room for the cache")
 
     link = SessionLink(make)
     link.on_update = failed.set
-    link.connect()
+    background = Background(lambda level, text: said.append((level, text)))
+    link.connect(background)
     assert failed.wait(10)
+    assert background.finish(10)
     assert link.status.state == "failed"
-    assert [m.text for m in link.take_messages()] == ["The engine did not start: no room for the cache"]
+    assert said == [("error", "The engine did not start: no room for the cache")]
 
 
 def test_figures_of_deposition():
@@ -184,7 +164,6 @@ def test_figures_of_deposition():
     np.testing.assert_array_equal(counts, [1, 1, 0, 1])
     assert histogram_of(shared)[0].size == 0
     assert [weight_text(e) for e in (-2.0, 0.0, 5.0)] == ["1/4", "1", "32"]
-    assert FATES == photons.FATES
 
 
 def test_points_are_projected_where_the_camera_sees_them():

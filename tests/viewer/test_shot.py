@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pmviewer.commands.job import load_job
+from pmviewer.commands.shot import take_shot
 from pmviewer.errors import PmviewerError
-from pmviewer.job import load_job
 from pmviewer.output.png import read_png
-from pmviewer.viewer.shot import shot_job
 
 SMALL = ["camera.width=200", "camera.height=160", "photons.N=2000", "importance.N=500"]
 
 
 def take(tmp_path, *settings, pixel=None, window=False, captions=True):
     path = tmp_path / "shot.png"
-    shot_job(load_job("cornell_diffuse", [*SMALL, *settings], []), path, 1, None, window, pixel, captions, 1)
+    take_shot(load_job("cornell_diffuse", [*SMALL, *settings], []), path, 1, None, window, pixel, captions, 1)
     return read_png(path)[0]
 
 

@@ -15,9 +15,11 @@ from pmviewer.output.frame_export import layer_name
 from pmviewer.output.tone import to_uint8
 from pmviewer.photons.projection.projection import ProjectionMap
 from pmviewer.settings.access import Settings, get, with_values
-from pmviewer.viewer.gl.lines import circles, directions, encoded, gather_lines
-from pmviewer.viewer.overlays.cells import cell_corners
-from pmviewer.viewer.overlays.overlays import FATE_PALETTE, LIGHT_PALETTE, LIT_COLOUR, SHADOW_COLOUR
+from pmviewer.viewer.gl.palette import FATE_PALETTE, LIGHT_PALETTE, LIT_COLOUR, SHADOW_COLOUR
+from pmviewer.viewer.gl.records import directions, encoded
+from pmviewer.viewer.overlays.gather_rays import gather_lines
+from pmviewer.viewer.overlays.irradiance_cache import circles
+from pmviewer.viewer.overlays.projection_maps import cell_corners
 from pmviewer.viewer.panels.light_list import top_lights
 from tests.support import naive_maps as naive
 from tests.viewer.driver import chord, drive, make_app, on_window_thread, overlay_item, viewport_pixels

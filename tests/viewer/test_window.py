@@ -130,6 +130,14 @@ def test_reset_all_restores_every_default(app, session):
     def script(c):
         c.item_click("//Settings/**/\uf0e2##reset.all")
         c.yield_(2)
+        assert session.settings != Settings(), "it asks"
+        c.item_click("//$FOCUSED/Cancel")
+        c.yield_(2)
+        assert session.settings != Settings()
+        c.item_click("//Settings/**/\uf0e2##reset.all")
+        c.yield_(2)
+        c.item_click("//$FOCUSED/Reset all")
+        c.yield_(2)
 
     drive(app, script)
     assert session.settings == Settings()

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench.agree.xml import MAX_DEPTH
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.render.planes import PLANES, TERMS
 from pmviewer.settings.access import Settings, with_values
 
@@ -54,7 +54,7 @@ def our_runs(
     images = []
     prepare(opened, with_values(Settings(), values), pool, lambda text, share: None)
     for seed in seeds:
-        renderer = Renderer(opened, with_values(Settings(), values | {"render.seed": seed}), pool, StageCache(0))
+        renderer = Renderer(opened, with_values(Settings(), values | {"render.seed": seed}), pool, StageStore(0))
         for _ in range(passes):
             renderer.step()
         images.append(renderer.film.planes()[..., : PLANES[TERMS[-1]].stop])

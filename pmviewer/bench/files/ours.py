@@ -82,14 +82,14 @@ def picture(request: dict[str, Any]) -> dict[str, Any]:
 
 
 def _renderer(opened: Any, values: dict[str, Any], pool: Any) -> Any:
-    from pmviewer.engine.cache import StageCache
     from pmviewer.engine.prepare import prepare
     from pmviewer.engine.renderer import Renderer
+    from pmviewer.engine.store import StageStore
     from pmviewer.settings.access import Settings, with_values
 
     settings = with_values(Settings(), values)
     prepare(opened, settings, pool, lambda text, share: None)
-    return Renderer(opened, settings, pool, StageCache(0))
+    return Renderer(opened, settings, pool, StageStore(0))
 
 
 def _seen(opened: Any, size: Any, passes: int, pool: Any) -> dict[str, Any]:

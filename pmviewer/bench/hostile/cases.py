@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pmviewer.bench.hostile.mutate import BYTE_MUTATIONS, TEXT_MUTATIONS
 from pmviewer.bench.hostile.seeds import Seed, seeds
-from pmviewer.bench.hostile.special import specials
+from pmviewer.bench.hostile.specials import specials
 from pmviewer.bench.hostile.structure import mutate_deflated, mutate_glb, mutate_json, mutate_xml
 
 TEXTS = (".xml", ".gltf", ".obj", ".mtl")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
 
 Files = dict[str, bytes]
 
@@ -21,12 +20,3 @@ class Special:
 
 
 Maker = Callable[[], Special]
-
-
-@cache
-def specials() -> list[tuple[str, Maker]]:
-    """Names and makers of all; bombs are made when they are asked for."""
-    from pmviewer.bench.hostile import bad_names, special_images, special_meshes, special_xml
-
-    modules = (special_xml, special_images, special_meshes, bad_names)
-    return [entry for module in modules for entry in module.specials()]

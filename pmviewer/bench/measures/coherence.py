@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench.report import BenchResult, Cell, Target
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.frame import Frame
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.settings.access import Settings, with_values
 
 SCENE = "three_glasses"
@@ -43,7 +43,7 @@ def shoot(opened: OpenScene, seed: int, photons: int, passes: int, pool: WorkPoo
     values = {"render.seed": seed, "photons.N": photons}
     settings = with_values(Settings(), values)
     prepare(opened, settings, pool, lambda text, share: None)
-    renderer = Renderer(opened, settings, pool, StageCache(0))
+    renderer = Renderer(opened, settings, pool, StageStore(0))
     renderer.step()
     cloud = renderer.frame(0).clouds["caustic"].photons.copy()
     for _ in range(passes - 1):

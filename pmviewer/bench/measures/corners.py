@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.settings.access import Settings, with_values
 
 SCENES = ("cornell_diffuse", "skylight_room")
@@ -38,7 +38,7 @@ def rendered(opened: OpenScene, pool: WorkPool, values: dict[str, Any], seed: in
     image = {"camera.width": size, "camera.height": size}
     settings = with_values(Settings(), {**shared, **image, **values})
     prepare(opened, settings, pool, lambda text, share: None)
-    renderer = Renderer(opened, settings, pool, StageCache(0))
+    renderer = Renderer(opened, settings, pool, StageStore(0))
     for _ in range(passes):
         renderer.step()
     return renderer

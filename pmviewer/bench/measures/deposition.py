@@ -29,11 +29,11 @@ from numpy.typing import NDArray
 
 from pmviewer.bench.measures.error import reference
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.output.metric import EPSILON, block_means, relmse, z_test
 from pmviewer.photons.deposition.deposited import Deposited
 from pmviewer.scene.arrays.flatten import LUMINANCE
@@ -113,11 +113,11 @@ def measure(
     settings = with_values(Settings(), values | {"camera.width": size[0], "camera.height": size[1]})
     prepare(opened, settings, pool, lambda text, share: None)
     small = with_values(settings, {"camera.width": 8, "camera.height": 8, "photons.N": 1000, "importance.N": 100})
-    Renderer(opened, small, pool, StageCache(0)).step()  # what is left to load
+    Renderer(opened, small, pool, StageStore(0)).step()  # what is left to load
     images, indirect, held, light, cpu = [], [], 0.0, 0.0, 0.0
     deposited: dict[str, Deposited] = {}
     for seed in seeds:
-        renderer = Renderer(opened, with_values(settings, {"render.seed": seed}), pool, StageCache(0))
+        renderer = Renderer(opened, with_values(settings, {"render.seed": seed}), pool, StageStore(0))
         for _ in range(passes):
             renderer.step()
             held += renderer.tally.map_photons / passes / len(seeds)

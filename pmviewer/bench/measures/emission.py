@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 from pmviewer.bench.measures.deposition import held_for
 from pmviewer.bench.measures.emission_bound import Bound, Float, bound_of
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.stages.emission import guidance_of
+from pmviewer.engine.store import StageStore
 from pmviewer.maps.power import luminances
 from pmviewer.photons.emission.guided import TEST_SHARE
 from pmviewer.settings.access import Settings, with_values
@@ -80,7 +80,7 @@ def measure(
         settings = with_values(Settings(), values | chosen)
         if seed == FIRST_SEED:
             prepare(opened, settings, pool, lambda text, share: None)
-        renderer = Renderer(opened, settings, pool, StageCache(0))
+        renderer = Renderer(opened, settings, pool, StageStore(0))
         for _ in range(passes):
             renderer.step()
         frame = renderer.frame(0)
@@ -159,7 +159,7 @@ def _bound(
 ) -> Bound:
     """What the best table of a pass's strata gains in the view."""
     settings = with_values(Settings(), values | VIEWS[view])
-    renderer = Renderer(opened, settings, pool, StageCache(0))
+    renderer = Renderer(opened, settings, pool, StageStore(0))
     renderer.step()
     most = int(TEST_SHARE["Peter-Pietrek"] * settings.photons.N) // max(2, settings.importance.tests)
     return bound_of(renderer, weight, most, trajectories)

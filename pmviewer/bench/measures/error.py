@@ -15,11 +15,11 @@ import numpy as np
 
 from pmviewer.bench import peer
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.output.exr import read_exr
 from pmviewer.output.metric import loglog_slope, metrics
 from pmviewer.resources import data_folder
@@ -97,8 +97,8 @@ def measure(
     curve = Curve(opened.scene.name, method, [], [], [], [])
     try:
         prepare(opened, settings, pool, lambda text, share: None)
-        Renderer(opened, settings, pool, StageCache(0)).step()
-        renderer = Renderer(opened, settings, pool, StageCache(0))
+        Renderer(opened, settings, pool, StageStore(0)).step()
+        renderer = Renderer(opened, settings, pool, StageStore(0))
         while not renderer.finished:
             renderer.step()
             spent = renderer.tally.cpu_seconds

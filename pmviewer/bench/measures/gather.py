@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.output.metric import relmse
 from pmviewer.settings.access import Settings, with_values
 
@@ -64,7 +64,7 @@ def gathered(opened: OpenScene, pool: WorkPool, values: dict[str, Any], passes: 
     """Render some passes with `values` over the settings of a gather of many rays."""
     settings = with_values(Settings(), {"render.method": "gather", "gather.rays": RAYS, **values})
     prepare(opened, settings, pool, lambda text, share: None)
-    renderer = Renderer(opened, settings, pool, StageCache(0))
+    renderer = Renderer(opened, settings, pool, StageStore(0))
     for _ in range(passes):
         renderer.step()
     image = renderer.frame(0).image("indirect") + renderer.frame(0).image("specular")
@@ -76,7 +76,7 @@ def gathered(opened: OpenScene, pool: WorkPool, values: dict[str, Any], passes: 
 def _wide(opened: OpenScene, pool: WorkPool, factor: float) -> float:
     """`factor` times the automatic radius, as a setting."""
     settings = with_values(Settings(), {"render.method": "gather"})
-    return factor * Renderer(opened, settings, pool, StageCache(0)).first_radius / opened.flat.radius
+    return factor * Renderer(opened, settings, pool, StageStore(0)).first_radius / opened.flat.radius
 
 
 def whole_image(pool: WorkPool, size: tuple[int, int], passes: int) -> tuple[list[Row], Target]:
@@ -88,7 +88,7 @@ def whole_image(pool: WorkPool, size: tuple[int, int], passes: int) -> tuple[lis
     def picture(values: dict[str, Any], n: int = 1, seed: int = 1) -> tuple[float, NDArray[np.float64]]:
         settings = with_values(Settings(), {**image, **values, "render.seed": seed})
         prepare(opened, settings, pool, lambda text, share: None)
-        renderer = Renderer(opened, settings, pool, StageCache(0))
+        renderer = Renderer(opened, settings, pool, StageStore(0))
         for _ in range(n):
             renderer.step()
         return renderer.tally.cpu_seconds, renderer.frame(0).image("indirect").astype(np.float64)

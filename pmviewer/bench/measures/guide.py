@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.settings.access import Settings, with_values
 
 LIT = "skylight_room"
@@ -55,7 +55,7 @@ def measured(opened: OpenScene, pool: WorkPool, values: dict[str, Any], seeds: i
     for seed in range(1, seeds + 1):
         settings = with_values(Settings(), {**shared, "render.seed": seed, **values})
         prepare(opened, settings, pool, lambda text, share: None)
-        renderer = Renderer(opened, settings, pool, StageCache(0))
+        renderer = Renderer(opened, settings, pool, StageStore(0))
         renderer.step()
         images.append(renderer.frame(0).image("indirect").astype(np.float64))
         eye += renderer.tally.stage_seconds["eye pass"] / seeds

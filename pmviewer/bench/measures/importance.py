@@ -28,13 +28,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.stages.importance import ImportanceStage
+from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.importance.importons import Rule, joined, trace
 from pmviewer.maps.importance.build import build_importance
@@ -160,7 +160,7 @@ def traced(scene: Scene, passes: int, pool: WorkPool) -> dict[str, float]:
     for share in (0.0, FAINT):
         opened = open_scene(reflecting(scene, share, settings.photons.glossy))
         prepare(opened, settings, pool, lambda text, share: None)
-        renderer = Renderer(opened, settings, pool, StageCache(0))
+        renderer = Renderer(opened, settings, pool, StageStore(0))
         for _ in range(passes):
             renderer.step()
         image = renderer.frame(0).image().astype(np.float64)
@@ -223,7 +223,7 @@ def _move(opened: OpenScene, pool: WorkPool, method: str, rounds: int) -> tuple[
     for i in range(rounds + 1):
         moved = with_values(settings, {"camera.fov": camera.fov * (1 - 0.002 * i)})
         stage = ImportanceStage(
-            opened, moved, plan, resolve_camera(opened.scene, moved.camera), 0.0, pool, StageCache(0), Tally()
+            opened, moved, plan, resolve_camera(opened.scene, moved.camera), 0.0, pool, StageStore(0), Tally()
         )
         begin, before = time.perf_counter(), pool.cpu_seconds
         stage.run(0)

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from pmviewer.bench.measures.error import Curve, measure, reference
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.output.metric import squared_error
 from pmviewer.settings.access import Settings, with_values
 
@@ -44,7 +44,7 @@ TERMS = ("emission", "direct", "indirect")
 def _renderer(opened: OpenScene, pool: WorkPool, values: dict[str, Any]) -> Renderer:
     settings = with_values(Settings(), {"render.method": "gather", **values})
     prepare(opened, settings, pool, lambda text, share: None)
-    return Renderer(opened, settings, pool, StageCache(0))
+    return Renderer(opened, settings, pool, StageStore(0))
 
 
 def _gathered(renderer: Renderer) -> NDArray[np.float64]:

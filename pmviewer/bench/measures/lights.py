@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from pmviewer.bench.measures.error import reference
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.output.metric import EPSILON, block_means
 from pmviewer.settings.access import Settings, with_values
 
@@ -52,7 +52,7 @@ class RuleCurve:
 def measure_rule(opened: OpenScene, rule: str, passes: int, size: int, pool: WorkPool) -> RuleCurve:
     """Render the scene with both seeds at size × size pixels; errors after 1, 2, 4, … passes."""
     values = RULES[rule] | {"render.method": "progressive", "camera.width": size, "camera.height": size}
-    runs = [Renderer(opened, with_values(Settings(), values | {"render.seed": s}), pool, StageCache(0)) for s in SEEDS]
+    runs = [Renderer(opened, with_values(Settings(), values | {"render.seed": s}), pool, StageStore(0)) for s in SEEDS]
     prepare(opened, runs[0].settings, pool, lambda text, share: None)
     target = reference(SCENE)
     weight = 1 / (block_means(target, len(target) // size) ** 2 + EPSILON)

@@ -24,11 +24,11 @@ from pmviewer.bench import peer
 from pmviewer.bench.agreement import Agreement, agreement
 from pmviewer.bench.feature_scenes import write_scenes
 from pmviewer.bench.report import BenchResult, Cell, Target
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.settings.access import Settings, with_values
 
 SIGNIFICANCE = 1e-4
@@ -95,13 +95,13 @@ def our_runs(opened: OpenScene, method: str, passes: int, runs: int, pool: WorkP
     images = []
     values: dict[str, object] = {"render.method": method}
     if method != "path":
-        automatic = Renderer(opened, with_values(Settings(), values), pool, StageCache(0)).first_radius
+        automatic = Renderer(opened, with_values(Settings(), values), pool, StageStore(0)).first_radius
         values["estimate.radius"] = max(RADIUS_SHARE * automatic / opened.flat.radius, 1e-5)
     for seed in range(1, runs + 1):
         settings = with_values(Settings(), values | {"render.seed": seed})
         if seed == 1:
             prepare(opened, settings, pool, lambda text, share: None)
-        renderer = Renderer(opened, settings, pool, StageCache(0))
+        renderer = Renderer(opened, settings, pool, StageStore(0))
         for _ in range(passes):
             renderer.step()
         images.append(renderer.frame(0).image().astype(np.float64))

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.output.metric import relmse_drop
 from pmviewer.settings.access import Settings, with_values
 
@@ -40,7 +40,7 @@ class Run:
 def render(opened: OpenScene, size: int, passes: int, pool: WorkPool, values: dict[str, object]) -> Run:
     """Render the direct and the specular term at size × size pixels."""
     base: dict[str, object] = {"camera.width": size, "camera.height": size, "photons.N": 1000}
-    renderer = Renderer(opened, with_values(Settings(), base | values), pool, StageCache(0))
+    renderer = Renderer(opened, with_values(Settings(), base | values), pool, StageStore(0))
     prepare(opened, renderer.settings, pool, lambda text, share: None)
     for _ in range(passes):
         renderer.step()

@@ -19,12 +19,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pmviewer.bench.report import BenchResult, Cell, Target
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.kernels.scene import scene_dtype
 from pmviewer.maps.record import CAUSTIC, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.render.camera import resolve_camera
@@ -35,7 +35,7 @@ WIDTH = 160
 """Of the pictures; a run must be short, or too few pairs fit into the time."""
 PHOTONS = 60_000
 PASSES = 4
-CACHE_BYTES = 64 << 20
+STORE_BYTES = 64 << 20
 BOUND = 1.02
 EXACT = 0.004
 """The median's standard error at which a scene is done."""
@@ -116,10 +116,7 @@ class Side:
         prepare(opened, settings, pool, lambda text, share: None)
 
     def renderer(self) -> Renderer:
-        made = Renderer(self.opened, self.settings, self.pool, StageCache(CACHE_BYTES))
-        if self.plan is not None:
-            made.plan = self.plan
-        return made
+        return Renderer(self.opened, self.settings, self.pool, StageStore(STORE_BYTES), plan=self.plan)
 
     def picture(self) -> np.ndarray:
         renderer = self.renderer()
@@ -139,7 +136,7 @@ def sides(opened: OpenScene, needs: Needs, pool: WorkPool) -> tuple[Side, Side]:
     """As it comes, and stripped."""
     values = small(opened)
     automatic = with_values(Settings(), values)
-    radius = Renderer(opened, automatic, pool, StageCache(0)).first_radius / opened.flat.radius
+    radius = Renderer(opened, automatic, pool, StageStore(0)).first_radius / opened.flat.radius
     by_hand = values | {
         "estimate.radius": float(radius),
         "direct.choice": needs.choice,

@@ -17,13 +17,13 @@ import numpy as np
 
 from pmviewer.bench.stress.lab import Case, Lab, Outcome
 from pmviewer.bench.stress.scenes import MIRROR, furnace, grey, open_floor, panel, room
-from pmviewer.engine.cache import StageCache
-from pmviewer.engine.diagnose import refused_view
+from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.energy import ENTRIES
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.scene.description import Material, PointLight, Scene, Shape, Sphere
 from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, with_values
@@ -174,7 +174,7 @@ def check(scene: Scene | OpenScene, settings: Settings, views: bool = True, pass
     for threads in (1, 3):
         pool = WorkPool(threads)
         try:
-            made = Renderer(opened, settings, pool, StageCache(0))
+            made = Renderer(opened, settings, pool, StageStore(0))
             for _ in range(passes):
                 made.step()
             films.append(made.film.sums.tobytes())
@@ -200,7 +200,7 @@ def _problem(made: Renderer, views: bool) -> str:
         if made.plan.emission == "off" and not math.isclose(energy.watts[0], lights, rel_tol=1e-5):
             return f"the ledger starts with {energy.watts[0] / lights:.6f} of the light"
     for view in DIAGNOSTICS if views else ():
-        if refused_view(view, made.plan) is not None:
+        if inactive_reason(f"display.view={view}", made.settings, made.scene.traits) is not None:
             continue
         maps = ("global", "caustic") if made.plan.caustic_mask and made.plan.global_classes else ("",)
         for name in maps:

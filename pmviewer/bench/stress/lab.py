@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.frame import Frame
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.errors import PmviewerError
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import Settings, with_values
@@ -126,7 +126,7 @@ class Lab:
         opened = self.open(scene)
         settings = with_values(Settings(), SMALL | {k.replace("__", "."): v for k, v in values.items()})
         prepare(opened, settings, self.pool, lambda text, share: None)
-        made = Renderer(opened, settings, self.pool, StageCache(0))
+        made = Renderer(opened, settings, self.pool, StageStore(0))
         for _ in range(passes):
             made.step()
         return made

@@ -286,7 +286,7 @@ def _small_caustics(lab: Lab) -> Outcome:
     scene = open_floor((point(),), (Shape("ball", Sphere((0.0, 0.3, 0.0), 0.1), 1),), materials=(MIRROR,))
     values: dict[str, Any] = {"photons__q": 0.005, "photons__projection": "on", "render__method": "caustic map"}
     made = lab.renderer(scene, photons__N=4_000_000, **values)
-    photons, projection = made.light.photons, made.light.projection
+    photons, projection = made.light.photons, made.light.tracer.projection
     assert photons is not None
     assert projection is not None
     named = unpack(photons.caustic, photons.caustic_unit)

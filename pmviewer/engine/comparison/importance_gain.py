@@ -15,7 +15,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.comparison.without_importance import plain, refusal
 from pmviewer.engine.frame import Frame
 from pmviewer.engine.inspection import Wanted
@@ -23,6 +22,7 @@ from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.errors import SettingError
 from pmviewer.output.metric import Metrics, metrics
 from pmviewer.settings.access import SETTINGS, Settings, with_values
@@ -130,7 +130,7 @@ def compare(opened: OpenScene, settings: Settings, pool: WorkPool, tell: Tell, t
     for each in (calm, plain(calm)):
         prepare(opened, each, pool, lambda text, share: tell(text, 0.0))
 
-    with_ = Renderer(opened, calm, pool, StageCache(KEPT))
+    with_ = Renderer(opened, calm, pool, StageStore(KEPT))
     _passes(with_, how.passes, "with importance", tell, 0.0, 0.3)
     stored = sum(with_.tally.stored.values())
     if stored == 0:
@@ -143,7 +143,7 @@ def compare(opened: OpenScene, settings: Settings, pool: WorkPool, tell: Tell, t
 
     N, note = _equal_N(opened, plain(calm), stored, how.passes, pool)
     notes += note
-    without = Renderer(opened, with_values(plain(calm), {"photons.N": N}), pool, StageCache(KEPT))
+    without = Renderer(opened, with_values(plain(calm), {"photons.N": N}), pool, StageStore(KEPT))
     error = metrics(_image(with_), target)
     if how.equal == "photons":
         _passes(without, how.passes, "without importance", tell, 0.7, 0.3)
@@ -167,7 +167,7 @@ def _passes(renderer: Renderer, count: int, what: str, tell: Tell, start: float,
 def _longer(opened: OpenScene, settings: Settings, passes: int, pool: WorkPool, tell: Tell) -> Truth:
     """A picture that both are measured against where no reference fits."""
     other = with_values(settings, {"render.seed": (settings.render.seed + 1) % 2**31})
-    renderer = Renderer(opened, other, pool, StageCache(KEPT))
+    renderer = Renderer(opened, other, pool, StageStore(KEPT))
     count = LONGER * passes
     _passes(renderer, count, "a longer run for the error", tell, 0.3, 0.4)
     name = (
@@ -179,7 +179,7 @@ def _longer(opened: OpenScene, settings: Settings, passes: int, pool: WorkPool, 
 def _equal_N(opened: OpenScene, settings: Settings, stored: int, passes: int, pool: WorkPool) -> tuple[int, list[str]]:
     """N that stores `stored` photons in `passes` passes without importance, and what to know of it."""
     tiny = {"camera.width": 8, "camera.height": 8, "photons.N": min(settings.photons.N, PROBE)}
-    probe = Renderer(opened, with_values(settings, tiny), pool, StageCache(KEPT))
+    probe = Renderer(opened, with_values(settings, tiny), pool, StageStore(KEPT))
     probe.step()
     found = sum(probe.tally.stored.values())
     if found == 0:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-from pmviewer.engine.method import plan_of
+from pmviewer.engine.effects import inactive_reason
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Importance, Settings
 
@@ -16,9 +14,4 @@ def plain(settings: Settings) -> Settings:
 
 def refusal(settings: Settings, traits: SceneTraits) -> str | None:
     """Why there is nothing to compare, None if there is."""
-    plan, without = plan_of(settings, traits), plan_of(plain(settings), traits)
-    if not plan.photons:
-        return "This method traces no photons, or no surface stores them."
-    if replace(plan, importance=False, skipped=(), warnings=()) == replace(without, skipped=(), warnings=()):
-        return "Importance decides nothing now: choose a rule that uses it, such as importance.deposition."
-    return None
+    return inactive_reason("compare.equal", settings, traits)

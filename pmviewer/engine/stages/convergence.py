@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.stages.deposition import Rules
+from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.maps.convergence import NO_CAUSTIC, Convergence, Criterion, other_light
 from pmviewer.maps.record import decode_directions
-from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.diagnostics.diagnostics import seen_places
-from pmviewer.tasks import Runner
 
+Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 TILE = 2048
 
 
-def convergence_plane(
-    scene: NDArray[np.void], eye: NDArray[np.void], pixels: int, photons: PhotonMaps, rules: Rules, run: Runner
-) -> NDArray[np.float32]:
+def convergence_plane(rendered: RenderedPass, run: Runner) -> NDArray[np.float32]:
     """State of the caustic map (pixels,) at the first surface seen through a pixel's middle that stores photons: MORE,
-    CONVERGED or DENSE of `pmviewer.maps.convergence`, −1 where there is no caustic or no such surface.
-
-    scene, eye: records of the latest pass; photons: those of the pass, whose `sample` `rules` have asked for.
-    """
+    CONVERGED or DENSE of `pmviewer.maps.convergence`, −1 where there is no caustic or no such surface. The rules of the
+    pass have asked for its photons' `sample`."""
+    photons, rules = rendered.maps.photons, rendered.maps.rules
+    assert photons is not None
     assert rules.deposition is not None
     assert rules.deposition.criterion is not None
     assert rules.required is not None
+    scene, eye = rendered.given.scene, rendered.given.eye
+    pixels = int(eye[0]["width"]) * int(eye[0]["height"])
     points, normals = np.empty((pixels, 3), np.float32), np.empty(pixels, np.uint32)
     found = np.empty(pixels, bool)
     run(

@@ -13,6 +13,7 @@ from pmviewer.engine.stages.importance import ImportanceMaps, ImportanceStage
 from pmviewer.importance.importons import Rule as ImportonRule
 from pmviewer.importance.importons import trace
 from pmviewer.importance.rules import TESTS, automatic_f, density_beyond, density_of, probability_of
+from pmviewer.kernels.dimensions import ROUNDING_SALT, TEST_RAY_SALT
 from pmviewer.maps.convergence import Criterion
 from pmviewer.maps.density.control import ACCEPTANCE, NEAREST, Around
 from pmviewer.maps.density.growing_tree import M
@@ -30,10 +31,6 @@ from pmviewer.photons.deposition.rules import (
 )
 from pmviewer.render.record import eye_record
 from pmviewer.settings.access import Settings
-
-SEED = 0xDE905
-"""Keeps the rules' random numbers apart from those of the light pass."""
-TEST_SEED = 0x7E57
 
 
 @dataclass(frozen=True)
@@ -68,7 +65,7 @@ def rules_of(
     needs_importance = plan.deposition != "constant density"
     assert maps is not None or not needs_importance
     growth = (first / radii["global"]) ** 2
-    seed = settings.render.seed ^ SEED
+    seed = settings.render.seed ^ ROUNDING_SALT
     scene_radius = importance.scene.flat.radius
     key: tuple[Any, ...] = ("deposition", plan.deposition, importance.key if needs_importance else ())
     key += (maps.traced if maps is not None and needs_importance else 0,)
@@ -158,7 +155,7 @@ def factors(
 
     def make() -> tuple[dict[str, float], list[str]]:
         eye: NDArray[np.void] = eye_record(stage.camera, s, 0)
-        tests = trace(stage.scene.flat, eye, direct, s.render.seed ^ TEST_SEED, 0, TESTS, stage.pool.run).global_
+        tests = trace(stage.scene.flat, eye, direct, s.render.seed ^ TEST_RAY_SALT, 0, TESTS, stage.pool.run).global_
         f, notes = {}, []
         for name, made in (("caustic", maps.caustic), ("global", maps.global_)):
             if made is not None:
@@ -166,4 +163,4 @@ def factors(
                 notes += [note] if note and note not in notes else []
         return f, notes
 
-    return stage.cache.get(("deposition f", stage.key, maps.traced), make, lambda made: 0)
+    return stage.store.get(("deposition f", stage.key, maps.traced), make, lambda made: 0)

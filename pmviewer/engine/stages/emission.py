@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 
 from pmviewer.engine.method import Plan
-from pmviewer.engine.stages.deposition import SEED, Rules, importance_of, sampled_classes
+from pmviewer.engine.stages.deposition import Rules, importance_of, sampled_classes
 from pmviewer.engine.stages.importance import ImportanceStage
+from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.importance.rules import full_importance, relative_importance
+from pmviewer.kernels.dimensions import ROUNDING_SALT, SCATTERED_SALT
 from pmviewer.maps.importance.build import build_importance
 from pmviewer.maps.importance.importance_map import ImportanceMap, Importons
 from pmviewer.maps.power import luminances
@@ -18,7 +20,7 @@ from pmviewer.photons.deposition.rules import Deposition, Homogeneous, Rule
 from pmviewer.photons.emission.guided import Guidance, Guided, Known
 from pmviewer.photons.emission.scattered import FIRST
 from pmviewer.photons.emission.tested import Sought
-from pmviewer.photons.light_pass.light_pass import guided_emission_of, scattered_photons, trace_pass
+from pmviewer.photons.light_pass.light_pass import scattered_photons
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Settings
 
@@ -27,7 +29,6 @@ MOST_SCATTERED = 1 << 15
 SCATTERED_NEIGHBOURS = 50
 LEAST = 0.2
 """Importance of places for storing photons: look-ups at the border of what is seen reach across it."""
-SCATTER_SEED = 0x5CA77E
 
 
 def emission_key(settings: Settings, plan: Plan, importance: ImportanceStage) -> tuple[Any, ...]:
@@ -74,7 +75,7 @@ def _scattered(settings: Settings, importance: ImportanceStage, made: Importance
         places = np.ascontiguousarray(places[:: -(-made.n // MOST_SCATTERED)] if made.n else places)
         photons, normals = np.empty((0, 6), np.float32), np.empty(0, np.uint32)
         if len(places):
-            seed = settings.render.seed ^ SCATTER_SEED
+            seed = settings.render.seed ^ SCATTERED_SALT
             photons, normals = scattered_photons(scene, settings.photons, seed, places, stage.pool.run)
         weights = np.empty(len(photons), np.float32)
         luminances(photons.view(np.uint32), weights)
@@ -84,31 +85,22 @@ def _scattered(settings: Settings, importance: ImportanceStage, made: Importance
         return build_importance(further, "screen", scene.radius, SCATTERED_NEIGHBOURS, False, stage.pool.run)
 
     key = "scattered importance", stage.key, settings.photons, stage.latest.traced
-    return stage.cache.get(key, make, lambda map_: map_.bytes)
+    return stage.store.get(key, make, lambda map_: map_.bytes)
 
 
 def guided_photons(
-    guidance: Guidance,
-    rules: Rules,
-    settings: Settings,
-    plan: Plan,
-    importance: ImportanceStage,
-    index: int,
-    N: int,
-    before: Known | None,
+    tracer: Tracer, guidance: Guidance, rules: Rules, index: int, N: int, before: Known | None
 ) -> PhotonMaps | None:
     """The light pass of N trajectories with guided emission; None where they are too few to test all lights. `before`
     is what the passes before know.
 
     Without deposition rules, those of Christensen's emission are used with it (`Homogeneous`).
     """
-    scene, run, photons = importance.scene.flat, importance.pool.run, settings.photons
-    seed, caustics = settings.render.seed, bool(plan.caustic_classes)
-    guided = guided_emission_of(scene, photons, seed, index * N, N, caustics, guidance, run, before)
+    guided = tracer.guided_emission(index, N, guidance, before)
     if guided is None:
         return None
-    deposition = rules.deposition or storage(guidance, guided, settings, plan)
-    return trace_pass(scene, photons, seed, index * N, N, caustics, run, deposition=deposition, guided=guided)
+    deposition = rules.deposition or storage(guidance, guided, tracer.settings, tracer.plan)
+    return tracer.trace(index, N, deposition=deposition, guided=guided)
 
 
 def storage(guidance: Guidance, guided: Guided, settings: Settings, plan: Plan) -> Deposition:
@@ -117,7 +109,7 @@ def storage(guidance: Guidance, guided: Guided, settings: Settings, plan: Plan) 
     if guidance.variant != "Peter-Pietrek":
         for goal in guidance.sought:
             if goal.places:
-                seed = settings.render.seed ^ SEED ^ (goal.photons == "global")
+                seed = settings.render.seed ^ ROUNDING_SALT ^ (goal.photons == "global")
                 rules[goal.photons] = Homogeneous(goal.importance, LEAST, guided.smallest, seed)
     classes = plan.caustic_classes, plan.global_classes
     return Deposition(rules.get("caustic"), rules.get("global"), *classes, sampled_classes(plan))

@@ -7,24 +7,22 @@ are made of depends on the pass's number, and on nothing that was there before.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.cache import StageCache
 from pmviewer.engine.frame import PhotonCloud
-from pmviewer.engine.method import Plan
+from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.importance.importons import Rule, Traced, joined, trace
 from pmviewer.maps.importance.build import build_importance
 from pmviewer.maps.importance.importance_map import NO_IMPORTANCE, ImportanceMap, Importons
-from pmviewer.render.camera import CameraPose
+from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.record import eye_record
 from pmviewer.settings.access import Settings
 
@@ -100,12 +98,12 @@ class ImportanceStage:
         camera: CameraPose,
         first_radius: float,
         pool: WorkPool,
-        cache: StageCache,
+        store: StageStore,
         tally: Tally,
     ) -> None:
         self.scene, self.settings, self.plan, self.camera = scene, settings, plan, camera
         self.first_radius = first_radius
-        self.pool, self.cache, self.tally = pool, cache, tally
+        self.pool, self.store, self.tally = pool, store, tally
         self.latest: ImportanceMaps | None = None
         self._parts: list[Traced] = []
 
@@ -169,7 +167,7 @@ class ImportanceStage:
             def more(first: int = first) -> Traced:
                 return trace(self.scene.flat, eye, rule, s.render.seed, first, N, self.pool.run)
 
-            part = self.cache.get((*key, "importons", first), more, lambda made: made.bytes)
+            part = self.store.get((*key, "importons", first), more, lambda made: made.bytes)
             self._parts.append(part)
             self.tally.rays += part.rays
             if part.dropped:
@@ -183,7 +181,7 @@ class ImportanceStage:
                 return ImportanceMaps(both if plan.caustic_classes else None, both, count * N)
             return ImportanceMaps(self._build(caustic, even=True) if plan.caustic_classes else None, both, count * N)
 
-        return self.cache.get((*key, "maps", count), build, lambda made: made.bytes)
+        return self.store.get((*key, "maps", count), build, lambda made: made.bytes)
 
     def _build(self, importons: Importons, even: bool) -> ImportanceMap:
         how = self.settings.importance
@@ -191,18 +189,15 @@ class ImportanceStage:
         return build_importance(importons, how.map, self.scene.flat.radius, how.neighbours, even, self.pool.run)
 
 
-def prepare_importance(scene: OpenScene, settings: Settings, plan: Plan, camera: CameraPose) -> Callable[[], Any]:
-    """A function that compiles what the stage runs, by running it on next to nothing."""
-
-    def compile_() -> None:
-        pool = WorkPool(1)
-        try:
-            few = settings.model_copy(update={"importance": settings.importance.model_copy(update={"N": 4})})
-            stage = ImportanceStage(scene, few, plan, camera, 0.0, pool, StageCache(0), Tally())
-            stage.run(0)
-            one = np.ones(1, np.float32)
-            build_importance(Importons(np.zeros((1, 3), np.float32), np.zeros(1, np.uint32), one, one), "screen", 1.0)
-        finally:
-            pool.close()
-
-    return compile_
+def prepare_importance(scene: OpenScene, settings: Settings) -> None:
+    """Compile, or load, what the stage runs, by running it on next to nothing."""
+    pool = WorkPool(1)
+    try:
+        few = settings.model_copy(update={"importance": settings.importance.model_copy(update={"N": 4})})
+        camera, plan = resolve_camera(scene.scene, settings.camera), plan_of(settings, scene.traits)
+        stage = ImportanceStage(scene, few, plan, camera, 0.0, pool, StageStore(0), Tally())
+        stage.run(0)
+        one = np.ones(1, np.float32)
+        build_importance(Importons(np.zeros((1, 3), np.float32), np.zeros(1, np.uint32), one, one), "screen", 1.0)
+    finally:
+        pool.close()

@@ -260,6 +260,13 @@ def _divide(boxes, n_triangles, nodes, node_ints, node, first, depth, centers, s
     return middle
 
 
+@device
+def _put(row, into):
+    # Numba's own assignment of rows takes a second to compile: it can tell of rows that don't match.
+    for k in range(LANES):
+        into[k] = row[k]
+
+
 @kernel
 def divide(boxes, n_triangles, nodes, node_ints, depth, centers, sides, scratch, spare):
     """Give node 0 of nodes (3, 8) the children 1 and 2, with their boxes as leaves would have them; `centers` (1, 8)
@@ -277,7 +284,7 @@ def subtree(boxes, n_triangles, nodes, node_ints, depth, centers, scratch, spare
     waiting = np.empty((256, 8), np.float32)
     own, sides = scratch[_OWN], scratch[_SIDES : _SIDES + 2]
     stack[0, 0], stack[0, 1] = 0, depth
-    waiting[0] = centers[0]
+    _put(centers[0], waiting[0])
     size, used, n_blocks = 1, np.int64(1), np.int64(0)
     while size > 0:
         size -= 1
@@ -287,11 +294,11 @@ def subtree(boxes, n_triangles, nodes, node_ints, depth, centers, scratch, spare
         if end - begin <= (LANES if begin < n_triangles else 1) and not begin < n_triangles < end:
             n_blocks += 1 if begin < n_triangles and end > begin else 0
             continue
-        own[:] = waiting[size]
+        _put(waiting[size], own)
         _divide(boxes, n_triangles, nodes, node_ints, index, used, depth, own, sides, scratch, spare, counts)
         for child in range(2):
             stack[size, 0], stack[size, 1] = used + child, depth + 1
-            waiting[size] = sides[child]
+            _put(sides[child], waiting[size])
             size += 1
         used += 2
     return used, n_blocks

@@ -18,6 +18,7 @@ import numpy as np
 from pmviewer.kernels.accel.instance import I_TO_LOCAL, find_instance, has_instances, stored_of, transform_point
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import has, is_a, specialised
+from pmviewer.kernels.dimensions import OPACITY_SALT
 from pmviewer.kernels.memory import bits_of_float, load_f4, load_i4
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.scene import M_ALPHA_CUTOFF, M_OPACITY, M_OPACITY_MAP, MATERIAL_COLUMNS, material_of
@@ -135,7 +136,7 @@ def hit_counts(scene, key, ident, stored, b1, b2, px, py, pz):
     opacity = opacity_of(scene, material, stored, b1, b2, (px, py, pz))
     if opacity >= NEARLY_ONE:
         return True
-    return unit_float(hash3(key, _u4(ident), _u4(0x0FAC17E))) < opacity
+    return unit_float(hash3(key, _u4(ident), _u4(OPACITY_SALT))) < opacity
 
 
 @specialised

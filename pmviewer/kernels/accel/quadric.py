@@ -65,7 +65,7 @@ def intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax):
     a = vx * vx + vy * vy + vz * vz
     middle = -(sx * vx + sy * vy + sz * vz) / a
     # Discriminant from the perpendicular from the centre to the ray: no cancellation for small, distant spheres
-    # (Haines et al., "Precision improvements for ray/sphere intersection", Ray Tracing Gems, 2019).
+    # (Haines et al. 2019).
     px, py, pz = sx + middle * vx, sy + middle * vy, sz + middle * vz
     discriminant = radius * radius - (px * px + py * py + pz * pz)
     if not discriminant >= 0.0:

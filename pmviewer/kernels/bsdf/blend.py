@@ -13,6 +13,7 @@ from pmviewer.kernels.bsdf.material import beer_lambert
 from pmviewer.kernels.bsdf.plain import FOLLOWED, NOTHING, STORED
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import has, specialised
+from pmviewer.kernels.dimensions import BLEND_SALT
 from pmviewer.kernels.memory import bits_of_float, load_f4
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.scene import (
@@ -45,7 +46,7 @@ def hit_number(p, wo, prim, salt):
     h = hash3(bits_of_float(p[0]), bits_of_float(p[1]), bits_of_float(p[2]))
     h = hash3(h, bits_of_float(wo[0]), bits_of_float(wo[1]))
     h = hash3(h, bits_of_float(wo[2]), _u4(prim))
-    return unit_float(hash3(h, _u4(salt), _u4(0xB1E2D)))
+    return unit_float(hash3(h, _u4(salt), _u4(BLEND_SALT)))
 
 
 @specialised

@@ -24,8 +24,10 @@ from numba import njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
 
+from pmviewer.kernels.compile import collector, library
 from pmviewer.kernels.compile.cache_folder import claim
 from pmviewer.kernels.compile.sources import PACKAGE, stamp
+from pmviewer.kernels.compile.turns import Turns
 
 FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
 """Never `nnan`/`ninf`: they delete the checks for non-finite numbers."""
@@ -71,6 +73,10 @@ def _choose_cache() -> Path:
 
 CACHE_FOLDER = _choose_cache()
 numba.config.CACHE_DIR = str(CACHE_FOLDER)
+_turns = Turns(CACHE_FOLDER)
+if not numba.config.DISABLE_JIT:
+    library.install()
+    collector.install()
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": FASTMATH}
 
@@ -96,12 +102,16 @@ class _KernelCacheImpl(CompileResultCacheImpl):
     _locator_classes = (_Locator,)
 
 
+def _number(name: str) -> int:
+    return int(hashlib.sha256(name.encode()).hexdigest()[:15], 16)
+
+
 class _OneFileEach(IndexDataCacheFile):
     """Compiled code in a file named after its signature. Numba's index of numbered files loses what two processes
     save at the same time, and can hand one signature the other's code."""
 
     def _name(self, key: Any) -> str:
-        return self._data_name_pattern.format(number=int(hashlib.sha256(str(key).encode()).hexdigest()[:15], 16))
+        return self._data_name_pattern.format(number=_number(str(key)))
 
     def flush(self) -> None:
         for file in Path(self._cache_path).glob(self._data_name_pattern.replace("{number:d}", "*")):
@@ -128,15 +138,62 @@ class _KernelCache(FunctionCache):
         super().__init__(py_func)
         impl = self._impl
         self._cache_file = _OneFileEach(self._cache_path, impl.filename_base, impl.locator.get_source_stamp())
+        self._held: list[int] = []
+
+    def has(self, sig: Any, target_context: Any) -> bool:
+        """Whether there is compiled code on disk."""
+        name = self._cache_file._name(self._index_key(sig, target_context.codegen()))
+        return Path(self._cache_path, name).is_file()
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Compiled code, or None when it is this process's turn to compile it: until `give_back`."""
+        loaded = super().load_overload(sig, target_context)
+        if loaded is not None:
+            return loaded
+        key = self._index_key(sig, target_context.codegen())
+        number = _number(f"{self._cache_path}{self._cache_file._name(key)}")
+        if _turns.take(number):
+            self._held.append(number)
+            loaded = super().load_overload(sig, target_context)
+        return loaded
+
+    def give_back(self, count: int) -> None:
+        """End all turns but the first `count`."""
+        while len(self._held) > count:
+            _turns.give(self._held.pop())
+
+    @property
+    def turns(self) -> int:
+        """How many are held: more than one where a function compiles itself for other types."""
+        return len(self._held)
 
 
-def _cached(dispatcher: Any) -> Any:
+class _KernelDispatcher(CPUDispatcher):
+    """Compiles what no other process is compiling."""
+
+    _cache: _KernelCache
+
+    def is_kept(self, *arguments: Any) -> bool:
+        """Whether code for such arguments is compiled already, by any process."""
+        types = tuple(self.typeof_pyval(argument) for argument in arguments)
+        return types in self.overloads or self._cache.has(types, self.targetctx)
+
+    def compile(self, sig: Any) -> Any:
+        before = self._cache.turns
+        try:
+            return super().compile(sig)
+        finally:
+            self._cache.give_back(before)
+
+
+def _cached(dispatcher: Any, kind: type[_KernelDispatcher]) -> Any:
     if not numba.config.DISABLE_JIT:
         dispatcher._cache = _KernelCache(dispatcher.py_func)
+        dispatcher.__class__ = kind
     return dispatcher
 
 
-class _DeviceDispatcher(CPUDispatcher):
+class _DeviceDispatcher(_KernelDispatcher):
     """Without a wrapper numba would jump to address 0."""
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
@@ -146,10 +203,7 @@ class _DeviceDispatcher(CPUDispatcher):
 def device(function: Callable[..., Any]) -> Any:
     """A function that kernels call. It has no wrapper for Python, which halves the time to compile; a call from Python
     raises TypeError."""
-    dispatcher = _cached(njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function))
-    if not numba.config.DISABLE_JIT:
-        dispatcher.__class__ = _DeviceDispatcher
-    return dispatcher
+    return _cached(njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function), _DeviceDispatcher)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
@@ -161,7 +215,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     """An entry point that Python calls: serial, without the GIL, on one tile or batch."""
     if numba.config.DISABLE_JIT:
         return functools.wraps(function)(lambda *arguments: function(*map(_readable, arguments)))
-    return _cached(njit(**_OPTIONS)(function))
+    return _cached(njit(no_cfunc_wrapper=True, **_OPTIONS)(function), _KernelDispatcher)
 
 
 def _readable(argument: Any) -> Any:

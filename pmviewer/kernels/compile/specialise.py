@@ -35,7 +35,7 @@ def specialised(choose: Callable[..., Callable[..., Any]]) -> Any:
     def chosen(*arguments: Any) -> Any:
         return choose(*arguments)(*arguments)
 
-    overload(chosen)(choose)
+    overload(chosen, jit_options={"no_cfunc_wrapper": True})(choose)
     return chosen
 
 

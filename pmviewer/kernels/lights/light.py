@@ -20,8 +20,8 @@ from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.lights.distant import behind_scene, emit_directional, outside, sample_directional
 from pmviewer.kernels.lights.environment import emit_image, image_pdf, image_radiance, sample_image
 from pmviewer.kernels.lights.spot import emit_spot, sample_spot
-from pmviewer.kernels.lights.textured_light import area_density, emission_at, radiance_from, spread
-from pmviewer.kernels.memory import load_f4, load_i4
+from pmviewer.kernels.lights.textured_light import area_density, emission_at, picked_triangle, radiance_from, spread
+from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.scene import (
     CYLINDER,
     DIRECTIONAL,
@@ -32,8 +32,6 @@ from pmviewer.kernels.scene import (
     L_AREA,
     L_B,
     L_C,
-    L_COUNT,
-    L_FIRST,
     L_FLIP,
     L_KIND,
     L_LENGTH,
@@ -126,14 +124,8 @@ def light_point(scene, light, u, v):
         length = light_number(scene, light, L_LENGTH)
         facing = scale(n, flip)
         return along(along(a, b, v * length), n, radius), facing, facing, _round_gap(n, a, radius + length)
-    first = np.int64(light_number(scene, light, L_FIRST))
-    count = np.int64(light_number(scene, light, L_COUNT))
-    k = find_interval(scene.light_triangle_cdf, count, first, u)
-    low = _f4(0.0) if k == 0 else load_f4(scene.light_triangle_cdf, first + k - 1)
-    width = load_f4(scene.light_triangle_cdf, first + k) - low
-    if width > _f4(0.0):
-        u = min((u - low) / width, _f4(0.99999994))
-    base = np.int64(load_i4(scene.light_triangles, first + k)) * 9
+    triangle, u = picked_triangle(scene, light, u)
+    base = triangle * 9
     p0 = load3(scene.vertices, base)
     e1 = sub(load3(scene.vertices, base + 3), p0)
     e2 = sub(load3(scene.vertices, base + 6), p0)

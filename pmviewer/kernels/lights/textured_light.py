@@ -211,20 +211,27 @@ def _light_uv(scene, light, p):
 
 
 @device
+def picked_triangle(scene, light, u):
+    """A triangle of a mesh that is a light, by area, and u stretched to [0, 1) for another use."""
+    first = np.int64(light_number(scene, light, L_FIRST))
+    count = np.int64(light_number(scene, light, L_COUNT))
+    k = find_interval(scene.light_triangle_cdf, count, first, u)
+    low = _f4(0.0) if k == 0 else load_f4(scene.light_triangle_cdf, first + k - 1)
+    width = load_f4(scene.light_triangle_cdf, first + k) - low
+    if width > _f4(0.0):
+        u = min((u - low) / width, _BELOW_ONE)
+    return np.int64(load_i4(scene.light_triangles, first + k)), u
+
+
+@device
 def _textured_from(scene, light, p, u, v):
     texture = _setting(scene, light, LT_TEXTURE)
     if texture < 0:
         return light_vector(scene, light, L_RADIANCE)
     if np.int32(light_number(scene, light, L_KIND)) == MESH:
-        first = np.int64(light_number(scene, light, L_FIRST))
-        count = np.int64(light_number(scene, light, L_COUNT))
-        k = find_interval(scene.light_triangle_cdf, count, first, u)
-        low = _f4(0.0) if k == 0 else load_f4(scene.light_triangle_cdf, first + k - 1)
-        width = load_f4(scene.light_triangle_cdf, first + k) - low
-        if width > _f4(0.0):
-            u = min((u - low) / width, _BELOW_ONE)
+        triangle, u = picked_triangle(scene, light, u)
         b1, b2 = square_to_triangle(u, v)
-        s, t = hit_uv(scene, np.int64(load_i4(scene.light_triangles, first + k)), b1, b2, p)
+        s, t = hit_uv(scene, triangle, b1, b2, p)
         return texture_rgb(scene, texture, s, t)
     s, t = _light_uv(scene, light, p)
     return texture_rgb(scene, texture, s, t)

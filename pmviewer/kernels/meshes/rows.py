@@ -108,39 +108,6 @@ def strips(indices, starts, out):
     return count
 
 
-@device
-def _mixed(a, b, c):
-    h = (a * np.uint32(0x9E3779B1)) ^ (b * np.uint32(0x85EBCA77)) ^ (c * np.uint32(0xC2B2AE3D))
-    h ^= h >> np.uint32(15)
-    h *= np.uint32(0x2C1B3C6D)
-    return h ^ (h >> np.uint32(13))
-
-
-@kernel
-def weld(bits, table, index, first):
-    """Number the different rows of bits (n, 3) uint32 in the order of their first appearance.
-
-    `table` (a power of two above n,) int32 is −1 everywhere; index (n,) int32 becomes each row's number, first (n,)
-    int32 the first row with each number. Returns how many there are.
-    """
-    mask = np.uint32(len(table) - 1)
-    used = np.int32(0)
-    for i in range(len(bits)):
-        a, b, c = bits[i, 0], bits[i, 1], bits[i, 2]
-        slot = _mixed(a, b, c) & mask
-        while True:
-            j = table[slot]  # the first row of some number; most are near this one in memory
-            if j < 0:
-                table[slot], first[used], index[i] = i, i, used
-                used += 1
-                break
-            if bits[j, 0] == a and bits[j, 1] == b and bits[j, 2] == c:
-                index[i] = index[j]
-                break
-            slot = (slot + np.uint32(1)) & mask
-    return used
-
-
 @kernel
 def text_facets(data, corners, solids):
     """The triangles of a text STL: corners (3 m, 3) float64 of its `vertex` lines, and `solids` (k, 2) int64: the place

@@ -17,7 +17,7 @@ _LOW = _u8(0xFFFFFFFF)
 
 @device
 def _hash(x, y, z, seed):
-    """Well-mixed bits of three integers (the finaliser of Steele, Lea and Flood's SplitMix, 2014)."""
+    """Well-mixed bits of three integers (the finaliser of SplitMix; Steele, Lea and Flood 2014)."""
     h = (_u8(x) * _MIXED + _u8(y)) * _MIXED + _u8(z) + _u8(seed) * _SEED
     h = (h ^ (h >> _u8(30))) * _FIRST
     h = (h ^ (h >> _u8(27))) * _SECOND

@@ -1,4 +1,4 @@
-"""Irradiance with differential checking (E3; Jensen & Christensen 1995; course notes 2004, §2.3.2 and §5.5.3).
+"""Irradiance with differential checking (E3; Jensen & Christensen 1995; course guide §2.3.2 and §5.5.3).
 
 While the disc around a point grows, an estimate in even light changes at random; near the edge of a surface or of a
 caustic it follows a trend, darker and darker or brighter and brighter. The disc stops growing where a trend begins.

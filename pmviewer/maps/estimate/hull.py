@@ -1,4 +1,4 @@
-"""Irradiance by the convex hull of the photons (E4; Christensen in Jensen et al. 2004, §5.5.4).
+"""Irradiance by the convex hull of the photons (E4; course guide §5.5.4).
 
 A disc over the edge of a surface is divided by area that holds no surface: edges and corners come out too dark. Instead
 divide by the area that the photons span, their convex hull in the tangent plane.

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.dimensions import REWEIGHT_SALT, STORING_SALT
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.vector import luminance
 from pmviewer.maps.convergence import Converged, Convergence, Criterion
@@ -45,7 +46,7 @@ def judged(p, epsilon, discard, seed, i):
         if discard:
             return DISCARDED, p, _u4(0)
         p = epsilon
-    noise = hash3(seed, _u4(i), _u4(0x4B57))
+    noise = hash3(seed, _u4(i), _u4(STORING_SALT))
     if p < _f4(1.0) and not unit_float(noise) < p:
         return REJECTED, p, noise
     return STORED, p, noise
@@ -72,7 +73,8 @@ def _thin(words, normals, p, epsilon, discard, seed, kept, kept_normals, powers)
             kept[count, w] = words[i, w]
         if q < _f4(1.0):
             inverse = _f4(1.0) / q
-            write_power(kept, count, red * inverse, green * inverse, blue * inverse, hash3(noise, _u4(i), _u4(1)))
+            noise = hash3(noise, _u4(i), _u4(REWEIGHT_SALT))
+            write_power(kept, count, red * inverse, green * inverse, blue * inverse, noise)
         kept_normals[count] = normals[i]
         count += 1
     return count

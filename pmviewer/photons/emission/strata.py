@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels import scene as K
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.dimensions import STRATUM
 from pmviewer.kernels.lights.light import emit_from
 from pmviewer.kernels.memory import load_f4, load_f8, load_i4
 from pmviewer.kernels.random import INDEPENDENT, draw1
@@ -43,7 +44,6 @@ MOST_DIVISIONS = 16
 """Divisions of one number."""
 WITH_PLACES = 256
 """Strata a light from which those of a surface divide places, too."""
-_SET = np.int64(0xE819)
 
 _f4 = np.float32
 _f8 = np.float64
@@ -148,7 +148,7 @@ def emit_stratified(scene, strata, i, seed, index, u_pick, position, direction):
     if strata.tests != 0:
         s = _i8(i) % _i8(strata.strata)
     else:  # a share may be near the 2⁻²⁴ of one random number
-        fine = draw1(INDEPENDENT, seed, index, _SET)
+        fine = draw1(INDEPENDENT, seed, index, STRATUM)
         s = _stratum(strata, _f8(u_pick) + _f8(fine) * _f8(2.0**-24))
     light = _i8(load_i4(strata.light, s))
     cell = s - _i8(load_i4(strata.first, light))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.dimensions import TEST_PHOTON_SALT
 from pmviewer.kernels.random import hash3
 from pmviewer.maps.photon_words import decode_powers
 from pmviewer.maps.power import write_power
@@ -27,8 +28,6 @@ Evaluate = Callable[[Float, Codes], Float]
 
 _f4 = np.float32
 _u4 = np.uint32
-_FOLD = 0x7E57F01D
-"""Sets of test photons have seeds of their own."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +86,7 @@ def trace_tests(
 ) -> Tested:
     """`each` test photons of every stratum, in batches of `size`; see `Tested`."""
     table, n = table_of(strata, None, None), each * strata.n
-    own = int((seed ^ _FOLD) + 0x9E3779B9 * (fold + 1)) & 0xFFFFFFFF
+    own = int((seed ^ TEST_PHOTON_SALT) + 0x9E3779B9 * (fold + 1)) & 0xFFFFFFFF
 
     def task(first: int) -> Callable[[], tuple[Batch, NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]]:
         end = min(first + size, n)

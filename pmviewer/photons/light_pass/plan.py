@@ -100,7 +100,7 @@ def plan_pass(
     """The plan of a pass of N trajectories.
 
     Photon powers are the same for all trajectories of a map: Φ/N in the caustic map, Φ/⌊qN⌋ in the global one
-    (trajectory split) or Φ/(qN) (photon rule), K §2.4.
+    (trajectory split) or Φ/(qN) (photon rule), Keller and Wald 2000, §2.4.
 
     With projection maps the first ⌊qN⌋ trajectories start where they can meet surfaces, with power W₁ in all, and
     the others where they can meet what makes caustics, with W₂. A light's path L S⁺ D is found by a = ⌊qN⌋/W₁

@@ -4,19 +4,19 @@ A photon's power before and after a scattering is Φ and Φ'; a survivor's is Φ
 that every rule is right in the mean. Powers are in units of what photons have when they leave the lights, whose
 luminance Y is 1.
 
-===============  ==================================  ======================================================
-rule             probability of surviving            what all photons have in common
-===============  ==================================  ======================================================
-luminance        Y(Φ')/Y(Φ), at most 1 (P §0.2.2)    Y = 1, unless a scattering weighs more than 1
-channel maximum  max Φ'/max Φ, at most 1 (G:402)     the largest channel; no channel ever grows beyond it
-equal            Y(Φ'), at most 1                    Y = 1, always
-===============  ==================================  ======================================================
+===============  ========================  ======================================================
+rule             probability of surviving  what all photons have in common
+===============  ========================  ======================================================
+luminance        Y(Φ')/Y(Φ), at most 1     Y = 1, unless a scattering weighs more than 1
+channel maximum  max Φ'/max Φ, at most 1   the largest channel; no channel ever grows beyond it
+equal            Y(Φ'), at most 1          Y = 1, always
+===============  ========================  ======================================================
 
-"equal" is rejection sampling (P, exercise 0.1): a direction proposed by the BSDF's sampling is accepted with its weight
-as probability, which gives accepted ones exactly the distribution of f·cos. A weight above 1, from sampling that does
-not quite match its BSDF (for diffuse surfaces, mirrors and smooth glass it does), can't be a probability: such a photon
-travels on with Y > 1, is stored as ⌊Y⌋ photons of Y = 1 or, with probability Y − ⌊Y⌋, as one more, and gets rid of the
-excess at its next scattering.
+The first is that of Pharr §0.2.2, the second of the course guide §2.1.2. "equal" is rejection sampling (Pharr, exercise
+0.1): a direction proposed by the BSDF's sampling is accepted with its weight as probability, which gives accepted ones
+exactly the distribution of f·cos. A weight above 1, from sampling that does not quite match its BSDF (for diffuse
+surfaces, mirrors and smooth glass it does), can't be a probability: such a photon travels on with Y > 1, is stored as
+⌊Y⌋ photons of Y = 1 or, with probability Y − ⌊Y⌋, as one more, and gets rid of the excess at its next scattering.
 """
 
 from __future__ import annotations

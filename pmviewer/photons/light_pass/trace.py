@@ -4,8 +4,8 @@ Weights stay nearly equal: lights are picked by power, and roulette decides abou
 (`pmviewer.photons.light_pass.roulette`). Photons of guided emission (`pmviewer.photons.emission.strata`) carry a factor
 for their power that roulette does not see, so that the same paths survive.
 
-Random numbers of a photon are keyed by (seed, its index over all passes, dimension): the same photons for any number of
-threads and any batch size (T2). Dimension set 0 is emission, set 1 + b the b-th scattering.
+Random numbers of a photon are keyed by (seed, its index over all passes, dimension), see
+`pmviewer.kernels.dimensions`: the same photons for any number of threads and any batch size (T2).
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from pmviewer.kernels.bsdf.scattering import (
 )
 from pmviewer.kernels.compile.jit import inlined, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
+from pmviewer.kernels.dimensions import COPIES, EMISSION, EMITTER, FURTHER_PHOTONS_SALT, PHOTON_SCATTER, STORE
 from pmviewer.kernels.lights.light import is_delta_light
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.scene import material_of
@@ -47,7 +48,6 @@ _f8 = np.float64
 _u4 = np.uint32
 _i8 = np.int64
 _INF = _f4(np.inf)
-LIGHT_CHOICE_SET, STORE_SET, COPIES_SET = _i8(0xE817), _i8(0x10000), _i8(0x20000)
 
 LIGHT_PASS_DTYPE = np.dtype(
     [
@@ -161,7 +161,7 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 ledgers[kind, E_ABSORBED] += _f8(before * factor)
                 break
             ng = face(ng, wi)
-            u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
+            u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, PHOTON_SCATTER + bounces)
             unfound = deltas and bounces > 0 and kept & FOLLOWED != 0
             if kept & STORED != 0 or unfound:
                 if unfound:
@@ -212,8 +212,8 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
 @inlined
 def _emitted(scene, pass_, projection, i, seed, index):
     """Photon i as it leaves its light, see `emission`."""
-    u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, _i8(0))
-    u_pick = draw1(pass_.sequence, seed, index, LIGHT_CHOICE_SET)
+    u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, EMISSION)
+    u_pick = draw1(pass_.sequence, seed, index, EMITTER)
     return emission(scene, projection, i, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1))
 
 
@@ -223,7 +223,7 @@ def _stream(pass_, i):
     place = _i8(pass_.first_index) + _i8(i)
     seed = pass_.seed
     if place >> 32 != 0:  # a Sobol set has 2³² points; the next photons use other sets
-        seed = hash3(seed, _u4(place >> 32), _u4(LIGHT_CHOICE_SET))
+        seed = hash3(seed, _u4(place >> 32), _u4(FURTHER_PHOTONS_SALT))
     return seed, _u4(place)
 
 
@@ -251,7 +251,7 @@ def _copies(pass_, beta, seed, index, bounces):
     """As how many photons the power beta is stored, and the power of each."""
     if pass_.roulette != EQUAL:
         return 1, beta
-    times, part = copies(beta, draw1(pass_.sequence, seed, index, COPIES_SET + bounces))
+    times, part = copies(beta, draw1(pass_.sequence, seed, index, COPIES + bounces))
     return times, scale(beta, part)
 
 
@@ -260,7 +260,7 @@ def _is_chosen(pass_, seed, index, bounces):
     """Whether a photon is one of those that the global map stores."""
     if pass_.store_probability >= _f4(1.0):
         return True
-    return draw1(pass_.sequence, seed, index, STORE_SET + bounces) < pass_.store_probability
+    return draw1(pass_.sequence, seed, index, STORE + bounces) < pass_.store_probability
 
 
 @inlined

@@ -24,6 +24,7 @@ import numpy as np
 
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, specialised
+from pmviewer.kernels.dimensions import PROJECTION_ACCEPT
 from pmviewer.kernels.lights.light import emit_from, emit_photon, light_point
 from pmviewer.kernels.memory import load_f4, load_i4
 from pmviewer.kernels.random import draw1
@@ -57,7 +58,6 @@ PROJECTION_DTYPE = np.dtype(
 )
 """Two records: of the trajectories that fill the global map, and of the others."""
 
-ACCEPT_SET = np.int64(0xE818)
 _f4 = np.float32
 _i8 = np.int64
 _BELOW_ONE = _f4(0.99999994)
@@ -139,7 +139,7 @@ def emission(scene, projection, i, sequence, seed, index, u_pick, position, dire
         u = (_f4(cell // COLUMNS) + pair[0]) * _f4(1.0 / ROWS)
         v = (_f4(cell % COLUMNS) + pair[1]) * _f4(1.0 / COLUMNS)
         if mode == WORLD:
-            accept = draw1(sequence, seed, index, ACCEPT_SET)
+            accept = draw1(sequence, seed, index, PROJECTION_ACCEPT)
             p, d, beta, kept = _from_curved_light(scene, light, position, square_to_sphere(u, v), accept)
             return p, d, beta, light, kept, _f4(1.0)
         if mode == PLACES:

@@ -41,9 +41,9 @@ def counting_tree(photons: NDArray[np.float32]) -> PhotonKdTree:
 
 def counting_eye(eye: NDArray[np.void]) -> NDArray[Any]:
     """The eye record (1,) with the look-up of `density_view`."""
-    made = eye.copy()
-    made["k"], made["share"], made["flatness"], made["boundary"] = NEAREST, 1.0, FLATNESS, 0.0
-    return made
+    counting = eye.copy()
+    counting["k"], counting["share"], counting["flatness"], counting["boundary"] = NEAREST, 1.0, FLATNESS, 0.0
+    return counting
 
 
 @kernel
@@ -56,7 +56,7 @@ def density_view(scenes, eyes, trees, widest, out, first, last):
     """
     scene, eye, tree = scenes[0], eyes[0], trees[0]
     for pixel in range(first, last):
-        prim, _, _, p, ng, _, _, _ = stored_hit(scene, eye, pixel)
+        hit, ng, _ = stored_hit(scene, eye, pixel)
         out[pixel, 0] = _f4(-1.0)
-        if prim >= 0:
-            out[pixel, 0], _, _ = hull_irradiance(tree, eye, widest, p, ng, _i4(ALL_CLASSES))
+        if hit.prim >= 0:
+            out[pixel, 0], _, _ = hull_irradiance(tree, eye, widest, hit.p, ng, _i4(ALL_CLASSES))

@@ -9,31 +9,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.accel.raycast import closest_hit
-from pmviewer.kernels.bsdf.scattering import (
-    FOLLOWED,
-    NOTHING,
-    STORED,
-    bsdf_at,
-    bsdf_f,
-    bsdf_sample,
-    same_side,
-    shading_normal,
-)
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, bsdf_f, same_side, shading_normal
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.dimensions import BSDF, PIXEL
 from pmviewer.kernels.lights.light import sample_one_light
 from pmviewer.kernels.memory import bits_of_float, stack_i4
 from pmviewer.kernels.random import draw4, hash3
-from pmviewer.kernels.scene import material_of
-from pmviewer.kernels.surface import face, leave, surface_at
 from pmviewer.kernels.vector import dot, largest
 from pmviewer.maps.photon_words import encode_direction
 from pmviewer.maps.radiance import nearest_site, site_place
 from pmviewer.maps.search.stored import ALL_CLASSES
-from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose_by_power, choose_near, chosen_light
+from pmviewer.render.cast import Hit, cast
+from pmviewer.render.chain import BLACK, WHITE, arrive, follow
+from pmviewer.render.direct.choice import LIST_WORDS, choose, chosen_light
 from pmviewer.render.direct.shadow import UNKNOWN, known_visibility
-from pmviewer.render.eye import BSDF_SET, PIXEL_SET, camera_ray, pixel_seed
 from pmviewer.render.lookup import irradiance, looked_up
+from pmviewer.render.pixel import camera_ray, pixel_seed
 from pmviewer.render.pixel_radius import own_radius
 
 FEWEST_SAMPLES = 8
@@ -45,41 +36,33 @@ BEYOND = 0.5
 `pmviewer.output.diagnostic_views`."""
 
 _f4 = np.float32
-_f8 = np.float64
 _i4 = np.int32
 _i8 = np.int64
 _u4 = np.uint32
-_INF = _f4(np.inf)
-_NOWHERE = (_f4(0.0), _f4(0.0), _f4(0.0))
 _NONE = _f4(-1.0)
 
 
 @device
 def stored_hit(scene, eye, pixel):
-    """The first surface seen through the pixel's middle that stores photons.
-
-    Returns primitive (−1: none) with its coordinates u, v, the point, geometric and shading normal (the first on the
-    viewer's side), gap and wo.
-    """
+    """The first surface seen through the pixel's middle that stores photons: a Hit (of primitive −1 where there is
+    none), its geometric normal on the viewer's side, and the direction in which it is seen."""
     half = _f4(0.5)
-    o, d, near, far = camera_ray(eye, pixel, half, half)
+    ray = camera_ray(eye, pixel, half, half)
+    hit = cast(scene, ray)
+    beta = WHITE
     for _ in range(eye.max_depth + 1):
-        t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], near, far)
-        if prim < 0:
+        if hit.prim < 0:
             break
-        p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
-        wo = (-d[0], -d[1], -d[2])
-        b = bsdf_at(scene, prim, material_of(scene, prim), u, v, p, ng, ns, wo, eye.glossy)
-        if b.groups & STORED != 0:
-            return prim, u, v, p, face(ng, wo), ns, gap, wo
-        if b.groups == NOTHING:
+        si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
+        if si.bsdf.groups & STORED != 0:
+            return hit, si.ng, ray.d
+        if si.bsdf.groups & FOLLOWED == 0:
             break
-        d, weight, _, _ = bsdf_sample(scene, b, FOLLOWED, wo, half, half, half)
-        if not largest(weight) > _f4(0.0) or same_side(b, FOLLOWED, face(ng, wo), wo, d) == 0:
+        ray, beta, _ = follow(scene, si, beta, half, half, half)
+        if not largest(beta) > _f4(0.0):
             break
-        o = leave(p, face(ng, wo), gap, d[0], d[1], d[2])
-        near, far = _f4(0.0), _INF
-    return _i8(-1), _f4(0.0), _f4(0.0), _NOWHERE, _NOWHERE, _NOWHERE, _f4(0.0), _NOWHERE
+        hit = cast(scene, ray)
+    return Hit(_i8(-1), hit.u, hit.v, hit.t, hit.p, hit.ng, hit.ns, hit.gap), hit.ng, ray.d
 
 
 @kernel
@@ -88,10 +71,10 @@ def seen_places(scenes, eyes, points, normals, found, first, last):
     found one."""
     scene, eye = scenes[0], eyes[0]
     for pixel in range(first, last):
-        prim, _, _, p, ng, _, _, _ = stored_hit(scene, eye, pixel)
-        found[pixel] = prim >= 0
-        points[pixel, 0], points[pixel, 1], points[pixel, 2] = p
-        normals[pixel] = encode_direction(ng[0], ng[1], ng[2]) if prim >= 0 else _u4(0)
+        hit, ng, _ = stored_hit(scene, eye, pixel)
+        found[pixel] = hit.prim >= 0
+        points[pixel, 0], points[pixel, 1], points[pixel, 2] = hit.p if hit.prim >= 0 else BLACK
+        normals[pixel] = encode_direction(ng[0], ng[1], ng[2]) if hit.prim >= 0 else _u4(0)
 
 
 @kernel
@@ -104,11 +87,11 @@ def lookup_view(scenes, eyes, maps, radii, which, radius, class_mask, out, first
     """
     scene, eye, photons = scenes[0], eyes[0], maps[0]
     for pixel in range(first, last):
-        prim, _, _, p, ng, _, _, _ = stored_hit(scene, eye, pixel)
+        hit, ng, _ = stored_hit(scene, eye, pixel)
         out[pixel, 0] = out[pixel, 1] = _NONE
-        if prim >= 0:
+        if hit.prim >= 0:
             r = own_radius(radii, which, pixel, radius)
-            out[pixel, 0], out[pixel, 1] = looked_up(photons, eye, r, p, ng, class_mask)
+            out[pixel, 0], out[pixel, 1] = looked_up(photons, eye, r, hit.p, ng, class_mask)
 
 
 @device
@@ -129,11 +112,12 @@ def site_view(scenes, eyes, maps, site_maps, cell_maps, out, first, last):
     """
     scene, eye, photons, sites, cells = scenes[0], eyes[0], maps[0], site_maps[0], cell_maps[0]
     for pixel in range(first, last):
-        prim, _, _, p, ng, _, _, _ = stored_hit(scene, eye, pixel)
+        hit, ng, _ = stored_hit(scene, eye, pixel)
         for c in range(4):
             out[pixel, c] = _NONE
-        if prim < 0:
+        if hit.prim < 0:
             continue
+        p = hit.p
         site = nearest_site(sites, p, ng, eye.site_radius, eye.flatness, eye.site_similarity)
         if site >= 0:
             p, ng = site_place(sites, site)
@@ -147,6 +131,30 @@ def site_view(scenes, eyes, maps, site_maps, cell_maps, out, first, last):
         out[pixel, 0], out[pixel, 1], out[pixel, 2] = E
 
 
+@device
+def known_share(scene, eye, choice_map, shadows, si, pixel, lights):
+    """Light samples at a surface that count, and how many of them shadow photons decide. `lights`: LIST_WORDS words of
+    scratch; the rest as for `shadow_view`."""
+    choice = choose(scene, eye, choice_map, si.p, si.ng, lights)
+    samples = choice[4]
+    seed = pixel_seed(eye, pixel)
+    counted, known = _i8(0), _i8(0)
+    rounds = (FEWEST_SAMPLES + samples - 1) // samples if samples > 0 else 0
+    for i in range(rounds * samples):
+        _, _, u, v = draw4(eye.sequence, seed, _u4(i), PIXEL)
+        u_pick, _, _, _ = draw4(eye.sequence, seed, _u4(i), BSDF)
+        light, m = chosen_light(scene, choice, i % samples, u_pick)
+        wi, _, _, pdf, _ = sample_one_light(scene, light, si.p, u, v)
+        if not m * pdf > _f4(0.0) or same_side(si.bsdf, STORED, si.ng, si.wo, wi) == 0:
+            continue
+        f = bsdf_f(si.bsdf, STORED, si.wo, wi)
+        if f[0] + f[1] + f[2] > _f4(0.0) and abs(dot(wi, shading_normal(si.bsdf))) > _f4(0.0):
+            counted += 1
+            if known_visibility(shadows, si.p, si.ng, light) != UNKNOWN:
+                known += 1
+    return counted, known
+
+
 @kernel
 def shadow_view(scenes, eyes, choice_maps, shadow_maps, out, first, last):
     """Share of the light samples, in percent, that shadow photons decide; −1 where no light sample counts.
@@ -154,35 +162,13 @@ def shadow_view(scenes, eyes, choice_maps, shadow_maps, out, first, last):
     choice_maps: record (1,) of the grid of photons that choose lights; shadow_maps: record (1,) of the shadow photons;
     out: float32 (pixels, 1); the rest as for `lookup_view`.
     """
-    scene, eye, choice_map, shadows = scenes[0], eyes[0], choice_maps[0], shadow_maps[0]
+    scene, eye = scenes[0], eyes[0]
     lights = stack_i4(LIST_WORDS)
     for pixel in range(first, last):
         out[pixel, 0] = _NONE
-        prim, u, v, p, ng, ns, _, wo = stored_hit(scene, eye, pixel)
-        if prim < 0:
-            continue
-        b = bsdf_at(scene, prim, material_of(scene, prim), u, v, p, ng, ns, wo, eye.glossy)
-        if eye.choice == BY_POWER:
-            choice = choose_by_power(lights, eye.light_samples)
-        else:
-            choice = choose_near(scene, eye, choice_map, p, ng, lights)
-        if choice[4] == 0:
-            continue
-        seed = pixel_seed(eye, pixel)
-        counted, known = _i8(0), _i8(0)
-        for round_ in range((FEWEST_SAMPLES + choice[4] - 1) // choice[4]):
-            for s in range(choice[4]):
-                index = _u4(round_ * choice[4] + s)
-                _, _, lu, lv = draw4(eye.sequence, seed, index, PIXEL_SET)
-                u_pick, _, _, _ = draw4(eye.sequence, seed, index, BSDF_SET)
-                light, m = chosen_light(scene, choice, s, u_pick)
-                wi, _, _, pdf, _ = sample_one_light(scene, light, p, lu, lv)
-                if not m * pdf > _f4(0.0) or same_side(b, STORED, ng, wo, wi) == 0:
-                    continue
-                f = bsdf_f(b, STORED, wo, wi)
-                if f[0] + f[1] + f[2] > _f4(0.0) and abs(dot(wi, shading_normal(b))) > _f4(0.0):
-                    counted += 1
-                    if known_visibility(shadows, p, ng, light) != UNKNOWN:
-                        known += 1
-        if counted > 0:
-            out[pixel, 0] = _f4(100.0) * _f4(known) / _f4(counted)
+        hit, _, d = stored_hit(scene, eye, pixel)
+        if hit.prim >= 0:
+            si, _ = arrive(scene, eye.glossy, d, hit, WHITE)
+            counted, known = known_share(scene, eye, choice_maps[0], shadow_maps[0], si, pixel, lights)
+            if counted > 0:
+                out[pixel, 0] = _f4(100.0) * _f4(known) / _f4(counted)

@@ -174,6 +174,15 @@ def choose_near(scene, eye, grid, p, n, lights):
 
 
 @device
+def choose(scene, eye, grid, p, n, lights):
+    """The choice at the point p with normal n, by power or by the photons near; arguments as for `choose_near`."""
+    choice = choose_by_power(lights, eye.light_samples)
+    if eye.choice != BY_POWER:
+        choice = choose_near(scene, eye, grid, p, n, lights)
+    return choice
+
+
+@device
 def expected_samples(scene, choice, light):
     """m, the expected number of light samples on `light` under that choice."""
     lights, known, _, rest, _ = choice

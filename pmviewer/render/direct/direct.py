@@ -10,6 +10,7 @@ import numpy as np
 from pmviewer.kernels.accel.occlusion import occluded
 from pmviewer.kernels.bsdf.scattering import bsdf_f, bsdf_pdf, compressed, same_side, shading_normal
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.dimensions import FURTHER_LIGHT
 from pmviewer.kernels.lights.light import emitted, environment_radiance, one_light_pdf, sample_one_light
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.scene import light_of
@@ -18,11 +19,10 @@ from pmviewer.kernels.vector import add, dot, mul, scale, sub
 from pmviewer.render.chain import BLACK
 from pmviewer.render.direct.choice import chosen_light, expected_samples
 from pmviewer.render.direct.shadow import LIT, UNKNOWN, known_visibility
+from pmviewer.render.record import C_RAYS, C_SAVED, C_SHADOW_RAYS
 
 _f4 = np.float32
 _u4 = np.uint32
-EXTRA_SET = np.int64(1000)
-"""Dimension set of the second light sample; further ones follow."""
 BEFORE_LIGHT = _f4(1.0 - 2.0**-13)
 """Shadow rays end a little before the light's own surface."""
 
@@ -35,6 +35,18 @@ def power_heuristic(n_this, pdf_this, n_other, pdf_other):
 
 
 @device
+def met_light(scene, hit):
+    """The light that a ray met, −1 for none; the environment where it met nothing."""
+    return scene.environment if hit.prim < 0 else light_of(scene, hit.prim)
+
+
+@device
+def radiance_of(scene, light, hit, d):
+    """Radiance that the light which a ray of direction d met sends back along it."""
+    return environment_radiance(scene, d) if hit.prim < 0 else emitted(scene, light, hit.prim, hit.p, hit.ng, d)
+
+
+@device
 def visible(scene, p, ng, gap, wi, end):
     """Whether nothing stands between the surface point p and the point `end`, seen from p in direction wi."""
     o = leave(p, ng, gap, wi[0], wi[1], wi[2])
@@ -43,19 +55,20 @@ def visible(scene, p, ng, gap, wi, end):
 
 
 @device
-def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, u_pick, u, v):
+def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, numbers):
     """Radiance towards wo from the light samples of the choice, reflected by a group of the BSDF's lobes.
 
-    Each is weighted against n_bsdf BSDF samples of the group (0: no MIS). (u_pick, u, v) are the first sample's
-    numbers; the sampler draws further ones. `shadows` is for `known_visibility`. Returns L, the shadow
-    rays cast and those that shadow photons saved.
+    Each is weighted against n_bsdf BSDF samples of the group (0: no MIS). `numbers`, three, are for the first sample:
+    choice of light and place; the sampler draws further ones. `shadows` is for `known_visibility`. Returns L, the
+    shadow rays cast and those that shadow photons saved.
     """
     p, ng, gap, b, wo = si.p, si.ng, si.gap, si.bsdf, si.wo
     total = BLACK
     rays, saved = 0, 0
+    u_pick, u, v = numbers
     for s in range(choice[4]):
         if s > 0:
-            u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, EXTRA_SET + s)
+            u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, FURTHER_LIGHT + s)
         light, m = chosen_light(scene, choice, s, u_pick)
         wi, end, L, pdf, findable = sample_one_light(scene, light, p, u, v)
         if not m * pdf > _f4(0.0) or same_side(b, group, ng, wo, wi) == 0:
@@ -77,20 +90,30 @@ def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, u_pick, u,
 
 
 @device
-def found_light(scene, p, wi, pdf_bsdf, n_bsdf, choice, biased, prim, q, nq):
-    """A BSDF sample from p in direction wi found primitive `prim` at q with geometric normal nq (prim < 0: nothing).
+def direct_light(given, si, group, choice, n_bsdf, sampler, numbers, counts):
+    """L of `light_samples` in a pass (PassData), its rays counted."""
+    L, rays, saved = light_samples(given.scene, given.shadows, si, group, choice, n_bsdf, sampler, numbers)
+    counts[C_RAYS] += rays
+    counts[C_SHADOW_RAYS] += rays
+    counts[C_SAVED] += saved
+    return L
 
-    Its emission (radiance), weighted against the light samples of the choice, where `pdf_bsdf` is the density of the
-    BSDF sample; a biased choice leaves the lights that it does not sample out of both halves.
+
+@device
+def found_light(scene, p, wi, pdf_bsdf, n_bsdf, choice, biased, hit):
+    """Radiance that was emitted by what a BSDF sample from p in direction wi met (`pmviewer.render.cast.Hit`).
+
+    It is weighted against the light samples of the choice, where `pdf_bsdf` is the density of the BSDF sample; a biased
+    choice leaves the lights that it does not sample out of both halves.
     """
-    light = scene.environment if prim < 0 else light_of(scene, prim)
+    light = met_light(scene, hit)
     if light < 0:
         return BLACK
-    L = environment_radiance(scene, wi) if prim < 0 else emitted(scene, light, prim, q, nq, wi)
+    L = radiance_of(scene, light, hit, wi)
     if not L[0] + L[1] + L[2] > _f4(0.0):
         return BLACK
     m = expected_samples(scene, choice, light)
     if biased != 0 and not m > _f4(0.0):
         return BLACK
-    pdf = one_light_pdf(scene, light, p, q, nq, wi)
+    pdf = one_light_pdf(scene, light, p, hit.p, hit.ng, wi)
     return scale(L, power_heuristic(_f4(n_bsdf), pdf_bsdf, m, pdf))

@@ -11,11 +11,10 @@ import math
 
 import numpy as np
 
-from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian, shading_normal
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.dimensions import CACHE_SALT, HEMISPHERE
 from pmviewer.kernels.random import draw4, hash3
-from pmviewer.kernels.surface import leave
 from pmviewer.kernels.vector import dot, largest, luminance
 from pmviewer.maps.hemisphere import cell_direction, irradiance_and_gradients
 from pmviewer.maps.irradiance_cache import (
@@ -29,22 +28,21 @@ from pmviewer.maps.irradiance_cache import (
     interpolate,
     reach_of,
 )
-from pmviewer.render.cast import cast
-from pmviewer.render.chain import arrive, follow_camera_path
-from pmviewer.render.eye import PIXEL_SET, camera_ray, pixel_seed
+from pmviewer.render.cast import cast, ray_from
+from pmviewer.render.chain import BLACK, WHITE, arrive, follow_camera_path
 from pmviewer.render.gather.gather import gather_light
 from pmviewer.render.given import opened
+from pmviewer.render.pixel import pixel_seed, sampled_ray
 from pmviewer.render.record import C_DROPPED, C_RAYS
 
 _f4 = np.float32
 _f8 = np.float64
 _u4 = np.uint32
 _INF = _f4(np.inf)
-HEMISPHERE_SET = np.int64(5000)
 ENOUGH = _f4(0.25)
 """Sum of weights from which a point needs no record of its own: one of error 0.8, say. Less than that would do for the
 eye pass; the overlap hides the rims."""
-NO_HIT = (False, (_f4(0.0),) * 3, (_f4(0.0),) * 3, (_f4(0.0),) * 3, _f4(0.0), _f4(0.0))
+NO_HIT = (False, BLACK, BLACK, BLACK, _f4(0.0), _f4(0.0))
 
 
 @device
@@ -55,18 +53,16 @@ def uncovered_hit(given, pixel, counts):
     size of a pixel there.
     """
     scene, eye, cache = given.scene, given.eye, given.cache
-    seed = pixel_seed(eye, pixel)
-    ux, uy, _, _ = draw4(eye.sequence, seed, eye.index, PIXEL_SET)
-    o, d, near, far = camera_ray(eye, pixel, ux, uy)
-    beta = (_f4(1.0), _f4(1.0), _f4(1.0))
+    seed, ray, _ = sampled_ray(eye, pixel)
+    beta = WHITE
     travelled = _f4(0.0)
     for depth in range(eye.max_depth + 1):
-        t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], near, far)
+        hit = cast(scene, ray)
         counts[C_RAYS] += 1
-        if prim < 0:
+        if hit.prim < 0:
             break
-        travelled += t
-        _, si, beta = arrive(scene, eye, o, d, t, prim, u, v, beta)
+        travelled += hit.t
+        si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
         if si.bsdf.groups & STORED != 0 and is_lambertian(si.bsdf):
             n = shading_normal(si.bsdf)
             _, weight = interpolate(cache, si.p, n)
@@ -74,11 +70,9 @@ def uncovered_hit(given, pixel, counts):
                 return True, si.p, si.ng, n, si.gap, cache.pixel_size + travelled * cache.pixel_angle
         if si.bsdf.groups & FOLLOWED == 0 or depth == eye.max_depth:
             break
-        d, beta, _ = follow_camera_path(given, si, beta, seed, depth)
+        ray, beta, _ = follow_camera_path(given, si, beta, seed, depth)
         if not largest(beta) > _f4(0.0):
             break
-        o = leave(si.p, si.ng, si.gap, d[0], d[1], d[2])
-        near, far = _f4(0.0), _INF
     return NO_HIT
 
 
@@ -89,7 +83,7 @@ def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
     for k in range(cache.sectors):
         for j in range(cache.rings):
             here = j + cache.rings * k
-            u, v, _, _ = draw4(eye.sequence, seed, _u4(here), HEMISPHERE_SET)
+            u, v, _, _ = draw4(eye.sequence, seed, _u4(here), HEMISPHERE)
             wi = cell_direction(n, cache.rings, cache.sectors, j, k, u, v)
             cos = dot(wi, n)
             cells[here, 0] = cells[here, 1] = cells[here, 2] = _f4(0.0)
@@ -97,17 +91,17 @@ def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
             if dot(wi, ng) <= _f4(0.0):
                 continue
             counts[C_RAYS] += 1
-            hit = cast(given.scene, p, ng, gap, wi)
-            if hit[0] >= 0:
-                cells[here, 3] = hit[7]
+            hit = cast(given.scene, ray_from(p, ng, gap, wi))
+            if hit.prim >= 0:
+                cells[here, 3] = hit.t
                 cells[here, 0], cells[here, 1], cells[here, 2] = gather_light(given, hit, wi, seed, _u4(here), counts)
 
 
 @kernel
-def fill_records(given, pixels, rows, made, counts, first, last):
-    """Make the records of candidates first … last−1 that lack them, and tell in `made` which.
+def fill_records(given, pixels, rows, filled, counts, first, last):
+    """Make the records of candidates first … last−1 that lack them, and tell in `filled` which.
 
-    given: as for the eye pass, with the cache so far; pixels: int32 (n,); rows: float32 (n, ROW); made: bool (n,);
+    given: as for the eye pass, with the cache so far; pixels: int32 (n,); rows: float32 (n, ROW); filled: bool (n,);
     counts: int64 (N_COUNTS,).
     """
     given = opened(given)
@@ -117,15 +111,15 @@ def fill_records(given, pixels, rows, made, counts, first, last):
     for i in range(first, last):
         pixel = pixels[i]
         found, p, ng, n, gap, footprint = uncovered_hit(given, pixel, counts)
-        made[i] = found
+        filled[i] = found
         if not found:
             continue
-        seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(0xCAC4E))
+        seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(CACHE_SALT))
         gather_hemisphere(given, p, ng, n, gap, seed, cells, counts)
         harmonic = irradiance_and_gradients(cells, cache.rings, cache.sectors, n, E, rotation, translation)
         if not (E[0] + E[1] + E[2] < _f8(np.inf) and harmonic > _f8(0.0)):
             counts[C_DROPPED] += 1
-            made[i] = False
+            filled[i] = False
             continue
         harmonic = limit_gradient(cache, harmonic, footprint, E, translation)
         row = rows[i]

@@ -13,7 +13,7 @@ from pmviewer.kernels.bsdf.scattering import STORED, bsdf_sample, is_lambertian,
 from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.kernels.vector import dot, largest, mul, scale
 from pmviewer.maps.irradiance_cache import interpolate
-from pmviewer.render.cast import cast
+from pmviewer.render.cast import cast, leaving
 from pmviewer.render.chain import BLACK
 from pmviewer.render.direct.direct import found_light
 from pmviewer.render.gather.gather import gather_rays
@@ -41,28 +41,24 @@ def cached(given, si, counts):
 
 
 @specialised
-def surface_rays(given, known, gather, si, beta, choice, aimed, n, numbers, seed, counts):
-    """`pmviewer.render.gather.gather.gather_rays` where `gather` rays are to be cast, else direct light by n rays and
-    indirect light from the irradiance `known`. Both are sums over n rays."""
+def surface_rays(given, known, gather, si, beta, rays, counts):
+    """`pmviewer.render.gather.gather.gather_rays` where `gather` rays are to be cast, else direct light by the rays of
+    the BSDF and indirect light from the irradiance `known`. Both are sums over the rays."""
     if absent(part(given, "cache")):
+        return lambda given, known, gather, si, beta, rays, counts: gather_rays(given, si, beta, rays, counts)
 
-        def plain(given, known, gather, si, beta, choice, aimed, n, numbers, seed, counts):
-            return gather_rays(given, si, beta, choice, aimed, n, numbers, seed, counts)
-
-        return plain
-
-    def with_cache(given, known, gather, si, beta, choice, aimed, n, numbers, seed, counts):
+    def with_cache(given, known, gather, si, beta, rays, counts):
         if gather > 0:
-            return gather_rays(given, si, beta, choice, aimed, n, numbers, seed, counts)
+            return gather_rays(given, si, beta, rays, counts)
         scene, eye = given.scene, given.eye
         direct = BLACK
         if eye.direct != 0 and eye.mis != 0:
-            wi, weight, pdf, _ = bsdf_sample(scene, si.bsdf, STORED, si.wo, numbers[0], numbers[1], numbers[2])
+            u_lobe, u, v = rays.numbers
+            wi, weight, pdf, _ = bsdf_sample(scene, si.bsdf, STORED, si.wo, u_lobe, u, v)
             if dot(wi, si.ng) > _f4(0.0) and largest(weight) > _f4(0.0):
                 counts[C_RAYS] += 1
-                hit = cast(scene, si.p, si.ng, si.gap, wi)
-                L = found_light(scene, si.p, wi, pdf, n, choice, eye.biased, hit[0], hit[3], hit[4])
-                direct = mul(weight, L)
+                hit = cast(scene, leaving(si, wi))
+                direct = mul(weight, found_light(scene, si.p, wi, pdf, rays.n, rays.choice, eye.biased, hit))
         return direct, scale(mul(si.bsdf.albedo, known), INV_PI)
 
     return with_cache

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import stack_i4
-from pmviewer.kernels.random import draw4
-from pmviewer.kernels.surface import leave
 from pmviewer.kernels.vector import dot, largest, mul, scale
-from pmviewer.render.cast import cast
-from pmviewer.render.chain import arrive, follow_camera_path
-from pmviewer.render.eye import PIXEL_SET, camera_ray, pixel_seed
+from pmviewer.render.cast import cast, leaving
+from pmviewer.render.chain import BLACK, WHITE, arrive, follow_camera_path
 from pmviewer.render.gather.gather import gather_light, gather_survival
 from pmviewer.render.gather.guide import AIM_WORDS, aim, gather_direction
-from pmviewer.render.given import opened
+from pmviewer.render.given import GatherRays, opened
+from pmviewer.render.pixel import sampled_ray
 
 _f4 = np.float32
 _i8 = np.int64
-_INF = _f4(np.inf)
-NO_NUMBERS = (_f4(0.0), _f4(0.0), _f4(0.0))
 
 POINT_COLUMNS = 10
 """Of a gather ray: its start (3), its end on the first surface that it meets (3), the radiance that it adds to the
@@ -31,22 +26,22 @@ pixel (red, green, blue), and 1 if photons guided it, 0 if it followed the BSDF.
 @device
 def _replay(given, si, beta, seed, rows, row, counts):
     """The gather rays of a surface into `rows` from `row` on; returns the next free row."""
-    aimed = aim(given, si, seed, stack_i4(AIM_WORDS))
     n = given.eye.gather_rays
+    rays = GatherRays(n, aim(given, si, seed, stack_i4(AIM_WORDS)), None, seed, BLACK)
     for j in range(n):
-        wi, weight, pdf, share, u_end, sample = gather_direction(given, aimed, si, j, n, seed, NO_NUMBERS)
+        wi, weight, pdf, share, u_end, sample = gather_direction(given, rays, si, j)
         if row >= len(rows) or dot(wi, si.ng) <= _f4(0.0) or not largest(weight) > _f4(0.0):
             continue
         survival = gather_survival(given.eye, beta, weight, share)
         if not u_end < survival:
             continue
-        hit = cast(given.scene, si.p, si.ng, si.gap, wi)
-        if hit[0] < 0:
+        hit = cast(given.scene, leaving(si, wi))
+        if hit.prim < 0:
             continue
         L = gather_light(given, hit, wi, seed, sample, counts)
         L = scale(mul(mul(beta, weight), L), share / (survival * _f4(n)))
         for k in range(3):
-            rows[row, k], rows[row, 3 + k], rows[row, 6 + k] = si.p[k], hit[3][k], L[k]
+            rows[row, k], rows[row, 3 + k], rows[row, 6 + k] = si.p[k], hit.p[k], L[k]
         rows[row, 9] = _f4(0.0) if pdf > _f4(0.0) else _f4(1.0)
         row += 1
     return row
@@ -61,23 +56,19 @@ def gather_points(given, pixel, counts, rows):
     """
     given = opened(given)
     scene, eye = given.scene, given.eye
-    seed = pixel_seed(eye, pixel)
-    ux, uy, _, _ = draw4(eye.sequence, seed, eye.index, PIXEL_SET)
-    o, d, near, far = camera_ray(eye, pixel, ux, uy)
-    beta = (_f4(1.0), _f4(1.0), _f4(1.0))
+    seed, ray, _ = sampled_ray(eye, pixel)
+    beta = WHITE
     row = _i8(0)
     for depth in range(eye.max_depth + 1):
-        t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], near, far)
-        if prim < 0:
+        hit = cast(scene, ray)
+        if hit.prim < 0:
             break
-        _, si, beta = arrive(scene, eye, o, d, t, prim, u, v, beta)
+        si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
         if si.bsdf.groups & STORED != 0:
             row = _replay(given, si, beta, seed, rows, row, counts)
         if si.bsdf.groups & FOLLOWED == 0:
             break
-        d, beta, _ = follow_camera_path(given, si, beta, seed, depth)
+        ray, beta, _ = follow_camera_path(given, si, beta, seed, depth)
         if not largest(beta) > _f4(0.0):
             break
-        o = leave(si.p, si.ng, si.gap, d[0], d[1], d[2])
-        near, far = _f4(0.0), _INF
     return row

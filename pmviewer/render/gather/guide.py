@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_f, bsdf_pdf, bsdf_sample, shading_normal
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
+from pmviewer.kernels.dimensions import GATHER, GATHER_BESIDE, GATHER_GUIDED, GUIDE_SALT
 from pmviewer.kernels.memory import (
     count_trailing_zeros,
     load_u4,
@@ -67,9 +68,6 @@ CONCENTRATED, CONCENTRATED_CELLS = np.float32(1.0), np.float32(1.25)
 """Photons guide from this relative variance of the radiance over directions on, see `concentration`: below, their own
 noise costs more than they gain (measured). Cells blur more than cones."""
 
-GATHER_SET, BESIDE_SET, GUIDED_SET = np.array([2000, 2001, 2002], np.int64)
-"""Dimension sets of rays where all follow the BSDF, and of both kinds where some are guided."""
-
 
 def guides_of(grid: PhotonGrid, directions: Directions) -> NDArray[np.void]:
     """The record of a grid of photons that guide rays in that way; valid while the grid lives."""
@@ -102,7 +100,7 @@ def photons_near(grid, class_mask, p, n, seed, most, found):
                 lane = count_trailing_zeros(mask)
                 mask &= mask - _i4(1)
                 at, seen = seen, seen + _i8(1)
-                if at >= most:  # Vitter's algorithm R
+                if at >= most:  # algorithm R of Vitter 1985
                     state = _u4(_u4(state * _u4(1664525)) + _u4(1013904223))
                     at = (_i8(state) * seen) >> 32
                 if at < most:
@@ -158,23 +156,26 @@ def aim(given, si, seed, found):
     return _aim_by_cells
 
 
+@device
+def _guides(given, si, seed, most, least_concentration, found):
+    """Up to `most` photons around the point into `found`: their number, or 0 where they have nothing to tell."""
+    grid, mask = given.guides, given.eye.guide_mask
+    m = photons_near(grid, mask, si.p, si.ng, hash3(seed, given.eye.index, _u4(GUIDE_SALT)), most, found)
+    if m < FEWEST or concentration(found, m, shading_normal(si.bsdf)) < least_concentration:
+        return _i8(0)
+    return m
+
+
 def _aim_by_cones(given, si, seed, found):
-    eye = given.eye
-    m = photons_near(given.guides, eye.guide_mask, si.p, si.ng, hash3(seed, eye.index, GUIDED_SET), MOST_CONES, found)
-    if m < FEWEST or concentration(found, m, shading_normal(si.bsdf)) < CONCENTRATED:
-        return Aim(found, _i8(0), _i8(0))
-    return Aim(found, _i8(eye.guided_rays), m)
+    m = _guides(given, si, seed, MOST_CONES, CONCENTRATED, found)
+    return Aim(found, _i8(given.eye.guided_rays) if m > 0 else _i8(0), m)
 
 
 def _aim_by_cells(given, si, seed, found):
-    eye = given.eye
-    m = photons_near(
-        given.guides, eye.guide_mask, si.p, si.ng, hash3(seed, eye.index, GUIDED_SET), MOST_IN_CELLS, found
-    )
-    if m < FEWEST or concentration(found, m, shading_normal(si.bsdf)) < CONCENTRATED_CELLS:
-        return Aim(found, _i8(0), _i8(0))
-    fill_cells(found, 4 * MOST_IN_CELLS, m, si.bsdf, si.wo)
-    return Aim(found, _i8(eye.guided_rays), m)
+    m = _guides(given, si, seed, MOST_IN_CELLS, CONCENTRATED_CELLS, found)
+    if m > 0:
+        fill_cells(found, 4 * MOST_IN_CELLS, m, si.bsdf, si.wo)
+    return Aim(found, _i8(given.eye.guided_rays) if m > 0 else _i8(0), m)
 
 
 @specialised
@@ -196,50 +197,50 @@ def guided_pdf(guides, aimed, b, wi):
 
 
 @specialised
-def gather_direction(given, aimed, si, j, n, seed, numbers):
-    """Direction of ray j of n by the STORED lobes of the BSDF.
+def gather_direction(given, rays, si, j):
+    """Direction of ray j of a surface's `GatherRays` by the STORED lobes of the BSDF.
 
     Returns wi, weight = f·cos/pdf (times n/n_b or n/n_p where there are two kinds), the density of BSDF samples (0 for
     a guided ray: its emission is none of its business), the share by multiple importance sampling in gathered light, a
-    number to use and the ray's index in its sequences. Without gather rays the direction is that of `numbers`: one for
-    the lobe, two for the direction.
+    number to use and the ray's index in its sequences. Without gather rays the direction is that of `rays.numbers`: one
+    for the lobe, two for the direction.
     """
     if absent(part(given, "guides")):
         return _by_bsdf
     return _by_both
 
 
-def _by_bsdf(given, aimed, si, j, n, seed, numbers):
-    scene, eye = given.scene, given.eye
-    u_lobe, u, v = numbers
+def _by_bsdf(given, rays, si, j):
+    eye = given.eye
+    u_lobe, u, v = rays.numbers
     sample, u_end = eye.index, _f4(0.0)
     if eye.gather_rays > 0:
         sample = _u4(eye.index * _u4(eye.gather_rays) + _u4(j))
-        u, v, u_lobe, u_end = draw4(eye.sequence, seed, sample, GATHER_SET)
-    wi, weight, pdf, _ = bsdf_sample(scene, si.bsdf, STORED, si.wo, u_lobe, u, v)
+        u, v, u_lobe, u_end = draw4(eye.sequence, rays.seed, sample, GATHER)
+    wi, weight, pdf, _ = bsdf_sample(given.scene, si.bsdf, STORED, si.wo, u_lobe, u, v)
     return wi, weight, pdf, _f4(1.0), u_end, sample
 
 
-def _by_both(given, aimed, si, j, n, seed, numbers):
+def _by_both(given, rays, si, j):
     # Guides are for gather rays alone, so that n = eye.gather_rays here.
-    scene, eye, guides, b, wo = given.scene, given.eye, given.guides, si.bsdf, si.wo
+    eye, aimed, b, wo, n = given.eye, rays.aimed, si.bsdf, si.wo, rays.n
     guided = aimed.rays
     sample = _u4(eye.index * _u4(eye.gather_rays) + _u4(j))
     n_b = n - guided
     if j < n_b:
-        place, dimensions = sample, GATHER_SET
+        place, dimension = sample, GATHER
         if guided > 0:
-            place, dimensions = _u4(eye.index * _u4(n_b) + _u4(j)), BESIDE_SET
-        u, v, u_lobe, u_end = draw4(eye.sequence, seed, place, dimensions)
-        wi, weight, pdf, _ = bsdf_sample(scene, b, STORED, wo, u_lobe, u, v)
+            place, dimension = _u4(eye.index * _u4(n_b) + _u4(j)), GATHER_BESIDE
+        u, v, u_lobe, u_end = draw4(eye.sequence, rays.seed, place, dimension)
+        wi, weight, pdf, _ = bsdf_sample(given.scene, b, STORED, wo, u_lobe, u, v)
         share = _f4(1.0)
         if guided > 0:
-            share = power_heuristic(_f4(n_b), pdf, _f4(guided), guided_pdf(guides, aimed, b, wi))
+            share = power_heuristic(_f4(n_b), pdf, _f4(guided), guided_pdf(given.guides, aimed, b, wi))
             weight = scale(weight, _f4(n) / _f4(n_b))
         return wi, weight, pdf, share, u_end, sample
     place = _u4(eye.index * _u4(guided) + _u4(j - n_b))
-    u, v, u_pick, u_end = draw4(eye.sequence, seed, place, GUIDED_SET)
-    wi, q = guided_direction(guides, aimed, b, u, v, u_pick)
+    u, v, u_pick, u_end = draw4(eye.sequence, rays.seed, place, GATHER_GUIDED)
+    wi, q = guided_direction(given.guides, aimed, b, u, v, u_pick)
     cos = dot(wi, shading_normal(b))
     weight, share = (_f4(0.0), _f4(0.0), _f4(0.0)), _f4(0.0)
     if cos > _f4(0.0) and q > _f4(0.0):

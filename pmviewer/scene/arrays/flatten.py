@@ -5,6 +5,7 @@ Primitives are numbered triangles first, then quadrics (spheres, cylinders, disk
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -99,8 +100,9 @@ def _bounds(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.array(g.center) - g.radius, np.array(g.center) + g.radius
 
 
-def flatten(scene: Scene) -> FlatScene:
-    """Build arrays, acceleration structure and light table.
+def flatten(scene: Scene, on_type: Callable[[np.dtype], None] = lambda of_record: None) -> FlatScene:
+    """Build arrays, acceleration structure and light table. `on_type` hears of what type the record will be, before the
+    tree is built.
 
     Raises SceneError when the scene has no surface or no light that emits.
     """
@@ -114,6 +116,7 @@ def flatten(scene: Scene) -> FlatScene:
     features = _features(scene, materials, lights, bool(emissions))
     record = np.zeros(1, K.scene_dtype(**features))
     r = record[0]
+    on_type(record.dtype)
     stage(f"building the tree over {len(stored.vertices):,} triangles")
     if stored.groups:
         bvh, shown = build_instanced(scene, stored.groups, stored.vertices, stored.quadrics, stored.shape_of_prim, r)

@@ -197,7 +197,7 @@ def clean_instances(instances: Sequence[Instance], diagnostics: Diagnostics) -> 
     groups: dict[Group, Group] = {}
     for group in dict.fromkeys(instance.group for instance in instances):
         groups[group] = Group(group.name, clean_shapes(list(group.shapes), diagnostics))
-    kept = [replace(i, group=groups[i.group]) for i in instances if groups[i.group].shapes]
+    kept = [Instance(i.name, groups[i.group], i.to_world) for i in instances if groups[i.group].shapes]
     if len(kept) < len(instances):
         diagnostics.dropped["instance of an empty group"] += len(instances) - len(kept)
     return tuple(kept)

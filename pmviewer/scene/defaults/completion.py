@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.arrays.instances import joint_bounds
@@ -15,10 +16,11 @@ from pmviewer.scene.defaults.light_reach import lights_enough
 from pmviewer.scene.defaults.light_rigs import Rig, headlight, overcast_sky, sunlight
 from pmviewer.scene.defaults.picture_rating import picture_rays
 from pmviewer.scene.defaults.proxy import Proxy, proxy_of
-from pmviewer.scene.defaults.studio import Studio, has_ground, room_light, studio_of
+from pmviewer.scene.defaults.studio import Studio, has_ground, has_level_bottom, room_light, studio_of
 from pmviewer.scene.defaults.viewpoint import Viewpoint, chosen_viewpoint, enclosure, sees
 from pmviewer.scene.description import Camera, Environment, Light, Scene
 
+Float = NDArray[np.float64]
 ROOM = 0.7
 """Share of the directions from a place with a surface in them, from which on it is lit as a room is: from inside."""
 NO_LIGHT = "The file has no light"
@@ -71,7 +73,7 @@ def _with_studio(scene: Scene, proxy: Proxy, view: Viewpoint, up: Up, why: str |
     """Shapes and lights of a studio added, or of a room's lamp; `why` begins the sentence that says so."""
     first = len(scene.materials)
     box = joint_bounds(scene.shapes, scene.instances)
-    if view.inside or view.enclosed >= ROOM:
+    if view.inside or (view.enclosed >= ROOM and _looks_into(proxy, scene.camera, view.place)):
         studio = room_light(proxy, view, up, first)
         added = "a light under the ceiling" + (" and a sky were" if studio.sky else " was")
     else:
@@ -86,6 +88,18 @@ def _with_studio(scene: Scene, proxy: Proxy, view: Viewpoint, up: Up, why: str |
         lights=_with_sky(scene.lights, studio),
         warnings=warnings,
     )
+
+
+def _looks_into(proxy: Proxy, camera: Camera, place: Float) -> bool:
+    """Does most of what the camera sees lie in sight of the place? A hole in the side of a block is no room."""
+    rays = picture_rays(camera, 24)
+    hits = proxy.closest(np.broadcast_to(camera.origin, rays.shape), rays)
+    if not hits.met.any():
+        return False
+    found = np.asarray(camera.origin) + (hits.distance[:, None] * rays)[hits.met]
+    way = place - found
+    distance = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
+    return float(proxy.occluded(found, way / distance[:, None], distance).mean()) <= 0.5
 
 
 def _with_sky(lights: tuple[Light, ...], studio: Studio) -> tuple[Light, ...]:
@@ -134,4 +148,5 @@ def upright(scene: Scene, proxy: Proxy) -> Up:
     low, high = proxy.corners.min(axis=(0, 1)), proxy.corners.max(axis=(0, 1))
     size = high - low
     flat = size[2] < 0.5 * max(size[0], size[1])
-    return "z" if flat and has_ground(proxy, (low, high), "z") and not has_ground(proxy, (low, high), "y") else "y"
+    box = low, high
+    return "z" if flat and has_level_bottom(proxy, box, "z") and not has_level_bottom(proxy, box, "y") else "y"

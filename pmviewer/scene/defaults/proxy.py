@@ -19,9 +19,9 @@ from pmviewer.kernels import scene as K
 from pmviewer.kernels.accel.bvh import Bvh, build
 from pmviewer.kernels.accel.occlusion import cast_occluded
 from pmviewer.kernels.accel.raycast import cast_closest
+from pmviewer.kernels.meshes.cells import cell_means, spanning
 from pmviewer.scene.arrays.tessellate import triangles_of
-from pmviewer.scene.description import Mesh, Scene, Shape
-from pmviewer.scene.formats.mitsuba.transform import mirrors
+from pmviewer.scene.description import Group, Mesh, Scene, Shape
 
 Float = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -132,23 +132,36 @@ def _parts(scene: Scene, keep: Bools) -> list[Part]:
     parts = _reduced(own)
     start = len(scene.shapes)
     budget = _MOST_COPIED
+    places: dict[Group, list[Float]] = {}
+    for instance in scene.instances:
+        places.setdefault(instance.group, []).append(instance.to_world)
     for group in scene.groups:
         numbered = [(start + i, s) for i, s in enumerate(group.shapes) if keep[start + i]]
         start += len(group.shapes)
         inside = _reduced(numbered)
-        shown = [instance for instance in scene.instances if instance.group is group]
+        shown = places[group]
         count = sum(len(part[0]) for part in inside) * len(shown)
         step = max(1, -(-count // max(budget, 1)))
         budget -= count // step
-        for instance in shown[::step]:
-            m = instance.to_world
-            turned = np.linalg.inv(m[:3, :3]) * (-1.0 if mirrors(m) else 1.0)
-            for corners, normals, shape in inside:
-                parts.append((corners @ m[:3, :3].T + m[:3, 3], normals @ turned, shape))
+        if inside:
+            parts += _copied(np.stack(shown[::step]), inside)
     if sum(len(part[0]) for part in parts) > 2 * MOST_EXACT and scene.instances:
         corners, normals, shape = (np.concatenate(column) for column in zip(*parts))
-        faces = np.arange(3 * len(corners)).reshape(-1, 3)
+        faces = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
         return [_merged(corners.reshape(-1, 3), faces, shape, lambda kept: normals[kept])]
+    return parts
+
+
+def _copied(to_world: Float, inside: list[Part]) -> list[Part]:
+    """The parts of a group under each of the matrices (k, 4, 4)."""
+    linear, moved = to_world[:, :3, :3], to_world[:, None, None, :3, 3]
+    sign = np.where(np.linalg.det(linear) < 0, -1.0, 1.0)[:, None, None]
+    turned = np.linalg.inv(linear) * sign
+    parts = []
+    for corners, normals, shape in inside:
+        placed = np.einsum("kij,ncj->knci", linear, corners) + moved
+        facing = np.einsum("nj,kji->kni", normals, turned)
+        parts.append((placed.reshape(-1, 3, 3), facing.reshape(-1, 3), np.tile(shape, len(to_world))))
     return parts
 
 
@@ -201,12 +214,13 @@ def _merged(vertices: Float, faces: NDArray, shape_of: NDArray, fronts: Fronts, 
     if not size > 0:
         size = max(float(np.ptp(some, axis=0).max()) / cells, 1e-300)
     start = (low + high) / 2 - cells / 2 * size
-    cell = np.floor(np.clip((vertices - start) / size, -1, cells)).astype(np.int32) + 1
     side = cells + 2
-    key = (cell[:, 0] * side + cell[:, 1]) * side + cell[:, 2]
-    k = key[faces]
-    kept = np.flatnonzero((k[:, 0] != k[:, 1]) & (k[:, 1] != k[:, 2]) & (k[:, 2] != k[:, 0]))
-    k = k[kept].astype(np.int64)
+    key, mean = np.empty(len(vertices), np.int32), np.empty((side**3, 3))
+    cell_means(np.ascontiguousarray(vertices, np.float64), start, size, cells, key, mean)
+    faces = np.ascontiguousarray(faces)
+    kept = np.empty(len(faces), np.int64)
+    kept = kept[: spanning(faces, key, kept)]
+    k = key[faces[kept]].astype(np.int64)
     if len(k) > MOST_EXACT // 4:
         packed = np.sort(k, axis=1) @ np.array([side**6, side**3, 1])
         _, first = np.unique(packed, return_index=True)
@@ -217,6 +231,4 @@ def _merged(vertices: Float, faces: NDArray, shape_of: NDArray, fronts: Fronts, 
     finer = min(MOST_CELLS, int(cells * math.sqrt(MOST_EXACT / 2 / max(len(k), 1))))
     if cells == CELLS and finer > 1.3 * CELLS:
         return _merged(vertices, faces, shape_of, fronts, finer)
-    number = np.maximum(np.bincount(key, minlength=side**3), 1)
-    mean = np.stack([np.bincount(key, vertices[:, j], side**3) / number for j in range(3)], axis=1)
     return mean[k], fronts(kept), shape_of[kept]

@@ -24,6 +24,10 @@ SKY_RADIANCE = 0.1
 FLOOR_RADIUS, FLOOR_GAP, FLOOR_ALBEDO = 2.5, 1e-3, 0.6
 GROUND = 0.6
 """Share of the scene's ground plan from which on surfaces near its lower end are a floor."""
+FREE_GROUND = 0.25
+"""Share of the plan, and of its rim, over which there must be nothing above such a floor."""
+_PLAN, _GAP, _THICKEST = 16, 1e-2, 0.08
+"""Places along the plan; how far below the scene they lie, in radii; thickness of a floor over the scene's height."""
 WINDOW_SKY, MOST_SKY = 0.2, 2.0
 """Radiance, and the most power of such a sky, relative to that of the light under the ceiling."""
 CLOSED = 0.97
@@ -60,18 +64,37 @@ def studio_of(box: tuple[Float, Float], up: Up, first_material: int, eye: Float,
 
 
 def has_ground(proxy: Proxy, box: tuple[Float, Float], up: Up) -> bool:
-    """Does the scene stand on a floor of its own: level surfaces near its lower end under most of its ground plan?"""
+    """Does the scene stand on a floor of its own: level surfaces near its lower end under most of its ground plan, in
+    part with nothing above them, at the rim of the plan too? The bottom of a crate is no floor."""
+    below, level = _level_bottom(proxy, box, up)
+    if level.mean() < GROUND:
+        return False
+    top = axes_of(up)[1]
+    above = below + (2 * _GAP * proxy.radius + _THICKEST * float((box[1] - box[0]) @ np.abs(top))) * top
+    free = level & ~proxy.closest(above, np.broadcast_to(top, above.shape)).met
+    grid = free.reshape(_PLAN, _PLAN)
+    rim = np.concatenate([grid[0], grid[-1], grid[1:-1, 0], grid[1:-1, -1]])
+    return bool(min(free.mean(), rim.mean()) >= FREE_GROUND)
+
+
+def has_level_bottom(proxy: Proxy, box: tuple[Float, Float], up: Up) -> bool:
+    """Are there level surfaces near the scene's lower end under most of its ground plan?"""
+    return bool(_level_bottom(proxy, box, up)[1].mean() >= GROUND)
+
+
+def _level_bottom(proxy: Proxy, box: tuple[Float, Float], up: Up) -> tuple[Float, NDArray[np.bool_]]:
+    """Points (n, 3) in a grid just below the scene, and above which of them is a level surface near its lower end."""
     low, high = box
     right, top, front = axes_of(up)
     size = high - low
     tall = float(abs(size @ top))
-    steps = (np.arange(16) + 0.5) / 16 - 0.5
+    steps = (np.arange(_PLAN) + 0.5) / _PLAN - 0.5
     x, y = (grid.reshape(-1, 1) for grid in np.meshgrid(steps, steps))
-    gap = 1e-2 * proxy.radius
+    gap = _GAP * proxy.radius
     below = (low + high) / 2 + x * size * np.abs(right) + y * size * np.abs(front) - (tall / 2 + gap) * top
     hits = proxy.closest(below, np.broadcast_to(top, below.shape))
     level = np.abs(proxy.normals[hits.triangle] @ top) > 0.97
-    return float((hits.met & level & (hits.distance <= gap + 0.08 * tall + 1e-6 * proxy.radius)).mean()) >= GROUND
+    return below, hits.met & level & (hits.distance <= gap + _THICKEST * tall + 1e-6 * proxy.radius)
 
 
 def room_light(proxy: Proxy, view: Viewpoint, up: Up, first_material: int) -> Studio:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import stat
 from pathlib import Path
+from typing import BinaryIO
 
 from pmviewer.errors import SceneError
 
 
-def read_regular(path: Path, what: str = "The file") -> bytes:
-    """The content of a regular file.
+def open_regular(path: Path, what: str = "The file") -> tuple[BinaryIO, int]:
+    """A regular file, opened, and its size in bytes.
 
     What it is is looked up on the opened file, so that nothing else can take its place behind the check; opening does
     not wait for a pipe's other end. Raises SceneError.
@@ -19,10 +20,17 @@ def read_regular(path: Path, what: str = "The file") -> bytes:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except (OSError, ValueError) as error:
         raise SceneError(f"{what} can't be read: {getattr(error, 'strerror', None) or error}.", path) from None
-    with open(descriptor, "rb") as file:
-        kind = os.fstat(descriptor)
-        if not stat.S_ISREG(kind.st_mode):
-            raise SceneError(f"{what} is not a regular file.", path)
+    about = os.fstat(descriptor)
+    if not stat.S_ISREG(about.st_mode):
+        os.close(descriptor)
+        raise SceneError(f"{what} is not a regular file.", path)
+    return os.fdopen(descriptor, "rb"), about.st_size
+
+
+def read_regular(path: Path, what: str = "The file") -> bytes:
+    """The content of a regular file. Raises SceneError."""
+    file, _ = open_regular(path, what)
+    with file:
         try:
             return file.read()
         except OSError as error:

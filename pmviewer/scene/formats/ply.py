@@ -38,16 +38,17 @@ class PlyFile:
     notes: tuple[str, ...] = ()
 
 
-def read_ply(path: Path) -> Mesh:
+def read_ply(path: Path, face_colours: bool = False) -> Mesh:
     """The file's triangles (polygons are cut), with its normals, texture coordinates and colours if it has them.
 
-    Colours of one byte are decoded from sRGB, others are taken as linear. Raises SceneError for anything unreadable;
-    indices are checked by `clean`.
+    Colours of one byte are decoded from sRGB, others are taken as linear. Where vertices and faces have some, those of
+    the vertices count, with `face_colours` the faces'. Raises SceneError for anything unreadable; indices are checked
+    by `clean`.
     """
-    return read_ply_file(path).mesh
+    return read_ply_file(path, face_colours).mesh
 
 
-def read_ply_file(path: Path) -> PlyFile:
+def read_ply_file(path: Path, face_colours: bool = False) -> PlyFile:
     """`read_ply` with what the file says besides. Raises SceneError."""
     data = read_regular(path, "The mesh")
     if not data:
@@ -75,7 +76,7 @@ def read_ply_file(path: Path) -> PlyFile:
     if isinstance(wedges, ListColumn) and mesh.uv is None and owner is None and len(wedges.items) == 6 * len(faces):
         mesh = replace(_apart(mesh), uv=wedges.items.reshape(-1, 2).astype(np.float64))
     of_faces = _colours({name: c for name, c in face.items() if not isinstance(c, ListColumn)})
-    if of_faces is not None and mesh.colours is None:
+    if of_faces is not None and (face_colours or mesh.colours is None):
         each = of_faces if owner is None else of_faces[owner]
         mesh = replace(_apart(mesh), colours=np.repeat(each, 3, axis=0))
     alpha = vertex.get("alpha")

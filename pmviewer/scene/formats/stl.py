@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.meshes.rows import text_facets, weld
+from pmviewer.kernels.meshes.rows import text_facets
 from pmviewer.progress import stage
 from pmviewer.scene.description import Mesh
 from pmviewer.scene.diagnostics import Diagnostics
-from pmviewer.scene.formats.open_file import read_regular
+from pmviewer.scene.formats.open_file import open_regular
+from pmviewer.scene.meshes.welding import Welder
 
 _HEADER, _RECORD = 84, 50
+_AT_ONCE = 20_000
+"""Triangles of a binary file that are in memory as they were read."""
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -23,10 +28,13 @@ def read_stl(path: Path, diagnostics: Diagnostics) -> list[tuple[str, Mesh]]:
 
     Raises SceneError for what is no STL file.
     """
-    data = read_regular(path)
-    claimed = int.from_bytes(data[80:84], "little") if len(data) >= _HEADER else -1
-    if claimed >= 0 and len(data) == _HEADER + _RECORD * claimed:
-        return _binary(data, claimed, path, diagnostics)
+    file, size = open_regular(path)
+    with file:
+        data = file.read(_HEADER)
+        claimed = int.from_bytes(data[80:84], "little") if len(data) == _HEADER else -1
+        if claimed >= 0 and size == _HEADER + _RECORD * claimed:
+            return _binary(data, file, claimed, path, diagnostics)
+        data += file.read()
     start = data[:1024].removeprefix(b"\xef\xbb\xbf").lstrip()
     if start[:5].lower() == b"solid" and (b"facet" in data[:100_000].lower() or b"endsolid" in data[-1000:].lower()):
         return _text(data, path)
@@ -39,7 +47,7 @@ def read_stl(path: Path, diagnostics: Diagnostics) -> list[tuple[str, Mesh]]:
         if claimed == 0 or claimed == 2**32 - 1:
             what, claimed = f"The file does not say how many triangles it has; {whole:,} are shown.", whole
         diagnostics.warn(what)
-        return _binary(data, min(claimed, whole), path, diagnostics)
+        return _binary(data[:_HEADER], io.BytesIO(data[_HEADER:]), min(claimed, whole), path, diagnostics)
     hint = "Is the file complete? Export it again."
     raise SceneError("This is neither a binary nor a text STL file.", path, hint=hint)
 
@@ -53,16 +61,22 @@ def _plausible(data: bytes, claimed: int, whole: int) -> bool:
         return bool((np.abs(facets["corners"]) < 1e10).all() and (np.abs(facets["normal"]) < 1.001).all())
 
 
-def _binary(data: bytes, n: int, path: Path, diagnostics: Diagnostics) -> list[tuple[str, Mesh]]:
-    facets = np.frombuffer(data, _FACET, n, _HEADER)
+def _binary(header: bytes, records: BinaryIO, n: int, path: Path, diagnostics: Diagnostics) -> list[tuple[str, Mesh]]:
     if not n:
         raise SceneError("The STL file has no triangles.", path, hint="Export it again.")
-    if b"COLOR=" in data[:80] or facets["attribute"].any():
+    stage(f"reading {n:,} triangles")
+    welder, coloured, left = Welder(n), b"COLOR=" in header, n
+    while left:
+        data = records.read(_RECORD * min(left, _AT_ONCE))
+        facets = np.frombuffer(data, _FACET, len(data) // _RECORD)
+        if not len(facets):
+            raise SceneError("The STL file ended while it was read.", path, hint="Open it again.")
+        welder.add(facets["corners"])
+        coloured = coloured or bool(facets["attribute"].any())
+        left -= len(facets)
+    if coloured:
         diagnostics.warn("Colours of the STL file are ignored: programs do not agree on how to write them.")
-    with np.errstate(invalid="ignore"):
-        corners = np.add(facets["corners"], np.float32(0), dtype=np.float32).reshape(-1, 3)  # −0 becomes 0
-    del facets, data
-    return [(path.stem, _welded(corners))]
+    return [(path.stem, welder.mesh())]
 
 
 def _text(data: bytes, path: Path) -> list[tuple[str, Mesh]]:
@@ -81,15 +95,14 @@ def _text(data: bytes, path: Path) -> list[tuple[str, Mesh]]:
         if len(own):
             name = data[place : data.find(b"\n", place)].decode("utf-8", "replace")[5:].strip()[:80]
             with np.errstate(over="ignore", invalid="ignore"):  # what is infinite is left out later
-                rounded = own.astype(np.float32) + np.float32(0)
+                rounded = own.astype(np.float32)
             found.append((name or path.stem, _welded(rounded)))
     return found
 
 
 def _welded(corners: NDArray[np.float32]) -> Mesh:
-    """The triangles of corners (3 n, 3), which have no −0, with each vertex once."""
+    """The triangles of corners (3 n, 3) with each vertex once."""
     stage(f"joining the corners of {len(corners) // 3:,} triangles")
-    size = 1 << max(2, (4 * len(corners) // 3).bit_length())
-    index, first = np.empty(len(corners), np.int32), np.empty(len(corners), np.int32)
-    used = weld(corners.view(np.uint32), np.full(size, -1, np.int32), index, first)
-    return Mesh(corners[first[:used]].astype(np.float64), index.reshape(-1, 3))
+    welder = Welder(len(corners) // 3)
+    welder.add(corners.reshape(-1, 3, 3))
+    return welder.mesh()

@@ -10,7 +10,9 @@ from __future__ import annotations
 from pydantic import Field
 
 from pmviewer.settings.schema.base import Auto, Group, Scale, Stage, Vec3, setting
+from pmviewer.settings.schema.camera import CameraSettings
 from pmviewer.settings.schema.compare import Compare
+from pmviewer.settings.schema.direct import Direct
 from pmviewer.settings.schema.display import (
     CacheOverlay,
     Colour,
@@ -27,10 +29,11 @@ from pmviewer.settings.schema.display import (
 )
 from pmviewer.settings.schema.estimate import Estimate
 from pmviewer.settings.schema.free_camera import FreeCamera
-from pmviewer.settings.schema.image import CameraSettings, Direct, Gather, Render
+from pmviewer.settings.schema.gather import Gather
 from pmviewer.settings.schema.importance import Importance
 from pmviewer.settings.schema.light import Light
 from pmviewer.settings.schema.light_pass import Photons
+from pmviewer.settings.schema.render import Render
 
 __all__ = [
     "Auto",

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
+from pmviewer.settings.needs import Need, Needs
 from pmviewer.settings.schema.base import Group, setting
+
+TRACED = Need(lambda f: f.plan.photons, "This method traces no photons, or no surface stores them.")
+DECIDED_BY_IMPORTANCE = Need(
+    lambda f: f.plan.chooses_photons,
+    "Importance decides nothing now: choose a rule that uses it, such as importance.deposition.",
+)
+AT_EQUAL_ERROR = Need(lambda f: f.settings.compare.equal == "error", "Only at equal error (compare.equal).")
 
 
 class Compare(Group):
     """Comparison without importance"""
+
+    needs: ClassVar[Needs] = (
+        TRACED,
+        DECIDED_BY_IMPORTANCE,
+    )
 
     equal: Literal["photons", "error"] = setting(
         "photons",
@@ -35,6 +48,7 @@ class Compare(Group):
         unit="× passes",
         ge=1.0,
         le=1000.0,
+        needs=(AT_EQUAL_ERROR,),
     )
     split: float = setting(
         0.5,

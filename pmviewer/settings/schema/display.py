@@ -2,11 +2,85 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict
 
-from pmviewer.settings.schema.base import Auto, Group, setting
+from pmviewer.settings.needs import BOTH_MAPS, IMPORTANCE, SHADOW_PHOTONS, Need, Needs, never
+from pmviewer.settings.schema.base import Auto, Group, setting, subgroup
+
+LOOKED_UP = Need(
+    lambda f: f.plan.photons, "Nothing is looked up: this method uses no photons, or no surface stores them."
+)
+STORED = Need(lambda f: f.plan.photons, "No photons are stored: this method uses none, or no surface stores them.")
+REQUIRED_DENSITY = Need(
+    lambda f: f.plan.importance or f.plan.deposition == "constant density",
+    "Only with importance (importance.map) or constant density (importance.deposition).",
+)
+STORED_BY_CHANCE = Need(
+    lambda f: f.plan.deposition == "Keller-Wald",
+    "Only with the deposition rule 'Keller-Wald' (importance.deposition).",
+)
+CONVERGENCE = Need(
+    lambda f: f.plan.convergence,
+    "Only with density control of a caustic map, and its criterion (importance.convergence).",
+)
+RADIANCE_PHOTONS = Need(
+    lambda f: f.plan.radiance, "Only with the method 'gather' and radiance photons (gather.radiance_photons)."
+)
+VIEW_NEEDS: dict[str, Needs] = {
+    "look-up radius": (LOOKED_UP,),
+    "photon count": (LOOKED_UP,),
+    "shadow rays skipped": (SHADOW_PHOTONS,),
+    "radiance photons": (RADIANCE_PHOTONS,),
+    "radiance cells": (RADIANCE_PHOTONS,),
+    "importance": (STORED, IMPORTANCE),
+    "required density": (STORED, REQUIRED_DENSITY),
+    "achieved density": (STORED,),
+    "density ratio": (STORED, REQUIRED_DENSITY),
+    "storing probability": (STORED, STORED_BY_CHANCE),
+    "caustic convergence": (STORED, CONVERGENCE),
+}
+"""Of the views that tell how the picture was made."""
+MAP_VIEWS = (
+    "look-up radius",
+    "photon count",
+    "importance",
+    "required density",
+    "achieved density",
+    "density ratio",
+    "storing probability",
+)
+"""Views that show one of the maps."""
+VIEW_OF_A_MAP = Need(
+    lambda f: f.settings.display.view in MAP_VIEWS,
+    f"Only with the views {', '.join(repr(view) for view in MAP_VIEWS)}.",
+)
+
+TRACED = Need(lambda f: f.plan.photons, "This method traces no photons.")
+CAUSTIC_PHOTONS = Need(
+    lambda f: f.plan.caustic_classes,
+    "No caustic photons: the scene has no mirror or glass, or the method does not use them.",
+)
+RADIANCE_SHOWN = Need(lambda f: f.plan.radiance, "Only the method 'gather' has radiance photons, where they are on.")
+CACHE_SHOWN = Need(lambda f: f.plan.cache, "Only the method 'gather' has an irradiance cache, where it is on.")
+IMPORTANCE_OF_EACH_MAP = Need(
+    lambda f: f.plan.caustic_classes and f.plan.global_classes and f.plan.gather,
+    "One importance serves both maps: they are shown at the same places.",
+)
+JUDGED = Need(lambda f: f.plan.judges, "Every photon is stored (importance.deposition).")
+GATHER_RAYS = Need(lambda f: f.plan.gather, "Only the method 'gather' casts gather rays.")
+PLAIN_EMISSION = Need(
+    lambda f: f.plan.emission == "off", "Guided emission takes no projection maps (importance.emission)."
+)
+PROJECTED = Need(
+    lambda f: f.settings.photons.projection != "off",
+    "Photons leave the lights in all directions (photons.projection).",
+)
+CAUSTIC_TRAJECTORIES = Need(
+    lambda f: f.settings.photons.q != 1.0 and f.settings.photons.q_rule != "photons",
+    "All trajectories fill the global map, and leave for any surface (photons.q).",
+)
 
 
 class Display(Group):
@@ -43,6 +117,7 @@ class Display(Group):
         "picture.",
         stage="display",
         scale="choice",
+        choice_needs=VIEW_NEEDS,
     )
     map: Literal["global", "caustic"] = setting(
         "global",
@@ -52,6 +127,10 @@ class Display(Group):
         stage="display",
         scale="choice",
         title="map of the view",
+        needs=(
+            VIEW_OF_A_MAP,
+            BOTH_MAPS,
+        ),
     )
     exposure: float | Auto = setting(
         "auto",
@@ -94,9 +173,27 @@ class PointOverlay(Group):
     )
 
 
+def coloured_by_irradiance(what: str) -> Any:
+    """The colour of points that are light of many photons."""
+    return setting(
+        "power",
+        "Colour by irradiance.",
+        stage="display",
+        scale="choice",
+        needs=(never(f"{what} are coloured by irradiance: light of many photons, lights and bounces."),),
+    )
+
+
+class RadianceOverlay(PointOverlay):
+    """Radiance photons drawn as points"""
+
+    colour: Colour = coloured_by_irradiance("Radiance photons")
+
+
 class CacheOverlay(PointOverlay):
     """Records of the irradiance cache drawn as points"""
 
+    colour: Colour = coloured_by_irradiance("Records")
     circles: bool = setting(
         False,
         "Circles as wide as records reach, for at most 2,000 of them, evenly thinned.",
@@ -131,7 +228,11 @@ class ImportonOverlay(PointOverlay):
         scale="choice",
     )
     map: Literal["both", "caustic", "global"] = setting(
-        "both", "Importons of which importance map are drawn.", stage="display", scale="choice"
+        "both",
+        "Importons of which importance map are drawn.",
+        stage="display",
+        scale="choice",
+        needs=(IMPORTANCE_OF_EACH_MAP,),
     )
 
 
@@ -151,7 +252,11 @@ class FateOverlay(PointOverlay):
         scale="choice",
     )
     map: Literal["both", "caustic", "global"] = setting(
-        "both", "Photons of which map are drawn.", stage="display", scale="choice"
+        "both",
+        "Photons of which map are drawn.",
+        stage="display",
+        scale="choice",
+        needs=(BOTH_MAPS,),
     )
     only: Literal["all", "stored", "not stored"] = setting(
         "all", "Draw all photons, or some.", stage="display", scale="choice"
@@ -234,8 +339,8 @@ class GatherOverlay(Group):
         scale="switch",
     )
     size: float = setting(1.5, "Line width.", stage="display", scale="linear", title="width", unit="px", ge=1, le=8)
-    colour: Literal["brought", "source"] = setting(
-        "brought",
+    colour: Literal["contribution", "source"] = setting(
+        "contribution",
         "Colour by the radiance that a ray adds to the pixel, or by what chose its direction: the BSDF or photons.",
         stage="display",
         scale="choice",
@@ -257,6 +362,7 @@ class ProjectionOverlay(Group):
         "Cells in which photons can meet any surface, or what makes caustics.",
         stage="display",
         scale="choice",
+        needs=(CAUSTIC_TRAJECTORIES,),
     )
     size: float = setting(
         0.15,
@@ -274,35 +380,21 @@ class ProjectionOverlay(Group):
 class Overlays(Group):
     """Overlays"""
 
-    caustic: PointOverlay = Field(default_factory=PointOverlay, title="caustic photons")
-    global_: PointOverlay = Field(default_factory=PointOverlay, alias="global", title="global photons")
-    radiance: PointOverlay = Field(default_factory=PointOverlay, title="radiance photons")
-    cache: CacheOverlay = Field(default_factory=CacheOverlay, title="irradiance cache")
-    shadow: ShadowOverlay = Field(default_factory=ShadowOverlay, title="shadow photons")
-    importons: ImportonOverlay = Field(default_factory=ImportonOverlay, title="importons")
-    fates: FateOverlay = Field(default_factory=FateOverlay, title="photons by fate")
-    lights: LightOverlay = Field(default_factory=LightOverlay, title="light importance")
-    paths: PathOverlay = Field(default_factory=PathOverlay, title="photon paths")
-    gather: GatherOverlay = Field(default_factory=GatherOverlay, title="gather rays")
-    projection: ProjectionOverlay = Field(default_factory=ProjectionOverlay, title="projection maps")
+    caustic: PointOverlay = subgroup(PointOverlay, "caustic photons", TRACED, CAUSTIC_PHOTONS)
+    global_: PointOverlay = subgroup(PointOverlay, "global photons", TRACED, alias="global")
+    radiance: RadianceOverlay = subgroup(RadianceOverlay, "radiance photons", TRACED, RADIANCE_SHOWN)
+    cache: CacheOverlay = subgroup(CacheOverlay, "irradiance cache", TRACED, CACHE_SHOWN)
+    shadow: ShadowOverlay = subgroup(ShadowOverlay, "shadow photons", SHADOW_PHOTONS)
+    importons: ImportonOverlay = subgroup(ImportonOverlay, "importons", TRACED, IMPORTANCE)
+    fates: FateOverlay = subgroup(FateOverlay, "photons by fate", TRACED, JUDGED)
+    lights: LightOverlay = subgroup(LightOverlay, "light importance", TRACED, IMPORTANCE)
+    paths: PathOverlay = subgroup(PathOverlay, "photon paths", TRACED)
+    gather: GatherOverlay = subgroup(GatherOverlay, "gather rays", TRACED, GATHER_RAYS)
+    projection: ProjectionOverlay = subgroup(ProjectionOverlay, "projection maps", TRACED, PLAIN_EMISSION, PROJECTED)
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
-    def by_map(self) -> dict[str, PointOverlay]:
-        """Name in a frame's clouds → how its points are drawn."""
-        maps = {"caustic": self.caustic, "global": self.global_, "radiance": self.radiance}
-        own = {"cache": self.cache, "shadow": self.shadow, "importons": self.importons}
-        return {**maps, **own, "fates": self.fates, "lights": self.lights}
-
-    @property
-    def any_shown(self) -> bool:
-        """Whether anything is drawn over the picture."""
-        others = self.paths.show or self.gather.show or self.projection.show
-        return others or any(style.show for style in self.by_map().values())
-
-    @property
-    def tests_depth(self) -> bool:
-        """Whether surfaces hide any of it."""
-        ways = self.paths, self.gather, self.projection
-        points = any(style.show and style.depth for style in self.by_map().values())
-        return points or any(way.show and way.depth for way in ways)
+    def styles(self) -> dict[str, Group]:
+        """How each overlay is drawn, by its name in the settings' paths."""
+        fields = type(self).model_fields
+        return {field.alias or name: getattr(self, name) for name, field in fields.items()}

@@ -2,13 +2,54 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
+from pmviewer.settings.needs import CAUSTIC_MAP, PHOTONS, Need, Needs
 from pmviewer.settings.schema.base import Auto, Group, setting
+
+NEAREST = Need(lambda f: f.settings.estimate.lookup == "nearest", "Only with look-up 'nearest'.")
+FIXED_RADIUS = Need(
+    lambda f: f.settings.estimate.lookup != "nearest",
+    "Not with look-up 'nearest': the k nearest photons set the radius.",
+)
+AUTOMATIC_MAX_RADIUS = Need(
+    lambda f: f.settings.estimate.max_radius == "auto", "Only with an automatic maximum radius."
+)
+NEW_MAPS = Need(
+    lambda f: f.settings.photons.renew == "each pass",
+    "One photon map serves all passes: the radius does not shrink.",
+)
+SHRINKING = Need(
+    lambda f: f.settings.photons.renew == "each pass" and f.settings.estimate.alpha != 1.0,
+    "The radius does not shrink (photons.renew, estimate.alpha).",
+)
+SHOWN_DIRECTLY = Need(
+    lambda f: f.plan.caustic_classes or f.plan.shown_directly,
+    "Gather rays alone look photons up, with the radius of the pass.",
+)
+AUTOMATIC_RADIUS = Need(
+    lambda f: f.settings.estimate.lookup != "nearest" or f.settings.estimate.max_radius == "auto",
+    "With look-up 'nearest' it bounds the automatic maximum radius.",
+)
+SHRINKING_RADIUS = Need(
+    lambda f: f.settings.estimate.lookup == "nearest" or f.settings.estimate.alpha != 1.0,
+    "The radius does not shrink with alpha = 1.",
+)
+DISC = Need(
+    lambda f: f.settings.estimate.area != "convex hull",
+    "The convex hull weighs all photons alike and has no dark edges to check for.",
+)
+CONE = Need(lambda f: f.settings.estimate.filter == "cone", "Only with the cone filter.")
+BOUNDARY = Need(
+    lambda f: f.settings.estimate.area == "convex hull" or f.settings.estimate.differential,
+    "Only with the area 'convex hull' or differential checking.",
+)
 
 
 class Estimate(Group):
     """Density estimate"""
+
+    needs: ClassVar[Needs] = (PHOTONS,)
 
     radius: float | Auto = setting(
         "auto",
@@ -19,6 +60,7 @@ class Estimate(Group):
         unit="× scene",
         ge=1e-7,
         le=10.0,
+        needs=(FIXED_RADIUS,),
     )
     caustic_radius: float = setting(
         0.5,
@@ -28,6 +70,10 @@ class Estimate(Group):
         unit="× radius",
         ge=0.05,
         le=2.0,
+        needs=(
+            FIXED_RADIUS,
+            CAUSTIC_MAP,
+        ),
     )
     radius_rule: Literal["pass", "pixel"] = setting(
         "pass",
@@ -36,6 +82,11 @@ class Estimate(Group):
         stage="image",
         scale="choice",
         title="radius by",
+        needs=(
+            FIXED_RADIUS,
+            SHRINKING,
+            SHOWN_DIRECTLY,
+        ),
     )
     alpha: float = setting(
         2.0 / 3.0,
@@ -45,6 +96,7 @@ class Estimate(Group):
         scale="linear",
         ge=0.0,
         le=1.0,
+        needs=(NEW_MAPS,),
     )
     floor: float = setting(
         1e-5,
@@ -54,6 +106,11 @@ class Estimate(Group):
         unit="× scene",
         ge=1e-7,
         le=0.1,
+        needs=(
+            NEW_MAPS,
+            AUTOMATIC_RADIUS,
+            SHRINKING_RADIUS,
+        ),
     )
     lookup: Literal["radius", "nearest"] = setting(
         "radius",
@@ -70,6 +127,7 @@ class Estimate(Group):
         unit="photons",
         ge=1,
         le=1000,
+        needs=(NEAREST,),
     )
     rim: Literal["left out", "half", "whole"] = setting(
         "left out",
@@ -77,6 +135,10 @@ class Estimate(Group):
         "photons, half suits stratified ones, whole is too bright.",
         stage="image",
         scale="choice",
+        needs=(
+            NEAREST,
+            DISC,
+        ),
     )
     max_radius: float | Auto = setting(
         "auto",
@@ -87,6 +149,7 @@ class Estimate(Group):
         unit="× scene",
         ge=1e-7,
         le=10.0,
+        needs=(NEAREST,),
     )
     black_level: float = setting(
         0.05,
@@ -96,6 +159,10 @@ class Estimate(Group):
         unit="W/(m² sr)",
         ge=1e-6,
         le=10.0,
+        needs=(
+            NEAREST,
+            AUTOMATIC_MAX_RADIUS,
+        ),
     )
     filter: Literal["constant", "cone", "gaussian", "simpson", "epanechnikov"] = setting(
         "constant",
@@ -103,9 +170,19 @@ class Estimate(Group):
         section="Kernel and area",
         stage="image",
         scale="choice",
+        needs=(DISC,),
     )
     cone_k: float = setting(
-        1.1, "Slope of the cone filter: its weight is 1 − d/(k·r).", stage="image", scale="linear", ge=1.0, le=10.0
+        1.1,
+        "Slope of the cone filter: its weight is 1 − d/(k·r).",
+        stage="image",
+        scale="linear",
+        ge=1.0,
+        le=10.0,
+        needs=(
+            DISC,
+            CONE,
+        ),
     )
     flatness: float = setting(
         0.2,
@@ -133,6 +210,7 @@ class Estimate(Group):
         ge=0.0,
         le=1.0,
         title="boundary share",
+        needs=(BOUNDARY,),
     )
     differential: bool = setting(
         False,
@@ -142,4 +220,5 @@ class Estimate(Group):
         stage="image",
         scale="switch",
         title="differential checking",
+        needs=(DISC,),
     )

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from pmviewer.settings.needs import Need
 from pmviewer.settings.schema.base import Auto, Group, Vec3, setting
+
+ON = Need(lambda f: f.settings.free_camera.on, "Only with the free camera (free_camera.on).")
+CUT = Need(lambda f: f.settings.free_camera.cut, "Nothing is cut open (free_camera.cut).")
+FRUSTUM = Need(lambda f: f.settings.free_camera.frustum, "The frustum is not drawn.")
 
 
 class FreeCamera(Group):
@@ -21,18 +26,21 @@ class FreeCamera(Group):
         "Eye point. Automatic: behind and above the render camera, so far that scene and camera fit.",
         stage="image",
         scale="vector",
+        needs=(ON,),
     )
     target: Vec3 | Auto = setting(
         "auto",
         "Point in the image's centre. Automatic: the centre of scene and render camera.",
         stage="image",
         scale="vector",
+        needs=(ON,),
     )
     up: Vec3 | Auto = setting(
         "auto",
         "Direction that is upright. Automatic: the coordinate axis nearest to the render camera's.",
         stage="image",
         scale="vector",
+        needs=(ON,),
     )
     fov: float | Auto = setting(
         "auto",
@@ -43,6 +51,7 @@ class FreeCamera(Group):
         ge=1.0,
         le=170.0,
         title="FOV",
+        needs=(ON,),
     )
     cut: bool = setting(
         True,
@@ -51,6 +60,7 @@ class FreeCamera(Group):
         stage="image",
         scale="switch",
         title="cut open",
+        needs=(ON,),
     )
     cut_height: float = setting(
         0.02,
@@ -60,8 +70,18 @@ class FreeCamera(Group):
         unit="× scene",
         ge=-2.0,
         le=2.0,
+        needs=(
+            ON,
+            CUT,
+        ),
     )
-    frustum: bool = setting(True, "Draw the render camera's frustum.", stage="display", scale="switch")
+    frustum: bool = setting(
+        True,
+        "Draw the render camera's frustum.",
+        stage="display",
+        scale="switch",
+        needs=(ON,),
+    )
     length: float = setting(
         0.3,
         "Distance of the frustum's image plane from the render camera's eye.",
@@ -71,4 +91,8 @@ class FreeCamera(Group):
         title="frustum length",
         ge=0.01,
         le=10.0,
+        needs=(
+            ON,
+            FRUSTUM,
+        ),
     )

@@ -2,13 +2,38 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
+from pmviewer.settings.needs import CAUSTIC_MAP, GLOBAL_MAP, IMPORTANCE, PHOTONS, Need, Needs
 from pmviewer.settings.schema.base import Auto, Group, setting
+
+OF_A_PIXEL = Need(lambda f: f.settings.importance.of == "pixel", "Only for the importance of a pixel (importance.of).")
+DEPOSITION = Need(
+    lambda f: f.plan.deposition == f.settings.importance.deposition,
+    lambda f: f"{f.settings.importance.deposition} needs importance (importance.map).",
+)
+KELLER_WALD = Need(lambda f: f.plan.deposition == "Keller-Wald", "Only with the deposition rule 'Keller-Wald'.")
+DENSITY_CONTROL = Need(
+    lambda f: f.plan.deposition in ("density control", "constant density"), "Only with density control."
+)
+CONSTANT_DENSITY = Need(
+    lambda f: f.plan.deposition == "constant density", "Only with the deposition rule 'constant density'."
+)
+GUARDED = Need(lambda f: f.settings.importance.around == "guarded", "Only with guarded neighbours (importance.around).")
+EMISSION = Need(
+    lambda f: f.plan.emission == f.settings.importance.emission,
+    lambda f: f"{f.settings.importance.emission} needs importance (importance.map).",
+)
+GUIDED_EMISSION = Need(lambda f: f.plan.emission != "off", "Only with guided emission.")
+CHRISTENSEN_DISCARD = Need(
+    lambda f: f.plan.emission == "Christensen discard", "Only with guided emission by Christensen discard."
+)
 
 
 class Importance(Group):
     """Importance"""
+
+    needs: ClassVar[Needs] = (PHOTONS,)
 
     map: Literal["off", "screen", "footprint", "average"] = setting(
         "off",
@@ -27,6 +52,7 @@ class Importance(Group):
         unit="importons",
         ge=100,
         le=5_000_000,
+        needs=(IMPORTANCE,),
     )
     neighbours: int = setting(
         200,
@@ -36,6 +62,7 @@ class Importance(Group):
         unit="importons",
         ge=10,
         le=1024,
+        needs=(IMPORTANCE,),
     )
     of: Literal["image", "pixel"] = setting(
         "image",
@@ -43,6 +70,7 @@ class Importance(Group):
         stage="photons",
         scale="choice",
         title="importance of",
+        needs=(IMPORTANCE,),
     )
     x: float = setting(
         0.5,
@@ -53,6 +81,10 @@ class Importance(Group):
         ge=0.0,
         le=1.0,
         title="pixel, across",
+        needs=(
+            IMPORTANCE,
+            OF_A_PIXEL,
+        ),
     )
     y: float = setting(
         0.5,
@@ -63,6 +95,10 @@ class Importance(Group):
         ge=0.0,
         le=1.0,
         title="pixel, down",
+        needs=(
+            IMPORTANCE,
+            OF_A_PIXEL,
+        ),
     )
     M_r: float = setting(
         2.0,
@@ -74,6 +110,10 @@ class Importance(Group):
         title="M_r, global map",
         ge=1e-3,
         le=1e4,
+        needs=(
+            IMPORTANCE,
+            GLOBAL_MAP,
+        ),
     )
     caustic_M_r: float = setting(
         25.0,
@@ -84,6 +124,10 @@ class Importance(Group):
         title="M_r, caustic map",
         ge=1e-3,
         le=1e5,
+        needs=(
+            IMPORTANCE,
+            CAUSTIC_MAP,
+        ),
     )
     deposition: Literal["all", "Keller-Wald", "density control", "constant density"] = setting(
         "all",
@@ -93,6 +137,7 @@ class Importance(Group):
         "density everywhere, without importance.",
         stage="photons",
         scale="choice",
+        needs=(DEPOSITION,),
     )
     f: float | Auto = setting(
         "auto",
@@ -104,6 +149,7 @@ class Importance(Group):
         title="f",
         ge=1e-9,
         le=1e6,
+        needs=(KELLER_WALD,),
     )
     epsilon: float = setting(
         0.02,
@@ -113,6 +159,7 @@ class Importance(Group):
         title="cut-off ε",
         ge=1e-3,
         le=1.0,
+        needs=(KELLER_WALD,),
     )
     cut_off: Literal["clamp", "discard"] = setting(
         "clamp",
@@ -121,6 +168,7 @@ class Importance(Group):
         stage="photons",
         scale="choice",
         title="below the cut-off",
+        needs=(KELLER_WALD,),
     )
     acceptance: Literal["step", "cosine"] = setting(
         "step",
@@ -129,6 +177,7 @@ class Importance(Group):
         "gaps that are filled, so that the density comes to rest at about 1.3 and 2.2 times the required one.",
         stage="photons",
         scale="choice",
+        needs=(DENSITY_CONTROL,),
     )
     around: Literal["nearest", "guarded"] = setting(
         "guarded",
@@ -140,6 +189,7 @@ class Importance(Group):
         stage="photons",
         scale="choice",
         title="neighbours of a photon",
+        needs=(DENSITY_CONTROL,),
     )
     contrast: float = setting(
         4.0,
@@ -150,6 +200,10 @@ class Importance(Group):
         title="guard: contrast",
         ge=1.0,
         le=1e6,
+        needs=(
+            DENSITY_CONTROL,
+            GUARDED,
+        ),
     )
     reach: float = setting(
         1.0,
@@ -162,6 +216,10 @@ class Importance(Group):
         title="guard: reach",
         ge=0.01,
         le=1.0,
+        needs=(
+            DENSITY_CONTROL,
+            GUARDED,
+        ),
     )
     convergence: Literal["off", "square", "cube"] = setting(
         "off",
@@ -173,6 +231,10 @@ class Importance(Group):
         stage="photons",
         scale="choice",
         title="caustic convergence",
+        needs=(
+            DENSITY_CONTROL,
+            CAUSTIC_MAP,
+        ),
     )
     density: float | Auto = setting(
         "auto",
@@ -183,6 +245,7 @@ class Importance(Group):
         title="constant density",
         ge=1e-6,
         le=1e12,
+        needs=(CONSTANT_DENSITY,),
     )
     emission: Literal["off", "Peter-Pietrek", "Christensen discard", "Christensen keep"] = setting(
         "off",
@@ -193,6 +256,7 @@ class Importance(Group):
         stage="photons",
         scale="choice",
         title="guided emission",
+        needs=(EMISSION,),
     )
     tests: int = setting(
         2,
@@ -204,6 +268,7 @@ class Importance(Group):
         title="test photons",
         ge=2,
         le=1024,
+        needs=(GUIDED_EMISSION,),
     )
     important: float = setting(
         0.05,
@@ -214,4 +279,5 @@ class Importance(Group):
         title="important from",
         ge=1e-4,
         le=1.0,
+        needs=(CHRISTENSEN_DISCARD,),
     )

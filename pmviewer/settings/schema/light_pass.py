@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from typing import Literal
 
+from pmviewer.settings.needs import FOLLOWED, GLOBAL_MAP, PHOTONS, Need
 from pmviewer.settings.schema.base import Group, setting
+
+GLOSSY = Need(lambda f: f.traits.glossy_roughness, "No glossy surface in this scene.")
+TERMS_OF_PATHS = Need(lambda f: f.plan.path or f.plan.photons, "No surface of this scene stores photons.")
+"""The path tracer sorts its paths into terms as photons would be."""
+PLAIN_EMISSION = Need(
+    lambda f: f.plan.emission == "off",
+    "Guided emission finds where photons start by test photons (importance.emission).",
+)
+PLAIN_EMISSION_FOR_Q = Need(
+    lambda f: f.plan.emission == "off", "With guided emission q is the probability of storing a global photon."
+)
 
 
 class Photons(Group):
@@ -18,6 +30,7 @@ class Photons(Group):
         unit="photons",
         ge=1,
         le=50_000_000,
+        needs=(PHOTONS,),
     )
     q: float = setting(
         1.0,
@@ -26,6 +39,7 @@ class Photons(Group):
         scale="log",
         ge=0.001,
         le=1.0,
+        needs=(PHOTONS,),
     )
     q_rule: Literal["trajectories", "photons"] = setting(
         "trajectories",
@@ -34,6 +48,11 @@ class Photons(Group):
         stage="photons",
         scale="choice",
         title="q rule",
+        needs=(
+            PHOTONS,
+            PLAIN_EMISSION_FOR_Q,
+            GLOBAL_MAP,
+        ),
     )
     indirect_caustics: bool = setting(
         True,
@@ -41,6 +60,7 @@ class Photons(Group):
         "(Keller and Wald §2.3). Off: they belong to the global map alone.",
         stage="photons",
         scale="switch",
+        needs=(TERMS_OF_PATHS, FOLLOWED),
     )
     renew: Literal["each pass", "once"] = setting(
         "each pass",
@@ -49,6 +69,7 @@ class Photons(Group):
         stage="photons",
         scale="choice",
         title="new photons",
+        needs=(PHOTONS,),
     )
     glossy: float = setting(
         0.2,
@@ -59,12 +80,14 @@ class Photons(Group):
         ge=0.0,
         le=1.0,
         title="glossy from",
+        needs=(GLOSSY,),
     )
     sequence: Literal["sobol", "independent"] = setting(
         "sobol",
         "Random numbers of the photons: Owen-scrambled Sobol points, or independent ones.",
         stage="photons",
         scale="choice",
+        needs=(PHOTONS,),
     )
     projection: Literal["auto", "on", "off"] = setting(
         "auto",
@@ -73,6 +96,7 @@ class Photons(Group):
         stage="photons",
         scale="choice",
         title="projection maps",
+        needs=(PHOTONS, PLAIN_EMISSION),
     )
     roulette: Literal["luminance", "channel maximum", "equal"] = setting(
         "luminance",
@@ -80,6 +104,7 @@ class Photons(Group):
         "before, or by rejection sampling, so that all photons have exactly the same luminance.",
         stage="photons",
         scale="choice",
+        needs=(PHOTONS,),
     )
     max_bounces: int = setting(
         64,
@@ -88,4 +113,5 @@ class Photons(Group):
         scale="integer",
         ge=1,
         le=1000,
+        needs=(PHOTONS,),
     )

@@ -32,6 +32,8 @@ class FileDialogs:
         self._browser: FileBrowser | None = None
         self._chosen: Chosen | None = None
         self._suffix = ""
+        self._folder: Path | None = None
+        """Where the last file was chosen."""
 
     @property
     def is_open(self) -> bool:
@@ -42,15 +44,21 @@ class FileDialogs:
         if self.is_open:
             return
         self._chosen, self._suffix = chosen, ""
+        folder = self._start(Path.cwd())
         if has_native_dialogs():
-            self._native = native.open_file(title, str(Path.cwd()), [name, " ".join(patterns), "All files", "*"])
+            self._native = native.open_file(title, str(folder), [name, " ".join(patterns), "All files", "*"])
         else:
-            self._browser = FileBrowser(title, Path.cwd(), patterns, self._answer)
+            self._browser = FileBrowser(title, folder, patterns, self._answer)
+
+    def _start(self, folder: Path) -> Path:
+        """The folder to begin in: where the last file was chosen, if there was one and it is still there."""
+        return self._folder if self._folder is not None and self._folder.is_dir() else folder
 
     def save(self, title: str, default: Path, chosen: Chosen) -> None:
-        """Ask where to write; `default` gives folder, name and suffix."""
+        """Ask where to write; `default` gives name and suffix, and the folder of the first dialog."""
         if self.is_open:
             return
+        default = self._start(default.parent) / default.name
         self._chosen, self._suffix = chosen, default.suffix
         patterns = [f"*{default.suffix}"]
         if has_native_dialogs():
@@ -72,4 +80,5 @@ class FileDialogs:
         chosen, self._chosen = self._chosen, None
         if path is None or chosen is None:
             return
+        self._folder = path.absolute().parent
         chosen(path if path.suffix or not self._suffix else path.with_suffix(self._suffix))

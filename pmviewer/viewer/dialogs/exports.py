@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.viewer.background import FILES
 from pmviewer.viewer.comparison import COMPARED_VIEWS
+from pmviewer.viewer.overlays.layers import any_shown
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport.viewport import Viewport
 
@@ -38,7 +41,7 @@ class Exports:
     def png(self, path: Path, *, overlays: bool) -> None:
         """The picture at its own resolution as it is shown, with or without the points over it."""
         settings, frame = self._state.settings, self._state.frame
-        points = overlays and (settings.overlays.any_shown or self._state.frustum() is not None)
+        points = overlays and any_shown(settings)
         display = self._state.shown_display
         pair, gain = self._state.shown_pair(), self._state.gain.gain
         if pair is not None and gain is not None:
@@ -50,7 +53,7 @@ class Exports:
                 write_png(path, gain_sheet(gain, pair[1]))
                 return f"wrote {path.absolute()}"
 
-            self._state.jobs.start("writing PNG", sheet)
+            self._state.background.start(FILES, "writing PNG", sheet)
             return
         if frame is not None and not points and display.view not in ("geometry", *COMPARED_VIEWS):
             # The same code as `pmviewer render` uses, so that both write the same picture.
@@ -61,7 +64,7 @@ class Exports:
                 write_frame_png(path, frame, display=display)
                 return f"wrote {path.absolute()}"
 
-            self._state.jobs.start("writing PNG", work)
+            self._state.background.start(FILES, "writing PNG", work)
             return
         pixels = self._viewport.capture(overlays=overlays)
         if pixels is None:
@@ -78,7 +81,7 @@ class Exports:
             write_png(path, pixels)
             return f"wrote {path.absolute()}"
 
-        self._state.jobs.start("writing PNG", work)
+        self._state.background.start(FILES, "writing PNG", work)
 
     def exr(self, path: Path, *, half: bool = False) -> None:
         """Every layer of the newest frame."""
@@ -87,13 +90,17 @@ class Exports:
             self._state.say("error", "There is no picture to export yet: wait for the first pass.")
             return
 
+        now = self._state.settings  # what is drawn over the picture may have changed since the pass
+        update = {"display": now.display, "overlays": now.overlays}
+        shown = replace(frame, settings=frame.settings.model_copy(update=update))
+
         def work() -> str:
             from pmviewer.output.frame_export import write_frame_exr
 
-            write_frame_exr(path, frame, half)
+            write_frame_exr(path, shown, half)
             return f"wrote {path.absolute()}"
 
-        self._state.jobs.start("writing EXR", work)
+        self._state.background.start(FILES, "writing EXR", work)
 
     def session(self, path: Path) -> None:
         """Settings and scene, so that the file reopens to the same picture."""
@@ -111,4 +118,4 @@ class Exports:
             write_session(path, settings, scene, passes, parameters)
             return f"wrote {path.absolute()}"
 
-        state.jobs.start("saving the session", work)
+        state.background.start(FILES, "saving the session", work)

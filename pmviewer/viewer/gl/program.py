@@ -1,7 +1,9 @@
-"""Shader programs from the files in `shaders/`."""
+"""Shader programs from the files in `shaders/`, and what everything that is drawn over the picture is told."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import WindowError
+from pmviewer.render.camera import Matrix
 from pmviewer.resources import data_folder
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Where things are drawn over the picture: into the bound framebuffer, whose depth buffer holds the surfaces if
+    any of them hides behind surfaces. `viewport` is the picture's width and height in pixels, `pixel_ratio` scales
+    widths (HiDPI), `limit` is the most points of a cloud, None as many as the user wants."""
+
+    view: Matrix
+    projection: Matrix
+    viewport: tuple[int, int]
+    pixel_ratio: float = 1.0
+    limit: int | None = None
+
+
+class Shaders:
+    """Programs of a context by name, each compiled when it is first used."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self.context = context
+        self._programs: dict[str, moderngl.Program] = {}
+
+    def get(self, name: str, constants: Callable[[], Mapping[str, Any]] = dict) -> moderngl.Program:
+        """The program of that name; `constants` gives its uniforms that never change. Raises WindowError."""
+        if name not in self._programs:
+            program = self._programs[name] = load_program(self.context, name)
+            set_uniforms(program, **constants())
+        return self._programs[name]
+
+    def release(self) -> None:
+        """Free what lies on the GPU."""
+        for program in self._programs.values():
+            program.release()
+        self._programs.clear()
 
 
 def load_program(context: moderngl.Context, name: str) -> moderngl.Program:

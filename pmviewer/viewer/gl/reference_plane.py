@@ -30,15 +30,24 @@ class ReferencePlane:
         if image is self._image:
             return False
         self._image = image
-        if self.texture is not None:
-            self.texture.release()
-            self.texture = None
+        self._free()
         if image is not None:
             height, width, channels = image.shape
             pixels = np.ascontiguousarray(image, np.float32)
             self.texture = self._context.texture((width, height), channels, pixels.tobytes(), dtype="f4", alignment=4)
             self.texture.repeat_x = self.texture.repeat_y = False
         return True
+
+    def _free(self) -> None:
+        if self.texture is not None:
+            self.texture.release()
+            self.texture = None
+
+    def release(self) -> None:
+        """Free what lies on the GPU."""
+        self._free()
+        self._image = None
+        self._colours.release()
 
     def bind(self) -> None:
         """For the error view: pixels are compared one by one, so nothing is interpolated. Diagnostic views use the

@@ -1,4 +1,4 @@
-"""The render camera's frustum as lines on the GPU, for the free camera.
+"""The render camera's frustum as lines, for the free camera.
 
 Lines have a dark rim, to be read on any ground. What surfaces hide shows through faintly.
 """
@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 
-from pmviewer.render.camera import Matrix
+from pmviewer.render.camera import CameraPose
+from pmviewer.render.free_camera import frustum_lines
+from pmviewer.settings.access import FreeCamera, Settings
 from pmviewer.viewer import theme
-from pmviewer.viewer.gl.program import load_program, set_uniforms
+from pmviewer.viewer.gl.program import Drawing, Shaders, set_uniforms
+from pmviewer.viewer.overlays.overlay import Needs, Overlay, Source
 
 COLOUR = theme.FREE[:3]
 RIM_COLOUR = (0.0, 0.0, 0.0)
@@ -22,49 +24,61 @@ _DEPTH_CLAMP = 0x864F
 """GL_DEPTH_CLAMP: the frustum may stand before the near plane, where surfaces are cut away, or beyond the scene."""
 
 
-class FrustumLines:
-    """Every method needs the window's OpenGL context."""
+class Frustum(Overlay):
+    """Its settings are those of the free camera, and so is its switch."""
 
-    def __init__(self, context: moderngl.Context) -> None:
-        self._context = context
-        self._program = load_program(context, "frustum")
+    name = "frustum"
+    rank = 1
+
+    def __init__(self, shaders: Shaders) -> None:
+        super().__init__(shaders)
         self._buffer: moderngl.Buffer | None = None
         self._array: moderngl.VertexArray | None = None
-        self._ends: NDArray[np.floating] | None = None
 
-    def upload(self, ends: NDArray[np.floating] | None) -> bool:
-        """Take line ends (2n, 3), or none. True when they are others than before."""
-        before = self._ends
-        if ends is before or (ends is not None and before is not None and np.array_equal(ends, before)):
-            return False
-        self._ends = ends
+    @classmethod
+    def style(cls, settings: Settings) -> FreeCamera:
+        return settings.free_camera
+
+    @classmethod
+    def is_shown(cls, settings: Settings) -> bool:
+        return settings.free_camera.on and settings.free_camera.frustum
+
+    @classmethod
+    def tests_depth(cls, settings: Settings) -> bool:
+        return True
+
+    def needs(self, source: Source) -> Needs | None:
+        camera = source.render_camera()
+        return None if camera is None else (camera, source.settings.free_camera.length * source.scene_radius)
+
+    def take(self, camera: CameraPose, length: float) -> None:
+        """The frustum of that camera, so long in scene units."""
+        self.release()
+        ends = np.ascontiguousarray(frustum_lines(camera, length), np.float32)
+        self._buffer = self.shaders.context.buffer(ends)
+        content = [(self._buffer, "3f4", "position")]
+        self._array = self.shaders.context.vertex_array(self.shaders.get("frustum"), content)
+
+    def release(self) -> None:
         if self._array is not None and self._buffer is not None:
             self._array.release()
             self._buffer.release()
         self._array = self._buffer = None
-        if ends is not None:
-            self._buffer = self._context.buffer(np.ascontiguousarray(ends, np.float32))
-            self._array = self._context.vertex_array(self._program, [(self._buffer, "3f4", "position")])
-        return True
 
-    @property
-    def shown(self) -> bool:
-        return self._array is not None
-
-    def draw(self, view: Matrix, projection: Matrix, viewport: tuple[int, int], pixel_ratio: float) -> None:
-        """Draw into the bound framebuffer, whose depth buffer holds the surfaces and is left as it is."""
+    def draw_over(self, drawing: Drawing, settings: Settings) -> None:
         if self._array is None:
             return
-        context = self._context
-        size = float(viewport[0]), float(viewport[1])
-        set_uniforms(self._program, view=view, projection=projection, viewport=size)
+        context, program = self.shaders.context, self.shaders.get("frustum")
+        width, height = drawing.viewport
+        size = float(width), float(height)
+        set_uniforms(program, view=drawing.view, projection=drawing.projection, viewport=size)
         for tested in (False, True):
             context.enable_only(moderngl.BLEND | (moderngl.DEPTH_TEST if tested else 0))
             context.enable_direct(_DEPTH_CLAMP)
             context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
             opacity = 1.0 if tested else HIDDEN
-            for tint, width, share in ((RIM_COLOUR, RIM, 0.6), (COLOUR, WIDTH, 1.0)):
-                set_uniforms(self._program, tint=tint, size=width * pixel_ratio, opacity=share * opacity)
+            for tint, wide, share in ((RIM_COLOUR, RIM, 0.6), (COLOUR, WIDTH, 1.0)):
+                set_uniforms(program, tint=tint, size=wide * drawing.pixel_ratio, opacity=share * opacity)
                 self._array.render(moderngl.LINES)
         context.disable_direct(_DEPTH_CLAMP)
         context.disable(moderngl.BLEND)

@@ -13,7 +13,7 @@ from pmviewer.engine.frame import Frame, Statistics
 from pmviewer.photons.deposition.deposited import FIRST_WEIGHT, Deposited
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import data_size, grouped
-from pmviewer.viewer.overlays.overlays import LIGHT_PALETTE
+from pmviewer.viewer.gl.palette import LIGHT_PALETTE
 from pmviewer.viewer.panels.light_list import light_rows
 from pmviewer.viewer.panels.statistics_panel import table
 from pmviewer.viewer.state import ViewerState

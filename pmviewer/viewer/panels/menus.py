@@ -8,7 +8,7 @@ from imgui_bundle import hello_imgui, imgui
 
 from pmviewer.settings.access import SETTINGS, get
 from pmviewer.viewer import theme
-from pmviewer.viewer.overlays.overlay_panel import OVERLAYS
+from pmviewer.viewer.overlays.registry import SWITCHED
 from pmviewer.viewer.panels.toolbar import Actions
 from pmviewer.viewer.shortcuts import keys_of
 from pmviewer.viewer.state import ViewerState
@@ -31,9 +31,9 @@ class Menus:
             self._render()
             imgui.end_menu()
         if imgui.begin_menu("Overlays"):
-            for name in OVERLAYS:
-                shown = get(self._state.settings, f"overlays.{name}.show")
-                self._item(SETTINGS[f"overlays.{name}.show"].group.capitalize(), f"toggle_{name}", shown)
+            for overlay in SWITCHED:
+                title = SETTINGS[f"overlays.{overlay.name}.show"].group.capitalize()
+                self._item(title, f"toggle_{overlay.name}", overlay.is_shown(self._state.settings))
             imgui.end_menu()
         if imgui.begin_menu("Help"):
             self._item("Keys and mouse", "toggle_help", self._state.help_open)

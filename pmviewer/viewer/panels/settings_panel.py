@@ -20,6 +20,7 @@ from pmviewer.viewer.panels.widgets import (
 )
 from pmviewer.viewer.state import ViewerState
 
+_ASK = "Reset every setting"
 PINNED = ("photons.N", "photons.q", "estimate.radius")
 _ELSEWHERE = ("overlays.",)
 _OPEN = ("Light pass", "Density estimate", "Method")
@@ -61,7 +62,25 @@ class SettingsPanel:
         imgui.same_line()
         tip = "Reset every setting to its default" if everything else "Every setting has its default"
         if icon_button(fa.ICON_FA_ARROW_ROTATE_LEFT, "reset.all", tip, enabled=bool(everything)):
-            self.state.change({path: SETTINGS[path].default for path in everything})
+            imgui.open_popup(_ASK)
+        self._ask_reset(everything)
+
+    def _ask_reset(self, paths: list[str]) -> None:
+        """Whether everything is meant, since there is no way back."""
+        if not imgui.begin_popup(_ASK):
+            return
+        names = ", ".join(paths[:6]) + (f" and {len(paths) - 6} more" if len(paths) > 6 else "")
+        imgui.push_text_wrap_pos(imgui.get_font_size() * 22)
+        imgui.text_unformatted(f"Reset {len(paths)} settings to their defaults?")
+        imgui.text_colored(imgui.ImVec4(*theme.DIM), names)
+        imgui.pop_text_wrap_pos()
+        if imgui.button("Reset all"):
+            self.state.change({path: SETTINGS[path].default for path in paths})
+            imgui.close_current_popup()
+        imgui.same_line()
+        if imgui.button("Cancel"):
+            imgui.close_current_popup()
+        imgui.end_popup()
 
     def _group(self, heading: str, infos: list[SettingInfo]) -> None:
         wanted = self.find.strip().lower()
@@ -70,11 +89,13 @@ class SettingsPanel:
             if not infos:
                 return
             imgui.set_next_item_open(True)
+            identity = f"{heading}, found"  # groups are as they were once the search is over
         else:
+            identity = heading
             imgui.set_next_item_open(heading in _OPEN, imgui.Cond_.once)
         changed = sum(self._value(i.path) != i.default for i in infos)
         note = f"   {changed} changed" if changed else ""
-        if imgui.collapsing_header(f"{heading}{note}###{heading}") and self.begin_rows(heading):
+        if imgui.collapsing_header(f"{heading}{note}###{identity}") and self.begin_rows(heading):
             section = ""
             for info in infos:
                 if info.section != section:

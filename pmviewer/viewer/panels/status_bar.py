@@ -73,9 +73,11 @@ def draw_status_bar(state: ViewerState) -> None:
         imgui.text_disabled("·")
         imgui.same_line()
         imgui.text_unformatted(theme.drawable(part))
-    for job in state.jobs.running:
+    for work in state.background.running():
+        if not work.lane.shown:
+            continue
         imgui.same_line()
         imgui.text_disabled("·")
         imgui.same_line()
-        waited = f" {duration(job.seconds)}" if job.seconds > 0.5 else ""
-        imgui.text_colored(imgui.ImVec4(*theme.ACCENT), f"{job.title} …{waited}")
+        waited = f" {duration(work.seconds)}" if work.seconds > 0.5 else ""
+        imgui.text_colored(imgui.ImVec4(*theme.ACCENT), f"{work.title} …{waited}")

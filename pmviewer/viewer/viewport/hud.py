@@ -15,22 +15,16 @@ from pmviewer.output.diagnostic_views import CLASS_COLOURS, DIAGNOSTICS
 from pmviewer.output.falsecolour import COLOURS, ERROR_SCALE, Scale
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import duration, si
-from pmviewer.viewer.panels.light_list import top_lights
+from pmviewer.viewer.viewport.caption import LEGEND_EMS, caption
 
 if TYPE_CHECKING:
     from pmviewer.output.compare import Reference
-    from pmviewer.render.camera import CameraPose
     from pmviewer.viewer.viewport.viewport import Viewport
 
 _TITLES = {"error": "error: (I–R)²/(R²+0.01) of each pixel, no unit"} | {
     view: f"{view}: {how.text}; grey: {how.none}" for view, how in DIAGNOSTICS.items()
 }
 _UNITS = {"albedo": "", "normal": "", "depth": "m"} | {view: how.unit for view, how in DIAGNOSTICS.items()}
-
-LEGEND_EMS = 9.0
-"""Width that captions leave to legends, in font sizes."""
-_CENTRED_SHARE = 0.8
-"""Of the viewport's width, that a centred text fills at most."""
 
 
 def draw_hud(viewport: Viewport, hovered: bool) -> None:
@@ -42,14 +36,14 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
     margin = 0.6 * line
     if viewport.shown_camera() is None:
         status = state.session.status
-        _caption(viewport, status.text or "Drop a scene here or press Ctrl+O", (width / 2, height / 2), anchor=0.5)
+        caption(viewport, status.text or "Drop a scene here or press Ctrl+O", (width / 2, height / 2), anchor=0.5)
         return
     if state.gain.frames() is not None:
         _compared_pictures(viewport)
         if state.settings.free_camera.on:
             _free_camera_label(viewport)
         if hovered and (text := _value_under_mouse(viewport)):
-            _caption(viewport, text, (margin, height - line - 1.2 * margin))
+            caption(viewport, text, (margin, height - line - 1.2 * margin))
         return
     if state.frame is None or view == "geometry":
         text = (
@@ -58,61 +52,33 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
             else f"geometry, while the first picture is made: {state.session.status.text}"
         )
         if viewport.captions:
-            _caption(viewport, text, (margin, margin))
+            caption(viewport, text, (margin, margin))
     elif view != state.settings.display.view and not state.flipped:
-        refusal = state.refused_view(state.settings.display.view) or "is being made"
-        _caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.WARNING)
+        refusal = state.refused_view(state.settings.display.view) or "to come with the next pass"
+        caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.WARNING)
     elif view != "beauty" and viewport.captions:
-        _caption(viewport, _title(viewport, view), (margin, margin))
+        caption(viewport, _title(viewport, view), (margin, margin))
     if state.settings.free_camera.on and viewport.captions:
         _free_camera_label(viewport)
     if view == "depth" and state.frame is not None and viewport.picture is not None:
-        _depth_legend(viewport, *viewport.picture.depth_range)
+        _depth_legend(viewport, *viewport.picture.planes.depth_range)
     if view == "error":
         _error_legend(viewport)
     if view in DIAGNOSTICS and DIAGNOSTICS[view].classes:
         _class_legend(viewport, DIAGNOSTICS[view].classes)
     elif view in DIAGNOSTICS and not DIAGNOSTICS[view].cells and viewport.picture is not None:
-        _scale_legend(viewport, viewport.picture.scale, DIAGNOSTICS[view].colours)
-    if state.settings.overlays.lights.show:
-        _light_labels(viewport)
-    if state.settings.overlays.gather.show and viewport.inspected is None and state.frame is not None:
-        text = "hold I over the picture: gather rays of the pixel under the mouse"
-        _caption(viewport, text, (width / 2, height - line - 2 * margin), anchor=0.5, colour=theme.ACCENT)
+        _scale_legend(viewport, viewport.picture.planes.scale, DIAGNOSTICS[view].colours)
+    if viewport.picture is not None:
+        source = viewport.source()
+        for overlay in viewport.picture.layers.shown(state.settings):
+            overlay.annotate(viewport, source)
     if state.flying:
         text = "flying: W A S D, Q down, E up, drag to look, Shift faster, F or Esc to leave"
-        _caption(viewport, text, (width / 2, height - line - 2 * margin), anchor=0.5, colour=theme.ACCENT)
+        caption(viewport, text, (width / 2, height - line - 2 * margin), anchor=0.5, colour=theme.ACCENT)
     elif hovered:
         text = _value_under_mouse(viewport)
         if text:
-            _caption(viewport, text, (margin, height - line - 1.2 * margin))
-
-
-def _light_labels(viewport: Viewport) -> None:
-    """Shares of the most important lights, beside them."""
-    frame, camera, style = viewport.state.frame, viewport.shown_camera(), viewport.state.settings.overlays.lights
-    if frame is None or camera is None or frame.known_lights is None or frame.light_places is None:
-        return
-    left, top, width, height = viewport.rectangle()
-    line = imgui.get_text_line_height()
-    for light in top_lights(frame.known_lights, style.labels):
-        place = projected(camera, frame.light_places[light])
-        if place is not None:
-            position = left + place[0] * width + 0.5 * style.size + 0.4 * line, top + place[1] * height - 0.5 * line
-            if 0 <= position[0] < viewport.size[0] and 0 <= position[1] < viewport.size[1] - line:
-                _caption(viewport, f"{light + 1}: {frame.known_lights.lit[light]:.1%}", position)
-
-
-def projected(camera: CameraPose, point: NDArray[np.floating]) -> tuple[float, float] | None:
-    """Where a point is in the picture, from (0, 0) top left to (1, 1); None where the camera doesn't see it."""
-    if not np.isfinite(point).all():
-        return None
-    seen = camera.view_matrix() @ np.append(point, 1.0)
-    if not seen[2] < 0:
-        return None
-    clip = camera.projection_matrix(1e-3, 1.0) @ seen
-    x, y = 0.5 + 0.5 * clip[0] / clip[3], 0.5 - 0.5 * clip[1] / clip[3]
-    return (float(x), float(y)) if 0 <= x <= 1 and 0 <= y <= 1 else None
+            caption(viewport, text, (margin, height - line - 1.2 * margin))
 
 
 def _title(viewport: Viewport, view: str) -> str:
@@ -139,7 +105,7 @@ def _compared_pictures(viewport: Viewport) -> None:
         (f"with importance{view}", gain.with_, 1.0, x - gap),
         (f"without{view}", gain.without, 0.0, x + gap),
     ):
-        _caption(viewport, title, (at, 0.6 * line), anchor=anchor, colour=theme.ACCENT)
+        caption(viewport, title, (at, 0.6 * line), anchor=anchor, colour=theme.ACCENT)
         stored, error, spent = si(side.stored), f"{side.error.relmse_all:.2e}", duration(side.cpu_seconds)
         facts = (
             f"{stored} photons stored",
@@ -148,7 +114,7 @@ def _compared_pictures(viewport: Viewport) -> None:
             *((gain.heading,) if side is gain.without else ()),
         )
         for number, fact in enumerate(facts):  # one below the other: narrow windows have no room for a line of them
-            _caption(viewport, fact, (at, (2.2 + 1.4 * number) * line), anchor=anchor)
+            caption(viewport, fact, (at, (2.2 + 1.4 * number) * line), anchor=anchor)
 
 
 def _free_camera_label(viewport: Viewport) -> None:
@@ -165,7 +131,7 @@ def _free_camera_label(viewport: Viewport) -> None:
     x = 0.6 * line
     wrap = max(viewport.size[0] - x - LEGEND_EMS * imgui.get_font_size(), 1.0)  # as the caption does
     lines = imgui.calc_text_size(text, wrap_width=wrap).y
-    _caption(viewport, text, (x, viewport.size[1] - lines - 2.4 * line), colour=theme.FREE)
+    caption(viewport, text, (x, viewport.size[1] - lines - 2.4 * line), colour=theme.FREE)
 
 
 def _value_under_mouse(viewport: Viewport) -> str:
@@ -265,28 +231,3 @@ def _legend(viewport: Viewport, labels: list[tuple[float, str]], colours: NDArra
             continue
         lowest = top + 0.9 * size.y
         draw.add_text((x0 - size.x - 0.4 * line, top), imgui.get_color_u32(theme.grey(0.9)), text)
-
-
-def _caption(
-    viewport: Viewport,
-    text: str,
-    position: tuple[float, float],
-    *,
-    anchor: float = 0.0,
-    colour: theme.Colour = theme.TEXT,
-) -> None:
-    """Text on a translucent ground, in lines that leave room for a legend; `anchor` 0.5 centres it on the position, in
-    lines that fit into the viewport."""
-    text = theme.drawable(text)
-    room = viewport.size[0] - position[0] - LEGEND_EMS * imgui.get_font_size()
-    if anchor:
-        room = _CENTRED_SHARE * viewport.size[0]
-    wrap = room if room > 0 and (anchor == 0.0 or imgui.calc_text_size(text).x > room) else 0.0
-    size = imgui.calc_text_size(text, wrap_width=wrap or -1.0)
-    x, y = viewport.origin[0] + position[0] - anchor * size.x, viewport.origin[1] + position[1]
-    draw = imgui.get_window_draw_list()
-    pad = 0.35 * imgui.get_text_line_height()
-    ground = imgui.get_color_u32(theme.grey(0.08, 0.7))
-    draw.add_rect_filled((x - pad, y - 0.5 * pad), (x + size.x + pad, y + size.y + 0.5 * pad), ground, 3)
-    code = imgui.get_color_u32(imgui.ImVec4(*colour))
-    draw.add_text(imgui.get_font(), imgui.get_font_size(), (x, y), code, text, wrap_width=wrap)

@@ -4,7 +4,6 @@ moves."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from typing import Any
 
 import moderngl
@@ -15,32 +14,17 @@ from pmviewer.engine.frame import Frame
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.render.camera import CameraPose
 from pmviewer.settings.access import Display
-from pmviewer.viewer.shortcuts import INSPECT_KEY, K, is_held
+from pmviewer.viewer.overlays.overlay import Source
+from pmviewer.viewer.shortcuts import INSPECT_KEY, is_held
 from pmviewer.viewer.state import ViewerState
-from pmviewer.viewer.viewport import controls
 from pmviewer.viewer.viewport.hud import draw_hud
-from pmviewer.viewer.viewport.picture import Picture, Target
+from pmviewer.viewer.viewport.navigation import Navigation
+from pmviewer.viewer.viewport.picture import Picture
+from pmviewer.viewer.viewport.target import Fit, Target
 
 VIEWPORT = "Viewport"
-MOST_ZOOM = 64.0
 SPLIT_REACH = 8.0
 """Points from the line between compared pictures at which a drag moves it."""
-_FLY_AXES = {K.d: (1, 0, 0), K.a: (-1, 0, 0), K.e: (0, 1, 0), K.q: (0, -1, 0), K.w: (0, 0, 1), K.s: (0, 0, -1)}
-
-
-@dataclass(frozen=True)
-class Fit:
-    """How the picture lies in the panel: `zoom` 1 shows all of it, `center` is the picture's point (0 to 1) in the
-    panel's middle."""
-
-    zoom: float = 1.0
-    center: tuple[float, float] = (0.5, 0.5)
-
-    def rectangle(self, panel: tuple[float, float], aspect: float) -> tuple[float, float, float, float]:
-        """Left, top, width and height of a picture of that width/height ratio."""
-        width = min(panel[0], panel[1] * aspect) * self.zoom
-        height = width / aspect
-        return panel[0] / 2 - self.center[0] * width, panel[1] / 2 - self.center[1] * height, width, height
 
 
 class Viewport:
@@ -63,11 +47,25 @@ class Viewport:
         self._ratio = 1.0
         self._texture: moderngl.Texture | None = None
         self._drawn_key: Any = None
-        self._flew_with_right = False
+        self._navigation = Navigation(self)
         self._splitting = False
         self.draw_toasts: Callable[[], None] = lambda: None
 
     # drawing ----------------------------------------------------------------------------------------------------
+
+    def release(self) -> None:
+        """Free what lies on the GPU; nothing is drawn any more."""
+        if self.picture is not None:
+            self.picture.release()
+        self.picture = self._texture = None
+
+    def source(self) -> Source:
+        """What overlays take their data from."""
+        state = self.state
+        geometry = state.session.geometry
+        radius = float(geometry.radius) if geometry is not None else 1.0
+        camera = state.render_camera if geometry is not None else lambda: None
+        return Source(state.settings, state.frame, radius, camera, self.inspected)
 
     def shown_camera(self) -> CameraPose | None:
         """The frame's camera, so that points lie on the picture; the newest one when only geometry is shown."""
@@ -101,30 +99,22 @@ class Viewport:
             self.inspected = None
             self.fit = Fit()
         settings, frame = self.state.settings, self.state.frame
-        changed = picture.upload_geometry(self.state.session.geometry)
-        overlays, display = settings.overlays, self.state.shown_display
-        reference = self.state.comparison.reference
-        changed |= picture.reference.upload(reference.image if reference is not None else None)
+        changed = picture.surfaces.upload(self.state.session.geometry)
+        display, reference = self.state.shown_display, self.state.comparison.reference
+        changed |= picture.planes.reference.upload(reference.image if reference is not None else None)
         if frame is not None:
-            shown = {name: style.show for name, style in overlays.by_map().items()}
-            changed |= picture.upload_frame(frame, display.view, shown)
-            changed |= picture.upload_paths(frame.inspection.paths, overlays.paths)
-            changed |= picture.upload_gathered(frame.inspection.gathered, overlays.gather)
-            changed |= picture.upload_circles(frame.clouds.get("cache"), overlays.cache)
-            changed |= picture.upload_cells(frame.projections, overlays.projection)
-            changed |= picture.upload_fates(frame.inspection.fates, overlays.fates)
-            changed |= picture.upload_lights(frame.known_lights, frame.light_places, overlays.lights)
-        changed |= picture.frustum.upload(self.state.frustum())
+            changed |= picture.planes.upload(frame, display.view)
+        changed |= picture.layers.upload(self.source())
         pair, split = self.state.shown_pair(), None
         if pair is not None:
             display, split = pair[1], settings.compare.split
-        changed |= picture.pair.upload(pair[0] if pair is not None else None, display.view)
+        changed |= picture.planes.pair.upload(pair[0] if pair is not None else None, display.view)
         camera, target = self.shown_camera(), self.target()
         navigating = self.state.navigating and picture.software
-        key = (camera, target, display, overlays, navigating, split)
+        key = (camera, target, display, settings.overlays, settings.free_camera, navigating, split)
         if changed or key != self._drawn_key:
             self._texture = picture.draw(
-                "window", target, camera, display, overlays, navigating=navigating, split=split
+                "window", target, camera, display, settings, navigating=navigating, split=split
             )
             self._drawn_key = key
             self.redraws += 1
@@ -137,8 +127,8 @@ class Viewport:
         settings = self.state.settings
         size = camera.width, camera.height
         target = Target(size, (0, 0, *size))
-        picture.draw("capture", target, camera, self.state.shown_display, settings.overlays if overlays else None)
-        return picture.read("capture")
+        picture.draw("capture", target, camera, self.state.shown_display, settings if overlays else None)
+        return picture.framebuffers.read("capture")
 
     # interface --------------------------------------------------------------------------------------------------
 
@@ -178,7 +168,7 @@ class Viewport:
         if self._drags_split(hovered, active):
             pose = None
         if pose is not None:
-            self._handle(pose, hovered, active)
+            self._navigation.handle(pose, hovered, active)
         draw_hud(self, hovered and not self.alone)
         self.draw_toasts()
 
@@ -213,73 +203,6 @@ class Viewport:
         if pair is None:
             return self.state.frame
         return pair[0 if pixel[0] + 0.5 < self.state.settings.compare.split * pair[0].camera.width else 1]
-
-    def _handle(self, pose: CameraPose, hovered: bool, active: bool) -> None:
-        io = imgui.get_io()
-        before = pose
-        geometry = self.state.session.geometry
-        radius = float(geometry.radius) if geometry is not None else 1.0
-        if geometry is not None and self._target_is_automatic():
-            pose = controls.with_pivot(pose, geometry.center, radius)
-            before = pose
-        height = max(self.rectangle()[3], 1.0)
-        dx, dy = io.mouse_delta.x / height, io.mouse_delta.y / height
-        right = active and imgui.is_mouse_down(imgui.MouseButton_.right)
-        if hovered and io.mouse_wheel and io.key_ctrl:
-            self._magnify(io.mouse_wheel)
-        elif hovered and io.mouse_wheel:
-            pose = controls.zoom(pose, io.mouse_wheel, radius)
-        if active and io.key_ctrl:
-            self._shift(io.mouse_delta.x, io.mouse_delta.y)
-        elif active and (dx or dy):
-            pose = self._drag(pose, dx, dy, right, radius)
-        if not right:
-            self._flew_with_right = False
-        if (self.state.flying or right) and not io.want_text_input and not io.key_ctrl:
-            pose = self._fly(pose, radius, right)
-        if pose != before:
-            self.state.move_camera(pose)
-
-    def _target_is_automatic(self) -> bool:
-        """Whether the target is the scene file's, which may lie anywhere. An automatic free camera's is well placed."""
-        settings = self.state.settings
-        return settings.camera.target == "auto" and not settings.free_camera.on
-
-    def _drag(self, pose: CameraPose, dx: float, dy: float, right: bool, radius: float) -> CameraPose:
-        if imgui.is_mouse_down(imgui.MouseButton_.middle) or (imgui.get_io().key_shift and not self.state.flying):
-            return controls.pan(pose, dx, dy)
-        if self.state.flying or self._flew_with_right:
-            return controls.look(pose, dx, dy)
-        if right:
-            return controls.zoom(pose, (dx - dy) * 12, radius)
-        return controls.orbit(pose, dx, dy)
-
-    def _fly(self, pose: CameraPose, radius: float, right: bool) -> CameraPose:
-        axes = np.sum([axis for key, axis in _FLY_AXES.items() if imgui.is_key_down(key)] or [(0, 0, 0)], axis=0)
-        if not np.any(axes):
-            return pose
-        self._flew_with_right = self._flew_with_right or right
-        io = imgui.get_io()
-        step = 0.5 * radius * min(io.delta_time, 0.1) * (4 if io.key_shift else 1)
-        across, up, ahead = (float(a) for a in axes)
-        return controls.fly(pose, across, up, ahead, step)
-
-    def _magnify(self, notches: float) -> None:
-        """Zoom into the pixels, keeping the point under the mouse where it is."""
-        mouse = imgui.get_mouse_pos()
-        x, y = mouse.x - self.origin[0], mouse.y - self.origin[1]
-        left, top, width, height = self.rectangle()
-        u, v = (x - left) / width, (y - top) / height
-        zoom = min(max(self.fit.zoom * 1.25**notches, 1.0), MOST_ZOOM)
-        grown = zoom / self.fit.zoom
-        center = u + (self.fit.center[0] - u) / grown, v + (self.fit.center[1] - v) / grown
-        self.fit = Fit() if zoom == 1.0 else Fit(zoom, center)
-
-    def _shift(self, dx: float, dy: float) -> None:
-        if self.fit.zoom > 1:
-            _, _, width, height = self.rectangle()
-            u, v = self.fit.center
-            self.fit = replace(self.fit, center=(min(max(u - dx / width, 0), 1), min(max(v - dy / height, 0), 1)))
 
     def _inspect(self) -> None:
         """Ask for the gather rays of the pixel under the mouse."""

@@ -86,9 +86,11 @@ class _Reader:
     def _uses(self, placed: list[Placed]) -> Counter[int]:
         """How often each mesh is shown without a skin and in its own shape, so that copies look the same."""
         uses: Counter[int] = Counter()
+        meshes = self._document.rows("meshes")
         for place in placed:
             if "mesh" in place.node:
-                self._document.row("meshes", place.node["mesh"], place.name)
+                if not is_index(place.node["mesh"]) or place.node["mesh"] >= len(meshes):
+                    self._document.row("meshes", place.node["mesh"], place.name)  # says what is wrong
                 if self._is_own(place):
                     uses[place.node["mesh"]] += len(place.matrices)
         return uses
@@ -98,7 +100,7 @@ class _Reader:
         return (
             "skin" not in place.node
             and "weights" not in place.node
-            and not self._pose.get(place.index, {}).get("weights")
+            and not (place.index in self._pose and self._pose[place.index].get("weights"))
         )
 
     def _triangles(self, index: int) -> int:
@@ -242,7 +244,7 @@ class _Reader:
             self._result.camera, self._result.aspect = cameras[index].camera, cameras[index].aspect
 
     def _add_light(self, place: Placed) -> None:
-        number = extension(place.node, _LIGHTS).get("light")
+        number = extension(place.node, _LIGHTS).get("light") if "extensions" in place.node else None
         if number is None:
             return
         lights = self._document.extension(_LIGHTS).get("lights", [])

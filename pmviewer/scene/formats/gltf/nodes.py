@@ -58,7 +58,7 @@ class Nodes:
             what = f"The file has {len(self._rows)} nodes; {MOST_NODES} is the most that can be opened."
             raise document.error(what, hint="Join objects, or use EXT_mesh_gpu_instancing for copies.")
         self.world: dict[int, Matrix] = {}
-        self._parts: tuple[Float, NDArray[np.bool_]] | None = None
+        self._locals: tuple[Float, NDArray[np.bool_]] | None = None
 
     def walk(self, scene: int | None) -> list[Placed]:
         """The nodes of a scene (of the whole file where it has no scenes), parents before children; hidden ones and
@@ -86,14 +86,13 @@ class Nodes:
         return self.world
 
     def _placed(self, roots: list[int], hidden_too: bool = False) -> Iterator[Placed]:
-        stack = [(index, np.eye(4)) for index in reversed(roots)]
+        stack = [(index, _IDENTITY) for index in reversed(roots)]
         while stack:
             index, parent = stack.pop()
             node = self._rows[index]
-            local = self._local(node, index)
-            matrix = parent if local is None else parent @ local
+            matrix = self._under(parent, index)
             self.world[index] = matrix
-            if not hidden_too and extension(node, "KHR_node_visibility").get("visible", True) is False:
+            if not hidden_too and _is_hidden(node):
                 self._document.warn("Nodes that the file hides are left out.")
                 self._settle(index, matrix)
                 continue
@@ -105,8 +104,7 @@ class Nodes:
         below = [(child, matrix) for child in self._listed(self._rows[index], "children")]
         while below:
             child, parent = below.pop()
-            local = self._local(self._rows[child], child)
-            self.world[child] = parent if local is None else parent @ local
+            self.world[child] = self._under(parent, child)
             below += [(c, self.world[child]) for c in self._listed(self._rows[child], "children")]
 
     def _listed(self, row: Json, key: str) -> list[int]:
@@ -130,7 +128,10 @@ class Nodes:
             while stack:
                 index = stack[-1]
                 children = self._listed(self._rows[index], "children")
-                if index in shown:
+                if not children:
+                    shown[index] = 1
+                    stack.pop()
+                elif index in shown:
                     stack.pop()
                 elif index in inside:
                     shown[index] = 1 + sum(shown[child] for child in children)
@@ -150,43 +151,44 @@ class Nodes:
             what = f"The file's {len(self._rows)} nodes contain each other {times} times."
             raise self._document.error(what, hint="In glTF a node has one parent at most: export the file again.")
 
-    def _local(self, node: Json, index: int) -> Matrix | None:
-        """The node's own matrix; None for none. Raises SceneError for one of unusable numbers."""
-        moved = self._pose.get(index, _STILL)
-        if "matrix" not in node and not moved and not any(key in node for key, _ in _TRS):
-            return None
-        if "matrix" in node and not any(key in moved for key, _ in _TRS):
-            try:
-                matrix = np.array(node["matrix"], np.float64).reshape(4, 4).T
-            except (TypeError, ValueError, OverflowError):
-                matrix = np.full((4, 4), np.nan)
-            good = bool((np.abs(matrix) <= _LARGEST).all())
-        else:
-            if self._parts is None:
-                self._parts = self._all_parts()
-            matrix, good = self._parts[0][index], bool(self._parts[1][index])
-        if not good:
-            what = f"The place of {name_of(node, f'node {index}')!r} is not given by usable numbers."
+    def _under(self, parent: Matrix, index: int) -> Matrix:
+        """The node's world matrix below one of that matrix. Raises SceneError for one of unusable numbers."""
+        if self._locals is None:
+            self._locals = self._all_local()
+        matrices, usable = self._locals
+        if not usable[index]:
+            what = f"The place of {name_of(self._rows[index], f'node {index}')!r} is not given by usable numbers."
             raise self._document.error(what)
-        return matrix
+        local: Matrix = matrices[index]
+        return local if parent is _IDENTITY else parent @ local
 
-    def _all_parts(self) -> tuple[Float, NDArray[np.bool_]]:
-        """(n, 4, 4) matrices of all nodes' translations, rotations and scales, and which of them can be used: at once,
-        since arrays of few numbers take long."""
+    def _all_local(self) -> tuple[Float, NDArray[np.bool_]]:
+        """(n, 4, 4) matrices of all nodes in their parents, and which of them can be used: at once, since arrays of few
+        numbers take long."""
         columns: list[Float] = []
         for key, default in _TRS:
-            values = [self._pose.get(i, _STILL).get(key, row.get(key, default)) for i, row in enumerate(self._rows)]
-            try:
-                columns.append(np.array(values, np.float64).reshape(len(values), len(default)))
-            except (TypeError, ValueError, OverflowError):
-                columns.append(np.array([_numbers(value, len(default)) for value in values]))
+            values = [row.get(key, default) for row in self._rows]
+            for i, moved in self._pose.items():
+                if key in moved and i < len(values):
+                    values[i] = moved[key]
+            columns.append(_rows_of_numbers(values, len(default)))
         matrices = trs(*columns)
+        given = [
+            i
+            for i, row in enumerate(self._rows)
+            if "matrix" in row and not (i in self._pose and any(key in self._pose[i] for key, _ in _TRS))
+        ]
+        if given:
+            found = _rows_of_numbers([self._rows[i]["matrix"] for i in given], 16)
+            matrices[given] = found.reshape(-1, 4, 4).transpose(0, 2, 1)
         return matrices, np.all(np.abs(matrices) <= _LARGEST, axis=(1, 2))
 
     def _copies(self, node: Json, index: int) -> tuple[Matrix, ...] | None:
         """Places of EXT_mesh_gpu_instancing in the node."""
+        if "mesh" not in node or "extensions" not in node:
+            return None
         attributes = extension(node, _INSTANCING).get("attributes")
-        if not isinstance(attributes, dict) or "mesh" not in node:
+        if not isinstance(attributes, dict):
             return None
         who = f"the copies of node {index}"
         found: list[Any] = []
@@ -209,7 +211,19 @@ class Nodes:
 
 
 _TRS = (("translation", (0, 0, 0)), ("rotation", (0, 0, 0, 1)), ("scale", (1, 1, 1)))
-_STILL: dict[str, list[float]] = {}
+_IDENTITY = np.eye(4)
+
+
+def _is_hidden(node: Json) -> bool:
+    return "extensions" in node and extension(node, "KHR_node_visibility").get("visible", True) is False
+
+
+def _rows_of_numbers(values: list[Any], count: int) -> Float:
+    """(n, count); NaN where a row is something else."""
+    try:
+        return np.array(values, np.float64).reshape(len(values), count)
+    except (TypeError, ValueError, OverflowError):
+        return np.array([_numbers(value, count) for value in values])
 
 
 def _numbers(value: Any, count: int) -> list[float]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.scene.formats.mitsuba.texture import to_uv
+from pmviewer.scene.formats.mitsuba.texture_place import to_uv
 from pmviewer.scene.formats.texture_file import read_picture
 from pmviewer.scene.texture import Bitmap, Texture
 

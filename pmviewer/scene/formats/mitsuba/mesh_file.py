@@ -10,6 +10,7 @@ from pmviewer.scene.arrays import primitives
 from pmviewer.scene.clean import check_faces
 from pmviewer.scene.description import Mesh
 from pmviewer.scene.formats.mitsuba.document import Properties
+from pmviewer.scene.formats.mitsuba.texture import reads_face_colours
 from pmviewer.scene.formats.mitsuba.transform import Matrix, mirrors
 from pmviewer.scene.formats.ply import read_ply
 from pmviewer.scene.formats.serialized import read_serialized
@@ -54,14 +55,15 @@ def _stored(p: Properties) -> Mesh:
     if not name:
         raise document.error(f"{p.element} needs a 'filename'.", p.element)
     path = document.file(name, p.element)
-    key = (str(path), p.type, index)
+    of_faces = p.type == "ply" and reads_face_colours(p.element, document)
+    key = (str(path), "ply with colours of faces" if of_faces else p.type, index)
     if key in document.broken_meshes:
         raise document.broken_meshes[key]
     mesh = document.meshes.get(key)
     if mesh is not None:
         return mesh
     try:
-        mesh = _read(path, p.type, index)
+        mesh = read_ply(path, of_faces) if p.type == "ply" else _read(path, p.type, index)
         check_faces(mesh, path)
     except SceneError as error:
         at = p.element.file or document.diagnostics.path
@@ -73,8 +75,6 @@ def _stored(p: Properties) -> Mesh:
 
 
 def _read(path: Path, kind: str, index: int) -> Mesh:
-    if kind == "ply":
-        return read_ply(path)
     if kind == "serialized":
         return read_serialized(path, index)
     from pmviewer.scene.formats.meshes import read_single

@@ -8,17 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pmviewer.scene.description import RGB
+from pmviewer.scene.formats.mitsuba.bitmap import read_bitmap
 from pmviewer.scene.formats.mitsuba.spectrum import spectrum_object
-from pmviewer.scene.texture import LUMINANCE, Affine, Bitmap, Checkerboard, Texture, scaled
+from pmviewer.scene.formats.mitsuba.texture_place import to_uv
+from pmviewer.scene.texture import LUMINANCE, Bitmap, Checkerboard, Texture, scaled
 
 if TYPE_CHECKING:
-    from pmviewer.scene.formats.mitsuba.document import Properties
+    from pmviewer.scene.formats.mitsuba.document import Document, Properties
     from pmviewer.scene.formats.mitsuba.xml import Element
 
 _SPECTRA = frozenset(("rgb", "srgb", "uniform", "d65", "regular", "irregular", "blackbody", "spectrum", "rawconstant"))
 _BITMAPS = frozenset(("bitmap", "ldrtexture", "exrtexture", "hdrtexture"))
 _VERTEX_COLOURS = frozenset(("mesh_attribute", "vertexcolors"))
-_ATTRIBUTE = "vertex_color"
+_ATTRIBUTE, _FACE_ATTRIBUTE = "vertex_color", "face_color"
+_DEEPEST = 8
 _MOST_GRID = 1024
 WHITE: RGB = (1.0, 1.0, 1.0)
 
@@ -34,8 +37,6 @@ def read_texture(p: Properties) -> Texture | None:
 
 
 def _read(p: Properties) -> Texture | None:
-    from pmviewer.scene.formats.mitsuba.bitmap import read_bitmap
-
     if p.type in _BITMAPS:
         return read_bitmap(p)
     if p.type == "checkerboard":
@@ -78,33 +79,36 @@ def squared_luminance(texture: Texture) -> Texture:
     return replace(texture, pixels=np.ascontiguousarray(grey, np.float32), scale=WHITE)
 
 
-def to_uv(p: Properties) -> Affine:
-    """How the texture's coordinates follow from the surface's: `to_uv`, or `uscale`, `uoffset`, … of version 0.x,
-    which count as s·(u + o), as Mitsuba 3 upgrades them."""
-    if "to_uv" in p:
-        matrix = p.transform("to_uv")
-        a, b, d, e = (float(x) for x in matrix[:2, :2].reshape(-1))
-        return (a, b, float(matrix[0, 3]), d, e, float(matrix[1, 3]))
-    su, sv = p.number("uscale", 1.0), p.number("vscale", 1.0)
-    return (su, 0.0, su * p.number("uoffset", 0.0), 0.0, sv, sv * p.number("voffset", 0.0))
-
-
 def has_vertex_colours(p: Properties, name: str) -> bool:
-    """Does the value of that name come from a mesh's vertices, whatever scales it?"""
+    """Does the value of that name come from a mesh's vertices or faces, whatever scales it?"""
     element = p.values.get(name)
-    return element is not None and element.tag == "texture" and _from_vertices(element, p, 0)
+    return element is not None and element.tag == "texture" and _from_mesh(element, p.document, 0)
 
 
-def _from_vertices(element: Element, p: Properties, depth: int) -> bool:
+def _from_mesh(element: Element, document: Document, depth: int) -> bool:
     kind = element.attributes.get("type")
     if kind in _VERTEX_COLOURS:
-        return _attribute_of(element) == _ATTRIBUTE
-    if kind != "scale" or depth > 8:
+        return _attribute_of(element) in (_ATTRIBUTE, _FACE_ATTRIBUTE)
+    if kind != "scale" or depth > _DEEPEST:
         return False
-    ids = p.document.ids
-    inside = (ids.get(c.attributes.get("id", "")) if c.tag == "ref" else c for c in element.children)
-    first = next((c for c in inside if c is not None and c.tag == "texture"), None)
-    return first is not None and _from_vertices(first, p, depth + 1)
+    first = next((c for c in _inside(element, document) if c.tag == "texture"), None)
+    return first is not None and _from_mesh(first, document, depth + 1)
+
+
+def _inside(element: Element, document: Document) -> list[Element]:
+    """The elements inside, those that are referred to in their references' place."""
+    found = (document.ids.get(c.attributes.get("id", "")) if c.tag == "ref" else c for c in element.children)
+    return [c for c in found if c is not None]
+
+
+def reads_face_colours(shape: Element, document: Document) -> bool:
+    """Does a BSDF of the shape take its colours from the mesh's faces?"""
+    level = [c for c in _inside(shape, document) if c.tag == "bsdf"]
+    for _ in range(_DEEPEST):
+        level = [c for e in level for c in _inside(e, document) if c.tag in ("bsdf", "texture")]
+        if any(c.attributes.get("type") in _VERTEX_COLOURS and _attribute_of(c) == _FACE_ATTRIBUTE for c in level):
+            return True
+    return False
 
 
 def _attribute_of(element: Element) -> str:
@@ -159,12 +163,12 @@ def _scale(p: Properties) -> Texture | None:
 
 
 def _vertex_colours(p: Properties) -> Texture | None:
-    """White, which the colours at the vertices multiply (`Material.vertex_colours`)."""
+    """White, which the colours at the corners of the triangles multiply (`Material.vertex_colours`)."""
     attribute = _attribute_of(p.element)
     p.known("name")
     factor = p.number("scale", 1.0)
     p.warn_unused()
-    if attribute == _ATTRIBUTE:
+    if attribute in (_ATTRIBUTE, _FACE_ATTRIBUTE):
         return constant((factor, factor, factor))
     what = f"The attribute '{attribute[:40]}' of {p.element} is not read: what it would colour keeps its default."
     p.document.warn(what, p.element)
@@ -173,10 +177,8 @@ def _vertex_colours(p: Properties) -> Texture | None:
 
 def _volume(p: Properties) -> Texture | None:
     """The colour of a constant volume; grids are not read."""
-    from pmviewer.scene.formats.mitsuba.document import Properties
-
     for element in p.objects("volume"):
-        inner = Properties(element, p.document)
+        inner = type(p)(element, p.document)
         if inner.type == "constvolume":
             return constant(inner.bounded_colour("value", 1.0, None))
     p.document.warn(f"{p.element} is not supported: what it would colour keeps its default.", p.element)

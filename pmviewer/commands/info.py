@@ -1,0 +1,36 @@
+"""`pmviewer info`: what is in a scene, and which stages it needs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import typer
+
+from pmviewer.commands.options import ParameterOption, SceneArgument, SearchOption
+
+if TYPE_CHECKING:
+    from pmviewer.commands.job import Job
+
+
+def info(scene: SceneArgument, define: ParameterOption = None, search_path: SearchOption = None) -> None:
+    """Say what is in a scene, what was ignored, and which stages it needs or skips."""
+    from pmviewer.commands.job import load_job
+
+    typer.echo(scene_report(load_job(scene, [], define or [])))
+
+
+def scene_report(job: Job) -> str:
+    """What is in the scene, what was ignored, which stages run and which do not. Raises SceneError."""
+    from pmviewer.engine.method import plan_of
+    from pmviewer.scene.analysis import analyse
+    from pmviewer.scene.describe import describe
+    from pmviewer.scene.load import load_scene
+    from pmviewer.scene.meshes.recentre import recentred
+
+    scene = recentred(load_scene(job.scene, job.parameters, rig=job.settings.light.rig))
+    plan = plan_of(job.settings, analyse(scene))
+    rows = describe(scene)
+    rows.append((f"stages ({job.settings.render.method})", ", ".join(plan.running) or "none"))
+    rows += [(f"skips {stage}", reason) for stage, reason in plan.skipped]
+    width = max(len(label) for label, _ in rows)
+    return "\n".join(f"{label:{width}s}  {text}" for label, text in rows)

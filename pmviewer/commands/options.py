@@ -1,0 +1,42 @@
+"""Options that several commands take."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+SceneArgument = Annotated[
+    str,
+    typer.Argument(help="A bundled scene's name, a scene file (.xml .glb .gltf .obj .ply .stl) or a session (.toml)."),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Change a setting, for example photons.N=200000."),
+]
+ThreadsOption = Annotated[int | None, typer.Option(min=1, max=1024, help="Threads; all processors if not given.")]
+ParameterOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--define",
+        "-D",
+        metavar="NAME=VALUE",
+        help="A scene file's <default> parameter; scene, camera or variant of a glTF file.",
+    ),
+]
+
+
+def _search(folders: list[Path] | None) -> list[Path] | None:
+    if folders:
+        from pmviewer.scene.load import search_also
+
+        search_also(folders)
+    return folders
+
+
+SearchOption = Annotated[
+    list[Path] | None,
+    typer.Option("--search-path", metavar="FOLDER", callback=_search, expose_value=False,
+                 help="Look here too for the files that a scene names."),
+]  # fmt: skip

@@ -1,0 +1,49 @@
+"""`pmviewer render`: a picture without a window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pmviewer.commands.options import ParameterOption, SceneArgument, SetOption, ThreadsOption
+from pmviewer.errors import SettingError
+
+
+def render(
+    scene: SceneArgument,
+    output: Annotated[list[Path], typer.Option("-o", "--output", help="File to write, .exr or .png; may be repeated.")],
+    passes: Annotated[int | None, typer.Option(min=1, help="Passes to render.")] = None,
+    time: Annotated[float | None, typer.Option(min=0.001, metavar="S", help="Seconds to render.")] = None,
+    size: Annotated[str | None, typer.Option(metavar="WxH", help="Image size, for example 1280x720.")] = None,
+    threads: ThreadsOption = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the random streams.")] = None,
+    set_: SetOption = None,
+    half: Annotated[bool, typer.Option(help="Half-precision EXR.")] = False,
+    define: ParameterOption = None,
+    reference: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="EXR to print the error against; auto: the bundled scene's own."),
+    ] = None,
+    stats: Annotated[bool, typer.Option(help="Print photons, rays, times and the energy ledger.")] = False,
+) -> None:
+    """Render to a file without a window; the result is what the window shows after the same passes."""
+    from pmviewer.commands.job import load_job
+    from pmviewer.commands.rendering import render_job
+
+    if passes is not None and time is not None:
+        raise SettingError("--passes and --time exclude each other: give one of them.")
+    job = load_job(scene, set_ or [], define or [])
+    render_job(
+        job,
+        output,
+        passes=passes,
+        seconds=time,
+        size=size,
+        threads=threads,
+        seed=seed,
+        half=half,
+        reference=reference,
+        stats=stats,
+    )

@@ -1,0 +1,136 @@
+"""Rendering a job to files, with a progress bar."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from pmviewer.commands.job import Job, check_output, overrides
+from pmviewer.commands.patience import patiently, print_warnings
+from pmviewer.commands.progress_bar import progress_bar
+from pmviewer.commands.statistics import pass_report, statistics_report
+from pmviewer.engine.effects import inactive_reason
+from pmviewer.engine.frame import Frame
+from pmviewer.engine.opened import OpenScene, open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.prepare import prepare
+from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
+from pmviewer.errors import SceneError, SettingError
+from pmviewer.output.compare import ERROR_COLUMNS, Reference, error_row, load_reference
+from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.output.frame_export import LAYERS, write_frame_exr, write_frame_png
+from pmviewer.output.metric import metrics
+from pmviewer.progress import watched
+from pmviewer.render.camera import resolve_camera, size_only
+from pmviewer.scene.description import Scene
+from pmviewer.scene.load import reference_of
+from pmviewer.settings.access import Settings, with_values
+
+FORMATS = (".exr", ".png")
+
+
+def render_job(
+    job: Job,
+    outputs: list[Path],
+    *,
+    passes: int | None = None,
+    seconds: float | None = None,
+    size: str | None = None,
+    threads: int | None = None,
+    seed: int | None = None,
+    half: bool = False,
+    reference: str | None = None,
+    stats: bool = False,
+) -> Frame:
+    """Render and write the files; with a reference (a file or "auto") also print the error at passes 1, 2, 4, … and at
+    the end; with `stats` photons, rays, times and the energy ledger.
+
+    Raises PmviewerError; refuses bad file names and references that don't fit before rendering.
+    """
+    for path in outputs:
+        check_output(path, FORMATS)
+    settings = with_values(job.settings, overrides(passes, seconds, size, seed, job.passes))
+    with patiently() as tell, watched(tell, threads=threads):
+        opened = open_scene(job.scene, job.parameters, settings.light.rig)
+    print_warnings(opened.scene.warnings, opened.scene.dropped)
+    target = None if reference is None else _reference(reference, opened.scene, settings)
+    view = _view(settings, opened)
+    frame = _rendered(opened, settings, threads, target)
+    if said := pass_report(frame.statistics):
+        print(said)
+    if stats:
+        print(statistics_report(frame.statistics))
+    print_warnings(frame.statistics.warnings, {})
+    for path in outputs:
+        if path.suffix.lower() == ".exr":
+            write_frame_exr(path, frame, half=half)
+        else:
+            write_frame_png(path, frame, view=view)
+        print(f"wrote {path}")
+    return frame
+
+
+def _rendered(opened: OpenScene, settings: Settings, threads: int | None, target: Reference | None) -> Frame:
+    pool = WorkPool(threads)
+    try:
+        renderer = Renderer(opened, settings, pool, StageStore(0))
+        if opened.scene.exposure is None and settings.display.exposure == "auto":
+            renderer.coarse_frame(0)  # as in the window it decides the exposure
+        _run(renderer, pool, None if target is None else partial(_print_error, target))
+        return renderer.frame(1)
+    finally:
+        pool.close()
+
+
+def _run(renderer: Renderer, pool: WorkPool, measure: Callable[[Renderer], None] | None) -> None:
+    """Render until a stop rule holds; `measure` is called after passes 1, 2, 4, … and the last one."""
+    render = renderer.settings.render
+    with progress_bar(remaining=True) as bar:
+        prepare(renderer.scene, renderer.settings, pool, bar.update)
+        bar.restart("rendering")
+        while not renderer.finished:
+            renderer.step()
+            if measure is not None and (renderer.passes & (renderer.passes - 1) == 0 or renderer.finished):
+                measure(renderer)
+            share = renderer.passes / render.passes
+            if render.time_limit > 0:
+                share = renderer.tally.seconds / render.time_limit
+            bar.update(f"pass {renderer.passes}", min(share, 1.0))
+
+
+def _view(settings: Settings, opened: OpenScene) -> str:
+    """The view to write as PNG; what the window alone draws gives the image. Raises SettingError for a diagnostic view
+    that has nothing to show."""
+    view = settings.display.view
+    if view in DIAGNOSTICS:
+        reason = inactive_reason(f"display.view={view}", settings, opened.traits)
+        if reason is not None:
+            raise SettingError(f"display.view = {view}: {reason}")
+        return view
+    return view if view in LAYERS else "beauty"
+
+
+def _reference(source: str, scene: Scene, settings: Settings) -> Reference:
+    """Read the reference, checked against the picture that will be rendered. Raises SceneError."""
+    if settings.free_camera.on:
+        raise SettingError("References are seen by the render camera: leave out free_camera.on, or --reference.")
+    camera = resolve_camera(scene, settings.camera)
+    path = reference_of(scene) if source == "auto" else Path(source)
+    if path is None:
+        raise SceneError(f"The scene '{scene.name}' has no reference of its own.", hint="Name an EXR file.")
+    if source == "auto" and not camera.sees_like(resolve_camera(scene, size_only(settings.camera))):
+        raise SceneError(
+            "The scene's reference is seen by the scene's own camera: leave out the camera settings.", path
+        )
+    reference = load_reference(path)
+    reference.check_size((camera.width, camera.height))
+    return reference
+
+
+def _print_error(reference: Reference, renderer: Renderer) -> None:
+    if renderer.passes == 1:
+        print(ERROR_COLUMNS)
+    measured = metrics(renderer.frame(0).image(), reference.image)
+    print(error_row(renderer.passes, renderer.tally.seconds, measured))

@@ -1,0 +1,77 @@
+"""`pmviewer shot`: a picture of the window."""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pmviewer.commands.options import ParameterOption, SceneArgument, SearchOption, SetOption, ThreadsOption
+from pmviewer.errors import SettingError, WindowError
+
+if TYPE_CHECKING:
+    from pmviewer.commands.job import Job
+
+
+def shot(
+    scene: SceneArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", help="PNG file to write.")],
+    passes: Annotated[int | None, typer.Option(min=1, help="Passes to render before.")] = None,
+    size: Annotated[str | None, typer.Option(metavar="WxH", help="Image size, for example 1280x720.")] = None,
+    window: Annotated[bool, typer.Option("--window", help="The whole window instead of the picture.")] = False,
+    pixel: Annotated[
+        str | None, typer.Option(metavar="X,Y", help="Pixel whose gather rays overlays.gather.show draws.")
+    ] = None,
+    captions: Annotated[bool, typer.Option(help="Say in the picture which view it is.")] = True,
+    threads: ThreadsOption = None,
+    set_: SetOption = None,
+    define: ParameterOption = None,
+    search_path: SearchOption = None,
+) -> None:
+    """Open the window, wait for the last pass, write the picture with all overlays, captions and legends, close it."""
+    from pmviewer.commands.job import load_job
+
+    take_shot(load_job(scene, set_ or [], define or []), output, passes, size, window, pixel, captions, threads)
+
+
+def take_shot(
+    job: Job,
+    output: Path,
+    passes: int | None,
+    size: str | None,
+    window: bool,
+    pixel: str | None,
+    captions: bool,
+    threads: int | None,
+) -> None:
+    """Open the window, take its picture (`pmviewer.viewer.shot`), close it. Raises PmviewerError; WindowError without a
+    display."""
+    from pmviewer.commands.job import check_output, overrides
+    from pmviewer.render.camera import resolve_camera
+    from pmviewer.scene.load import load_scene  # numba; the window itself comes up before
+    from pmviewer.settings.access import with_values
+    from pmviewer.viewer.app import ViewerApp
+    from pmviewer.viewer.shot import Shot
+    from pmviewer.viewer.start import start_viewer
+
+    check_output(output, (".png",))
+    settings = with_values(job.settings, overrides(passes, None, size, None, job.passes))
+    chosen = None
+    if pixel is not None:
+        match = re.fullmatch(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*", pixel)
+        if not match:
+            raise SettingError(f"--pixel {pixel} is not a pixel: write X,Y, for example 120,80.")
+        chosen = int(match[1]), int(match[2])
+    camera = resolve_camera(load_scene(job.scene, job.parameters, rig=settings.light.rig), settings.camera)
+    shot = Shot(output, chosen)
+    picture_size = None if window else (camera.width, camera.height)
+    make = partial(ViewerApp, remember=False, shot=shot, picture_size=picture_size, captions=captions)
+    start_viewer(make, job.scene, settings, threads, job.parameters)
+    if not shot.done:
+        raise shot.error or WindowError("The window was closed before the picture was taken.")
+    if shot.error is not None:
+        raise shot.error
+    print(f"wrote {output.absolute()}{shot.stored}")

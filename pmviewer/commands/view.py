@@ -1,0 +1,39 @@
+"""`pmviewer view`: the window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from pmviewer.commands.options import ParameterOption, SceneArgument, SearchOption, SetOption, ThreadsOption
+from pmviewer.commands.render import render
+from pmviewer.errors import WindowError
+
+DEFAULT_SCENE = "cornell_caustic"
+FALLBACK_PASSES = 64
+"""Rendered to a file where no window can be opened."""
+
+
+def view(
+    scene: SceneArgument = DEFAULT_SCENE,
+    set_: SetOption = None,
+    threads: ThreadsOption = None,
+    define: ParameterOption = None,
+    search_path: SearchOption = None,
+) -> None:
+    """Open the window (the default command)."""
+    from pmviewer.commands.job import load_job
+
+    job = load_job(scene, set_ or [], define or [])
+    try:
+        from pmviewer.viewer.app import run_viewer
+
+        code = run_viewer(job.scene, job.settings, threads, job.parameters)
+    except WindowError as error:
+        typer.echo(f"{error}", err=True)
+        target = Path(f"{Path(job.scene).stem}.png")
+        typer.echo(f"Rendering {FALLBACK_PASSES} passes to {target} instead.", err=True)
+        render(scene, [target, target.with_suffix(".exr")], FALLBACK_PASSES, set_=set_, threads=threads, define=define)
+        code = 0
+    raise typer.Exit(code)

@@ -1,0 +1,1 @@
+"""Compiling ahead: in processes of their own, what the first picture needs next and what a click would need."""

@@ -1,0 +1,99 @@
+"""What a click would need: every setting changed alone, of which those remain that run something else."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from pmviewer.engine.effects import facts_of
+from pmviewer.engine.inspection import Wanted
+from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.prepare import prepare, steps_of
+from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
+from pmviewer.engine.wanted import wanted_of
+from pmviewer.errors import PmviewerError
+from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, get, with_values
+
+FIRST = ("render", "estimate", "gather", "photons", "importance", "direct")
+"""Groups of settings in the order in which they are most likely clicked; the others follow."""
+SIDE = 8
+"""Pixels of the picture that a click is tried with, across and down."""
+FEW = {"photons.N": 200, "importance.N": 100, "gather.rays": 4, "gather.cache_samples": 8}
+"""No more than these where it is tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class Click:
+    """Settings one click away; `text` says which, "" for none."""
+
+    text: str
+    settings: Settings
+
+    def run(self, opened: OpenScene, pool: WorkPool) -> None:
+        """Render one small picture of the scene as the window would, with what its display asks for."""
+        prepare(opened, self.settings, pool, lambda text, share: None)
+        few = {path: most for path, most in FEW.items() if get(self.settings, path) > most}
+        small = {"camera.width": SIDE, "camera.height": SIDE, **few}
+        renderer = Renderer(opened, with_values(self.settings, small), pool, StageStore(0))
+        renderer.coarse_frame(1)
+        renderer.step()
+        renderer.frame(2, replace(wanted_of(renderer.facts), pixel=(SIDE // 2, SIDE // 2)))
+
+
+def clicks(opened: OpenScene, settings: Settings) -> list[Click]:
+    """The settings as they are, then each that is one click away and runs something that none before it runs."""
+    seen: set[Hashable] = set()
+    found = []
+    for click in _all(settings):
+        try:
+            needs = _needs(opened, click.settings)
+        except PmviewerError:  # nothing that the scene can be seen with
+            continue
+        if needs not in seen:
+            seen.add(needs)
+            found.append(click)
+    return found
+
+
+def _needs(opened: OpenScene, settings: Settings) -> Hashable:
+    """What decides about the kernels that run."""
+    facts = facts_of(settings, opened.traits)
+    wanted = wanted_of(facts)
+    shown = replace(wanted, paths=min(wanted.paths, 1), fates=min(wanted.fates, 1))
+    keys = frozenset(step.key for step in steps_of(opened, settings))
+    return replace(facts.plan, skipped=(), warnings=()), keys, shown if shown != Wanted() else None
+
+
+def _all(settings: Settings) -> Iterator[Click]:
+    yield Click("", settings)
+    order = sorted(SETTINGS.values(), key=lambda info: _rank(info.path))
+    for info in order:
+        if info.stage in ("scene", "stop"):
+            continue
+        for value in _others(info, get(settings, info.path)):
+            try:
+                yield Click(f"{info.title}: {_word(value)}", with_values(settings, {info.path: value}))
+            except PmviewerError:
+                continue
+
+
+def _rank(path: str) -> int:
+    group = path.split(".")[0]
+    return FIRST.index(group) if group in FIRST else len(FIRST)
+
+
+def _others(info: SettingInfo, value: Any) -> list[Any]:
+    """Values that a setting may be given by one click or drag: all of a choice, the ends of a range."""
+    values: list[Any] = [*info.choices]
+    if info.kind is bool:
+        values = [not value]
+    elif info.kind in (int, float):
+        values = [end for end in (info.lower, info.upper) if end is not None]
+    return [*values, *(["auto"] if info.auto else [])]
+
+
+def _word(value: Any) -> str:
+    return {True: "on", False: "off"}.get(value, str(value)) if isinstance(value, bool) else str(value)

@@ -1,0 +1,78 @@
+"""A helping process as its parent sees it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pmviewer.engine.ahead.requests import Request
+from pmviewer.kernels.compile.sources import PACKAGE
+
+
+@dataclass(frozen=True)
+class Progress:
+    """The part being compiled, of so many; `text` names it."""
+
+    part: int
+    of: int
+    text: str
+
+
+class Helper:
+    """A process that works on one request and is ended with `stop`, or when this process ends. `on_change` is called on
+    a thread of its own; `finished` tells whether all was done."""
+
+    def __init__(self, request: Request, on_change: Callable[[], None] = lambda: None) -> None:
+        self.progress: Progress | None = None
+        self.finished = False
+        self._on_change = on_change
+        paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "pmviewer.engine.ahead.child"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
+        )
+        self._thread = threading.Thread(target=self._talk, args=(request,), name="pmviewer ahead", daemon=True)
+        self._thread.start()
+
+    @property
+    def running(self) -> bool:
+        """Whether it is at work."""
+        return self._process.poll() is None
+
+    def wait(self, timeout: float | None = None) -> None:
+        """Until it has ended."""
+        self._thread.join(timeout)
+
+    def stop(self) -> None:
+        """End it now; what it was compiling is lost."""
+        self._process.kill()
+        self._thread.join()
+
+    def _talk(self, request: Request) -> None:
+        process = self._process
+        assert process.stdin is not None
+        assert process.stdout is not None
+        with contextlib.suppress(OSError):  # it died, and is not missed
+            pickle.dump(request, process.stdin)
+            process.stdin.flush()
+        for line in process.stdout:
+            said = json.loads(line)
+            self.finished = self.finished or "done" in said
+            self.progress = Progress(said["part"], said["of"], said["text"]) if "part" in said else None
+            self._on_change()
+        process.wait()
+        with contextlib.suppress(OSError):
+            process.stdin.close()
+        process.stdout.close()
+        self.progress = None
+        self._on_change()

@@ -1,0 +1,109 @@
+"""A frame from the film and what the stages have counted."""
+
+from __future__ import annotations
+
+from pmviewer.engine.caveats import caveats
+from pmviewer.engine.diagnose import Looked
+from pmviewer.engine.energy import Energy
+from pmviewer.engine.frame import Frame, PhotonCloud, Statistics
+from pmviewer.engine.inspection import Inspection
+from pmviewer.engine.stages.irradiance_cache import cache_cloud
+from pmviewer.engine.tally import Tally
+from pmviewer.maps.importance.importance_map import NO_IMPORTANCE
+from pmviewer.maps.irradiance_cache import REACH
+
+
+def frame_of(looked: Looked, tally: Tally, inspection: Inspection) -> Frame:
+    """The film as it stands, with the clouds of the latest pass. Serial number, version and coarseness are the
+    caller's to set."""
+    scene, light = looked.scene, looked.light
+    clouds = _clouds(looked)
+    projection, maps = light.tracer.projection, light.latest
+    return Frame(
+        serial=0,
+        version=0,
+        coarse=False,
+        planes=looked.film.planes(),
+        settings=looked.settings,
+        camera=looked.camera,
+        statistics=_statistics(looked, tally, clouds),
+        clouds=clouds,
+        projections=projection.maps if projection is not None else {},
+        light_places=light.places,
+        exposure=scene.exposure(looked.settings.camera.name),
+        lights=maps.lights if maps is not None else None,
+        scene_name=scene.scene.name,
+        inspection=inspection,
+    )
+
+
+def _clouds(looked: Looked) -> dict[str, PhotonCloud]:
+    """Points of the latest pass, by what they are."""
+    clouds: dict[str, PhotonCloud] = {}
+    if looked.latest is None:
+        return clouds
+    maps, shadows, cache = looked.latest.maps, looked.latest.shadows, looked.latest.cache
+    if maps.photons is not None:
+        clouds["global"] = PhotonCloud(maps.photons.global_, maps.photons.global_unit)
+        clouds["caustic"] = PhotonCloud(maps.photons.caustic, maps.photons.caustic_unit)
+    if maps.radiance is not None:
+        clouds["radiance"] = PhotonCloud(maps.radiance.known(), maps.radiance.grid.power_unit)
+    if shadows is not None:
+        clouds["shadow"] = PhotonCloud(shadows.photons, 1.0)
+    if looked.importance.latest is not None:
+        clouds["importons"] = looked.importance.latest.cloud
+    if cache is not None:
+        clouds["cache"] = PhotonCloud(*cache_cloud(cache), cache.rows[:, REACH].copy())
+    return clouds
+
+
+def _statistics(looked: Looked, tally: Tally, clouds: dict[str, PhotonCloud]) -> Statistics:
+    film, plan, importance = looked.film, looked.plan, looked.importance.latest
+    stored_in_pass = dict(tally.stored_in_pass)
+    for name in clouds.keys() & {"radiance", "shadow", "cache"}:
+        stored_in_pass[name] = len(clouds[name].photons)
+    if importance is not None:
+        stored_in_pass["importons"] = importance.n
+    samples = max(len(film.sums) * film.passes, 1)
+    energy = tally.energy.close(plan.emission.startswith("Christensen"))
+    return Statistics(
+        passes=film.passes,
+        emitted=tally.emitted,
+        stored=dict(tally.stored),
+        stored_in_pass=stored_in_pass,
+        radius=dict(tally.radius),
+        rays=tally.rays,
+        shadow_rays=tally.shadow_rays,
+        saved_rays=tally.saved_rays,
+        shadow_rays_per_pixel=tally.shadow_rays / samples,
+        cache_records=stored_in_pass.get("cache", 0),
+        gathers_per_pixel=(tally.records + tally.gathered) / samples,
+        interpolated=tally.cached / max(tally.cached + tally.gathered, 1),
+        seconds=tally.seconds,
+        cpu_seconds=tally.cpu_seconds,
+        stage_seconds=dict(tally.stage_seconds),
+        map_bytes=tally.map_bytes,
+        bytes_per_photon=tally.map_bytes / tally.map_photons if tally.map_photons else 0.0,
+        dropped=dict(tally.dropped),
+        energy=energy,
+        skipped=plan.skipped,
+        importons=importance.traced if importance is not None else 0,
+        warnings=_warnings(looked, tally, energy),
+        deposited=dict(tally.deposited),
+    )
+
+
+def _warnings(looked: Looked, tally: Tally, energy: Energy | None) -> tuple[str, ...]:
+    """Sentences for the log."""
+    latest, plan, maps, film = looked.importance.latest, looked.plan, looked.light.latest, looked.film
+    unimportant: tuple[str, ...] = ()
+    if latest is not None and latest.n and plan.deposition in ("Keller-Wald", "density control"):
+        unimportant = tuple(
+            f"{plan.deposition}: none of the {map_.arrived:,} photons that arrived for the {name} map in "
+            "this pass is in an important place. Does light reach what the camera sees?"
+            for name, map_ in tally.deposited.items()
+            if map_.important == 0 and latest.record(name).dtype != NO_IMPORTANCE.dtype
+        )
+    cut = caveats(looked.settings, plan, tally, energy, looked.scene.flat.radius, len(film.sums), film.passes)
+    notes = maps.notes if maps is not None else ()
+    return (*plan.warnings, *(latest.warnings if latest else ()), *notes, *unimportant, *cut)

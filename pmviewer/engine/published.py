@@ -1,0 +1,62 @@
+"""What a session shows to the outside: its newest frame, its state, its messages, and who wants to hear of them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+from pmviewer.engine.frame import Frame, Level, Message, State, Status
+from pmviewer.engine.guarded import unexpected
+
+
+class Published:
+    """Everything may be read from any thread; frames and statuses are immutable. Changes are made under `changed`,
+    which wakes those who wait for them."""
+
+    def __init__(self) -> None:
+        self.changed = threading.Condition()
+        self.on_update: Callable[[], None] | None = None
+        self.frame: Frame | None = None
+        self.serial = 0
+        self.status = Status()
+        self._messages: list[Message] = []
+
+    def take_messages(self) -> list[Message]:
+        """Messages since the last call."""
+        with self.changed:
+            taken, self._messages = self._messages, []
+        return taken
+
+    def say(self, level: Level, text: str) -> None:
+        """A line for the log."""
+        with self.changed:
+            self._messages.append(Message(level, text, time.time()))
+        self.notify()
+
+    def tell(self, state: State, text: str, passes: int = 0, progress: float | None = None) -> None:
+        """What goes on now."""
+        with self.changed:
+            self.status = Status(state, text, passes, progress)
+            self.changed.notify_all()
+        self.notify()
+
+    def show(self, frame: Frame, version: int) -> None:
+        """A new frame; one of an older version only where it is a coarse one."""
+        _ = frame.beauty  # added up here, so that the window does not wait for it
+        with self.changed:
+            self.serial = frame.serial
+            if frame.version == version or frame.coarse:
+                self.frame = frame
+            self.changed.notify_all()
+        self.notify()
+
+    def notify(self) -> None:
+        """Tell the listener; one that fails is not told again, and rendering goes on."""
+        try:
+            if self.on_update:
+                self.on_update()
+        except Exception as error:
+            self.on_update = None
+            with self.changed:
+                self._messages.append(Message("error", unexpected(error)))

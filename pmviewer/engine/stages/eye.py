@@ -1,0 +1,81 @@
+"""The eye pass: tiles of pixels over the threads, into the film."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.engine.method import Plan
+from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.store import StageStore
+from pmviewer.render.camera import CameraPose
+from pmviewer.render.direct.choice import CHOICES
+from pmviewer.render.direct.outline import outline_pixels
+from pmviewer.render.eye import eye_pass
+from pmviewer.render.film import Film
+from pmviewer.render.gather.gather_points import POINT_COLUMNS, gather_points
+from pmviewer.render.given import PassData
+from pmviewer.render.path import path_pass
+from pmviewer.render.record import N_COUNTS
+from pmviewer.settings.access import Settings
+
+MOST_POINTS = 1024
+"""Most gather rays of a pixel that are told of."""
+
+
+def render_into(
+    film: Film, given: PassData, outline: NDArray[np.uint8], plan: Plan, pool: WorkPool
+) -> NDArray[np.int64]:
+    """One sample a pixel more, of the path tracer or by maps. Returns the counts of `pmviewer.render.record`."""
+    pixels = len(film.sums)
+    tile = tile_size(pixels, given.eye[0], pool.threads)
+
+    def task(first: int) -> Callable[[], NDArray[np.int64]]:
+        def run() -> NDArray[np.int64]:
+            counts = np.zeros(N_COUNTS, np.int64)
+            last = min(first + tile, pixels)
+            if plan.path:
+                path_pass(given.scene, given.eye, film.sums, counts, first, last)
+            else:
+                eye_pass(given, outline, film.radii, film.sums, counts, first, last)
+            return counts
+
+        return run
+
+    return sum(pool.run([task(first) for first in range(0, pixels, tile)]), np.zeros(N_COUNTS, np.int64))
+
+
+def tile_size(pixels: int, eye: np.void, threads: int) -> int:
+    """Pixels a task, so that a task takes at most some 30 ms. The picture does not depend on it."""
+    keller_wald = eye["choice"] == CHOICES.index("Keller-Wald")
+    light_samples = int(eye["con_samples"] + eye["noncon_samples"] if keller_wald else eye["light_samples"])
+    work = 1 + int(eye["gather_rays"]) + light_samples // 4
+    return max(64, min(4096 * 2 // work, -(-pixels // (4 * threads))))
+
+
+def outline_of(scene: OpenScene, camera: CameraPose, film: Film, settings: Settings, store: StageStore) -> NDArray:
+    """Pixels on the outline of a light, where the eye pass looks for emission with rays of its own: uint8, empty where
+    it does not. The film may be smaller than the camera's picture."""
+    if settings.render.outline_rays == 0:
+        return np.zeros(0, np.uint8)
+    if (film.width, film.height) != (camera.width, camera.height):
+        camera = replace(camera, width=film.width, height=film.height)
+    key = ("outline", scene.uid, camera)
+    return store.get(key, lambda: outline_pixels(scene.scene, camera), lambda pixels: pixels.nbytes)
+
+
+def gather_rays_of(given: PassData, x: int, y: int, pool: WorkPool) -> NDArray[np.float32]:
+    """The gather rays of a pixel of the pass, (n, POINT_COLUMNS), see `pmviewer.render.gather.gather_points`; none
+    where the pass does not gather, and for pixels outside of the image."""
+    eye = given.eye[0]
+    width, height = int(eye["width"]), int(eye["height"])
+    if eye["gather_rays"] == 0 or not (0 <= x < width and 0 <= y < height):
+        return np.empty((0, POINT_COLUMNS), np.float32)
+    rows = np.empty((MOST_POINTS, POINT_COLUMNS), np.float32)
+    pixel, counts = np.int64(y * width + x), np.zeros(N_COUNTS, np.int64)
+    count = pool.run([lambda: gather_points(given, pixel, counts, rows)])[0]
+    return rows[:count].copy()

@@ -1,0 +1,122 @@
+"""Filling the irradiance cache of a pass, coarse to fine, before the eye pass (R6).
+
+Candidates are pixels on a lattice that gets finer from round to round. In a round, all candidates are looked up in the
+cache as the rounds before left it, and the records made for those that it says too little about are added in the
+order of pixels. Nothing depends on threads.
+
+Every pass has a cache of its own, from its own photons and at its own places: the lattice and the places within pixels
+move. The film averages the passes, and with them all that a record's noise and place do. Reaches shrink with the number
+of the pass as the look-up radius does; what then lies between records is gathered as without a cache, so that in the
+limit the mean is that of the plain gather.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.engine.pool import WorkPool
+from pmviewer.maps.hemisphere import strata
+from pmviewer.maps.irradiance_cache import (
+    IRRADIANCE,
+    RECORD,
+    ROW,
+    IrradianceCache,
+    build_cache,
+    encode_records,
+    limit_by_neighbours,
+)
+from pmviewer.render.camera import CameraPose
+from pmviewer.render.gather.cache_fill import fill_records
+from pmviewer.render.given import PassData
+from pmviewer.render.record import N_COUNTS
+from pmviewer.settings.schema import Gather
+
+COARSEST, FINEST = 16, 4
+"""Widths of the lattice in pixels, in the first and the last round."""
+SHRINK = 1.0 / 6.0
+"""Reaches fall with this power of the pass: as radii do with alpha = 2/3."""
+BATCH_RAYS = 8192
+"""Gather rays a task."""
+
+_f4 = np.float32
+
+
+def recipe(gather: Gather, camera: CameraPose, index: int) -> NDArray[np.void]:
+    """How records are made in pass `index`: RECORD (1,) without records."""
+    record = np.zeros(1, RECORD)
+    shrink = (index + 1.0) ** -SHRINK
+    record["error"] = gather.cache_error * shrink
+    record["least"], record["most"] = gather.cache_min * shrink, gather.cache_max * shrink
+    record["pixel_angle"], record["pixel_size"] = camera.pixel_angle(), camera.pixel_size()
+    record["rings"], record["sectors"] = strata(gather.cache_samples)
+    return record
+
+
+def lattices(width: int, height: int, seed: int, index: int) -> list[NDArray[np.int32]]:
+    """Candidates of each round: pixels that no coarser lattice has, in ascending order."""
+    rng = np.random.default_rng([seed, index])
+    x0, y0 = (int(offset) for offset in rng.integers(0, COARSEST, 2))
+    x, y = np.meshgrid(np.arange(width) + x0, np.arange(height) + y0)
+    pixels = np.arange(width * height, dtype=np.int32).reshape(height, width)
+    rounds, step = [], COARSEST
+    while step >= FINEST:
+        chosen = (x % step == 0) & (y % step == 0)
+        if step < COARSEST:
+            chosen &= (x % (2 * step) != 0) | (y % (2 * step) != 0)
+        rounds.append(pixels[chosen])
+        step //= 2
+    return rounds
+
+
+def fill_cache(given: PassData, how: NDArray[np.void], pool: WorkPool) -> tuple[IrradianceCache, NDArray[np.int64]]:
+    """The cache of a pass and the rays counted; `how` is the pass's recipe."""
+    camera = given.eye[0]
+    cache = build_cache(np.empty((0, ROW), np.float32), how)
+    total = np.zeros(N_COUNTS, np.int64)
+    batch = max(1, BATCH_RAYS // int(how["rings"][0] * how["sectors"][0]))
+    for pixels in lattices(int(camera["width"]), int(camera["height"]), int(camera["seed"]), int(camera["index"])):
+        rows, made = np.empty((len(pixels), ROW), np.float32), np.empty(len(pixels), bool)
+
+        def task(first: int, rows: Any = rows, made: Any = made, pixels: Any = pixels, cache: Any = cache) -> Any:
+            def run() -> NDArray[np.int64]:
+                counts = np.zeros(N_COUNTS, np.int64)
+                last = min(first + batch, len(pixels))
+                fill_records(given._replace(cache=cache.record), pixels, rows, made, counts, first, last)
+                return counts
+
+            return run
+
+        total += sum(pool.run([task(first) for first in range(0, len(pixels), batch)]), np.zeros(N_COUNTS, np.int64))
+        if made.any():
+            cache = pool.run([partial(_extended, cache, rows[made])])[0]
+    return cache, total
+
+
+def prepare_cache(given: PassData) -> None:
+    """Call every kernel of this stage once, on nothing."""
+    none = np.empty((0, ROW), np.float32)
+    cache = _extended(build_cache(none, np.zeros(1, RECORD)), none)
+    rows, made, counts = np.empty((0, ROW), np.float32), np.empty(0, bool), np.zeros(N_COUNTS, np.int64)
+    fill_records(given._replace(cache=cache.record), np.empty(0, np.int32), rows, made, counts, 0, 0)
+    cache_cloud(cache)
+
+
+def _extended(cache: IrradianceCache, rows: NDArray[np.float32]) -> IrradianceCache:
+    together = build_cache(np.concatenate([cache.rows, rows]), cache.record)
+    limit_by_neighbours(together.record, together.rows)
+    return build_cache(together.rows, cache.record)
+
+
+def cache_cloud(cache: IrradianceCache) -> tuple[NDArray[np.float32], float]:
+    """Records as photon records (n, 6) (`pmviewer.maps.record`), the normal as direction, the irradiance as power, and
+    the unit of that power."""
+    rows = cache.rows
+    unit = float(rows[:, IRRADIANCE : IRRADIANCE + 3].mean()) if cache.n else 0.0
+    unit = unit if unit > 0 else 1.0
+    photons = np.zeros((cache.n, 6), np.float32)
+    encode_records(rows, _f4(1.0 / unit), photons, photons.view(np.uint32))
+    return photons, unit

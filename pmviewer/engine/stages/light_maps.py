@@ -1,0 +1,205 @@
+"""The maps of a pass, from its photons."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.engine.method import Plan
+from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.stages.gather_guides import GUIDING_PHOTONS, guide_grid, guide_radius
+from pmviewer.engine.stages.light_plan import LightPlan
+from pmviewer.engine.stages.light_trace import TracedPass
+from pmviewer.engine.stages.pass_maps import LookUpMap, PassMaps, Structure
+from pmviewer.engine.stages.radiance_photons import median_radius, radiance_photons_of
+from pmviewer.engine.store import StageStore
+from pmviewer.maps.radiance import RadianceMap
+from pmviewer.maps.radius import automatic_radius, largest_power, neighbourhood
+from pmviewer.maps.record import DIRECT, in_classes
+from pmviewer.maps.search.grid import PhotonGrid, build_grid
+from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
+from pmviewer.photons.emission.guided import Known
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
+from pmviewer.settings.access import Settings
+
+CHOOSING_PHOTONS = 1 << 17
+"""Most photons in the map that chooses lights."""
+Float = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class MapBuilder:
+    """Builds the maps of one scene with one set of settings, on the threads of `pool`; those of the first passes go to
+    the stage store."""
+
+    scene: OpenScene
+    settings: Settings
+    plan: Plan
+    pool: WorkPool
+    store: StageStore
+
+    def without_photons(self, index: int, N: int) -> PassMaps:
+        """For a method that looks nothing up."""
+        return PassMaps(index, N, *self._empty())
+
+    def maps(self, light: LightPlan, traced: TracedPass, before: PassMaps | None, known: Known | None) -> PassMaps:
+        """All maps of the pass; `before` are those of the pass before, whose radii of guides and light choice are kept:
+        they blur nothing."""
+        plan, photons = self.plan, traced.photons
+        caustic, global_ = self._photon_maps(light, traced)
+        radiance, reach = None, 0.0
+        if plan.radiance:
+            assert global_ is not None
+            radiance, reach = self._radiance(light, traced, global_)
+        guides = chooser = None
+        if plan.guided_rays:
+            guides = self._guides(light, traced, before.guides.radius if before and before.guides else None)
+        if plan.choice != "power":
+            chooser = self._chooser(light, traced, before.chooser.radius if before and before.chooser else None)
+        corner = 0.0
+        if plan.corners:
+            assert global_ is not None
+            corner = self.settings.gather.secondary * self._typical_radius(light, photons, global_)
+        return PassMaps(
+            light.index,
+            light.N,
+            *self._empty(),
+            photons=photons,
+            rules=light.rules,
+            notes=traced.notes,
+            known_before=known,
+            caustic=caustic,
+            global_=global_,
+            neighbours=light.neighbours,
+            share=light.share,
+            radiance=radiance,
+            radiance_reach=reach,
+            guides=guides,
+            corner=corner,
+            chooser=chooser,
+        )
+
+    def _empty(self) -> tuple[Structure, PhotonGrid]:
+        none = np.empty((0, 6), np.float32)
+        grid = self.store.get(("empty", "radius"), lambda: build_grid(none, 1.0, 1.0), lambda _: 0)
+        if self.settings.estimate.lookup == "nearest":
+            return self.store.get(("empty", "nearest"), lambda: build_kdtree(none, 1.0), lambda _: 0), grid
+        return grid, grid
+
+    def _kept(self, light: LightPlan, key: tuple[Any, ...], make: Callable[[], Any], size: Callable[[Any], int]) -> Any:
+        """What `make` returns, on a thread of the pool."""
+        if light.kept:
+            return self.pool.run([lambda: self.store.get(key, make, size)])[0]
+        return self.pool.run([make])[0]
+
+    # caustic and global map ------------------------------------------------------------------------------------------
+
+    def _photon_maps(self, light: LightPlan, traced: TracedPass) -> tuple[LookUpMap | None, LookUpMap | None]:
+        makes = [partial(self._photon_map, light, traced.photons, name) for name in ("caustic", "global")]
+        if not light.kept:
+            caustic, global_ = self.pool.run(makes)
+            return caustic, global_
+        found = []
+        for name, make in zip(("caustic", "global"), makes, strict=True):  # the stage store belongs to one thread
+            key = "map", traced.key, name, self._classes(name), self._look_up_key(light, name)
+            found.append(self._kept(light, key, make, lambda made: made.structure.bytes if made else 0))
+        return found[0], found[1]
+
+    def _look_up_key(self, light: LightPlan, name: str) -> tuple[Any, ...]:
+        if self.settings.estimate.lookup == "nearest":
+            return ("nearest", self.settings.estimate)
+        return "radius", light.radii[name], light.reach[name]
+
+    def _classes(self, name: str) -> int:
+        return self.plan.caustic_classes if name == "caustic" else self.plan.global_classes
+
+    def _photon_map(self, light: LightPlan, photons: PhotonMaps, name: str) -> LookUpMap | None:
+        classes = self._classes(name)
+        if not classes:
+            return None
+        stored, unit = photons.caustic, photons.caustic_unit
+        if name == "global":
+            stored, unit = photons.global_, photons.global_unit
+        chosen = of_classes(stored, classes)
+        if self.settings.estimate.lookup == "nearest":
+            brightest = self._brightest(name, photons, chosen, unit)
+            return LookUpMap(build_kdtree(chosen, unit), self._max_radius(brightest, light.neighbours))
+        return LookUpMap(build_grid(chosen, light.reach[name], unit), light.radii[name])
+
+    def _brightest(self, name: str, photons: PhotonMaps, chosen: Float, unit: float) -> float:
+        """Luminance of the brightest photon of a map, in watts. Of photons stored with a probability it is that before:
+        those that grew stand for many that are not there, and k of them don't meet in a disc that matters."""
+        if photons.guided is not None and self.plan.deposition in ("all", "Keller-Wald"):
+            return unit  # that of photons that leave by power: the few strong ones are not where the camera looks
+        if self.plan.deposition == "Keller-Wald":
+            return photons.deposited[name].largest_arrived
+        return largest_power(chosen, unit)
+
+    def _max_radius(self, brightest: float, k: int) -> float:
+        """Of a search for k photons, as many as the pass takes."""
+        estimate, scene_radius = self.settings.estimate, self.scene.flat.radius
+        if estimate.max_radius != "auto":
+            return float(estimate.max_radius) * scene_radius * math.sqrt(k / estimate.k)
+        automatic = automatic_radius(k, brightest, estimate.black_level)
+        return min(max(automatic, estimate.floor * scene_radius), 2 * scene_radius)
+
+    def _typical_radius(self, light: LightPlan, photons: PhotonMaps, global_: LookUpMap) -> float:
+        """Of look-ups in the global map: that of the pass, or the median of k-nearest ones."""
+        if isinstance(global_.structure, PhotonKdTree):
+            return median_radius(photons, global_.structure, global_.radius, self.settings.estimate, light)
+        return global_.radius
+
+    # beside them -----------------------------------------------------------------------------------------------------
+
+    def _radiance(self, light: LightPlan, traced: TracedPass, global_: LookUpMap) -> tuple[RadianceMap, float]:
+        """Radiance photons of the pass in the global map, and the distance up to which they are used."""
+        gather, estimate = self.settings.gather, self.settings.estimate
+        key = "radiance photons", traced.key, estimate, gather.radiance_photons, gather.cutoff, global_.radius
+        make = partial(radiance_photons_of, traced.photons, global_, self.settings, light)
+        return self._kept(light, key, make, lambda made: made[0].bytes)
+
+    def _guides(self, light: LightPlan, traced: TracedPass, radius: float | None) -> PhotonGrid:
+        """The pass's photons that guide gather rays."""
+        asked, photons = self.settings.gather.guide_radius, traced.photons
+
+        def build() -> PhotonGrid:
+            some = of_classes(as_arrived(photons)[: 2 * GUIDING_PHOTONS], self.plan.guide_mask)
+            return guide_grid(some, photons.global_unit, radius or guide_radius(some, asked, self.scene.flat.radius))
+
+        return self._kept(light, ("guides", traced.key, self.plan.guide_mask, asked, radius), build, _bytes)
+
+    def _chooser(self, light: LightPlan, traced: TracedPass, radius: float | None) -> PhotonGrid:
+        """The pass's direct photons that choose lights. A small radius would miss lights."""
+        asked, photons, scene_radius = self.settings.direct.choice_radius, traced.photons, self.scene.flat.radius
+
+        def build() -> PhotonGrid:
+            some = as_arrived(photons)[: 8 * CHOOSING_PHOTONS]  # of all classes
+            primary = of_classes(some, 1 << DIRECT)[:CHOOSING_PHOTONS]
+            if radius is not None:
+                return build_grid(primary, radius, photons.global_unit)
+            relative = neighbourhood(primary[:, :3]) / scene_radius if asked == "auto" else float(asked)
+            return build_grid(primary, min(max(relative, 1e-4), 1.0) * scene_radius, photons.global_unit)
+
+        return self._kept(light, ("light choice", traced.key, asked, radius), build, _bytes)
+
+
+def _bytes(grid: PhotonGrid) -> int:
+    return grid.bytes
+
+
+def as_arrived(photons: PhotonMaps) -> Float:
+    """Global photons of the pass for those who count photons: no rule has thinned them."""
+    return photons.sample if photons.deposited else photons.global_
+
+
+def of_classes(photons: Float, mask: int) -> Float:
+    """The photons whose path class has its bit in the mask."""
+    wanted = in_classes(photons, mask)
+    return photons if wanted is None else np.ascontiguousarray(photons[wanted])

@@ -1,0 +1,58 @@
+"""What the light stage will do in a pass, decided before its first photon."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pmviewer.engine.method import Plan
+from pmviewer.engine.radius import pass_neighbours, pass_radius
+from pmviewer.engine.stages.deposition import Rules, rules_of
+from pmviewer.engine.stages.importance import ImportanceStage
+from pmviewer.settings.access import Settings
+
+KEPT_PASSES = 4
+"""Photons and maps of the first passes are kept, so that a new camera or radius starts from them."""
+
+
+@dataclass(frozen=True, eq=False)
+class LightPlan:
+    """Pass `index` of N trajectories: radii of look-ups by map in scene units, how far its maps have to `reach` (the
+    largest radius in use), how many nearest photons are looked up and in which `share` of their disc's area they count,
+    whether photons need the `normals` of their surfaces, and the deposition `rules`."""
+
+    index: int
+    N: int
+    radii: Mapping[str, float]
+    reach: Mapping[str, float]
+    neighbours: int
+    share: float
+    normals: bool
+    rules: Rules
+
+    @property
+    def kept(self) -> bool:
+        """Whether its results go to the stage store."""
+        return self.index < KEPT_PASSES
+
+
+def light_plan(
+    settings: Settings,
+    plan: Plan,
+    importance: ImportanceStage,
+    index: int,
+    N: int,
+    first_radius: float,
+    widest: Mapping[str, float],
+) -> LightPlan:
+    """For pass `index`, for which `importance` has run. first_radius: of the first pass, in scene units; widest: the
+    largest radii in use by map, where they may be more than that of the pass."""
+    estimate = settings.estimate
+    radius = pass_radius(first_radius, index, estimate, importance.scene.flat.radius)
+    radii = {"caustic": radius * estimate.caustic_radius, "global": radius}
+    reach = {name: max(r, widest.get(name, 0.0)) for name, r in radii.items()}
+    rules = Rules()
+    if plan.deposition != "all":
+        rules = rules_of(settings, plan, importance, index, radii, first_radius)
+    normals = plan.radiance or (plan.corners and estimate.lookup == "nearest")
+    return LightPlan(index, N, radii, reach, *pass_neighbours(index, estimate), normals, rules)

@@ -1,0 +1,103 @@
+"""What the kernels of a pass are given: its settings, masks and radii as one record, its maps as records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.engine.method import Plan, estimator_of
+from pmviewer.engine.stages.gather_guides import gather_records
+from pmviewer.engine.stages.pass_maps import LookUpMap, PassMaps, blank_grid, blank_maps
+from pmviewer.engine.stages.shadow_photons import ShadowMap
+from pmviewer.maps.irradiance_cache import NO_CACHE, IrradianceCache
+from pmviewer.maps.irradiance_cache import RECORD as CACHE_RECORD
+from pmviewer.maps.shadow import shadow_record
+from pmviewer.maps.variant import looked_up_by
+from pmviewer.render.camera import CameraPose
+from pmviewer.render.direct.choice import CHOICES
+from pmviewer.render.direct.shadow import NO_SHADOWS
+from pmviewer.render.given import PassData
+from pmviewer.render.lookup import NO_SITES
+from pmviewer.render.record import EYE_DTYPE, Evaluation, eye_record
+from pmviewer.settings.access import Settings
+
+
+@dataclass(frozen=True, eq=False)
+class RenderedPass:
+    """A pass that is in the picture: what its kernels were `given`, and what its records belong to."""
+
+    given: PassData
+    maps: PassMaps
+    shadows: ShadowMap | None = None
+    cache: IrradianceCache | None = None
+
+
+def pass_record(camera: CameraPose, settings: Settings, plan: Plan, maps: PassMaps, index: int) -> NDArray[np.void]:
+    """The EYE_DTYPE record (1,) of pass `index`, which looks these maps up."""
+    return eye_record(camera, settings, index, _evaluation(settings, plan, maps))
+
+
+def _evaluation(settings: Settings, plan: Plan, maps: PassMaps) -> Evaluation:
+    indirect_caustics = settings.photons.indirect_caustics
+    return Evaluation(
+        direct=plan.direct,
+        followed_direct=plan.followed_direct,
+        unfound=plan.unfound,
+        caustic_mask=plan.caustic_mask,
+        global_mask=plan.global_mask,
+        direct_mask=plan.direct_mask,
+        global_caustics=plan.global_caustics,
+        indirect_caustics=indirect_caustics,
+        gather_rays=settings.gather.rays if plan.gather else 0,
+        gather_specular=not indirect_caustics,
+        guided_rays=plan.guided_rays,
+        guide_mask=plan.guide_mask,
+        corner=maps.corner,
+        choice=CHOICES.index(plan.choice),
+        biased=plan.choice != "power" and settings.direct.biased,
+        choice_radius=maps.chooser.radius if maps.chooser is not None else 0.0,
+        k=maps.neighbours,
+        share=maps.share,
+        caustic_radius=maps.caustic.radius if maps.caustic is not None else 0.0,
+        global_radius=maps.global_.radius if maps.global_ is not None else 0.0,
+        site_radius=maps.radiance_reach,
+    )
+
+
+def pass_data(
+    scene: NDArray[np.void],
+    eye: NDArray[np.void],
+    settings: Settings,
+    plan: Plan,
+    maps: PassMaps,
+    shadows: NDArray[np.void] | None = None,
+) -> PassData:
+    """The records that the kernels of a pass take, before its irradiance cache is filled."""
+    estimator = estimator_of(settings)
+
+    def photon_map(made: LookUpMap | None) -> NDArray[np.void]:
+        return looked_up_by((made.structure if made is not None else maps.empty).record, estimator)
+
+    guides, corner = gather_records(plan, maps.guides)
+    return PassData(
+        scene=scene,
+        eye=eye,
+        caustic_map=photon_map(maps.caustic),
+        global_map=photon_map(maps.global_),
+        choice_map=(maps.chooser if maps.chooser is not None else maps.empty_grid).record,
+        sites=maps.radiance.record if maps.radiance is not None else NO_SITES,
+        cache=NO_CACHE,
+        shadows=shadows if shadows is not None else NO_SHADOWS,
+        guides=guides,
+        corner=corner,
+    )
+
+
+def blank_pass(scene: NDArray[np.void], settings: Settings, plan: Plan) -> PassData:
+    """The records of a pass with these settings, of the types that kernels compile for and without contents: for calls
+    for no pixel."""
+    shadows = shadow_record(blank_grid(), 1) if plan.shadows else None
+    given = pass_data(scene, np.zeros(1, EYE_DTYPE), settings, plan, blank_maps(settings, plan), shadows)
+    return given._replace(cache=np.zeros(1, CACHE_RECORD)) if plan.cache else given

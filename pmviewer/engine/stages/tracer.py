@@ -1,0 +1,72 @@
+"""The light pass as the engine calls it: which trajectories a pass has follows from its number and the settings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pmviewer.engine.method import Plan
+from pmviewer.photons.deposition.fates import Fates
+from pmviewer.photons.deposition.rules import Deposition
+from pmviewer.photons.emission.guided import Guidance, Guided, Known
+from pmviewer.photons.light_pass.light_pass import guided_emission_of, trace_pass
+from pmviewer.photons.light_pass.paths import PhotonPaths
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
+from pmviewer.photons.light_pass.plan import trajectories
+from pmviewer.photons.projection.projection import Projection
+from pmviewer.scene.arrays.flatten import FlatScene
+from pmviewer.settings.access import Settings
+from pmviewer.tasks import Runner
+
+
+@dataclass(frozen=True, eq=False)
+class Tracer:
+    """Traces photons of one scene by one set of settings; `projection` are its projection maps, if it takes any."""
+
+    flat: FlatScene
+    settings: Settings
+    plan: Plan
+    projection: Projection | None
+    run: Runner
+
+    @property
+    def caustics(self) -> bool:
+        """Whether a caustic map is filled."""
+        return bool(self.plan.caustic_classes)
+
+    def trajectories(self, N: int, guided: Guided | None = None) -> int:
+        """How many a pass of N has: those that would fill a map that is not there are left out."""
+        return N if guided is not None else trajectories(self.settings.photons, N, self.caustics)[0]
+
+    def trace(
+        self,
+        index: int,
+        N: int,
+        *,
+        normals: bool = False,
+        deposition: Deposition | None = None,
+        guided: Guided | None = None,
+        watch: PhotonPaths | Fates | None = None,
+    ) -> PhotonMaps:
+        """Photons of pass `index`; see `pmviewer.photons.light_pass.light_pass.trace_pass` for what is asked of them.
+        Raises SettingError where they can't fit into memory."""
+        settings = self.settings
+        return trace_pass(
+            self.flat,
+            settings.photons,
+            settings.render.seed,
+            index * self.trajectories(N, guided),
+            N,
+            self.caustics,
+            self.run,
+            normals,
+            projection=None if guided is not None else self.projection,
+            deposition=deposition,
+            guided=guided,
+            watch=watch,
+        )
+
+    def guided_emission(self, index: int, N: int, guidance: Guidance, before: Known | None) -> Guided | None:
+        """How the photons of pass `index` leave the lights, by test photons and what is known from the passes `before`;
+        None where N photons are too few to test all lights."""
+        photons, seed = self.settings.photons, self.settings.render.seed
+        return guided_emission_of(self.flat, photons, seed, index * N, N, self.caustics, guidance, self.run, before)

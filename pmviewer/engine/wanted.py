@@ -1,0 +1,43 @@
+"""What the display asks of a pass: by the settings, as far as the plan makes it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pmviewer.engine.inspection import Wanted
+from pmviewer.engine.method import Plan
+from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.settings.access import Settings, get, needs_of
+from pmviewer.settings.needs import Facts, unmet
+from pmviewer.settings.schema.display import MAP_VIEWS
+
+
+def wanted_of(facts: Facts, pixel: tuple[int, int] | None = None) -> Wanted:
+    """What the settings show of what the plan makes, with `pixel` the one whose gather rays were asked for; what can't
+    be shown is not asked for."""
+    settings: Settings = facts.settings
+    view, overlays = settings.display.view, settings.overlays
+
+    def shown(overlay: str) -> bool:
+        path = f"overlays.{overlay}.show"
+        return get(settings, path) and unmet(needs_of(path), facts) is None
+
+    wanted = Wanted()
+    if view in DIAGNOSTICS and unmet(needs_of(f"display.view={view}"), facts) is None:
+        wanted = Wanted(DIAGNOSTICS[view].family, looked_map(settings, facts.plan) if view in MAP_VIEWS else "")
+    if shown("paths"):
+        wanted = replace(wanted, paths=overlays.paths.count)
+    if shown("fates"):
+        wanted = replace(wanted, fates=overlays.fates.count)
+    if shown("lights"):
+        wanted = replace(wanted, lights=True)
+    if shown("gather"):
+        wanted = replace(wanted, pixel=pixel)
+    return wanted
+
+
+def looked_map(settings: Settings, plan: Plan) -> str:
+    """The map whose look-ups are shown: the one asked for, or the other where there is only that."""
+    if settings.display.map == "caustic" and plan.caustic_classes:
+        return "caustic"
+    return "global" if plan.global_classes else "caustic"

@@ -1,0 +1,94 @@
+"""Native code for what Python calls, and for nothing else.
+
+Numba turns each function that it compiles into native code: it links in the code of all functions that it calls,
+optimises the whole and keeps the machine code. A function that is called by kernels alone needs none of that: it is
+optimised and translated again as part of each kernel. Here such a function stays what it was after its own, cheap
+passes, and a kernel's code is optimised once, when Python first asks for its address. Same machine code (films are
+equal bit for bit), in two thirds of the time.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.environment import lookup_environment
+from numba.core.registry import cpu_target
+
+ENVIRONMENT = "_ZN08NumbaEnv"
+"""How the names of globals begin that hold the address of a function's Python constants."""
+
+
+class KernelLibrary(JITCodeLibrary):
+    """The code of one function with all that it calls. Native from the first call of `get_pointer_to_function` on that
+    names one of its own functions."""
+
+    _native = False
+
+    def finalize(self) -> None:
+        """Link in what it calls. After this nothing can be added."""
+        self._raise_if_finalized()
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Address of a function, 0 if it is not here."""
+        self._ensure_finalized()
+        if not self._native and self._defines(name):
+            self._make_native()
+        return super().get_pointer_to_function(name) if self._native else 0
+
+    def _defines(self, name: str) -> bool:
+        try:
+            return not self._final_module.get_function(name).is_declaration
+        except NameError:
+            return False
+
+    def _make_native(self) -> None:
+        self._codegen._check_llvm_bugs()
+        self._optimize_final_module()
+        self._final_module.verify()
+        self._finalize_final_module()
+        self._native = True
+        for variable in self._final_module.global_variables:
+            if variable.name.startswith(ENVIRONMENT):
+                environment = lookup_environment(variable.name)
+                if environment is not None:
+                    self._codegen.set_env(variable.name, environment)
+
+    def serialize_using_object_code(self) -> tuple[str, str, Any]:
+        """What is kept on disk: machine code and bitcode of what is native, bitcode alone of the rest."""
+        self._ensure_finalized()
+        if self._native:
+            state: tuple[str, str, Any] = super().serialize_using_object_code()
+            return state
+        return self.name, "linkable", self._get_module_for_linking().as_bitcode()
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: tuple[str, str, Any]) -> KernelLibrary:
+        name, kind, data = state
+        if kind == "linkable":
+            library: KernelLibrary = codegen.create_library(name)
+            library._final_module = library._shared_module = llvm.parse_bitcode(data)
+            library._finalized = library._disable_inspection = True
+        else:
+            library = super()._unserialize(codegen, state)
+            library._native = True
+        return library
+
+
+class _KernelCodegen(JITCPUCodegen):
+    _library_class = KernelLibrary
+
+    def set_env(self, env_name: str, env: Any) -> None:
+        """Give native code its constants; what is not native gets them as a part of what is."""
+        if self._engine.is_symbol_defined(env_name):
+            super().set_env(env_name, env)
+
+
+def install() -> None:
+    """From now on all that this process compiles for the processor is compiled so."""
+    cpu_target.target_context.codegen().__class__ = _KernelCodegen

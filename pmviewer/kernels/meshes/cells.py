@@ -1,0 +1,47 @@
+"""Vertices and triangles in the cells of a grid."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.compile.jit import device, kernel
+
+
+@device
+def _along(x, start, size, cells):
+    """Number of the cell along one axis, 1 … `cells`; 0 and cells + 1 for what lies outside."""
+    return np.int32(np.floor(min(max((x - start) / size, -1.0), np.float64(cells)))) + np.int32(1)
+
+
+@kernel
+def cell_means(vertices, start, size, cells, key, mean):
+    """key (V,) int32 becomes the cell of each of vertices (V, 3), of `cells`³ of that size from `start` (3,) on and a
+    rim around them; mean ((cells + 2)³, 3) the mean of the vertices in each cell that has one."""
+    side = np.int32(cells + 2)
+    count = np.zeros(len(mean), np.int32)
+    mean[:] = 0.0
+    for i in range(len(vertices)):
+        x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+        cx, cy = _along(x, start[0], size, cells), _along(y, start[1], size, cells)
+        k = (cx * side + cy) * side + _along(z, start[2], size, cells)
+        key[i] = k
+        count[k] += 1
+        mean[k, 0] += x
+        mean[k, 1] += y
+        mean[k, 2] += z
+    for k in range(len(count)):
+        if count[k] > 1:
+            for axis in range(3):
+                mean[k, axis] /= count[k]
+
+
+@kernel
+def spanning(faces, key, kept):
+    """The faces whose corners lie in three different cells: their numbers go to kept (F,) int64; returns how many."""
+    count = 0
+    for f in range(len(faces)):
+        a, b, c = key[faces[f, 0]], key[faces[f, 1]], key[faces[f, 2]]
+        if a != b and b != c and c != a:
+            kept[count] = f
+            count += 1
+    return count

@@ -1,0 +1,97 @@
+"""A pixel of the eye pass and of the path tracer: its seed, its camera ray, and its place in the film."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pmviewer.kernels.bsdf.scattering import shading_normal
+from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.dimensions import PIXEL, PIXEL_SALT
+from pmviewer.kernels.random import draw4, hash3
+from pmviewer.kernels.surface import face
+from pmviewer.kernels.vector import add, dot, is_good, normalize
+from pmviewer.render.cast import Ray
+from pmviewer.render.planes import PLANES
+from pmviewer.render.record import C_DROPPED
+
+_f4 = np.float32
+_f8 = np.float64
+_u4 = np.uint32
+_INF = _f4(np.inf)
+
+EMISSION, DIRECT, SPECULAR, CAUSTIC, INDIRECT, ALBEDO, NORMAL, DEPTH = (
+    PLANES[name].start
+    for name in ("emission", "direct", "specular", "caustic", "indirect", "albedo", "normal", "depth")
+)
+"""First column of each plane of the film."""
+
+
+class Pixel(NamedTuple):
+    """A pixel that is sampled: its number and seed, and where its samples go: film, float64 (pixels, CHANNELS); radii,
+    of its look-ups, or None (`pmviewer.render.pixel_radius`); counts, int64 (N_COUNTS,)."""
+
+    number: Any
+    seed: Any
+    film: Any
+    radii: Any
+    counts: Any
+
+
+@device
+def pixel_seed(eye, pixel):
+    """Seed of a pixel's random numbers in all passes."""
+    return hash3(eye.seed, _u4(pixel), _u4(PIXEL_SALT))
+
+
+@device
+def camera_ray(eye, pixel, u, v):
+    """The ray through the pixel at (u, v) in [0, 1)², from the near to the far plane."""
+    x = _f4(pixel % eye.width) + u
+    y = _f4(pixel // eye.width) + v
+    o = (eye.x_eye, eye.y_eye, eye.z_eye)
+    d = (
+        eye.x_corner + x * eye.x_right + y * eye.x_down,
+        eye.y_corner + x * eye.y_right + y * eye.y_down,
+        eye.z_corner + x * eye.z_right + y * eye.z_down,
+    )
+    if eye.orthographic != 0:
+        return Ray(add(o, d), (eye.x_forward, eye.y_forward, eye.z_forward), eye.near, eye.far)
+    d = normalize(d)
+    far = eye.far / dot(d, (eye.x_forward, eye.y_forward, eye.z_forward))
+    near = _f4(0.0)
+    if eye.near > near:
+        towards = dot(d, (eye.x_near, eye.y_near, eye.z_near))
+        near = eye.near / towards if towards > near else _INF
+    return Ray(o, d, near, far)
+
+
+@device
+def sampled_ray(eye, pixel):
+    """The pixel's seed, its camera ray in the pass of the eye record, and two numbers for its first light sample."""
+    seed = pixel_seed(eye, pixel)
+    ux, uy, u_light, v_light = draw4(eye.sequence, seed, eye.index, PIXEL)
+    return seed, camera_ray(eye, pixel, ux, uy), (u_light, v_light)
+
+
+@device
+def deposit(pixel, plane, value):
+    """Add a sample to a plane of the film, or count it when it is not finite or negative."""
+    if is_good(value):
+        for k in range(3):
+            pixel.film[pixel.number, plane + k] += _f8(value[k])
+    else:
+        pixel.counts[C_DROPPED] += 1
+
+
+@device
+def properties(eye, pixel, si):
+    """Add the properties of the first surface that the pixel sees: albedo, normal towards the eye, distance along the
+    view."""
+    p, albedo, n = si.p, si.bsdf.albedo, face(shading_normal(si.bsdf), si.wo)
+    depth = (p[0] - eye.x_eye) * eye.x_forward + (p[1] - eye.y_eye) * eye.y_forward + (p[2] - eye.z_eye) * eye.z_forward
+    for k in range(3):
+        pixel.film[pixel.number, ALBEDO + k] += _f8(albedo[k])
+        pixel.film[pixel.number, NORMAL + k] += _f8(n[k])
+    pixel.film[pixel.number, DEPTH] += _f8(depth)

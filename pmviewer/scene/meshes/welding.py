@@ -1,0 +1,51 @@
+"""Meshes from loose triangles that arrive in pieces."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.kernels.meshes.weld import rehash, weld
+from pmviewer.scene.description import Mesh
+
+_FULLEST = 0.6
+"""Share of the table in use up to which collisions are rare."""
+
+
+class Welder:
+    """Gathers up to `count` triangles and gives corners of the same float32 coordinates one vertex, in the order of
+    their first appearance.
+
+    Closed meshes have half as many vertices as triangles, and the table has room for those at first. It grows for
+    others: loose triangles have three vertices each.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._index = np.empty(3 * count, np.int32)
+        self._filled = self._used = 0
+        self._allocate(1 << count.bit_length())
+
+    def _allocate(self, slots: int) -> None:
+        self._table = np.full(slots, -1, np.int32)
+        self._vertices = np.empty((max(int(_FULLEST * slots), 1), 3), np.uint32)
+
+    def add(self, corners: NDArray[np.float32]) -> None:
+        """Triangles (n, 3, 3)."""
+        with np.errstate(invalid="ignore"):
+            bits = np.add(corners, np.float32(0), dtype=np.float32).reshape(-1, 3).view(np.uint32)  # −0 becomes 0
+        while len(bits):
+            index = self._index[self._filled : self._filled + len(bits)]
+            done, self._used = weld(bits, self._table, self._vertices, self._used, index)
+            self._filled += done
+            bits = bits[done:]
+            if len(bits):
+                known = self._vertices
+                self._allocate(2 * len(self._table))
+                self._vertices[: len(known)] = known
+                rehash(known, self._table)
+
+    def mesh(self) -> Mesh:
+        """The triangles so far."""
+        vertices = self._vertices[: self._used].view(np.float32)
+        with np.errstate(invalid="ignore"):  # NaN, which is left out later
+            return Mesh(vertices.astype(np.float64), self._index[: self._filled].reshape(-1, 3))

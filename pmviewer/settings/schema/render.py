@@ -1,0 +1,92 @@
+"""Settings of the method: how terms are evaluated, and for how long."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pmviewer.settings.needs import FOLLOWED, Need
+from pmviewer.settings.schema.base import Group, setting
+
+FOLLOWED_OR_PATHS = Need(lambda f: f.plan.path or FOLLOWED.holds(f), "No mirror or glass in this scene.")
+NO_PATHS = Need(lambda f: not f.plan.path, "The path tracer treats all pixels alike.")
+TWO_WAYS = Need(
+    lambda f: f.settings.render.method in ("progressive", "gather"),
+    "Only with the methods 'progressive' and 'gather'.",
+)
+GLOBAL_MAP_STORED = Need(lambda f: f.plan.global_classes, "No surface of this scene stores photons.")
+
+
+class Render(Group):
+    """Method"""
+
+    method: Literal["progressive", "gather", "path", "global map", "caustic map"] = setting(
+        "progressive",
+        "progressive: direct light by sampling, both maps shown directly with a shrinking radius. gather: indirect "
+        "light by a final gather into the global map. path: path tracing, the yardstick without photons. "
+        "global/caustic map: that map alone, as it is.",
+        stage="image",
+        scale="choice",
+    )
+    max_depth: int = setting(
+        32,
+        "Longest chain of mirrors and glass followed from the camera, and longest path of the path tracer.",
+        stage="image",
+        scale="integer",
+        ge=1,
+        le=1000,
+        needs=(FOLLOWED_OR_PATHS,),
+    )
+    outline_rays: int = setting(
+        16,
+        "Camera rays per pass that look for emission in pixels which the outline of a light crosses: nearly all of the "
+        "error of the first passes sits there. 0 leaves it to the pixel's one ray. Path tracing does without.",
+        stage="image",
+        scale="integer",
+        unit="rays",
+        ge=0,
+        le=256,
+        needs=(NO_PATHS,),
+    )
+    seed: int = setting(1, "Seed of every random stream.", stage="photons", scale="integer", ge=0, le=2**31 - 1)
+    passes: int = setting(
+        1024, "Refinement stops after this many passes.", stage="stop", scale="log", unit="passes", ge=1, le=1_000_000
+    )
+    time_limit: float = setting(
+        0.0, "Refinement stops after this time; 0 is no limit.", stage="stop", scale="linear", unit="s", ge=0, le=1e6
+    )
+    direct: Literal["by method", "accurate", "approximate"] = setting(
+        "by method",
+        "Direct light. accurate: light samples. approximate: the global map's photons straight from the lights (Jensen "
+        "1996, §4).",
+        section="Terms",
+        stage="image",
+        scale="choice",
+        title="direct light",
+        needs=(
+            TWO_WAYS,
+            GLOBAL_MAP_STORED,
+        ),
+    )
+    caustic: Literal["by method", "accurate", "approximate"] = setting(
+        "by method",
+        "Caustics. accurate: the caustic map. approximate: the same photons as the global map has them, at its radius.",
+        stage="image",
+        scale="choice",
+        title="caustics",
+        needs=(
+            TWO_WAYS,
+            GLOBAL_MAP_STORED,
+            FOLLOWED,
+        ),
+    )
+    indirect: Literal["by method", "accurate", "approximate"] = setting(
+        "by method",
+        "Indirect light. accurate: a final gather. approximate: the global map shown directly.",
+        stage="image",
+        scale="choice",
+        title="indirect light",
+        needs=(
+            TWO_WAYS,
+            GLOBAL_MAP_STORED,
+        ),
+    )

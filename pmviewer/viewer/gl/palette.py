@@ -1,0 +1,107 @@
+"""Colours of points and lines, and what they stand for. `shaders/photon.glsl` turns photon records into them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.output.falsecolour import COLOURS, DIVERGING
+
+RGB = tuple[float, float, float]
+
+BOUNCE_PALETTE: tuple[RGB, ...] = (
+    (0.99, 0.91, 0.15),
+    (0.62, 0.85, 0.22),
+    (0.29, 0.76, 0.43),
+    (0.13, 0.63, 0.53),
+    (0.20, 0.53, 0.70),
+    (0.35, 0.44, 0.82),
+    (0.53, 0.36, 0.80),
+    (0.66, 0.30, 0.62),
+)
+"""None (straight from the light) to seven and more scatterings."""
+LIGHT_PALETTE: tuple[RGB, ...] = (
+    (0.95, 0.69, 0.15),
+    (0.35, 0.71, 0.91),
+    (0.10, 0.70, 0.50),
+    (0.94, 0.89, 0.36),
+    (0.25, 0.52, 0.85),
+    (0.88, 0.45, 0.20),
+    (0.84, 0.55, 0.72),
+    (0.75, 0.75, 0.75),
+)
+"""Distinct with colour-blind eyes too (after Okabe and Ito); lights beyond the eighth start again."""
+
+LIT_COLOUR: RGB = (1.0, 0.80, 0.25)
+SHADOW_COLOUR: RGB = (0.35, 0.30, 0.95)
+"""Of shadow photons where the light arrives and where it does not."""
+
+FATE_PALETTE: tuple[RGB, ...] = (
+    (0.45, 0.85, 0.40),
+    (0.90, 0.35, 0.30),
+    (0.35, 0.60, 0.98),
+    (0.98, 0.85, 0.25),
+)
+"""Of photons that are stored, rejected, redistributed and discarded (`pmviewer.photons.deposition.deposited.FATES`)."""
+
+
+class By(IntEnum):
+    """What a record's colour is taken from, as the shader counts it (`colour_by`)."""
+
+    POWER = 0
+    BOUNCES = 1
+    LIGHT = 2
+    LIT = 3
+    QUANTITY = 4
+    FATE = 5
+
+
+MEAN_OF_GREEN_AND_BLUE = 3
+"""A channel of its own, beside red, green and blue."""
+
+
+@dataclass(frozen=True)
+class Colouring:
+    """How records become colours. A quantity is a channel of the stored power, in false colours.
+
+    scale: of a quantity, between its percentiles; as far above 1 as below; or down from the largest value, to a
+    thousandth of it, as a share
+    text: of a quantity, for the legend
+    """
+
+    by: By
+    channel: int = 0
+    scale: Literal["percentiles", "around one", "share"] = "percentiles"
+    text: str = ""
+
+    @property
+    def table(self) -> NDArray[np.floating]:
+        """(n, 3) false colours from small to large."""
+        return DIVERGING if self.scale == "around one" else COLOURS
+
+
+POWER = Colouring(By.POWER)
+BOUNCES = Colouring(By.BOUNCES)
+LIGHTS = Colouring(By.LIGHT)
+
+
+def palettes() -> dict[str, Any]:
+    """Uniforms of `shaders/photon.glsl` that never change."""
+    colours = {
+        "bounce_palette": BOUNCE_PALETTE,
+        "light_palette": LIGHT_PALETTE,
+        "lit_colour": LIT_COLOUR,
+        "shadow_colour": SHADOW_COLOUR,
+        "fate_palette": FATE_PALETTE,
+        "false_colours": np.concatenate([COLOURS[::17], DIVERGING[::17]]),
+    }
+    return {name: np.array(value, np.float32) for name, value in colours.items()}
+
+
+def light_colour(number: int) -> RGB:
+    """Of the light of that number, from 0."""
+    return LIGHT_PALETTE[number % len(LIGHT_PALETTE)]

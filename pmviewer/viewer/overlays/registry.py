@@ -1,0 +1,33 @@
+"""Every overlay, in the order of the panel and the menu."""
+
+from __future__ import annotations
+
+from pmviewer.viewer.overlays.fates import Fates
+from pmviewer.viewer.overlays.frustum import Frustum
+from pmviewer.viewer.overlays.gather_rays import GatherRays
+from pmviewer.viewer.overlays.importons import Importons
+from pmviewer.viewer.overlays.irradiance_cache import IrradianceCache
+from pmviewer.viewer.overlays.light_importance import Lights
+from pmviewer.viewer.overlays.overlay import Overlay
+from pmviewer.viewer.overlays.photon_maps import CausticPhotons, GlobalPhotons
+from pmviewer.viewer.overlays.photon_paths import Paths
+from pmviewer.viewer.overlays.projection_maps import ProjectionMaps
+from pmviewer.viewer.overlays.radiance_photons import RadiancePhotons
+from pmviewer.viewer.overlays.shadow_photons import ShadowPhotons
+
+OVERLAYS: tuple[type[Overlay], ...] = (
+    CausticPhotons,
+    GlobalPhotons,
+    RadiancePhotons,
+    IrradianceCache,
+    ShadowPhotons,
+    Importons,
+    Fates,
+    Lights,
+    Paths,
+    GatherRays,
+    ProjectionMaps,
+    Frustum,
+)
+SWITCHED = tuple(overlay for overlay in OVERLAYS if overlay.switch is not None)
+"""Those with a row in the panel, settings in `overlays` and an action that switches them."""

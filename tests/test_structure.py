@@ -1,0 +1,120 @@
+"""The package as a reader meets it: modules that import in one direction, functions and files of a size to be read."""
+
+from __future__ import annotations
+
+import ast
+import statistics
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pmviewer
+
+PACKAGE = Path(pmviewer.__file__).parent
+MOST_PARAMETERS, MOST_LINES, MEDIAN_FILE, LONGEST_FILE = 12, 100, 130, 500
+
+
+@cache
+def modules() -> dict[str, ast.Module]:
+    """Every module of the package by its name without `pmviewer.`, parsed."""
+    found = {}
+    for file in sorted(PACKAGE.rglob("*.py")):
+        parts = file.relative_to(PACKAGE).with_suffix("").parts
+        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        found[name] = ast.parse(file.read_text(encoding="utf-8"))
+    return found
+
+
+def functions() -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
+    for module, tree in modules().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                yield f"{module}.{node.name}", node
+
+
+def imports(tree: ast.AST) -> Iterator[str]:
+    """Modules of the package that running this code imports, within functions too; not what type checkers alone see."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            for other in node.orelse:
+                yield from imports(ast.Module([other], []))
+        elif isinstance(node, ast.Import):
+            yield from (_inner(alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            inner = _inner(node.module)
+            for alias in node.names:
+                submodule = f"{inner}.{alias.name}".lstrip(".")
+                yield submodule if submodule in modules() else inner
+        else:
+            yield from imports(node)
+
+
+def _inner(name: str) -> str:
+    return name.removeprefix("pmviewer").removeprefix(".") if name.split(".")[0] == "pmviewer" else "-"
+
+
+def circles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Sets of modules that reach each other (Tarjan's strongly connected components of more than one)."""
+    number: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    found: list[list[str]] = []
+
+    def visit(name: str) -> None:
+        number[name] = low[name] = len(number)
+        stack.append(name)
+        for other in sorted(graph[name]):
+            if other not in number:
+                visit(other)
+                low[name] = min(low[name], low[other])
+            elif other in stack:
+                low[name] = min(low[name], number[other])
+        if low[name] == number[name]:
+            circle = stack[stack.index(name) :]
+            del stack[stack.index(name) :]
+            if len(circle) > 1:
+                found.append(sorted(circle))
+
+    for name in graph:
+        if name not in number:
+            visit(name)
+    return found
+
+
+def parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    a = function.args
+    return len(a.posonlyargs) + len(a.args) + len(a.kwonlyargs) + (a.vararg is not None) + (a.kwarg is not None)
+
+
+def test_circles_are_found():
+    """Of the check itself: two that import each other, over a third."""
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [["a", "b", "c"]]
+    assert circles({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
+    tree = ast.parse(
+        "if TYPE_CHECKING:\n    import pmviewer.engine\ndef f():\n    from pmviewer.engine import session\n"
+    )
+    assert set(imports(tree)) == {"engine.session"}
+
+
+def test_no_module_imports_itself_over_others():
+    graph = {
+        name: {other for other in imports(tree) if other in modules()} - {name} for name, tree in modules().items()
+    }
+    assert sum(map(len, graph.values())) > len(graph), "imports are read"
+    assert circles(graph) == []
+
+
+def test_no_function_has_too_many_parameters():
+    many = {name for name, function in functions() if parameters(function) > MOST_PARAMETERS}
+    assert many == set()
+
+
+def test_no_function_is_too_long():
+    long = {name for name, f in functions() if (f.end_lineno or 0) - f.lineno + 1 > MOST_LINES}
+    assert long == set()
+
+
+def test_files_have_a_size_to_be_read():
+    lines = {str(file.relative_to(PACKAGE)): file.read_bytes().count(b"\n") for file in PACKAGE.rglob("*.py")}
+    assert {name: n for name, n in lines.items() if n > LONGEST_FILE} == {}
+    assert statistics.median(lines.values()) <= MEDIAN_FILE

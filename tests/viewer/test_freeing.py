@@ -1,0 +1,111 @@
+"""OpenGL objects live as long as they are used: counted by OpenGL itself."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import threading
+
+import glfw
+import moderngl
+import pytest
+
+from pmviewer.settings.access import Settings, with_values
+from tests.viewer.driver import drive, make_app, on_window_thread
+from tests.viewer.fake_session import FakeSession
+
+KINDS = ("Buffer", "Texture", "VertexArray", "Framebuffer", "Renderbuffer", "Program")
+NAMES = range(1, 4096)
+SCREEN = 0
+"""The window's own framebuffer."""
+CLASSES = (moderngl.Buffer, moderngl.Texture, moderngl.VertexArray, moderngl.Framebuffer, moderngl.Renderbuffer)
+
+
+def is_there(kind: str):
+    address = glfw.get_proc_address(f"glIs{kind}")
+    return ctypes.CFUNCTYPE(ctypes.c_ubyte, ctypes.c_uint)(ctypes.cast(address, ctypes.c_void_p).value)
+
+
+def live() -> dict[str, int]:
+    """How many objects of each kind there are. On the window's thread."""
+    return {kind: sum(map(is_there(kind), NAMES)) for kind in KINDS}
+
+
+@pytest.fixture
+def app(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shown = {"overlays.caustic.show": True, "overlays.global.show": True, "free_camera.on": True}
+    session = FakeSession(with_values(Settings(), shown))
+    session.open("box")
+    return make_app(session, tmp_path)
+
+
+def test_scene_changes_leave_nothing_behind(app, tmp_path):
+    """Ten scenes, pictures exported and screenshots taken between: as many objects after each."""
+    counts, hidden = [], []
+
+    def script(c):
+        for number in range(10):
+            app.state.session.open(f"scene{number}")
+            app.state.change({"free_camera.on": True, "display.view": ("beauty", "depth")[number % 2]})
+            c.yield_(4)
+            on_window_thread(c, lambda: app.viewport.capture(overlays=True))
+            app.commands.window_shot = tmp_path / "window.png"
+            c.yield_(4)
+            counts.append(on_window_thread(c, live))
+        names = ("overlays.caustic.show", "overlays.global.show", "free_camera.on")
+        app.state.change(dict.fromkeys(names, False))
+        c.yield_(4)
+        hidden.append(on_window_thread(c, live))
+
+    drive(app, script)
+    assert counts == [counts[0]] * 10
+    assert counts[0]["VertexArray"] - hidden[0]["VertexArray"] == 3, "two clouds and the frustum are freed"
+    assert counts[0]["Buffer"] - hidden[0]["Buffer"] == 3
+
+
+def test_what_the_collector_finds_on_another_thread_is_freed_on_the_windows(app):
+    seen = {}
+
+    def script(c):
+        buffers = [on_window_thread(c, lambda: app.context.buffer(b"dropped without release"))]
+        seen["before"] = on_window_thread(c, live)["Buffer"]
+
+        def drop():
+            buffers.clear()
+            gc.collect()
+
+        other = threading.Thread(target=drop)
+        other.start()
+        other.join()
+        c.yield_(3)
+        seen["after"] = on_window_thread(c, live)["Buffer"]
+
+    drive(app, script)
+    assert seen["after"] == seen["before"] - 1
+
+
+def test_everything_is_freed_before_the_window_closes(app):
+    alive = []
+
+    def script(c):
+        alive.append(len(living()))
+
+    def living():
+        made = [o for o in gc.get_objects() if isinstance(o, CLASSES) and o.glo != SCREEN]
+        return [o for o in made if not isinstance(o.mglo, moderngl.InvalidObject)]
+
+    before = app.params.callbacks.before_exit
+    names = {}
+
+    def before_exit():
+        names["before"] = live()
+        before()
+        alive.append(len(living()))
+        names["after"] = live()
+
+    app.params.callbacks.before_exit = before_exit
+    drive(app, script)
+    assert alive[0] > 8
+    assert alive[1] == 0
+    assert names["before"]["VertexArray"] - names["after"]["VertexArray"] >= 4, "OpenGL agrees"
