@@ -13,26 +13,6 @@ import pmviewer
 PACKAGE = Path(pmviewer.__file__).parent
 MOST_PARAMETERS, MOST_LINES, MEDIAN_FILE, LONGEST_FILE = 12, 100, 130, 500
 
-# Temporary: functions that are being rebuilt elsewhere. A name goes when its function is within the limits.
-STILL_MANY_PARAMETERS: set[str] = {
-    "kernels.accel.raycast._closest_quadric",
-    "kernels.accel.simd._hit_boxes",
-    "kernels.accel.simd.hit_boxes",
-    "maps.density_control._settle",
-    "maps.estimate.estimate.irradiance_at_knn",
-    "maps.estimate.estimate.irradiance_knn",
-    "maps.estimate.nearest.nearest_disc",
-    "maps.search.kdtree.nearest",
-    "maps.search.simd.facing8",
-    "photons.light_pass.light_pass.trace_pass",
-    "scene.formats.obj_text.read_statements",
-}
-STILL_LONG: set[str] = {
-    "photons.light_pass.light_pass.trace_pass",
-    "photons.light_pass.trace.trace_photons",
-    "scene.arrays.flatten.flatten",
-}
-
 
 @cache
 def modules() -> dict[str, ast.Module]:
@@ -126,12 +106,12 @@ def test_no_module_imports_itself_over_others():
 
 def test_no_function_has_too_many_parameters():
     many = {name for name, function in functions() if parameters(function) > MOST_PARAMETERS}
-    assert many - STILL_MANY_PARAMETERS == set()
+    assert many == set()
 
 
 def test_no_function_is_too_long():
     long = {name for name, f in functions() if (f.end_lineno or 0) - f.lineno + 1 > MOST_LINES}
-    assert long - STILL_LONG == set()
+    assert long == set()
 
 
 def test_files_have_a_size_to_be_read():

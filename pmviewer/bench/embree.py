@@ -146,7 +146,7 @@ def embree_closest(function, scene, origins, directions, tmin, tmax, t, primitiv
 
 @kernel
 def embree_occluded(function, scene, origins, directions, tmin, tmax, hit):
-    """The counterpart of `raycast.cast_occluded`."""
+    """The counterpart of `occlusion.cast_occluded`."""
     for i in range(len(origins)):
         hit[i] = _occluded1(
             function, scene, origins[i, 0], origins[i, 1], origins[i, 2],

@@ -18,12 +18,12 @@ def pass_report(s: Statistics) -> str:
         )
     if s.importons:
         lines.append(f"importance: {s.importons:,} importons, stored at {s.stored_in_pass['importons']:,} places")
-    for name, books in s.deposited.items():
-        if books.arrived:
-            lost = books.discarded_power / books.arrived_power if books.arrived_power > 0 else 0.0
+    for name, map_ in s.deposited.items():
+        if map_.arrived:
+            lost = map_.discarded_power / map_.arrived_power if map_.arrived_power > 0 else 0.0
             biased = f"; biased: {lost:.2%} of the power discarded" if lost > 0 else ""
-            saved = f"{books.saved_bytes / 2**20:.1f} MiB saved"
-            stored = f"{books.stored:,} of {books.arrived:,} photons stored in the last pass"
+            saved = f"{map_.saved_bytes / 2**20:.1f} MiB saved"
+            stored = f"{map_.stored:,} of {map_.arrived:,} photons stored in the last pass"
             lines.append(f"{name} map: {stored}, {saved}{biased}")
     caustic = s.deposited.get("caustic")
     if caustic is not None and caustic.converged is not None:
@@ -53,6 +53,6 @@ def statistics_report(s: Statistics) -> str:
             known = "" if math.isnan(error) else f" ± {error:.2%}"
             rows.append((f"energy {entry}", f"{share:.3%}{known}"))
         if s.energy.uncounted > 0:
-            rows.append(("energy of test photons, not in the books", f"{s.energy.uncounted:.6g} W"))
+            rows.append(("energy of test photons, not in the ledger", f"{s.energy.uncounted:.6g} W"))
     width = max(len(label) for label, _ in rows)
     return "\n".join(f"{label:{width}s}  {text}" for label, text in rows)

@@ -26,7 +26,7 @@ from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.retrace import contributions_of, fates_of, paths_of
 from pmviewer.importance.view import CHANNELS as IMPORTANCE_CHANNELS
 from pmviewer.importance.view import importance_view, probability_view
-from pmviewer.maps.importance import NO_IMPORTANCE
+from pmviewer.maps.importance.importance_map import NO_IMPORTANCE
 from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import neighbourhood
 from pmviewer.maps.search.grid import PhotonGrid, build_grid

@@ -16,7 +16,7 @@ when `photons.max_bounces` ended it, dropped what photons held whose power becam
 @dataclass(frozen=True)
 class Energy:
     """Means over `passes` ledgers in watts of luminance, by `ENTRIES`, and their standard errors, NaN for one pass.
-    `uncounted` is how much of the emission is with test photons of guided emission, whose ways are not in the books."""
+    `uncounted` is how much of the emission is with test photons of guided emission, whose ways no ledger has."""
 
     passes: int
     watts: tuple[float, ...]
@@ -38,7 +38,7 @@ class Energy:
 
 
 @dataclass
-class EnergyBooks:
+class EnergyLedger:
     """Sums over passes of (5,) ledgers and of their squares."""
 
     passes: int = 0
@@ -54,7 +54,7 @@ class EnergyBooks:
         self.lights = lights
 
     def close(self, with_tests: bool) -> Energy | None:
-        """The books so far, `with_tests` if test photons carry power, too; None before the first pass."""
+        """The ledger so far, `with_tests` if test photons carry power, too; None before the first pass."""
         n = self.passes
         if n == 0:
             return None

@@ -19,7 +19,7 @@ from pmviewer.render.planes import beauty_of, view_of
 from pmviewer.settings.access import Settings
 
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
-    from pmviewer.photons.deposition.rules import Deposited
+    from pmviewer.photons.deposition.deposited import Deposited
     from pmviewer.photons.emission.light_importance import LightImportance
     from pmviewer.photons.projection.projection import ProjectionMap
 

@@ -9,7 +9,7 @@ from pmviewer.engine.frame import Frame, PhotonCloud, Statistics
 from pmviewer.engine.inspection import Inspection
 from pmviewer.engine.stages.irradiance_cache import cache_cloud
 from pmviewer.engine.tally import Tally
-from pmviewer.maps.importance import NO_IMPORTANCE
+from pmviewer.maps.importance.importance_map import NO_IMPORTANCE
 from pmviewer.maps.irradiance_cache import REACH
 
 
@@ -99,10 +99,10 @@ def _warnings(looked: Looked, tally: Tally, energy: Energy | None) -> tuple[str,
     unimportant: tuple[str, ...] = ()
     if latest is not None and latest.n and plan.deposition in ("Keller-Wald", "density control"):
         unimportant = tuple(
-            f"{plan.deposition}: none of the {books.arrived:,} photons that arrived for the {name} map in "
+            f"{plan.deposition}: none of the {map_.arrived:,} photons that arrived for the {name} map in "
             "this pass is in an important place. Does light reach what the camera sees?"
-            for name, books in tally.deposited.items()
-            if books.important == 0 and latest.record(name).dtype != NO_IMPORTANCE.dtype
+            for name, map_ in tally.deposited.items()
+            if map_.important == 0 and latest.record(name).dtype != NO_IMPORTANCE.dtype
         )
     cut = caveats(looked.settings, plan, tally, energy, looked.scene.flat.radius, len(film.sums), film.passes)
     notes = maps.notes if maps is not None else ()

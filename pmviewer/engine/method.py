@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
-from pmviewer.maps.estimate.variant import Estimator
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
+from pmviewer.maps.variant import Estimator
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings
 

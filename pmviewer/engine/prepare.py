@@ -25,10 +25,10 @@ from pmviewer.engine.stages.projection import projection_for
 from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.maps.search.grid import build_grid
 from pmviewer.maps.search.kdtree import build_kdtree
-from pmviewer.photons.deposition.rules import prepare_rules
+from pmviewer.photons.deposition.depositor import prepare_rules
 from pmviewer.photons.emission.scattered import scattered_record
 from pmviewer.photons.emission.strata import STRATA_DTYPE
-from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE, N_COUNTS, empty_ledger, trace_photons
+from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE, N_COUNTS, PhotonBuffers, empty_ledger, trace_photons
 from pmviewer.photons.projection.projected import NO_PROJECTION
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
@@ -111,7 +111,7 @@ def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]
     hits = ends, np.empty(0, np.int32), np.empty((0, 2), np.float32)
     steps = [Step("ray casting", cast_closest, (record[0], points, points, ends, ends, *hits))]
     light_pass, codes = np.zeros(1, LIGHT_PASS_DTYPE), np.zeros(1, np.uint32)
-    out = photons, (codes, codes), photons, np.zeros(N_COUNTS, np.int64), empty_ledger(), None
+    out = PhotonBuffers(photons, photons, codes, codes, np.zeros(N_COUNTS, np.int64), empty_ledger())
     maps = projection_for(scene, settings)
     emissions = [("light pass", NO_PROJECTION if maps is None else maps.records)]
     if plan.emission != "off":
@@ -119,7 +119,9 @@ def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]
             ("light pass", np.zeros(2, STRATA_DTYPE)),
             ("light pass from surfaces", scattered_record(np.empty((0, 7), np.float32))),
         ]
-    steps += [Step(text, trace_photons, (record, light_pass, emission, 0, 0, *out)) for text, emission in emissions]
+    steps += [
+        Step(text, trace_photons, (record, light_pass, emission, 0, 0, out, None)) for text, emission in emissions
+    ]
     if plan.deposition != "all" or plan.emission != "off":
         steps.append(Step("deposition rules", prepare_rules))
     if plan.convergence:

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.energy import EnergyBooks
+from pmviewer.engine.energy import EnergyLedger
 from pmviewer.engine.pool import WorkPool
-from pmviewer.photons.deposition.rules import Deposited
-from pmviewer.photons.light_pass.light_pass import PhotonMaps
+from pmviewer.photons.deposition.deposited import Deposited
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.record import C_CACHED, C_CUT, C_DROPPED, C_GATHERED, C_RAYS, C_SAVED, C_SHADOW_RAYS
 
 
@@ -37,7 +37,7 @@ class Tally:
     radius: dict[str, float] = field(default_factory=dict)
     stage_seconds: dict[str, float] = field(default_factory=dict)
     dropped: dict[str, int] = field(default_factory=lambda: {"photons": 0, "samples": 0})
-    energy: EnergyBooks = field(default_factory=EnergyBooks)
+    energy: EnergyLedger = field(default_factory=EnergyLedger)
     map_bytes: int = 0
     map_photons: int = 0
 

@@ -20,7 +20,7 @@ from pmviewer.importance.trace import (
     trace_importons,
 )
 from pmviewer.kernels.dimensions import IMPORTON_SALT
-from pmviewer.maps.importance import Importons
+from pmviewer.maps.importance.importance_map import Importons
 from pmviewer.scene.arrays.flatten import FlatScene
 
 Runner = Callable[[list[Callable[[], Any]]], list[Any]]

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.importance.rules import density_of
-from pmviewer.maps.importance import ImportanceMap
+from pmviewer.maps.importance.importance_map import ImportanceMap
 from pmviewer.maps.power import luminances
 from pmviewer.photons.emission.light_importance import LightImportance
+from pmviewer.tasks import Runner
 
-Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 Arrived = tuple[NDArray[np.float32], NDArray[np.uint32], float, ImportanceMap]
 """Photons (n, 6) with normal codes (n,), their unit of power in watts, and the importance where they are looked up."""
 CHUNK = 8192

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.maps.density_control import M
-from pmviewer.maps.importance import ImportanceMap, importance_sums, importances, nearest_importances, required_density
+from pmviewer.maps.density.growing_tree import M
+from pmviewer.maps.importance.importance_map import ImportanceMap, required_density
+from pmviewer.maps.importance.look_up import importance_sums, importances, nearest_importances
 from pmviewer.maps.record import decode_directions
 
 Float = NDArray[np.float32]

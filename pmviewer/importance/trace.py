@@ -42,7 +42,7 @@ from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import SOBOL, draw4
 from pmviewer.kernels.surface import face
 from pmviewer.kernels.vector import add, along, dot, luminance, scale
-from pmviewer.maps.record import encode_direction
+from pmviewer.maps.photon_words import encode_direction
 from pmviewer.render.cast import Ray, cast, leaving
 from pmviewer.render.chain import WHITE, arrive, scatter
 

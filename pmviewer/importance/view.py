@@ -6,7 +6,7 @@ import numpy as np
 
 from pmviewer.importance.rules import NEAREST
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.maps.importance import importance_at, importance_sum
+from pmviewer.maps.importance.look_up import importance_at, importance_sum
 from pmviewer.render.diagnostics.diagnostics import stored_hit
 
 CHANNELS = 2

@@ -94,7 +94,7 @@ def scene_dtype(
         *(COLOUR_FIELDS if colours else []),
         *(OPACITY_FIELDS if opacity else []),
     ]
-    # In front: to numba's types a longer record is also a shorter one that it begins with.
+    # In front, since numba warns where one record begins like another.
     return np.dtype([*extra, *_FIELDS], align=True)
 
 

@@ -25,19 +25,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.vector import luminance
-from pmviewer.maps.density_control import FLATNESS, M, needs_of
+from pmviewer.maps.density.control import FLATNESS, needs_of
+from pmviewer.maps.density.growing_tree import M
 from pmviewer.maps.estimate.estimate import RIM_LEFT_OUT, irradiance_knn
-from pmviewer.maps.estimate.filters import CONSTANT
+from pmviewer.maps.estimate.filters import CONSTANT, Filter
+from pmviewer.maps.estimate.nearest import Neighbours
 from pmviewer.maps.record import decode_directions, in_classes
+from pmviewer.maps.search.disc import Place
 from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
 from pmviewer.maps.search.stored import ALL_CLASSES
+from pmviewer.tasks import Runner
 
 MORE, CONVERGED, DENSE = 0, 1, 2
 NO_CAUSTIC = -1
@@ -58,7 +61,6 @@ SPARSEST = 10.0
 CHUNK = 1024
 
 Float = NDArray[np.float32]
-Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 
 _f4 = np.float32
 _f8 = np.float64
@@ -96,28 +98,13 @@ def _classify(caustics, others, points, normals, needs, own, m, widest, i0, i1, 
     """States of points i0 … i1−1, (n, 3) with unit normals (n, 3) and needed densities (n,), into int8 (n,). own: 1
     where a photon of the map lies at each point, which says nothing about the density around it, else 0."""
     caustic, other = caustics[0], others[0]
-    k, cone, whole = _i4(M) + _i4(own), _f4(1.0), _f4(1.0)
+    k, rim, whole = _i4(M) + _i4(own), _i4(RIM_LEFT_OUT), _f4(1.0)
+    even = Filter(_i4(CONSTANT), _f4(1.0))
     for i in range(i0, i1):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
+        p, n = (points[i, 0], points[i, 1], points[i, 2]), (normals[i, 0], normals[i, 1], normals[i, 2])
+        place = Place(p, n, FLATNESS, _i4(ALL_CLASSES))
         reach = _f4(math.sqrt(_f8(SPARSEST * M) / (_PI * _f8(needs[i]))))
-        r, g, b, count, radius = irradiance_knn(
-            caustic,
-            x,
-            y,
-            z,
-            nx,
-            ny,
-            nz,
-            k,
-            reach,
-            FLATNESS,
-            _i4(ALL_CLASSES),
-            _i4(CONSTANT),
-            cone,
-            _i4(RIM_LEFT_OUT),
-            whole,
-        )
+        r, g, b, count, radius = irradiance_knn(caustic, place, Neighbours(k, reach, rim, whole), even)
         if count == 0:
             states[i] = NO_CAUSTIC
             continue
@@ -127,23 +114,7 @@ def _classify(caustics, others, points, normals, needs, own, m, widest, i0, i1, 
         if rho >= 1.0:
             continue
         of_caustic = _f8(luminance((r, g, b)))
-        r, g, b, _, _ = irradiance_knn(
-            other,
-            x,
-            y,
-            z,
-            nx,
-            ny,
-            nz,
-            _i4(OTHERS),
-            widest,
-            FLATNESS,
-            _i4(ALL_CLASSES),
-            _i4(CONSTANT),
-            cone,
-            _i4(RIM_LEFT_OUT),
-            whole,
-        )
+        r, g, b, _, _ = irradiance_knn(other, place, Neighbours(_i4(OTHERS), widest, rim, whole), even)
         of_all = of_caustic + _f8(luminance((r, g, b)))
         if rho * of_all**m >= of_caustic**m:  # also where the caustic photons have no power
             states[i] = CONVERGED
@@ -160,15 +131,17 @@ class Convergence:
     def states(self, points: Float, normals: Float, required: Float, own: bool, run: Runner) -> NDArray[np.int8]:
         """NO_CAUSTIC, MORE, CONVERGED or DENSE at points (n, 3) with unit normals (n, 3) and densities required (n,) in
         photons per unit area; own: whether each is the place of a photon of the map."""
-        how, n = self.criterion, len(points)
+        criterion, n = self.criterion, len(points)
         points, normals = np.ascontiguousarray(points, np.float32), np.ascontiguousarray(normals, np.float32)
         needs = needs_of(required)
-        states, widest = np.empty(n, np.int8), np.float32(WIDEST * how.scene_radius)
+        states, widest = np.empty(n, np.int8), np.float32(WIDEST * criterion.scene_radius)
         trees = self.tree.record, self.others.record
 
         def task(i0: int) -> Callable[[], None]:
             i1 = min(i0 + CHUNK, n)
-            return lambda: _classify(*trees, points, normals, needs, int(own), how.exponent, widest, i0, i1, states)
+            return lambda: _classify(
+                *trees, points, normals, needs, int(own), criterion.exponent, widest, i0, i1, states
+            )
 
         run([task(i0) for i0 in range(0, n, CHUNK)])
         return states

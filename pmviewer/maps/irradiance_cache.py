@@ -23,7 +23,8 @@ from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import load_f4, load_i4
 from pmviewer.kernels.random import hash3
 from pmviewer.kernels.vector import add, cross, dot, scale, sub
-from pmviewer.maps.record import encode_direction, encode_power
+from pmviewer.maps.photon_words import encode_direction, encode_power
+from pmviewer.maps.variant import ABSENT
 
 ROW = 32
 """Floats of a record."""
@@ -60,7 +61,7 @@ RECORD = np.dtype(
 )
 """What kernels see of a cache. The last six fields tell how records are made."""
 
-NO_CACHE = np.zeros(1, np.dtype([("none", np.int32)]))
+NO_CACHE = ABSENT
 """Stands for the cache where there is none: kernels are compiled without it."""
 
 _f4 = np.float32

@@ -15,7 +15,8 @@ from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import BLUE_SALT, ROUNDING_SALT
 from pmviewer.kernels.memory import bits_of_float
 from pmviewer.kernels.random import hash3
-from pmviewer.maps.record import EXPONENT_BASE, decode_power
+from pmviewer.maps.photon_words import decode_powers
+from pmviewer.maps.record import EXPONENT_BASE
 
 LARGEST = 2.0**16
 """The largest power that is encoded; codes end a factor of 2 above."""
@@ -55,8 +56,7 @@ def _write(words, powers, scale, seed):
 def luminances(words, out):
     """Luminance of the power of photons (n, 6), seen as uint32, in units of the map's, into out (n,) float32."""
     for i in range(len(words)):
-        red, green = decode_power(words[i, 4] & _u4(0xFFFF)), decode_power(words[i, 4] >> _u4(16))
-        blue = decode_power(words[i, 5] & _u4(0xFFFF))
+        red, green, blue = decode_powers(words[i, 4], words[i, 5])
         out[i] = _f4(0.2126) * red + _f4(0.7152) * green + _f4(0.0722) * blue
 
 

@@ -40,9 +40,10 @@ from pmviewer.kernels.memory import (
     store_shared_i8,
 )
 from pmviewer.kernels.vector import normalize
-from pmviewer.maps.record import decode_direction, decode_power, encode_power
-from pmviewer.maps.search.grid import BLOCK_BYTES, ROW_BYTES, PhotonGrid, build_grid, grid_ranges, lanes_between
-from pmviewer.maps.search.simd import WIDTH, facing8, within8
+from pmviewer.maps.photon_words import decode_direction, decode_power, encode_power
+from pmviewer.maps.search.disc import Disc
+from pmviewer.maps.search.grid import PhotonGrid, build_grid, counted_in_block, grid_ranges
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH
 
 Share = Literal["all", "1/4", "1/8"]
 SHARES: dict[Share, int] = {"all": 1, "1/4": 4, "1/8": 8}
@@ -152,11 +153,8 @@ def nearest_site(sites, p, n, radius, flatness, similarity):
     for k in range(grid_ranges(sites, p[0], p[1], p[2], radius, ranges)):
         first, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
         for block in range(first // WIDTH, (end - 1) // WIDTH + 1):
-            x = sites.blocks + block * BLOCK_BYTES
-            y, z, words = x + ROW_BYTES, x + 2 * ROW_BYTES, x + 3 * ROW_BYTES
-            mask = _i4(within8(x, y, z, p[0], p[1], p[2], r2, squared) & lanes_between(first, end, block))
-            if mask != 0:
-                mask &= facing8(x, y, z, words, p[0], p[1], p[2], n[0], n[1], n[2], height, _i4(1))
+            mask = counted_in_block(sites, block, first, end, Disc(p, n, r2, height, _i4(1)), squared)
+            words = sites.blocks + block * BLOCK_BYTES + 3 * ROW_BYTES
             while mask != 0:
                 lane = count_trailing_zeros(mask)
                 mask &= mask - _i4(1)

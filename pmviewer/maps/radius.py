@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.maps.record import decode_power
+from pmviewer.maps.photon_words import decode_powers
 
 _SAMPLE, _PROBES = 16384, 64
 _f4 = np.float32
@@ -19,8 +19,7 @@ def _largest_luminance(words):
     """Largest luminance (Rec. 709) of the power of photons (n, 6), seen as uint32, in units of the map's power."""
     largest = _f4(0.0)
     for i in range(len(words)):
-        red, green = decode_power(words[i, 4] & _u4(0xFFFF)), decode_power(words[i, 4] >> _u4(16))
-        blue = decode_power(words[i, 5] & _u4(0xFFFF))
+        red, green, blue = decode_powers(words[i, 4], words[i, 5])
         largest = max(largest, _f4(0.2126) * red + _f4(0.7152) * green + _f4(0.0722) * blue)
     return largest
 

@@ -1,4 +1,6 @@
-"""The photon as it is stored: 24 bytes (T4).
+"""The photon as it is stored: 24 bytes (T4). Everything that has photons has them so: the light pass's buffers, maps
+before they are built, samples, paths, clouds for the window and for files. Kernels write and read it with
+`pmviewer.maps.photon_words`.
 
 A map is a C-contiguous (n, 6) float32 array of which only the first three columns are floats; the rest is read
 through its uint32 view:
@@ -18,14 +20,14 @@ Flags: bit 7 the last scattering was specular; bit 6 there was a non-specular sc
 class: direct `LD` (neither bit), caustic `LS+D` (bit 7 alone), indirect (bit 6 alone), indirect caustic (both). Bit 5:
 the photon came over mirrors and clear glass alone from a light that no ray can meet to a lobe that is followed, so that
 no path from the eye finds this light. Bits 0–4: the number of scatterings so far (31 means 31 or more).
+
+Rows rather than a structured type: three columns are coordinates as arrays of points are, one copy moves a photon, and
+kernels address a word by its column. Grids and kd-trees keep the same words in an order of their own.
 """
 
 from __future__ import annotations
 
 import numpy as np
-
-from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.memory import bits_of_float, float_of_bits
 
 BYTES_PER_PHOTON = 24
 
@@ -41,53 +43,6 @@ EXPONENT_BASE = (127 - 47) << 23
 """Bits of 2⁻⁴⁷ as float32, the power of code 0 if that did not mean none."""
 
 _EXPONENT_BASE = np.uint32(EXPONENT_BASE)
-_f4 = np.float32
-_u4 = np.uint32
-
-
-@device
-def encode_power(x):
-    """Non-negative float32 in units of the map's power → 16-bit code (round to nearest, 0 below 2⁻⁴⁷)."""
-    bits = _u4(bits_of_float(_f4(x)))
-    if bits < _u4(_EXPONENT_BASE + _u4(0x2000)):
-        return _u4(0)
-    code = _u4(_u4(bits + _u4(0x1000) - _EXPONENT_BASE) >> _u4(13))
-    return min(code, _u4(0xFFFF))
-
-
-@device
-def decode_power(code):
-    """16-bit code → float32 in units of the map's power."""
-    if _u4(code) == _u4(0):
-        return _f4(0.0)
-    return float_of_bits(_u4(_u4(_u4(code) << _u4(13)) + _EXPONENT_BASE))
-
-
-@device
-def encode_direction(x, y, z):
-    """Unit vector → 24-bit octahedral code in the high bits of a uint32 (worst error 0.06°)."""
-    s = _f4(1.0) / (abs(x) + abs(y) + abs(z))
-    u, v = x * s, y * s
-    if z < _f4(0.0):
-        a = (_f4(1.0) - abs(v)) * (_f4(1.0) if u >= _f4(0.0) else _f4(-1.0))
-        v = (_f4(1.0) - abs(u)) * (_f4(1.0) if v >= _f4(0.0) else _f4(-1.0))
-        u = a
-    iu = _u4(min(max(u * _f4(2047.0) + _f4(2047.5), _f4(0.0)), _f4(4094.0)))
-    iv = _u4(min(max(v * _f4(2047.0) + _f4(2047.5), _f4(0.0)), _f4(4094.0)))
-    return _u4((iu << _u4(20)) | (iv << _u4(8)))
-
-
-@device
-def decode_direction(code):
-    """24-bit octahedral code → vector of the right direction, not normalised (length in [0.57, 1])."""
-    scale = _f4(1.0 / 2047.0)
-    u = _f4(np.int32(_u4(code) >> _u4(20)) - np.int32(2047)) * scale
-    v = _f4(np.int32((_u4(code) >> _u4(8)) & _u4(0xFFF)) - np.int32(2047)) * scale
-    z = _f4(1.0) - abs(u) - abs(v)
-    t = max(-z, _f4(0.0))
-    x = u - t if u >= _f4(0.0) else u + t
-    y = v - t if v >= _f4(0.0) else v + t
-    return x, y, z
 
 
 def decode_directions(codes: np.ndarray) -> np.ndarray:

@@ -20,9 +20,11 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.memory import count_trailing_zeros, load_u4, stack_get_i4, stack_i4
 from pmviewer.maps.radius import neighbourhood
 from pmviewer.maps.record import HAD_DIFFUSE
-from pmviewer.maps.search.grid import BLOCK_BYTES, ROW_BYTES, PhotonGrid, build_grid, grid_ranges, lanes_between
-from pmviewer.maps.search.simd import WIDTH, facing8, within8
+from pmviewer.maps.search.disc import Disc
+from pmviewer.maps.search.grid import PhotonGrid, build_grid, counted_in_block, grid_ranges
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH
 from pmviewer.maps.search.stored import ALL_CLASSES
+from pmviewer.maps.variant import marked
 
 SHADOW_FLAGS = HAD_DIFFUSE | 1
 """Flags of a photon in shadow: of another class than direct ones, one surface behind."""
@@ -39,14 +41,8 @@ _u4 = np.uint32
 
 
 def shadow_record(grid: PhotonGrid, fewest: int) -> NDArray[np.void]:
-    """The grid's record (1,) for kernels, with the number of photons that it takes to decide; the field that tells it
-    from a plain map comes first, see `pmviewer.maps.estimate.variant`."""
-    fields = [(name, field[0]) for name, field in grid.record.dtype.fields.items()]  # type: ignore[union-attr]
-    record = np.zeros(1, np.dtype([("fewest", np.int32), *fields], align=True))
-    for name, _ in fields:
-        record[name] = grid.record[name]
-    record["fewest"] = fewest
-    return record
+    """The grid's record (1,) for kernels, with the number of photons that it takes to decide."""
+    return marked(grid.record, "fewest", fewest)
 
 
 def build_shadows(photons: NDArray[np.float32], fewest: int, radius: float | None, scene_radius: float) -> PhotonGrid:
@@ -66,20 +62,17 @@ def visibility(shadows, p, n, light):
     ranges, squared = stack_i4(16), stack_i4(8)
     radius = _f4(0.25) * shadows.radius
     for _ in range(DISCS):
-        r2, height = radius * radius, FLATNESS * radius
+        disc = Disc(p, n, radius * radius, FLATNESS * radius, _i4(ALL_CLASSES))
         lit, dark = _i8(0), _i8(0)
         for k in range(grid_ranges(shadows, p[0], p[1], p[2], radius, ranges)):
             first, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
             for block in range(first // WIDTH, (end - 1) // WIDTH + 1):
-                x = shadows.blocks + block * BLOCK_BYTES
-                y, z, words, b = x + ROW_BYTES, x + 2 * ROW_BYTES, x + 3 * ROW_BYTES, x + 5 * ROW_BYTES
-                mask = _i4(within8(x, y, z, p[0], p[1], p[2], r2, squared) & lanes_between(first, end, block))
-                if mask != 0:
-                    mask &= facing8(x, y, z, words, p[0], p[1], p[2], n[0], n[1], n[2], height, _i4(ALL_CLASSES))
+                mask = counted_in_block(shadows, block, first, end, disc, squared)
+                words = shadows.blocks + block * BLOCK_BYTES + 3 * ROW_BYTES
                 while mask != 0:
                     lane = count_trailing_zeros(mask)
                     mask &= mask - _i4(1)
-                    if _i8(load_u4(b, lane) >> _u4(16)) == light:
+                    if _i8(load_u4(words + 2 * ROW_BYTES, lane) >> _u4(16)) == light:
                         if load_u4(words, lane) & _u4(HAD_DIFFUSE) != 0:
                             dark += 1
                         else:

@@ -23,14 +23,13 @@ from pmviewer.kernels.bsdf.scattering import NOTHING, bsdf_at, keeps
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.dimensions import EMISSION, SHADOW_EMITTER
 from pmviewer.kernels.lights.light import emit_photon
-from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import SOBOL, draw1, draw4
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face, leave, surface_at
-from pmviewer.maps.record import encode_direction, encode_power
+from pmviewer.maps.photon_words import write_photon
 from pmviewer.maps.shadow import SHADOW_FLAGS
-from pmviewer.photons.light_pass.light_pass import Runner
 from pmviewer.scene.arrays.flatten import FlatScene
+from pmviewer.tasks import Runner
 
 MOST_HITS = 16
 """Surfaces after which a photon is dropped: what lies behind so many is traced."""
@@ -66,8 +65,6 @@ def trace_shadows(scenes, seed, glossy, i0, i1, out, counts):
         u0, u1, u2, u3 = draw4(SOBOL, seed, _u4(i), EMISSION)
         p, d, beta, light = emit_photon(scene, draw1(SOBOL, seed, _u4(i), SHADOW_EMITTER), (u2, u3), (u0, u1))
         wi = (-d[0], -d[1], -d[2])
-        code = encode_direction(wi[0], wi[1], wi[2])
-        r, g, b = encode_power(beta[0]), encode_power(beta[1]), encode_power(beta[2])
         flags = _u4(0)
         for _ in range(MOST_HITS):
             t, prim, u, v = closest_hit(scene, p[0], p[1], p[2], d[0], d[1], d[2], _f4(0.0), _INF)
@@ -78,11 +75,7 @@ def trace_shadows(scenes, seed, glossy, i0, i1, out, counts):
             material = material_of(scene, prim)
             bsdf = bsdf_at(scene, prim, material, u, v, q, ng, ns, wi, glossy)
             if keeps(scene, material, bsdf, ng, wi, glossy) != NOTHING:
-                row = counts[0]
-                out[row, 0], out[row, 1], out[row, 2] = q
-                out[row, 3] = float_of_bits(_u4(code | flags))
-                out[row, 4] = float_of_bits(_u4(r | _u4(g << _u4(16))))
-                out[row, 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
+                write_photon(out, counts[0], q, wi, beta, flags, light)
                 counts[0] += 1
             flags = _u4(SHADOW_FLAGS)
             p = leave(q, face(ng, wi), gap, d[0], d[1], d[2])

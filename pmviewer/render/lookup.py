@@ -1,6 +1,6 @@
 """One look-up for both kinds of map: a grid searches the pass's radius, a kd-tree the k nearest photons.
 
-Kernels are compiled for the kind of map they are given and for the mark it may bear (`pmviewer.maps.estimate.variant`),
+Kernels are compiled for the kind of map they are given and for the mark it may bear (`pmviewer.maps.variant`),
 so that nobody compiles a search or an estimate that is not used.
 """
 
@@ -8,14 +8,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.maps.estimate.differential import checked_irradiance, reach
 from pmviewer.maps.estimate.estimate import irradiance_knn, irradiance_radius
+from pmviewer.maps.estimate.filters import Filter
 from pmviewer.maps.estimate.hull import hull_irradiance
+from pmviewer.maps.estimate.nearest import Neighbours
 from pmviewer.maps.estimate.neighbours import BATCH_WORDS, FOUND_WORDS, SQUARED_WORDS, next_batch, search
 from pmviewer.maps.radiance import UNKNOWN, nearest_site, site_irradiance, site_place, site_slot, store_irradiance
+from pmviewer.maps.search.disc import Place
 from pmviewer.maps.search.stored import ALL_CLASSES
+from pmviewer.maps.variant import ABSENT, is_kdtree
 
 _f4 = np.float32
 _i8 = np.int64
@@ -42,25 +46,14 @@ def irradiance(photons, eye, radius, p, n, class_mask):
 
         return checked
 
-    if has(photons, "planes"):
+    if is_kdtree(photons):
 
         def nearest(photons, eye, radius, p, n, class_mask):
             r, g, b, _, _ = irradiance_knn(
                 photons,
-                p[0],
-                p[1],
-                p[2],
-                n[0],
-                n[1],
-                n[2],
-                eye.k,
-                radius,
-                eye.flatness,
-                class_mask,
-                eye.filter,
-                eye.cone_k,
-                eye.rim,
-                eye.share,
+                Place(p, n, eye.flatness, class_mask),
+                Neighbours(eye.k, radius, eye.rim, eye.share),
+                Filter(eye.filter, eye.cone_k),
             )
             return r, g, b
 
@@ -68,18 +61,7 @@ def irradiance(photons, eye, radius, p, n, class_mask):
 
     def within(photons, eye, radius, p, n, class_mask):
         r, g, b, _ = irradiance_radius(
-            photons,
-            p[0],
-            p[1],
-            p[2],
-            n[0],
-            n[1],
-            n[2],
-            radius,
-            eye.flatness,
-            class_mask,
-            eye.filter,
-            eye.cone_k,
+            photons, Place(p, n, eye.flatness, class_mask), radius, Filter(eye.filter, eye.cone_k)
         )
         return r, g, b
 
@@ -117,25 +99,14 @@ def looked_up(photons, eye, radius, p, n, class_mask):
 
         return checked
 
-    if has(photons, "planes"):
+    if is_kdtree(photons):
 
         def nearest(photons, eye, radius, p, n, class_mask):
             _, _, _, count, r = irradiance_knn(
                 photons,
-                p[0],
-                p[1],
-                p[2],
-                n[0],
-                n[1],
-                n[2],
-                eye.k,
-                radius,
-                eye.flatness,
-                class_mask,
-                eye.filter,
-                eye.cone_k,
-                eye.rim,
-                eye.share,
+                Place(p, n, eye.flatness, class_mask),
+                Neighbours(eye.k, radius, eye.rim, eye.share),
+                Filter(eye.filter, eye.cone_k),
             )
             return r, _f4(count)
 
@@ -143,25 +114,14 @@ def looked_up(photons, eye, radius, p, n, class_mask):
 
     def within(photons, eye, radius, p, n, class_mask):
         _, _, _, count = irradiance_radius(
-            photons,
-            p[0],
-            p[1],
-            p[2],
-            n[0],
-            n[1],
-            n[2],
-            radius,
-            eye.flatness,
-            class_mask,
-            eye.filter,
-            eye.cone_k,
+            photons, Place(p, n, eye.flatness, class_mask), radius, Filter(eye.filter, eye.cone_k)
         )
         return min(radius, photons.radius), _f4(count)
 
     return within
 
 
-NO_SITES = np.zeros(1, np.dtype([("none", np.int32)]))
+NO_SITES = ABSENT
 """Stands for radiance photons where there are none."""
 
 
@@ -172,7 +132,7 @@ def gathered_irradiance(given, p, n):
     Where the pass has radiance photons, that of the nearest one, made by the first ray that needs it, and where none is
     near a look-up of its own; without them always that.
     """
-    if has(part(given, "sites"), "none"):
+    if absent(part(given, "sites")):
 
         def plain(given, p, n):
             return irradiance(given.global_map, given.eye, given.eye.global_radius, p, n, np.int32(ALL_CLASSES))

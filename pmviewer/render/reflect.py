@@ -7,12 +7,13 @@ import numpy as np
 from pmviewer.kernels.bsdf.plain import INV_PI
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian, is_plain, shading_normal, transmits
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.compile.specialise import part, specialised
 from pmviewer.kernels.surface import STRAIGHT
 from pmviewer.kernels.vector import add, dot, mul, scale
 from pmviewer.maps.estimate.glossy import radiance_knn, radiance_radius
 from pmviewer.maps.record import CAUSTIC, UNFOUND
 from pmviewer.maps.search.stored import ALL_CLASSES
+from pmviewer.maps.variant import is_kdtree
 from pmviewer.render.lookup import gathered_irradiance, irradiance
 
 _f4 = np.float32
@@ -35,7 +36,7 @@ def _by_nearest(photons, eye, radius, si, n, group, flags, class_mask):
 
 def _photon_by_photon(photons):
     """The search for the kind of map that the type of its record says."""
-    return _by_nearest if has(photons, "planes") else _by_radius
+    return _by_nearest if is_kdtree(photons) else _by_radius
 
 
 @specialised

@@ -90,12 +90,12 @@ def check(renderer):
         power = unpack(map_, unit)["Phi"]
         assert np.isfinite(power).all()
         assert (power >= 0).all()
-    for books in frame.statistics.deposited.values():
+    for deposited in frame.statistics.deposited.values():
         assert np.isfinite(
-            [books.arrived_power, books.stored_power, books.discarded_power, books.largest_arrived]
+            [deposited.arrived_power, deposited.stored_power, deposited.discarded_power, deposited.largest_arrived]
         ).all()
         if renderer.settings.importance.deposition in ("density control", "constant density"):
-            assert books.stored_power == pytest.approx(books.arrived_power, rel=1e-3)
+            assert deposited.stored_power == pytest.approx(deposited.arrived_power, rel=1e-3)
     return frame
 
 
@@ -118,7 +118,7 @@ def test_degenerate_scenes(case, rule, method):
         if rule in ("clamp", "discard"):
             assert "no importance" in said
     if blind and rule == "discard":
-        assert sum(books.stored for books in frame.statistics.deposited.values()) == 0
+        assert sum(deposited.stored for deposited in frame.statistics.deposited.values()) == 0
     if name == "no light":
         assert frame.image().max() == 0
         assert ("Does light reach" in said) == (rule not in ("all", "constant")), said
@@ -130,10 +130,10 @@ def test_vanishing_probability(rule, method):
     """f → 0: p_k → 0 everywhere, which ε bounds."""
     renderer = rendered(cornell_box(size=SIZE), settings(method, rule, f=1e-9, epsilon=1e-3), 2)
     frame = check(renderer)
-    books = frame.statistics.deposited["global"]
-    assert books.stored <= (0 if rule == "discard" else 0.02 * books.arrived + 5)
+    deposited = frame.statistics.deposited["global"]
+    assert deposited.stored <= (0 if rule == "discard" else 0.02 * deposited.arrived + 5)
     if rule == "discard":
-        assert books.discarded_power == pytest.approx(books.arrived_power)
+        assert deposited.discarded_power == pytest.approx(deposited.arrived_power)
 
 
 @pytest.mark.parametrize("density", [1e-6, 1e12])

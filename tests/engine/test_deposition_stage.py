@@ -81,8 +81,16 @@ from pmviewer.engine.prepare import prepare
 from pmviewer.engine.opened import open_scene
 from pmviewer.viewer.panels.statistics_panel import photon_rows
 from tests.support.scenes import cornell_box, rendered, settings_of
-import pmviewer.maps.convergence as c, pmviewer.maps.density_control as d, pmviewer.photons.deposition.rules as p
-import pmviewer.maps.importance as i, pmviewer.importance.trace as t, pmviewer.importance.view as v
+import pmviewer.importance.trace, pmviewer.importance.view, pmviewer.maps.convergence, pmviewer.maps.density.control
+import pmviewer.maps.density.growing_tree, pmviewer.maps.importance.build, pmviewer.maps.importance.importance_map
+import pmviewer.maps.importance.look_up, pmviewer.photons.deposition.depositor, pmviewer.photons.deposition.fates
+from pmviewer import importance, maps, photons
+
+MODULES = [
+    importance.trace, importance.view, maps.convergence, maps.density.control, maps.density.growing_tree,
+    maps.importance.build, maps.importance.importance_map, maps.importance.look_up, photons.deposition.depositor,
+    photons.deposition.fates,
+]
 
 scene = open_scene(cornell_box(size=8))
 for method in ("progressive", "gather", "global map"):
@@ -97,7 +105,7 @@ for method in ("progressive", "gather", "global map"):
     assert not {"importance", "deposition"} & set(statistics.stage_seconds)
     assert not [row for row in photon_rows(statistics) if "onverged" in row[0]]
     assert len(renderer.light.photons.sample) == len(renderer.light.photons.caustic_normals) == 0
-for module in (c, d, p, i, t, v):
+for module in MODULES:
     for name, value in vars(module).items():
         if hasattr(value, "nopython_signatures") and value.__module__ == module.__name__:
             assert not value.nopython_signatures, (module.__name__, name)

@@ -8,7 +8,8 @@ import numpy as np
 
 from pmviewer.engine.opened import open_scene
 from pmviewer.importance.importons import Rule, joined, trace
-from pmviewer.maps.importance import build_importance, importances
+from pmviewer.maps.importance.build import build_importance
+from pmviewer.maps.importance.look_up import importances
 from pmviewer.render.camera import resolve_camera
 from pmviewer.render.record import eye_record
 from pmviewer.scene.description import PointLight

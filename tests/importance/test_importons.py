@@ -10,7 +10,7 @@ import pytest
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.importance.importons import joined
-from pmviewer.maps.importance import build_importance
+from pmviewer.maps.importance.build import build_importance
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.description import Camera, Material, Parallelogram, Scene, Shape, Sphere
 from pmviewer.settings.access import Settings

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.kernels.accel import raycast
+from pmviewer.kernels.accel import occlusion, raycast
 from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Group, Instance, Material, Mesh, Parallelogram, Shape, Sphere
 from pmviewer.scene.texture import Bitmap, Checkerboard
@@ -23,7 +23,7 @@ def cast(flat, origins, directions):
     rays = [np.ascontiguousarray(a, np.float32) for a in (origins, directions)]
     zero, inf = np.zeros(n, np.float32), np.full(n, np.inf, np.float32)
     raycast.cast_closest(flat.record[0], *rays, zero, inf, t, prim, uv)
-    raycast.cast_occluded(flat.record[0], *rays, zero, np.ones(n, np.float32), hit)
+    occlusion.cast_occluded(flat.record[0], *rays, zero, np.ones(n, np.float32), hit)
     return t, prim, hit
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from pmviewer.kernels.accel import bvh, raycast
+from pmviewer.kernels.accel import bvh, occlusion, raycast
 from pmviewer.kernels.accel.quadric import CYLINDER, DISK, QUADRIC_FLOATS, SPHERE, quadric_normal, quadric_project
 from pmviewer.kernels.compile.jit import kernel
 from tests.support import naive_rays
@@ -34,7 +34,7 @@ class Tracer:
     def occluded(self, origins, directions, tmin=0.0, tmax=np.inf):
         rays = self._rays(origins, directions, tmin, tmax)
         hit = np.empty(len(rays[0]), np.bool_)
-        raycast.cast_occluded(self.scene[0], *rays, hit)
+        occlusion.cast_occluded(self.scene[0], *rays, hit)
         return hit
 
     @staticmethod

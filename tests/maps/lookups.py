@@ -6,8 +6,8 @@ import numpy as np
 
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.estimate.filters import FILTERS
-from pmviewer.maps.estimate.variant import marked
 from pmviewer.maps.search.stored import ALL_CLASSES
+from pmviewer.maps.variant import looked_up_by
 from pmviewer.render.lookup import irradiance
 from pmviewer.render.record import EYE_DTYPE
 
@@ -42,5 +42,5 @@ def estimate(
     points = np.ascontiguousarray(points, np.float32)
     normals = np.ascontiguousarray(np.broadcast_to(normals, points.shape), np.float32)
     E = np.full(points.shape, np.nan, np.float32)
-    look_up(marked(structure.record, estimator), eye, np.float32(radius), points, normals, np.int32(classes), E)
+    look_up(looked_up_by(structure.record, estimator), eye, np.float32(radius), points, normals, np.int32(classes), E)
     return E

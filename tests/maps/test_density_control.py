@@ -6,7 +6,8 @@ import pytest
 from pmviewer.engine.pool import WorkPool
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.random import hash3, unit_float
-from pmviewer.maps.density_control import CAPACITY, COSINE, NEAREST, STEP, Around, DensityControl, M
+from pmviewer.maps.density.control import COSINE, NEAREST, STEP, Around, DensityControl
+from pmviewer.maps.density.growing_tree import CAPACITY, M
 from pmviewer.maps.record import unpack
 from tests.support.naive_maps import pack
 
@@ -181,7 +182,7 @@ def test_sides_of_a_surface_are_apart():
 
 
 def _code(z):
-    from pmviewer.maps.record import encode_direction
+    from pmviewer.maps.photon_words import encode_direction
 
     @kernel
     def encode(z):

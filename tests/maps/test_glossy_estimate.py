@@ -6,8 +6,9 @@ from numba import njit
 
 from pmviewer.kernels.bsdf.plain import STORED, PlainBsdf
 from pmviewer.maps.estimate.estimate import irradiance_at_knn, irradiance_at_radius
-from pmviewer.maps.estimate.filters import FILTERS
+from pmviewer.maps.estimate.filters import FILTERS, Filter
 from pmviewer.maps.estimate.glossy import GRAZING, radiance_knn, radiance_radius
+from pmviewer.maps.estimate.nearest import Neighbours
 from pmviewer.maps.record import unpack
 from pmviewer.maps.search.grid import build_grid
 from pmviewer.maps.search.kdtree import build_kdtree
@@ -74,9 +75,8 @@ def test_lambertian_within_a_radius_is_irradiance_times_albedo_over_pi(cloud, ki
     grid = build_grid(photons, 0.2, power_unit=2.0)
     L, E, counts = np.empty((40, 3), f4), np.empty((40, 3), f4), np.empty(40, i4)
     _by_radius(grid.record, points, normals, normals, f4(0.2), f4(0.5), i4(kind), L)
-    irradiance_at_radius(
-        grid.record, points, normals, f4(0.2), f4(0.5), i4(ALL_CLASSES), i4(kind), f4(1.1), 0, 40, E, counts
-    )
+    weighting = Filter(i4(kind), f4(1.1))
+    irradiance_at_radius(grid.record, points, normals, f4(0.2), f4(0.5), i4(ALL_CLASSES), weighting, 0, 40, E, counts)
     assert counts.sum() > 50
     np.testing.assert_allclose(L, E * np.array(ALBEDO) / np.pi, rtol=2e-4, atol=1e-7)
 
@@ -92,14 +92,10 @@ def test_lambertian_from_the_nearest_is_irradiance_times_albedo_over_pi(cloud):
         tree.record,
         points,
         normals,
-        i4(30),
-        f4(1.0),
+        Neighbours(i4(30), f4(1.0), rim, f4(1.0)),
         f4(0.5),
         i4(ALL_CLASSES),
-        kind,
-        f4(1.1),
-        rim,
-        f4(1.0),
+        Filter(kind, f4(1.1)),
         0,
         40,
         E,

@@ -7,15 +7,11 @@ import pytest
 
 from pmviewer.importance.rules import density_beyond
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.maps.importance import (
-    NO_IMPORTANCE,
-    Importons,
-    build_importance,
-    importance_sums,
-    importances,
-    required_density,
-)
-from pmviewer.maps.record import encode_direction, unpack
+from pmviewer.maps.importance.build import build_importance
+from pmviewer.maps.importance.importance_map import NO_IMPORTANCE, Importons, required_density
+from pmviewer.maps.importance.look_up import importance_sums, importances
+from pmviewer.maps.photon_words import encode_direction
+from pmviewer.maps.record import unpack
 
 UP, EAST = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
 N, WEIGHT = 20_000, 2.0

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from pmviewer.maps.estimate.estimate import RIM_HALF, RIM_LEFT_OUT, irradiance_at_knn, irradiance_at_radius
-from pmviewer.maps.estimate.filters import FILTERS, filter_disc_mean, filter_weight
+from pmviewer.maps.estimate.filters import FILTERS, Filter, filter_disc_mean, filter_weight
+from pmviewer.maps.estimate.nearest import Neighbours
 from pmviewer.maps.search.grid import build_grid
 from pmviewer.maps.search.kdtree import build_kdtree
 from pmviewer.maps.search.stored import ALL_CLASSES
@@ -17,7 +18,7 @@ f4, i4 = np.float32, np.int32
 def by_radius(grid, points, normals, radius, flatness=1.0, classes=ALL_CLASSES, kind="constant", cone_k=1.1):
     m = len(points)
     E, counts = np.full((m, 3), np.nan, f4), np.full(m, -1, i4)
-    arguments = f4(radius), f4(flatness), i4(classes), i4(FILTERS.index(kind)), f4(cone_k)
+    arguments = f4(radius), f4(flatness), i4(classes), Filter(i4(FILTERS.index(kind)), f4(cone_k))
     irradiance_at_radius(grid.record, points, normals, *arguments, 0, m, E, counts)
     return E, counts
 
@@ -27,8 +28,9 @@ def by_knn(
 ):
     m = len(points)
     E, counts, radii = np.full((m, 3), np.nan, f4), np.full(m, -1, i4), np.full(m, np.nan, f4)
-    arguments = f4(max_radius), f4(flatness), i4(classes), i4(FILTERS.index(kind)), f4(cone_k), i4(rim), f4(share)
-    irradiance_at_knn(tree.record, points, normals, i4(k), *arguments, 0, m, E, counts, radii)
+    neighbours = Neighbours(i4(k), f4(max_radius), i4(rim), f4(share))
+    arguments = neighbours, f4(flatness), i4(classes), Filter(i4(FILTERS.index(kind)), f4(cone_k))
+    irradiance_at_knn(tree.record, points, normals, *arguments, 0, m, E, counts, radii)
     return E, counts, radii
 
 

@@ -7,7 +7,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from pmviewer.errors import PmviewerError
-from pmviewer.maps.search.kdtree import MAX_K, build_kdtree, knn
+from pmviewer.maps.search.k_nearest import MAX_K, knn
+from pmviewer.maps.search.kdtree import build_kdtree
 from tests.support import naive_maps as naive
 
 f4 = np.float32

@@ -12,6 +12,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.kernels.compile.jit import kernel
+from pmviewer.maps.photon_words import encode_direction
 from pmviewer.maps.radiance import (
     SHARES,
     build_sites,
@@ -22,7 +23,7 @@ from pmviewer.maps.radiance import (
     site_slot,
     store_irradiance,
 )
-from pmviewer.maps.record import decode_directions, encode_direction, unpack
+from pmviewer.maps.record import decode_directions, unpack
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.description import Camera, Parallelogram, Scene, Shape
 from tests.support.scenes import (

@@ -1,4 +1,4 @@
-"""Deposition rules on the photons of a light pass: unbiased, reproducible, with honest books (I4, I5)."""
+"""Deposition rules on the photons of a light pass: unbiased, reproducible, with an honest ledger (I4, I5)."""
 
 import math
 
@@ -6,18 +6,11 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.pool import WorkPool
-from pmviewer.maps.density_control import COSINE, STEP
+from pmviewer.maps.density.control import COSINE, STEP
 from pmviewer.maps.power import LARGEST, encode_powers
 from pmviewer.maps.record import unpack
-from pmviewer.photons.deposition.rules import (
-    FIRST_WEIGHT,
-    Density,
-    Deposition,
-    KellerWald,
-    constant,
-    rounds,
-    weight_histogram,
-)
+from pmviewer.photons.deposition.deposited import FIRST_WEIGHT, weight_histogram
+from pmviewer.photons.deposition.rules import Density, Deposition, KellerWald, constant, rounds
 from pmviewer.photons.light_pass.light_pass import trace_pass
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.settings.access import Photons
@@ -102,22 +95,22 @@ def test_clamping_is_unbiased():
 def test_discarding_is_biased_by_what_the_books_say():
     whole = light_pass(None)
     thinned = light_pass(KellerWald(by_place, 0.3, discard=True))
-    books = thinned.deposited["global"]
+    deposited = thinned.deposited["global"]
     assert unpack(thinned.global_, 1.0)["position"][:, 0].min() >= 0.3
     expected = power_in_cells(whole.global_, whole.global_unit).sum()
-    assert books.arrived_power == pytest.approx(expected, rel=1e-5)
-    assert 0.3 < books.discarded_power / books.arrived_power < 0.9
-    assert books.stored_power + books.discarded_power == pytest.approx(books.arrived_power, rel=0.03)
-    assert books.largest_arrived <= 1.01 * thinned.global_unit * LUMINANCE.sum()
+    assert deposited.arrived_power == pytest.approx(expected, rel=1e-5)
+    assert 0.3 < deposited.discarded_power / deposited.arrived_power < 0.9
+    assert deposited.stored_power + deposited.discarded_power == pytest.approx(deposited.arrived_power, rel=0.03)
+    assert deposited.largest_arrived <= 1.01 * thinned.global_unit * LUMINANCE.sum()
 
 
 @pytest.mark.parametrize("acceptance", [STEP, COSINE])
 def test_density_control_keeps_the_power_to_a_ten_thousandth(acceptance):
     made = light_pass(Density(constant(50.0), acceptance), n=30_000)
-    books = made.deposited["global"]
-    assert books.stored_power == pytest.approx(books.arrived_power, rel=1e-4)
-    assert books.stored + books.redistributed == books.arrived
-    assert books.stored < books.arrived / 10
+    deposited = made.deposited["global"]
+    assert deposited.stored_power == pytest.approx(deposited.arrived_power, rel=1e-4)
+    assert deposited.stored + deposited.redistributed == deposited.arrived
+    assert deposited.stored < deposited.arrived / 10
     whole = light_pass(None, n=30_000)
     a, b = (unpack(m.global_, m.global_unit)["Phi"].astype(float).sum(axis=0) for m in (made, whole))
     np.testing.assert_allclose(a, b, rtol=1e-4)
@@ -127,15 +120,15 @@ def test_density_control_keeps_the_power_to_a_ten_thousandth(acceptance):
 @pytest.mark.parametrize("discard", [False, True])
 def test_any_probability_is_survived(p, discard):
     made = light_pass(KellerWald(constant(p), 0.0, discard), n=5000)
-    books = made.deposited["global"]
+    deposited = made.deposited["global"]
     assert np.isfinite(unpack(made.global_, made.global_unit)["Phi"]).all()
     if p == np.inf:
-        assert books.rejected == 0
+        assert deposited.rejected == 0
     elif discard:
-        assert books.stored == 0
-        assert books.discarded_power == pytest.approx(books.arrived_power)
+        assert deposited.stored == 0
+        assert deposited.discarded_power == pytest.approx(deposited.arrived_power)
     else:  # the smallest ε there is
-        assert books.stored < 0.01 * books.arrived
+        assert deposited.stored < 0.01 * deposited.arrived
 
 
 def test_classes_and_sample():

@@ -14,8 +14,8 @@ from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.importance.lights import importance_of_lights
 from pmviewer.maps.record import unpack
+from pmviewer.photons.deposition.deposited import DISCARDED, REDISTRIBUTED, REJECTED, STORED
 from pmviewer.photons.deposition.fates import FATE_BITS
-from pmviewer.photons.deposition.rules import DISCARDED, REDISTRIBUTED, REJECTED, STORED
 from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Scene
 from pmviewer.scene.light_places import light_places
@@ -59,20 +59,20 @@ def stepped(scene, pool, method="progressive", passes=1, N=20_000, **importance)
 
 @pytest.mark.parametrize("rule", RULES)
 def test_fates_are_those_of_the_pass_and_add_up(scene, pool, rule):
-    """The second pass, so that its own photons and rules are meant: counts as in the books, stored ones where the map
-    has them."""
+    """The second pass, so that its own photons and rules are meant: counts as in the statistics, stored ones where the
+    map has them."""
     renderer = stepped(scene, pool, passes=2, **RULES[rule])
     assert (renderer.light.latest.lights is not None) == (rule in ("guided", "Christensen"))
     rows = renderer.inspect(Wanted(fates=1_000_000)).fates
     found = unpack(rows, 1.0)
     fates, maps = found["light"] & 7, found["light"] >> FATE_BITS
     for number, name in enumerate(("caustic", "global")):
-        books = renderer.tally.deposited[name]
+        deposited = renderer.tally.deposited[name]
         counts = np.bincount(fates[maps == number], minlength=4)
-        assert counts.sum() == books.arrived > 200
-        assert counts[STORED] == books.stored
-        assert counts[REDISTRIBUTED] == books.redistributed
-        assert counts[REJECTED] + counts[DISCARDED] == books.rejected - books.redistributed
+        assert counts.sum() == deposited.arrived > 200
+        assert counts[STORED] == deposited.stored
+        assert counts[REDISTRIBUTED] == deposited.redistributed
+        assert counts[REJECTED] + counts[DISCARDED] == deposited.rejected - deposited.redistributed
         assert (counts[DISCARDED] > 0) == (rule == "discard")
         assert tuple(counts) == fate_counts(rows, name)
         stored = found["position"][(maps == number) & (fates == STORED)]

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pmviewer.engine.energy import ENTRIES, Energy, EnergyBooks
+from pmviewer.engine.energy import ENTRIES, Energy, EnergyLedger
 from pmviewer.photons.light_pass.light_pass import trace_pass
 from pmviewer.photons.light_pass.roulette import RULES
 from pmviewer.photons.light_pass.trace import E_DROPPED, E_EMITTED, E_STORED
@@ -45,7 +45,7 @@ def trace(flat, scene, seed, N=8000, projection=None, **settings):
 
 
 def shares(scene, N=8000, projected=False, **settings):
-    """Means and standard errors (5,) of the entries relative to the lights' power, over independent seeds; the books
+    """Means and standard errors (5,) of the entries relative to the lights' power, over independent seeds; the ledgers
     of each pass balance to rounding."""
     flat = flatten(scene)
     projection = projection_of(flat) if projected else None
@@ -54,7 +54,7 @@ def shares(scene, N=8000, projected=False, **settings):
         maps = trace(flat, scene, seed, N, projection, **settings)
         row = maps.energy / flat.total_luminance
         assert row[1:].sum() == pytest.approx(row[0], rel=1e-5)
-        assert maps.books.sum() > 0
+        assert maps.ledgers.sum() > 0
         rows.append(row)
     rows = np.array(rows)
     return rows.mean(axis=0), rows.std(axis=0, ddof=1) / math.sqrt(len(rows))
@@ -111,7 +111,7 @@ def lit_square(material, height=0.7, half=1.0):
 @pytest.mark.parametrize("rule", RULES)
 def test_open_scene_lets_its_share_escape(rule, projected):
     """A point over a square of albedo 0.4: what misses the square escapes, and of the rest the reflected part. With
-    projection maps no photon starts where it misses everything, and the books say the same."""
+    projection maps no photon starts where it misses everything, and the ledger says the same."""
     albedo = 0.4
     mean, error = shares(lit_square(diffuse(albedo=(albedo,) * 3)), projected=projected, roulette=rule)
     met = disc_view(0.7, 1.0)
@@ -155,21 +155,21 @@ def test_trajectories_for_the_caustic_map_do_not_change_the_books(rule, q):
     assert (
         abs(mean[ABSORBED] - expected[ABSORBED]) <= 4.5 * math.hypot(error[ABSORBED], expected_error[ABSORBED]) + 1e-5
     )
-    books = trace(flat, scene, 1, round(4000 / q), q=q, indirect_caustics=False).books
-    assert books[:, E_EMITTED] == pytest.approx([4000, round(4000 / q) - 4000], abs=1)
-    ended = np.delete(books, [E_EMITTED, E_STORED], axis=1).sum(axis=1)
-    assert ended == pytest.approx(books[:, E_EMITTED], rel=1e-6)
+    ledgers = trace(flat, scene, 1, round(4000 / q), q=q, indirect_caustics=False).ledgers
+    assert ledgers[:, E_EMITTED] == pytest.approx([4000, round(4000 / q) - 4000], abs=1)
+    ended = np.delete(ledgers, [E_EMITTED, E_STORED], axis=1).sum(axis=1)
+    assert ended == pytest.approx(ledgers[:, E_EMITTED], rel=1e-6)
 
 
 def test_what_becomes_infinite_is_dropped_with_what_it_had():
-    """A reflectance beyond float32's range is what no loader lets through; the books hold even then."""
+    """A reflectance beyond float32's range is what no loader lets through; the ledger holds even then."""
     scene = diffuse_box(albedo=0.5)
     flat = flatten(scene)
     row = flat.arrays[3][0]  # materials
     row[4:7] = 3e38  # M_REFLECTANCE
     maps = trace(flat, scene, 1, 2000)
     assert maps.dropped > 0
-    assert np.isfinite(maps.books).all()
+    assert np.isfinite(maps.ledgers).all()
     ledger = maps.ledger
     assert ledger[E_DROPPED] != 0
     ended = ledger.sum() - ledger[E_EMITTED] - ledger[E_STORED]
@@ -198,12 +198,12 @@ def test_frames_tell_the_energy(emission):
 
 
 def test_books_are_means_with_standard_errors():
-    books = EnergyBooks()
-    assert books.close(False) is None
+    ledger = EnergyLedger()
+    assert ledger.close(False) is None
     rows = np.random.default_rng(1).uniform(0.1, 1.0, (5, 5))
     for row in rows:
-        books.add(row, 2.0)
-    energy = books.close(False)
+        ledger.add(row, 2.0)
+    energy = ledger.close(False)
     assert energy.watts == pytest.approx(rows.mean(axis=0))
     assert energy.errors == pytest.approx(rows.std(axis=0, ddof=1) / math.sqrt(5))
     assert energy.share("escaped") == pytest.approx(rows[:, 2].mean() / rows[:, 0].mean())

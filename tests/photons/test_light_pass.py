@@ -11,8 +11,10 @@ import pytest
 from pmviewer.engine.pool import WorkPool
 from pmviewer.errors import SettingError
 from pmviewer.maps.record import BYTES_PER_PHOTON, unpack
+from pmviewer.photons.light_pass import batch as batch_module
 from pmviewer.photons.light_pass import light_pass as lightpass
-from pmviewer.photons.light_pass.light_pass import trace_pass, trajectories
+from pmviewer.photons.light_pass.light_pass import trace_pass
+from pmviewer.photons.light_pass.plan import trajectories
 from pmviewer.photons.light_pass.trace import E_ABSORBED, E_EMITTED, E_ESCAPED, E_STORED, E_TERMINATED
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
@@ -151,7 +153,7 @@ CLOSED = {"diffuse box": diffuse_box, "cornell box": cornell_box, "closed sphere
 @pytest.mark.parametrize("name", [*OPEN, *CLOSED])
 def test_energy_is_accounted_for(name):
     """Emitted = absorbed + escaped + terminated. Roulette keeps a survivor's luminance and a victim's is all absorbed,
-    so that the books balance to the last photon, not in the mean alone."""
+    so that the ledger balances to the last photon, not in the mean alone."""
     maps = trace((OPEN | CLOSED)[name](), N=40_000, max_bounces=12)
     ledger = maps.ledger
     ended = ledger[E_ABSORBED] + ledger[E_ESCAPED] + ledger[E_TERMINATED]
@@ -258,14 +260,14 @@ def test_photons_that_do_not_fit_are_refused_before_they_are_traced(monkeypatch)
         asked.append(len(tasks))
         return serially(tasks)
 
-    monkeypatch.setattr(lightpass, "PROBED", 1)
+    monkeypatch.setattr(batch_module, "PROBED", 1)
     monkeypatch.setattr(lightpass, "BATCH", 1000)
-    monkeypatch.setattr(lightpass, "available_memory", lambda: 10**9)
+    monkeypatch.setattr(batch_module, "available_memory", lambda: 10**9)
     with pytest.raises(SettingError, match=r"about 25,600,000 photons .* need 1\.5 GB .* 1\.0 GB are free"):
         trace(diffuse_box(albedo=1.0), N=400_000, run=counted)
     assert asked == [1]
-    monkeypatch.setattr(lightpass, "available_memory", lambda: 10**7)
+    monkeypatch.setattr(batch_module, "available_memory", lambda: 10**7)
     part = trace(diffuse_box(albedo=0.2), N=20_000, run=counted)
     assert asked[1:] == [1, 19]
-    monkeypatch.setattr(lightpass, "available_memory", lambda: None)
+    monkeypatch.setattr(batch_module, "available_memory", lambda: None)
     assert same(trace(diffuse_box(albedo=0.2), N=20_000), part)

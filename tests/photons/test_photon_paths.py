@@ -40,7 +40,7 @@ def used(paths):
 def test_stored_photons_lie_on_the_paths_with_their_power(box, first):
     """The global photons of the first M trajectories are vertices of the paths, word for word, in the same order."""
     paths = empty_paths(M, box.radius)
-    few = trace(box, first, paths=paths)
+    few = trace(box, first, watch=paths)
     everything = trace(box, first)
     stored = everything.global_[: len(few.global_)]
     np.testing.assert_array_equal(few.global_.view(np.uint32), stored.view(np.uint32))
@@ -53,7 +53,7 @@ def test_stored_photons_lie_on_the_paths_with_their_power(box, first):
 
 def test_paths_start_on_the_light_and_count_bounces(box):
     paths = empty_paths(M, box.radius)
-    trace(box, paths=paths)
+    trace(box, watch=paths)
     assert np.all(paths.counts >= 2), "the box is closed"
     starts = paths.vertices[:, 0, :3]
     assert np.ptp(starts[:, 1]) < 1e-6, "all on the lamp"
@@ -68,7 +68,7 @@ def test_paths_start_on_the_light_and_count_bounces(box):
 def test_a_photon_that_leaves_ends_a_little_way_out():
     flat = open_scene(light_scene("point")).flat
     paths = empty_paths(M, flat.radius)
-    trace(flat, paths=paths)
+    trace(flat, watch=paths)
     ends = paths.vertices[np.arange(M), paths.counts - 1, :3]
     before = paths.vertices[np.arange(M), paths.counts - 2, :3]
     last = np.linalg.norm(ends - before, axis=1)
@@ -77,7 +77,7 @@ def test_a_photon_that_leaves_ends_a_little_way_out():
 
 def test_flights_are_cut_out_of_the_paths(box):
     paths = empty_paths(M, box.radius)
-    trace(box, paths=paths)
+    trace(box, watch=paths)
     everything = flights(paths, 1, MOST_VERTICES)
     assert len(everything) == 2 * int((paths.counts - 1).sum())
     second = flights(paths, 2, 1)

@@ -13,7 +13,7 @@ from pmviewer.engine.stages.projection import projection_for
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.random import INDEPENDENT
 from pmviewer.maps.record import CAUSTIC, INDIRECT_CAUSTIC, unpack
-from pmviewer.photons.light_pass import light_pass as lightpass
+from pmviewer.photons.light_pass import plan as passplan
 from pmviewer.photons.light_pass.light_pass import trace_pass
 from pmviewer.photons.light_pass.trace import E_ABSORBED, E_EMITTED, E_ESCAPED, E_TERMINATED
 from pmviewer.photons.projection.bounds import MOST_SPHERES, enclosing, spheres_of
@@ -213,7 +213,7 @@ def test_units_of_the_caustic_map_follow_the_strongest_photons(monkeypatch):
     flat = flatten(lit("point", Sphere((-0.2, 0.4, 0.15), 0.3)))
     projection, found = projection_of(flat), []
     for largest in (2.0**12, 2.0**-5):
-        monkeypatch.setattr(lightpass, "LARGEST_SCALE", largest)
+        monkeypatch.setattr(passplan, "LARGEST_SCALE", largest)
         photons = trace(flat, projection, N=400_000, q=0.5)
         found.append((photons.caustic_unit, unpack(photons.caustic, photons.caustic_unit)))
     (unit, plain), (larger, scaled) = found

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.accel.raycast import cast_closest, cast_occluded, closest_hit
+from pmviewer.kernels.accel.occlusion import cast_occluded
+from pmviewer.kernels.accel.raycast import cast_closest, closest_hit
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.scene import light_of, material_of, scene_dtype
 from pmviewer.kernels.surface import leave, surface_at

@@ -10,8 +10,7 @@ import pytest
 
 from pmviewer.engine.energy import Energy
 from pmviewer.maps.record import unpack
-from pmviewer.photons.deposition import rules as photons
-from pmviewer.photons.deposition.rules import Deposited, weight_histogram
+from pmviewer.photons.deposition.deposited import Deposited, weight_histogram
 from pmviewer.render.camera import resolve_camera
 from pmviewer.settings.access import Settings, with_values
 from pmviewer.viewer import format as fmt
@@ -19,9 +18,8 @@ from pmviewer.viewer.background import Background
 from pmviewer.viewer.dialogs.recent import LENGTH, RecentFiles
 from pmviewer.viewer.gl.points import even_thinning
 from pmviewer.viewer.gl.records import brightest_channel
-from pmviewer.viewer.overlays.fates import FATES
 from pmviewer.viewer.overlays.light_importance import projected
-from pmviewer.viewer.panels.importance_panel import FIRST_WEIGHT, bias_row, deposition_rows, histogram_of, weight_text
+from pmviewer.viewer.panels.importance_panel import bias_row, deposition_rows, histogram_of, weight_text
 from pmviewer.viewer.panels.statistics_panel import energy_rows
 from pmviewer.viewer.session_link import SessionLink
 from pmviewer.viewer.theme import drawable
@@ -166,8 +164,6 @@ def test_figures_of_deposition():
     np.testing.assert_array_equal(counts, [1, 1, 0, 1])
     assert histogram_of(shared)[0].size == 0
     assert [weight_text(e) for e in (-2.0, 0.0, 5.0)] == ["1/4", "1", "32"]
-    assert FIRST_WEIGHT == photons.FIRST_WEIGHT
-    assert FATES == photons.FATES
 
 
 def test_points_are_projected_where_the_camera_sees_them():
@@ -187,6 +183,6 @@ def test_energy_rows_are_shares_with_errors():
     assert rows["Escaped from the scene"] == "20.00 ± 0.5 %"
     assert rows["On its way after the last scattering"] == "5.00 ± 0.1 %"
     assert rows["Dropped, not finite"] == "0.00 %"
-    assert rows["With test photons, not in these books"] == "3 W"
+    assert rows["With test photons, not in this ledger"] == "3 W"
     one = dict(energy_rows(Energy(1, (12.0, 12.0, 0.0, 0.0, 0.0), (math.nan,) * 5)))
     assert one["Absorbed"] == "100.00 %"

@@ -35,7 +35,7 @@ from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.output.metric import EPSILON, block_means, relmse, z_test
-from pmviewer.photons.deposition.rules import Deposited
+from pmviewer.photons.deposition.deposited import Deposited
 from pmviewer.scene.arrays.flatten import LUMINANCE
 from pmviewer.settings.access import Settings, with_values
 
@@ -89,8 +89,8 @@ class Measured:
     @property
     def power_off(self) -> float:
         """Largest relative difference between stored and arrived power of a map."""
-        books = [d for d in self.deposited.values() if d.arrived_power > 0]
-        return max((abs(d.stored_power / d.arrived_power - 1) for d in books), default=0.0)
+        maps = [d for d in self.deposited.values() if d.arrived_power > 0]
+        return max((abs(d.stored_power / d.arrived_power - 1) for d in maps), default=0.0)
 
     @property
     def discarded(self) -> float:

@@ -26,7 +26,8 @@ from pmviewer.engine.renderer import Renderer
 from pmviewer.maps.record import decode_directions, in_classes, unpack
 from pmviewer.photons.emission.strata import Strata, strata_of
 from pmviewer.photons.emission.tested import Batch, trace_tests
-from pmviewer.photons.light_pass.light_pass import BATCH, testing
+from pmviewer.photons.light_pass.batch import BATCH
+from pmviewer.photons.light_pass.light_pass import testing
 from pmviewer.render.diagnostics.diagnostics import seen_places
 from pmviewer.render.record import eye_record
 

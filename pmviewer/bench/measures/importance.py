@@ -37,7 +37,9 @@ from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.importance.importons import Rule, joined, trace
-from pmviewer.maps.importance import ImportanceMap, Importons, build_importance, importances
+from pmviewer.maps.importance.build import build_importance
+from pmviewer.maps.importance.importance_map import ImportanceMap, Importons
+from pmviewer.maps.importance.look_up import importances
 from pmviewer.maps.record import decode_directions
 from pmviewer.render.camera import resolve_camera
 from pmviewer.render.record import eye_record

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from pmviewer.bench.measures.rays import Rays, _race, _rays
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.kernels.accel.raycast import cast_closest, cast_occluded
+from pmviewer.kernels.accel.occlusion import cast_occluded
+from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.scene.arrays.flatten import FlatScene, flatten
 from pmviewer.scene.arrays.primitives import transformed
 from pmviewer.scene.description import Mesh, Scene

@@ -12,9 +12,11 @@ from scipy.spatial import cKDTree
 
 from pmviewer.bench.report import BenchResult, Target
 from pmviewer.maps.estimate.estimate import RIM_LEFT_OUT, irradiance_at_knn, irradiance_at_radius
-from pmviewer.maps.estimate.filters import CONSTANT
+from pmviewer.maps.estimate.filters import CONSTANT, Filter
+from pmviewer.maps.estimate.nearest import Neighbours
 from pmviewer.maps.search.grid import PhotonGrid, build_grid, count_in_radius
-from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree, nearest_at
+from pmviewer.maps.search.k_nearest import nearest_at
+from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
 from pmviewer.maps.search.stored import ALL_CLASSES
 
 K = 50
@@ -27,6 +29,7 @@ WALLS = 22.67
 THREADS = 2
 CHUNK = 4096
 _f4, _i4 = np.float32, np.int32
+EVEN = Filter(_i4(CONSTANT), _f4(1))
 
 
 def clustered(n: int, seed: int) -> np.ndarray:
@@ -93,7 +96,7 @@ class _Queries:
         self._run(lambda i, j: count_in_radius(grid.record, self.points, _f4(grid.radius), i, j, self.counts))
 
     def estimate(self, grid: PhotonGrid) -> None:
-        shape = _f4(grid.radius), _f4(1), _i4(ALL_CLASSES), _i4(CONSTANT), _f4(1)
+        shape = _f4(grid.radius), _f4(1), _i4(ALL_CLASSES), EVEN
         out = self.irradiance, self.counts
         self._run(lambda i, j: irradiance_at_radius(grid.record, self.points, self.normals, *shape, i, j, *out))
 
@@ -102,7 +105,8 @@ class _Queries:
         self._run(lambda i, j: nearest_at(tree.record, self.points, k, reach, ordered, i, j, *out))
 
     def estimate_nearest(self, tree: PhotonKdTree, max_radius: float) -> None:
-        shape = _i4(K), _f4(max_radius), _f4(1), _i4(ALL_CLASSES), _i4(CONSTANT), _f4(1), _i4(RIM_LEFT_OUT), _f4(1)
+        neighbours = Neighbours(_i4(K), _f4(max_radius), _i4(RIM_LEFT_OUT), _f4(1))
+        shape = neighbours, _f4(1), _i4(ALL_CLASSES), EVEN
         out = self.irradiance, self.counts, self.radii
         self._run(lambda i, j: irradiance_at_knn(tree.record, self.points, self.normals, *shape, i, j, *out))
 

@@ -12,7 +12,8 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.maps.search.grid import build_grid
 from pmviewer.maps.search.kdtree import build_kdtree
-from pmviewer.photons.light_pass.light_pass import PhotonMaps, trace_pass
+from pmviewer.photons.light_pass.light_pass import trace_pass
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Photons
 
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from pmviewer.bench.report import BenchResult, Target
 from pmviewer.maps.record import CAUSTIC, unpack
-from pmviewer.photons.light_pass.light_pass import PhotonMaps, trace_pass
+from pmviewer.photons.light_pass.light_pass import trace_pass
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.photons.projection.projection import Projection, projection_of
 from pmviewer.scene.arrays.flatten import LUMINANCE, FlatScene, flatten
 from pmviewer.scene.description import (

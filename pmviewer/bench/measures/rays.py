@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pmviewer.bench.embree import EmbreeScene, embree_closest, embree_occluded
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.kernels.accel import bvh, raycast
+from pmviewer.kernels.accel import bvh, occlusion, raycast
 from pmviewer.kernels.accel.quadric import QUADRIC_FLOATS
 
 BOUND = 1.2
@@ -147,7 +147,7 @@ def _measure(name: str, triangles: F4, size: int, rounds: int) -> tuple[list[lis
     def shadow(rays: Rays) -> list[Callable[[], None]]:
         data, m = (rays.origins, rays.directions, rays.tmin, rays.tmax), len(rays)
         return [
-            lambda: raycast.cast_occluded(scene[0], *data, blocked[:m]),
+            lambda: occlusion.cast_occluded(scene[0], *data, blocked[:m]),
             lambda: embree_occluded(embree.occluded1, embree.scene, *data, theirs_blocked[:m]),
         ]
 

@@ -12,14 +12,16 @@ from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.importance.rules import full_importance, relative_importance
 from pmviewer.kernels.dimensions import ROUNDING_SALT, SCATTERED_SALT
-from pmviewer.maps.importance import ImportanceMap, Importons, build_importance
+from pmviewer.maps.importance.build import build_importance
+from pmviewer.maps.importance.importance_map import ImportanceMap, Importons
 from pmviewer.maps.power import luminances
 from pmviewer.maps.record import CAUSTIC, DIRECT
 from pmviewer.photons.deposition.rules import Deposition, Homogeneous, Rule
 from pmviewer.photons.emission.guided import Guidance, Guided, Known
 from pmviewer.photons.emission.scattered import FIRST
 from pmviewer.photons.emission.tested import Sought
-from pmviewer.photons.light_pass.light_pass import PhotonMaps, scattered_photons
+from pmviewer.photons.light_pass.light_pass import scattered_photons
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Settings
 
 MOST_SCATTERED = 1 << 15

@@ -20,7 +20,8 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.importance.importons import Rule, Traced, joined, trace
-from pmviewer.maps.importance import NO_IMPORTANCE, ImportanceMap, Importons, build_importance
+from pmviewer.maps.importance.build import build_importance
+from pmviewer.maps.importance.importance_map import NO_IMPORTANCE, ImportanceMap, Importons
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.record import eye_record
 from pmviewer.settings.access import Settings

@@ -20,7 +20,7 @@ from pmviewer.engine.stages.projection import projection_for
 from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
-from pmviewer.photons.light_pass.light_pass import PhotonMaps
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.scene.light_places import light_places
 from pmviewer.settings.access import Settings
 

@@ -26,7 +26,7 @@ from pmviewer.maps.record import DIRECT, in_classes
 from pmviewer.maps.search.grid import PhotonGrid, build_grid
 from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
 from pmviewer.photons.emission.guided import Known
-from pmviewer.photons.light_pass.light_pass import PhotonMaps
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Settings
 
 CHOOSING_PHOTONS = 1 << 17

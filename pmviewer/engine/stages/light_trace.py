@@ -11,7 +11,7 @@ from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.light_plan import LightPlan
 from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.photons.emission.guided import Guidance, Known
-from pmviewer.photons.light_pass.light_pass import PhotonMaps
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 
 
 @dataclass(frozen=True, eq=False)

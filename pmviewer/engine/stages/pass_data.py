@@ -11,10 +11,10 @@ from pmviewer.engine.method import Plan, estimator_of
 from pmviewer.engine.stages.gather_guides import gather_records
 from pmviewer.engine.stages.pass_maps import LookUpMap, PassMaps, blank_grid, blank_maps
 from pmviewer.engine.stages.shadow_photons import ShadowMap
-from pmviewer.maps.estimate.variant import marked
 from pmviewer.maps.irradiance_cache import NO_CACHE, IrradianceCache
 from pmviewer.maps.irradiance_cache import RECORD as CACHE_RECORD
 from pmviewer.maps.shadow import shadow_record
+from pmviewer.maps.variant import looked_up_by
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.direct.choice import CHOICES
 from pmviewer.render.direct.shadow import NO_SHADOWS
@@ -78,7 +78,7 @@ def pass_data(
     estimator = estimator_of(settings)
 
     def photon_map(made: LookUpMap | None) -> NDArray[np.void]:
-        return marked((made.structure if made is not None else maps.empty).record, estimator)
+        return looked_up_by((made.structure if made is not None else maps.empty).record, estimator)
 
     guides, corner = gather_records(plan, maps.guides)
     return PassData(

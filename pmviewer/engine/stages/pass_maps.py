@@ -16,7 +16,7 @@ from pmviewer.maps.search.kdtree import RECORD as TREE_RECORD
 from pmviewer.maps.search.kdtree import PhotonKdTree
 from pmviewer.photons.emission.guided import Known
 from pmviewer.photons.emission.light_importance import LightImportance
-from pmviewer.photons.light_pass.light_pass import PhotonMaps
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Settings
 
 Structure = PhotonGrid | PhotonKdTree

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
-from pmviewer.photons.light_pass.light_pass import trajectories
+from pmviewer.photons.light_pass.plan import trajectories
 from pmviewer.photons.projection.projection import Projection, projection_of
 from pmviewer.settings.access import Settings
 

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from pmviewer.engine.stages.light_plan import LightPlan
 from pmviewer.engine.stages.pass_maps import LookUpMap
 from pmviewer.maps.estimate.estimate import irradiance_at_knn
-from pmviewer.maps.estimate.filters import FILTERS
+from pmviewer.maps.estimate.filters import FILTERS, Filter
+from pmviewer.maps.estimate.nearest import Neighbours
 from pmviewer.maps.radiance import RadianceMap, build_sites
 from pmviewer.maps.record import decode_directions
 from pmviewer.maps.search.kdtree import PhotonKdTree
 from pmviewer.maps.search.stored import ALL_CLASSES
-from pmviewer.photons.light_pass.light_pass import PhotonMaps
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.record import RIMS
 from pmviewer.settings.access import Estimate, Settings
 
@@ -61,18 +62,16 @@ def median_radius(
     normals = decode_directions(photons.normals[picked])
     m = len(picked)
     E, counts, radii = np.empty((m, 3), np.float32), np.empty(m, np.int32), np.empty(m, np.float32)
+    rim = np.int32(RIMS.index(estimate.rim))
+    neighbours = Neighbours(np.int32(light.neighbours), np.float32(max_radius), rim, np.float32(light.share))
     irradiance_at_knn(
         tree.record,
         points,
         normals,
-        np.int32(light.neighbours),
-        np.float32(max_radius),
+        neighbours,
         np.float32(estimate.flatness),
         np.int32(ALL_CLASSES),
-        np.int32(FILTERS.index(estimate.filter)),
-        np.float32(estimate.cone_k),
-        np.int32(RIMS.index(estimate.rim)),
-        np.float32(light.share),
+        Filter(np.int32(FILTERS.index(estimate.filter)), np.float32(estimate.cone_k)),
         0,
         m,
         E,

@@ -30,7 +30,7 @@ def paths_of(tracer: Tracer, maps: PassMaps, count: int) -> PhotonPaths | None:
     guided = maps.photons.guided
     most = tracer.trajectories(maps.N) if guided is None else guided.n
     paths = empty_paths(min(count, most), tracer.flat.radius)
-    photons = tracer.trace(maps.index, maps.N, guided=guided, paths=paths)
+    photons = tracer.trace(maps.index, maps.N, guided=guided, watch=paths)
     return replace(paths, power_unit=photons.global_unit)
 
 
@@ -48,7 +48,7 @@ def fates_of(tracer: Tracer, maps: PassMaps, importance: ImportanceStage, count:
     if deposition is None:
         return None
     fates = Fates(count)
-    tracer.trace(maps.index, maps.N, deposition=deposition, fates=fates, guided=guided)
+    tracer.trace(maps.index, maps.N, deposition=deposition, watch=fates, guided=guided)
     return fates.cloud()
 
 

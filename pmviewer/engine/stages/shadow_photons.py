@@ -15,10 +15,10 @@ from pmviewer.engine.tally import Tally
 from pmviewer.kernels.dimensions import SHADOW_SALT
 from pmviewer.maps.search.grid import PhotonGrid
 from pmviewer.maps.shadow import build_shadows, shadow_record
-from pmviewer.photons.light_pass.light_pass import Runner
 from pmviewer.photons.shadow import shadow_pass
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import Direct, Settings
+from pmviewer.tasks import Runner
 
 
 @dataclass(frozen=True)

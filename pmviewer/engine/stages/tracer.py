@@ -8,11 +8,14 @@ from pmviewer.engine.method import Plan
 from pmviewer.photons.deposition.fates import Fates
 from pmviewer.photons.deposition.rules import Deposition
 from pmviewer.photons.emission.guided import Guidance, Guided, Known
-from pmviewer.photons.light_pass.light_pass import PhotonMaps, Runner, guided_emission_of, trace_pass, trajectories
+from pmviewer.photons.light_pass.light_pass import guided_emission_of, trace_pass
 from pmviewer.photons.light_pass.paths import PhotonPaths
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
+from pmviewer.photons.light_pass.plan import trajectories
 from pmviewer.photons.projection.projection import Projection
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import Settings
+from pmviewer.tasks import Runner
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +45,7 @@ class Tracer:
         normals: bool = False,
         deposition: Deposition | None = None,
         guided: Guided | None = None,
-        fates: Fates | None = None,
-        paths: PhotonPaths | None = None,
+        watch: PhotonPaths | Fates | None = None,
     ) -> PhotonMaps:
         """Photons of pass `index`; see `pmviewer.photons.light_pass.light_pass.trace_pass` for what is asked of them.
         Raises SettingError where they can't fit into memory."""
@@ -58,10 +60,9 @@ class Tracer:
             self.run,
             normals,
             projection=None if guided is not None else self.projection,
-            paths=paths,
             deposition=deposition,
             guided=guided,
-            fates=fates,
+            watch=watch,
         )
 
     def guided_emission(self, index: int, N: int, guidance: Guidance, before: Known | None) -> Guided | None:

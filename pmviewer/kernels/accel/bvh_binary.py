@@ -1,8 +1,5 @@
 """The binary tree that the wide one is made of: binned surface-area heuristic (Wald, "On fast construction of SAH-based
 bounding volume hierarchies", 2007), large nodes split one by one, small ones on several threads at the same time.
-
-A box is eight float32 in one row of 32 bytes: lower corner, a number, the upper corner negated, a number. The union of
-two boxes is then the smaller of each of the eight; the numbers are integers in the same memory and of no account there.
 """
 
 from __future__ import annotations
@@ -12,13 +9,12 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from llvmlite import ir
-from numba import types
 from numpy.typing import NDArray
 
-from pmviewer.kernels.accel.simd import LANES, ROW_BYTES, V8, V8I
+from pmviewer.kernels.accel.box import clear, clear_rows, copy_row, grow, grow_by_center, half_area
+from pmviewer.kernels.accel.simd import LANES, ROW_BYTES
 from pmviewer.kernels.compile.jit import device, kernel
-from pmviewer.kernels.memory import aligned_empty, at_address, with_twin
+from pmviewer.kernels.memory import aligned_empty
 from pmviewer.progress import check, grown
 
 BINS = 16
@@ -132,108 +128,6 @@ def _joined(root: _Part) -> Binary:
     return Binary(nodes, plan, sum(part.n_blocks for part in upper))
 
 
-def _row(builder, address):
-    value = builder.load(builder.inttoptr(address, V8.as_pointer()))
-    value.align = ROW_BYTES
-    return value
-
-
-def _shrink(builder, address, other):
-    """Keep the smaller of what is at the address and `other`, lane by lane."""
-    old = _row(builder, address)
-    smaller = builder.select(builder.fcmp_ordered("<", other, old), other, old)
-    builder.store(smaller, builder.inttoptr(address, V8.as_pointer())).align = ROW_BYTES
-
-
-def _lanes(address):
-    return at_address(address, LANES, np.float32)
-
-
-def _shrink_row(address, other):
-    row = _lanes(address)
-    row[:] = np.where(other < row, other, row)
-
-
-def _center_row(box, other):
-    row = _lanes(other)
-    with np.errstate(invalid="ignore"):
-        _shrink_row(box, row - np.concatenate([row[4:], row[:4]]))
-
-
-def _copy_row(box, to):
-    _lanes(to)[:] = _lanes(box)
-
-
-def _clear_row(box):
-    _lanes(box)[:] = np.inf
-
-
-@with_twin(lambda box, other: _shrink_row(box, _lanes(other)))
-def _grow(typingctx, box, other):
-    """The box at one address grows by that at the other."""
-    signature = types.void(types.int64, types.int64)
-
-    def codegen(context, builder, sig, args):
-        _shrink(builder, args[0], _row(builder, args[1]))
-        return context.get_dummy_value()
-
-    return signature, codegen
-
-
-@with_twin(_center_row)
-def _grow_by_center(typingctx, box, other):
-    """The box at one address grows by twice the centre of that at the other."""
-    signature = types.void(types.int64, types.int64)
-
-    def codegen(context, builder, sig, args):
-        row = _row(builder, args[1])
-        undefined = ir.Constant(V8, ir.Undefined)
-        turned = builder.shuffle_vector(row, undefined, ir.Constant(V8I, [4, 5, 6, 7, 0, 1, 2, 3]))
-        # lower - (-upper) in the first four lanes, its negative in the others
-        _shrink(builder, args[0], builder.fsub(row, turned))
-        return context.get_dummy_value()
-
-    return signature, codegen
-
-
-@with_twin(_copy_row)
-def _copy(typingctx, box, to):
-    """Copy the row at one address to the other."""
-    signature = types.void(types.int64, types.int64)
-
-    def codegen(context, builder, sig, args):
-        row = _row(builder, args[0])
-        builder.store(row, builder.inttoptr(args[1], V8.as_pointer())).align = ROW_BYTES
-        return context.get_dummy_value()
-
-    return signature, codegen
-
-
-@with_twin(_clear_row)
-def _clear(typingctx, box):
-    """The row at the address becomes a box around nothing."""
-    signature = types.void(types.int64)
-
-    def codegen(context, builder, sig, args):
-        nothing = ir.Constant(V8, [float("inf")] * LANES)
-        builder.store(nothing, builder.inttoptr(args[0], V8.as_pointer())).align = ROW_BYTES
-        return context.get_dummy_value()
-
-    return signature, codegen
-
-
-@device
-def _empty(address, rows):
-    for i in range(rows):
-        _clear(address + ROW_BYTES * i)
-
-
-@device
-def _half_area(box):
-    dx, dy, dz = -(box[0] + box[4]), -(box[1] + box[5]), -(box[2] + box[6])
-    return dx * dy + dy * dz + dz * dx
-
-
 @device
 def _bin(value, low, scale):
     # Clamped in floating point: the conversion of a huge number or a NaN to an integer is anything.
@@ -248,11 +142,11 @@ def bound(boxes, begin, end, box, centers):
     """Into the first rows of `box` and `centers`, the box around boxes [begin, end) and that around their centres,
     twice as far out."""
     at, to, around = boxes.ctypes.data, box.ctypes.data, centers.ctypes.data
-    _clear(to)
-    _clear(around)
+    clear(to)
+    clear(around)
     for i in range(begin, end):
-        _grow(to, at + ROW_BYTES * i)
-        _grow_by_center(around, at + ROW_BYTES * i)
+        grow(to, at + ROW_BYTES * i)
+        grow_by_center(around, at + ROW_BYTES * i)
 
 
 @device
@@ -271,7 +165,7 @@ def _split(boxes, begin, end, lanes, sah, centers, children, sides, scratch, spa
             low[k] = centers[k]
             extent = -centers[4 + k] - centers[k]
             scale[k] = np.float32(BINS * 0.9999) / extent if extent > np.float32(0) else np.float32(0)
-        _empty(bins, 3 * BINS)
+        clear_rows(bins, 3 * BINS)
         counts[:] = 0
         l0, l1, l2, s0, s1, s2 = low[0], low[1], low[2], scale[0], scale[1], scale[2]
         for i in range(begin, end):
@@ -282,34 +176,34 @@ def _split(boxes, begin, end, lanes, sah, centers, children, sides, scratch, spa
             counts[b1] += 1
             counts[b2] += 1
             row = at + ROW_BYTES * i
-            _grow(bins + ROW_BYTES * b0, row)
-            _grow(bins + ROW_BYTES * b1, row)
-            _grow(bins + ROW_BYTES * b2, row)
+            grow(bins + ROW_BYTES * b0, row)
+            grow(bins + ROW_BYTES * b1, row)
+            grow(bins + ROW_BYTES * b2, row)
         side, side_at = scratch[_SIDE], bins + ROW_BYTES * _SIDE
         for k in range(3):
             if scale[k] == np.float32(0):
                 continue
             count = 0
-            _clear(side_at)
+            clear(side_at)
             for b in range(BINS - 1, 0, -1):
-                _grow(side_at, bins + ROW_BYTES * (k * BINS + b))
+                grow(side_at, bins + ROW_BYTES * (k * BINS + b))
                 count += counts[k * BINS + b]
                 full = np.float32((count + lanes - 1) >> shift)
-                costs[b] = _half_area(side) * full if count > 0 else np.float32(np.inf)
+                costs[b] = half_area(side) * full if count > 0 else np.float32(np.inf)
             count = 0
-            _clear(side_at)
+            clear(side_at)
             for b in range(BINS - 1):
-                _grow(side_at, bins + ROW_BYTES * (k * BINS + b))
+                grow(side_at, bins + ROW_BYTES * (k * BINS + b))
                 count += counts[k * BINS + b]
                 if count == 0:
                     continue
                 full = np.float32((count + lanes - 1) >> shift)
-                cost = _half_area(side) * full + costs[b + 1]
+                cost = half_area(side) * full + costs[b + 1]
                 if cost < best:
                     best, best_axis, best_bin = cost, k, b
     if best_axis >= 0:
         left = sides.ctypes.data
-        _empty(left, 2)
+        clear_rows(left, 2)
         k, lk, sk = best_axis, low[best_axis], scale[best_axis]
         border = np.float32(best_bin + 1)
         i, j, apart = at + ROW_BYTES * begin, np.int64(0), spare.ctypes.data
@@ -317,19 +211,19 @@ def _split(boxes, begin, end, lanes, sah, centers, children, sides, scratch, spa
             # Without a branch, which the processor would guess wrong half the time: to both places, one of which stays.
             box = (row - at) >> 5
             behind = np.int64((boxes[box, k] - boxes[box, 4 + k] - lk) * sk >= border)
-            _grow_by_center(left + ROW_BYTES * behind, row)
-            _copy(row, apart + j)
-            _copy(row, i)
+            grow_by_center(left + ROW_BYTES * behind, row)
+            copy_row(row, apart + j)
+            copy_row(row, i)
             i += ROW_BYTES * (1 - behind)
             j += ROW_BYTES * behind
         for moved in range(0, j, ROW_BYTES):
-            _copy(apart + moved, i + moved)
+            copy_row(apart + moved, i + moved)
         i = (i - at) >> 5
         if begin < i < end:
             first = children.ctypes.data
-            _empty(first, 2)
+            clear_rows(first, 2)
             for b in range(BINS):
-                _grow(first if b <= best_bin else first + 32, bins + ROW_BYTES * (k * BINS + b))
+                grow(first if b <= best_bin else first + 32, bins + ROW_BYTES * (k * BINS + b))
             return i
     middle = (begin + end) // 2
     _halve(boxes, begin, middle, end, children, sides)
@@ -339,12 +233,12 @@ def _split(boxes, begin, end, lanes, sah, centers, children, sides, scratch, spa
 @device
 def _halve(boxes, begin, middle, end, children, sides):
     at, first, left = boxes.ctypes.data, children.ctypes.data, sides.ctypes.data
-    _empty(first, 2)
-    _empty(left, 2)
+    clear_rows(first, 2)
+    clear_rows(left, 2)
     for i in range(begin, end):
         side = 0 if i < middle else 32
-        _grow(first + side, at + ROW_BYTES * i)
-        _grow_by_center(left + side, at + ROW_BYTES * i)
+        grow(first + side, at + ROW_BYTES * i)
+        grow_by_center(left + side, at + ROW_BYTES * i)
 
 
 @device
@@ -420,7 +314,7 @@ def plan_range(binary, binary_ints, costs, plan, first, end):
     is a wide node itself.
     """
     for c in range(end - 1, first - 1, -1):
-        area = _half_area(binary[c])
+        area = half_area(binary[c])
         if binary_ints[c, 7] > 0:
             costs[c], plan[c] = area * LEAF_COST, 0
             continue

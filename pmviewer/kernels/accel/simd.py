@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 
 from pmviewer.kernels.memory import F32, I8, I32, I64, at_address, with_twin
 
@@ -61,10 +62,10 @@ def _bits(lanes):
     return np.int32(np.packbits(lanes, bitorder="little")[0])
 
 
-def _hit_boxes(node, near_x, near_y, near_z, ox, oy, oz, ix, iy, iz, tmin, tmax, out):
+def _hit_boxes(node, nears, origin, inverse, tmin, tmax, out):
     enter, leave = np.full(LANES, tmin, np.float32), np.full(LANES, tmax, np.float32)
     with np.errstate(invalid="ignore", over="ignore"):
-        for near, o, i in zip((near_x, near_y, near_z), (ox, oy, oz), (ix, iy, iz)):
+        for near, o, i in zip(nears, origin, inverse):
             t0 = (at_address(node + near, LANES, np.float32) - o) * i
             t1 = (at_address(node + (near ^ ROW_BYTES), LANES, np.float32) - o) * i
             enter, leave = np.where(t0 > enter, t0, enter), np.where(t1 < leave, t1, leave)
@@ -74,21 +75,23 @@ def _hit_boxes(node, near_x, near_y, near_z, ox, oy, oz, ix, iy, iz, tmin, tmax,
 
 
 @with_twin(_hit_boxes)
-def hit_boxes(typingctx, node, near_x, near_y, near_z, ox, oy, oz, ix, iy, iz, tmin, tmax, out):
+def hit_boxes(typingctx, node, nears, origin, inverse, tmin, tmax, out):
     """Lanes of the node at address `node` whose boxes the ray meets in [tmin, tmax]; entry distances go to `out`.
 
-    `near_*` are the byte offsets of the rows of the planes that the ray meets first, `i*` the reciprocals of the
-    direction. Differences come before products, so all rounding errors are relative to t and `FAR_FACTOR` covers them.
-    A ray in a plane of the box gives 0 · inf there: comparisons with the NaN fail and the other planes decide.
+    `nears` (int64 triple) are the byte offsets of the rows of the planes that the ray meets first, `inverse` (float32
+    triple) the reciprocals of the direction, `out` points to 8 float32.
+
+    Differences come before products, so all rounding errors are relative to t and `FAR_FACTOR` covers them. A ray in a
+    plane of the box gives 0 · inf there: comparisons with the NaN fail and the other planes decide.
     """
     f = types.float32
-    signature = types.int32(*[types.int64] * 4, *[f] * 8, out)
+    triple = types.UniTuple(f, 3)
+    signature = types.int32(types.int64, types.UniTuple(types.int64, 3), triple, triple, f, f, out)
 
     def codegen(context, builder, sig, args):
-        node, nears, origin, inverses = args[0], args[1:4], args[4:7], args[7:10]
-        tmin, tmax, out = args[10:13]
+        node, nears, origin, inverse, tmin, tmax, out = args
         enter, leave = _splat(builder, tmin), _splat(builder, tmax)
-        for near, o, i in zip(nears, origin, inverses):
+        for near, o, i in zip(*(cgutils.unpack_tuple(builder, values, 3) for values in (nears, origin, inverse))):
             first = _load(builder, builder.add(node, near))
             last = _load(builder, builder.add(node, builder.xor(near, ir.Constant(I64, ROW_BYTES))))
             o, i = _splat(builder, o), _splat(builder, i)

@@ -6,7 +6,7 @@ made by one function, in compiled code and in plain Python (NUMBA_DISABLE_JIT=1)
     @specialised
     def cached(cache, eye, p):
         '''What it does.'''
-        if has(cache, "none"):
+        if absent(cache):
             return lambda cache, eye, p: BLACK
 
         def from_records(cache, eye, p):
@@ -54,8 +54,13 @@ def part(argument: Any, name: str) -> Any:
 
 
 def absent(argument: Any) -> bool:
-    """Whether an argument is None, or its type is None's."""
-    return argument is None or isinstance(argument, types.NoneType)
+    """Whether an argument is None or the record of nothing (`pmviewer.maps.variant.ABSENT`), or its type is that of
+    one."""
+    if argument is None or isinstance(argument, types.NoneType):
+        return True
+    if isinstance(argument, types.Record):
+        return "absent" in argument.fields
+    return "absent" in (getattr(getattr(argument, "dtype", None), "names", None) or ())
 
 
 def is_a(argument: Any, kind: type[tuple[Any, ...]]) -> bool:

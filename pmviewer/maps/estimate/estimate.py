@@ -31,9 +31,10 @@ from pmviewer.kernels.memory import (
 )
 from pmviewer.maps.estimate.filters import CONSTANT, filter_disc_mean, filter_weight
 from pmviewer.maps.estimate.nearest import nearest_disc
-from pmviewer.maps.search.grid import BLOCK_BYTES, ROW_BYTES, grid_ranges, lanes_between
-from pmviewer.maps.search.kdtree import KEYS
-from pmviewer.maps.search.simd import WIDTH, add_power8, count_bits, facing8, within8
+from pmviewer.maps.search.disc import Disc, Place
+from pmviewer.maps.search.grid import counted_in_block, grid_ranges
+from pmviewer.maps.search.k_nearest import KEYS
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, add_power8, count_bits
 from pmviewer.maps.search.stored import stored_power
 
 RIM_LEFT_OUT, RIM_HALF, RIM_WHOLE = 0, 1, 2
@@ -64,16 +65,15 @@ def _flush(sums, red, green, blue):
 
 
 @device
-def irradiance_radius(grid, px, py, pz, nx, ny, nz, radius, flatness, class_mask, filter_kind, cone_k):
+def irradiance_radius(grid, place, radius, weighting):
     """Irradiance from all photons closer than `radius`.
 
     Parameters
     ----------
     grid: record of a PhotonGrid; a radius above the grid's own is lowered to it.
-    px, py, pz; nx, ny, nz: float32 point and unit normal.
-    radius, flatness: float32.
-    class_mask, filter_kind: int32; filter_kind is an index into FILTERS.
-    cone_k: float32 ≥ 1, used by the cone alone.
+    place: a `pmviewer.maps.search.disc.Place`.
+    radius: float32.
+    weighting: a `pmviewer.maps.estimate.filters.Filter`.
 
     Returns
     -------
@@ -82,7 +82,9 @@ def irradiance_radius(grid, px, py, pz, nx, ny, nz, radius, flatness, class_mask
     radius = min(radius, grid.radius)
     r2 = radius * radius
     inverse_r2 = _f4(1.0) / r2
-    height = flatness * radius
+    p = place.p
+    filter_kind, cone_k = weighting
+    disc = Disc(p, place.n, r2, place.flatness * radius, place.class_mask)
     ranges, squared, weights, sums = stack_i4(16), stack_i4(8), stack_i4(8), stack_i4(24)
     for lane in range(WIDTH):
         stack_put_f4(weights, lane, _f4(1.0))
@@ -90,20 +92,10 @@ def irradiance_radius(grid, px, py, pz, nx, ny, nz, radius, flatness, class_mask
         stack_put_f4(sums, lane, _f4(0.0))
     red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
     count, pending = _i4(0), _i4(0)
-    for k in range(grid_ranges(grid, px, py, pz, radius, ranges)):
+    for k in range(grid_ranges(grid, p[0], p[1], p[2], radius, ranges)):
         first, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
         for block in range(first // WIDTH, (end - 1) // WIDTH + 1):
-            x = grid.blocks + block * BLOCK_BYTES
-            y, z, words, rg, b = (
-                x + ROW_BYTES,
-                x + 2 * ROW_BYTES,
-                x + 3 * ROW_BYTES,
-                x + 4 * ROW_BYTES,
-                x + 5 * ROW_BYTES,
-            )
-            mask = _i4(within8(x, y, z, px, py, pz, r2, squared) & lanes_between(first, end, block))
-            if mask != 0:
-                mask &= facing8(x, y, z, words, px, py, pz, nx, ny, nz, height, class_mask)
+            mask = counted_in_block(grid, block, first, end, disc, squared)
             if mask != 0:
                 if filter_kind != CONSTANT:
                     lanes = mask
@@ -112,7 +104,8 @@ def irradiance_radius(grid, px, py, pz, nx, ny, nz, radius, flatness, class_mask
                         lanes &= lanes - _i4(1)
                         x2 = stack_get_f4(squared, lane) * inverse_r2
                         stack_put_f4(weights, lane, filter_weight(filter_kind, cone_k, x2))
-                add_power8(rg, b, mask, weights, sums)
+                powers = grid.blocks + block * BLOCK_BYTES + 4 * ROW_BYTES
+                add_power8(powers, powers + ROW_BYTES, mask, weights, sums)
                 count += count_bits(mask)
                 pending += _i4(1)
                 if pending == FLUSH:
@@ -124,25 +117,24 @@ def irradiance_radius(grid, px, py, pz, nx, ny, nz, radius, flatness, class_mask
 
 
 @device
-def irradiance_knn(tree, px, py, pz, nx, ny, nz, k, max_radius, flatness, class_mask, filter_kind, cone_k, rim, share):
-    """Irradiance from the k nearest photons, at most `max_radius` away.
+def irradiance_knn(tree, place, neighbours, weighting):
+    """Irradiance from the k nearest photons.
 
     Parameters
     ----------
     tree: record of a PhotonKdTree.
-    k: int32, 2 … MAX_K.
-    max_radius: float32, finite.
-    rim: int32, RIM_LEFT_OUT, RIM_HALF or RIM_WHOLE.
-    share: float32, the part of the disc's area in which photons count (`pmviewer.maps.estimate.nearest`), 1 for all.
-    others: as for `irradiance_radius`. In a flattened disc the distance is max(d, |h|/flatness), which on the
-        tangent plane is d.
+    place: as for `irradiance_radius`. In a flattened disc the distance is max(d, |h|/flatness), which on the tangent
+        plane is d.
+    neighbours: a `pmviewer.maps.estimate.nearest.Neighbours`.
+    weighting: as for `irradiance_radius`.
 
     Returns
     -------
     (E red, E green, E blue) float32, number of photons int32, that on the rim included, radius float32.
     """
     keys = stack_i4(KEYS)
-    count, rim_place, r2 = nearest_disc(tree, px, py, pz, nx, ny, nz, k, max_radius, flatness, class_mask, share, keys)
+    filter_kind, cone_k = weighting
+    count, rim_place, r2 = nearest_disc(tree, place, neighbours, keys)
     inverse_r2 = _f4(1.0) / r2
     red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
     for j in range(count):
@@ -155,7 +147,7 @@ def irradiance_knn(tree, px, py, pz, nx, ny, nz, k, max_radius, flatness, class_
     if rim_place >= 0:
         count += 1
         r, g, b = stored_power(tree, rim_place)
-        w = _f4(0.5) * _f4(rim) * filter_weight(filter_kind, cone_k, _f4(1.0))
+        w = _f4(0.5) * _f4(neighbours.rim) * filter_weight(filter_kind, cone_k, _f4(1.0))
         red += w * r
         green += w * g
         blue += w * b
@@ -164,76 +156,33 @@ def irradiance_knn(tree, px, py, pz, nx, ny, nz, k, max_radius, flatness, class_
 
 
 @kernel
-def irradiance_at_radius(
-    grids, points, normals, radius, flatness, class_mask, filter_kind, cone_k, i0, i1, irradiance, counts
-):
+def irradiance_at_radius(grids, points, normals, radius, flatness, class_mask, weighting, i0, i1, irradiance, counts):
     """`irradiance_radius` at points[i0:i1].
 
-    points, normals, irradiance: (m, 3) float32; counts: (m,) int32; grids: the record array of a PhotonGrid.
+    points, normals, irradiance: (m, 3) float32; counts: (m,) int32; grids: the record array of a PhotonGrid; flatness,
+    class_mask: as in a `Place`.
     """
     grid = grids[0]
     for i in range(i0, i1):
-        red, green, blue, count = irradiance_radius(
-            grid,
-            points[i, 0],
-            points[i, 1],
-            points[i, 2],
-            normals[i, 0],
-            normals[i, 1],
-            normals[i, 2],
-            radius,
-            flatness,
-            class_mask,
-            filter_kind,
-            cone_k,
-        )
+        p, n = (points[i, 0], points[i, 1], points[i, 2]), (normals[i, 0], normals[i, 1], normals[i, 2])
+        red, green, blue, count = irradiance_radius(grid, Place(p, n, flatness, class_mask), radius, weighting)
         irradiance[i, 0], irradiance[i, 1], irradiance[i, 2] = red, green, blue
         counts[i] = count
 
 
 @kernel
 def irradiance_at_knn(
-    trees,
-    points,
-    normals,
-    k,
-    max_radius,
-    flatness,
-    class_mask,
-    filter_kind,
-    cone_k,
-    rim,
-    share,
-    i0,
-    i1,
-    irradiance,
-    counts,
-    radii,
+    trees, points, normals, neighbours, flatness, class_mask, weighting, i0, i1, irradiance, counts, radii
 ):
     """`irradiance_knn` at points[i0:i1].
 
     points, normals, irradiance: (m, 3) float32; counts: (m,) int32; radii: (m,) float32; trees: the record array of a
-    PhotonKdTree.
+    PhotonKdTree; flatness, class_mask: as in a `Place`.
     """
     tree = trees[0]
     for i in range(i0, i1):
-        red, green, blue, count, radius = irradiance_knn(
-            tree,
-            points[i, 0],
-            points[i, 1],
-            points[i, 2],
-            normals[i, 0],
-            normals[i, 1],
-            normals[i, 2],
-            k,
-            max_radius,
-            flatness,
-            class_mask,
-            filter_kind,
-            cone_k,
-            rim,
-            share,
-        )
+        p, n = (points[i, 0], points[i, 1], points[i, 2]), (normals[i, 0], normals[i, 1], normals[i, 2])
+        red, green, blue, count, radius = irradiance_knn(tree, Place(p, n, flatness, class_mask), neighbours, weighting)
         irradiance[i, 0], irradiance[i, 1], irradiance[i, 2] = red, green, blue
         counts[i] = count
         radii[i] = radius

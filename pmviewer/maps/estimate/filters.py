@@ -19,6 +19,7 @@ epanechnikov  1 − x²                                               1/2
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,13 @@ _GAUSSIAN_MEAN = _f4(_ALPHA * (1 - (1 - 2 / _BETA * (1 - math.exp(-_BETA / 2))) 
 _GAUSSIAN_SCALE = _f4(_ALPHA / (1 - math.exp(-_BETA)))
 _GAUSSIAN_BASE = _f4(_ALPHA - _ALPHA / (1 - math.exp(-_BETA)))
 _GAUSSIAN_RATE = _f4(-_BETA / 2)
+
+
+class Filter(NamedTuple):
+    """A kernel: `kind`, int32, its id; `cone_k`, float32 ≥ 1, the k of the cone, which no other reads."""
+
+    kind: Any
+    cone_k: Any
 
 
 @device

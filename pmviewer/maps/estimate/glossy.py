@@ -24,11 +24,12 @@ from pmviewer.kernels.memory import (
 )
 from pmviewer.kernels.vector import dot, normalize
 from pmviewer.maps.estimate.filters import filter_disc_mean, filter_weight
-from pmviewer.maps.estimate.nearest import nearest_disc
-from pmviewer.maps.record import decode_direction, decode_power
-from pmviewer.maps.search.grid import BLOCK_BYTES, ROW_BYTES, grid_ranges, lanes_between
-from pmviewer.maps.search.kdtree import KEYS
-from pmviewer.maps.search.simd import WIDTH, facing8, within8
+from pmviewer.maps.estimate.nearest import Neighbours, nearest_disc
+from pmviewer.maps.photon_words import decode_direction, decode_powers
+from pmviewer.maps.search.disc import Disc, Place
+from pmviewer.maps.search.grid import counted_in_block, grid_ranges
+from pmviewer.maps.search.k_nearest import KEYS
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH
 from pmviewer.maps.search.stored import stored_power
 
 _f4 = np.float32
@@ -67,19 +68,17 @@ def radiance_radius(grid, eye, radius, p, n, class_mask, b, group, flags, wo):
     photons that have all of the `flags` (`pmviewer.maps.record`) count.
     """
     radius = min(radius, grid.radius)
-    flatness, filter_kind, cone_k = eye.flatness, eye.filter, eye.cone_k
+    filter_kind, cone_k = eye.filter, eye.cone_k
     r2 = radius * radius
     inverse_r2 = _f4(1.0) / r2
+    disc = Disc(p, n, r2, eye.flatness * radius, class_mask)
     ranges, squared = stack_i4(16), stack_i4(8)
     red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
     for k in range(grid_ranges(grid, p[0], p[1], p[2], radius, ranges)):
         first, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
         for block in range(first // WIDTH, (end - 1) // WIDTH + 1):
-            x = grid.blocks + block * BLOCK_BYTES
-            y, z, words = x + ROW_BYTES, x + 2 * ROW_BYTES, x + 3 * ROW_BYTES
-            mask = _i4(within8(x, y, z, p[0], p[1], p[2], r2, squared) & lanes_between(first, end, block))
-            if mask != 0:
-                mask &= facing8(x, y, z, words, p[0], p[1], p[2], n[0], n[1], n[2], flatness * radius, class_mask)
+            mask = counted_in_block(grid, block, first, end, disc, squared)
+            words = grid.blocks + block * BLOCK_BYTES + 3 * ROW_BYTES
             while mask != 0:
                 lane = count_trailing_zeros(mask)
                 mask &= mask - _i4(1)
@@ -88,10 +87,10 @@ def radiance_radius(grid, eye, radius, p, n, class_mask, b, group, flags, wo):
                     continue
                 f = reflected_share(b, group, n, wo, normalize(decode_direction(word)))
                 w = filter_weight(filter_kind, cone_k, stack_get_f4(squared, lane) * inverse_r2)
-                rg, last = load_u4(x + 4 * ROW_BYTES, lane), load_u4(x + 5 * ROW_BYTES, lane)
-                red += _f8(w * f[0] * decode_power(rg & _u4(0xFFFF)))
-                green += _f8(w * f[1] * decode_power(rg >> _u4(16)))
-                blue += _f8(w * f[2] * decode_power(last & _u4(0xFFFF)))
+                power = decode_powers(load_u4(words + ROW_BYTES, lane), load_u4(words + 2 * ROW_BYTES, lane))
+                red += _f8(w * f[0] * power[0])
+                green += _f8(w * f[1] * power[1])
+                blue += _f8(w * f[2] * power[2])
     scale = _f8(grid.power_unit) / (_f8(filter_disc_mean(filter_kind, cone_k)) * _PI * _f8(radius) * _f8(radius))
     return _f4(red * scale), _f4(green * scale), _f4(blue * scale)
 
@@ -112,9 +111,8 @@ def radiance_knn(tree, eye, max_radius, p, n, class_mask, b, group, flags, wo):
     """The same from the `eye.k` nearest photons, whatever their flags."""
     filter_kind, cone_k, rim = eye.filter, eye.cone_k, eye.rim
     keys = stack_i4(KEYS)
-    count, rim_place, r2 = nearest_disc(
-        tree, p[0], p[1], p[2], n[0], n[1], n[2], eye.k, max_radius, eye.flatness, class_mask, eye.share, keys
-    )
+    neighbours = Neighbours(eye.k, max_radius, rim, eye.share)
+    count, rim_place, r2 = nearest_disc(tree, Place(p, n, eye.flatness, class_mask), neighbours, keys)
     red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
     for j in range(count):
         key = stack_get_i8(keys, j)

@@ -24,12 +24,14 @@ the part: what they lack within R, they lack along the rim (so the shrinking is 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.memory import bits_of_float, stack_get_i8, stack_put_i8
-from pmviewer.maps.search.kdtree import nearest
+from pmviewer.maps.search.disc import Facing
+from pmviewer.maps.search.k_nearest import nearest
 
 FEWEST = 16
 """Least number of neighbours that passes shrink k to: those of a leaf, so that fewer would cost as much."""
@@ -41,6 +43,20 @@ _f4 = np.float32
 _i8 = np.int64
 
 
+class Neighbours(NamedTuple):
+    """The k nearest photons that an estimate takes.
+
+    k: int32, 2 … MAX_K; max_radius: float32, finite, how far they are at most; rim: int32, RIM_LEFT_OUT, RIM_HALF or
+    RIM_WHOLE of `pmviewer.maps.estimate.estimate`, what the farthest counts; share: float32, the part of the disc's
+    area in which photons count, 1 for all.
+    """
+
+    k: Any
+    max_radius: Any
+    rim: Any
+    share: Any
+
+
 def shrunk(k: int, s: float) -> tuple[int, float]:
     """Neighbours that a pass looks up, and the share of their disc's area in which it counts them, when it should use
     the share `s` ≤ 1 of the area that k photons fill."""
@@ -49,26 +65,25 @@ def shrunk(k: int, s: float) -> tuple[int, float]:
 
 
 @device
-def nearest_disc(tree, px, py, pz, nx, ny, nz, k, max_radius, flatness, class_mask, share, keys):
-    """Search the disc of the k nearest photons around a point with unit normal n, and keep the share of its area.
+def nearest_disc(tree, place, neighbours, keys):
+    """Search the disc of the k nearest photons around a place, and keep the share of its area.
 
     Parameters
     ----------
     tree: record of a PhotonKdTree.
-    k: int32, 2 … MAX_K; max_radius: float32, finite; share: float32, at most 1.
-    keys: pointer to `KEYS` int32 of scratch, which receives the photons as `pmviewer.maps.search.kdtree.nearest` leaves
-        them.
-    others: as for `pmviewer.maps.estimate.estimate.irradiance_radius`.
+    place: a `pmviewer.maps.search.disc.Place`; neighbours: a `Neighbours`, whose rim does not matter here.
+    keys: pointer to `KEYS` int32 of scratch, which receives the photons as `pmviewer.maps.search.k_nearest.nearest`
+        leaves them.
 
     Returns
     -------
     Number of photons inside (int64); the place in the tree of the photon on the rim (int64, −1 without one); the
     squared radius of the disc, or of the part of it (float32).
     """
-    flatness = max(flatness, _FLATTEST)
-    steepness = _f4(1.0) / (flatness * flatness)
-    largest = max_radius * max_radius
-    count, r2 = nearest(tree, px, py, pz, k, largest, keys, True, nx, ny, nz, steepness, class_mask)
+    flatness = max(place.flatness, _FLATTEST)
+    facing = Facing(place.n, _f4(1.0) / (flatness * flatness), place.class_mask)
+    k, largest = neighbours.k, neighbours.max_radius * neighbours.max_radius
+    count, r2 = nearest(tree, place.p, k, largest, keys, facing)
     rim = _i8(-1)
     if count == k:
         last = _i8(0)
@@ -80,14 +95,14 @@ def nearest_disc(tree, px, py, pz, nx, ny, nz, k, max_radius, flatness, class_ma
         stack_put_i8(keys, last, stack_get_i8(keys, count))
     least = tree.smallest_radius * tree.smallest_radius
     r2 = max(r2, least)
-    part = max(share * r2, least)
+    part = max(neighbours.share * r2, least)
     if part < r2:
         r2, rim = part, _i8(-1)
-        beyond = _i8(bits_of_float(part)) << 32
+        outside = _i8(bits_of_float(part)) << 32
         inside = _i8(0)
         for j in range(count):
             key = stack_get_i8(keys, j)
-            if key < beyond:
+            if key < outside:
                 stack_put_i8(keys, inside, key)
                 inside += 1
         count = inside

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.compile.specialise import has, specialised
+from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.memory import (
     count_trailing_zeros,
     float_of_bits,
@@ -25,12 +25,14 @@ from pmviewer.kernels.memory import (
     stack_put_f4,
     stack_put_i4,
 )
-from pmviewer.maps.estimate.nearest import nearest_disc
-from pmviewer.maps.record import decode_power
-from pmviewer.maps.search.grid import BLOCK_BYTES, ROW_BYTES, grid_ranges, lanes_between
-from pmviewer.maps.search.kdtree import KEYS
-from pmviewer.maps.search.simd import WIDTH, facing8, within8
+from pmviewer.maps.estimate.nearest import Neighbours, nearest_disc
+from pmviewer.maps.photon_words import decode_powers
+from pmviewer.maps.search.disc import Disc, Place
+from pmviewer.maps.search.grid import counted_in_block, grid_ranges
+from pmviewer.maps.search.k_nearest import KEYS
+from pmviewer.maps.search.simd import BLOCK_BYTES, WIDTH
 from pmviewer.maps.search.stored import stored_power
+from pmviewer.maps.variant import is_kdtree
 
 FOUND_WORDS, SQUARED_WORDS, BATCH_WORDS = KEYS, WIDTH, 2 * WIDTH
 """int32 elements of the three pieces of scratch of a look-up: what was found, eight squared distances, the batch."""
@@ -56,24 +58,11 @@ def search(photons, eye, radius, p, n, class_mask, scratch):
     What `next_batch` needs to go on; the squared radius of the disc, float32; the place of the photon that ends it,
     int64, −1 with a fixed radius, where there are fewer than k, and in a part of the disc.
     """
-    if has(photons, "planes"):
+    if is_kdtree(photons):
 
         def k_nearest(photons, eye, radius, p, n, class_mask, scratch):
-            count, rim, r2 = nearest_disc(
-                photons,
-                p[0],
-                p[1],
-                p[2],
-                n[0],
-                n[1],
-                n[2],
-                eye.k,
-                radius,
-                eye.flatness,
-                class_mask,
-                eye.share,
-                scratch[0],
-            )
+            neighbours = Neighbours(eye.k, radius, eye.rim, eye.share)
+            count, rim, r2 = nearest_disc(photons, Place(p, n, eye.flatness, class_mask), neighbours, scratch[0])
             return count, r2, rim
 
         return k_nearest
@@ -82,7 +71,7 @@ def search(photons, eye, radius, p, n, class_mask, scratch):
         radius = min(radius, photons.radius)
         runs = grid_ranges(photons, p[0], p[1], p[2], radius, scratch[0])
         r2 = radius * radius
-        return (_i8(runs), p, n, r2, eye.flatness * radius, class_mask), r2, _i8(-1)
+        return (_i8(runs), Disc(p, n, r2, eye.flatness * radius, class_mask)), r2, _i8(-1)
 
     return within
 
@@ -95,7 +84,7 @@ def next_batch(photons, found, run, at, scratch):
     (int32) and from element WIDTH on their squared distances (float32; with the k nearest in the metric of the
     flattened disc).
     """
-    if has(photons, "planes"):
+    if is_kdtree(photons):
 
         def of_keys(photons, found, run, at, scratch):
             some = min(found - at, _i8(WIDTH))
@@ -108,7 +97,7 @@ def next_batch(photons, found, run, at, scratch):
         return of_keys
 
     def of_runs(photons, found, run, at, scratch):
-        runs, p, n, r2, height, class_mask = found
+        runs, disc = found
         ranges, squared, batch = scratch
         while run < runs:
             first, end = _i8(stack_get_i4(ranges, 2 * run)), _i8(stack_get_i4(ranges, 2 * run + 1))
@@ -118,11 +107,7 @@ def next_batch(photons, found, run, at, scratch):
                 at = _i8(0)
                 continue
             at = block + 1
-            x = photons.blocks + block * BLOCK_BYTES
-            y, z, words = x + ROW_BYTES, x + 2 * ROW_BYTES, x + 3 * ROW_BYTES
-            mask = _i4(within8(x, y, z, p[0], p[1], p[2], r2, squared) & lanes_between(first, end, block))
-            if mask != 0:
-                mask &= facing8(x, y, z, words, p[0], p[1], p[2], n[0], n[1], n[2], height, class_mask)
+            mask = counted_in_block(photons, block, first, end, disc, squared)
             some = _i8(0)
             while mask != 0:
                 lane = count_trailing_zeros(mask)
@@ -139,14 +124,14 @@ def next_batch(photons, found, run, at, scratch):
 
 @device
 def _column(photons, place):
-    """Address of the x of a photon of a grid, whose other words follow at multiples of ROW_BYTES."""
+    """Address of the x of a photon of a grid, whose other words follow at multiples of WIDTH."""
     return photons.blocks + (place // WIDTH) * BLOCK_BYTES + 4 * (place % WIDTH)
 
 
 @specialised
 def place_of(photons, place):
     """Position (x, y, z) of the photon at a place (int64)."""
-    if has(photons, "planes"):
+    if is_kdtree(photons):
 
         def in_tree(photons, place):
             return load_f4(photons.x, place), load_f4(photons.y, place), load_f4(photons.z, place)
@@ -163,7 +148,7 @@ def place_of(photons, place):
 @specialised
 def power_of(photons, place):
     """Red, green, blue power of the photon at a place (int64), in units of the map's power."""
-    if has(photons, "planes"):
+    if is_kdtree(photons):
 
         def in_tree(photons, place):
             return stored_power(photons, place)
@@ -172,7 +157,6 @@ def power_of(photons, place):
 
     def in_grid(photons, place):
         at = _column(photons, place)
-        rg, b = load_u4(at, 4 * WIDTH), load_u4(at, 5 * WIDTH)
-        return decode_power(rg & _u4(0xFFFF)), decode_power(rg >> _u4(16)), decode_power(b & _u4(0xFFFF))
+        return decode_powers(load_u4(at, 4 * WIDTH), load_u4(at, 5 * WIDTH))
 
     return in_grid

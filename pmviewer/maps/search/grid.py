@@ -22,9 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pmviewer.errors import SettingError
-from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.compile.jit import device, inlined, kernel
 from pmviewer.kernels.memory import load_i4, stack_get_i4, stack_i4, stack_put_i4
-from pmviewer.maps.search.simd import WIDTH, count_bits, within8
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, count_bits, facing8, within8
 
 DENSE_CELLS_PER_PHOTON = 1.5
 FEWEST_DENSE_CELLS = 1 << 12
@@ -34,9 +34,6 @@ MOST_CELLS = 30_000_000
 MOST_CELLS_ALONG_AXIS = 1 << 22
 MARGIN = 1.0 + 1e-6
 """Photons whose float32 distance rounds to inside may lie this much farther out."""
-
-ROW_BYTES = 4 * WIDTH
-BLOCK_BYTES = 6 * ROW_BYTES
 
 RANGES = 8
 """Most runs of photons that one look-up visits."""
@@ -172,6 +169,25 @@ def lanes_between(first, end, block):
         mask &= _i4(0xFF << (first - start))
     if end - start < WIDTH:
         mask &= _i4((1 << (end - start)) - 1)
+    return mask
+
+
+@inlined
+def counted_in_block(grid, block, first, end, disc, squared):
+    """Which of the eight photons of a block count: those of first … end−1 in the disc. Mask as int32.
+
+    disc: a `pmviewer.maps.search.disc.Disc`; squared: pointer to 8 float32 of scratch that receive the squared
+    distances. Inlined: it runs for every eight
+    photons of a look-up.
+    """
+    at = grid.blocks + block * BLOCK_BYTES
+    p = disc.p
+    mask = _i4(
+        within8(at, at + ROW_BYTES, at + 2 * ROW_BYTES, p[0], p[1], p[2], disc.r2, squared)
+        & lanes_between(first, end, block)
+    )
+    if mask != 0:
+        mask &= facing8(at, p, disc.n, disc.height, disc.class_mask)
     return mask
 
 

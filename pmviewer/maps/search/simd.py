@@ -11,10 +11,14 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from pmviewer.kernels.memory import F32, I8, I32, at_address, with_twin
-from pmviewer.maps.record import EXPONENT_BASE, decode_direction, decode_power
+from pmviewer.kernels.memory import F32, I8, I32, I64, at_address, with_twin
+from pmviewer.maps.photon_words import decode_direction, decode_power
+from pmviewer.maps.record import EXPONENT_BASE
 
 WIDTH = 8
+ROW_BYTES = 4 * WIDTH
+BLOCK_BYTES = 6 * ROW_BYTES
+"""A grid keeps eight photons in a block: the six words of their records in turn, eight to a row."""
 _VECTOR = ir.VectorType(F32, WIDTH)
 _WORDS = ir.VectorType(I32, WIDTH)
 _BITS = ir.VectorType(ir.IntType(1), WIDTH)
@@ -108,32 +112,34 @@ def count_bits(typingctx, mask):
     return signature, codegen
 
 
-def _facing8(x_address, y_address, z_address, words, x, y, z, nx, ny, nz, height, class_mask):
-    n = (nx, ny, nz)
-    above = sum(d * c for d, c in zip(_offsets(x_address, y_address, z_address, x, y, z), n))
-    word = at_address(words, WIDTH, np.uint32)
+def _facing8(block, p, n, height, class_mask):
+    coordinates = [block + row * ROW_BYTES for row in range(3)]
+    above = sum(d * c for d, c in zip(_offsets(*coordinates, *p), n))
+    word = at_address(block + 3 * ROW_BYTES, WIDTH, np.uint32)
     wanted = (int(class_mask) >> (word >> 6 & 3).astype(np.int64)) & 1
     front = [sum(d * c for d, c in zip(decode_direction(w), n)) > 0 for w in word]
     return _bits((np.abs(above) <= height) & (wanted == 1) & front)
 
 
 @with_twin(_facing8)
-def facing8(typingctx, x_address, y_address, z_address, words, x, y, z, nx, ny, nz, height, class_mask):
-    """Which of eight photons arrive from the side of the normal, within `height` of the tangent plane, on a path of a
-    class in `class_mask`.
+def facing8(typingctx, block, p, n, height, class_mask):
+    """Which photons of a grid's block arrive from the side of the normal, within `height` of the tangent plane, on a
+    path of a class in `class_mask`.
 
-    words: int64 address of words 3 of the photon records; others as for `within8` and `irradiance_radius`. Returns
-    int32 with bit j set for photon j.
+    block: int64 address of the block; p, n: float32 triples, point and normal; height: float32; class_mask: int32.
+    Returns int32 with bit j set for photon j.
     """
-    f, i8, i4 = types.float32, types.int64, types.int32
-    signature = i4(i8, i8, i8, i8, f, f, f, f, f, f, f, i4)
+    triple = types.UniTuple(types.float32, 3)
+    signature = types.int32(types.int64, triple, triple, types.float32, types.int32)
 
     def codegen(context, builder, sig, args):
-        *addresses, words, x, y, z, nx, ny, nz, height, class_mask = args
-        normal = [_splat(builder, n) for n in (nx, ny, nz)]
+        block, p, n, height, class_mask = args
+        row = [builder.add(block, ir.Constant(I64, ROW_BYTES * j)) for j in range(4)]
+        words = row[3]
+        normal = [_splat(builder, x) for x in cgutils.unpack_tuple(builder, n, 3)]
         d = [
             builder.fsub(_load(builder, address), _splat(builder, coordinate), flags=_FAST)
-            for address, coordinate in zip(addresses, (x, y, z))
+            for address, coordinate in zip(row, cgutils.unpack_tuple(builder, p, 3))
         ]
         inside = builder.fcmp_ordered("<=", _call(builder, "fabs", _dot(builder, d, normal)), _splat(builder, height))
 

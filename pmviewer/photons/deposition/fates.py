@@ -13,22 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.photons.deposition.rules import (
-    REDISTRIBUTED,
-    STORED,
-    Codes,
-    Density,
-    Deposition,
-    Filling,
-    Float,
-    Homogeneous,
-    KellerWald,
-    Prepared,
-    Rule,
-    Runner,
-    judged,
-    probabilities,
-)
+from pmviewer.photons.deposition.deposited import REDISTRIBUTED, STORED
+from pmviewer.photons.deposition.depositor import Depositor, Judged, judged, probabilities
+from pmviewer.photons.deposition.rules import Codes, Density, Deposition, Float, Homogeneous, KellerWald, Rule
+from pmviewer.tasks import Runner
 
 FATE_BITS = 3
 """The number of a photon's fate is in so many low bits of what is otherwise its light's id; the next bit is the map's:
@@ -42,7 +30,7 @@ def _judge(p, epsilon, discard, seed, fates):
         fates[i] = judged(p[i], epsilon, discard, seed, i)[0]
 
 
-class WatchedFilling(Filling):
+class WatchedDepositor(Depositor):
     """A map being filled that keeps all that arrives: `photons` (n, 6) as they arrived, with their `fates` (n,)."""
 
     def __init__(self, rule: Rule | None) -> None:
@@ -50,13 +38,13 @@ class WatchedFilling(Filling):
         self._arrived: list[Float] = []
         self._fates: list[NDArray[np.uint8]] = []
 
-    def judge(self, photons: Float, normals: Codes, index: int) -> Prepared:
+    def judge(self, photons: Float, normals: Codes, index: int) -> Judged:
         fates = np.full(len(photons), STORED, np.uint8)
         if isinstance(self.rule, KellerWald | Homogeneous):
             _judge(*probabilities(self.rule, np.ascontiguousarray(photons), normals, index), fates)
         return (*super().judge(photons, normals, index), photons, fates)
 
-    def take(self, judged: list[Prepared], run: Runner) -> None:
+    def take(self, judged: list[Judged], run: Runner) -> None:
         super().take(judged, run)
         fates = [batch[-1] for batch in judged]
         if isinstance(self.rule, Density) and judged:
@@ -80,21 +68,21 @@ class Fates:
 
     def __init__(self, trajectories: int) -> None:
         self.trajectories = trajectories
-        self.caustic = WatchedFilling(None)
-        self.global_ = WatchedFilling(None)
+        self.caustic = WatchedDepositor(None)
+        self.global_ = WatchedDepositor(None)
 
-    def fillings(self, deposition: Deposition) -> tuple[Filling, Filling]:
+    def depositors(self, deposition: Deposition) -> tuple[Depositor, Depositor]:
         """Of the caustic and the global map."""
-        self.caustic, self.global_ = WatchedFilling(deposition.caustic), WatchedFilling(deposition.global_)
+        self.caustic, self.global_ = WatchedDepositor(deposition.caustic), WatchedDepositor(deposition.global_)
         return self.caustic, self.global_
 
     def cloud(self) -> Float:
         """(n, 6) float32 photon records, with fate and map (FATE_BITS) where the light's id is otherwise."""
         parts = []
-        for map_, filling in enumerate((self.caustic, self.global_)):
-            rows = np.array(filling.photons, np.float32, order="C")
+        for map_, depositor in enumerate((self.caustic, self.global_)):
+            rows = np.array(depositor.photons, np.float32, order="C")
             words: Any = rows.view(np.uint32)
-            number = filling.fates.astype(np.uint32) | np.uint32(map_ << FATE_BITS)
+            number = depositor.fates.astype(np.uint32) | np.uint32(map_ << FATE_BITS)
             words[:, 5] = (words[:, 5] & np.uint32(0xFFFF)) | number << np.uint32(16)
             parts.append(rows)
         return np.concatenate(parts)

@@ -112,7 +112,7 @@ class Guided:
 
 def guided_emission(
     scene: FlatScene,
-    how: Guidance,
+    guidance: Guidance,
     seed: int,
     N: int,
     size: int,
@@ -124,20 +124,20 @@ def guided_emission(
 
     size: test photons a task; trace: see `pmviewer.photons.emission.tested`; before: what those of earlier passes met.
     """
-    most = int(TEST_SHARE[how.variant] * N)
-    strata = strata_of(scene, most // max(2, how.tests))
+    most = int(TEST_SHARE[guidance.variant] * N)
+    strata = strata_of(scene, most // max(2, guidance.tests))
     if strata is None:
         return None
     each = most // strata.n // 2 * 2
-    folds = [trace_tests(strata, each // 2, fold, seed, size, trace, how.sought, run) for fold in (0, 1)]
+    folds = [trace_tests(strata, each // 2, fold, seed, size, trace, guidance.sought, run) for fold in (0, 1)]
     nothing = Known(*np.zeros((3, strata.n)))
-    sets = [known_of(strata, tests, how.important) for tests in folds]
+    sets = [known_of(strata, tests, guidance.important) for tests in folds]
     tested, before = each * strata.n, before or nothing
     known, n = before + sets[0] + sets[1], N - tested
     h = each // 2
-    if how.variant == "Peter-Pietrek":
+    if guidance.variant == "Peter-Pietrek":
         share, weight, powers = peter_pietrek(strata, known, n, N)
-    elif how.variant == "Christensen discard":
+    elif guidance.variant == "Christensen discard":
         share, weight, powers = discard(strata, known, h, n, N)
     else:
         share, weight, powers = keep(strata, before + sets[0], before + sets[1], h, n, N)

@@ -20,8 +20,8 @@ from pmviewer.kernels.warp import square_to_cosine_hemisphere
 FIRST = 0.5
 SCATTERED_DTYPE = np.dtype(
     [
-        ("scattered", "i4"),  # importons; first, it tells the record from that of projection maps
-        ("places", "i8"),  # float32 (n, 7): position, unit normal, what it counts
+        ("scattered", "i4"),  # how many importons
+        ("places", "i8"),  # float32 (n, 7): position, unit normal, importance
     ],
     align=True,
 )
@@ -40,7 +40,7 @@ def scattered_record(places: NDArray[np.float32]) -> NDArray[np.void]:
 
 @device
 def emit_scattered(scattered, i, direction):
-    """Origin, direction and what it counts of trajectory i."""
+    """Origin, direction and importance of trajectory i."""
     row = 7 * (_i8(i) % _i8(scattered.scattered))
     p = (load_f4(scattered.places, row), load_f4(scattered.places, row + 1), load_f4(scattered.places, row + 2))
     n = (load_f4(scattered.places, row + 3), load_f4(scattered.places, row + 4), load_f4(scattered.places, row + 5))

@@ -30,7 +30,7 @@ from pmviewer.scene.description import LUMINANCE
 
 STRATA_DTYPE = np.dtype(
     [
-        ("strata", "i4"),  # their number; first, it tells the record from that of projection maps
+        ("strata", "i4"),  # their number
         ("tests", "i4"),  # whether trajectory i starts in stratum i modulo their number, its photons' light being i
         ("cdf", "i8"),  # float64 (strata,), cumulative: their shares of the trajectories
         ("light", "i8"),  # int32 (strata,)

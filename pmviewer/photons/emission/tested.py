@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +14,17 @@ from numpy.typing import NDArray
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.dimensions import TEST_PHOTON_SALT
 from pmviewer.kernels.random import hash3
+from pmviewer.maps.photon_words import decode_powers
 from pmviewer.maps.power import write_power
-from pmviewer.maps.record import decode_power, in_classes
+from pmviewer.maps.record import in_classes
 from pmviewer.photons.emission.strata import Strata, table_of
+from pmviewer.photons.light_pass import batch as light_pass
 from pmviewer.photons.light_pass.trace import C_DROPPED, C_RAYS, N_COUNTS, empty_ledger
+from pmviewer.tasks import Runner
 
 Float = NDArray[np.float32]
 Codes = NDArray[np.uint32]
 Evaluate = Callable[[Float, Codes], Float]
-Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 
 _f4 = np.float32
 _u4 = np.uint32
@@ -69,9 +70,8 @@ class Tested:
         return len(self.met)
 
 
-TraceBatch = Callable[[NDArray[np.void], int, int, int, int], Any]
-"""(table, seed, first, end, of so many) → a batch of the light pass with the normals of both maps' photons, as
-`pmviewer.photons.light_pass.light_pass` makes them, its lists joined."""
+TraceBatch = Callable[[NDArray[np.void], int, int, int, int], light_pass.Batch]
+"""(table, seed, first, end, of so many) → a batch of the light pass with the normals of both maps' photons."""
 
 
 def trace_tests(
@@ -92,12 +92,15 @@ def trace_tests(
         end = min(first + size, n)
 
         def work() -> tuple[Batch, NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-            caustics, globals_, counts, _, global_normals, caustic_normals = trace(table.records, own, first, end, n)
+            batch = trace(table.records, own, first, end, n)
             met, most = np.zeros(end - first), np.zeros(end - first)
-            photons = {"caustic": (caustics, caustic_normals), "global": (globals_, global_normals)}
+            photons = {
+                "caustic": (batch.caustic, batch.caustic_normals),
+                "global": (batch.global_, batch.global_normals),
+            }
             for goal in sought:
                 _meet(*photons[goal.photons], goal, first, met, most)
-            return Batch(first, end, photons["caustic"], photons["global"]), met, most, counts
+            return Batch(first, end, photons["caustic"], photons["global"]), met, most, batch.counts
 
         return work
 
@@ -137,20 +140,19 @@ def _weigh(words, normals, first, factor, light, seed, out, out_normals):
         for w in range(5):
             out[count, w] = words[i, w]
         out[count, 5] = _u4((words[i, 5] & _u4(0xFFFF)) | _u4(_u4(light[which]) << _u4(16)))
-        red, green = decode_power(words[i, 4] & _u4(0xFFFF)), decode_power(words[i, 4] >> _u4(16))
-        blue = decode_power(words[i, 5] & _u4(0xFFFF))
+        red, green, blue = decode_powers(words[i, 4], words[i, 5])
         write_power(out, count, f * red, f * green, f * blue, hash3(seed, _u4(first), _u4(i)))
         out_normals[count] = normals[i]
         count += 1
     return count
 
 
-def weighed(tested: Tested, strata: Strata, factor: NDArray[np.float64], seed: int) -> list[Callable[[], Any]]:
+def weighed(tested: Tested, strata: Strata, factor: NDArray[np.float64], seed: int) -> list[light_pass.Task]:
     """The test photons' batches to be stored with powers `factor` (n,), 0 for those that are not; as the light pass
     makes batches, so that whatever it does with those it can do with these."""
 
-    def task(batch: Batch) -> Callable[[], Any]:
-        def work() -> Any:
+    def task(batch: Batch) -> light_pass.Task:
+        def work() -> light_pass.Batch:
             numbers = np.arange(batch.first, batch.end)
             light = np.ascontiguousarray(strata.light[numbers % strata.n])
             chosen = []
@@ -161,7 +163,7 @@ def weighed(tested: Tested, strata: Strata, factor: NDArray[np.float64], seed: i
                 chosen.append((out[:n].view(np.float32).copy(), out_normals[:n].copy()))
             counts, ledger = np.zeros(N_COUNTS, np.int64), empty_ledger()
             (caustics, caustic_normals), (globals_, global_normals) = chosen
-            return [caustics], [globals_], counts, ledger, [global_normals], [caustic_normals]
+            return light_pass.Batch(caustics, globals_, counts, ledger, global_normals, caustic_normals)
 
         return work
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, specialised
-from pmviewer.kernels.memory import float_of_bits
-from pmviewer.maps.record import encode_direction, encode_power
+from pmviewer.maps.photon_words import write_photon
 
 MOST_VERTICES = 64
 """Longer paths are cut: roulette ends nearly all of them long before."""
@@ -60,12 +59,7 @@ def _put(paths, i, p, wi, beta, flags, light):
     row = counts[i]
     if row >= MOST_VERTICES:
         return
-    out = vertices[i]
-    out[row, 0], out[row, 1], out[row, 2] = p
-    r, g, b = encode_power(beta[0]), encode_power(beta[1]), encode_power(beta[2])
-    out[row, 3] = float_of_bits(_u4(encode_direction(wi[0], wi[1], wi[2]) | _u4(flags)))
-    out[row, 4] = float_of_bits(_u4(r | _u4(g << _u4(16))))
-    out[row, 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
+    write_photon(vertices[i], row, p, wi, beta, flags, light)
     counts[i] = row + 1
 
 

@@ -23,7 +23,7 @@ import math
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.compile.specialise import has, specialised
+from pmviewer.kernels.compile.specialise import absent, has, specialised
 from pmviewer.kernels.dimensions import PROJECTION_ACCEPT
 from pmviewer.kernels.lights.light import emit_from, emit_photon, light_point
 from pmviewer.kernels.memory import load_f4, load_i4
@@ -33,13 +33,14 @@ from pmviewer.kernels.surface import leave
 from pmviewer.kernels.table import find_interval
 from pmviewer.kernels.vector import along, basis, dot, luminance, scale
 from pmviewer.kernels.warp import square_to_disk, square_to_sphere
+from pmviewer.maps.variant import ABSENT
 from pmviewer.photons.emission.scattered import emit_scattered
 from pmviewer.photons.emission.strata import emit_stratified
 
 WHOLE, DIRECTIONS, PLACES, WORLD, DISC = range(5)
 ROWS, COLUMNS = 64, 64
 
-NO_PROJECTION = np.zeros(2, np.dtype([("none", np.int32)]))
+NO_PROJECTION = np.repeat(ABSENT, 2)
 """Stands for projection maps where there are none."""
 
 PROJECTION_DTYPE = np.dtype(
@@ -97,7 +98,7 @@ def emission(scene, projection, i, sequence, seed, index, u_pick, position, dire
     NO_PROJECTION, of strata (`pmviewer.photons.emission.strata`) or of importons
     (`pmviewer.photons.emission.scattered`); i is its
     trajectory's number in the pass; the rest as `emit_photon`."""
-    if has(projection, "none"):
+    if absent(projection):
 
         def everywhere(scene, projection, i, sequence, seed, index, u_pick, position, direction):
             p, d, beta, light = emit_photon(scene, u_pick, position, direction)
@@ -116,8 +117,8 @@ def emission(scene, projection, i, sequence, seed, index, u_pick, position, dire
     if has(projection, "scattered"):
 
         def scattered(scene, projection, i, sequence, seed, index, u_pick, position, direction):
-            p, d, worth = emit_scattered(projection, i, direction)
-            return p, d, (_f4(1.0), _f4(1.0), _f4(1.0)), _i8(0), True, worth
+            p, d, importance = emit_scattered(projection, i, direction)
+            return p, d, (_f4(1.0), _f4(1.0), _f4(1.0)), _i8(0), True, importance
 
         return scattered
 

@@ -95,7 +95,7 @@ def projection_of(scene: FlatScene, always: bool = True, with_caustics: bool = T
     `with_caustics` says whether there are trajectories for the caustic map alone."""
     records = np.zeros(2, PROJECTION_DTYPE)
     arrays: list[NDArray] = []
-    made: list[tuple[tuple[ProjectionMap, ...], float]] = []
+    charted: list[tuple[tuple[ProjectionMap, ...], float]] = []
     total = scene.total_luminance
     for record, for_caustics in zip(records, (False, True), strict=True):
         spheres = spheres_of(scene.owner, for_caustics)
@@ -122,8 +122,8 @@ def projection_of(scene: FlatScene, always: bool = True, with_caustics: bool = T
             center, radius = enclosing(spheres)
             record["center_x"], record["center_y"], record["center_z"] = center
             record["radius"] = radius + _slack(scene)
-        made.append((tuple(m for m, _ in maps), float(powers.sum())))
-    (surfaces, surface_power), (caustic, caustic_power) = made
+        charted.append((tuple(m for m, _ in maps), float(powers.sum())))
+    (surfaces, surface_power), (caustic, caustic_power) = charted
     return Projection(records, tuple(arrays), surfaces, caustic, surface_power, caustic_power)
 
 

@@ -16,8 +16,8 @@ from pmviewer.kernels.lights.light import sample_one_light
 from pmviewer.kernels.memory import bits_of_float, stack_i4
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import dot, largest
+from pmviewer.maps.photon_words import encode_direction
 from pmviewer.maps.radiance import nearest_site, site_place
-from pmviewer.maps.record import encode_direction
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.render.cast import Hit, cast
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow

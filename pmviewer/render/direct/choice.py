@@ -37,8 +37,9 @@ from pmviewer.kernels.memory import (
     stack_put_i4,
 )
 from pmviewer.kernels.table import find_interval
-from pmviewer.maps.search.grid import BLOCK_BYTES, ROW_BYTES, grid_ranges, lanes_between
-from pmviewer.maps.search.simd import WIDTH, facing8, within8
+from pmviewer.maps.search.disc import Disc
+from pmviewer.maps.search.grid import counted_in_block, grid_ranges
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH
 from pmviewer.maps.search.stored import ALL_CLASSES
 
 CHOICES = ("power", "photons", "Keller-Wald")
@@ -85,7 +86,7 @@ def lights_near(grid, n_lights, radius, p, n, lights):
     known, total = _i8(0), _i8(0)
     ranges, squared = stack_i4(16), stack_i4(8)
     radius = min(radius, grid.radius)
-    r2 = radius * radius
+    disc = Disc(p, n, radius * radius, radius, _i4(ALL_CLASSES))
     runs = grid_ranges(grid, p[0], p[1], p[2], radius, ranges)
     candidates = _i8(0)
     for k in range(runs):
@@ -94,11 +95,8 @@ def lights_near(grid, n_lights, radius, p, n, lights):
     for k in range(runs):
         first, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
         for block in range(first // WIDTH, (end - 1) // WIDTH + 1, step):
-            x = grid.blocks + block * BLOCK_BYTES
-            y, z, words, b = x + ROW_BYTES, x + 2 * ROW_BYTES, x + 3 * ROW_BYTES, x + 5 * ROW_BYTES
-            mask = _i4(within8(x, y, z, p[0], p[1], p[2], r2, squared) & lanes_between(first, end, block))
-            if mask != 0:
-                mask &= facing8(x, y, z, words, p[0], p[1], p[2], n[0], n[1], n[2], radius, _i4(ALL_CLASSES))
+            mask = counted_in_block(grid, block, first, end, disc, squared)
+            b = grid.blocks + block * BLOCK_BYTES + 5 * ROW_BYTES
             while mask != 0:
                 lane = count_trailing_zeros(mask)
                 mask &= mask - _i4(1)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.accel.raycast import occluded
+from pmviewer.kernels.accel.occlusion import occluded
 from pmviewer.kernels.bsdf.scattering import bsdf_f, bsdf_pdf, compressed, same_side, shading_normal
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.dimensions import FURTHER_LIGHT

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from pmviewer.kernels.compile.specialise import absent, has, specialised
+from pmviewer.kernels.compile.specialise import absent, specialised
 from pmviewer.maps.shadow import LIT, SHADOW, UNKNOWN, visibility
+from pmviewer.maps.variant import ABSENT
 
 __all__ = ["LIT", "NO_SHADOWS", "SHADOW", "UNKNOWN", "known_visibility"]
 
-NO_SHADOWS = np.zeros(1, np.dtype([("none", np.int32)]))
+NO_SHADOWS = ABSENT
 """Stands for shadow photons where there are none."""
 
 
@@ -19,7 +18,7 @@ def known_visibility(shadows, p, n, light):
 
     `shadows` is the record of shadow photons, that of NO_SHADOWS, or None: with these, nothing is.
     """
-    if absent(shadows) or has(shadows, "none"):
+    if absent(shadows):
 
         def nothing(shadows, p, n, light):
             return UNKNOWN

@@ -10,7 +10,7 @@ import numpy as np
 
 from pmviewer.kernels.bsdf.plain import INV_PI
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_sample, is_lambertian, shading_normal
-from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.kernels.vector import dot, largest, mul, scale
 from pmviewer.maps.irradiance_cache import interpolate
 from pmviewer.render.cast import cast, leaving
@@ -25,7 +25,7 @@ _f4 = np.float32
 @specialised
 def cached(given, si, counts):
     """(irradiance, gather rays that are still to be cast) at a surface: all rays where there is no cache."""
-    if has(part(given, "cache"), "none"):
+    if absent(part(given, "cache")):
         return lambda given, si, counts: (BLACK, given.eye.gather_rays)
 
     def from_records(given, si, counts):
@@ -44,7 +44,7 @@ def cached(given, si, counts):
 def surface_rays(given, known, gather, si, beta, rays, counts):
     """`pmviewer.render.gather.gather.gather_rays` where `gather` rays are to be cast, else direct light by the rays of
     the BSDF and indirect light from the irradiance `known`. Both are sums over the rays."""
-    if has(part(given, "cache"), "none"):
+    if absent(part(given, "cache")):
         return lambda given, known, gather, si, beta, rays, counts: gather_rays(given, si, beta, rays, counts)
 
     def with_cache(given, known, gather, si, beta, rays, counts):

@@ -14,11 +14,12 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_sample
-from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.kernels.dimensions import SECOND_GATHER_SALT, SECOND_LIGHT, SECOND_RAY
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import add, dot, largest, mul
+from pmviewer.maps.variant import ABSENT
 from pmviewer.render.cast import cast, leaving
 from pmviewer.render.chain import BLACK
 from pmviewer.render.direct.choice import LIST_WORDS, choose
@@ -30,14 +31,14 @@ from pmviewer.render.reflect import reflected
 _f4 = np.float32
 _u4 = np.uint32
 
-NO_CORNERS = np.zeros(1, np.dtype([("none", np.int32)]))
+NO_CORNERS = ABSENT
 CORNERS = np.zeros(1, np.dtype([("corners", np.int32)]))
 
 
 @specialised
 def is_corner(given, length):
     """Whether a gather ray of that length gathers again where it lands."""
-    if has(part(given, "corner"), "none"):
+    if absent(part(given, "corner")):
         return lambda given, length: False
     return lambda given, length: length < given.eye.corner
 
@@ -49,7 +50,7 @@ def gather_again(given, si, seed, index, counts, hit):
     Returns the direct light and caustics, and of the ray that brings the rest its weight, direction and what it met
     (`cast`).
     """
-    if has(part(given, "corner"), "none"):
+    if absent(part(given, "corner")):
         return lambda given, si, seed, index, counts, hit: (BLACK, BLACK, si.wo, hit)
     return _again
 

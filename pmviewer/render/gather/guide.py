@@ -9,7 +9,8 @@ of their own whose radius does not shrink: it blurs nothing. A pixel looks them 
 come from all around, about as evenly as the BSDF sends rays, they have nothing to tell but their noise, and all rays
 follow the BSDF.
 
-Kernels compile for the kind of guides they are given: `guides` is a record of NO_GUIDES or of one of GUIDE_DTYPES.
+Kernels compile for the kind of guides they are given: `guides` is a grid's record with a mark, or NO_GUIDES
+(`pmviewer.maps.variant`).
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_f, bsdf_pdf, bsdf_sample, shading_normal
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.dimensions import GATHER, GATHER_BESIDE, GATHER_GUIDED, GUIDE_SALT
 from pmviewer.kernels.memory import (
     count_trailing_zeros,
@@ -34,9 +35,11 @@ from pmviewer.kernels.memory import (
 )
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import basis, dot, luminance, normalize, scale
-from pmviewer.maps.record import decode_direction, decode_power
-from pmviewer.maps.search.grid import BLOCK_BYTES, RECORD, ROW_BYTES, PhotonGrid, grid_ranges, lanes_between
-from pmviewer.maps.search.simd import WIDTH, facing8, within8
+from pmviewer.maps.photon_words import decode_direction, decode_powers
+from pmviewer.maps.search.disc import Disc
+from pmviewer.maps.search.grid import PhotonGrid, counted_in_block, grid_ranges
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH
+from pmviewer.maps.variant import ABSENT, Mark, marked
 from pmviewer.render.direct.direct import power_heuristic
 from pmviewer.render.gather.cones import cone_direction, cone_pdf
 from pmviewer.render.gather.hemicells import CELLS, cell_direction, cell_pdf, fill_cells
@@ -49,14 +52,9 @@ _i4 = np.int32
 _i8 = np.int64
 _u4 = np.uint32
 
-NO_GUIDES = np.zeros(1, np.dtype([("unguided", np.int32)]))
+NO_GUIDES = ABSENT
 """Stands for guides where rays follow the BSDF."""
-_GRID_FIELDS = [(name, RECORD[name]) for name in RECORD.names or ()]
-GUIDE_DTYPES: dict[Directions, np.dtype] = {
-    "photon cones": np.dtype([("cones", np.int32), *_GRID_FIELDS], align=True),
-    "hemisphere grid": np.dtype([("cells", np.int32), *_GRID_FIELDS], align=True),
-}
-"""A grid's record after a field that tells how its photons guide (first, see `pmviewer.maps.estimate.variant`)."""
+_MARKS: dict[Directions, Mark] = {"photon cones": "cones", "hemisphere grid": "cells"}
 
 MOST_CONES, MOST_IN_CELLS = 50, 128
 """Most photons that guide a pixel."""
@@ -73,10 +71,7 @@ noise costs more than they gain (measured). Cells blur more than cones."""
 
 def guides_of(grid: PhotonGrid, directions: Directions) -> NDArray[np.void]:
     """The record of a grid of photons that guide rays in that way; valid while the grid lives."""
-    record = np.zeros(1, GUIDE_DTYPES[directions])
-    for name in RECORD.names or ():
-        record[name] = grid.record[name]
-    return record
+    return marked(grid.record, _MARKS[directions])
 
 
 @device
@@ -88,7 +83,7 @@ def photons_near(grid, class_mask, p, n, seed, most, found):
     """
     ranges, squared = stack_i4(16), stack_i4(8)
     radius = grid.radius
-    r2 = radius * radius
+    disc = Disc(p, n, radius * radius, radius, _i4(class_mask))
     runs = grid_ranges(grid, p[0], p[1], p[2], radius, ranges)
     candidates = _i8(0)
     for k in range(runs):
@@ -99,11 +94,8 @@ def photons_near(grid, class_mask, p, n, seed, most, found):
     for k in range(runs):
         first, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
         for block in range(first // WIDTH, (end - 1) // WIDTH + 1, step):
-            x = grid.blocks + block * BLOCK_BYTES
-            y, z, words = x + ROW_BYTES, x + 2 * ROW_BYTES, x + 3 * ROW_BYTES
-            mask = _i4(within8(x, y, z, p[0], p[1], p[2], r2, squared) & lanes_between(first, end, block))
-            if mask != 0:
-                mask &= facing8(x, y, z, words, p[0], p[1], p[2], n[0], n[1], n[2], radius, _i4(class_mask))
+            mask = counted_in_block(grid, block, first, end, disc, squared)
+            words = grid.blocks + block * BLOCK_BYTES + 3 * ROW_BYTES
             while mask != 0:
                 lane = count_trailing_zeros(mask)
                 mask &= mask - _i4(1)
@@ -113,9 +105,8 @@ def photons_near(grid, class_mask, p, n, seed, most, found):
                     at = (_i8(state) * seen) >> 32
                 if at < most:
                     w = normalize(decode_direction(load_u4(words, lane)))
-                    rg, b = load_u4(words + ROW_BYTES, lane), load_u4(words + 2 * ROW_BYTES, lane)
                     power = luminance(
-                        (decode_power(rg & _u4(0xFFFF)), decode_power(rg >> _u4(16)), decode_power(b & _u4(0xFFFF)))
+                        decode_powers(load_u4(words + ROW_BYTES, lane), load_u4(words + 2 * ROW_BYTES, lane))
                     )
                     for axis in range(3):
                         stack_put_f4(found, 4 * at + axis, w[axis])
@@ -158,7 +149,7 @@ def aim(given, si, seed, found):
     """What photons tell the gather rays of a point (`Aim`), their directions in `found` (AIM_WORDS words). They guide
     no rays, or as many as the eye record says."""
     guides = part(given, "guides")
-    if has(guides, "unguided"):
+    if absent(guides):
         return lambda given, si, seed, found: Aim(found, _i8(0), _i8(0))
     if has(guides, "cones"):
         return _aim_by_cones
@@ -214,7 +205,7 @@ def gather_direction(given, rays, si, j):
     number to use and the ray's index in its sequences. Without gather rays the direction is that of `rays.numbers`: one
     for the lobe, two for the direction.
     """
-    if has(part(given, "guides"), "unguided"):
+    if absent(part(given, "guides")):
         return _by_bsdf
     return _by_both
 

@@ -11,10 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.errors import SceneError
 from pmviewer.kernels import scene as K
 from pmviewer.kernels.accel.bvh import Bvh, build
-from pmviewer.kernels.meshes.mesh import face_normals
 from pmviewer.progress import stage
 from pmviewer.scene.arrays.covered_emission import with_covered_emission
 from pmviewer.scene.arrays.flatten_textures import (
@@ -24,25 +22,15 @@ from pmviewer.scene.arrays.flatten_textures import (
     light_arrays,
     needs_tangents,
 )
-from pmviewer.scene.arrays.instances import build_instanced, instance_bounds, normalised
-from pmviewer.scene.arrays.light_table import LightTable, axis_of, side_of
-from pmviewer.scene.arrays.material_row import is_rich, material_table, used_materials
-from pmviewer.scene.arrays.textured_emission import textured_lights
-from pmviewer.scene.description import (
-    LUMINANCE,
-    Cylinder,
-    Disk,
-    Mesh,
-    Parallelogram,
-    Scene,
-    Shape,
-    Sphere,
-)
+from pmviewer.scene.arrays.instances import build_instanced, instance_bounds
+from pmviewer.scene.arrays.light_table import LightTable
+from pmviewer.scene.arrays.material_row import MaterialTable, is_rich, material_table, used_materials
+from pmviewer.scene.arrays.stored_geometry import StoredGeometry, stored_geometry
+from pmviewer.scene.arrays.textured_emission import Emission, textured_lights
+from pmviewer.scene.description import LUMINANCE, Cylinder, Mesh, Parallelogram, Scene, Shape
 from pmviewer.scene.meshes.mesh_bounds import mesh_bounds
 
 Float = NDArray[np.float32]
-
-_QUADRIC_KIND = {Sphere: 0, Cylinder: 1, Disk: 2}
 
 
 @dataclass(frozen=True)
@@ -118,59 +106,25 @@ def flatten(scene: Scene, on_type: Callable[[np.dtype], None] = lambda of_record
 
     Raises SceneError when the scene has no surface or no light that emits.
     """
-    if scene.instances:
-        groups = [normalised(group, scene) for group in scene.groups]
-        shapes = scene.shapes + tuple(shape for group in groups for shape in group.shapes)
-    else:
-        groups, shapes = [], scene.shapes
-    meshes = [(i, _triangulate(s.geometry)) for i, s in enumerate(shapes) if _is_triangles(s)]
-    round_shapes = [i for i, s in enumerate(shapes) if not _is_triangles(s)]
-    if not shapes:
-        raise SceneError("The scene has no surface.", scene.path, hint="Add at least one shape.")
-    counts = [len(m.faces) for _, m in meshes]
-    vertices = _corners([m for _, m in meshes], sum(counts))
-    quadrics = np.array([_quadric_row(shapes[i]) for i in round_shapes], np.float32).reshape(-1, 12)
-    shape_of_prim = np.repeat(
-        np.array([i for i, _ in meshes] + round_shapes, np.int32), counts + [1] * len(round_shapes)
-    )
-    materials, rich = material_table(scene), is_rich(scene)
-    prim_material = np.array([s.material for s in shapes], np.int32)[shape_of_prim]
-
+    stored, materials = stored_geometry(scene), material_table(scene)
+    prim_material = np.array([s.material for s in stored.shapes], np.int32)[stored.shape_of_prim]
     center, radius = bounding_sphere(scene)
     lit, emissions = textured_lights(with_covered_emission(scene))
-    lights = LightTable(lit, vertices, shape_of_prim, radius)
-    of_shape = np.concatenate([lights.of_shape, np.full(len(shapes) - len(scene.shapes), -1)])
-    prim_light = of_shape.astype(np.int32)[shape_of_prim]
-    textured = bool(emissions) or (rich and needs_tangents(scene))
-    used = used_materials(scene)
-    coloured, passable = any(m.vertex_colours for m in used), any(m.passable for m in used)
-    record = np.zeros(
-        1,
-        K.scene_dtype(
-            bsdfs=rich,
-            lights=lights.more,
-            instances=bool(groups),
-            textures=textured,
-            colours=coloured,
-            opacity=passable,
-            principled="principled" in materials.kinds,
-            blends="blend" in materials.kinds,
-        ),
-    )
+    lights = LightTable(lit, stored.vertices, stored.shape_of_prim, radius)
+    of_shape = np.concatenate([lights.of_shape, np.full(len(stored.shapes) - len(scene.shapes), -1)])
+    prim_light = of_shape.astype(np.int32)[stored.shape_of_prim]
+    features = _features(scene, materials, lights, bool(emissions))
+    record = np.zeros(1, K.scene_dtype(**features))
     r = record[0]
-    for name in {"principled", "blends"}.intersection(record.dtype.names):
-        r[name] = 1
     on_type(record.dtype)
-    stage(f"building the tree over {len(vertices):,} triangles")
-    if groups:
-        bvh, shown = build_instanced(scene, groups, vertices, quadrics, shape_of_prim, r)
+    stage(f"building the tree over {len(stored.vertices):,} triangles")
+    if stored.groups:
+        bvh, shown = build_instanced(scene, stored.groups, stored.vertices, stored.quadrics, stored.shape_of_prim, r)
     else:
-        bvh, shown = build(vertices, quadrics), None
+        bvh, shown = build(stored.vertices, stored.quadrics), None
         bvh.store(r)
-    del shape_of_prim
-    normals = _corner_normals([m for _, m in meshes], len(vertices))
     arrays: dict[str, NDArray] = {
-        "vertices": vertices,
+        "vertices": stored.vertices,
         "prim_material": prim_material,
         "prim_light": prim_light,
         "materials": materials.rows,
@@ -179,98 +133,87 @@ def flatten(scene: Scene, on_type: Callable[[np.dtype], None] = lambda of_record
         "light_triangles": lights.triangles,
         "light_triangle_cdf": lights.triangle_cdf,
         **lights.sky_arrays(),
+        **_shading_arrays(scene, features, stored, materials, lights, emissions),
     }
-    if normals is not None:
-        arrays["normals"] = normals
-    if passable:
-        r["passable"] = 1
-    if coloured:
-        arrays["colours"] = corner_colours([shapes[i].geometry for i, _ in meshes])
-    textures = TextureTable()
-    if rich:
-        r["bsdfs"] = 1
-        arrays["bsdf_tables"] = materials.tables
-        textures.write_rows(materials.rows, materials.materials)
-    if textured:
-        arrays |= coordinates([shapes[i].geometry for i, _ in meshes], [shapes[i].geometry for i in round_shapes])
-        arrays |= light_arrays(emissions, lights.of_shape, len(lights.rows), textures)
-        arrays |= textures.arrays(scene)
     for name, array in arrays.items():
         arrays[name] = np.ascontiguousarray(array)
         r[name] = arrays[name].ctypes.data
+    for feature, field_ in _FLAGS.items():
+        if features[feature]:
+            r[field_] = 1
     r["n_lights"], r["environment"] = len(lights.rows), lights.environment
-    if lights.more:
-        r["more_lights"] = 1
-        if lights.sky is not None:
-            r["sky_height"], r["sky_width"] = lights.sky.pixels.shape[:2]
+    if lights.sky is not None:
+        r["sky_height"], r["sky_width"] = lights.sky.pixels.shape[:2]
     r["center_x"], r["center_y"], r["center_z"], r["radius"] = *center, radius
+    n_elements = shown.n_elements if shown else len(stored.vertices) + len(stored.quadrics)
     return FlatScene(
         record=record,
         bvh=bvh,
-        arrays=(*arrays.values(), quadrics, *(shown.arrays if shown else ())),
+        arrays=(*arrays.values(), stored.quadrics, *(shown.arrays if shown else ())),
         light_power=lights.power,
         light_names=lights.names,
         lights=lights.rows,
-        light_corners=vertices[lights.triangles],
+        light_corners=stored.vertices[lights.triangles],
         prim_light=prim_light,
         center=center,
         radius=radius,
-        n_triangles=len(vertices),
-        n_quadrics=len(quadrics),
+        n_triangles=len(stored.vertices),
+        n_quadrics=len(stored.quadrics),
         owner=scene,
         n_instances=len(scene.instances),
-        n_elements=shown.n_elements if shown else len(vertices) + len(quadrics),
+        n_elements=n_elements,
         trees=shown.trees if shown else (),
     )
 
 
-def _is_triangles(shape: Shape) -> bool:
-    return isinstance(shape.geometry, Mesh | Parallelogram)
+_FLAGS = {
+    "bsdfs": "bsdfs",
+    "lights": "more_lights",
+    "opacity": "passable",
+    "principled": "principled",
+    "blends": "blends",
+}
+"""Features whose field in the record has no other number to hold."""
 
 
-def _triangulate(geometry: object) -> Mesh:
-    if isinstance(geometry, Mesh):
-        return geometry
-    assert isinstance(geometry, Parallelogram)
-    corner, u, v = np.array(geometry.corner), np.array(geometry.edge_u), np.array(geometry.edge_v)
-    return Mesh(np.array([corner, corner + u, corner + u + v, corner + v]), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+def _features(scene: Scene, materials: MaterialTable, lights: LightTable, emits_textures: bool) -> dict[str, bool]:
+    """What `pmviewer.kernels.scene.scene_dtype` is asked for."""
+    rich, used = is_rich(scene), used_materials(scene)
+    return {
+        "bsdfs": rich,
+        "lights": lights.more,
+        "instances": bool(scene.instances and scene.groups),
+        "textures": emits_textures or (rich and needs_tangents(scene)),
+        "colours": any(m.vertex_colours for m in used),
+        "opacity": any(m.passable for m in used),
+        "principled": "principled" in materials.kinds,
+        "blends": "blend" in materials.kinds,
+    }
 
 
-def _corners(meshes: list[Mesh], n: int) -> Float:
-    """(n, 3, 3) vertices at the corners of all triangles."""
-    out, start = np.empty((n, 3, 3), np.float32), 0
-    for m in meshes:
-        _take(m.vertices, m.faces, out[start : start + len(m.faces)])
-        start += len(m.faces)
-    return out
-
-
-def _corner_normals(meshes: list[Mesh], n: int) -> Float | None:
-    """(n, 3, 3) normals at the triangles' corners; flat meshes repeat the face's. None if all are flat."""
-    if all(m.normals is None for m in meshes):
-        return None
-    out, start = np.empty((n, 3, 3), np.float32), 0
-    for m in meshes:
-        rows = out[start : start + len(m.faces)]
-        if m.normals is not None:
-            _take(m.normals, m.faces, rows)
-        else:
-            face_normals(np.ascontiguousarray(m.vertices), m.faces, rows)
-        start += len(m.faces)
-    return out
-
-
-def _take(values: NDArray[np.float64], faces: NDArray[np.int32], out: Float) -> None:
-    """out (F, 3, 3) = values (V, 3) at the corners of the faces."""
-    np.take(values.astype(np.float32), faces, axis=0, out=out, mode="clip")  # checked before; "raise" would copy
-
-
-def _quadric_row(shape: Shape) -> list[float]:
-    g = shape.geometry
-    if isinstance(g, Sphere):
-        return [0, *g.center, 0, 0, 1, g.radius, 0, side_of(g), 0, 0]
-    if isinstance(g, Cylinder):
-        axis, length = axis_of(g)
-        return [1, *g.p0, *axis, g.radius, length, side_of(g), 0, 0]
-    assert isinstance(g, Disk)
-    return [2, *g.center, *g.normal, g.radius, 0, 1, 0, 0]
+def _shading_arrays(
+    scene: Scene,
+    features: dict[str, bool],
+    stored: StoredGeometry,
+    materials: MaterialTable,
+    lights: LightTable,
+    emissions: dict[int, Emission],
+) -> dict[str, NDArray]:
+    """Arrays that not every scene has: normals, colours, tables of BSDFs, textures. Textures' numbers are written into
+    the rows of the materials."""
+    arrays: dict[str, NDArray] = {}
+    normals = stored.corner_normals()
+    if normals is not None:
+        arrays["normals"] = normals
+    meshes = [stored.shapes[i].geometry for i, _ in stored.meshes]
+    if features["colours"]:
+        arrays["colours"] = corner_colours(meshes)
+    textures = TextureTable()
+    if features["bsdfs"]:
+        arrays["bsdf_tables"] = materials.tables
+        textures.write_rows(materials.rows, materials.materials)
+    if features["textures"]:
+        arrays |= coordinates(meshes, [stored.shapes[i].geometry for i in stored.round_shapes])
+        arrays |= light_arrays(emissions, lights.of_shape, len(lights.rows), textures)
+        arrays |= textures.arrays(scene)
+    return arrays

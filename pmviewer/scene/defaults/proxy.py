@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels import scene as K
 from pmviewer.kernels.accel.bvh import Bvh, build
-from pmviewer.kernels.accel.raycast import cast_closest, cast_occluded
+from pmviewer.kernels.accel.occlusion import cast_occluded
+from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.kernels.meshes.cells import cell_means, spanning
 from pmviewer.scene.arrays.tessellate import triangles_of
 from pmviewer.scene.description import Group, Mesh, Scene, Shape

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +70,38 @@ def decoded(data: bytes) -> str:
 
 def read_text(data: bytes) -> ObjText:
     """All statements of a file. What is no number becomes NaN, what is no index BAD."""
+    data = _normalised(data)
+    bytes_ = np.frombuffer(data, np.uint8)
+    pieces = _pieces(data)
+    counts = np.zeros((len(pieces), N_COUNTS), np.int64)
+    lines = parallel([partial(count_statements, bytes_, i, j, row) for (i, j), row in zip(pieces, counts)])
+    before = np.cumsum(counts, axis=0) - counts
+    total = counts.sum(axis=0)
+    first_lines = np.cumsum([1, *lines[:-1]])
+    arrays = _room_for(total)
+    parallel(
+        [
+            partial(read_statements, bytes_, i, j, row, line, arrays)
+            for (i, j), row, line in zip(pieces, before, first_lines.tolist())
+        ]
+    )
+    return ObjText(
+        data=data,
+        v=arrays.v,
+        vt=arrays.vt,
+        vn=arrays.vn,
+        colours=arrays.colours if total[_COLOURED] else None,
+        corners=arrays.corners,
+        corner_vt=arrays.corner_vt if len(arrays.corner_vt) else None,
+        corner_vn=arrays.corner_vn if len(arrays.corner_vn) else None,
+        starts=arrays.starts,
+        events=arrays.events,
+        ignored=int(total[_IGNORED]),
+    )
+
+
+def _normalised(data: bytes) -> bytes:
+    """The file as UTF-8 or Latin-1 with one line a statement, ended by line feeds, and two at the end."""
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         data = data.decode("utf-16", "replace").encode("utf-8")
     data = data.removeprefix(b"\xef\xbb\xbf")
@@ -76,38 +109,35 @@ def read_text(data: bytes) -> ObjText:
         data = re.sub(rb"\\[ \t]*\r?\n", lambda match: b" " * len(match[0]), data)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    data = data.replace(b"\0", b" ") + b"\n\n" if b"\0" in data else data + b"\n\n"
-    bytes_ = np.frombuffer(data, np.uint8)
+    return data.replace(b"\0", b" ") + b"\n\n" if b"\0" in data else data + b"\n\n"
+
+
+def _pieces(data: bytes) -> list[tuple[int, int]]:
+    """Begin and end of pieces of whole lines, of about _PIECE bytes."""
     ends = [0]
     while ends[-1] < len(data):
         cut = data.find(b"\n", min(ends[-1] + _PIECE, len(data) - 1)) + 1
         ends.append(cut or len(data))
-    pieces = list(pairwise(ends))
-    counts = np.zeros((len(pieces), N_COUNTS), np.int64)
-    lines = parallel([partial(count_statements, bytes_, i, j, row) for (i, j), row in zip(pieces, counts)])
-    before = np.cumsum(counts, axis=0) - counts
-    total = counts.sum(axis=0)
-    first_lines = np.cumsum([1, *lines[:-1]])
+    return list(pairwise(ends))
+
+
+def _room_for(total: Counts) -> _Arrays:
+    """Arrays for so many statements (N_COUNTS,)."""
     v, vt, vn = (np.empty((total[kind], width)) for kind, width in ((_V, 3), (_VT, 2), (_VN, 3)))
-    colours = np.full((len(v), 3), np.nan) if total[_COLOURED] else np.empty((0, 3))
     corners = np.empty(total[_CORNERS], np.int32)
-    corner_vt = np.empty(len(corners) if len(vt) else 0, np.int32)
-    corner_vn = np.empty(len(corners) if len(vn) else 0, np.int32)
     starts = np.empty(total[_FACE] + 1, np.int64)
     starts[-1] = len(corners)
-    events = np.empty((total[_EVENT], 3), np.int64)
-    arrays = v, vt, vn, colours, corners, corner_vt, corner_vn, starts, events
-    parallel(
-        [
-            partial(read_statements, bytes_, i, j, row, line, *arrays)
-            for (i, j), row, line in zip(pieces, before, first_lines.tolist())
-        ]
+    return _Arrays(
+        v=v,
+        vt=vt,
+        vn=vn,
+        colours=np.full((len(v), 3), np.nan) if total[_COLOURED] else np.empty((0, 3)),
+        corners=corners,
+        corner_vt=np.empty(len(corners) if len(vt) else 0, np.int32),
+        corner_vn=np.empty(len(corners) if len(vn) else 0, np.int32),
+        starts=starts,
+        events=np.empty((total[_EVENT], 3), np.int64),
     )
-    return ObjText(
-        data, v, vt, vn, colours if total[_COLOURED] else None, corners,
-        corner_vt if len(corner_vt) else None, corner_vn if len(corner_vn) else None,
-        starts, events, int(total[_IGNORED]),
-    )  # fmt: skip
 
 
 @device
@@ -200,9 +230,25 @@ def _row(data, i, out, row, width):
             out[row, k], i = number(data, i)
 
 
+class _Arrays(NamedTuple):
+    """What statements are read into, as in `ObjText`; an array that the file has nothing for has the length 0."""
+
+    v: Any
+    vt: Any
+    vn: Any
+    colours: Any
+    corners: Any
+    corner_vt: Any
+    corner_vn: Any
+    starts: Any
+    events: Any
+
+
 @kernel
-def read_statements(data, begin, end, counts, line, v, vt, vn, colours, corners, corner_vt, corner_vn, starts, events):
+def read_statements(data, begin, end, counts, line, arrays):
     """Fill the arrays from the lines of data[begin:end]; `counts` tells what precedes them."""
+    # Taken apart here: counting references to all of them would cost every statement.
+    v, vt, vn, colours, corners, corner_vt, corner_vn, starts, events = arrays
     n_v, n_vt, n_vn, n_face = counts[_V], counts[_VT], counts[_VN], counts[_FACE]
     n_event, n_corner = counts[_EVENT], counts[_CORNERS]
     i = begin

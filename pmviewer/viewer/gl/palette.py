@@ -46,7 +46,7 @@ FATE_PALETTE: tuple[RGB, ...] = (
     (0.35, 0.60, 0.98),
     (0.98, 0.85, 0.25),
 )
-"""Of photons that are stored, rejected, redistributed and discarded (`pmviewer.photons.deposition.rules.FATES`)."""
+"""Of photons that are stored, rejected, redistributed and discarded (`pmviewer.photons.deposition.deposited.FATES`)."""
 
 
 class By(IntEnum):

@@ -9,6 +9,7 @@ import numpy as np
 from imgui_bundle import imgui
 from numpy.typing import NDArray
 
+from pmviewer.photons.deposition.deposited import FATES
 from pmviewer.settings.access import FateOverlay
 from pmviewer.viewer.format import grouped
 from pmviewer.viewer.gl.palette import BOUNCES, FATE_PALETTE, By, Colouring
@@ -17,8 +18,6 @@ from pmviewer.viewer.overlays.legend import colour_legend, swatches
 from pmviewer.viewer.overlays.overlay import Needs, Source, Switch
 from pmviewer.viewer.overlays.points import Points
 
-FATES = ("stored", "rejected", "redistributed", "discarded")
-"""By number, as `pmviewer.photons.deposition.rules.FATES`."""
 _GLOBAL = 8
 """Of a photon that the global map was asked to store; the fate is in the bits below."""
 _OF_CAUSTIC, _OF_GLOBAL = 0xFF, 0xFF00

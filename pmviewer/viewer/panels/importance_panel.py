@@ -4,13 +4,13 @@ that matter."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from imgui_bundle import imgui, implot
 from numpy.typing import NDArray
 
 from pmviewer.engine.frame import Frame, Statistics
+from pmviewer.photons.deposition.deposited import FIRST_WEIGHT, Deposited
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import data_size, grouped
 from pmviewer.viewer.gl.palette import LIGHT_PALETTE
@@ -18,11 +18,6 @@ from pmviewer.viewer.panels.light_list import light_rows
 from pmviewer.viewer.panels.statistics_panel import table
 from pmviewer.viewer.state import ViewerState
 
-if TYPE_CHECKING:  # numba, which the window doesn't wait for
-    from pmviewer.photons.deposition.rules import Deposited
-
-FIRST_WEIGHT = -10
-"""Exponent of the histogram's first bin, as `pmviewer.photons.deposition.rules.FIRST_WEIGHT`."""
 MAP_COLOURS = {"caustic": LIGHT_PALETTE[0], "global": LIGHT_PALETTE[1]}
 PERCENTILES = ("1 %", "50 %", "99 %", "all")
 TOP_LIGHTS = 8
@@ -62,10 +57,10 @@ def traced_text(s: Statistics) -> str:
     return text
 
 
-def histogram_of(books: Deposited) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def histogram_of(deposited: Deposited) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Middles of the bins, as logarithms (base 2) of weights, and the photons in them, from the first to the last bin
     that has any."""
-    counts = np.array(books.histogram, np.float64)
+    counts = np.array(deposited.histogram, np.float64)
     used = np.flatnonzero(counts)
     if not len(used):
         return np.empty(0), np.empty(0)
@@ -111,7 +106,7 @@ class ImportancePanel:
         if not s.deposited:
             imgui.text_disabled("Every photon is stored (importance.deposition).")
         imgui.pop_text_wrap_pos()
-        used = {name: books for name, books in s.deposited.items() if books.arrived}
+        used = {name: deposited for name, deposited in s.deposited.items() if deposited.arrived}
         if not used or not imgui.begin_table("##figures", 1 + len(used)):
             return
         _cells("Latest pass", list(used), theme.DIM)
@@ -125,7 +120,7 @@ class ImportancePanel:
 
     def _weights(self, s: Statistics) -> None:
         """Histogram and percentiles, of both maps in their colours."""
-        shown = {name: books for name, books in s.deposited.items() if books.stored}
+        shown = {name: deposited for name, deposited in s.deposited.items() if deposited.stored}
         if not shown:
             imgui.text_disabled("Weights of the stored photons: all alike.")
             return
@@ -133,10 +128,10 @@ class ImportancePanel:
         imgui.set_item_tooltip("Power relative to that with which photons leave the lights")
         if imgui.begin_table("##percentiles", 1 + len(PERCENTILES)):
             _cells("at most", PERCENTILES, theme.DIM)
-            for name, books in shown.items():
-                _cells(name, [f"{weight:.3g}" for weight in books.percentiles], (*MAP_COLOURS[name], 1.0))
+            for name, deposited in shown.items():
+                _cells(name, [f"{weight:.3g}" for weight in deposited.percentiles], (*MAP_COLOURS[name], 1.0))
             imgui.end_table()
-        self._plot({name: histogram_of(books) for name, books in shown.items()})
+        self._plot({name: histogram_of(deposited) for name, deposited in shown.items()})
 
     @staticmethod
     def _plot(bars: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]) -> None:

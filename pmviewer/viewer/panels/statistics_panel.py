@@ -39,7 +39,7 @@ def energy_rows(energy: Energy) -> Rows:
         text = f"{share:.2f} %" if math.isnan(error) or not share else f"{share:.2f} ± {error:.2g} %"
         rows.append((LEDGER[entry], text))
     if energy.uncounted > 0:
-        rows.append(("With test photons, not in these books", si(energy.uncounted, "W")))
+        rows.append(("With test photons, not in this ledger", si(energy.uncounted, "W")))
     return rows
 
 
@@ -68,10 +68,10 @@ def time_rows(s: Statistics) -> Rows:
 
 def convergence_rows(s: Statistics) -> Rows:
     """How much of the caustic map's light lies where no more photons are needed; none without the criterion."""
-    books = s.deposited.get("caustic")
-    if books is None or books.converged is None:
+    deposited = s.deposited.get("caustic")
+    if deposited is None or deposited.converged is None:
         return []
-    found = books.converged
+    found = deposited.converged
     return [
         ("Caustic map converged", f"{1 - found.more:.1%}" if found.photons else "no caustic photons"),
         ("Caustic map dense enough", f"{found.dense:.1%}"),

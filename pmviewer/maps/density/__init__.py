@@ -1,0 +1,1 @@
+"""Density control: photons stored up to a required density."""

@@ -1,0 +1,285 @@
+"""Density control: photons are stored up to a required density; the power of all others goes to their neighbours (I5;
+Suykens and Willems 2000, §3.1; course guide §3.5.2).
+
+A photon at x looks for the M nearest stored ones. With r_M the distance of the farthest, the density is
+D_cur = M/(π·r_M²); while fewer than M are stored, it is 0. By ρ = D_cur/D_r the photon is stored or not: by the step if
+ρ < 1, by the translated cosine with the probability ½(1 + cos(π·ρ/2)) below ρ = 2 and never beyond. If not, each of the
+M' ≤ M neighbours that arrived on its side of the surface gets Φ/M', and the sum of all powers stays; with M' = 0 the
+photon is stored after all.
+
+Which stored photons are neighbours is said by `Around`: the M nearest in space (NEAREST, the source's), or with guards
+against power that goes through thin walls or into places that matter more.
+
+The density comes to rest above D_r: photons that fall into a gap that chance left are still stored. Where 10 to 400
+arrive for one that is stored that is at about 1.3·D_r with the step and 2.2·D_r with the cosine.
+
+**Order and threads.** Photons come in rounds. All of a round are first compared with what was stored before it, on any
+number of threads: a photon that is not stored for these neighbours would not be stored with more of them either, so
+that this decides. The rest is decided in order, each seeing all before it. The stored set is thus that of one photon
+after another, whatever the rounds (but for a photon whose M nearest become such of the other side alone within its
+round); of rounds only the neighbours that share a rejected photon's power know.
+
+Powers are float64 sums; they become 16-bit codes when everything is stored (`pmviewer.maps.power`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.random import hash3, unit_float
+from pmviewer.kernels.vector import dot, normalize
+from pmviewer.maps.density.growing_tree import Limits, M, Tree, grown, insert, reserved, search, search_scratch
+from pmviewer.maps.photon_words import decode_direction, decode_powers
+from pmviewer.tasks import Runner
+
+FLATNESS = np.float32(0.2)
+"""Half-thickness of guarded discs relative to their radius, that of look-ups."""
+CHUNK = 4096
+"""Photons a task."""
+
+STEP, COSINE = 0, 1
+ACCEPTANCE = ("step", "cosine")
+
+_f4 = np.float32
+_f8 = np.float64
+_i4 = np.int32
+_i8 = np.int64
+_u4 = np.uint32
+_PI = _f8(np.pi)
+UNDECIDED = _i4(-1)
+"""In place of the number of those who share a photon's power."""
+
+
+@dataclass(frozen=True)
+class Around:
+    """Which stored photons are neighbours of a place.
+
+    guarded: only those that arrived on the place's side of the surface and lie in a disc along it, as look-ups count
+    them; otherwise all, in a sphere. `contrast`: none that need more than so many times the density needed at the
+    place: where important and unimportant surfaces meet, power would seep into the important ones.
+    """
+
+    guarded: bool = False
+    contrast: float = math.inf
+
+    @property
+    def limits(self) -> Limits:
+        """For kernels."""
+        steepness, cosine = (1 / FLATNESS**2, 0.0) if self.guarded else (0.0, -math.inf)
+        return Limits(_f4(steepness), _f4(cosine), _f4(self.contrast))
+
+
+NEAREST = Around()
+"""The source's: the M nearest in space."""
+
+
+class Control(NamedTuple):
+    """What is constant for a map: rule, int32, STEP or COSINE; seed, uint32; limits, of the tree's search."""
+
+    rule: Any
+    seed: Any
+    limits: Any
+
+
+class Arrivals(NamedTuple):
+    """The photons of a round: (n, 6) float32 and the same as uint32 `words`; normals (n,) uint32 codes; needs (n,)
+    float32, required densities; first, int64, photons that arrived before."""
+
+    photons: Any
+    words: Any
+    normals: Any
+    needs: Any
+    first: Any
+
+
+class Stored(NamedTuple):
+    """The photons stored, in order: rows (capacity, 6) uint32, powers (capacity, 3) float64; size int64 (3,): nodes and
+    leaves of the tree, photons stored."""
+
+    rows: Any
+    powers: Any
+    size: Any
+
+
+@device
+def _rejected(density, need, rule, u):
+    """Whether a photon is not stored at D_cur, where `need` is D_r; u: a random number."""
+    rho = density / _f8(need)
+    if rule == STEP:
+        return not rho < _f8(1.0)
+    return not (rho < _f8(2.0) and _f8(u) < _f8(0.5) * (_f8(1.0) + np.cos(_PI * rho * _f8(0.5))))
+
+
+@device
+def _sharers(tree, control, arrivals, i, scratch):
+    """How many stored photons share the power of photon i, in scratch 0; 0 where it is stored itself."""
+    photons, need = arrivals.photons, arrivals.needs[i]
+    p = (photons[i, 0], photons[i, 1], photons[i, 2])
+    n = normalize(decode_direction(arrivals.normals[i]))
+    u = _random(control.seed, _i8(arrivals.first) + _i8(i))
+    r2 = _f4(np.inf)
+    if control.rule == STEP:  # M of them nearer than the disc of M at the required density
+        r2 = _f4(_f8(M) / (_PI * _f8(need)))
+    count, r2 = search(tree, p, n, need, control.limits, r2, scratch)
+    if count < M:
+        return _i8(0)
+    if r2 > _f4(0.0) and not _rejected(_f8(M) / (_PI * _f8(r2)), need, control.rule, u):
+        return _i8(0)
+    sharing, found = _i8(0), scratch[0]
+    for j in range(count):
+        if dot(n, decode_direction(tree.words[found[j]])) > _f4(0.0):
+            found[sharing] = found[j]
+            sharing += 1
+    return sharing
+
+
+@device
+def _random(seed, index):
+    return unit_float(hash3(seed, _u4(index), _u4(index >> 32)))
+
+
+@kernel
+def _compare(tree, control, arrivals, i0, i1, counts, neighbours):
+    """Photons i0 … i1−1 against the tree as it is: counts[i] neighbours that share the power of photon i, which is not
+    stored, or UNDECIDED."""
+    scratch = search_scratch()
+    for i in range(i0, i1):
+        count = _sharers(tree, control, arrivals, i, scratch)
+        counts[i] = count if count > 0 else UNDECIDED
+        for j in range(count):
+            neighbours[i, j] = scratch[0][j]
+
+
+@kernel
+def _settle(tree, control, arrivals, stored, counts, neighbours, kept):
+    """Decide the photons that `_compare` left open, in order, and hand out the power of the others.
+
+    stored: a `Stored`, filled; kept: bool, receives which of these are stored. Returns how many were rejected.
+    """
+    scratch = search_scratch()
+    found, words, size = scratch[0], arrivals.words, stored.size
+    rejected = _i8(0)
+    for i in range(len(words)):
+        red, green, blue = decode_powers(words[i, 4], words[i, 5])
+        count = _i8(counts[i])
+        if count != UNDECIDED:
+            for j in range(count):
+                found[j] = neighbours[i, j]
+        else:
+            count = _sharers(tree, control, arrivals, i, scratch)
+            if count == 0:
+                new = size[2]
+                for w in range(6):
+                    stored.rows[new, w] = words[i, w]
+                tree.words[new], tree.needs[new] = words[i, 3], arrivals.needs[i]
+                stored.powers[new, 0], stored.powers[new, 1], stored.powers[new, 2] = _f8(red), _f8(green), _f8(blue)
+                photons = arrivals.photons
+                insert(tree, size, (photons[i, 0], photons[i, 1], photons[i, 2]), _i4(new))
+                size[2] += 1
+                kept[i] = True
+                continue
+        kept[i] = False
+        rejected += 1
+        share = _f8(1.0) / _f8(count)
+        for j in range(count):
+            k = found[j]
+            stored.powers[k, 0] += _f8(red) * share
+            stored.powers[k, 1] += _f8(green) * share
+            stored.powers[k, 2] += _f8(blue) * share
+    return rejected
+
+
+def needs_of(required: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Required densities (n,) that can be divided by: what is not a number, or not positive, counts as next to none."""
+    return np.clip(np.nan_to_num(required, nan=0.0, posinf=1e30), 1e-30, 1e30, dtype=np.float32)
+
+
+# --- the map being filled -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Controlled:
+    """What density control made of a map's photons: `photons` (n, 6) float32 as in `pmviewer.maps.record`, whose power
+    words are to be replaced by those of `powers` (n, 3) float64 in units of the map's power; `normals` (n,) codes;
+    `required` (n,) float32 required densities; `redistributed` photons that are not stored."""
+
+    photons: NDArray[np.float32]
+    normals: NDArray[np.uint32]
+    powers: NDArray[np.float64]
+    required: NDArray[np.float32]
+    redistributed: int
+
+
+class DensityControl:
+    """A map that is filled round by round. The result depends on the photons and their order, on the rounds hardly
+    (see above), and not at all on threads."""
+
+    def __init__(self, rule: int, around: Around, seed: int) -> None:
+        """rule: STEP or COSINE."""
+        self.control = Control(np.int32(rule), np.uint32(seed & 0xFFFFFFFF), around.limits)
+        self.size = np.array([1, 1, 0], np.int64)
+        self.arrived = self.redistributed = 0
+        self.kept = np.zeros(0, bool)
+        """Which photons of the latest round are stored."""
+        self._rows = np.empty((0, 6), np.uint32)
+        self._normals: list[NDArray[np.uint32]] = []
+        self._powers = np.empty((0, 3), np.float64)
+        self._tree: Tree | None = None
+
+    @property
+    def stored(self) -> int:
+        return int(self.size[2])
+
+    def add(
+        self, photons: NDArray[np.float32], normals: NDArray[np.uint32], required: NDArray[np.float32], run: Runner
+    ) -> None:
+        """One round: photons (n, 6) with normal codes (n,) and the densities required at them (n,), in photons per unit
+        area; what is not a number counts as 0."""
+        n = len(photons)
+        self.kept = kept = np.zeros(n, bool)
+        if n == 0:
+            return
+        photons = np.ascontiguousarray(photons, np.float32)
+        arrivals = Arrivals(photons, photons.view(np.uint32), normals, needs_of(required), np.int64(self.arrived))
+        tree = self._reserve(self.stored + n)
+        counts, neighbours = np.full(n, UNDECIDED, np.int32), np.empty((n, M), np.int32)
+
+        def compare(i0: int) -> Callable[[], None]:
+            i1 = min(i0 + CHUNK, n)
+            return lambda: _compare(tree, self.control, arrivals, i0, i1, counts, neighbours)
+
+        if self.stored:
+            run([compare(i0) for i0 in range(0, n, CHUNK)])
+        before, stored = self.stored, Stored(self._rows, self._powers, self.size)
+        rejected = run([lambda: _settle(tree, self.control, arrivals, stored, counts, neighbours, kept)])
+        self.redistributed += rejected[0]
+        self.arrived += n
+        self._normals.append(normals[kept])
+        assert self.stored - before == int(kept.sum())
+
+    def result(self) -> Controlled:
+        """The map as it stands; the arrays are this object's own."""
+        n = self.stored
+        return Controlled(
+            photons=self._rows[:n].view(np.float32),
+            normals=np.concatenate([np.empty(0, np.uint32), *self._normals]),
+            powers=self._powers[:n],
+            required=np.empty(0, np.float32) if self._tree is None else self._tree.needs[:n],
+            redistributed=self.redistributed,
+        )
+
+    def _reserve(self, photons: int) -> Tree:
+        """The tree, with room for so many photons, and a half more, so that copying stays rare."""
+        room = len(self._rows)
+        if self._tree is None or photons > room:
+            photons = max(photons, room + room // 2)
+            self._tree = reserved(self._tree, photons)
+            self._rows, self._powers = grown(self._rows, photons), grown(self._powers, photons)
+        return self._tree

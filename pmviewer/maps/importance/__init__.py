@@ -1,0 +1,1 @@
+"""Importance maps: what they store, look-ups, building."""

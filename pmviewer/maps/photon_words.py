@@ -1,0 +1,75 @@
+"""Photons in kernels: writing and reading the words of `pmviewer.maps.record`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.compile.jit import device, inlined
+from pmviewer.kernels.memory import bits_of_float, float_of_bits
+from pmviewer.maps.record import EXPONENT_BASE
+
+_EXPONENT_BASE = np.uint32(EXPONENT_BASE)
+_f4 = np.float32
+_u4 = np.uint32
+
+
+@device
+def encode_power(x):
+    """Non-negative float32 in units of the map's power → 16-bit code (round to nearest, 0 below 2⁻⁴⁷)."""
+    bits = _u4(bits_of_float(_f4(x)))
+    if bits < _u4(_EXPONENT_BASE + _u4(0x2000)):
+        return _u4(0)
+    code = _u4(_u4(bits + _u4(0x1000) - _EXPONENT_BASE) >> _u4(13))
+    return min(code, _u4(0xFFFF))
+
+
+@device
+def decode_power(code):
+    """16-bit code → float32 in units of the map's power."""
+    if _u4(code) == _u4(0):
+        return _f4(0.0)
+    return float_of_bits(_u4(_u4(_u4(code) << _u4(13)) + _EXPONENT_BASE))
+
+
+@device
+def encode_direction(x, y, z):
+    """Unit vector → 24-bit octahedral code in the high bits of a uint32 (worst error 0.06°)."""
+    s = _f4(1.0) / (abs(x) + abs(y) + abs(z))
+    u, v = x * s, y * s
+    if z < _f4(0.0):
+        a = (_f4(1.0) - abs(v)) * (_f4(1.0) if u >= _f4(0.0) else _f4(-1.0))
+        v = (_f4(1.0) - abs(u)) * (_f4(1.0) if v >= _f4(0.0) else _f4(-1.0))
+        u = a
+    iu = _u4(min(max(u * _f4(2047.0) + _f4(2047.5), _f4(0.0)), _f4(4094.0)))
+    iv = _u4(min(max(v * _f4(2047.0) + _f4(2047.5), _f4(0.0)), _f4(4094.0)))
+    return _u4((iu << _u4(20)) | (iv << _u4(8)))
+
+
+@device
+def decode_direction(code):
+    """24-bit octahedral code → vector of the right direction, not normalised (length in [0.57, 1])."""
+    scale = _f4(1.0 / 2047.0)
+    u = _f4(np.int32(_u4(code) >> _u4(20)) - np.int32(2047)) * scale
+    v = _f4(np.int32((_u4(code) >> _u4(8)) & _u4(0xFFF)) - np.int32(2047)) * scale
+    z = _f4(1.0) - abs(u) - abs(v)
+    t = max(-z, _f4(0.0))
+    x = u - t if u >= _f4(0.0) else u + t
+    y = v - t if v >= _f4(0.0) else v + t
+    return x, y, z
+
+
+@device
+def write_photon(rows, row, p, wi, power, flags, light):
+    """Photon `row` of rows (n, 6) float32: point p, unit wi, power (red, green, blue) in units of the map's, flags and
+    id of the light."""
+    rows[row, 0], rows[row, 1], rows[row, 2] = p
+    r, g, b = encode_power(power[0]), encode_power(power[1]), encode_power(power[2])
+    rows[row, 3] = float_of_bits(_u4(encode_direction(wi[0], wi[1], wi[2]) | _u4(flags)))
+    rows[row, 4] = float_of_bits(_u4(r | _u4(g << _u4(16))))
+    rows[row, 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
+
+
+@inlined
+def decode_powers(rg, b):
+    """Words 4 and 5 of a photon → red, green, blue float32 in units of the map's power."""
+    return decode_power(_u4(rg) & _u4(0xFFFF)), decode_power(_u4(rg) >> _u4(16)), decode_power(_u4(b) & _u4(0xFFFF))
