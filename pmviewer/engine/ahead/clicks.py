@@ -75,7 +75,7 @@ def _all(settings: Settings) -> Iterator[Click]:
             continue
         for value in _others(info, get(settings, info.path)):
             try:
-                yield Click(f"{info.title}: {_word(value)}", with_values(settings, {info.path: value}))
+                yield Click(f"{info.path} = {_word(value)}", with_values(settings, {info.path: value}))
             except PmviewerError:
                 continue
 

@@ -81,6 +81,10 @@ if not numba.config.DISABLE_JIT:
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": FASTMATH}
 
 
+_used: set[str] = set()
+"""Folders of modules that this process has imported."""
+
+
 class _Locator(UserProvidedCacheLocator):
     """One folder for each module and state of the sources that it depends on."""
 
@@ -91,8 +95,11 @@ class _Locator(UserProvidedCacheLocator):
         self._cache_path = str(CACHE_FOLDER / f"{'.'.join(module.parts)}-{stamp(source)}")
 
     def ensure_cache_path(self) -> None:
-        super().ensure_cache_path()
-        os.utime(self._cache_path)
+        # Numba's own writes a file for each function that is defined; the folder above is known to be writable.
+        if self._cache_path not in _used:
+            _used.add(self._cache_path)
+            os.makedirs(self._cache_path, exist_ok=True)
+            os.utime(self._cache_path)
 
     def get_source_stamp(self) -> str:
         return stamp(Path(self._py_file).resolve())
