@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from pmviewer.engine import prepare as prepare_module
-from pmviewer.engine.ahead.beside import compile_beside
+from pmviewer.engine.ahead.beside import compile_beside, early_helper
 from pmviewer.engine.ahead.helper import Helper
 from pmviewer.engine.ahead.requests import Clicks
 from pmviewer.engine.opened import OpenScene
@@ -36,6 +36,7 @@ class Ahead:
         self._threads = threads or available_threads()
         self._on_change = on_change
         self._lock = threading.Lock()
+        self._early = early_helper(self._threads)
         self._helper: Helper | None = None
         self._timer: threading.Timer | None = None
         self._waiting: tuple[int, str] | None = None
@@ -55,7 +56,8 @@ class Ahead:
         with self._lock:
             if not self._closed:
                 self._end()
-                self._helper = compile_beside(of_record, traits, settings, self._threads)
+                early, self._early = self._early, None
+                self._helper = compile_beside(early, of_record, traits, settings, self._threads)
 
     def shown(self, opened: OpenScene, settings: Settings) -> None:
         """The picture of these settings is up: what a click would need comes next, once it is quiet."""
@@ -79,6 +81,8 @@ class Ahead:
         """End all work."""
         self._closed = True
         self.stop()
+        if self._early is not None:
+            self._early.stop()
 
     def _begin(self, state: tuple[int, str], opened: OpenScene, settings: Settings) -> None:
         """On the timer's thread."""
@@ -86,11 +90,15 @@ class Ahead:
         done = finished_mark(of_record, settings)
         if done.exists():
             return
+        before = self._helper
+        if before is not None:
+            before.wait()
         request = Clicks(miniature(opened.scene), of_record, settings)
         with self._lock:
-            if self._closed or state != self._waiting or (self._helper is not None and self._helper.running):
+            if self._closed or state != self._waiting:
                 return
-            helper = self._helper = Helper(request, self._on_change)
+            helper = self._helper = Helper()
+            helper.ask(request, self._on_change)
         helper.wait()
         if helper.finished:
             mark(done)
@@ -123,6 +131,6 @@ def mark(path: Path) -> None:
 
 
 def _words(settings: Settings) -> str:
-    """The settings that choose between things. Numbers rarely decide about what is compiled, and change all the time."""
+    """The settings that choose between things. Numbers rarely decide what is compiled, and change all the time."""
     chosen = [info.path for info in SETTINGS.values() if info.choices or info.kind is bool]
     return " ".join(f"{path}={get(settings, path)}" for path in chosen)

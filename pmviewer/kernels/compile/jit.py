@@ -147,6 +147,11 @@ class _KernelCache(FunctionCache):
         self._cache_file = _OneFileEach(self._cache_path, impl.filename_base, impl.locator.get_source_stamp())
         self._held: list[int] = []
 
+    @property
+    def has_any(self) -> bool:
+        """Whether there is compiled code on disk, for whatever types."""
+        return any(Path(self._cache_path).glob(self._cache_file._data_name_pattern.replace("{number:d}", "*")))
+
     def has(self, sig: Any, target_context: Any) -> bool:
         """Whether there is compiled code on disk."""
         name = self._cache_file._name(self._index_key(sig, target_context.codegen()))
@@ -179,6 +184,11 @@ class _KernelDispatcher(CPUDispatcher):
     """Compiles what no other process is compiling."""
 
     _cache: _KernelCache
+
+    @property
+    def has_code(self) -> bool:
+        """Whether it is compiled for any arguments, by any process."""
+        return bool(self.overloads) or self._cache.has_any
 
     def is_kept(self, *arguments: Any) -> bool:
         """Whether code for such arguments is compiled already, by any process."""
