@@ -14,20 +14,13 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-<<<<<<< HEAD
+from pmviewer.engine.ahead.ahead import Ahead
 from pmviewer.engine.frame import Frame, Message, State, Status
 from pmviewer.engine.guarded import guarded
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.loader import Loaded, Loader
-from pmviewer.engine.opened import OpenScene, open_scene, relit
-from pmviewer.engine.pool import WorkPool, lower_priority
-=======
-from pmviewer.engine.ahead.ahead import Ahead
-from pmviewer.engine.frame import Frame, Level, Message, State, Status
-from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import OpenScene, nobody, open_scene, relit
-from pmviewer.engine.pool import Cancelled, WorkPool, lower_priority
->>>>>>> 2f6af6f (The window compiles ahead what a click would need; miniatures of scenes)
+from pmviewer.engine.pool import WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.published import Published
 from pmviewer.engine.renderer import Renderer
@@ -46,17 +39,10 @@ NO_MEMORY = "Not enough memory for these settings: lower N or the image size."
 class Session:
     """See the module. All public attributes may be read from any thread."""
 
-<<<<<<< HEAD
-    def __init__(self, threads: int | None = None, settings: Settings | None = None) -> None:
-=======
     def __init__(
         self, threads: int | None = None, settings: Settings | None = None, *, compiles_ahead: bool = False
     ) -> None:
         """compiles_ahead: in a process beside this one, `pmviewer.engine.ahead`."""
-        self.on_update: Callable[[], None] | None = None
-        self.frame: Frame | None = None
-        self.status = Status()
->>>>>>> 2f6af6f (The window compiles ahead what a click would need; miniatures of scenes)
         self.geometry: DrawGeometry | None = None
         self._published = Published()
         self._changed = self._published.changed
@@ -77,7 +63,7 @@ class Session:
         self._pool = WorkPool(threads, behind_window=True)
         self._store = StageStore()
         self._renderer: Renderer | None = None
-        self._ahead = Ahead(self._pool.threads, self._notify) if compiles_ahead else None
+        self._ahead = Ahead(self._pool.threads, self._published.notify) if compiles_ahead else None
         self._worker = threading.Thread(target=self._work, name="pmviewer session", daemon=True)
         self._worker.start()
 
@@ -89,20 +75,11 @@ class Session:
         """Open a scene, with other settings if given. Until it is loaded the old one goes on; a failure becomes an
         error message and changes nothing."""
         with self._changed:
-<<<<<<< HEAD
-            rig = (settings or self._settings).light.rig
-            name = source.name if isinstance(source, Scene) else str(source)
-            self._loader.start(lambda: open_scene(source, parameters or {}, rig), name, settings)
-=======
-            self._loading += 1
-            ticket = self._loading
             chosen = settings or self._settings
             rig, ahead = chosen.light.rig, self._ahead
             on_type = nobody if ahead is None else partial(ahead.opening, settings=chosen)
-        name = source.name if isinstance(source, Scene) else str(source)
-        arguments = (ticket, lambda: open_scene(source, parameters or {}, rig, on_type), name, settings)
-        threading.Thread(target=self._load, args=arguments, name="pmviewer loader", daemon=True).start()
->>>>>>> 2f6af6f (The window compiles ahead what a click would need; miniatures of scenes)
+            name = source.name if isinstance(source, Scene) else str(source)
+            self._loader.start(lambda: open_scene(source, parameters or {}, rig, on_type), name, settings)
 
     def cancel_loading(self) -> None:
         """Give up the scene that is being loaded; the old one stays."""
@@ -407,13 +384,9 @@ class Session:
 
     def _step(self, renderer: Renderer) -> None:
         renderer.step()
-<<<<<<< HEAD
         self._published.show(renderer.frame(self._published.serial + 1, self._wanted(renderer)), self._version)
-=======
-        self._publish(renderer.frame(self._serial + 1, self._wanted(renderer)))
         if self._ahead is not None:
             self._ahead.shown(renderer.scene, self._settings)
->>>>>>> 2f6af6f (The window compiles ahead what a click would need; miniatures of scenes)
         with self._changed:
             self._settle()
         self._published.notify()

@@ -59,9 +59,7 @@ def run(folder, *functions):
     (folder / "lengths.py").write_text(MODULE)
     env = {**os.environ, "PMVIEWER_CACHE": str(folder / "cache"), "PYTHONPATH": os.getcwd()}
     command = [sys.executable, str(folder / "lengths.py"), *functions]
-    return subprocess.run(
-        command, env=env, capture_output=True, text=True, check=True, timeout=300
-    ).stdout.splitlines()
+    return subprocess.run(command, env=env, capture_output=True, text=True, check=True, timeout=300).stdout.splitlines()
 
 
 def test_machine_code_is_made_for_what_python_calls_alone(tmp_path):
