@@ -1,5 +1,8 @@
 """Set up and start from a bare checkout: `python3 -m pmviewer.launch` opens the window, `… launch test` runs the tests.
 
+`… launch setup` installs everything and compiles what the window's first clicks need; `--without-kernels` leaves that
+to the first start.
+
 Uses the standard library alone. Makes a virtual environment in `.venv`, installs pmviewer into it, and sees to the
 system's OpenGL packages: as root on Debian or Ubuntu it installs what is missing, otherwise it says what to install.
 """
@@ -19,6 +22,7 @@ MOST_PROCESSES = 4
 """For tests: each grows to some two gigabytes."""
 ENVIRONMENT = Path(os.environ.get("PMVIEWER_VENV", ROOT / ".venv"))
 SCENE = "cornell_caustic"
+WITHOUT_KERNELS = "--without-kernels"
 
 LIBRARIES = {
     "GL": "libgl1",
@@ -106,7 +110,7 @@ def side_by_side(options: list[str]) -> list[str]:
 
 
 def main(arguments: list[str]) -> int:
-    """`[SCENE and options]`, `test [pytest options]` or `setup` (install everything, run nothing)."""
+    """`[SCENE and options]`, `test [pytest options]` or `setup [--without-kernels]`."""
     if tuple(sys.version_info) < (3, 11):
         sys.exit(f"pmviewer needs Python 3.11 or newer; this is {sys.version.split()[0]}.")
     testing = arguments[:1] in (["test"], ["setup"])
@@ -114,7 +118,10 @@ def main(arguments: list[str]) -> int:
     python = environment_python()
     install(python, "test" if testing else "")
     if arguments[:1] == ["setup"]:
-        return 0
+        if WITHOUT_KERNELS in arguments:
+            return 0
+        print("compiling what the window's first clicks need (about a minute the first time)", flush=True)
+        return subprocess.run([str(python), "-m", "pmviewer", "compile"], check=False, cwd=ROOT).returncode
     if testing:
         command = [str(python), "-m", "pytest", *side_by_side(arguments[1:]), *arguments[1:]]
     else:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from pmviewer.errors import PmviewerError, WindowError
@@ -37,10 +38,13 @@ def screen() -> Iterator[dict[str, str]]:
         process.wait()
 
 
-def probe(environment: dict[str, str], *arguments: str) -> dict[str, Any]:
-    """Run `pmviewer.viewer.probe` and return what it measured. Raises PmviewerError when it fails."""
+def probe(environment: dict[str, str], *arguments: str, folder: Path | None = None) -> dict[str, Any]:
+    """Run `pmviewer.viewer.probe`, of the checkout in `folder` if that is given, and return what it measured. Raises
+    PmviewerError when it fails."""
+    if folder is not None:
+        environment = {**environment, "PYTHONPATH": str(folder)}
     command = [sys.executable, "-m", "pmviewer.viewer.probe", *arguments]
-    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300)
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300, cwd=folder)
     lines = [line for line in run.stdout.splitlines() if line.startswith("{")]
     if run.returncode != 0 or not lines:
         raise PmviewerError(f"The window did not run: {run.stderr.strip()[-400:] or run.stdout.strip()[-400:]}")

@@ -12,6 +12,7 @@ from pmviewer import __version__
 from pmviewer.commands.bench import bench
 from pmviewer.commands.compare import compare
 from pmviewer.commands.compare_importance import compare_importance
+from pmviewer.commands.compile import compile_
 from pmviewer.commands.info import info
 from pmviewer.commands.render import render
 from pmviewer.commands.scenes import scenes
@@ -29,6 +30,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "scenes": scenes,
     "info": info,
     "bench": bench,
+    "compile": compile_,
     "settings": settings,
 }
 """By name, in the order of `--help`."""

@@ -27,8 +27,8 @@ OnType = Callable[[np.dtype, SceneTraits], None]
 _uids = itertools.count(1)
 
 
-def _nobody(of_record: np.dtype, traits: SceneTraits) -> None:
-    return None
+def nobody(of_record: np.dtype, traits: SceneTraits) -> None:
+    """Nobody needs to know."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def open_scene(
     source: str | Path | Scene,
     parameters: Mapping[str, str] | None = None,
     rig: Rig = "auto",
-    on_type: OnType = _nobody,
+    on_type: OnType = nobody,
 ) -> OpenScene:
     """Load, add the camera that the file lacks and the lights of the rig, check, move to the origin and flatten. A
     scene that is given instead of a file is taken as it is. Raises SceneError."""
@@ -77,7 +77,7 @@ def relit(opened: OpenScene, rig: Rig) -> OpenScene:
     return _opened(completed(opened.content, rig), opened.source, opened.content, rig)
 
 
-def _opened(scene: Scene, source: str, content: Scene | None, rig: Rig, on_type: OnType = _nobody) -> OpenScene:
+def _opened(scene: Scene, source: str, content: Scene | None, rig: Rig, on_type: OnType = nobody) -> OpenScene:
     check_scene_memory(scene)
     scene = without_unseen_lights(recentred(scene))
     traits = analyse(scene)

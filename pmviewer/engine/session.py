@@ -14,11 +14,12 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from pmviewer.engine.ahead.ahead import Ahead
 from pmviewer.engine.frame import Frame, Message, State, Status
 from pmviewer.engine.guarded import guarded
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.loader import Loaded, Loader
-from pmviewer.engine.opened import OpenScene, open_scene, relit
+from pmviewer.engine.opened import OpenScene, nobody, open_scene, relit
 from pmviewer.engine.pool import WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.published import Published
@@ -38,7 +39,10 @@ NO_MEMORY = "Not enough memory for these settings: lower N or the image size."
 class Session:
     """See the module. All public attributes may be read from any thread."""
 
-    def __init__(self, threads: int | None = None, settings: Settings | None = None) -> None:
+    def __init__(
+        self, threads: int | None = None, settings: Settings | None = None, *, compiles_ahead: bool = False
+    ) -> None:
+        """compiles_ahead: in a process beside this one, `pmviewer.engine.ahead`."""
         self.geometry: DrawGeometry | None = None
         self._published = Published()
         self._changed = self._published.changed
@@ -59,6 +63,7 @@ class Session:
         self._pool = WorkPool(threads, behind_window=True)
         self._store = StageStore()
         self._renderer: Renderer | None = None
+        self._ahead = Ahead(self._pool.threads, self._published.notify) if compiles_ahead else None
         self._worker = threading.Thread(target=self._work, name="pmviewer session", daemon=True)
         self._worker.start()
 
@@ -70,9 +75,11 @@ class Session:
         """Open a scene, with other settings if given. Until it is loaded the old one goes on; a failure becomes an
         error message and changes nothing."""
         with self._changed:
-            rig = (settings or self._settings).light.rig
+            chosen = settings or self._settings
+            rig, ahead = chosen.light.rig, self._ahead
+            on_type = nobody if ahead is None else partial(ahead.opening, settings=chosen)
             name = source.name if isinstance(source, Scene) else str(source)
-            self._loader.start(lambda: open_scene(source, parameters or {}, rig), name, settings)
+            self._loader.start(lambda: open_scene(source, parameters or {}, rig, on_type), name, settings)
 
     def cancel_loading(self) -> None:
         """Give up the scene that is being loaded; the old one stays."""
@@ -83,6 +90,8 @@ class Session:
         with self._changed:
             before, self._settings = self._settings, settings
             changed = changed_stages(before, settings)
+            if not settings.display.compile_ahead:
+                self.stop_compiling_ahead()
             if "scene" in changed:
                 self._relight(settings)
             if changed - {"scene", "display", "stop"}:
@@ -128,6 +137,8 @@ class Session:
             self._closed = True
             self._loader.close()
             self._interrupt()
+        if self._ahead is not None:
+            self._ahead.close()
         self._worker.join()
         self._pool.close()
 
@@ -212,6 +223,16 @@ class Session:
     def opened_scene(self) -> OpenScene | None:
         """The open scene with all that was derived from it, for renderers beside the session's."""
         return self._opened
+
+    @property
+    def ahead(self) -> str:
+        """What is being compiled ahead ("estimate.lookup = nearest (3 of 20)"), "" when nothing is."""
+        return self._ahead.text if self._ahead is not None else ""
+
+    def stop_compiling_ahead(self) -> None:
+        """Compile nothing ahead until something is changed."""
+        if self._ahead is not None:
+            self._ahead.stop()
 
     def take_messages(self) -> list[Message]:
         """Messages since the last call."""
@@ -364,6 +385,8 @@ class Session:
     def _step(self, renderer: Renderer) -> None:
         renderer.step()
         self._published.show(renderer.frame(self._published.serial + 1, self._wanted(renderer)), self._version)
+        if self._ahead is not None:
+            self._ahead.shown(renderer.scene, self._settings)
         with self._changed:
             self._settle()
         self._published.notify()

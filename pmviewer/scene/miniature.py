@@ -55,7 +55,7 @@ def _two_each(things: Iterable[T], kind: Any) -> list[T]:
 
 def _shapes(shapes: tuple[Shape, ...]) -> tuple[Shape, ...]:
     return tuple(
-        replace(shape, geometry=_fewer(shape.geometry), emission=_texture(shape.emission))
+        replace(shape, geometry=_fewer(shape.geometry), emission=shape.emission and _coarser(shape.emission))
         for shape in _two_each(shapes, _kind)
     )
 
@@ -81,16 +81,16 @@ def _fewer(geometry: Any) -> Any:
     )
 
 
-def _rows(used: NDArray[np.int64], values: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+def _rows(used: NDArray[np.signedinteger], values: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
     return None if values is None else values[used]
 
 
-def _texture(texture: Texture | None) -> Texture | None:
+def _coarser(texture: Texture) -> Texture:
     return replace(texture, pixels=_coarse(texture.pixels)) if isinstance(texture, Bitmap) else texture
 
 
 def _material(material: Material) -> Material:
-    textures = {slot: _texture(texture) for slot, texture in material.textures.items()}
+    textures = {slot: _coarser(texture) for slot, texture in material.textures.items()}
     return replace(material, textures=textures, parts=tuple(map(_material, material.parts)))
 
 

@@ -46,6 +46,9 @@ class SessionLike(Protocol):
     @property
     def loading(self) -> str: ...
     def cancel_loading(self) -> None: ...
+    @property
+    def ahead(self) -> str: ...
+    def stop_compiling_ahead(self) -> None: ...
     def open(
         self, source: Any, settings: Settings | None = None, parameters: Mapping[str, str] | None = None
     ) -> None: ...
@@ -121,6 +124,11 @@ class SessionLink:
             if self._session is not None:
                 self._session.cancel_loading()
 
+    def stop_compiling_ahead(self) -> None:
+        """What is not there yet compiles nothing."""
+        if self._session is not None:
+            self._session.stop_compiling_ahead()
+
     def set(self, settings: Settings) -> None:
         with self._lock:
             self._settings = settings
@@ -179,6 +187,10 @@ class SessionLink:
     @property
     def loading(self) -> str:
         return self._session.loading if self._session else ""
+
+    @property
+    def ahead(self) -> str:
+        return self._session.ahead if self._session else ""
 
     @property
     def scene(self) -> Scene | None:

@@ -60,7 +60,7 @@ def _make_session(threads: int | None, settings: Settings | None) -> Callable[[]
     def make() -> SessionLike:
         from pmviewer.engine.session import Session
 
-        return Session(threads, settings)
+        return Session(threads, settings, compiles_ahead=True)
 
     return make
 

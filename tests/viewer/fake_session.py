@@ -97,6 +97,8 @@ class FakeSession:
         self.status = Status()
         self.opened_scene = None
         self.loading = ""
+        self.ahead = ""
+        self.stops_ahead = 0
         self.threads = None
         self.paused = False
         self.restarts = 0
@@ -107,6 +109,10 @@ class FakeSession:
 
     def cancel_loading(self) -> None:
         self.loading = ""
+
+    def stop_compiling_ahead(self) -> None:
+        self.stops_ahead += 1
+        self.ahead = ""
 
     def open(self, source: str | Path, settings: Settings | None = None, parameters=None) -> None:
         self.opened.append(str(source))

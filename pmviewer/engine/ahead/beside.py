@@ -1,8 +1,8 @@
 """The cold start on two cores: a second process compiles the eye pass while this one builds the tree and what follows.
 
-Numba compiles one function at a time in a process, whatever its threads. The types of all that the eye pass is given are
-known as soon as a scene's description is read; by the time that this process gets there, the other one has compiled it,
-or is waited for.
+Numba compiles one function at a time in a process, whatever its threads. The types of all that the eye pass is given
+are known as soon as a scene's description is read; by the time that this process gets there, the other one has compiled
+it, or is waited for.
 """
 
 from __future__ import annotations
@@ -13,20 +13,27 @@ from pmviewer.engine.ahead.helper import Helper
 from pmviewer.engine.ahead.requests import NextSteps
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.prepare import eye_steps
-from pmviewer.progress import available_threads
+from pmviewer.render.eye import eye_pass
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings
 
 
+def early_helper(threads: int) -> Helper | None:
+    """A process that imports what it needs before it is known what to compile, where it looks like a first start on
+    several processors."""
+    return Helper() if threads > 1 and not eye_pass.has_code else None
+
+
 def compile_beside(
-    of_record: np.dtype, traits: SceneTraits, settings: Settings, threads: int | None = None
+    helper: Helper | None, of_record: np.dtype, traits: SceneTraits, settings: Settings, threads: int
 ) -> Helper | None:
-    """A process that compiles the eye pass for such a scene; None where that is done, or there is one processor."""
-    if (threads or available_threads()) < 2 or not _missing(of_record, traits, settings):
-        return None
-    return Helper(NextSteps(of_record, traits, settings))
-
-
-def _missing(of_record: np.dtype, traits: SceneTraits, settings: Settings) -> bool:
+    """A process, `helper` if there is one, that compiles the eye pass for such a scene; None where that is done, or
+    where there is one processor."""
     steps = eye_steps(np.zeros(1, of_record), traits, settings, plan_of(settings, traits))
-    return not steps[-1].is_kept
+    if threads < 2 or steps[-1].is_kept:
+        if helper is not None:
+            helper.stop()
+        return None
+    helper = helper or Helper()
+    helper.ask(NextSteps(of_record, traits, settings))
+    return helper

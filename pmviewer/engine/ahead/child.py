@@ -12,7 +12,7 @@ from typing import IO
 
 import numpy as np
 
-from pmviewer.engine.ahead.clicks import clicks
+from pmviewer.engine.ahead.clicks import clicks, other_kinds
 from pmviewer.engine.ahead.requests import Clicks, NextSteps, Request
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
@@ -41,12 +41,12 @@ def all_clicks(request: Clicks) -> None:
         return
     pool = WorkPool(1)
     try:
-        todo = clicks(opened, request.settings)[: 1 if request.alone else None]
+        todo = [*clicks(opened, request.settings), *other_kinds(request.record, request.settings)]
         todo = todo[request.offset :: request.every]
         for i, click in enumerate(todo):
             _say(part=i + 1, of=len(todo), text=click.text)
             try:
-                click.run(opened, pool)
+                click.run(pool)
             except PmviewerError:  # the window says so when it is clicked
                 continue
     finally:

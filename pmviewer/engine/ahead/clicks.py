@@ -1,4 +1,5 @@
-"""What a click would need: every setting changed alone, of which those remain that run something else."""
+"""What a click would need: every setting changed alone, of which those remain that run something else, and a first
+picture of every other kind of scene."""
 
 from __future__ import annotations
 
@@ -6,15 +7,19 @@ from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from pmviewer.engine.effects import facts_of
 from pmviewer.engine.inspection import Wanted
-from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare, steps_of
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.wanted import wanted_of
 from pmviewer.errors import PmviewerError
+from pmviewer.scene.load import bundled_scenes, load_scene
+from pmviewer.scene.miniature import miniature
 from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, get, with_values
 
 FIRST = ("render", "estimate", "gather", "photons", "importance", "direct")
@@ -27,17 +32,18 @@ FEW = {"photons.N": 200, "importance.N": 100, "gather.rays": 4, "gather.cache_sa
 
 @dataclass(frozen=True, eq=False)
 class Click:
-    """Settings one click away; `text` says which, "" for none."""
+    """Settings, or a scene, one click away; `text` says which, "" for none."""
 
     text: str
+    opened: OpenScene
     settings: Settings
 
-    def run(self, opened: OpenScene, pool: WorkPool) -> None:
+    def run(self, pool: WorkPool) -> None:
         """Render one small picture of the scene as the window would, with what its display asks for."""
-        prepare(opened, self.settings, pool, lambda text, share: None)
+        prepare(self.opened, self.settings, pool, lambda text, share: None)
         few = {path: most for path, most in FEW.items() if get(self.settings, path) > most}
         small = {"camera.width": SIDE, "camera.height": SIDE, **few}
-        renderer = Renderer(opened, with_values(self.settings, small), pool, StageStore(0))
+        renderer = Renderer(self.opened, with_values(self.settings, small), pool, StageStore(0))
         renderer.coarse_frame(1)
         renderer.step()
         renderer.frame(2, replace(wanted_of(renderer.facts), pixel=(SIDE // 2, SIDE // 2)))
@@ -47,7 +53,7 @@ def clicks(opened: OpenScene, settings: Settings) -> list[Click]:
     """The settings as they are, then each that is one click away and runs something that none before it runs."""
     seen: set[Hashable] = set()
     found = []
-    for click in _all(settings):
+    for click in _all(opened, settings):
         try:
             needs = _needs(opened, click.settings)
         except PmviewerError:  # nothing that the scene can be seen with
@@ -55,6 +61,17 @@ def clicks(opened: OpenScene, settings: Settings) -> list[Click]:
         if needs not in seen:
             seen.add(needs)
             found.append(click)
+    return found
+
+
+def other_kinds(of_record: np.dtype, settings: Settings) -> list[Click]:
+    """A bundled scene's miniature for every other type of record that bundled scenes have."""
+    seen, found = {of_record}, []
+    for bundled in bundled_scenes():
+        opened = open_scene(miniature(load_scene(bundled.name)))
+        if opened.flat.record.dtype not in seen:
+            seen.add(opened.flat.record.dtype)
+            found.append(Click(f"scenes like {bundled.name}", opened, settings))
     return found
 
 
@@ -67,15 +84,15 @@ def _needs(opened: OpenScene, settings: Settings) -> Hashable:
     return replace(facts.plan, skipped=(), warnings=()), keys, shown if shown != Wanted() else None
 
 
-def _all(settings: Settings) -> Iterator[Click]:
-    yield Click("", settings)
+def _all(opened: OpenScene, settings: Settings) -> Iterator[Click]:
+    yield Click("", opened, settings)
     order = sorted(SETTINGS.values(), key=lambda info: _rank(info.path))
     for info in order:
         if info.stage in ("scene", "stop"):
             continue
         for value in _others(info, get(settings, info.path)):
             try:
-                yield Click(f"{info.title}: {_word(value)}", with_values(settings, {info.path: value}))
+                yield Click(f"{info.path} = {_word(value)}", opened, with_values(settings, {info.path: value}))
             except PmviewerError:
                 continue
 
@@ -96,4 +113,4 @@ def _others(info: SettingInfo, value: Any) -> list[Any]:
 
 
 def _word(value: Any) -> str:
-    return {True: "on", False: "off"}.get(value, str(value)) if isinstance(value, bool) else str(value)
+    return ("on" if value else "off") if isinstance(value, bool) else str(value)

@@ -26,13 +26,13 @@ class Progress:
 
 
 class Helper:
-    """A process that works on one request and is ended with `stop`, or when this process ends. `on_change` is called on
-    a thread of its own; `finished` tells whether all was done."""
+    """A process that works on one request and is ended with `stop`, or when this process ends. `finished` tells whether
+    all was done."""
 
-    def __init__(self, request: Request, on_change: Callable[[], None] = lambda: None) -> None:
+    def __init__(self) -> None:
+        """It begins to import what it needs."""
         self.progress: Progress | None = None
         self.finished = False
-        self._on_change = on_change
         paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
         self._process = subprocess.Popen(
             [sys.executable, "-m", "pmviewer.engine.ahead.child"],
@@ -41,24 +41,26 @@ class Helper:
             stderr=subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
         )
-        self._thread = threading.Thread(target=self._talk, args=(request,), name="pmviewer ahead", daemon=True)
+        self._thread: threading.Thread | None = None
+
+    def ask(self, request: Request, on_change: Callable[[], None] = lambda: None) -> None:
+        """Give it its work, once. `on_change` is called on a thread of its own."""
+        arguments = request, on_change
+        self._thread = threading.Thread(target=self._talk, args=arguments, name="pmviewer ahead", daemon=True)
         self._thread.start()
 
-    @property
-    def running(self) -> bool:
-        """Whether it is at work."""
-        return self._process.poll() is None
-
-    def wait(self, timeout: float | None = None) -> None:
-        """Until it has ended."""
-        self._thread.join(timeout)
+    def wait(self) -> None:
+        """Until it has done what it was asked for."""
+        if self._thread is not None:
+            self._thread.join()
 
     def stop(self) -> None:
         """End it now; what it was compiling is lost."""
         self._process.kill()
-        self._thread.join()
+        self._process.wait()
+        self.wait()
 
-    def _talk(self, request: Request) -> None:
+    def _talk(self, request: Request, on_change: Callable[[], None]) -> None:
         process = self._process
         assert process.stdin is not None
         assert process.stdout is not None
@@ -69,10 +71,10 @@ class Helper:
             said = json.loads(line)
             self.finished = self.finished or "done" in said
             self.progress = Progress(said["part"], said["of"], said["text"]) if "part" in said else None
-            self._on_change()
+            on_change()
         process.wait()
         with contextlib.suppress(OSError):
             process.stdin.close()
         process.stdout.close()
         self.progress = None
-        self._on_change()
+        on_change()

@@ -23,14 +23,14 @@ class NextSteps:
 @dataclass(frozen=True, eq=False)
 class Clicks:
     """What is one click away from these settings of a scene: its miniature, and the type of its record, which the
-    miniature must share. `every` and `offset`: of all clicks, one of so many. `alone`: the settings and no click."""
+    miniature must share; other kinds of scenes are a click away too. `every` and `offset`: of all that, one of so
+    many."""
 
     scene: Scene
     record: np.dtype
     settings: Settings
     every: int = 1
     offset: int = 0
-    alone: bool = False
 
 
 Request = NextSteps | Clicks

@@ -81,6 +81,10 @@ if not numba.config.DISABLE_JIT:
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": FASTMATH}
 
 
+_used: set[str] = set()
+"""Folders of modules that this process has imported."""
+
+
 class _Locator(UserProvidedCacheLocator):
     """One folder for each module and state of the sources that it depends on."""
 
@@ -91,8 +95,11 @@ class _Locator(UserProvidedCacheLocator):
         self._cache_path = str(CACHE_FOLDER / f"{'.'.join(module.parts)}-{stamp(source)}")
 
     def ensure_cache_path(self) -> None:
-        super().ensure_cache_path()
-        os.utime(self._cache_path)
+        # Numba's own writes a file for each function that is defined; the folder above is known to be writable.
+        if self._cache_path not in _used:
+            _used.add(self._cache_path)
+            os.makedirs(self._cache_path, exist_ok=True)
+            os.utime(self._cache_path)
 
     def get_source_stamp(self) -> str:
         return stamp(Path(self._py_file).resolve())
@@ -140,6 +147,11 @@ class _KernelCache(FunctionCache):
         self._cache_file = _OneFileEach(self._cache_path, impl.filename_base, impl.locator.get_source_stamp())
         self._held: list[int] = []
 
+    @property
+    def has_any(self) -> bool:
+        """Whether there is compiled code on disk, for whatever types."""
+        return any(Path(self._cache_path).glob(self._cache_file._data_name_pattern.replace("{number:d}", "*")))
+
     def has(self, sig: Any, target_context: Any) -> bool:
         """Whether there is compiled code on disk."""
         name = self._cache_file._name(self._index_key(sig, target_context.codegen()))
@@ -172,6 +184,11 @@ class _KernelDispatcher(CPUDispatcher):
     """Compiles what no other process is compiling."""
 
     _cache: _KernelCache
+
+    @property
+    def has_code(self) -> bool:
+        """Whether it is compiled for any arguments, by any process."""
+        return bool(self.overloads) or self._cache.has_any
 
     def is_kept(self, *arguments: Any) -> bool:
         """Whether code for such arguments is compiled already, by any process."""

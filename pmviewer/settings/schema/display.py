@@ -145,6 +145,14 @@ class Display(Group):
     tone: Literal["sRGB", "Reinhard", "filmic", "linear"] = setting(
         "sRGB", "Tone curve from radiance to the screen.", stage="display", scale="choice", title="tone curve"
     )
+    compile_ahead: bool = setting(
+        True,
+        "While nothing is asked for, compile in the background what the next click may need: other methods, look-ups, "
+        "views. Without it the first use of each takes some seconds.",
+        stage="display",
+        scale="switch",
+        title="compile ahead",
+    )
 
 
 Colour = Literal["power", "bounce", "light"]

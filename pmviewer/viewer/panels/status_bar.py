@@ -68,6 +68,14 @@ def draw_status_bar(state: ViewerState) -> None:
         if imgui.small_button("Cancel##loading"):
             state.session.cancel_loading()
         imgui.set_item_tooltip("Give up loading; the open scene stays")
+    ahead = state.session.ahead
+    if ahead and not busy:
+        imgui.same_line()
+        imgui.text_colored(imgui.ImVec4(*theme.ACCENT), theme.drawable(f"preparing {ahead}"))
+        imgui.set_item_tooltip("Compiles what the next click may need, behind everything else (display.compile_ahead)")
+        imgui.same_line()
+        if imgui.small_button("Stop##ahead"):
+            state.session.stop_compiling_ahead()
     for part in status_parts(state):
         imgui.same_line()
         imgui.text_disabled("·")

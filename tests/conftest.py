@@ -1,0 +1,68 @@
+"""What a run of the tests costs: `pytest --costs 20` lists the tests that took the most CPU time, with how many
+functions they had to compile because nobody had before."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any
+
+import pytest
+
+COST = "cost"
+_begun: pytest.StashKey[tuple[float, int]] = pytest.StashKey()
+_compiled: list[int] = []
+"""The number of functions compiled so far, once numba is imported."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--costs", type=int, default=0, metavar="N", help="list the N tests of the most CPU time")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    item.stash[_begun] = _cpu_seconds(), _count()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_teardown(item: pytest.Item) -> None:
+    seconds, count = item.stash[_begun]
+    item.user_properties.append((COST, (_cpu_seconds() - seconds, _count() - count)))
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    wanted = terminalreporter.config.getoption("--costs")
+    costs = [
+        (*dict(report.user_properties)[COST], report.nodeid)
+        for reports in terminalreporter.stats.values()
+        for report in reports
+        if getattr(report, "when", "") == "teardown" and COST in dict(report.user_properties)
+    ]
+    if not wanted or not costs:
+        return
+    seconds, compiled = sum(cost[0] for cost in costs), sum(cost[1] for cost in costs)
+    terminalreporter.section(f"costs: {seconds:.0f} CPU s, {compiled} functions compiled")
+    for cpu, count, name in sorted(costs, reverse=True)[:wanted]:
+        terminalreporter.write_line(f"{cpu:7.2f} s {count:5d} functions  {name}")
+
+
+def _cpu_seconds() -> float:
+    """Of this process and of the children that it has waited for."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+def _count() -> int:
+    if not _compiled and "numba" in sys.modules:
+        from numba.core import event
+
+        class Count(event.Listener):
+            def on_start(self, event: event.Event) -> None:
+                _compiled[0] += 1
+
+            def on_end(self, event: event.Event) -> None:
+                pass
+
+        _compiled.append(0)
+        event.register("numba:compile", Count())
+    return _compiled[0] if _compiled else 0

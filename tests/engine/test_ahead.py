@@ -1,0 +1,211 @@
+"""Compiling ahead: which clicks there are, in which process, when it begins and how it ends."""
+
+from __future__ import annotations
+
+import threading
+import time
+from types import SimpleNamespace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from pmviewer.engine.ahead import ahead as ahead_module
+from pmviewer.engine.ahead.ahead import Ahead
+from pmviewer.engine.ahead.clicks import clicks, other_kinds
+from pmviewer.engine.ahead.helper import Helper
+from pmviewer.engine.ahead.requests import Clicks, NextSteps
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.session import Session
+from pmviewer.kernels.compile import jit
+from pmviewer.settings.access import Settings, with_values
+from tests.support.scenes import diffuse_box, settings_of
+
+PATIENCE = 300.0
+
+
+@pytest.fixture(scope="module")
+def box():
+    return open_scene(diffuse_box(size=8))
+
+
+def test_clicks_are_those_that_run_something_else(box):
+    found = {click.text: click.settings for click in clicks(box, Settings())}
+    assert next(iter(found)) == ""
+    assert {"render.method = gather", "render.method = path", "estimate.lookup = nearest"} <= found.keys()
+    assert found["estimate.lookup = nearest"] == with_values(Settings(), {"estimate.lookup": "nearest"})
+    assert not [text for text in found if text.startswith(("camera.", "free_camera.", "display.tone", "render.passes"))]
+
+
+def test_from_another_state_other_clicks_matter(box):
+    """What only gathering uses is one click away from gathering alone."""
+    here = {click.text for click in clicks(box, Settings())}
+    there = {click.text for click in clicks(box, settings_of(render={"method": "gather"}))}
+    assert {"gather.cache = on", "render.method = progressive"} <= there - here
+
+
+def test_after_its_clicks_nothing_is_left_to_compile(box):
+    """A click is a picture as the window makes it: what it has rendered small, the session renders large."""
+    click = next(each for each in clicks(box, Settings()) if each.text == "estimate.lookup = nearest")
+    pool = WorkPool(1)
+    click.run(pool)
+    pool.close()
+    before = jit_misses()
+    session = Session(1, with_values(click.settings, {"render.passes": 1}))
+    session.open(box.scene)
+    assert session.wait(1, PATIENCE)
+    session.close()
+    assert jit_misses() == before
+
+
+def jit_misses() -> int:
+    """Functions that this process had to compile, because nobody had."""
+    import gc
+
+    return sum(
+        sum(each.stats.cache_misses.values()) for each in gc.get_objects() if isinstance(each, jit._KernelDispatcher)
+    )
+
+
+def test_other_kinds_of_scenes_have_other_records(box):
+    kinds = [click.opened.flat.record.dtype for click in other_kinds(box.flat.record.dtype, Settings())]
+    assert len({str(kind) for kind in kinds}) == len(kinds) >= 2
+    assert box.flat.record.dtype not in kinds
+
+
+def test_a_helper_compiles_the_eye_pass_from_types_alone(box):
+    helper = Helper()
+    helper.ask(NextSteps(box.flat.record.dtype, box.traits, Settings()))
+    helper.wait()
+    assert helper._process.returncode == 0
+
+
+def test_a_helper_tells_how_far_it_is(box):
+    heard = []
+    helper = Helper()
+    every = len(clicks(box, Settings())) + 50  # the first alone
+    helper.ask(Clicks(box.scene, box.flat.record.dtype, Settings(), every), lambda: heard.append(helper.progress))
+    helper.wait()
+    assert helper.finished
+    assert (heard[0].part, heard[0].of, heard[0].text) == (1, 1, "")
+    assert heard[-1] is None
+
+
+def test_a_stand_in_that_compiles_something_else_is_refused(box):
+    helper = Helper()
+    helper.ask(Clicks(box.scene, np.dtype([("other", "i8")]), Settings()))
+    helper.wait()
+    assert not helper.finished
+
+
+def test_a_helper_ends_with_its_parent_and_at_once_when_stopped():
+    helper = Helper()
+    assert helper._process.poll() is None
+    helper._process.stdin.close()
+    assert helper._process.wait(PATIENCE) != 0  # nobody asked it for anything
+    helper = Helper()
+    helper.stop()
+    assert helper._process.poll() is not None
+
+
+class Fake:
+    """Stands for the helper process: waits until it is stopped or told to finish."""
+
+    made: ClassVar[list[Fake]] = []
+
+    def __init__(self) -> None:
+        self.request, self.finished, self.stopped = None, False, False
+        self.progress = SimpleNamespace(part=3, of=20, text="estimate.lookup = nearest")
+        self._ended = threading.Event()
+        Fake.made.append(self)
+
+    def ask(self, request, on_change=lambda: None):
+        self.request = request
+        on_change()
+
+    def wait(self):
+        self._ended.wait(PATIENCE)
+
+    def finish(self):
+        self.finished, self.progress = True, None
+        self._ended.set()
+
+    def stop(self):
+        self.stopped, self.progress = True, None
+        self._ended.set()
+
+
+@pytest.fixture
+def quick(monkeypatch, tmp_path):
+    """No waiting for quiet, no processes, marks of its own."""
+    monkeypatch.setattr(ahead_module, "QUIET", 0.0)
+    monkeypatch.setattr(ahead_module, "Helper", Fake)
+    monkeypatch.setattr(ahead_module, "CACHE_FOLDER", tmp_path)
+    monkeypatch.setattr(ahead_module, "early_helper", lambda threads: None)
+    Fake.made = []
+
+
+def until(condition):
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+def test_it_begins_when_it_is_quiet_and_is_not_done_twice(box, quick):
+    heard = threading.Event()
+    ahead = Ahead(2, heard.set)
+    ahead.shown(box, Settings())
+    until(lambda: Fake.made)
+    assert heard.wait(PATIENCE)
+    assert ahead.text == "estimate.lookup = nearest (3 of 20)"
+    assert Fake.made[0].request.record == box.flat.record.dtype
+    Fake.made[0].finish()
+    until(lambda: ahead_module.finished_mark(box.flat.record.dtype, Settings()).exists())
+    assert ahead.text == ""
+    again = Ahead(2, lambda: None)
+    again.shown(box, Settings())
+    again._timer.join()
+    assert len(Fake.made) == 1
+
+
+def test_a_change_waits_for_what_is_being_compiled_and_comes_next(box, quick):
+    ahead = Ahead(2, lambda: None)
+    ahead.shown(box, Settings())
+    until(lambda: Fake.made)
+    ahead.shown(box, settings_of(render={"method": "gather"}))
+    Fake.made[0].finish()
+    until(lambda: len(Fake.made) == 2)
+    assert Fake.made[1].request.settings.render.method == "gather"
+    ahead.close()
+    assert Fake.made[1].stopped
+
+
+def test_stopping_lasts_until_something_is_changed(box, quick):
+    ahead = Ahead(2, lambda: None)
+    ahead.shown(box, Settings())
+    until(lambda: Fake.made)
+    ahead.stop()
+    assert Fake.made[0].stopped
+    ahead.shown(box, Settings())
+    assert ahead._timer is None
+    ahead.shown(box, settings_of(render={"method": "path"}))
+    until(lambda: len(Fake.made) == 2)
+    ahead.close()
+
+
+def test_the_setting_turns_it_off(box, quick):
+    ahead = Ahead(2, lambda: None)
+    ahead.shown(box, settings_of(display={"compile_ahead": False}))
+    assert ahead._timer is None
+
+
+def test_a_change_of_a_number_is_no_other_state(box, quick):
+    ahead = Ahead(2, lambda: None)
+    ahead.shown(box, Settings())
+    until(lambda: Fake.made)
+    ahead.shown(box, settings_of(photons={"N": 12345}))
+    Fake.made[0].finish()
+    until(lambda: not ahead.text)
+    assert len(Fake.made) == 1

@@ -1,0 +1,87 @@
+"""Only what Python calls becomes machine code, and what comes back from disk does the same as what was compiled."""
+
+import os
+import subprocess
+import sys
+
+MODULE = """
+import sys
+import numpy as np
+from numba.core import event
+from pmviewer.kernels.compile.jit import device, kernel
+
+@device
+def squared(x):
+    return x * x
+
+@device
+def length(v):
+    return np.sqrt(squared(v[0]) + squared(v[1]))
+
+@kernel
+def lengths(vectors, out):
+    for i in range(len(vectors)):
+        out[i] = length(vectors[i])
+    if len(out) != len(vectors):
+        raise ValueError("another length")
+
+@kernel
+def twice(vectors, out):
+    lengths(vectors, out)
+    for i in range(len(out)):
+        out[i] = squared(out[i])
+
+names = []
+
+class Count(event.Listener):
+    def on_start(self, of):
+        names.append(of.data["dispatcher"].py_func.__name__)
+    def on_end(self, of):
+        pass
+
+event.register("numba:compile", Count())
+v, out = np.array([[3.0, 4.0], [6.0, 8.0]]), np.zeros(2)
+for function in sys.argv[1:]:
+    globals()[function](v, out)
+    print(*out)
+try:
+    lengths(v, np.zeros(3))
+except ValueError as error:
+    print(error)
+print(*names)
+for dispatcher in (squared, length, lengths, twice):
+    for result in dispatcher.overloads.values():
+        print(dispatcher.py_func.__name__, result.library._native)
+"""
+
+
+def run(folder, *functions):
+    (folder / "lengths.py").write_text(MODULE)
+    env = {**os.environ, "PMVIEWER_CACHE": str(folder / "cache"), "PYTHONPATH": os.getcwd()}
+    command = [sys.executable, str(folder / "lengths.py"), *functions]
+    return subprocess.run(command, env=env, capture_output=True, text=True, check=True, timeout=300).stdout.splitlines()
+
+
+def test_machine_code_is_made_for_what_python_calls_alone(tmp_path):
+    assert run(tmp_path, "lengths") == [
+        "5.0 10.0",
+        "another length",
+        "lengths length squared",
+        "squared False",
+        "length False",
+        "lengths True",
+    ]
+
+
+def test_what_was_saved_is_linked_into_what_is_compiled_later(tmp_path):
+    run(tmp_path, "lengths")
+    assert run(tmp_path, "lengths", "twice") == [
+        "5.0 10.0",
+        "25.0 100.0",
+        "another length",
+        "twice",
+        "squared False",
+        "lengths True",
+        "twice True",
+    ]
+    assert run(tmp_path, "twice")[:2] == ["25.0 100.0", "another length"]
