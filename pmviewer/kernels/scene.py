@@ -126,6 +126,8 @@ M_METALLIC, M_SPEC_TRANS, M_SPEC_TINT, M_SHEEN, M_SHEEN_TINT, M_FLATNESS, M_CLEA
 M_PART_0, M_PART_1, M_WEIGHT, M_STORES_FRONT, M_STORES_BACK, M_FOLLOWS_FRONT, M_FOLLOWS_BACK = _columns[32:39]
 """Of a blend: the rows of its parts, the share of the second, and by side the roughness up to which some part has
 STORED lobes, and that above which one has FOLLOWED lobes that are no deltas. M_SPECULAR is the absorption inside."""
+BY_SIDE = 2.0
+"""M_WEIGHT of a blend whose first part is the front and whose second is the back."""
 M_METALLIC_MAP, M_WEIGHT_MAP = _columns[40:42]
 BSDF_TABLE_SIZE = 64
 

@@ -141,7 +141,7 @@ class Material:
     A "principled" material is Disney's (Burley 2012, 2015) as Mitsuba 3's `principled` has it: `reflectance` is its
     base colour, `alpha` its roughness squared (with the aspect of anisotropy), `eta` the index that its specular
     reflection comes from; see `Principled` for the rest. A "blend" is `parts[0]` and `parts[1]` in the shares 1 −
-    `weight` and `weight`; all else of its own that counts is `opacity`.
+    `weight` and `weight`, or the front and the back of the surface; all else of its own that counts is `opacity`.
     """
 
     name: str
@@ -169,6 +169,8 @@ class Material:
     principled: Principled | None = None
     parts: tuple[Material, ...] = ()
     weight: float = 0.5
+    by_side: bool = False
+    """Of a blend: is `parts[0]` what the front shows and `parts[1]` what the back does, whatever the weight?"""
     mirrored_maps: bool = False
     """Seen from behind, do mapped normals turn round only across the surface, as if its picture were mirrored
     (Mitsuba's `twosided` around a map), or as a whole, as those of a thin sheet with bumps do?"""

@@ -33,10 +33,10 @@ def _numbers(p, wo, prim, salt, out):
 
 @kernel
 def _parts(scenes, material, prim, p, wo, out):
-    b1, b2 = np.float32(0.125), np.float32(0.125)
+    b1, b2, n = np.float32(0.125), np.float32(0.125), (np.float32(0), np.float32(0), np.float32(1))
     for k in range(len(p)):
         o = (wo[k, 0], wo[k, 1], wo[k, 2])
-        out[k] = chosen_part(scenes[0], material, prim, b1, b2, (p[k, 0], p[k, 1], p[k, 2]), o)
+        out[k] = chosen_part(scenes[0], material, prim, b1, b2, (p[k, 0], p[k, 1], p[k, 2]), n, o)
 
 
 @kernel
@@ -160,6 +160,20 @@ def test_a_texture_gives_the_share():
     assert abs((out == 2).sum() - 0.2 * N) < 5 * (0.2 * 0.8 * N) ** 0.5
 
 
+def test_a_part_for_each_side():
+    """Whatever the weight; inside another blend as well."""
+    front, back = diffuse("front"), diffuse("back")
+    sides = blend(0.3, front, blend(0.0, back, diffuse("never"), "inner"), by_side=True)
+    scene = with_floor(blend(1.0, diffuse("never too"), sides, "outer"))
+    flat, table = flatten(scene), material_table(scene)
+    p, wo = np.random.default_rng(5).random((N, 3), np.float32), directions(N)
+    out = np.empty(N, np.int64)
+    _parts(flat.record, np.int64(0), np.int64(0), p, wo, out)
+    names = np.array([m.name for m in table.materials])[out]
+    assert set(names[wo[:, 2] >= 0]) == {"front"}
+    assert set(names[wo[:, 2] < 0]) == {"back"}
+
+
 ROUGH_METAL = Material("metal", "rough conductor", alpha=(0.3, 0.4), two_sided=True)
 ROUGH_GLASS = Material("frost", "rough dielectric", alpha=(0.3, 0.3))
 ONE_SIDED = diffuse("front", two_sided=False)
@@ -183,11 +197,13 @@ CLEAR = Material("clear", "principled", alpha=(0.5, 0.5), principled=Principled(
         (COATED, MIRROR, 0.01, STORED, 0),
         (CLEAR, MIRROR, 0.2, STORED | FOLLOWED, FOLLOWED),
         (blend(0.5, MIRROR, diffuse()), GLASS, 0.2, STORED, STORED),
+        (None, blend(0.5, MIRROR, diffuse(), by_side=True), 0.2, 0, STORED),
+        (None, blend(0.5, diffuse(), ROUGH_METAL, by_side=True), 0.35, STORED, FOLLOWED),
     ],
 )
 def test_photons_are_kept_for_every_part(first, second, glossy, front, back):
     """Whichever part is chosen; and none has lobes that photons are not kept for."""
-    flat = flatten(with_floor(blend(0.5, first, second)))
+    flat = flatten(with_floor(second if first is None else blend(0.5, first, second)))
     wo = directions(400)
     out = np.empty((len(wo), 2), np.int64)
     _kept(flat.record, np.int64(0), wo, np.float32(glossy), out)

@@ -168,3 +168,18 @@ def test_phongs_lobe_has_wards_width(tmp_path: Path, exponent: float) -> None:
     found, _ = material(tmp_path, f'<bsdf type="phong"><float name="exponent" value="{exponent}"/></bsdf>')
     lean = math.acos(0.5 ** (1 / exponent))
     assert math.exp(-((math.tan(lean / 2) / found.alpha[0]) ** 2)) == pytest.approx(0.5, abs=0.02)
+
+
+def test_a_bsdf_for_each_side(tmp_path: Path) -> None:
+    found, warnings = material(tmp_path, f'<bsdf type="twosided">{METAL}{GREY}</bsdf>')
+    assert (found.kind, found.by_side, [p.kind for p in found.parts]) == ("blend", True, ["conductor", "diffuse"])
+    assert [p.two_sided for p in found.parts] == [True, True]
+    assert warnings == ()
+    holes = f'<bsdf type="mask">{GREY}<float name="opacity" value="0.25"/></bsdf>'
+    assert material(tmp_path, f'<bsdf type="twosided">{holes}{METAL}</bsdf>')[0].opacity == 0.25
+    clear, warnings = material(tmp_path, f'<bsdf type="twosided">{GREY}<bsdf type="dielectric"/></bsdf>')
+    assert (clear.kind, clear.two_sided) == ("diffuse", True)
+    assert "the first counts for both sides" in warnings[0]
+    many, warnings = material(tmp_path, f'<bsdf type="twosided">{GREY}{METAL}{METAL}</bsdf>')
+    assert [p.kind for p in many.parts] == ["diffuse", "conductor"]
+    assert "more than two" in warnings[0]

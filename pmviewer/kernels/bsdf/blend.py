@@ -1,4 +1,5 @@
-"""Blends of materials: at each hit one part is chosen, by a hash of the hit, with the probability of its share.
+"""Blends of materials: at each hit one part is chosen, by a hash of the hit, with the probability of its share, or by
+the side that is seen.
 
 A reflected or refracted radiance is linear in f, so that the mean over choices is that of the blend, whichever method
 follows the path; no random number of a path is spent on it, and the same hit seen again has the same part. Whether
@@ -18,6 +19,7 @@ from pmviewer.kernels.memory import bits_of_float, load_f4
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.scene import (
     BLEND,
+    BY_SIDE,
     DIELECTRIC,
     M_FOLLOWS_BACK,
     M_FOLLOWS_FRONT,
@@ -67,10 +69,12 @@ def weight_at(scene, material, prim, b1, b2, p):
 
 
 @device
-def chosen_part(scene, material, prim, b1, b2, p, wo):
-    """The material itself, or the part of a blend that counts at this hit; blends of blends choose again."""
+def chosen_part(scene, material, prim, b1, b2, p, ng, wo):
+    """The material itself, or the part of a blend that counts at this hit; blends of blends choose again. ng is the
+    surface's normal, outwards."""
     while material_kind(scene, material) == BLEND:
-        second = hit_number(p, wo, prim, material) < weight_at(scene, material, prim, b1, b2, p)
+        weight = weight_at(scene, material, prim, b1, b2, p)
+        second = dot(ng, wo) < _f4(0.0) if weight >= _f4(BY_SIDE) else hit_number(p, wo, prim, material) < weight
         row = material * MATERIAL_COLUMNS
         material = np.int64(load_f4(scene.materials, row + (M_PART_1 if second else M_PART_0)))
     return material

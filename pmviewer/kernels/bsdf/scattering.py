@@ -87,7 +87,7 @@ def bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
     if has(scene, "blends"):
 
         def blended(scene, prim, material, u, v, p, ng, ns, wo, glossy):
-            part = chosen_part(scene, material, prim, u, v, p, wo)
+            part = chosen_part(scene, material, prim, u, v, p, ng, wo)
             return unblended(scene, prim, part, u, v, p, ng, ns, wo, glossy)
 
         return blended

@@ -60,13 +60,15 @@ def fill_blend(row: list[float], material: Material, number_of: dict[int, int]) 
     Roughness of a texture is taken to be anything: photons that nobody looks up do no harm.
     """
     first, second = material.parts
-    row[K.M_PART_0], row[K.M_PART_1], row[K.M_WEIGHT] = number_of[id(first)], number_of[id(second)], material.weight
+    row[K.M_PART_0], row[K.M_PART_1] = number_of[id(first)], number_of[id(second)]
+    row[K.M_WEIGHT] = K.BY_SIDE if material.by_side else min(max(material.weight, 0.0), 1.0)
     row[K.M_SPECULAR : K.M_SPECULAR + 3] = _absorption(material)
     for stores, follows, back in (
         (K.M_STORES_FRONT, K.M_FOLLOWS_FRONT, False),
         (K.M_STORES_BACK, K.M_FOLLOWS_BACK, True),
     ):
-        stored, followed = zip(*(_roughness(m, back) for m in leaves(material)))
+        shown = material.parts[back] if material.by_side else material
+        stored, followed = zip(*(_roughness(m, back) for m in leaves(shown)))
         row[stores], row[follows] = max(stored), min(followed)
 
 
@@ -94,6 +96,8 @@ def _roughness(material: Material, back: bool) -> tuple[float, float]:
 
 def blend_text(material: Material) -> str:
     """A blend in words: shares and names of its parts."""
+    if material.by_side:
+        return f"{material.name}: {material.parts[0].name}, {material.parts[1].name} on the back"
     share = "a texture's share" if "weight" in material.textures else f"{min(max(material.weight, 0.0), 1.0):.0%}"
     first, second = material.parts
     return f"{material.name}: {share} of {second.name} over {first.name}"
@@ -107,7 +111,7 @@ def mean_colour(material: Material, colour_of: Callable[[Material], RGB]) -> RGB
             break
         m, share = stack.pop()
         if m.kind == "blend":
-            w = min(max(m.weight, 0.0), 1.0)
+            w = 0.5 if m.by_side else min(max(m.weight, 0.0), 1.0)
             stack += [(m.parts[0], share * (1 - w)), (m.parts[1], share * w)]
         else:
             colour = [a + share * b for a, b in zip(colour, colour_of(m))]

@@ -36,10 +36,13 @@ def _lets_through(material: Material) -> bool:
 
 
 def two_sided(p: Properties, inner: Material, others: list[Material]) -> Material:
-    """The first BSDF on both sides of a surface."""
-    if others:
-        p.document.warn(f"{p.element}: the second BSDF is ignored, both sides use the first.", p.element)
-    if any(_lets_through(leaf) for leaf in leaves(inner)):
+    """The BSDF on both sides of a surface, or one for the front and one for the back."""
+    if len(others) > 1:
+        p.document.warn(f"{p.element} has more than two BSDFs inside: the first two are used.", p.element)
+    seen_through = any(_lets_through(leaf) for part in (inner, *others) for leaf in leaves(part))
+    if seen_through and others:
+        p.document.warn(f"{p.element}: with a transparent BSDF inside, the first counts for both sides.", p.element)
+    elif seen_through:
         p.document.warn(f"{p.element} has no effect on a transparent BSDF.", p.element)
     p.known("allow_transmission")
     p.warn_unused("bsdf")
@@ -49,7 +52,12 @@ def two_sided(p: Properties, inner: Material, others: list[Material]) -> Materia
             return m
         return replace(m, two_sided=True, mirrored_maps=not _MAP_SLOTS.isdisjoint(m.textures))
 
-    return on_parts(inner, both)
+    front = on_parts(inner, both)
+    if not others or seen_through:
+        return front
+    parts = _not_too_deep(p, front), _not_too_deep(p, on_parts(others[0], both))
+    opacity = {slot: texture for slot, texture in inner.textures.items() if slot == "opacity"}
+    return Material(inner.name, "blend", BLACK, opacity=inner.opacity, textures=opacity, parts=parts, by_side=True)
 
 
 def mask(p: Properties, inner: Material) -> Material:
@@ -109,7 +117,7 @@ def _not_too_deep(p: Properties, part: Material) -> Material:
         return part
     p.document.warn(f"{p.element}: of blends more than {_DEEPEST} deep the heaviest parts are used.", p.element)
     while part.kind == "blend":
-        part = part.parts[int(part.weight >= 0.5)]
+        part = part.parts[int(part.weight >= 0.5 and not part.by_side)]
     return part
 
 
