@@ -73,6 +73,8 @@ class FlatScene:
     """Triangles and quadrics that rays can meet, those of instances counted as often as they are shown."""
     trees: tuple[Bvh, ...] = field(default=(), repr=False)
     """Of the instanced groups."""
+    shape_of_prim: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, np.int32), repr=False)
+    """The shape of each stored primitive."""
 
     @property
     def delta_lights(self) -> bool:
@@ -167,7 +169,6 @@ def flatten(scene: Scene, on_type: Callable[[np.dtype], None] = lambda of_record
     else:
         bvh, shown = build(vertices, quadrics), None
         bvh.store(r)
-    del shape_of_prim
     normals = _corner_normals([m for _, m in meshes], len(vertices))
     arrays: dict[str, NDArray] = {
         "vertices": vertices,
@@ -221,6 +222,7 @@ def flatten(scene: Scene, on_type: Callable[[np.dtype], None] = lambda of_record
         n_instances=len(scene.instances),
         n_elements=shown.n_elements if shown else len(vertices) + len(quadrics),
         trees=shown.trees if shown else (),
+        shape_of_prim=shape_of_prim,
     )
 
 

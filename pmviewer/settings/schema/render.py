@@ -19,10 +19,11 @@ GLOBAL_MAP_STORED = Need(lambda f: f.plan.global_classes, "No surface of this sc
 class Render(Group):
     """Method"""
 
-    method: Literal["progressive", "gather", "path", "global map", "caustic map"] = setting(
+    method: Literal["progressive", "gather", "virtual lights", "path", "global map", "caustic map"] = setting(
         "progressive",
         "progressive: direct light by sampling, both maps shown directly with a shrinking radius. gather: indirect "
-        "light by a final gather into the global map. path: path tracing, the yardstick without photons. "
+        "light by a final gather into the global map. virtual lights: indirect light by photons as point lights. path: "
+        "path tracing, the yardstick without photons. "
         "global/caustic map: that map alone, as it is.",
         stage="image",
         scale="choice",
