@@ -84,4 +84,5 @@ def opened(given):
         given.shadows[0],
         given.guides[0],
         given.corner[0],
+        given.virtual[0],
     )

@@ -22,6 +22,7 @@ from pmviewer.maps.virtual_lights import (
 from pmviewer.photons.light_pass.light_pass import Runner
 from pmviewer.photons.virtual.lights import VirtualLights, virtual_lights
 from pmviewer.render.film import Film
+from pmviewer.render.planes import CHANNELS
 from pmviewer.render.virtual_lights.film import WeightedFilm
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import Settings
@@ -95,3 +96,19 @@ def bias_of(settings: Settings) -> tuple[str, ...]:
 def no_lights(settings: Settings, plan: Plan, flat: FlatScene) -> NDArray[np.void]:
     """A record without lights to compile kernels with: of the type that the method needs."""
     return virtual_record(flat, settings, np.empty((0, COLUMNS), np.float32)) if plan.virtual else NO_VIRTUAL
+
+
+def virtual_kind(settings: Settings, plan: Plan) -> str:
+    """Tells apart what kernels are compiled for."""
+    if not plan.virtual:
+        return ""
+    return "paths" if ESTIMATORS.index(settings.virtual.estimator) in OF_PATHS else "lights"
+
+
+def prepare_virtual(flat: FlatScene, settings: Settings) -> None:
+    """Compile what traces and weighs virtual lights, and what reads the film."""
+    few = settings.virtual.model_copy(update={"number": 1, "photons": 1})
+    virtual_lights(flat, few, settings.photons, 0, 0, lambda tasks: [task() for task in tasks])
+    film = WeightedFilm(1, 1, settings.virtual)
+    film.sums[:, CHANNELS:] = 1.0
+    film.planes()
