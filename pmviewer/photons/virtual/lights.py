@@ -37,6 +37,10 @@ AREAS = 128
 """Lights a task whose areas are found."""
 SPARE = 2
 """Trajectories for each light where nobody asks for their density: chosen among more, they are less of a family."""
+MOST = 500_000
+"""Most trajectories that passes grow to of their own accord."""
+FEWEST = 2
+"""Fewest photons of a disc that passes shrink to."""
 SEED = 0x7117
 """Keeps their random numbers apart from those of the light pass."""
 
@@ -64,11 +68,31 @@ class VirtualLights:
         return self.rows.nbytes + self.photons.nbytes
 
 
-def trajectories(how: Virtual) -> int:
-    """Trajectories of a pass."""
-    if ESTIMATORS.index(how.estimator) == SINGLE and how.density == "photon map":
-        return max(how.photons, SPARE * how.number)
+def trajectories(how: Virtual, index: int) -> int:
+    """Trajectories of pass `index`.
+
+    A disc of k photons blurs the density by its area, and no number of passes mends that. So both its k and its area
+    shrink: k with the cube root of the passes down to FEWEST, while the map's photons grow with it up to MOST.
+    """
+    if _grows(how):
+        return max(min(round(how.photons * (index + 1) ** (1 / 3)), max(MOST, how.photons)), SPARE * how.number)
     return SPARE * how.number
+
+
+def neighbours(how: Virtual, index: int) -> int:
+    """Photons of the disc that tells the density in pass `index`."""
+    return max(round(how.k / (index + 1) ** (1 / 3)), min(how.k, FEWEST)) if _grows(how) else how.k
+
+
+def _first_index(how: Virtual, index: int) -> int:
+    """Trajectories of all passes before `index`."""
+    if not _grows(how):
+        return index * trajectories(how, 0)
+    return sum(trajectories(how, i) for i in range(index))
+
+
+def _grows(how: Virtual) -> bool:
+    return ESTIMATORS.index(how.estimator) == SINGLE and how.density == "photon map"
 
 
 def virtual_lights(
@@ -80,11 +104,11 @@ def virtual_lights(
     candidate is kept with the same probability, few of one trajectory are kept together. Open scenes have fewer
     candidates than trajectories, and may have fewer than the lights asked for; then all are kept.
     """
-    N, estimator = trajectories(how), ESTIMATORS.index(how.estimator)
+    N, estimator = trajectories(how, index), ESTIMATORS.index(how.estimator)
     record = np.zeros(1, TRACE_DTYPE)
     sequence = SOBOL if photons.sequence == "sobol" else INDEPENDENT
     own = (seed ^ SEED) & 0xFFFFFFFF
-    record[0] = (own, index * N, sequence, photons.max_bounces, photons.glossy, estimator)
+    record[0] = (own, _first_index(how, index), sequence, photons.max_bounces, photons.glossy, estimator)
     results = run([partial(_batch, scene, record, i0, min(i0 + BATCH, N)) for i0 in range(0, N, BATCH)])
     found = np.concatenate([r[0] for r in results])
     rows = np.concatenate([r[1] for r in results])
@@ -101,7 +125,7 @@ def virtual_lights(
         thinned = np.ascontiguousarray(found[kept])
         whole = estimator == PRINTED_SINGLE
         of_map = not whole and how.density == "photon map"
-        areas = areas_of(scene, found if of_map else thinned, lights, how.k, whole, run)
+        areas = areas_of(scene, found if of_map else thinned, lights, neighbours(how, index), whole, run)
         lights[:, V_Q] = areas * (share if of_map else 1.0)
         if not whole:
             lights[:, V_Q] *= lights[:, V_OPACITY]

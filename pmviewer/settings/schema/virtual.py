@@ -100,7 +100,8 @@ class Virtual(Group):
     )
     photons: int = setting(
         20_000,
-        "Trajectories in each pass that virtual lights are chosen from where the photon map tells their density.",
+        "Trajectories in the first pass that virtual lights are chosen from where the photon map tells their density; "
+        "they grow with the cube root of the passes, up to 500,000.",
         stage="image",
         scale="log",
         unit="photons",
@@ -109,8 +110,9 @@ class Virtual(Group):
         title="trajectories",
     )
     k: int = setting(
-        16,
-        "Photons whose disc tells the density at a virtual light.",
+        8,
+        "Photons whose disc tells the density at a virtual light in the first pass; by the photon map it shrinks with "
+        "the cube root of the passes.",
         stage="image",
         scale="integer",
         unit="photons",
