@@ -23,6 +23,7 @@ from pmviewer.maps.virtual_lights import (
     V_PHI,
     V_Q,
 )
+from pmviewer.photons.virtual.choice import as_photons, chosen, worths
 from pmviewer.photons.virtual.density import lit_areas
 from pmviewer.photons.virtual.trace import C_DROPPED, C_RAYS, C_STORED, N_COUNTS, TRACE_DTYPE, trace_virtual_lights
 from pmviewer.scene.arrays.flatten import FlatScene
@@ -98,12 +99,8 @@ def _grows(how: Virtual) -> bool:
 def virtual_lights(
     scene: FlatScene, how: Virtual, photons: Photons, seed: int, index: int, run: Runner
 ) -> VirtualLights:
-    """The virtual lights of pass `index`.
-
-    Of P candidates M are kept, evenly spaced along the trajectories from a random start, and count P/M times: each
-    candidate is kept with the same probability, few of one trajectory are kept together. Open scenes have fewer
-    candidates than trajectories, and may have fewer than the lights asked for; then all are kept.
-    """
+    """The virtual lights of pass `index`, chosen from P candidates (`pmviewer.photons.virtual.choice`). Open scenes
+    have fewer candidates than trajectories, and may have fewer than the lights asked for."""
     N, estimator = trajectories(how, index), ESTIMATORS.index(how.estimator)
     record = np.zeros(1, TRACE_DTYPE)
     sequence = SOBOL if photons.sequence == "sobol" else INDEPENDENT
@@ -113,27 +110,26 @@ def virtual_lights(
     found = np.concatenate([r[0] for r in results])
     rows = np.concatenate([r[1] for r in results])
     counts = sum((r[2] for r in results), np.zeros(N_COUNTS, np.int64))
-    P, M = len(rows), min(how.number, len(rows))
-    kept = _spaced(P, M, np.random.default_rng([own, index]).random())
-    share = P / M if M else 1.0
+    of_map = _grows(how)
+    worth = worths(rows, estimator, scene.radius if of_map else None)
+    kept, share = chosen(worth, min(how.number, len(rows)), np.random.default_rng([own, index]).random())
     lights = np.ascontiguousarray(rows[kept])
-    unit = scene.total_luminance / N * share
-    lights[:, V_PHI : V_PHI + 3] *= np.float32(unit)
+    unit = scene.total_luminance / N
+    lights[:, V_PHI : V_PHI + 3] *= (unit * share)[:, None]
     if estimator in OF_PATHS:
-        lights[:, V_Q] *= np.float32(share / N)
-    elif estimator in OF_DENSITY and M:
+        lights[:, V_Q] *= share / np.float32(N)
+    elif estimator in OF_DENSITY and len(kept):
         thinned = np.ascontiguousarray(found[kept])
         whole = estimator == PRINTED_SINGLE
-        of_map = not whole and how.density == "photon map"
         areas = areas_of(scene, found if of_map else thinned, lights, neighbours(how, index), whole, run)
-        lights[:, V_Q] = areas * (share if of_map else 1.0)
+        lights[:, V_Q] = areas * (share if of_map else np.float32(1.0))
         if not whole:
             lights[:, V_Q] *= lights[:, V_OPACITY]
     return VirtualLights(
         rows=lights,
-        photons=np.ascontiguousarray(found[kept]),
+        photons=as_photons(found[kept], share),
         power_unit=unit,
-        candidates=P,
+        candidates=len(rows),
         emitted=N,
         rays=int(counts[C_RAYS]),
         dropped=int(counts[C_DROPPED]),
@@ -154,11 +150,6 @@ def areas_of(scene: FlatScene, photons: Float, lights: Float, k: int, whole: boo
 
     run([partial(some, first) for first in range(0, len(lights), AREAS)])
     return areas
-
-
-def _spaced(P: int, M: int, start: float) -> NDArray[np.int64]:
-    """M of P places, evenly spaced, `start` in [0, 1) of a step from the first."""
-    return np.minimum(((np.arange(M) + start) * (P / max(M, 1))).astype(np.int64), max(P - 1, 0))
 
 
 def _batch(scene: FlatScene, record: NDArray[np.void], i0: int, i1: int) -> tuple[Float, Float, NDArray[np.int64]]:

@@ -231,4 +231,3 @@ def trace_virtual_lights(scenes, passes, i0, i1, photons_out, lights_out, counts
                 first, flags = False, _u4(HAD_DIFFUSE)
             o = leave(p, ng, gap, d[0], d[1], d[2])
     return i1
-

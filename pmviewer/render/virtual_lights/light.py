@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from pmviewer.kernels.bsdf.albedo import stored_albedo
-from pmviewer.kernels.bsdf.scattering import STORED, bsdf_at, bsdf_f, is_plain
+from pmviewer.kernels.bsdf.scattering import STORED, bsdf_at, bsdf_f
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.memory import load_f4, load_i4
 from pmviewer.kernels.scene import load3, material_of
 from pmviewer.kernels.surface import face

@@ -101,14 +101,14 @@ def from_virtual_lights(given, si, beta, pixel, seed, film, counts, whole):
         if m < n:
             j = min(_i8((_f8(i) + _f8(start)) * _f8(each)), n - 1)
         F, G, geometry, wi, end = _one(given, si, j)
-        if not (F[0] + F[1] + F[2] > _f4(0.0) or G > _f4(0.0)):
+        if not (F[0] + F[1] + F[2] > _f4(0.0) or _f4(0.0) < G):
             continue
         counts[C_RAYS] += 1
         counts[C_SHADOW_RAYS] += 1
         if not visible(scene, si.p, si.ng, si.gap, wi, end):
             continue
         F = scale(mul(beta, F), each)
-        if not (is_good(F) and G < _f4(np.inf)):
+        if not (is_good(F) and _f4(np.inf) > G):
             counts[C_DROPPED] += 1
             continue
         Y = _f8(luminance(F))
@@ -118,7 +118,7 @@ def from_virtual_lights(given, si, beta, pixel, seed, film, counts, whole):
             F = scale(F, virtual.clamp / geometry)
             film[pixel, CHANNELS + W_LOST] += Y - _f8(luminance(F))
         target = plane
-        if weighted and G > _f4(0.0):
+        if weighted and _f4(0.0) < G:
             target = base + W_F
             film[pixel, base + W_G] += _f8(throughput * each * G)
         film[pixel, target] += _f8(F[0])
