@@ -36,7 +36,8 @@ class Statistics:
     stored: Mapping[str, int] = field(default_factory=dict)
     """Photons stored, all passes together, by map ("caustic", "global")."""
     stored_in_pass: Mapping[str, int] = field(default_factory=dict)
-    """By map; with "virtual" the virtual lights; with "radiance" the radiance photons that gather rays have used; with "shadow" the shadow photons,
+    """By map; with "virtual" the virtual lights; with "radiance" the radiance photons that gather rays have used; with
+    "shadow" the shadow photons,
     which serve all passes."""
     radius: Mapping[str, float] = field(default_factory=dict)
     """Look-up radius of the latest pass by map."""

@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 from pmviewer.output.falsecolour import COLOURS, DIVERGING, Scale, false_colour, scale_around_one, scale_of
 
 Family = Literal[
-    "look-up", "shadow rays", "radiance photons", "importance", "density", "storing", "convergence", "virtual lights"
+    "look-up",
+    "shadow rays",
+    "radiance photons",
+    "importance",
+    "density",
+    "storing",
+    "convergence",
+    "virtual lights",
 ]
 NOTHING = -1.0
 DIMMED = 0.4

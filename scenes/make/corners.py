@@ -67,7 +67,7 @@ def glossy_room() -> MadeScene:
     return _room(
         "Glossy room full of corners",
         "The room of corner_room with a floor of brushed metal and a crate and a step of rough gold.",
-        "Glossy reflections of virtual lights are spots of light; weighted importance sampling makes them smooth (R10).",
+        "Glossy reflections of virtual lights are spots; weighted importance sampling makes them smooth (R10).",
         [*PLAIN, *metals],
         materials,
     )

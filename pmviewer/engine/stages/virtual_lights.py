@@ -8,24 +8,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.method import Plan
+from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.stages.light_plan import KEPT_PASSES
+from pmviewer.engine.store import StageStore
+from pmviewer.engine.tally import Tally
 from pmviewer.maps.virtual_lights import (
     CLAMPED,
-    COLUMNS,
     ESTIMATORS,
-    NO_VIRTUAL,
     OF_PATHS,
     PATHS_DTYPE,
     PRINTED,
     UNWEIGHTED,
     VIRTUAL_DTYPE,
 )
-from pmviewer.photons.light_pass.light_pass import Runner
 from pmviewer.photons.virtual.lights import VirtualLights, virtual_lights
 from pmviewer.render.film import Film
 from pmviewer.render.planes import CHANNELS
 from pmviewer.render.virtual_lights.film import WeightedFilm
 from pmviewer.scene.arrays.flatten import FlatScene
-from pmviewer.settings.access import Settings
+from pmviewer.settings.access import Settings, Virtual
 
 PRINTED_BIAS = {
     "printed single step": (
@@ -48,25 +50,59 @@ FALSE_SHADOWS = (
 
 
 @dataclass(frozen=True, eq=False)
-class VirtualStage:
-    """`record` for kernels, valid while this object lives, of `lights`."""
+class VirtualMap:
+    """`record` for kernels of `lights`, valid while this object and the scene live."""
 
     lights: VirtualLights
     record: NDArray[np.void]
-    objects: NDArray[np.int32]
+
+    @property
+    def bytes(self) -> int:
+        return self.lights.bytes
 
 
-def virtual_stage(flat: FlatScene, settings: Settings, index: int, run: Runner) -> VirtualStage:
-    """Trace and weigh the virtual lights of pass `index`."""
-    made = virtual_lights(flat, settings.virtual, settings.photons, settings.render.seed, index, run)
-    return VirtualStage(made, virtual_record(flat, settings, made.rows), flat.shape_of_prim)
+class VirtualStage:
+    """The virtual lights of one scene with one set of settings; `latest` are those of the latest pass, None before the
+    first."""
+
+    def __init__(self, scene: OpenScene, settings: Settings, pool: WorkPool, store: StageStore, tally: Tally) -> None:
+        self.scene, self.settings, self.pool, self.store, self.tally = scene, settings, pool, store, tally
+        self.latest: VirtualMap | None = None
+
+    def run(self, index: int) -> VirtualMap:
+        """Those of pass `index`; those of the first where one photon map serves all passes."""
+        s = self.settings
+        if s.photons.renew == "once":
+            if self.latest is not None:
+                return self.latest
+            index = 0
+        traced = s.photons.max_bounces, s.photons.glossy, s.photons.sequence
+        key = ("virtual lights", self.scene.uid, s.render.seed, index, s.virtual, *traced)
+        keep = index < KEPT_PASSES
+        made: VirtualMap = (
+            self.store.get(key, lambda: self._make(index), lambda m: m.bytes) if keep else self._make(index)
+        )
+        self.tally.rays += made.lights.rays
+        self.tally.dropped["photons"] += made.lights.dropped
+        self.latest = made
+        return made
+
+    def _make(self, index: int) -> VirtualMap:
+        s, flat = self.settings, self.scene.flat
+        lights = virtual_lights(flat, s.virtual, s.photons, s.render.seed, index, self.pool.run)
+        return VirtualMap(lights, virtual_record(flat, s, lights.rows))
+
+
+def virtual_dtype(how: Virtual) -> np.dtype:
+    """Type of the record of virtual lights for that estimator."""
+    return PATHS_DTYPE if ESTIMATORS.index(how.estimator) in OF_PATHS else VIRTUAL_DTYPE
 
 
 def virtual_record(flat: FlatScene, settings: Settings, rows: NDArray[np.float32]) -> NDArray[np.void]:
     """The record (1,) for kernels of virtual lights (n, COLUMNS)."""
     how = settings.virtual
     estimator = ESTIMATORS.index(how.estimator)
-    record = np.zeros(1, PATHS_DTYPE if estimator in OF_PATHS else VIRTUAL_DTYPE)
+    record = np.zeros(1, virtual_dtype(how))
     r = record[0]
     r["virtual"], r["lights"], r["n"] = 1, rows.ctypes.data, len(rows)
     r["per_pixel"] = how.per_pixel or len(rows)
@@ -76,6 +112,11 @@ def virtual_record(flat: FlatScene, settings: Settings, rows: NDArray[np.float32
     r["clamp"] = how.clamp / flat.radius**2
     r["objects"], r["n_objects"] = flat.shape_of_prim.ctypes.data, int(flat.shape_of_prim.max(initial=-1)) + 1
     return record
+
+
+def lights_asked(record: NDArray[np.void]) -> int:
+    """Virtual lights that a pixel asks for in a pass with that record, 0 without."""
+    return int(min(record[0]["per_pixel"], record[0]["n"])) if "virtual" in (record.dtype.names or ()) else 0
 
 
 def film_of(settings: Settings, plan: Plan, width: int, height: int) -> Film:
@@ -93,22 +134,10 @@ def bias_of(settings: Settings) -> tuple[str, ...]:
     return {"none": (UNNORMALISED,), "per object": (FALSE_SHADOWS,)}.get(how.normalisation, ())
 
 
-def no_lights(settings: Settings, plan: Plan, flat: FlatScene) -> NDArray[np.void]:
-    """A record without lights to compile kernels with: of the type that the method needs."""
-    return virtual_record(flat, settings, np.empty((0, COLUMNS), np.float32)) if plan.virtual else NO_VIRTUAL
-
-
-def virtual_kind(settings: Settings, plan: Plan) -> str:
-    """Tells apart what kernels are compiled for."""
-    if not plan.virtual:
-        return ""
-    return "paths" if ESTIMATORS.index(settings.virtual.estimator) in OF_PATHS else "lights"
-
-
-def prepare_virtual(flat: FlatScene, settings: Settings) -> None:
+def prepare_virtual(scene: OpenScene, settings: Settings) -> None:
     """Compile what traces and weighs virtual lights, and what reads the film."""
     few = settings.virtual.model_copy(update={"number": 1, "photons": 1})
-    virtual_lights(flat, few, settings.photons, 0, 0, lambda tasks: [task() for task in tasks])
+    virtual_lights(scene.flat, few, settings.photons, 0, 0, lambda tasks: [task() for task in tasks])
     film = WeightedFilm(1, 1, settings.virtual)
     film.sums[:, CHANNELS:] = 1.0
     film.planes()

@@ -14,6 +14,7 @@ import numpy as np
 
 from pmviewer.kernels.accel.raycast import closest_hit, occluded
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.dimensions import DISC_SALT
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.surface import face, leave, surface_at
@@ -91,6 +92,6 @@ def lit_areas(scenes, trees, lights, own, k, reach, whole, out, first, last):
             tree, p[0], p[1], p[2], k + own, reach * reach, keys, True, n[0], n[1], n[2], steepness, _i4(ALL_CLASSES)
         )
         others = max(count - own, _i8(1))
-        turn = unit_float(hash3(_u4(i), _u4(k), _u4(0xA5EA)))
+        turn = unit_float(hash3(_u4(i), _u4(k), _u4(DISC_SALT)))
         share = share_on_surface(scene, p, n, row[V_GAP], _f4(math.sqrt(r2)), turn)
         out[i] = _f4(math.pi) * r2 * share / _f4(others)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.kernels.dimensions import VIRTUAL_SALT
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
 from pmviewer.maps.search.kdtree import build_kdtree
 from pmviewer.maps.virtual_lights import (
@@ -42,8 +43,6 @@ MOST = 500_000
 """Most trajectories that passes grow to of their own accord."""
 FEWEST = 2
 """Fewest photons of a disc that passes shrink to."""
-SEED = 0x7117
-"""Keeps their random numbers apart from those of the light pass."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +103,7 @@ def virtual_lights(
     N, estimator = trajectories(how, index), ESTIMATORS.index(how.estimator)
     record = np.zeros(1, TRACE_DTYPE)
     sequence = SOBOL if photons.sequence == "sobol" else INDEPENDENT
-    own = (seed ^ SEED) & 0xFFFFFFFF
+    own = (seed ^ VIRTUAL_SALT) & 0xFFFFFFFF
     record[0] = (own, _first_index(how, index), sequence, photons.max_bounces, photons.glossy, estimator)
     results = run([partial(_batch, scene, record, i0, min(i0 + BATCH, N)) for i0 in range(0, N, BATCH)])
     found = np.concatenate([r[0] for r in results])

@@ -36,6 +36,14 @@ from pmviewer.kernels.bsdf.scattering import (
     shading_normal,
 )
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.dimensions import (
+    EMISSION,
+    EMITTER,
+    FURTHER_PHOTONS_SALT,
+    PHOTON_SCATTER,
+    SEEN_EMITTER,
+    SEEN_LIGHT,
+)
 from pmviewer.kernels.lights.light import emit_from, pick_light
 from pmviewer.kernels.lights.start import seen_from, spread_over
 from pmviewer.kernels.memory import float_of_bits
@@ -71,7 +79,6 @@ _u4 = np.uint32
 _i8 = np.int64
 _INF = _f4(np.inf)
 _BEFORE = _f4(1.0 - 2.0**-13)
-PICK_SET, START_SET, LIGHT_SET = _i8(0xE819), _i8(0x30000), _i8(0x40000)
 LEAST_COSINE = _f4(1e-4)
 
 TRACE_DTYPE = np.dtype(
@@ -116,8 +123,8 @@ def leaning(b, ng, w):
 @device
 def is_blocked(scene, pass_, seed, index, bounces, p, ng, gap):
     """Whether a sample of the lights, drawn as photons leave them, is hidden from the surface point p."""
-    u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, START_SET + bounces)
-    light, _, _ = pick_light(scene, draw1(pass_.sequence, seed, index, LIGHT_SET + bounces))
+    u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, SEEN_LIGHT + bounces)
+    light, _, _ = pick_light(scene, draw1(pass_.sequence, seed, index, SEEN_EMITTER + bounces))
     wi, end, area = seen_from(scene, light, (u2, u3), (u0, u1), p)
     if not (area > _f4(0.0) and dot(ng, wi) > _f4(0.0)):
         return True
@@ -158,9 +165,9 @@ def trace_virtual_lights(scenes, passes, i0, i1, photons_out, lights_out, counts
         place = _i8(pass_.first_index) + _i8(i)
         index, seed = _u4(place), pass_.seed
         if place >> 32 != 0:  # a Sobol set has 2³² points; the next trajectories use other sets
-            seed = hash3(seed, _u4(place >> 32), _u4(PICK_SET))
-        u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, _i8(0))
-        light, _, _ = pick_light(scene, draw1(pass_.sequence, seed, index, PICK_SET))
+            seed = hash3(seed, _u4(place >> 32), _u4(FURTHER_PHOTONS_SALT))
+        u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, EMISSION)
+        light, _, _ = pick_light(scene, draw1(pass_.sequence, seed, index, EMITTER))
         z0, d, beta = emit_from(scene, light, (u2, u3), (u0, u1))
         if not is_good(beta):
             counts[C_DROPPED] += 1
@@ -200,7 +207,7 @@ def trace_virtual_lights(scenes, passes, i0, i1, photons_out, lights_out, counts
                 word = _u4(flags | _u4(min(bounces, BOUNCES)))
                 _photon(photons_out[counts[C_STORED]], p, wi, beta, word, light)
                 counts[C_STORED] += 1
-            s0, s1, s2, u_lobe = draw4(pass_.sequence, seed, index, _i8(1 + bounces))
+            s0, s1, s2, u_lobe = draw4(pass_.sequence, seed, index, PHOTON_SCATTER + bounces)
             group, share, u_lobe = pick_group(b, wi, u_lobe)
             d, weight, pdf, _ = bsdf_sample(scene, b, group, wi, u_lobe, s0, s1)
             if same_side(b, group, facing, wi, d) == 0:

@@ -75,8 +75,6 @@ def scattered(scene, virtual, row, glossy, wo):
 
         return plain
 
-    paths = has(virtual, "paths")
-
     def any_bsdf(scene, virtual, row, glossy, wo):
         if load_f4(virtual.lights, row + V_LAMBERTIAN) != _f4(0.0):
             f = load3(virtual.lights, row + V_F)

@@ -12,6 +12,7 @@ from pmviewer.kernels.accel.instance import find_instance
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_f, same_side, shading_normal
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.dimensions import VIRTUAL_SUBSET
 from pmviewer.kernels.memory import load_i4
 from pmviewer.kernels.random import draw1
 from pmviewer.kernels.scene import load3
@@ -35,7 +36,8 @@ from pmviewer.maps.virtual_lights import (
     W_SUM,
 )
 from pmviewer.render.direct.direct import visible
-from pmviewer.render.planes import CHANNELS, PLANES
+from pmviewer.render.pixel import INDIRECT, SPECULAR
+from pmviewer.render.planes import CHANNELS
 from pmviewer.render.record import C_DROPPED, C_RAYS, C_SHADOW_RAYS
 from pmviewer.render.virtual_lights.light import scattered, towards, weight_of
 from pmviewer.render.virtual_lights.walk import normalisation
@@ -44,19 +46,17 @@ _f4 = np.float32
 _f8 = np.float64
 _i8 = np.int64
 _BLACK = (_f4(0.0), _f4(0.0), _f4(0.0))
-INDIRECT, SPECULAR = _i8(PLANES["indirect"].start), _i8(PLANES["specular"].start)
-SUBSET_SET = _i8(0x80000)
 
 
 @specialised
-def virtual_light(given, si, beta, pixel, seed, film, counts, whole):
+def virtual_light(given, si, beta, pixel, whole):
     """Adds the light from virtual lights by the STORED lobes of a surface to the film. `whole`: at the camera ray's own
     surface. Without virtual lights nothing is compiled."""
     if has(part(given, "virtual"), "none"):
-        return lambda given, si, beta, pixel, seed, film, counts, whole: None
+        return lambda given, si, beta, pixel, whole: None
 
-    def lit(given, si, beta, pixel, seed, film, counts, whole):
-        from_virtual_lights(given, si, beta, pixel, seed, film, counts, whole)
+    def lit(given, si, beta, pixel, whole):
+        from_virtual_lights(given, si, beta, pixel, whole)
 
     return lit
 
@@ -84,17 +84,17 @@ def _one(given, si, j):
 
 
 @device
-def from_virtual_lights(given, si, beta, pixel, seed, film, counts, whole):
+def from_virtual_lights(given, si, beta, pixel, whole):
     """See `virtual_light`."""
-    scene, eye, virtual = given.scene, given.eye, given.virtual
+    scene, eye, virtual, film, counts = given.scene, given.eye, given.virtual, pixel.film, pixel.counts
     weighted = virtual.estimator != UNWEIGHTED and virtual.estimator != CLAMPED
     n, m = virtual.n, min(virtual.per_pixel, virtual.n)
     start = _f4(0.0)
     if m < n:
-        start = draw1(eye.sequence, seed, eye.index, SUBSET_SET)
+        start = draw1(eye.sequence, pixel.seed, eye.index, VIRTUAL_SUBSET)
     each = _f4(n) / _f4(max(m, _i8(1)))
     base = CHANNELS + (W_INDIRECT if whole else W_SPECULAR)
-    plane = INDIRECT if whole else SPECULAR
+    plane = _i8(INDIRECT if whole else SPECULAR)
     throughput = luminance(beta)
     for i in range(m):
         j = _i8(i)
@@ -112,45 +112,45 @@ def from_virtual_lights(given, si, beta, pixel, seed, film, counts, whole):
             counts[C_DROPPED] += 1
             continue
         Y = _f8(luminance(F))
-        film[pixel, CHANNELS + W_SUM] += Y
-        film[pixel, CHANNELS + W_SQUARES] += Y * Y
+        film[pixel.number, CHANNELS + W_SUM] += Y
+        film[pixel.number, CHANNELS + W_SQUARES] += Y * Y
         if virtual.estimator == CLAMPED and geometry > virtual.clamp:
             F = scale(F, virtual.clamp / geometry)
-            film[pixel, CHANNELS + W_LOST] += Y - _f8(luminance(F))
+            film[pixel.number, CHANNELS + W_LOST] += Y - _f8(luminance(F))
         target = plane
         if weighted and _f4(0.0) < G:
             target = base + W_F
-            film[pixel, base + W_G] += _f8(throughput * each * G)
-        film[pixel, target] += _f8(F[0])
-        film[pixel, target + 1] += _f8(F[1])
-        film[pixel, target + 2] += _f8(F[2])
-    film[pixel, CHANNELS + W_LIGHTS] += _f8(m)
+            film[pixel.number, base + W_G] += _f8(throughput * each * G)
+        film[pixel.number, target] += _f8(F[0])
+        film[pixel.number, target + 1] += _f8(F[1])
+        film[pixel.number, target + 2] += _f8(F[2])
+    film[pixel.number, CHANNELS + W_LIGHTS] += _f8(m)
     if weighted:
-        albedo, counted = normalisation(given, si, seed, counts)
+        albedo, counted = normalisation(given, si, pixel)
         if virtual.estimator == PRINTED_FULL:
             albedo = _f4(1.0)
-        film[pixel, base + W_A] += _f8(throughput * albedo)
-        film[pixel, base + W_C] += _f8(throughput * counted)
+        film[pixel.number, base + W_A] += _f8(throughput * albedo)
+        film[pixel.number, base + W_C] += _f8(throughput * counted)
 
 
 @specialised
-def note_object(given, prim, pixel, film):
+def note_object(given, prim, pixel):
     """Notes the object of the primitive that the camera ray met, for a normalisation by object: the shape, or the
     instance."""
     if has(part(given, "virtual"), "none"):
-        return lambda given, prim, pixel, film: None
+        return lambda given, prim, pixel: None
     if has(part(given, "scene"), "instances"):
 
-        def instanced(given, prim, pixel, film):
+        def instanced(given, prim, pixel):
             if prim < given.scene.n_stored:
                 number = _i8(load_i4(given.virtual.objects, prim))
             else:
                 number = given.virtual.n_objects + find_instance(given.scene, prim)
-            film[pixel, CHANNELS + W_OBJECT] = _f8(number)
+            pixel.film[pixel.number, CHANNELS + W_OBJECT] = _f8(number)
 
         return instanced
 
-    def stored(given, prim, pixel, film):
-        film[pixel, CHANNELS + W_OBJECT] = _f8(load_i4(given.virtual.objects, prim))
+    def stored(given, prim, pixel):
+        pixel.film[pixel.number, CHANNELS + W_OBJECT] = _f8(load_i4(given.virtual.objects, prim))
 
     return stored

@@ -23,8 +23,8 @@ class Virtual(Group):
 
     number: int = setting(
         200,
-        "Virtual lights in each pass: photons that light what the camera sees as point lights do. Each pass has others, "
-        "so that the picture converges whatever their number.",
+        "Virtual lights in each pass: photons that light what the camera sees as point lights do. Each pass has "
+        "others, so that the picture converges whatever their number.",
         stage="image",
         scale="log",
         unit="lights",
@@ -55,9 +55,9 @@ class Virtual(Group):
     normalisation: Literal["interpolated", "per pixel", "per object", "none"] = setting(
         "interpolated",
         "Probability c that a gathering walk makes what the lights stand for, which weighted sums are multiplied by. "
-        "interpolated: from pixels around, ever fewer from pass to pass. per pixel: exact in the limit, noisy at first. "
-        "per object: one number for all of an object's pixels, as in the paper; leaves false shadows. none: c = 1, "
-        "right in closed scenes alone and with a single step alone.",
+        "interpolated: from pixels around, ever fewer from pass to pass. per pixel: exact in the limit, noisy at "
+        "first. per object: one number for all of an object's pixels, as in the paper; leaves false shadows. "
+        "none: c = 1, right in closed scenes alone and with a single step alone.",
         stage="image",
         scale="choice",
     )
