@@ -135,9 +135,10 @@ def bias_of(settings: Settings) -> tuple[str, ...]:
 
 
 def prepare_virtual(scene: OpenScene, settings: Settings) -> None:
-    """Compile what traces and weighs virtual lights, and what reads the film."""
-    few = settings.virtual.model_copy(update={"number": 1, "photons": 1})
+    """Compile what traces and weighs virtual lights, and what reads the film: of all estimators."""
+    all_of_it = {"estimator": "single step", "density": "photon map", "normalisation": "interpolated"}
+    few = settings.virtual.model_copy(update=all_of_it | {"number": 1, "photons": 1})
     virtual_lights(scene.flat, few, settings.photons, 0, 0, lambda tasks: [task() for task in tasks])
-    film = WeightedFilm(1, 1, settings.virtual)
+    film = WeightedFilm(1, 1, few)
     film.sums[:, CHANNELS:] = 1.0
     film.planes()

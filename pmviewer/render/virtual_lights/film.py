@@ -14,6 +14,7 @@ Where ΣG is 0 nothing has arrived, and L is 0. What lights without a weight sen
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +86,7 @@ def shared_sums(sums, width, height, radius, base, out):
                     out[here, 1] += sums[there, base + W_C]
 
 
-def ratio(numerator: F8, denominator: F8) -> F8:
+def ratio(numerator: NDArray[Any], denominator: NDArray[Any]) -> F8:
     """Quotients, 0 where the denominator is."""
     out = np.zeros(np.broadcast_shapes(numerator.shape, denominator.shape))
     return np.divide(numerator, denominator, out=out, where=denominator > 0)
