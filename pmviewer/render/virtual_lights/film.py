@@ -42,7 +42,7 @@ from pmviewer.render.film import Film
 from pmviewer.render.planes import CHANNELS, PLANES
 from pmviewer.settings.access import Virtual
 
-TAPS = 4
+TAPS = 6
 """Pixels asked to each side of the middle; wider windows leave some out."""
 ALIKE = 0.9
 """Least cosine between normals of pixels that share a normalisation."""
