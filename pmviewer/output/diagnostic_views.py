@@ -133,7 +133,7 @@ DIAGNOSTICS: Mapping[str, DiagnosticView] = {
         "no caustic",
         classes=("more photons needed", "converged", "dense enough"),
     ),
-    "virtual lights' error": DiagnosticView(
+    "virtual light error": DiagnosticView(
         "virtual lights",
         "standard error of the plain sum over virtual lights relative to that sum, all passes",
         "%",

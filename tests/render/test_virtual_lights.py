@@ -207,5 +207,5 @@ def test_the_error_view_is_the_spread_of_pictures():
     for seed in range(60):
         renderer = lit(box_over_x(), passes=1, number=300, estimator="unweighted", render={"seed": seed})
         pictures.append(renderer.frame(0).image("indirect")[0, 0, 1])
-        views.append(renderer.film.views()["virtual lights' error"][0, 0, 0])
+        views.append(renderer.film.views()["virtual light error"][0, 0, 0])
     assert np.mean(views) == pytest.approx(100 * np.std(pictures) / np.mean(pictures), rel=0.4)

@@ -149,7 +149,7 @@ class WeightedFilm(Film):
         sums = self.sums
         total, n = sums[:, CHANNELS + W_SUM], sums[:, CHANNELS + W_LIGHTS]
         variance = np.maximum(sums[:, CHANNELS + W_SQUARES] - ratio(total * total, n), 0.0)
-        made = {"virtual lights' error": np.where(total > 0, 100 * ratio(np.sqrt(variance), total), -1.0)}
+        made = {"virtual light error": np.where(total > 0, 100 * ratio(np.sqrt(variance), total), -1.0)}
         if self.weighted:
             base = np.where(sums[:, CHANNELS + W_INDIRECT + W_A] > 0, W_INDIRECT, W_SPECULAR)
             picked = {

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
+from pmviewer.settings.needs import Need, Needs
 from pmviewer.settings.schema.base import Group, setting
 
 Estimator = Literal[
@@ -17,9 +18,30 @@ Estimator = Literal[
     "printed full path",
 ]
 
+VIRTUAL_LIGHTS = Need(
+    lambda f: f.plan.virtual, "Only with the method 'virtual lights' (render.method), where surfaces store photons."
+)
+WEIGHTED = Need(
+    lambda f: f.settings.virtual.estimator not in ("unweighted", "clamped"), "The plain sum is not weighted."
+)
+CLAMPED = Need(lambda f: f.settings.virtual.estimator == "clamped", "Only with the estimator 'clamped'.")
+SINGLE_STEP = Need(lambda f: f.settings.virtual.estimator == "single step", "Only with the estimator 'single step'.")
+ANY_SINGLE_STEP = Need(lambda f: "single step" in f.settings.virtual.estimator, "Only with a single step.")
+BY_THE_MAP = Need(
+    lambda f: f.settings.virtual.density == "photon map", "The virtual lights tell their density (virtual.density)."
+)
+NORMALISED = Need(
+    lambda f: not f.settings.virtual.estimator.startswith("printed"), "The printed forms are not normalised."
+)
+WINDOWED = Need(
+    lambda f: f.settings.virtual.normalisation == "interpolated", "Only with an interpolated normalisation."
+)
+
 
 class Virtual(Group):
     """Virtual lights"""
+
+    needs: ClassVar[Needs] = (VIRTUAL_LIGHTS,)
 
     number: int = setting(
         200,
@@ -60,6 +82,7 @@ class Virtual(Group):
         "none: c = 1, right in closed scenes alone and with a single step alone.",
         stage="image",
         scale="choice",
+        needs=(WEIGHTED, NORMALISED),
     )
     walks: int = setting(
         4,
@@ -69,6 +92,7 @@ class Virtual(Group):
         unit="walks",
         ge=1,
         le=256,
+        needs=(WEIGHTED,),
     )
     window: float = setting(
         6.0,
@@ -79,6 +103,7 @@ class Virtual(Group):
         unit="px",
         ge=1.0,
         le=64.0,
+        needs=(WEIGHTED, NORMALISED, WINDOWED),
     )
     clamp: float = setting(
         15.0,
@@ -89,6 +114,7 @@ class Virtual(Group):
         unit="/scene²",
         ge=1e-3,
         le=1e6,
+        needs=(CLAMPED,),
     )
     density: Literal["photon map", "virtual lights"] = setting(
         "photon map",
@@ -97,6 +123,7 @@ class Virtual(Group):
         section="Density",
         stage="image",
         scale="choice",
+        needs=(SINGLE_STEP,),
     )
     photons: int = setting(
         20_000,
@@ -108,6 +135,7 @@ class Virtual(Group):
         ge=100,
         le=5_000_000,
         title="trajectories",
+        needs=(SINGLE_STEP, BY_THE_MAP),
     )
     k: int = setting(
         8,
@@ -118,4 +146,5 @@ class Virtual(Group):
         unit="photons",
         ge=2,
         le=500,
+        needs=(ANY_SINGLE_STEP,),
     )
