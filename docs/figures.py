@@ -1,4 +1,4 @@
-"""`python docs/figures.py [NAME …]`: make the figures of docs/importance.md by the commands that stand there.
+"""`python docs/figures.py [NAME …]`: make the figures of the documentation by the commands that stand there.
 
 A block of commands that begins with ```sh figure=NAME columns=N gives images/NAME.png: each command writes one panel,
 in order, N of them a row; NAME='…' above them stands for words that they share. The commands open windows: without a
@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
+TEXTS = ("importance.md", "virtual.md")
 _BLOCK = re.compile(r"^```sh figure=(\S+) columns=(\d+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _SHARED = re.compile(r"(\w+)='([^']*)'")
 _USE = re.compile(r"\$(\w+)")
@@ -76,7 +77,7 @@ def make(figure: Figure, folder: Path) -> None:
 
 def main() -> None:
     """Make the figures asked for, all by default."""
-    known = {figure.name: figure for figure in figures((DOCS / "importance.md").read_text(encoding="utf-8"))}
+    known = {figure.name: figure for text in TEXTS for figure in figures((DOCS / text).read_text(encoding="utf-8"))}
     unknown = sorted(set(sys.argv[1:]) - known.keys())
     if unknown:
         sys.exit(f"there is no figure {', '.join(unknown)}; there are {', '.join(known)}")

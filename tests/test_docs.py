@@ -11,7 +11,8 @@ from pmviewer.commands.job import load_job
 from pmviewer.scene.load import bundled_scenes
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-FIGURES = list(runpy.run_path(str(DOCS / "figures.py"))["figures"]((DOCS / "importance.md").read_text("utf-8")))
+_MAKER = runpy.run_path(str(DOCS / "figures.py"))
+FIGURES = [figure for text in _MAKER["TEXTS"] for figure in _MAKER["figures"]((DOCS / text).read_text("utf-8"))]
 
 
 @pytest.mark.parametrize("figure", FIGURES, ids=lambda figure: figure.name)
@@ -19,7 +20,7 @@ def test_commands_of_figures_name_scenes_and_settings_that_there_are(figure):
     assert (DOCS / "images" / f"{figure.name}.png").is_file()
     assert len(set(figure.panels)) == len(figure.commands) >= 1
     for words in figure.commands:
-        assert words[:2] == ("pmviewer", "shot")
+        assert words[:2] in (("pmviewer", "shot"), ("pmviewer", "render"))
         assert words[2] in {scene.name for scene in bundled_scenes()}
         load_job(words[2], [words[i + 1] for i, word in enumerate(words) if word == "--set"], [])
 

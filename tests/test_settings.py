@@ -167,7 +167,7 @@ def test_assignments_of_the_command_line():
         ("direct.mis=maybe", "true or false"),
         ("camera.origin=1,2", "three numbers"),
         ("camera.origin=1,2,x", "three numbers"),
-        ("render.method=magic", "one of progressive, gather, path"),
+        ("render.method=magic", "one of progressive, gather, virtual lights, path"),
         ("estimate.radius=0", "or auto"),
         ("=3", "no setting ''"),
         ("photons.X=3", "no setting 'photons.X'"),

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+DEFAULT_SCENE = "cornell_caustic"
+
 SceneArgument = Annotated[
     str,
     typer.Argument(help="A bundled scene's name, a scene file (.xml .glb .gltf .obj .ply .stl) or a session (.toml)."),

@@ -6,11 +6,17 @@ from pathlib import Path
 
 import typer
 
-from pmviewer.commands.options import ParameterOption, SceneArgument, SearchOption, SetOption, ThreadsOption
+from pmviewer.commands.options import (
+    DEFAULT_SCENE,
+    ParameterOption,
+    SceneArgument,
+    SearchOption,
+    SetOption,
+    ThreadsOption,
+)
 from pmviewer.commands.render import render
 from pmviewer.errors import WindowError
 
-DEFAULT_SCENE = "cornell_caustic"
 FALLBACK_PASSES = 64
 """Rendered to a file where no window can be opened."""
 

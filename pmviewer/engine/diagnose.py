@@ -37,6 +37,7 @@ from pmviewer.render.diagnostics.density import WIDEST, counting_eye, counting_t
 from pmviewer.render.diagnostics.diagnostics import FAMILY_CHANNELS, lookup_view, shadow_view, site_view
 from pmviewer.render.film import Film
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL
+from pmviewer.render.virtual_lights.film import WeightedFilm
 from pmviewer.settings.access import Settings
 
 TILE = 2048
@@ -89,6 +90,8 @@ def diagnostic_planes(wanted: Wanted, looked: Looked, pool: WorkPool) -> dict[st
     """The planes of the family that is wanted, by view; none without one."""
     if wanted.family is None:
         return {}
+    if wanted.family == "virtual lights":
+        return looked.film.views() if isinstance(looked.film, WeightedFilm) else {}
     if wanted.family == "convergence":
         states = convergence_plane(looked.rendered, pool.run)
         return {"caustic convergence": states.reshape(looked.film.height, looked.film.width, 1)}

@@ -36,7 +36,8 @@ class Statistics:
     stored: Mapping[str, int] = field(default_factory=dict)
     """Photons stored, all passes together, by map ("caustic", "global")."""
     stored_in_pass: Mapping[str, int] = field(default_factory=dict)
-    """By map; with "radiance" the radiance photons that gather rays have used; with "shadow" the shadow photons,
+    """By map; with "virtual" the virtual lights; with "radiance" the radiance photons that gather rays have used; with
+    "shadow" the shadow photons,
     which serve all passes."""
     radius: Mapping[str, float] = field(default_factory=dict)
     """Look-up radius of the latest pass by map."""
@@ -66,6 +67,8 @@ class Statistics:
     """Where the light went; None without photons."""
     deposited: Mapping[str, Deposited] = field(default_factory=dict)
     """What became of the photons that arrived in the latest pass, by map; empty where all are stored."""
+    clamped: float = 0.0
+    """Share of the light from virtual lights that clamping took, 0 without."""
     importons: int = 0
     """Importons traced for the importance maps of the latest pass, 0 without; `stored_in_pass` tells how many are
     stored."""

@@ -8,9 +8,11 @@ from pmviewer.engine.energy import Energy
 from pmviewer.engine.frame import Frame, PhotonCloud, Statistics
 from pmviewer.engine.inspection import Inspection
 from pmviewer.engine.stages.irradiance_cache import cache_cloud
+from pmviewer.engine.stages.virtual_lights import bias_of
 from pmviewer.engine.tally import Tally
 from pmviewer.maps.importance.importance_map import NO_IMPORTANCE
 from pmviewer.maps.irradiance_cache import REACH
+from pmviewer.render.virtual_lights.film import WeightedFilm
 
 
 def frame_of(looked: Looked, tally: Tally, inspection: Inspection) -> Frame:
@@ -54,13 +56,15 @@ def _clouds(looked: Looked) -> dict[str, PhotonCloud]:
         clouds["importons"] = looked.importance.latest.cloud
     if cache is not None:
         clouds["cache"] = PhotonCloud(*cache_cloud(cache), cache.rows[:, REACH].copy())
+    if (virtual := looked.latest.virtual) is not None:
+        clouds["virtual"] = PhotonCloud(virtual.lights.photons, virtual.lights.power_unit)
     return clouds
 
 
 def _statistics(looked: Looked, tally: Tally, clouds: dict[str, PhotonCloud]) -> Statistics:
     film, plan, importance = looked.film, looked.plan, looked.importance.latest
     stored_in_pass = dict(tally.stored_in_pass)
-    for name in clouds.keys() & {"radiance", "shadow", "cache"}:
+    for name in clouds.keys() & {"radiance", "shadow", "cache", "virtual"}:
         stored_in_pass[name] = len(clouds[name].photons)
     if importance is not None:
         stored_in_pass["importons"] = importance.n
@@ -87,6 +91,7 @@ def _statistics(looked: Looked, tally: Tally, clouds: dict[str, PhotonCloud]) ->
         dropped=dict(tally.dropped),
         energy=energy,
         skipped=plan.skipped,
+        clamped=film.lost if isinstance(film, WeightedFilm) else 0.0,
         importons=importance.traced if importance is not None else 0,
         warnings=_warnings(looked, tally, energy),
         deposited=dict(tally.deposited),
@@ -106,4 +111,5 @@ def _warnings(looked: Looked, tally: Tally, energy: Energy | None) -> tuple[str,
         )
     cut = caveats(looked.settings, plan, tally, energy, looked.scene.flat.radius, len(film.sums), film.passes)
     notes = maps.notes if maps is not None else ()
-    return (*plan.warnings, *(latest.warnings if latest else ()), *notes, *unimportant, *cut)
+    biased = bias_of(looked.settings) if plan.virtual else ()
+    return (*plan.warnings, *biased, *(latest.warnings if latest else ()), *notes, *unimportant, *cut)

@@ -33,7 +33,8 @@ class Plan:
     photons of the classes `guide_mask` guide `guided_rays` of them; `corners` is whether short ones gather again,
     `cache` whether diffuse surfaces gather through an irradiance cache, `shadows` whether shadow photons save shadow
     rays, `importance` whether there are importance maps, `deposition` which photons maps store, `emission` how
-    importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0 without; `warnings`
+    importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0 without; `virtual`
+    is whether virtual lights bring the indirect light; `warnings`
     are sentences for the log about what was asked for and can't be."""
 
     path: bool = False
@@ -47,6 +48,7 @@ class Plan:
     guide_mask: int = 0
     corners: bool = False
     cache: bool = False
+    virtual: bool = False
     shadows: bool = False
     importance: bool = False
     deposition: Deposit = "all"
@@ -186,6 +188,8 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
         skipped.append(("light samples at surfaces that store photons", "render.direct is approximate"))
     if how.caustic == "approximate" and caustics:
         skipped.append(("caustic map", "render.caustic is approximate"))
+    if how.indirect == "virtual lights":
+        return _virtual_plan(shown, diffuse, caustics, skipped)
     if how.indirect == "accurate":
         radiance = settings.gather.radiance_photons != "off"
         if not radiance:
@@ -216,8 +220,23 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
     return replace(shown, global_mask=diffuse, global_classes=classes, skipped=tuple(skipped))
 
 
+def _virtual_plan(shown: Plan, diffuse: int, caustics: int, skipped: list[tuple[str, str]]) -> Plan:
+    """With virtual lights, which can't shine over mirrors: where the caustic map leaves out caustics after a diffuse
+    bounce, the global map shows them. `diffuse` are the path classes that are no caustics."""
+    mirrored = diffuse & 1 << INDIRECT_CAUSTIC if caustics else 0
+    chooses = 1 << DIRECT if shown.choice != "power" else 0
+    classes = mirrored | shown.direct_mask | shown.global_caustics | chooses
+    skipped.append(("final gather", "virtual lights bring the indirect light"))
+    if not classes:
+        skipped.append(("global map", "virtual lights bring the indirect light"))
+    if not (classes or shown.caustic_classes):
+        skipped.append(("light pass", "virtual lights are traced on their own, and nothing else asks for photons"))
+    return replace(shown, virtual=True, global_mask=mirrored, global_classes=classes, skipped=tuple(skipped))
+
+
 class Terms(NamedTuple):
-    """How each term is evaluated: "accurate" or "approximate" (Jensen 1996, §4)."""
+    """How each term is evaluated: "accurate" or "approximate" (Jensen 1996, §4), indirect light by "virtual lights",
+    too."""
 
     direct: str
     caustic: str
@@ -227,7 +246,8 @@ class Terms(NamedTuple):
 def _terms(settings: Settings) -> Terms:
     """What the method says, and what the user says otherwise."""
     render = settings.render
-    of_method = Terms("accurate", "accurate", "accurate" if render.method == "gather" else "approximate")
+    indirect = {"gather": "accurate", "virtual lights": "virtual lights"}.get(render.method, "approximate")
+    of_method = Terms("accurate", "accurate", indirect)
     asked = Terms(render.direct, render.caustic, render.indirect)
     return Terms(*(own if one == "by method" else one for one, own in zip(asked, of_method, strict=True)))
 

@@ -22,6 +22,7 @@ from pmviewer.engine.stages.importance import prepare_importance
 from pmviewer.engine.stages.irradiance_cache import prepare_cache
 from pmviewer.engine.stages.pass_data import blank_pass
 from pmviewer.engine.stages.projection import projection_for
+from pmviewer.engine.stages.virtual_lights import prepare_virtual
 from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.maps.search.grid import build_grid
 from pmviewer.maps.search.kdtree import build_kdtree
@@ -102,6 +103,8 @@ def steps_of(scene: OpenScene, settings: Settings) -> list[Step]:
         steps.append(Step("importance", prepare_importance, (scene, settings)))
     if plan.photons:
         steps += _light_steps(scene, settings, plan)
+    if plan.virtual:
+        steps.append(Step("virtual lights", prepare_virtual, (scene, settings)))
     return [*steps, *eye_steps(scene.flat.record, scene.traits, settings, plan)]
 
 

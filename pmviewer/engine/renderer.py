@@ -28,6 +28,7 @@ from pmviewer.engine.stages.irradiance_cache import fill_cache, recipe
 from pmviewer.engine.stages.light import LightStage
 from pmviewer.engine.stages.pass_data import RenderedPass, pass_data, pass_record
 from pmviewer.engine.stages.shadow_photons import ShadowStage
+from pmviewer.engine.stages.virtual_lights import VirtualStage, film_of
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.engine.wanted import wanted_of
@@ -70,7 +71,7 @@ class Renderer:
         check_memory(self.camera.width, self.camera.height, settings.photons.N)
         self.plan: Plan = plan or plan_of(settings, scene.traits)
         self.facts = Facts(settings, self.plan, scene.traits)
-        self.film = Film(self.camera.width, self.camera.height)
+        self.film = film_of(settings, self.plan, self.camera.width, self.camera.height)
         self.first_radius = (
             first_radius(scene.flat, self.render_camera, settings.estimate, self.plan.gather)
             if self.plan.photons
@@ -82,6 +83,7 @@ class Renderer:
             scene, settings, self.plan, self.render_camera, self.first_radius, pool, store, self.tally
         )
         self.shadows = ShadowStage(scene, settings, pool, store, self.tally)
+        self.virtual = VirtualStage(scene, settings, pool, store, self.tally)
         self.latest: RenderedPass | None = None
 
     @property
@@ -116,7 +118,7 @@ class Renderer:
         while pose.width * pose.height > COARSE_PIXELS * shrink * shrink:
             shrink *= 2
         small = CameraPose(**{**pose.__dict__, "width": -(-pose.width // shrink), "height": -(-pose.height // shrink)})
-        film = Film(small.width, small.height)
+        film = film_of(self.settings, self.plan, small.width, small.height)
         N = min(self.settings.photons.N, COARSE_PHOTONS)
         quick = Renderer(self.scene, self.settings, self.pool, self.store, self.version, self.plan)
         quick.first_radius = self.first_radius * min(2.0, (self.settings.photons.N / N) ** 0.25)
@@ -161,7 +163,10 @@ class Renderer:
         shadows = tally.timed(pool, "shadow photons", lambda: self.shadows.run(index)) if plan.shadows else None
         scene = self.scene.flat.record
         given = pass_data(scene, eye, settings, plan, maps, shadows.record if shadows is not None else None)
-        cache = None
+        cache = virtual = None
+        if plan.virtual:
+            virtual = tally.timed(pool, "virtual lights", lambda: self.virtual.run(index))
+            given = given._replace(virtual=virtual.record)
         if plan.cache:
             how = recipe(settings.gather, camera, index)
             cache, counts = tally.timed(pool, "irradiance cache", lambda: fill_cache(given, how, pool))
@@ -169,7 +174,7 @@ class Renderer:
             tally.add_counts(counts)
             given = given._replace(cache=cache.record)
         tally.timed(pool, "eye pass", lambda: self._eye_pass(given, film))
-        self.latest = RenderedPass(given, maps, shadows, cache)
+        self.latest = RenderedPass(given, maps, shadows, cache, virtual)
 
     def _eye_pass(self, given: PassData, film: Film) -> None:
         outline = np.zeros(0, np.uint8)

@@ -23,7 +23,8 @@ a surface."""
 
 EYE, PATH, SECOND_GATHER, CACHE_RECORD = "eye pass", "path tracer", "secondary gather", "irradiance cache record"
 PHOTON, SHADOW_PHOTON, IMPORTON = "photon", "shadow photon", "importon"
-STREAMS = (EYE, PATH, SECOND_GATHER, CACHE_RECORD, PHOTON, SHADOW_PHOTON, IMPORTON)
+VIRTUAL_LIGHT = "virtual light"
+STREAMS = (EYE, PATH, SECOND_GATHER, CACHE_RECORD, PHOTON, SHADOW_PHOTON, IMPORTON, VIRTUAL_LIGHT)
 
 
 class Dimension(NamedTuple):
@@ -71,6 +72,11 @@ GATHER_CHAIN = _dimension((EYE, CACHE_RECORD), 3000, "lobe that a gather ray fol
 CHAIN_LIGHT = _dimension((EYE,), 4000, "first light sample at followed lobes", DEPTH)
 OUTLINE = _dimension((EYE,), 5000, "camera ray for emission alone")
 FURTHER_LIGHT = _dimension((EYE, PATH, SECOND_GATHER), 6000, "light sample after a surface's first", LIGHT_SAMPLE)
+VIRTUAL_SUBSET = _dimension((EYE,), 0x10000, "which virtual lights a pixel asks for")
+WALK = _dimension((EYE,), 0x20000, "gathering walk's way from the surface that it normalises")
+WALK_SCATTER = _dimension((EYE,), 0x20001, "gathering walk's scattering and roulette", BOUNCE)
+WALK_LIGHT = _dimension((EYE,), 0x30000, "gathering walk's light sample", BOUNCE)
+WALK_EMITTER = _dimension((EYE,), 0x40000, "gathering walk's choice of light", BOUNCE)
 
 # Records of the irradiance cache: seed of pixel and pass (CACHE_SALT), index of the stratum.
 HEMISPHERE = _dimension((CACHE_RECORD,), 5000, "direction within a stratum of the hemisphere")
@@ -80,9 +86,9 @@ SECOND_LIGHT = _dimension((SECOND_GATHER,), 0, "first light sample")
 SECOND_RAY = _dimension((SECOND_GATHER,), 1, "ray")
 
 # Photons: seed of the render, index of the photon over all passes.
-EMISSION = _dimension((PHOTON, SHADOW_PHOTON), 0, "place and direction of emission")
-PHOTON_SCATTER = _dimension((PHOTON,), 1, "scattering and roulette", BOUNCE)
-EMITTER = _dimension((PHOTON,), 0xE817, "choice of light")
+EMISSION = _dimension((PHOTON, SHADOW_PHOTON, VIRTUAL_LIGHT), 0, "place and direction of emission")
+PHOTON_SCATTER = _dimension((PHOTON, VIRTUAL_LIGHT), 1, "scattering and roulette", BOUNCE)
+EMITTER = _dimension((PHOTON, VIRTUAL_LIGHT), 0xE817, "choice of light")
 PROJECTION_ACCEPT = _dimension((PHOTON,), 0xE818, "cosine of the light in projection maps of the world's directions")
 STRATUM = _dimension((PHOTON,), 0xE819, "finer digits of the choice of a stratum")
 STORE = _dimension((PHOTON,), 0x10000, "whether the photon is stored", BOUNCE)
@@ -90,6 +96,10 @@ COPIES = _dimension((PHOTON,), 0x20000, "how often the photon is stored", BOUNCE
 
 # Shadow photons: seed of the render (SHADOW_SALT), index over all passes.
 SHADOW_EMITTER = _dimension((SHADOW_PHOTON,), 1, "choice of light")
+
+# Virtual lights: seed of the render (VIRTUAL_SALT), index of the trajectory over all passes.
+SEEN_LIGHT = _dimension((VIRTUAL_LIGHT,), 0x30000, "light sample at a hit", BOUNCE)
+SEEN_EMITTER = _dimension((VIRTUAL_LIGHT,), 0x40000, "its choice of light", BOUNCE)
 
 # Importons: seed of the render (IMPORTON_SALT), index of the importon.
 IMAGE_PLACE = _dimension((IMPORTON,), 0, "place in the image")
@@ -108,6 +118,8 @@ ROUNDING_SALT = _salt(0xDE905, "rounding of photons' powers; by exclusive or, de
 BLUE_SALT = _salt(0x9E3779B9, "rounding of the third of a photon's powers")
 REWEIGHT_SALT = _salt(1, "rounding of powers that deposition rules raise")
 IMPORTON_SALT = _salt(0x1347, "importons, by exclusive or")
+VIRTUAL_SALT = _salt(0x7117, "virtual lights, by exclusive or")
+DISC_SALT = _salt(0xA5EA, "places that are asked of a disc around a virtual light")
 SHADOW_SALT = _salt(0x5AD0, "shadow photons, by exclusive or")
 SCATTERED_SALT = _salt(0x5CA77E, "importons scattered on, by exclusive or")
 TEST_RAY_SALT = _salt(0x7E57, "test rays of deposition rules, by exclusive or")

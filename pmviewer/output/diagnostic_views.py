@@ -15,7 +15,16 @@ from numpy.typing import NDArray
 
 from pmviewer.output.falsecolour import COLOURS, DIVERGING, Scale, false_colour, scale_around_one, scale_of
 
-Family = Literal["look-up", "shadow rays", "radiance photons", "importance", "density", "storing", "convergence"]
+Family = Literal[
+    "look-up",
+    "shadow rays",
+    "radiance photons",
+    "importance",
+    "density",
+    "storing",
+    "convergence",
+    "virtual lights",
+]
 NOTHING = -1.0
 DIMMED = 0.4
 """Brightness of cells whose radiance photon is the nearest, but not near enough to be used."""
@@ -123,6 +132,25 @@ DIAGNOSTICS: Mapping[str, DiagnosticView] = {
         "",
         "no caustic",
         classes=("more photons needed", "converged", "dense enough"),
+    ),
+    "virtual light error": DiagnosticView(
+        "virtual lights",
+        "standard error of the plain sum over virtual lights relative to that sum, all passes",
+        "%",
+        "no light from virtual lights",
+        log=True,
+    ),
+    "sum of weights": DiagnosticView(
+        "virtual lights",
+        "mean over passes of the sum of the virtual lights' weights; it tends to the normalisation",
+        "",
+        "no weighted light",
+    ),
+    "normalisation": DiagnosticView(
+        "virtual lights",
+        "what weighted sums are multiplied by: how often a gathering walk makes what the lights stand for",
+        "",
+        "no weighted light",
     ),
 }
 

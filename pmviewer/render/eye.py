@@ -42,6 +42,7 @@ from pmviewer.render.pixel import (
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius
 from pmviewer.render.record import C_CUT, C_RAYS
 from pmviewer.render.reflect import reflected, unfound
+from pmviewer.render.virtual_lights.lit import note_object, virtual_light
 
 _f4 = np.float32
 _i8 = np.int64
@@ -107,6 +108,7 @@ def _stored(given, si, beta, pixel, place, scratch, whole):
         L = direct_light(given, si, STORED, choice, n_bsdf, sampler, numbers, pixel.counts)
         deposit(pixel, DIRECT if whole else SPECULAR, mul(beta, L))
     _from_maps(given, si, beta, pixel, whole)
+    virtual_light(given, si, beta, pixel, whole)
     n = _i8(gather)
     if eye.direct != 0:
         n = max(n, n_bsdf)
@@ -185,6 +187,7 @@ def eye_pass(given, outline, radii, film, counts, first, last):
             si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
             if whole:
                 properties(eye, pixel, si)
+                note_object(given, hit.prim, pixel)
             if met_light(scene, hit) >= 0 and not (whole and outlined):
                 deposit(pixel, seen, mul(beta, _emission(given, left, pdf, choice, hit, ray.d)))
             groups = si.bsdf.groups

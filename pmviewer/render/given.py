@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from pmviewer.kernels.compile.jit import inlined
+from pmviewer.maps.virtual_lights import NO_VIRTUAL
 
 
 class PassData(NamedTuple):
@@ -13,7 +14,7 @@ class PassData(NamedTuple):
     scene: SCENE_DTYPE; eye: EYE_DTYPE; caustic_map, global_map: of grids or kd-trees; choice_map: of the grid of
     photons that choose lights; sites: of the radiance photons, or NO_SITES; cache: of the irradiance cache, or
     NO_CACHE; shadows: of the shadow photons, or NO_SHADOWS; guides: of the photons that guide gather rays, or
-    NO_GUIDES; corner: CORNERS or NO_CORNERS.
+    NO_GUIDES; corner: CORNERS or NO_CORNERS; virtual: of the virtual lights, or NO_VIRTUAL.
     """
 
     scene: Any
@@ -26,6 +27,7 @@ class PassData(NamedTuple):
     shadows: Any
     guides: Any
     corner: Any
+    virtual: Any = NO_VIRTUAL
 
 
 class SurfaceInteraction(NamedTuple):
@@ -82,4 +84,5 @@ def opened(given):
         given.shadows[0],
         given.guides[0],
         given.corner[0],
+        given.virtual[0],
     )

@@ -34,6 +34,7 @@ from pmviewer.settings.schema import (
     Settings,
     ShadowOverlay,
     Stage,
+    Virtual,
 )
 
 __all__ = [
@@ -59,6 +60,7 @@ __all__ = [
     "Settings",
     "ShadowOverlay",
     "Stage",
+    "Virtual",
     "changed_stages",
     "flat",
     "from_tree",

@@ -7,6 +7,7 @@ from functools import partial
 
 from make.boxes import glossy, lights, water
 from make.cardioid import cardioid
+from make.corners import corner_room, glossy_room
 from make.document import MadeScene
 from make.door import door_slit
 from make.egg import glass_egg
@@ -23,12 +24,14 @@ SCENES: dict[str, Callable[[], MadeScene]] = {
     "cardioid_010": partial(cardioid, 0.1),
     "cardioid_001": partial(cardioid, 0.01),
     "cognac": cognac,
+    "corner_room": corner_room,
     "cornell_fractal": fractal_box,
     "cornell_glossy": glossy,
     "cornell_lights": lights,
     "cornell_water": water,
     "door_slit": door_slit,
     "glass_egg": glass_egg,
+    "glossy_room": glossy_room,
     "lit_plane": lit_plane,
     "museum": museum,
     "office": office,

@@ -20,6 +20,7 @@ from pmviewer.settings.access import Settings, with_values
 from tests.support.scenes import cornell_box
 
 GATHER = {"render.method": "gather"}
+VIRTUAL = {"render.method": "virtual lights", "virtual.number": 20, "virtual.photons": 500}
 VARIANTS: dict[str, dict[str, object]] = {
     "path": {"render.method": "path"},
     "progressive": {},
@@ -34,6 +35,8 @@ VARIANTS: dict[str, dict[str, object]] = {
     "guided, corners": GATHER | {"gather.directions": "photon cones", "gather.secondary": 1.0},
     "hemisphere grid": GATHER | {"gather.directions": "hemisphere grid"},
     "irradiance cache": GATHER | {"gather.cache": "on"},
+    "virtual lights": VIRTUAL,
+    "virtual lights, paths": VIRTUAL | {"virtual.estimator": "every vertex"},
     "shadow photons": {"direct.shadow_photons": True},
     "projection": {"photons.projection": "on", "photons.q": 0.5},
     "importance": {"importance.map": "screen", "importance.deposition": "density control"},
@@ -73,7 +76,7 @@ def signatures() -> set[tuple[str, Any]]:
 
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
-@pytest.mark.parametrize("variant", ["progressive", "radiance photons, nearest", "guided emission"])
+@pytest.mark.parametrize("variant", ["progressive", "radiance photons, nearest", "guided emission", "virtual lights"])
 def test_the_large_kernels_of_a_pass_were_prepared(variant, box, pool):
     """Nothing that takes the eye's or the light pass's record compiles later."""
     settings = settings_of(variant)

@@ -60,10 +60,10 @@ def test_kernels_know_dimensions_as_int64():
 
 
 def test_seeds_made_from_a_renders_by_exclusive_or_differ():
-    """Photons, importons, test rays (traced as importons), importons scattered on, shadow photons: they draw the same
-    dimensions."""
+    """Photons, importons, test rays (traced as importons), importons scattered on, shadow photons, virtual lights: they
+    draw the same dimensions."""
     d = dimensions
-    seeds = [0, d.IMPORTON_SALT, d.TEST_RAY_SALT ^ d.IMPORTON_SALT, d.SCATTERED_SALT, d.SHADOW_SALT]
+    seeds = [0, d.IMPORTON_SALT, d.TEST_RAY_SALT ^ d.IMPORTON_SALT, d.SCATTERED_SALT, d.SHADOW_SALT, d.VIRTUAL_SALT]
     assert len(set(seeds)) == len(seeds)
 
 

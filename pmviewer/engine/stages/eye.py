@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.stages.virtual_lights import lights_asked
 from pmviewer.engine.store import StageStore
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.direct.choice import CHOICES
@@ -32,7 +33,7 @@ def render_into(
 ) -> NDArray[np.int64]:
     """One sample a pixel more, of the path tracer or by maps. Returns the counts of `pmviewer.render.record`."""
     pixels = len(film.sums)
-    tile = tile_size(pixels, given.eye[0], pool.threads)
+    tile = tile_size(pixels, given.eye[0], pool.threads, lights_asked(given.virtual))
 
     def task(first: int) -> Callable[[], NDArray[np.int64]]:
         def run() -> NDArray[np.int64]:
@@ -49,12 +50,12 @@ def render_into(
     return sum(pool.run([task(first) for first in range(0, pixels, tile)]), np.zeros(N_COUNTS, np.int64))
 
 
-def tile_size(pixels: int, eye: np.void, threads: int) -> int:
+def tile_size(pixels: int, eye: np.void, threads: int, virtual_lights: int = 0) -> int:
     """Pixels a task, so that a task takes at most some 30 ms. The picture does not depend on it."""
     keller_wald = eye["choice"] == CHOICES.index("Keller-Wald")
     light_samples = int(eye["con_samples"] + eye["noncon_samples"] if keller_wald else eye["light_samples"])
-    work = 1 + int(eye["gather_rays"]) + light_samples // 4
-    return max(64, min(4096 * 2 // work, -(-pixels // (4 * threads))))
+    work = 1 + int(eye["gather_rays"]) + light_samples // 4 + virtual_lights // 2
+    return max(64 if virtual_lights < 64 else 4, min(4096 * 2 // work, -(-pixels // (4 * threads))))
 
 
 def outline_of(scene: OpenScene, camera: CameraPose, film: Film, settings: Settings, store: StageStore) -> NDArray:

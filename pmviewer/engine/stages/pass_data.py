@@ -11,6 +11,7 @@ from pmviewer.engine.method import Plan, estimator_of
 from pmviewer.engine.stages.gather_guides import gather_records
 from pmviewer.engine.stages.pass_maps import LookUpMap, PassMaps, blank_grid, blank_maps
 from pmviewer.engine.stages.shadow_photons import ShadowMap
+from pmviewer.engine.stages.virtual_lights import VirtualMap, virtual_dtype
 from pmviewer.maps.irradiance_cache import NO_CACHE, IrradianceCache
 from pmviewer.maps.irradiance_cache import RECORD as CACHE_RECORD
 from pmviewer.maps.shadow import shadow_record
@@ -32,6 +33,7 @@ class RenderedPass:
     maps: PassMaps
     shadows: ShadowMap | None = None
     cache: IrradianceCache | None = None
+    virtual: VirtualMap | None = None
 
 
 def pass_record(camera: CameraPose, settings: Settings, plan: Plan, maps: PassMaps, index: int) -> NDArray[np.void]:
@@ -100,4 +102,6 @@ def blank_pass(scene: NDArray[np.void], settings: Settings, plan: Plan) -> PassD
     for no pixel."""
     shadows = shadow_record(blank_grid(), 1) if plan.shadows else None
     given = pass_data(scene, np.zeros(1, EYE_DTYPE), settings, plan, blank_maps(settings, plan), shadows)
+    if plan.virtual:
+        given = given._replace(virtual=np.zeros(1, virtual_dtype(settings.virtual)))
     return given._replace(cache=np.zeros(1, CACHE_RECORD)) if plan.cache else given

@@ -61,6 +61,8 @@ class FlatScene:
     """Triangles and quadrics that rays can meet, those of instances counted as often as they are shown."""
     trees: tuple[Bvh, ...] = field(default=(), repr=False)
     """Of the instanced groups."""
+    shape_of_prim: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, np.int32), repr=False)
+    """The shape of each stored primitive."""
 
     @property
     def delta_lights(self) -> bool:
@@ -163,6 +165,7 @@ def flatten(scene: Scene, on_type: Callable[[np.dtype], None] = lambda of_record
         n_instances=len(scene.instances),
         n_elements=n_elements,
         trees=shown.trees if shown else (),
+        shape_of_prim=stored.shape_of_prim,
     )
 
 

@@ -34,6 +34,7 @@ from pmviewer.settings.schema.importance import Importance
 from pmviewer.settings.schema.light import Light
 from pmviewer.settings.schema.light_pass import Photons
 from pmviewer.settings.schema.render import Render
+from pmviewer.settings.schema.virtual import Virtual
 
 __all__ = [
     "Auto",
@@ -64,6 +65,7 @@ __all__ = [
     "ShadowOverlay",
     "Stage",
     "Vec3",
+    "Virtual",
     "setting",
 ]
 
@@ -77,6 +79,7 @@ class Settings(Group):
     estimate: Estimate = Field(default_factory=Estimate)
     direct: Direct = Field(default_factory=Direct)
     gather: Gather = Field(default_factory=Gather)
+    virtual: Virtual = Field(default_factory=Virtual)
     render: Render = Field(default_factory=Render)
     camera: CameraSettings = Field(default_factory=CameraSettings)
     free_camera: FreeCamera = Field(default_factory=FreeCamera)

@@ -8,6 +8,7 @@ from pydantic import ConfigDict
 
 from pmviewer.settings.needs import BOTH_MAPS, IMPORTANCE, SHADOW_PHOTONS, Need, Needs, never
 from pmviewer.settings.schema.base import Auto, Group, setting, subgroup
+from pmviewer.settings.schema.virtual import VIRTUAL_LIGHTS, WEIGHTED
 
 LOOKED_UP = Need(
     lambda f: f.plan.photons, "Nothing is looked up: this method uses no photons, or no surface stores them."
@@ -40,6 +41,9 @@ VIEW_NEEDS: dict[str, Needs] = {
     "density ratio": (STORED, REQUIRED_DENSITY),
     "storing probability": (STORED, STORED_BY_CHANCE),
     "caustic convergence": (STORED, CONVERGENCE),
+    "virtual light error": (VIRTUAL_LIGHTS,),
+    "sum of weights": (VIRTUAL_LIGHTS, WEIGHTED),
+    "normalisation": (VIRTUAL_LIGHTS, WEIGHTED),
 }
 """Of the views that tell how the picture was made."""
 MAP_VIEWS = (
@@ -110,6 +114,9 @@ class Display(Group):
         "density ratio",
         "storing probability",
         "caustic convergence",
+        "virtual light error",
+        "sum of weights",
+        "normalisation",
     ] = setting(
         "beauty",
         "What the viewport shows: the image, one of its terms, a property of the first hit, the shaded geometry, the "

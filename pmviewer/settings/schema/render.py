@@ -10,19 +10,20 @@ from pmviewer.settings.schema.base import Group, setting
 FOLLOWED_OR_PATHS = Need(lambda f: f.plan.path or FOLLOWED.holds(f), "No mirror or glass in this scene.")
 NO_PATHS = Need(lambda f: not f.plan.path, "The path tracer treats all pixels alike.")
 TWO_WAYS = Need(
-    lambda f: f.settings.render.method in ("progressive", "gather"),
-    "Only with the methods 'progressive' and 'gather'.",
+    lambda f: f.settings.render.method in ("progressive", "gather", "virtual lights"),
+    "Only with the methods 'progressive', 'gather' and 'virtual lights'.",
 )
-GLOBAL_MAP_STORED = Need(lambda f: f.plan.global_classes, "No surface of this scene stores photons.")
+GLOBAL_MAP_STORED = Need(lambda f: f.plan.global_classes or f.plan.virtual, "No surface of this scene stores photons.")
 
 
 class Render(Group):
     """Method"""
 
-    method: Literal["progressive", "gather", "path", "global map", "caustic map"] = setting(
+    method: Literal["progressive", "gather", "virtual lights", "path", "global map", "caustic map"] = setting(
         "progressive",
         "progressive: direct light by sampling, both maps shown directly with a shrinking radius. gather: indirect "
-        "light by a final gather into the global map. path: path tracing, the yardstick without photons. "
+        "light by a final gather into the global map. virtual lights: indirect light by photons as point lights. path: "
+        "path tracing, the yardstick without photons. "
         "global/caustic map: that map alone, as it is.",
         stage="image",
         scale="choice",

@@ -28,7 +28,15 @@ def photon_rows(s: Statistics) -> Rows:
     if s.bytes_per_photon:
         rows.append(("Memory of a photon", f"{s.bytes_per_photon:.1f} bytes"))
     rows.append(("Memory of the maps", data_size(s.map_bytes)))
-    return rows + convergence_rows(s)
+    return rows + virtual_rows(s) + convergence_rows(s)
+
+
+def virtual_rows(s: Statistics) -> Rows:
+    """Virtual lights of the latest pass, and the light that clamping them lost; none with other methods."""
+    if "virtual" not in s.stored_in_pass:
+        return []
+    rows = [("Virtual lights of a pass", grouped(s.stored_in_pass["virtual"]))]
+    return rows + ([("Light lost by clamping", f"{s.clamped:.1%}")] if s.clamped else [])
 
 
 def energy_rows(energy: Energy) -> Rows:

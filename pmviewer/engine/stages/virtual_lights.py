@@ -1,0 +1,144 @@
+"""The virtual lights of a pass: traced, thinned, weighed, ready for the eye pass (R10)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.engine.method import Plan
+from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.stages.light_plan import KEPT_PASSES
+from pmviewer.engine.store import StageStore
+from pmviewer.engine.tally import Tally
+from pmviewer.maps.virtual_lights import (
+    CLAMPED,
+    ESTIMATORS,
+    OF_PATHS,
+    PATHS_DTYPE,
+    PRINTED,
+    UNWEIGHTED,
+    VIRTUAL_DTYPE,
+)
+from pmviewer.photons.virtual.lights import VirtualLights, virtual_lights
+from pmviewer.render.film import Film
+from pmviewer.render.planes import CHANNELS
+from pmviewer.render.virtual_lights.film import WeightedFilm
+from pmviewer.scene.arrays.flatten import FlatScene
+from pmviewer.settings.access import Settings, Virtual
+
+PRINTED_BIAS = {
+    "printed single step": (
+        "Virtual lights by the paper's printed single step: densities from whole discs and no c₁ leave the picture too "
+        "bright or too dark, however many passes there are. virtual.estimator = single step converges."
+    ),
+    "printed full path": (
+        "Virtual lights by the paper's printed full path: without 1 − s and 1/a the picture is right only where every "
+        "albedo is ½ and every light visible. virtual.estimator = every vertex converges."
+    ),
+}
+UNNORMALISED = (
+    "Virtual lights without normalisation: gathering walks that leave the scene, or end where no light is visible, are "
+    "taken to bring light, so that the picture stays too bright. virtual.normalisation = interpolated converges."
+)
+FALSE_SHADOWS = (
+    "Virtual lights normalised by object: where c differs from its mean over the object, false light and shadow stay. "
+    "virtual.normalisation = interpolated converges."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualMap:
+    """`record` for kernels of `lights`, valid while this object and the scene live."""
+
+    lights: VirtualLights
+    record: NDArray[np.void]
+
+    @property
+    def bytes(self) -> int:
+        return self.lights.bytes
+
+
+class VirtualStage:
+    """The virtual lights of one scene with one set of settings; `latest` are those of the latest pass, None before the
+    first."""
+
+    def __init__(self, scene: OpenScene, settings: Settings, pool: WorkPool, store: StageStore, tally: Tally) -> None:
+        self.scene, self.settings, self.pool, self.store, self.tally = scene, settings, pool, store, tally
+        self.latest: VirtualMap | None = None
+
+    def run(self, index: int) -> VirtualMap:
+        """Those of pass `index`; those of the first where one photon map serves all passes."""
+        s = self.settings
+        if s.photons.renew == "once":
+            if self.latest is not None:
+                return self.latest
+            index = 0
+        traced = s.photons.max_bounces, s.photons.glossy, s.photons.sequence
+        key = ("virtual lights", self.scene.uid, s.render.seed, index, s.virtual, *traced)
+        keep = index < KEPT_PASSES
+        made: VirtualMap = (
+            self.store.get(key, lambda: self._make(index), lambda m: m.bytes) if keep else self._make(index)
+        )
+        self.tally.rays += made.lights.rays
+        self.tally.dropped["photons"] += made.lights.dropped
+        self.latest = made
+        return made
+
+    def _make(self, index: int) -> VirtualMap:
+        s, flat = self.settings, self.scene.flat
+        lights = virtual_lights(flat, s.virtual, s.photons, s.render.seed, index, self.pool.run)
+        return VirtualMap(lights, virtual_record(flat, s, lights.rows))
+
+
+def virtual_dtype(how: Virtual) -> np.dtype:
+    """Type of the record of virtual lights for that estimator."""
+    return PATHS_DTYPE if ESTIMATORS.index(how.estimator) in OF_PATHS else VIRTUAL_DTYPE
+
+
+def virtual_record(flat: FlatScene, settings: Settings, rows: NDArray[np.float32]) -> NDArray[np.void]:
+    """The record (1,) for kernels of virtual lights (n, COLUMNS)."""
+    how = settings.virtual
+    estimator = ESTIMATORS.index(how.estimator)
+    record = np.zeros(1, virtual_dtype(how))
+    r = record[0]
+    r["virtual"], r["lights"], r["n"] = 1, rows.ctypes.data, len(rows)
+    r["per_pixel"] = how.per_pixel or len(rows)
+    r["estimator"] = estimator
+    r["normalised"] = how.normalisation != "none" and estimator not in PRINTED
+    r["walks"], r["max_bounces"] = how.walks, settings.photons.max_bounces
+    r["clamp"] = how.clamp / flat.radius**2
+    r["objects"], r["n_objects"] = flat.shape_of_prim.ctypes.data, int(flat.shape_of_prim.max(initial=-1)) + 1
+    return record
+
+
+def lights_asked(record: NDArray[np.void]) -> int:
+    """Virtual lights that a pixel asks for in a pass with that record, 0 without."""
+    return int(min(record[0]["per_pixel"], record[0]["n"])) if "virtual" in (record.dtype.names or ()) else 0
+
+
+def film_of(settings: Settings, plan: Plan, width: int, height: int) -> Film:
+    """An empty film for the method."""
+    return WeightedFilm(width, height, settings.virtual) if plan.virtual else Film(width, height)
+
+
+def bias_of(settings: Settings) -> tuple[str, ...]:
+    """A sentence for each reason why the picture does not converge to the right one."""
+    how = settings.virtual
+    if how.estimator in PRINTED_BIAS:
+        return (PRINTED_BIAS[how.estimator],)
+    if ESTIMATORS.index(how.estimator) in (UNWEIGHTED, CLAMPED):
+        return ()
+    return {"none": (UNNORMALISED,), "per object": (FALSE_SHADOWS,)}.get(how.normalisation, ())
+
+
+def prepare_virtual(scene: OpenScene, settings: Settings) -> None:
+    """Compile what traces and weighs virtual lights, and what reads the film: of all estimators."""
+    all_of_it = {"estimator": "single step", "density": "photon map", "normalisation": "interpolated"}
+    few = settings.virtual.model_copy(update=all_of_it | {"number": 1, "photons": 1})
+    virtual_lights(scene.flat, few, settings.photons, 0, 0, lambda tasks: [task() for task in tasks])
+    film = WeightedFilm(1, 1, few)
+    film.sums[:, CHANNELS:] = 1.0
+    film.planes()

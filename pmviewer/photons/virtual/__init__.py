@@ -1,0 +1,1 @@
+"""Virtual lights: the photons that light the picture as point lights."""

@@ -1,0 +1,167 @@
+"""The virtual lights of a pass: traced in batches, thinned to the number asked for, weighed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.kernels.dimensions import VIRTUAL_SALT
+from pmviewer.kernels.random import INDEPENDENT, SOBOL
+from pmviewer.maps.search.kdtree import build_kdtree
+from pmviewer.maps.virtual_lights import (
+    COLUMNS,
+    ESTIMATORS,
+    OF_DENSITY,
+    OF_PATHS,
+    PRINTED_SINGLE,
+    SINGLE,
+    V_OPACITY,
+    V_PHI,
+    V_Q,
+)
+from pmviewer.photons.virtual.choice import as_photons, chosen, worths
+from pmviewer.photons.virtual.density import lit_areas
+from pmviewer.photons.virtual.trace import C_DROPPED, C_RAYS, C_STORED, N_COUNTS, TRACE_DTYPE, trace_virtual_lights
+from pmviewer.scene.arrays.flatten import FlatScene
+from pmviewer.settings.access import Photons, Virtual
+
+Float = NDArray[np.float32]
+Runner = Callable[[list[Callable[[], Any]]], list[Any]]
+
+BATCH = 2048
+"""Trajectories a task: fixed, so that the result does not depend on the number of threads."""
+AREAS = 128
+"""Lights a task whose areas are found."""
+SPARE = 2
+"""Trajectories for each light where nobody asks for their density: chosen among more, they are less of a family."""
+MOST = 500_000
+"""Most trajectories that passes grow to of their own accord."""
+FEWEST = 2
+"""Fewest photons of a disc that passes shrink to."""
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualLights:
+    """`rows` (n, COLUMNS) float32, see `pmviewer.maps.virtual_lights`, with power in watts and q complete but for what
+    depends on the point that is lit; `photons` (n, 6) float32 the same as photon records in units of `power_unit`;
+    `candidates` that they were chosen from, of `emitted` trajectories; `rays` cast, candidates `dropped`."""
+
+    rows: Float
+    photons: Float
+    power_unit: float
+    candidates: int
+    emitted: int
+    rays: int
+    dropped: int
+
+    @property
+    def n(self) -> int:
+        return len(self.rows)
+
+    @property
+    def bytes(self) -> int:
+        return self.rows.nbytes + self.photons.nbytes
+
+
+def trajectories(how: Virtual, index: int) -> int:
+    """Trajectories of pass `index`.
+
+    A disc of k photons blurs the density by its area, and no number of passes mends that. So both its k and its area
+    shrink: k with the cube root of the passes down to FEWEST, while the map's photons grow with it up to MOST.
+    """
+    if _grows(how):
+        return max(min(round(how.photons * (index + 1) ** (1 / 3)), max(MOST, how.photons)), SPARE * how.number)
+    return SPARE * how.number
+
+
+def neighbours(how: Virtual, index: int) -> int:
+    """Photons of the disc that tells the density in pass `index`."""
+    return max(round(how.k / (index + 1) ** (1 / 3)), min(how.k, FEWEST)) if _grows(how) else how.k
+
+
+def _first_index(how: Virtual, index: int) -> int:
+    """Trajectories of all passes before `index`."""
+    if not _grows(how):
+        return index * trajectories(how, 0)
+    return sum(trajectories(how, i) for i in range(index))
+
+
+def _grows(how: Virtual) -> bool:
+    return ESTIMATORS.index(how.estimator) == SINGLE and how.density == "photon map"
+
+
+def virtual_lights(
+    scene: FlatScene, how: Virtual, photons: Photons, seed: int, index: int, run: Runner
+) -> VirtualLights:
+    """The virtual lights of pass `index`, chosen from P candidates (`pmviewer.photons.virtual.choice`). Open scenes
+    have fewer candidates than trajectories, and may have fewer than the lights asked for."""
+    N, estimator = trajectories(how, index), ESTIMATORS.index(how.estimator)
+    record = np.zeros(1, TRACE_DTYPE)
+    sequence = SOBOL if photons.sequence == "sobol" else INDEPENDENT
+    own = (seed ^ VIRTUAL_SALT) & 0xFFFFFFFF
+    record[0] = (own, _first_index(how, index), sequence, photons.max_bounces, photons.glossy, estimator)
+    results = run([partial(_batch, scene, record, i0, min(i0 + BATCH, N)) for i0 in range(0, N, BATCH)])
+    found = np.concatenate([r[0] for r in results])
+    rows = np.concatenate([r[1] for r in results])
+    counts = sum((r[2] for r in results), np.zeros(N_COUNTS, np.int64))
+    of_map = _grows(how)
+    worth = worths(rows, estimator, scene.radius if of_map else None)
+    kept, share = chosen(worth, min(how.number, len(rows)), np.random.default_rng([own, index]).random())
+    lights = np.ascontiguousarray(rows[kept])
+    unit = scene.total_luminance / N
+    lights[:, V_PHI : V_PHI + 3] *= (unit * share)[:, None]
+    if estimator in OF_PATHS:
+        lights[:, V_Q] *= share / np.float32(N)
+    elif estimator in OF_DENSITY and len(kept):
+        thinned = np.ascontiguousarray(found[kept])
+        whole = estimator == PRINTED_SINGLE
+        areas = areas_of(scene, found if of_map else thinned, lights, neighbours(how, index), whole, run)
+        lights[:, V_Q] = areas * (share if of_map else np.float32(1.0))
+        if not whole:
+            lights[:, V_Q] *= lights[:, V_OPACITY]
+    return VirtualLights(
+        rows=lights,
+        photons=as_photons(found[kept], share),
+        power_unit=unit,
+        candidates=len(rows),
+        emitted=N,
+        rays=int(counts[C_RAYS]),
+        dropped=int(counts[C_DROPPED]),
+    )
+
+
+def areas_of(scene: FlatScene, photons: Float, lights: Float, k: int, whole: bool, run: Runner) -> Float:
+    """Area (n,) that each of the lights stands for among the photons (m, 6), which hold the lights themselves
+    (`pmviewer.photons.virtual.density`)."""
+    tree = run([lambda: build_kdtree(photons)])[0]
+    areas = np.empty(len(lights), np.float32)
+    reach = np.float32(2 * scene.radius)
+    most = max(1, min(k, len(photons) - 1))
+
+    def some(first: int) -> None:
+        last = min(first + AREAS, len(lights))
+        lit_areas(scene.record, tree.record, lights, 1, most, reach, int(whole), areas, first, last)
+
+    run([partial(some, first) for first in range(0, len(lights), AREAS)])
+    return areas
+
+
+def _batch(scene: FlatScene, record: NDArray[np.void], i0: int, i1: int) -> tuple[Float, Float, NDArray[np.int64]]:
+    """Candidates of the trajectories i0 … i1−1, resumed with fresh buffers whenever one is full."""
+    total = np.zeros(N_COUNTS, np.int64)
+    photons, lights = [], []
+    most = int(record[0]["max_bounces"])
+    while i0 < i1:
+        capacity = 5 * (i1 - i0) + 2 * most
+        found, rows = np.empty((capacity, 6), np.float32), np.zeros((capacity, COLUMNS), np.float32)
+        counts = np.zeros(N_COUNTS, np.int64)
+        i0 = trace_virtual_lights(scene.record, record, i0, i1, found, rows, counts)
+        photons.append(found[: counts[C_STORED]].copy())
+        lights.append(rows[: counts[C_STORED]].copy())
+        total += counts
+    return np.concatenate(photons), np.concatenate(lights), total

@@ -1,0 +1,1 @@
+"""Indirect light from virtual lights: connections, normalising walks, and the sums that a film keeps."""

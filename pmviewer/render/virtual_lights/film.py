@@ -1,0 +1,165 @@
+"""A film that divides weighted sums when it is looked at (R10).
+
+A pixel's light is L = (ΣF/ΣG)·Σa·c/passes, with c from ΣC and Σa by the normalisation:
+
+- per pixel: c = ΣC/Σa of the pixel;
+- interpolated: of the pixels around it on the same object, with alike normals and depths. The window shrinks with the
+  fourth root of the passes, so that its bias goes as well as the walks' noise;
+- per object: of all pixels that show the object;
+- none, and the printed forms: c = 1.
+
+Where ΣG is 0 nothing has arrived, and L is 0. What lights without a weight sent is in the planes already.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.kernels.compile.jit import kernel
+from pmviewer.maps.virtual_lights import (
+    CLAMPED,
+    ESTIMATORS,
+    PRINTED,
+    SUMS,
+    UNWEIGHTED,
+    W_A,
+    W_C,
+    W_F,
+    W_G,
+    W_INDIRECT,
+    W_LIGHTS,
+    W_LOST,
+    W_OBJECT,
+    W_SPECULAR,
+    W_SQUARES,
+    W_SUM,
+)
+from pmviewer.render.film import Film
+from pmviewer.render.planes import CHANNELS, PLANES
+from pmviewer.settings.access import Virtual
+
+TAPS = 6
+"""Pixels asked to each side of the middle; wider windows leave some out."""
+ALIKE = 0.9
+"""Least cosine between normals of pixels that share a normalisation."""
+SAME_DEPTH = 0.05
+"""Largest relative difference of their depths."""
+
+F8 = NDArray[np.float64]
+_NORMAL, _DEPTH = PLANES["normal"].start, PLANES["depth"].start
+
+
+@kernel
+def shared_sums(sums, width, height, radius, base, out):
+    """ΣA and ΣC over the pixels within `radius` of each pixel that show the same surface, out (n, 2).
+
+    sums: float64 (n, CHANNELS + SUMS); base: first column of the term's sums.
+    """
+    step = max(1, math.ceil(radius / TAPS))
+    reach = int(radius) // step
+    for y in range(height):
+        for x in range(width):
+            here = y * width + x
+            nx, ny, nz = sums[here, _NORMAL], sums[here, _NORMAL + 1], sums[here, _NORMAL + 2]
+            length, depth = math.sqrt(nx * nx + ny * ny + nz * nz), sums[here, _DEPTH]
+            out[here, 0], out[here, 1] = 0.0, 0.0
+            for j in range(-reach, reach + 1):
+                for i in range(-reach, reach + 1):
+                    u, v = x + i * step, y + j * step
+                    if u < 0 or v < 0 or u >= width or v >= height:
+                        continue
+                    there = v * width + u
+                    if there != here:
+                        if sums[there, CHANNELS + W_OBJECT] != sums[here, CHANNELS + W_OBJECT]:
+                            continue
+                        mx, my, mz = sums[there, _NORMAL], sums[there, _NORMAL + 1], sums[there, _NORMAL + 2]
+                        other = math.sqrt(mx * mx + my * my + mz * mz)
+                        if nx * mx + ny * my + nz * mz < ALIKE * length * other:
+                            continue
+                        if abs(sums[there, _DEPTH] - depth) > SAME_DEPTH * abs(depth):
+                            continue
+                    out[here, 0] += sums[there, base + W_A]
+                    out[here, 1] += sums[there, base + W_C]
+
+
+def ratio(numerator: NDArray[Any], denominator: NDArray[Any]) -> F8:
+    """Quotients, 0 where the denominator is."""
+    out = np.zeros(np.broadcast_shapes(numerator.shape, denominator.shape))
+    return np.divide(numerator, denominator, out=out, where=denominator > 0)
+
+
+class WeightedFilm(Film):
+    """The film of the method "virtual lights": SUMS columns beyond the planes, see `pmviewer.maps.virtual_lights`."""
+
+    def __init__(self, width: int, height: int, how: Virtual) -> None:
+        super().__init__(width, height, SUMS)
+        self.sums[:, CHANNELS + W_OBJECT] = -1.0
+        self.how = how
+        self.estimator = ESTIMATORS.index(how.estimator)
+
+    @property
+    def weighted(self) -> bool:
+        return self.estimator not in (UNWEIGHTED, CLAMPED)
+
+    def planes(self) -> NDArray[np.float32]:
+        """Means (height, width, CHANNELS) float32, weighted light included."""
+        planes = super().planes()
+        if self.weighted:
+            for term, base in (("indirect", W_INDIRECT), ("specular", W_SPECULAR)):
+                light = self._light(CHANNELS + base)
+                planes[..., PLANES[term]] += light.reshape(self.height, self.width, 3).astype(np.float32)
+        return planes
+
+    def _light(self, base: int) -> F8:
+        """Weighted light (n, 3) of the term whose sums begin at that column."""
+        sums = self.sums
+        if not sums[:, base + W_G].any():
+            return np.zeros((len(sums), 3))
+        scale = ratio(sums[:, base + W_A] * self.normalisation(base), sums[:, base + W_G]) / max(self.passes, 1)
+        return np.asarray(sums[:, base + W_F : base + W_F + 3] * scale[:, None])
+
+    def normalisation(self, base: int) -> F8:
+        """c (n,) of the term whose sums begin at that column."""
+        sums, how = self.sums, self.how.normalisation
+        A, C = sums[:, base + W_A], sums[:, base + W_C]
+        if self.estimator in PRINTED or how == "none":
+            return np.ones(len(sums))
+        if how == "per object":
+            numbers = sums[:, CHANNELS + W_OBJECT].astype(np.int64) + 1
+            return ratio(np.bincount(numbers, C), np.bincount(numbers, A))[numbers]
+        if how == "interpolated":
+            radius = self.how.window / max(self.passes, 1) ** 0.25
+            shared = np.empty((len(sums), 2))
+            shared_sums(sums, self.width, self.height, radius, base, shared)
+            return ratio(shared[:, 1], shared[:, 0])
+        return ratio(C, A)
+
+    @property
+    def lost(self) -> float:
+        """Share of the light from virtual lights that clamping took."""
+        total = float(self.sums[:, CHANNELS + W_SUM].sum())
+        return float(self.sums[:, CHANNELS + W_LOST].sum()) / total if total > 0 else 0.0
+
+    def views(self) -> dict[str, NDArray[np.float32]]:
+        """Planes (h, w, 1) of the diagnostic views; negative where there is nothing."""
+        sums = self.sums
+        total, n = sums[:, CHANNELS + W_SUM], sums[:, CHANNELS + W_LIGHTS]
+        variance = np.maximum(sums[:, CHANNELS + W_SQUARES] - ratio(total * total, n), 0.0)
+        made = {"virtual light error": np.where(total > 0, 100 * ratio(np.sqrt(variance), total), -1.0)}
+        if self.weighted:
+            base = np.where(sums[:, CHANNELS + W_INDIRECT + W_A] > 0, W_INDIRECT, W_SPECULAR)
+            picked = {
+                "sum of weights": [ratio(sums[:, CHANNELS + b + W_G], sums[:, CHANNELS + b + W_A]) for b in _TERMS],
+                "normalisation": [self.normalisation(CHANNELS + b) for b in _TERMS],
+            }
+            lit = (sums[:, CHANNELS + W_INDIRECT + W_A] > 0) | (sums[:, CHANNELS + W_SPECULAR + W_A] > 0)
+            for view, (whole, chained) in picked.items():
+                made[view] = np.where(lit, np.where(base == W_INDIRECT, whole, chained), -1.0)
+        return {name: view.reshape(self.height, self.width, 1).astype(np.float32) for name, view in made.items()}
+
+
+_TERMS = (W_INDIRECT, W_SPECULAR)

@@ -1,0 +1,113 @@
+"""One virtual light and one point: what the light sends there, before anybody asks whether it arrives."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pmviewer.kernels.bsdf.albedo import stored_albedo
+from pmviewer.kernels.bsdf.scattering import STORED, bsdf_at, bsdf_f
+from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import has, specialised
+from pmviewer.kernels.memory import load_f4, load_i4
+from pmviewer.kernels.scene import load3, material_of
+from pmviewer.kernels.surface import face
+from pmviewer.kernels.vector import dot, luminance, scale, sub
+from pmviewer.maps.virtual_lights import (
+    COLUMNS,
+    FULL,
+    MODIFIED,
+    V_BLOCKED,
+    V_F,
+    V_FIRST,
+    V_GAP,
+    V_LAMBERTIAN,
+    V_N,
+    V_NS,
+    V_P,
+    V_PRIM,
+    V_Q,
+    V_U,
+    V_V,
+    V_WI,
+)
+
+_f4 = np.float32
+_i8 = np.int64
+_BLACK = (_f4(0.0), _f4(0.0), _f4(0.0))
+LEAST_ALBEDO = _f4(1e-4)
+
+
+@device
+def towards(virtual, j, p):
+    """Virtual light j as seen from p: its first column, its point, normal on its lit side, gap, unit direction there
+    and squared distance (0 where p is the light itself)."""
+    row = j * COLUMNS
+    y = load3(virtual.lights, row + V_P)
+    ng = face(load3(virtual.lights, row + V_N), load3(virtual.lights, row + V_WI))
+    offset = sub(y, p)
+    distance2 = dot(offset, offset)
+    if not distance2 > _f4(0.0):
+        return row, y, ng, _f4(0.0), ng, _f4(0.0)
+    wi = scale(offset, _f4(1.0) / _f4(math.sqrt(distance2)))
+    return row, y, ng, load_f4(virtual.lights, row + V_GAP), wi, distance2
+
+
+@device
+def bsdf_of(scene, virtual, row, glossy):
+    """The BSDF at the light, as the photon found it, and the photon's direction."""
+    prim = load_i4(virtual.lights, row + V_PRIM)
+    u, v = load_f4(virtual.lights, row + V_U), load_f4(virtual.lights, row + V_V)
+    y, wi = load3(virtual.lights, row + V_P), load3(virtual.lights, row + V_WI)
+    ng, ns = load3(virtual.lights, row + V_N), load3(virtual.lights, row + V_NS)
+    return bsdf_at(scene, prim, material_of(scene, prim), u, v, y, ng, ns, wi, glossy), wi
+
+
+@specialised
+def scattered(scene, virtual, row, glossy, wo):
+    """BRDF of the light towards wo (red, green, blue), which is on its lit side, and its albedo seen from there."""
+    if not has(scene, "bsdfs"):
+
+        def plain(scene, virtual, row, glossy, wo):
+            f = load3(virtual.lights, row + V_F)
+            return f, _f4(math.pi) * luminance(f)
+
+        return plain
+
+    def any_bsdf(scene, virtual, row, glossy, wo):
+        if load_f4(virtual.lights, row + V_LAMBERTIAN) != _f4(0.0):
+            f = load3(virtual.lights, row + V_F)
+            return f, _f4(math.pi) * luminance(f)
+        b, wi = bsdf_of(scene, virtual, row, glossy)
+        f = bsdf_f(b, STORED, wi, wo)
+        return f, albedo_seen(scene, virtual, b, wo)
+
+    return any_bsdf
+
+
+@specialised
+def albedo_seen(scene, virtual, b, wo):
+    """The albedo, where an estimator asks for it."""
+    if has(virtual, "paths"):
+        return lambda scene, virtual, b, wo: stored_albedo(scene, b, wo)
+    return lambda scene, virtual, b, wo: _f4(0.0)
+
+
+@specialised
+def weight_of(virtual, row, f, albedo):
+    """q of a light that scatters f towards the point, where its albedo is `albedo`."""
+    if not has(virtual, "paths"):
+        return lambda virtual, row, f, albedo: load_f4(virtual.lights, row + V_Q)
+
+    def of_path(virtual, row, f, albedo):
+        q = load_f4(virtual.lights, row + V_Q)
+        stops = virtual.estimator == FULL or virtual.estimator == MODIFIED
+        if load_f4(virtual.lights, row + V_FIRST) != _f4(0.0):
+            return q * max(_f4(1.0) - albedo, _f4(0.0)) if stops else q
+        q *= luminance(f)
+        if load_f4(virtual.lights, row + V_BLOCKED) != _f4(0.0):
+            q /= max(albedo, LEAST_ALBEDO)
+        return q
+
+    return of_path

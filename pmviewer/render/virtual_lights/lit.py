@@ -1,0 +1,156 @@
+"""Indirect light at a surface point from the virtual lights of a pass (R10).
+
+Sums go to the film's columns beyond its planes (`pmviewer.maps.virtual_lights`) and are divided when the film is looked
+at: a mean of ratios would keep the bias of a pass for ever.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.accel.instance import find_instance
+from pmviewer.kernels.bsdf.scattering import STORED, bsdf_f, same_side, shading_normal
+from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.dimensions import VIRTUAL_SUBSET
+from pmviewer.kernels.memory import load_i4
+from pmviewer.kernels.random import draw1
+from pmviewer.kernels.scene import load3
+from pmviewer.kernels.surface import leave
+from pmviewer.kernels.vector import dot, is_good, luminance, mul, scale
+from pmviewer.maps.virtual_lights import (
+    CLAMPED,
+    PRINTED_FULL,
+    UNWEIGHTED,
+    V_PHI,
+    W_A,
+    W_C,
+    W_F,
+    W_G,
+    W_INDIRECT,
+    W_LIGHTS,
+    W_LOST,
+    W_OBJECT,
+    W_SPECULAR,
+    W_SQUARES,
+    W_SUM,
+)
+from pmviewer.render.direct.direct import visible
+from pmviewer.render.pixel import INDIRECT, SPECULAR
+from pmviewer.render.planes import CHANNELS
+from pmviewer.render.record import C_DROPPED, C_RAYS, C_SHADOW_RAYS
+from pmviewer.render.virtual_lights.light import scattered, towards, weight_of
+from pmviewer.render.virtual_lights.walk import normalisation
+
+_f4 = np.float32
+_f8 = np.float64
+_i8 = np.int64
+_BLACK = (_f4(0.0), _f4(0.0), _f4(0.0))
+
+
+@specialised
+def virtual_light(given, si, beta, pixel, whole):
+    """Adds the light from virtual lights by the STORED lobes of a surface to the film. `whole`: at the camera ray's own
+    surface. Without virtual lights nothing is compiled."""
+    if has(part(given, "virtual"), "none"):
+        return lambda given, si, beta, pixel, whole: None
+
+    def lit(given, si, beta, pixel, whole):
+        from_virtual_lights(given, si, beta, pixel, whole)
+
+    return lit
+
+
+@device
+def _one(given, si, j):
+    """Virtual light j at the surface before visibility: reflected radiance F, its weight G, the geometry term, the
+    direction and the end of the shadow ray. F is black where nothing can arrive."""
+    scene, virtual, b = given.scene, given.virtual, si.bsdf
+    row, y, ny, gap, wi, distance2 = towards(virtual, j, si.p)
+    facing = -dot(ny, wi)
+    nothing = (_BLACK, _f4(0.0), _f4(0.0), wi, y)
+    if not (distance2 > _f4(0.0) and facing > _f4(0.0)) or same_side(b, STORED, si.ng, si.wo, wi) == 0:
+        return nothing
+    cos = abs(dot(shading_normal(b), wi))
+    f = bsdf_f(b, STORED, si.wo, wi)
+    if not (luminance(f) > _f4(0.0) and cos > _f4(0.0)):
+        return nothing
+    wo = (-wi[0], -wi[1], -wi[2])
+    geometry = cos * facing / distance2
+    f_y, albedo = scattered(scene, virtual, row, given.eye.glossy, wo)
+    F = scale(mul(mul(f, f_y), load3(virtual.lights, row + V_PHI)), geometry)
+    G = luminance(f) * geometry * weight_of(virtual, row, f_y, albedo)
+    return F, G, geometry, wi, leave(y, ny, gap, wo[0], wo[1], wo[2])
+
+
+@device
+def from_virtual_lights(given, si, beta, pixel, whole):
+    """See `virtual_light`."""
+    scene, eye, virtual, film, counts = given.scene, given.eye, given.virtual, pixel.film, pixel.counts
+    weighted = virtual.estimator != UNWEIGHTED and virtual.estimator != CLAMPED
+    n, m = virtual.n, min(virtual.per_pixel, virtual.n)
+    start = _f4(0.0)
+    if m < n:
+        start = draw1(eye.sequence, pixel.seed, eye.index, VIRTUAL_SUBSET)
+    each = _f4(n) / _f4(max(m, _i8(1)))
+    base = CHANNELS + (W_INDIRECT if whole else W_SPECULAR)
+    plane = _i8(INDIRECT if whole else SPECULAR)
+    throughput = luminance(beta)
+    for i in range(m):
+        j = _i8(i)
+        if m < n:
+            j = min(_i8((_f8(i) + _f8(start)) * _f8(each)), n - 1)
+        F, G, geometry, wi, end = _one(given, si, j)
+        if not (F[0] + F[1] + F[2] > _f4(0.0) or _f4(0.0) < G):
+            continue
+        counts[C_RAYS] += 1
+        counts[C_SHADOW_RAYS] += 1
+        if not visible(scene, si.p, si.ng, si.gap, wi, end):
+            continue
+        F = scale(mul(beta, F), each)
+        if not (is_good(F) and _f4(np.inf) > G):
+            counts[C_DROPPED] += 1
+            continue
+        Y = _f8(luminance(F))
+        film[pixel.number, CHANNELS + W_SUM] += Y
+        film[pixel.number, CHANNELS + W_SQUARES] += Y * Y
+        if virtual.estimator == CLAMPED and geometry > virtual.clamp:
+            F = scale(F, virtual.clamp / geometry)
+            film[pixel.number, CHANNELS + W_LOST] += Y - _f8(luminance(F))
+        target = _i8(plane)
+        if weighted and _f4(0.0) < G:
+            target = _i8(base + W_F)
+            film[pixel.number, base + W_G] += _f8(throughput * each * G)
+        film[pixel.number, target] += _f8(F[0])
+        film[pixel.number, target + 1] += _f8(F[1])
+        film[pixel.number, target + 2] += _f8(F[2])
+    film[pixel.number, CHANNELS + W_LIGHTS] += _f8(m)
+    if weighted:
+        albedo, counted = normalisation(given, si, pixel)
+        if virtual.estimator == PRINTED_FULL:
+            albedo = _f4(1.0)
+        film[pixel.number, base + W_A] += _f8(throughput * albedo)
+        film[pixel.number, base + W_C] += _f8(throughput * counted)
+
+
+@specialised
+def note_object(given, prim, pixel):
+    """Notes the object of the primitive that the camera ray met, for a normalisation by object: the shape, or the
+    instance."""
+    if has(part(given, "virtual"), "none"):
+        return lambda given, prim, pixel: None
+    if has(part(given, "scene"), "instances"):
+
+        def instanced(given, prim, pixel):
+            if prim < given.scene.n_stored:
+                number = _i8(load_i4(given.virtual.objects, prim))
+            else:
+                number = given.virtual.n_objects + find_instance(given.scene, prim)
+            pixel.film[pixel.number, CHANNELS + W_OBJECT] = _f8(number)
+
+        return instanced
+
+    def stored(given, prim, pixel):
+        pixel.film[pixel.number, CHANNELS + W_OBJECT] = _f8(load_i4(given.virtual.objects, prim))
+
+    return stored

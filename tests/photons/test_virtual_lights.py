@@ -1,0 +1,120 @@
+"""Virtual lights as they are traced, chosen and weighed (R10)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pmviewer.engine.opened import open_scene
+from pmviewer.kernels.lights.start import spread_over
+from pmviewer.maps.record import unpack
+from pmviewer.maps.virtual_lights import V_P, V_PHI, V_Q
+from pmviewer.photons.virtual.choice import as_photons, chosen
+from pmviewer.photons.virtual.lights import neighbours, trajectories, virtual_lights
+from pmviewer.scene.description import SpotLight
+from pmviewer.settings.access import Photons, Virtual
+from tests.support.device import from_python
+from tests.support.scenes import closed_sphere, diffuse_box, light_scene
+
+
+def serial(tasks):
+    return [task() for task in tasks]
+
+
+def made(scene, index=0, sequence="independent", **values):
+    how = Virtual(**{"photons": 4000, **values})
+    return virtual_lights(open_scene(scene).flat, how, Photons(sequence=sequence), 1, index, serial)
+
+
+@pytest.mark.parametrize("density", ["photon map", "virtual lights"])
+@pytest.mark.parametrize("k", [2, 16])
+def test_areas_of_the_lights_add_up_to_that_of_the_surface(density, k):
+    """Curved, with photons everywhere alike: 4π; flat and with edges, under a panel: the six walls and the panel's own
+    back, less than a strip of which is dark."""
+    areas = [made(closed_sphere(), i, number=1000, k=k, density=density).rows[:, V_Q].sum() for i in range(6)]
+    assert np.mean(areas) == pytest.approx(4 * np.pi, rel=0.04)
+    box = diffuse_box()
+    areas = [made(box, i, number=2000, k=k, density=density).rows for i in range(6)]
+    floor = [rows[rows[:, V_P + 1] < -1 + 1e-4, V_Q].sum() for rows in areas]
+    assert np.mean(floor) == pytest.approx(4.0, rel=0.06)
+
+
+@pytest.mark.parametrize("estimator", ["unweighted", "single step", "full path", "printed single step"])
+def test_power_of_the_lights_is_what_arrives_on_surfaces(estimator):
+    """In a closed box of albedo ½ twice the power of the light arrives."""
+    opened = open_scene(diffuse_box())
+    total = [made(diffuse_box(), i, number=300, estimator=estimator).rows[:, V_PHI].sum() for i in range(8)]
+    assert np.mean(total) == pytest.approx(2 * opened.flat.light_power[0, 0], rel=0.05)
+
+
+def test_every_candidate_is_chosen_as_often_as_its_probability_says():
+    worth = np.array([0.4, 0.05, 0.25, 0.1, 0.2])
+    counted = np.zeros(5)
+    for start in (np.arange(2000) + 0.5) / 2000:
+        kept, share = chosen(worth, 3, start)
+        np.add.at(counted, kept, share)
+    assert counted / 2000 == pytest.approx(np.ones(5), rel=0.01)
+
+
+def test_no_candidates_and_no_power_choose_nothing():
+    kept, share = chosen(np.zeros(0), 0, 0.5)
+    assert len(kept) == len(share) == 0
+
+
+def test_photon_records_carry_the_power_of_the_lights():
+    lights = made(diffuse_box(), number=50)
+    photons = unpack(lights.photons, lights.power_unit)
+    assert photons["Phi"][:, 0] == pytest.approx(lights.rows[:, V_PHI], rel=2e-3)
+    assert photons["position"] == pytest.approx(lights.rows[:, V_P : V_P + 3])
+    doubled = as_photons(lights.photons, np.full(50, 2.0, np.float32))
+    assert unpack(doubled, lights.power_unit)["Phi"] == pytest.approx(2 * photons["Phi"], rel=1e-3)
+
+
+def test_maps_sharpen_from_pass_to_pass():
+    how = Virtual()
+    assert [trajectories(how, i) for i in (0, 7, 63)] == [20_000, 40_000, 80_000]
+    assert [neighbours(how, i) for i in (0, 7, 63, 100_000)] == [8, 4, 2, 2]
+    own = Virtual(density="virtual lights")
+    assert trajectories(own, 63) == 2 * own.number
+    assert neighbours(own, 63) == own.k
+
+
+def test_passes_have_other_lights_and_a_pass_always_the_same():
+    first, again, second = (made(diffuse_box(), i, number=40).rows for i in (0, 0, 1))
+    assert (first == again).all()
+    assert not {tuple(row[:3]) for row in first} & {tuple(row[:3]) for row in second}
+
+
+def test_an_open_scene_may_have_fewer_lights_than_asked_for():
+    lights = made(light_scene("point"), number=3000, estimator="unweighted")
+    assert 0 < lights.n < 3000
+    assert lights.n == lights.candidates
+
+
+SPOT = SpotLight("spot", (0.0, 2.0, 0.0), (0.0, -1.0, 0.0), (3.0, 3.0, 3.0), 40.0, 25.0)
+
+
+@pytest.mark.parametrize("light", ["point", "spot", "parallelogram", "disk", "sphere", "cylinder", "mesh"])
+def test_densities_of_first_segments_have_the_integral_one(light):
+    """∫ p_ω dω over all directions, by uniform ones; p_ω = distance²/spread."""
+    scene = replace(light_scene("point"), lights=(SPOT,)) if light == "spot" else light_scene(light)
+    record = open_scene(scene).flat.record
+    spread = from_python(spread_over)
+    rng = np.random.default_rng(2)
+    total, n = 0.0, 20_000
+    for d in rng.normal(size=(n, 3)):
+        d /= np.linalg.norm(d)
+        place = tuple(np.float32(rng.random(2)))
+        area = spread(record[0], 0, place, tuple(np.float32(d)), np.float32(1.0))
+        total += 1 / area if area > 0 else 0.0
+    assert 4 * np.pi * total / n == pytest.approx(1.0, rel=0.05)
+
+
+def test_light_from_outside_is_spread_over_the_disc_that_it_starts_on():
+    opened = open_scene(light_scene("environment"))
+    area = from_python(spread_over)(
+        opened.flat.record[0], 0, (np.float32(0.5),) * 2, (np.float32(0), np.float32(1), np.float32(0)), np.float32(7)
+    )
+    assert area == pytest.approx(np.pi * opened.flat.radius**2, rel=1e-5)
