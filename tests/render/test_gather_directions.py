@@ -210,7 +210,7 @@ def test_threads_change_nothing(directions, wall):
     settings = settings_of(render={"method": "gather"}, photons={"N": 20_000}, gather={"directions": directions})
     one, two = (rendered(wall, settings, 2, threads) for threads in (1, 2))
     assert np.array_equal(one.film.sums, two.film.sums)
-    assert one.light.guide_radius == two.light.guide_radius
+    assert one.latest.maps.guides.radius == two.latest.maps.guides.radius
 
 
 def test_a_single_ray_follows_the_bsdf():
