@@ -29,6 +29,7 @@ from pmviewer.maps.search.kdtree import build_kdtree
 from pmviewer.photons.deposition.depositor import prepare_rules
 from pmviewer.photons.emission.scattered import scattered_record
 from pmviewer.photons.emission.strata import STRATA_DTYPE
+from pmviewer.photons.emission.tested import prepare_weighing
 from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE, N_COUNTS, PhotonBuffers, empty_ledger, trace_photons
 from pmviewer.photons.projection.projected import NO_PROJECTION
 from pmviewer.render.eye import eye_pass
@@ -122,6 +123,7 @@ def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]
             ("light pass", np.zeros(2, STRATA_DTYPE)),
             ("light pass from surfaces", scattered_record(np.empty((0, 7), np.float32))),
         ]
+        steps.append(Step("test photons", prepare_weighing))
     steps += [
         Step(text, trace_photons, (record, light_pass, emission, 0, 0, out, None)) for text, emission in emissions
     ]

@@ -168,3 +168,9 @@ def weighed(tested: Tested, strata: Strata, factor: NDArray[np.float64], seed: i
         return work
 
     return [task(batch) for batch in tested.batches]
+
+
+def prepare_weighing() -> None:
+    """Compile what weighs test photons, by weighing none."""
+    words, codes = np.empty((0, 6), np.uint32), np.empty(0, np.uint32)
+    _weigh(words, codes, 0, np.empty(0), np.empty(0, np.int32), np.uint32(0), words, codes)
