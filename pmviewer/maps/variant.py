@@ -15,6 +15,8 @@ field            record of
 `fewest`         a grid of shadow photons (`pmviewer.maps.shadow`), and how many it takes to decide
 `cones`          a grid of photons that guide gather rays through cones
 `cells`          a grid of photons that guide gather rays by cells of the hemisphere
+`virtual`        virtual lights (`pmviewer.maps.virtual_lights`)
+`paths`          virtual lights for estimators that whole light paths weigh
 `modes`          projection maps (`pmviewer.photons.projection`)
 `strata`         strata of guided emission (`pmviewer.photons.emission.strata`)
 `scattered`      importons that are scattered on (`pmviewer.photons.emission.scattered`)
@@ -34,7 +36,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels.compile.specialise import has
 
 Estimator = Literal["disc", "hull", "differential"]
-Mark = Literal["hull", "differential", "importons", "fewest", "cones", "cells"]
+Mark = Literal["hull", "differential", "importons", "fewest", "cones", "cells", "paths"]
 
 ABSENT = np.zeros(1, np.dtype([("absent", np.int32)]))
 """Stands for what is not there: `pmviewer.kernels.compile.specialise.absent` tells it from all else."""

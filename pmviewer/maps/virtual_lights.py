@@ -29,6 +29,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pmviewer.maps.variant import ABSENT, with_mark
+
 ESTIMATORS: Sequence[str] = (
     "unweighted",
     "clamped",
@@ -72,9 +74,9 @@ VIRTUAL_DTYPE = np.dtype(
     ],
     align=True,
 )
-PATHS_DTYPE = np.dtype([("paths", "i4"), *[(name, kind[0]) for name, kind in VIRTUAL_DTYPE.fields.items()]], align=True)  # type: ignore[union-attr]
+PATHS_DTYPE = with_mark(VIRTUAL_DTYPE, "paths")
 """Of estimators that whole light paths weigh: their walks alone compile emission."""
-NO_VIRTUAL = np.zeros(1, np.dtype([("none", np.int32)]))
+NO_VIRTUAL = ABSENT
 """Stands for virtual lights where there are none."""
 
 SUMS = 17

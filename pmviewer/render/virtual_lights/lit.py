@@ -11,7 +11,7 @@ import numpy as np
 from pmviewer.kernels.accel.instance import find_instance
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_f, same_side, shading_normal
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.dimensions import VIRTUAL_SUBSET
 from pmviewer.kernels.memory import load_i4
 from pmviewer.kernels.random import draw1
@@ -52,7 +52,7 @@ _BLACK = (_f4(0.0), _f4(0.0), _f4(0.0))
 def virtual_light(given, si, beta, pixel, whole):
     """Adds the light from virtual lights by the STORED lobes of a surface to the film. `whole`: at the camera ray's own
     surface. Without virtual lights nothing is compiled."""
-    if has(part(given, "virtual"), "none"):
+    if absent(part(given, "virtual")):
         return lambda given, si, beta, pixel, whole: None
 
     def lit(given, si, beta, pixel, whole):
@@ -137,7 +137,7 @@ def from_virtual_lights(given, si, beta, pixel, whole):
 def note_object(given, prim, pixel):
     """Notes the object of the primitive that the camera ray met, for a normalisation by object: the shape, or the
     instance."""
-    if has(part(given, "virtual"), "none"):
+    if absent(part(given, "virtual")):
         return lambda given, prim, pixel: None
     if has(part(given, "scene"), "instances"):
 
