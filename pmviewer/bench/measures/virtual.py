@@ -143,7 +143,16 @@ def measured(lab: Lab, name: str) -> tuple[list[list[str | float | int]], list[T
             off = lab.errors(lab.lit(how, effort.passes, 1)[0])[2]
         found[estimator] = error, percentile, timed, off
         plain = found["unweighted"]
-        cells = [error, error / plain[0], percentile, f"{fewer:+.2f}", f"{bias:+.2f}", passes, timed, timed / plain[2]]
+        cells: list[str | float | int] = [
+            error,
+            error / plain[0],
+            percentile,
+            f"{fewer:+.2f}",
+            f"{bias:+.2f}",
+            passes,
+            timed,
+            timed / plain[2],
+        ]
         rows.append([name, estimator, seconds, *cells, f"{off:+.2f}" if np.isfinite(off) else "–"])
     return rows, targets_of(found, name)
 

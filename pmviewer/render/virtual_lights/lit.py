@@ -119,7 +119,7 @@ def from_virtual_lights(given, si, beta, pixel, whole):
             film[pixel.number, CHANNELS + W_LOST] += Y - _f8(luminance(F))
         target = plane
         if weighted and _f4(0.0) < G:
-            target = base + W_F
+            target = _i8(base + W_F)
             film[pixel.number, base + W_G] += _f8(throughput * each * G)
         film[pixel.number, target] += _f8(F[0])
         film[pixel.number, target + 1] += _f8(F[1])
