@@ -43,6 +43,7 @@ STRUCTURAL = {
     "importance.deposition",
     "importance.convergence",
     "importance.emission",
+    "virtual.estimator",
 }
 """Settings that kernels are compiled for."""
 MOST = {
@@ -59,6 +60,11 @@ MOST = {
     "gather.cache_samples": 16,
     "render.outline_rays": 8,
     "render.max_depth": 100,
+    "virtual.number": 100,
+    "virtual.per_pixel": 100,
+    "virtual.photons": 1000,
+    "virtual.walks": 8,
+    "virtual.window": 8.0,
 }
 """Upper ends where the schema's only cost time."""
 
@@ -81,6 +87,8 @@ STRUCTURES: dict[str, dict[str, Any]] = PLAIN | {
     "secondary": {"render.method": "gather", "gather.secondary": 2.0},
     "irradiance cache": {"render.method": "gather", "gather.cache": "on"},
     "shadow photons": {"direct.shadow_photons": True},
+    "virtual lights": {"render.method": "virtual lights"},
+    "virtual lights, paths": {"render.method": "virtual lights", "virtual.estimator": "every vertex"},
     "Keller-Wald": {**_IMPORTANCE, "importance.deposition": "Keller-Wald"},
     "density control": {**_IMPORTANCE, "importance.deposition": "density control", "importance.convergence": "cube"},
     "constant density": {"importance.deposition": "constant density"},
