@@ -78,7 +78,7 @@ class Pose(Protocol):
 
     @property
     def fov(self) -> float:
-        """Vertical angle in degrees, of perspective alone."""
+        """Horizontal angle of view in degrees, of perspective alone."""
 
     @property
     def projection(self) -> str:
