@@ -118,3 +118,70 @@ def test_files_have_a_size_to_be_read():
     lines = {str(file.relative_to(PACKAGE)): file.read_bytes().count(b"\n") for file in PACKAGE.rglob("*.py")}
     assert {name: n for name, n in lines.items() if n > LONGEST_FILE} == {}
     assert statistics.median(lines.values()) <= MEDIAN_FILE
+
+
+def undocumented(trees: dict[str, ast.Module]) -> set[str]:
+    """Public functions, methods and classes without a docstring. Public is what no underscore begins, at the top of a
+    module or in a public class. A method that overrides one that a base class of the package documents is documented
+    there; setters by their property."""
+    classes: dict[str, list[ast.ClassDef]] = {}
+    for tree in trees.values():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                classes.setdefault(node.name, []).append(node)
+
+    def bases(owner: ast.ClassDef) -> Iterator[ast.ClassDef]:
+        for base in owner.bases:
+            base = base.value if isinstance(base, ast.Subscript) else base
+            name = base.attr if isinstance(base, ast.Attribute) else getattr(base, "id", "")
+            for found in classes.get(name, []):
+                if found is not owner:
+                    yield found
+                    yield from bases(found)
+
+    def is_inherited(name: str, owner: ast.ClassDef) -> bool:
+        return any(
+            isinstance(node, ast.FunctionDef) and node.name == name and ast.get_docstring(node)
+            for base in bases(owner)
+            for node in base.body
+        )
+
+    def missing(body: list[ast.stmt], where: str, owner: ast.ClassDef | None = None) -> Iterator[str]:
+        for node in body:
+            if isinstance(node, ast.If | ast.Try):
+                yield from missing([*node.body, *node.orelse], where, owner)
+            if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef) or node.name[0] == "_":
+                continue
+            is_setter = any(isinstance(d, ast.Attribute) and d.attr == "setter" for d in node.decorator_list)
+            if not (ast.get_docstring(node) or is_setter or (owner and is_inherited(node.name, owner))):
+                yield f"{where}.{node.name}"
+            if isinstance(node, ast.ClassDef):
+                yield from missing(node.body, f"{where}.{node.name}", node)
+
+    return {name for module, tree in trees.items() for name in missing(tree.body, module)}
+
+
+def test_undocumented_is_found():
+    """Of the check itself."""
+    tree = ast.parse("""
+class Base:
+    "A base."
+    def said(self): "What it is for."
+    def unsaid(self): ...
+class Child(Base):
+    "Its child."
+    def said(self): ...
+    def unsaid(self): ...
+    def _private(self): ...
+class _Hidden:
+    def hidden(self): ...
+def plain(): ...
+def said():
+    "Documented."
+    def inner(): ...
+""")
+    assert undocumented({"m": tree}) == {"m.Base.unsaid", "m.Child.unsaid", "m.plain"}
+
+
+def test_everything_public_is_documented():
+    assert undocumented(modules()) == set()

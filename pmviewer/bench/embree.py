@@ -67,6 +67,7 @@ class EmbreeScene:
         self.occluded1 = ctypes.cast(library.rtcOccluded1, pointer).value
 
     def close(self) -> None:
+        """Free the scene and the device, which the library holds outside of Python's memory."""
         self._library.rtcReleaseScene(self.scene)
         self._library.rtcReleaseDevice(self._device)
 

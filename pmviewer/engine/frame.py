@@ -79,6 +79,7 @@ class Statistics:
 
     @property
     def rays_per_second(self) -> float:
+        """By wall clock; 0 before anything was rendered."""
         return self.rays / self.seconds if self.seconds > 0 else 0.0
 
 

@@ -34,5 +34,6 @@ class StageStore:
         return value
 
     def clear(self) -> None:
+        """Forget all results."""
         self._entries.clear()
         self.bytes = 0

@@ -59,6 +59,7 @@ class Traced:
 
     @property
     def bytes(self) -> int:
+        """Of both maps, for the stage store."""
         return self.caustic.bytes + self.global_.bytes
 
 

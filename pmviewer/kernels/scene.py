@@ -157,11 +157,13 @@ def load3(address, index):
 
 @device
 def material_of(scene, prim):
+    """Number of the material; for a primitive of an instance, that of the stored one."""
     return np.int64(load_i4(scene.prim_material, stored_prim(scene, prim)))
 
 
 @device
 def light_of(scene, prim):
+    """Number of the light that the primitive is, −1 for none; primitives of instances are none."""
     if not is_own(scene, prim):
         return np.int64(-1)
     return np.int64(load_i4(scene.prim_light, np.int64(prim)))
@@ -169,34 +171,41 @@ def light_of(scene, prim):
 
 @device
 def material_kind(scene, material):
+    """DIFFUSE, CONDUCTOR, … of `pmviewer.kernels.scene`."""
     return np.int32(load_f4(scene.materials, material * MATERIAL_COLUMNS + M_KIND))
 
 
 @device
 def material_two_sided(scene, material):
+    """Whether the back scatters as the front does; else it is black."""
     return load_f4(scene.materials, material * MATERIAL_COLUMNS + M_TWO_SIDED) != _f4(0.0)
 
 
 @device
 def material_eta(scene, material):
+    """Index of the inside relative to the outside."""
     return load_f4(scene.materials, material * MATERIAL_COLUMNS + M_ETA)
 
 
 @device
 def reflectance(scene, material):
+    """(red, green, blue) without textures, see `pmviewer.kernels.bsdf.material_textures`."""
     return load3(scene.materials, material * MATERIAL_COLUMNS + M_REFLECTANCE)
 
 
 @device
 def transmittance(scene, material):
+    """(red, green, blue) of light that goes through glass."""
     return load3(scene.materials, material * MATERIAL_COLUMNS + M_TRANSMITTANCE)
 
 
 @device
 def light_number(scene, light, column):
+    """A float32 of a light's row; `column` is one of the L_ names."""
     return load_f4(scene.lights, light * LIGHT_COLUMNS + column)
 
 
 @device
 def light_vector(scene, light, column):
+    """Three float32 of a light's row from `column` on."""
     return load3(scene.lights, light * LIGHT_COLUMNS + column)

@@ -13,21 +13,25 @@ _f4 = np.float32
 
 @device
 def dot(a, b):
+    """Scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @device
 def cross(a, b):
+    """Vector product, right-handed."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @device
 def add(a, b):
+    """a + b"""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @device
 def sub(a, b):
+    """a − b"""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
@@ -39,6 +43,7 @@ def mul(a, b):
 
 @device
 def scale(a, s):
+    """s·a"""
     return a[0] * s, a[1] * s, a[2] * s
 
 
@@ -50,6 +55,7 @@ def along(a, b, s):
 
 @device
 def normalize(a):
+    """Unit vector along a; NaN for zero."""
     s = _f4(1.0) / _f4(math.sqrt(dot(a, a)))
     return a[0] * s, a[1] * s, a[2] * s
 
@@ -62,6 +68,7 @@ def luminance(c):
 
 @device
 def largest(c):
+    """Of three components."""
     return max(c[0], max(c[1], c[2]))
 
 

@@ -90,6 +90,8 @@ class Converged:
 
     @property
     def done(self) -> bool:
+        """Whether no more caustic photons are needed: enough have arrived to tell, and hardly any power lies where more
+        are."""
         return self.photons >= FEWEST and self.more <= UNFINISHED
 
 

@@ -81,10 +81,12 @@ class IrradianceCache:
 
     @property
     def n(self) -> int:
+        """Of records."""
         return len(self.rows)
 
     @property
     def bytes(self) -> int:
+        """Of records and of the index by which they are found."""
         return self.rows.nbytes + self.starts.nbytes + self.entries.nbytes + self.record.nbytes
 
 

@@ -68,14 +68,17 @@ class RadianceMap:
 
     @property
     def n(self) -> int:
+        """Places that can hold an irradiance, whether or not a ray has asked for it."""
         return self.grid.n
 
     @property
     def bytes(self) -> int:
+        """Irradiances included: they lie in the grid's own rows."""
         return self.grid.bytes
 
     @property
     def record(self) -> NDArray[np.void]:
+        """The grid's, for kernels; valid while this object lives."""
         return self.grid.record
 
     def known(self) -> NDArray[np.float32]:

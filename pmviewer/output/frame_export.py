@@ -29,58 +29,99 @@ class Counts(Protocol):
     """What an exporter reads of `pmviewer.engine.frame.Statistics`."""
 
     @property
-    def passes(self) -> int: ...
+    def passes(self) -> int:
+        """In the film."""
+
     @property
-    def emitted(self) -> int: ...
+    def emitted(self) -> int:
+        """Trajectories of all passes."""
+
     @property
-    def stored(self) -> Mapping[str, int]: ...
+    def stored(self) -> Mapping[str, int]:
+        """Photons of all passes by map."""
+
     @property
-    def radius(self) -> Mapping[str, float]: ...
+    def radius(self) -> Mapping[str, float]:
+        """Of look-ups in the latest pass by map, in scene units."""
+
     @property
-    def rays(self) -> int: ...
+    def rays(self) -> int:
+        """All that were cast, shadow rays included."""
+
     @property
-    def seconds(self) -> float: ...
+    def seconds(self) -> float:
+        """Rendering time without pauses, by wall clock."""
+
     @property
-    def cpu_seconds(self) -> float: ...
+    def cpu_seconds(self) -> float:
+        """Of all passes, summed over threads."""
+
     @property
-    def dropped(self) -> Mapping[str, int]: ...
+    def dropped(self) -> Mapping[str, int]:
+        """Samples that were not finite or negative, by where they arose."""
 
 
 class Pose(Protocol):
     """What an exporter reads of `pmviewer.render.camera.CameraPose`."""
 
     @property
-    def origin(self) -> tuple[float, float, float]: ...
+    def origin(self) -> tuple[float, float, float]:
+        """World coordinates of the eye."""
+
     @property
-    def target(self) -> tuple[float, float, float]: ...
+    def target(self) -> tuple[float, float, float]:
+        """World coordinates of the point that is looked at, in the middle of an unshifted picture."""
+
     @property
-    def up(self) -> tuple[float, float, float]: ...
+    def up(self) -> tuple[float, float, float]:
+        """Direction that points up in the picture; need not be perpendicular to the view."""
+
     @property
-    def fov(self) -> float: ...
+    def fov(self) -> float:
+        """Horizontal angle of view in degrees, of perspective alone."""
+
     @property
-    def projection(self) -> str: ...
+    def projection(self) -> str:
+        """ "perspective" or "orthographic"."""
+
     @property
-    def view_width(self) -> float: ...
+    def view_width(self) -> float:
+        """Width of the picture in scene units, of orthographic alone."""
+
     @property
-    def shift(self) -> tuple[float, float]: ...
+    def shift(self) -> tuple[float, float]:
+        """Of the picture on the film, in widths and heights."""
 
 
 class Exportable(Protocol):
     """What an exporter reads of `pmviewer.engine.frame.Frame`."""
 
     @property
-    def settings(self) -> Settings: ...
+    def settings(self) -> Settings:
+        """Those that the frame was made with."""
+
     @property
-    def statistics(self) -> Counts: ...
+    def statistics(self) -> Counts:
+        """Up to this frame's pass."""
+
     @property
-    def camera(self) -> Pose: ...
+    def camera(self) -> Pose:
+        """Through which the picture is seen, the free camera where it is on."""
+
     @property
-    def scene_name(self) -> str: ...
+    def scene_name(self) -> str:
+        """For titles."""
+
     @property
-    def exposure(self) -> float: ...
+    def exposure(self) -> float:
+        """In stops, as the display resolved it."""
+
     @property
-    def diagnostics(self) -> Mapping[str, NDArray[np.float32]]: ...
-    def image(self, view: str = ...) -> NDArray[np.float32]: ...
+    def diagnostics(self) -> Mapping[str, NDArray[np.float32]]:
+        """Planes of diagnostic views that the frame holds, (h, w, c) by view."""
+
+    def image(self, view: str = ...) -> NDArray[np.float32]:
+        """A layer of `LAYERS` or a plane of `diagnostics`, (h, w, c) float32; the image without a name."""
 
 
 def frame_layers(frame: Exportable) -> dict[str, NDArray[np.float32]]:
@@ -169,9 +210,14 @@ def write_frame_png(
 class Pair(Protocol):
     """What an exporter reads of `pmviewer.engine.comparison.importance_gain.Gain`."""
 
-    def frames(self) -> tuple[Exportable, Exportable]: ...
-    def table(self) -> list[tuple[str, str, str, str]]: ...
-    def sentences(self) -> list[str]: ...
+    def frames(self) -> tuple[Exportable, Exportable]:
+        """With importance and without."""
+
+    def table(self) -> list[tuple[str, str, str, str]]:
+        """Rows of text: what, with importance, without, the latter over the former; their heading first."""
+
+    def sentences(self) -> list[str]:
+        """What the errors are against, and what to know besides."""
 
 
 def gain_sheet(pair: Pair, display: Display | None = None) -> NDArray[np.uint8]:

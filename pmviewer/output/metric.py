@@ -135,6 +135,7 @@ class ZTest:
     p_value: float
 
     def passes(self, significance: float = 0.01) -> bool:
+        """Whether equal expectation isn't refuted at this level: `significance` is the share of false alarms."""
         return self.p_value > significance
 
 

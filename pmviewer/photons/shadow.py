@@ -50,6 +50,7 @@ class ShadowPhotons:
 
     @property
     def bytes(self) -> int:
+        """Of the photons, without their grid."""
         return self.photons.nbytes
 
 

@@ -57,14 +57,17 @@ class CameraPose:
 
     @property
     def orthographic(self) -> bool:
+        """Rays are parallel and start on a plane."""
         return self.projection == "orthographic"
 
     @property
     def shift_x(self) -> float:
+        """In widths of the picture."""
         return self.shift[0]
 
     @property
     def shift_y(self) -> float:
+        """In heights of the picture."""
         return self.shift[1]
 
     def half_width(self) -> float:

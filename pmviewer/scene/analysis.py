@@ -41,6 +41,7 @@ class SceneTraits:
 
     @property
     def many_lights(self) -> bool:
+        """Whether direct light has a choice of lights to make."""
         return self.n_lights > 1
 
     def follows(self, glossy: float) -> bool:

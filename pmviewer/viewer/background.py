@@ -62,6 +62,7 @@ class Work:
 
     @property
     def seconds(self) -> float:
+        """Since it was started."""
         return time.monotonic() - self.started
 
     def cancel(self) -> None:

@@ -165,6 +165,7 @@ class Comparison:
         self.earlier.clear()
 
     def clear_earlier(self) -> None:
+        """Drop the curves of former settings; the current one stays."""
         self.earlier.clear()
 
     def _measure(self, frame: Frame) -> None:

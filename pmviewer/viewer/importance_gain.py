@@ -42,6 +42,7 @@ class GainRun:
 
     @property
     def running(self) -> bool:
+        """Whether a comparison is being made now."""
         return self._work is not None and self._work.running
 
     def refusal(self) -> str | None:

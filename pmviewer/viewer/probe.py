@@ -33,6 +33,7 @@ class Probe:
         self._drags = 0
 
     def make_app(self, session: Any, **arguments: Any) -> ViewerApp:
+        """The window with a stopwatch at its buffer swaps; it idles as usual for `start` alone."""
         app = ViewerApp(session, remember=False, **arguments)
         app.params.callbacks.after_swap = self._after_swap
         app.params.fps_idling.enable_idling = self.mode == "start"
@@ -70,6 +71,7 @@ class Probe:
 
 
 def main(arguments: list[str]) -> int:
+    """Run the window on `[scene, mode, seconds]`, print the times; the window's exit status."""
     scene, mode, seconds = arguments[0], arguments[1], float(arguments[2]) if len(arguments) > 2 else 0.0
     probe = Probe(mode, seconds)
     settings = with_values(Settings(), {"camera.width": SIZE, "camera.height": SIZE})

@@ -24,44 +24,86 @@ class SessionLike(Protocol):
     on_update: Callable[[], None] | None
 
     @property
-    def settings(self) -> Settings: ...
+    def settings(self) -> Settings:
+        """Those that are asked for; frames on their way may have others."""
+
     @property
-    def frame(self) -> Frame | None: ...
+    def frame(self) -> Frame | None:
+        """The newest one, None before the first."""
+
     @property
-    def status(self) -> Status: ...
+    def status(self) -> Status:
+        """What goes on now."""
+
     @property
-    def scene(self) -> Scene | None: ...
+    def scene(self) -> Scene | None:
+        """The open one, None before the first is loaded."""
+
     @property
-    def scene_path(self) -> str: ...
+    def scene_path(self) -> str:
+        """What the open scene was opened by: a file or a bundled scene's name, "" for none."""
+
     @property
-    def traits(self) -> Any: ...
+    def traits(self) -> Any:
+        """`SceneTraits` of the open scene, None before it is loaded."""
+
     @property
-    def geometry(self) -> Any: ...
+    def geometry(self) -> Any:
+        """The open scene's surfaces for display, None before it is loaded."""
+
     @property
-    def opened_scene(self) -> Any: ...
+    def opened_scene(self) -> Any:
+        """The `OpenScene` with all that was derived from it, for renderers beside the session's."""
+
     @property
-    def threads(self) -> int | None: ...
+    def threads(self) -> int | None:
+        """How many the kernels run on, None while the engine is being imported."""
+
     @property
-    def paused(self) -> bool: ...
+    def paused(self) -> bool:
+        """Whether the user has paused."""
+
     @property
-    def loading(self) -> str: ...
-    def cancel_loading(self) -> None: ...
+    def loading(self) -> str:
+        """What the loader is doing, "" when nothing is being loaded."""
+
+    def cancel_loading(self) -> None:
+        """Give up the scene that is being loaded; the old one stays."""
+
     @property
-    def ahead(self) -> str: ...
-    def stop_compiling_ahead(self) -> None: ...
-    def open(
-        self, source: Any, settings: Settings | None = None, parameters: Mapping[str, str] | None = None
-    ) -> None: ...
-    def set(self, settings: Settings) -> Any: ...
-    def pause(self) -> None: ...
-    def resume(self) -> None: ...
-    def restart(self) -> None: ...
-    def inspect(self, pixel: tuple[int, int] | None) -> None: ...
-    def take_messages(self) -> list[Message]: ...
-    def close(self) -> None: ...
+    def ahead(self) -> str:
+        """What is being compiled ahead, "" when nothing is."""
+
+    def stop_compiling_ahead(self) -> None:
+        """Compile nothing ahead until something is changed."""
+
+    def open(self, source: Any, settings: Settings | None = None, parameters: Mapping[str, str] | None = None) -> None:
+        """Open a scene in the background, with other settings if given; `parameters` replace the file's defaults. A
+        failure becomes a message."""
+
+    def set(self, settings: Settings) -> Any:
+        """Use these settings from now on."""
+
+    def pause(self) -> None:
+        """Stop after the current pass."""
+
+    def resume(self) -> None:
+        """Go on after a pause."""
+
+    def restart(self) -> None:
+        """Forget the film and begin with pass 0."""
+
+    def inspect(self, pixel: tuple[int, int] | None) -> None:
+        """Frames shall hold the gather rays of this pixel (x, y) of the image, of none with None."""
+
+    def take_messages(self) -> list[Message]:
+        """Messages since the last call."""
+
+    def close(self) -> None:
+        """Stop the worker and its threads; returns when they are gone."""
 
 
-class SessionLink:
+class SessionLink(SessionLike):
     """A session that exists once `make` has returned; `make` runs on a thread of its own."""
 
     def __init__(self, make: Callable[[], SessionLike], settings: Settings | None = None) -> None:

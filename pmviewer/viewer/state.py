@@ -48,6 +48,7 @@ class Toast:
     born: float = field(default_factory=time.monotonic)
 
     def is_over(self) -> bool:
+        """Whether it has been shown for long enough."""
         return time.monotonic() - self.born > TOAST_SECONDS
 
 
@@ -104,6 +105,7 @@ class ViewerState:
 
     @property
     def settings(self) -> Settings:
+        """The session's own: what the user asked for last, whatever the frame shows."""
         return self.session.settings
 
     def change(self, values: dict[str, Any]) -> None:
@@ -243,12 +245,14 @@ class ViewerState:
         return True
 
     def move_camera(self, pose: CameraPose) -> None:
+        """Set the pose of the camera that is looked through, the free one while it is on."""
         self.last_camera_move = time.monotonic()
         group = "free_camera" if self.settings.free_camera.on else "camera"
         self.change(dict(camera_values(pose, group)))
 
     @property
     def navigating(self) -> bool:
+        """Whether the camera moved within the last 0.3 s: a drag or flight counts as one motion."""
         return time.monotonic() - self.last_camera_move < 0.3
 
     # files and messages -----------------------------------------------------------------------------------------

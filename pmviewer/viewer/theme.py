@@ -27,10 +27,12 @@ def drawable(text: str) -> str:
 
 
 def with_alpha(colour: Colour, alpha: float) -> imgui.ImVec4:
+    """The colour (r, g, b[, a] in 0 to 1) with another opacity."""
     return imgui.ImVec4(*colour[:3], alpha)
 
 
 def grey(level: float, alpha: float = 1.0) -> imgui.ImVec4:
+    """A neutral of this level, 0 black to 1 white."""
     return imgui.ImVec4(level, level, level, alpha)
 
 

@@ -29,12 +29,15 @@ class Draw:
         return int(self._rng.integers(low, high + 1))
 
     def seed(self) -> int:
+        """For whatever has a seed of its own: 0 to a million."""
         return self.integer(0, 10**6)
 
     def chance(self, p: float) -> bool:
+        """True with the probability p."""
         return bool(self._rng.uniform() < p)
 
     def pick(self, values: Sequence[T]) -> T:
+        """One of the values, each as likely."""
         return values[int(self._rng.integers(len(values)))]
 
     def some(self, values: Sequence[T], count: int) -> list[T]:
@@ -42,6 +45,7 @@ class Draw:
         return [values[int(i)] for i in self._rng.permutation(len(values))[:count]]
 
     def colour(self, low: float, high: float) -> list[float]:
+        """Three numbers (r, g, b), each uniform from `low` to `high`."""
         return [self.number(low, high) for _ in range(3)]
 
     def within(self, box: float) -> list[float]:

@@ -126,6 +126,7 @@ class Runs:
 
     @cached_property
     def seen_plainly(self) -> NDArray[np.bool_]:
+        """(h, w): as `Mitsuba.seen_plainly`, asked once."""
         return self.mitsuba.seen_plainly(self.flat_path)
 
 

@@ -58,10 +58,12 @@ class Row:
     png: str = ""
 
     def as_dict(self) -> dict[str, Any]:
+        """For JSON, as `--json` keeps it."""
         return asdict(self)
 
     @property
     def opens(self) -> bool:
+        """Whether our loader took it, in a process that lived."""
         return not (self.error or self.crash)
 
     @property

@@ -47,6 +47,7 @@ class Survey:
     missing: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
+        """For JSON, as `--json` keeps it."""
         return asdict(self)
 
 

@@ -30,6 +30,7 @@ class Case:
 
     @property
     def size(self) -> int:
+        """Bytes of all its files."""
         return sum(map(len, self.files.values()))
 
     def write(self, folder: Path) -> Path:

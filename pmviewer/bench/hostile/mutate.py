@@ -21,6 +21,7 @@ def _some(data: bytes | bytearray, chance: random.Random) -> int:
 
 
 def flip_bits(data: bytes, chance: random.Random) -> bytes:
+    """Single bits anywhere, one to forty of them."""
     out = bytearray(data)
     for _ in range(chance.choice((1, 1, 2, 8, 40))):
         if out:
@@ -29,20 +30,24 @@ def flip_bits(data: bytes, chance: random.Random) -> bytes:
 
 
 def truncate(data: bytes, chance: random.Random) -> bytes:
+    """An unfinished download: the end is missing from some byte on."""
     return data[: _some(data, chance)]
 
 
 def cut_out(data: bytes, chance: random.Random) -> bytes:
+    """Some bytes are missing in the middle, so that all behind them stand at wrong offsets."""
     at = _some(data, chance)
     return data[:at] + data[at + chance.choice((1, 4, 16, 200)) :]
 
 
 def repeat_slice(data: bytes, chance: random.Random) -> bytes:
+    """A piece stands there two, three or fifty times."""
     at, length = _some(data, chance), chance.choice((1, 4, 40, 400))
     return data[:at] + data[at : at + length] * chance.choice((2, 3, 50)) + data[at + length :]
 
 
 def insert_noise(data: bytes, chance: random.Random) -> bytes:
+    """Random bytes in the middle, up to a thousand."""
     at = _some(data, chance)
     return data[:at] + chance.randbytes(chance.choice((1, 3, 16, 1000))) + data[at:]
 
@@ -57,6 +62,7 @@ def overwrite_integer(data: bytes, chance: random.Random) -> bytes:
 
 
 def overwrite_float(data: bytes, chance: random.Random) -> bytes:
+    """Four bytes become a float32 that nobody expects: NaN, an infinity, the largest or the smallest there is."""
     if len(data) < 4:
         return data + struct.pack("<f", float("nan"))
     at = chance.randrange(len(data) - 3)
@@ -64,14 +70,17 @@ def overwrite_float(data: bytes, chance: random.Random) -> bytes:
 
 
 def append_noise(data: bytes, chance: random.Random) -> bytes:
+    """Random bytes behind the end that the header tells."""
     return data + chance.randbytes(chance.choice((1, 100, 5000)))
 
 
 def empty(data: bytes, chance: random.Random) -> bytes:
+    """Nothing, or hardly more than a signature."""
     return chance.choice((b"", b"\0", b"\n", b" " * 1000, b"\xef\xbb\xbf", data[:1], data[:4], data[:12], data[:84]))
 
 
 def other_encoding(data: bytes, chance: random.Random) -> bytes:
+    """The text in another encoding or with other line ends, with zero bytes or a byte order mark."""
     text = data.decode("latin-1")
     kind = chance.choice(("utf-16", "utf-32", "utf-16-be", "utf-7", "bom", "cr", "crlf", "nul", "latin"))
     if kind == "bom":
@@ -112,6 +121,7 @@ def change_word(data: bytes, chance: random.Random) -> bytes:
 
 
 def move_lines(data: bytes, chance: random.Random) -> bytes:
+    """Lines deleted, doubled, exchanged, shuffled, or one of them twenty thousand times."""
     lines = data.split(b"\n")
     kind = chance.choice(("delete", "repeat", "swap", "shuffle", "many"))
     i, j = _some(data, chance) % len(lines), _some(data, chance) % len(lines)
@@ -129,6 +139,7 @@ def move_lines(data: bytes, chance: random.Random) -> bytes:
 
 
 def join_lines(data: bytes, chance: random.Random) -> bytes:
+    """Line ends become spaces, nothing, continuations or empty lines."""
     return data.replace(b"\n", chance.choice((b" ", b"", b"\\\n", b"\n\n\n")))
 
 

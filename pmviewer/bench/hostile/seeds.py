@@ -115,6 +115,7 @@ def ply(binary: bool) -> bytes:
 
 
 def stl(binary: bool) -> bytes:
+    """The honest mesh as STL, in text or binary."""
     if binary:
         facets = b"".join(struct.pack("<12fH", 0, 0, 1, *CORNERS[a], *CORNERS[b], *CORNERS[c], 0) for a, b, c in FACES)
         return b"honest".ljust(80, b"\0") + struct.pack("<I", len(FACES)) + facets

@@ -99,6 +99,7 @@ class Measured:
         return sum(d.discarded_power for d in self.deposited.values()) / arrived if arrived > 0 else 0.0
 
     def error(self, target: Image) -> float:
+        """Mean relMSE of the seeds' pictures against `target` (h, w, 3)."""
         return float(np.mean([relmse(image, target) for image in self.images]))
 
     def indirect_variance(self, target: Image) -> float:

@@ -60,6 +60,7 @@ class Curve:
 
     @property
     def slope(self) -> float:
+        """−1 for unbiased noise; NaN with fewer than two points in the second half."""
         half = len(self.passes) // 2
         return loglog_slope(self.passes[half:], self.error[half:]) if len(self.passes) - half > 1 else math.nan
 

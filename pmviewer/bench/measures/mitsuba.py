@@ -53,6 +53,7 @@ class Case:
 
     @property
     def source(self) -> str | Path:
+        """What to open: a file, or a bundled scene's name."""
         return self.file or self.scene
 
 

@@ -28,11 +28,13 @@ class Compiling(event.Listener):
         self.seconds, self._depth, self._since = 0.0, 0, 0.0
 
     def on_start(self, event: event.Event) -> None:
+        """Numba begins to compile a function, perhaps one that another one being compiled calls."""
         if self._depth == 0:
             self._since = time.perf_counter()
         self._depth += 1
 
     def on_end(self, event: event.Event) -> None:
+        """Only the outermost function's time is counted, which includes those that it calls."""
         self._depth -= 1
         if self._depth == 0:
             self.seconds += time.perf_counter() - self._since

@@ -116,9 +116,11 @@ class Side:
         prepare(opened, settings, pool, lambda text, share: None)
 
     def renderer(self) -> Renderer:
+        """A new one with a stage store of its own, so that every run starts from nothing."""
         return Renderer(self.opened, self.settings, self.pool, StageStore(STORE_BYTES), plan=self.plan)
 
     def picture(self) -> np.ndarray:
+        """The image (h, w, 3) after one pass."""
         renderer = self.renderer()
         renderer.step()
         return renderer.frame(0).image()

@@ -102,6 +102,7 @@ class Row:
 
     @property
     def verdict(self) -> str:
+        """What is wrong, or why nothing is: nonsense was answered in words, a bias is as stated, or the mean agrees."""
         return self.wrong or ("said" if self.case.nonsense else "biased as stated" if self.outcome.bias else "ok")
 
 

@@ -23,6 +23,7 @@ GLASS = Material("glass", "dielectric", (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), eta=1.
 
 
 def grey(albedo: float = 0.5) -> Material:
+    """Diffuse on both sides, of this reflectance in all channels."""
     return Material("grey", "diffuse", (albedo,) * 3, two_sided=True)
 
 
@@ -60,6 +61,7 @@ def box_walls(s: float = 1.0, material: int = 0) -> tuple[Shape, ...]:
 
 
 def parallelogram(corner: Vec3, u: Vec3, v: Vec3, s: float = 1.0) -> Parallelogram:
+    """From its corner along `u` and `v`, all scaled by `s` about the origin."""
     (a, b, c) = (tuple(s * float(x) for x in vector) for vector in (corner, u, v))
     return Parallelogram(a, b, c)  # type: ignore[arg-type]
 
@@ -97,6 +99,7 @@ def open_floor(
 
 
 def point(position: Vec3 = (0.0, 1.0, 0.0), intensity: RGB = (1.0, 1.0, 1.0)) -> PointLight:
+    """A point light of this radiant intensity in W/sr."""
     return PointLight("point", position, intensity)
 
 

@@ -85,6 +85,7 @@ def _radius(lab: Lab, radius: float) -> Outcome:
 
 
 def radii() -> list[Case]:
+    """Cases of `estimate.radius` from far below what finds photons to beyond the scene."""
     truth = "furnace: indirect 1/4, by geometry"
     values = (1e-7, 1e-5, 1e-3, 0.01, 0.1, 0.4, 1.0, 2.0, 10.0)
     return [

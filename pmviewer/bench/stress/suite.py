@@ -51,6 +51,7 @@ def run_cases(cases: list[Case], tell: Callable[[Row], None] | None = None) -> l
 
 
 def cells(row: Row) -> list[Cell]:
+    """A line of the table that `pmviewer bench stress` prints."""
     o = row.outcome
     measured = "" if o.value != o.value else f"{o.value:.5g} ± {o.error:.1g}"
     expected = "" if o.expected is None else f"{o.expected:.5g}"

@@ -54,6 +54,7 @@ class ImportanceMaps:
 
     @property
     def bytes(self) -> int:
+        """Of all maps, for the stage store."""
         return sum(made.bytes for made in self.maps.values())
 
     def record(self, name: str) -> NDArray[np.void]:

@@ -32,6 +32,7 @@ class ShadowMap:
 
     @property
     def bytes(self) -> int:
+        """Of photons and grid, for the stage store."""
         return self.grid.bytes + self.photons.nbytes
 
 

@@ -58,6 +58,7 @@ class VirtualMap:
 
     @property
     def bytes(self) -> int:
+        """For the stage store."""
         return self.lights.bytes
 
 

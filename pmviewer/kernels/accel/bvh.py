@@ -55,22 +55,27 @@ class Bvh:
 
     @property
     def nodes_address(self) -> int:
+        """For the scene's record, as the other addresses: kernels read the arrays through it."""
         return self.nodes.ctypes.data
 
     @property
     def blocks_address(self) -> int:
+        """Of the triangles."""
         return self.blocks.ctypes.data
 
     @property
     def quadrics_address(self) -> int:
+        """Of spheres, cylinders and disks."""
         return self.quadrics.ctypes.data
 
     @property
     def n_blocks(self) -> int:
+        """Child indices from this on are quadrics."""
         return len(self.blocks)
 
     @property
     def bytes(self) -> int:
+        """Of all three arrays."""
         return self.nodes.nbytes + self.blocks.nbytes + self.quadrics.nbytes
 
     def store(self, record: np.record) -> None:

@@ -44,16 +44,19 @@ _one = np.int64(1)
 
 @device
 def instance_number(scene, i, column):
+    """A float64 of instance i; `column` is one of the I_ names."""
     return load_f8(scene.instances, i * INSTANCE_COLUMNS + column)
 
 
 @device
 def group_of(scene, i):
+    """Number of the group that instance i is a copy of."""
     return np.int64(instance_number(scene, i, I_GROUP))
 
 
 @device
 def group_number(scene, group, column):
+    """An int64 of a group's row: addresses and counts of its own tree."""
     return load_i8(scene.groups, group * GROUP_COLUMNS + column)
 
 

@@ -28,6 +28,7 @@ SCRATCH_INTS = 3 * LANES
 
 @device
 def is_finite(ox, oy, oz, dx, dy, dz):
+    """Whether a ray can be cast at all: neither NaN nor infinity in origin and direction."""
     return abs(ox) + abs(oy) + abs(oz) + abs(dx) + abs(dy) + abs(dz) < np.float32(np.inf)
 
 

@@ -56,6 +56,7 @@ def plain_bsdf(scene, material, ng, ns, wo):
 
 @device
 def plain_f(b, group, wo, wi):
+    """Albedo over π on the side of wo; 0 for mirrors and glass, whose lobes are deltas."""
     if group != STORED or dot(b.facing, wi) <= _f4(0.0):
         return _BLACK
     return scale(b.albedo, INV_PI)
@@ -63,6 +64,7 @@ def plain_f(b, group, wo, wi):
 
 @device
 def plain_pdf(b, group, wo, wi):
+    """Cosine over π, per solid angle; 0 for deltas."""
     if group != STORED:
         return _f4(0.0)
     return max(dot(b.facing, wi), _f4(0.0)) * INV_PI
@@ -70,6 +72,7 @@ def plain_pdf(b, group, wo, wi):
 
 @device
 def plain_sample(scene, b, group, wo, u_lobe, u, v):
+    """(wi, f·|cos|/pdf, pdf, compression); the pdf of a delta is 0."""
     if group == STORED:
         local = square_to_cosine_hemisphere(u, v)
         wi = from_basis(b.facing, local[0], local[1], local[2])

@@ -140,6 +140,7 @@ def _albedo(q, cos, weights):
 
 @device
 def bsdf_transmits(b):
+    """A principled material does so by its `spec_trans`, whichever lobe is taken."""
     if _is_principled(b):
         return b.q.transmits
     return lobes.bsdf_transmits(b.one)
@@ -147,11 +148,13 @@ def bsdf_transmits(b):
 
 @device
 def bsdf_is_lambertian(b):
+    """Never of a principled material, whose diffuse lobe depends on both angles."""
     return not _is_principled(b) and lobes.bsdf_is_lambertian(b.one)
 
 
 @device
 def sees_side(b, group, ng, wo, wi):
+    """As `lobes.sees_side`, by whether the material transmits instead of by its kind."""
     if _is_principled(b) and group == FOLLOWED and b.q.transmits:
         return not b.one.p.mapped or dot(ng, wi) * dot(b.n, wi) * dot(ng, wo) * dot(b.n, wo) > _ZERO
     return lobes.sees_side(b.one, group, ng, wo, wi)
@@ -176,6 +179,7 @@ def _parts(b, group):
 
 @device
 def followed_share(b, wo):
+    """By the lobes' sampling weights, as the FOLLOWED ones may be any of four."""
     if not _is_principled(b):
         return lobes.followed_share(b.one, wo)
     if b.groups != STORED | FOLLOWED:
@@ -219,6 +223,7 @@ def _f_pdf(b, group, o, i):
 
 @device
 def bsdf_f_pdf(b, group, wo, wi):
+    """(f, pdf) of a group's lobes, per solid angle; all lobes of the group together."""
     if _is_principled(b):
         return _f_pdf(b, group, lobes.local(b.one, wo), lobes.local(b.one, wi))
     return lobes.bsdf_f_pdf(b.one, group, wo, wi)
@@ -226,16 +231,19 @@ def bsdf_f_pdf(b, group, wo, wi):
 
 @device
 def bsdf_f(b, group, wo, wi):
+    """Value of a group's lobes (red, green, blue)."""
     return bsdf_f_pdf(b, group, wo, wi)[0]
 
 
 @device
 def bsdf_pdf(b, group, wo, wi):
+    """Density per solid angle of `bsdf_sample` within the group."""
     return bsdf_f_pdf(b, group, wo, wi)[1]
 
 
 @device
 def bsdf_compression(b, wo, wi):
+    """(n_i/n_t)² on refraction, else 1: what radiance is multiplied by besides f."""
     if not _is_principled(b):
         return lobes.bsdf_compression(b.one, wo, wi)
     side = dot(b.n, wo)
@@ -268,6 +276,7 @@ def _sampled(b, group, o, u_lobe, u, v):
 
 @device
 def bsdf_sample(b, group, wo, u_lobe, u, v):
+    """(wi, f·|cos|/pdf, pdf, compression), the pdf being that of all lobes of the group; weight 0 means absorbed."""
     if not _is_principled(b):
         return lobes.bsdf_sample(b.one, group, wo, u_lobe, u, v)
     o = lobes.local(b.one, wo)

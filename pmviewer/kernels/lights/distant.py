@@ -20,6 +20,7 @@ _f4 = np.float32
 
 @device
 def distance_to_center(scene, x):
+    """Of x from the centre of the scene's bounding sphere."""
     d = (x[0] - scene.center_x, x[1] - scene.center_y, x[2] - scene.center_z)
     return _f4(math.sqrt(dot(d, d)))
 

@@ -82,6 +82,7 @@ def is_delta_light(scene, light):
 
 @device
 def light_probability(scene, light):
+    """That a photon starts at this light: its share of the power."""
     return load_f4(scene.light_cdf, light + 1) - load_f4(scene.light_cdf, light)
 
 

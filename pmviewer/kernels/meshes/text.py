@@ -23,6 +23,7 @@ def skip_blanks(data, i):
 
 @device
 def ends_line(c):
+    """Whether the byte is a line feed or a carriage return, as old files end lines by."""
     return c in (NEWLINE, RETURN)
 
 

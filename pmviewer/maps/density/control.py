@@ -235,6 +235,7 @@ class DensityControl:
 
     @property
     def stored(self) -> int:
+        """Photons in the map so far."""
         return int(self.size[2])
 
     def add(

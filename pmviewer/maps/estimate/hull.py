@@ -112,6 +112,7 @@ def _edge(hull, corners, j):
 
 @device
 def area_of(hull, corners):
+    """Area of the convex polygon of `corners` corners on the stack `hull`, by the shoelace formula about the first."""
     u0, v0 = stack_get_f4(hull, _U), stack_get_f4(hull, _V)
     twice = _f4(0.0)
     for j in range(corners):

@@ -67,10 +67,12 @@ class Importons:
 
     @property
     def n(self) -> int:
+        """Of importons."""
         return len(self.weights)
 
     @property
     def bytes(self) -> int:
+        """Of the arrays, without a tree."""
         return self.positions.nbytes + self.normals.nbytes + self.weights.nbytes + self.footprints.nbytes
 
     @staticmethod
@@ -102,10 +104,12 @@ class ImportanceMap:
 
     @property
     def n(self) -> int:
+        """Of importons."""
         return self.tree.n
 
     @property
     def bytes(self) -> int:
+        """Of the tree and what it keeps at each importon, for the stage store."""
         return self.tree.bytes + sum(a.nbytes for a in (self.reach, self.weights, self.screen, self.footprint))
 
     @property

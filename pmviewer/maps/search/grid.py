@@ -85,6 +85,7 @@ class PhotonGrid:
 
     @property
     def hashed(self) -> bool:
+        """Whether cells are found by a hash; a dense grid has an entry for each."""
         return bool(self.record["hash_mask"][0])
 
     @property

@@ -63,6 +63,7 @@ class PhotonKdTree:
 
     @property
     def n(self) -> int:
+        """Of photons."""
         return len(self.payload)
 
     @property

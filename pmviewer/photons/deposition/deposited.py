@@ -47,10 +47,12 @@ class Deposited:
 
     @property
     def rejected(self) -> int:
+        """Photons that arrived and are not in the map; their power may be."""
         return self.arrived - self.stored
 
     @property
     def saved_bytes(self) -> int:
+        """What the rejected ones would take in a map, without grid or tree."""
         return self.rejected * BYTES_PER_PHOTON
 
 

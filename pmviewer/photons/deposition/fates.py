@@ -55,10 +55,12 @@ class WatchedDepositor(Depositor):
 
     @property
     def photons(self) -> Float:
+        """(n, 6) float32: all that were judged, in their order."""
         return np.concatenate([np.empty((0, 6), np.float32), *self._arrived])
 
     @property
     def fates(self) -> NDArray[np.uint8]:
+        """(n,) uint8: what became of each."""
         return np.concatenate([np.empty(0, np.uint8), *self._fates])
 
 

@@ -63,6 +63,7 @@ class Strata:
 
     @property
     def n(self) -> int:
+        """Strata of all lights."""
         return len(self.light)
 
 

@@ -67,6 +67,7 @@ class Tested:
 
     @property
     def n(self) -> int:
+        """Test photons of the set."""
         return len(self.met)
 
 

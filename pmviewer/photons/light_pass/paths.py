@@ -39,6 +39,7 @@ class PhotonPaths:
 
     @property
     def n(self) -> int:
+        """Paths, one a trajectory."""
         return len(self.counts)
 
     @property

@@ -51,5 +51,6 @@ class PhotonMaps:
 
     @property
     def bytes(self) -> int:
+        """Of all photons and normals, for the stage store; grids and trees count for themselves."""
         arrays = self.caustic, self.global_, self.normals, self.caustic_normals, self.sample
         return sum(array.nbytes for array in arrays)

@@ -61,10 +61,12 @@ class VirtualLights:
 
     @property
     def n(self) -> int:
+        """Lights that were chosen."""
         return len(self.rows)
 
     @property
     def bytes(self) -> int:
+        """For the stage store."""
         return self.rows.nbytes + self.photons.nbytes
 
 

@@ -103,6 +103,7 @@ class WeightedFilm(Film):
 
     @property
     def weighted(self) -> bool:
+        """Whether the estimator divides sums; else the planes hold all light as it is."""
         return self.estimator not in (UNWEIGHTED, CLAMPED)
 
     def planes(self) -> NDArray[np.float32]:

@@ -106,6 +106,7 @@ class InstanceTables:
 
     @property
     def arrays(self) -> tuple[NDArray, ...]:
+        """What kernels read by address, to be kept alive as long as the record that holds the addresses."""
         return (self.rows, self.base, self.groups)
 
 

@@ -70,6 +70,8 @@ class HosekWilkie:
         self._sun = _between(_between(tables["sun_irradiance"], turbidity - 1), degrees)
 
     def radiance(self, cos_zenith: Float, gamma: Float) -> Float:
+        """(…, 3) of the sky in directions with these cosines to the zenith (below 0: the horizon's) and angles `gamma`
+        to the sun in radians."""
         a, b, c, d, e, f, g, i, h = (self._shape[:, k] for k in range(9))
         cos, gamma = np.maximum(cos_zenith, 0.0)[..., None], gamma[..., None]
         cos_gamma = np.cos(gamma)
@@ -80,6 +82,7 @@ class HosekWilkie:
         return np.maximum(shape * self._scale / CIE_Y, 0.0)
 
     def sun(self) -> Float:
+        """Irradiance (3,) on a plane that faces the sun."""
         return np.maximum(_SUN_FACTOR * rgb_of_spectrum(self._sun), 0.0)
 
 

@@ -44,6 +44,8 @@ class Preetham:
         return np.asarray((1 + a * np.exp(b / (cos + 0.01))) * (1 + c * np.exp(d * gamma) + e * np.cos(gamma) ** 2))
 
     def radiance(self, cos_zenith: Float, gamma: Float) -> Float:
+        """(…, 3) linear RGB of the sky in directions with these cosines to the zenith and angles `gamma` to the sun in
+        radians."""
         t, sun = self.turbidity, self.zenith
         chi = (4 / 9 - t / 120) * (math.pi - 2 * sun)
         bright = (4.0453 * t - 4.9710) * math.tan(chi) - 0.2155 * t + 2.4192
@@ -60,6 +62,7 @@ class Preetham:
         return np.maximum(xyz @ RGB_OF_XYZ.T, 0.0)
 
     def sun(self) -> Float:
+        """Irradiance (3,) on a plane that faces the sun: what the air lets through of the light outside it."""
         nm = SUN_NM / 1000
         beyond = 93.885 - math.degrees(self.zenith)
         mass = 1 / (math.cos(self.zenith) + 0.15 * max(beyond, 1.0) ** -1.253)

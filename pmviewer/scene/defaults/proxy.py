@@ -46,6 +46,7 @@ class Hits:
 
     @property
     def met(self) -> Bools:
+        """(n,) True for rays that hit something."""
         return self.triangle >= 0
 
 

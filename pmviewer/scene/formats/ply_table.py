@@ -35,6 +35,8 @@ class Property:
 
 @dataclass
 class Element:
+    """What the header says of one kind of rows: `count` of them, each with these properties in this order."""
+
     name: str
     count: int
     properties: list[Property] = field(default_factory=list)

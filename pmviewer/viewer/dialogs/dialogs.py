@@ -37,6 +37,7 @@ class FileDialogs:
 
     @property
     def is_open(self) -> bool:
+        """Whether a file is being asked for; only one dialog is open at a time."""
         return self._chosen is not None
 
     def open(self, title: str, name: str, patterns: list[str], chosen: Chosen) -> None:

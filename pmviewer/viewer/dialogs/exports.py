@@ -34,6 +34,9 @@ def fresh_path(path: Path) -> Path:
 
 
 class Exports:
+    """Writers of what is shown. Pixels are read in the window's thread; where a file went, or why it did not, the log
+    says."""
+
     def __init__(self, state: ViewerState, viewport: Viewport) -> None:
         self._state = state
         self._viewport = viewport

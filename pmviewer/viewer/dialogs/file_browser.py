@@ -19,6 +19,8 @@ Answer = Callable[[Path | None], None]
 
 @dataclass(frozen=True)
 class Entry:
+    """A row of the list; `size` is in bytes, 0 for folders."""
+
     name: str
     is_folder: bool
     size: int = 0

@@ -23,15 +23,18 @@ class RecentFiles:
             self.entries = [line for line in lines if line.strip()][:LENGTH]
 
     def add(self, path: str | Path) -> None:
+        """Put a file or a bundled scene's name on top, and save the list."""
         entry = str(Path(path).absolute()) if Path(path).exists() else str(path)
         self.entries = [entry, *(e for e in self.entries if e != entry)][:LENGTH]
         self._save()
 
     def remove(self, entry: str) -> None:
+        """Forget one, by the text that `entries` has, and save the list."""
         self.entries = [e for e in self.entries if e != entry]
         self._save()
 
     def clear(self) -> None:
+        """Forget all, on disk too."""
         self.entries = []
         self._save()
 

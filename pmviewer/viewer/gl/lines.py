@@ -51,6 +51,7 @@ class LineCloud:
         self._summary = EMPTY
 
     def summary(self) -> CloudSummary:
+        """Of the records uploaded last: what scales of colours and legends need."""
         return self._summary
 
     def draw(self, drawing: Drawing, colouring: Colouring, *, size: float, depth: bool, flow: bool = True) -> None:

@@ -24,6 +24,7 @@ class Surfaces:
 
     @property
     def any(self) -> bool:
+        """Whether there is something to draw: false before the first scene and for scenes without surfaces."""
         return self._array is not None
 
     def upload(self, geometry: Any) -> bool:

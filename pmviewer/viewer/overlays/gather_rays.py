@@ -42,6 +42,8 @@ def gather_lines(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]
 
 
 class GatherRays(Overlay):
+    """Rays of the pixel that was asked for with I, coloured by what each brings or by who chose its direction."""
+
     name = "gather"
     switch = Switch(imgui.Key.j, "J", "Gather rays of a pixel on or off")
 

@@ -38,6 +38,8 @@ def circles(records: NDArray[np.float32], reach: NDArray[np.float32]) -> NDArray
 
 
 class IrradianceCache(MapPoints):
+    """Points coloured by irradiance; with `circles` on, rings of the radius up to which a record is interpolated."""
+
     name = "cache"
     switch = Switch(imgui.Key.i, "Shift+I", "Irradiance cache on or off", shift=True)
     things = "Records of the irradiance cache in the latest pass"

@@ -31,6 +31,7 @@ def wrapped(text: str) -> None:
 
 
 def nothing_to_draw() -> None:
+    """The sentence that stands for a legend when an overlay has no data."""
     imgui.text_disabled("There is nothing to draw.")
 
 

@@ -51,6 +51,8 @@ def projected(camera: CameraPose, point: NDArray[np.floating]) -> tuple[float, f
 
 
 class Lights(Points):
+    """Those that have a place, coloured by their share of the picture's light or of the photons."""
+
     name = "lights"
     switch = Switch(imgui.Key.l, "L", "Importance of the lights on or off")
     things = "Lights that have a place in the scene"

@@ -71,6 +71,7 @@ class Overlay(ABC):
 
     @classmethod
     def is_shown(cls, settings: Settings) -> bool:
+        """Whether the settings ask for it; there may be nothing to draw all the same."""
         return bool(cls.style(settings).show)
 
     @classmethod

@@ -25,6 +25,7 @@ class OverlayPanel:
         self._rows = rows
 
     def gui(self) -> None:
+        """Draw the panel; called once a frame inside its window."""
         for overlay in SWITCHED:
             self._overlay(overlay)
             imgui.spacing()

@@ -33,6 +33,8 @@ def flights(paths: PhotonPaths, first: int, length: int) -> NDArray[np.float32]:
 
 
 class Paths(Overlay):
+    """From light to the end of the trajectory, `length` of them from number `first` on."""
+
     name = "paths"
     switch = Switch(imgui.Key.p, "P", "Photon paths on or off")
 

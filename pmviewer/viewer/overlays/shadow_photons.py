@@ -14,6 +14,8 @@ from pmviewer.viewer.overlays.points import MapPoints
 
 
 class ShadowPhotons(MapPoints):
+    """Photons that flew straight through the scene, lit or in shadow."""
+
     name = "shadow"
     switch = Switch(imgui.Key.c, "Shift+C", "Shadow photons on or off", shift=True)
     things = "Shadow photons, which serve all passes"

@@ -46,12 +46,15 @@ def log_limits(values: Sequence[float]) -> tuple[float, float]:
 
 
 class ErrorPanel:
+    """The tab "Error". `by_passes`: the curves are plotted against passes, not time."""
+
     def __init__(self, state: ViewerState, actions: Mapping[str, Callable[[], None]]) -> None:
         self._state = state
         self._actions = actions
         self.by_passes = False
 
     def gui(self) -> None:
+        """Draw the tab; called once a frame while it is in front."""
         comparison = self._state.comparison
         runs = [*comparison.earlier, *([comparison.current] if comparison.current else [])]
         runs = [run for run in runs if run.points]

@@ -23,6 +23,7 @@ class GainPanel:
         self._rows = rows
 
     def gui(self) -> None:
+        """Draw the tab; called once a frame while it is in front."""
         run = self._state.gain
         if imgui.begin_child("##how", (min(20 * imgui.get_font_size(), 0.42 * imgui.get_content_region_avail().x), 0)):
             self._button()

@@ -73,10 +73,13 @@ def _share(part: int, whole: int) -> str:
 
 
 class ImportancePanel:
+    """The tab "Importance"; where nothing is stored by importance, the sentence that says why."""
+
     def __init__(self, state: ViewerState) -> None:
         self._state = state
 
     def gui(self) -> None:
+        """Draw the tab; called once a frame while it is in front."""
         frame = self._state.frame
         if frame is None:
             imgui.text_disabled("Nothing rendered yet.")

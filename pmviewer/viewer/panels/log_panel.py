@@ -24,11 +24,14 @@ def line_of(message: Message) -> str:
 
 
 class LogPanel:
+    """The tab "Log". It follows the end unless the user has scrolled up."""
+
     def __init__(self, state: ViewerState) -> None:
         self._state = state
         self._seen = 0
 
     def gui(self) -> None:
+        """Draw the tab; called once a frame while it is in front."""
         log = self._state.log
         imgui.begin_disabled(not log)
         if imgui.small_button(f"{fa.ICON_FA_COPY}  Copy all"):

@@ -15,12 +15,15 @@ from pmviewer.viewer.state import ViewerState
 
 
 class Menus:
+    """Menus name actions; `actions` maps these to what they do, `panels` are the windows that "View" lists."""
+
     def __init__(self, state: ViewerState, actions: Actions, panels: tuple[str, ...]) -> None:
         self._state = state
         self._actions = actions
         self._panels = panels
 
     def gui(self) -> None:
+        """Draw the bar's menus, between imgui's begin and end of a menu bar."""
         if imgui.begin_menu("File"):
             self._file()
             imgui.end_menu()

@@ -27,6 +27,8 @@ _OPEN = ("Light pass", "Density estimate", "Method")
 
 
 class SettingsPanel:
+    """Rows for every setting of the schema but those that have a place of their own: overlays, toolbar, comparison."""
+
     def __init__(self, state: ViewerState) -> None:
         self.state = state
         self.widgets = SettingWidgets(state.refused_view, state.choices)
@@ -37,6 +39,7 @@ class SettingsPanel:
         self._groups = [(heading, list(infos)) for heading, infos in groupby(listed, key=lambda info: info.group)]
 
     def gui(self) -> None:
+        """Draw the panel; called once a frame inside its window."""
         # The groups below scroll: leave the same room beside these rows as the scroll bar takes there.
         if self.begin_rows("pinned", room=imgui.get_style().scrollbar_size):
             for path in PINNED:

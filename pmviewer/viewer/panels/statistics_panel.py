@@ -24,6 +24,7 @@ LEDGER = {
 
 
 def photon_rows(s: Statistics) -> Rows:
+    """What the light pass emitted and stored, and the memory of it."""
     rows = [("Emitted", grouped(s.emitted))]
     if s.bytes_per_photon:
         rows.append(("Memory of a photon", f"{s.bytes_per_photon:.1f} bytes"))
@@ -52,6 +53,7 @@ def energy_rows(energy: Energy) -> Rows:
 
 
 def time_rows(s: Statistics) -> Rows:
+    """Times, rays, and what the irradiance cache and shadow photons spared."""
     rows = [
         ("Passes", grouped(s.passes)),
         ("Rendering time", duration(s.seconds)),
@@ -88,6 +90,7 @@ def convergence_rows(s: Statistics) -> Rows:
 
 
 def reference_rows(point: Point) -> Rows:
+    """The errors of the pass that was last measured against the reference."""
     return [
         (f"relMSE, pass {grouped(point.passes)}", f"{point.metrics.relmse_all:.3e}"),
         ("Mean ratio", f"{point.metrics.mean_ratio:.4f}"),
@@ -95,10 +98,13 @@ def reference_rows(point: Point) -> Rows:
 
 
 class StatisticsPanel:
+    """The tab "Statistics", of the frame that is shown."""
+
     def __init__(self, state: ViewerState) -> None:
         self._state = state
 
     def gui(self) -> None:
+        """Draw the tab; called once a frame while it is in front."""
         frame = self._state.frame
         if frame is None:
             imgui.text_disabled("Nothing rendered yet.")

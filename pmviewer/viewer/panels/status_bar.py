@@ -37,6 +37,7 @@ def status_parts(state: ViewerState) -> list[str]:
 
 
 def draw_status_bar(state: ViewerState) -> None:
+    """Draw the session's state with its progress, what is being loaded, figures of the picture, and work beside it."""
     status = state.session.status
     imgui.align_text_to_frame_padding()
     colour = _COLOURS.get(status.state, theme.TEXT)

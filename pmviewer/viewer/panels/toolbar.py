@@ -38,6 +38,8 @@ class Item:
 
 
 class Toolbar:
+    """Buttons and choices; what the window has no room for is behind a button at the end."""
+
     def __init__(self, state: ViewerState, actions: Actions) -> None:
         self._state = state
         self._actions = actions

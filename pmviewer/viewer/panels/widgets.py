@@ -86,6 +86,7 @@ class SettingWidgets:
         return self._number(info, value, resolved, width)
 
     def start_typing(self, info: SettingInfo, value: Any) -> None:
+        """Turn this row's slider into a text field that holds the value to six digits."""
         text = f"{value}" if info.kind is int or isinstance(value, str) else f"{value:.6g}"
         self.typing = Typing(info.path, text)
 

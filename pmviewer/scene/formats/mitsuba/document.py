@@ -70,9 +70,11 @@ class Document:
             todo += reversed(element.children)
 
     def error(self, what: str, element: Element, hint: str = "") -> SceneError:
+        """To be raised: what is wrong with this element, its file and line, and what to do about it."""
         return self.diagnostics.error(what, element.line, hint, element.file)
 
     def warn(self, sentence: str, element: Element, kind: str | None = None) -> None:
+        """Say a sentence with the element's file and line; those of one `kind` are said together."""
         self.diagnostics.warn(sentence, element.line, kind, element.file)
 
     def ignore(self, element: Element, reason: str = "is not supported and was ignored") -> None:

@@ -23,6 +23,7 @@ class Film:
 
     @property
     def cropped(self) -> bool:
+        """Whether the picture is a part of the film."""
         return (self.width, self.height) != self.full
 
     def shift(self, offset: tuple[float, float]) -> tuple[float, float]:

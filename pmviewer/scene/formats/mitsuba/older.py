@@ -41,6 +41,7 @@ def phong(p: Properties, name: str) -> Material:
 
 
 def rough_diffuse(p: Properties, name: str) -> Material:
+    """`roughdiffuse`, Oren and Nayar's model, as plain diffuse, with a sentence."""
     p.known("alpha", "use_fast_approx")
     _near(p, "an even diffuse surface of its colour replaces it")
     return Material(name, "diffuse", p.bounded_colour(diffuse_name(p), 0.5, 1))
@@ -70,6 +71,7 @@ def hanrahan_krueger(p: Properties, name: str) -> Material:
 
 
 def polarised_plastic(p: Properties, name: str) -> Material:
+    """`pplastic` as rough plastic, with a sentence: colours are kept, polarisation isn't."""
     _near(p, "rough plastic replaces it, light is not polarised here")
     rough = alpha(p, "alpha")
     return Material(

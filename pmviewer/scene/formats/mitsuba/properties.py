@@ -156,18 +156,23 @@ class Properties:
         return word if word in words else self._refused(name, f"expected {_or(words)}, found '{word}'", words[0])
 
     def number(self, name: str, default: float) -> float:
+        """A float; see the module for what can't be read."""
         return self._take(name, "a number", parse_float, default)
 
     def integer(self, name: str, default: int) -> int:
+        """A whole number, likewise."""
         return self._take(name, "a whole number", parse_integer, default)
 
     def boolean(self, name: str, default: bool) -> bool:
+        """ "true" or "false", likewise."""
         return self._take(name, "true or false", parse_boolean, default)
 
     def string(self, name: str, default: str) -> str:
+        """Text without the blanks around it."""
         return self._take(name, "text", str.strip, default)
 
     def point(self, name: str, default: Vec3) -> Vec3:
+        """Three numbers, or one for all three, likewise."""
         return self._take(name, "a point or vector", parse_vector, default)
 
     def tag_of(self, name: str) -> str | None:

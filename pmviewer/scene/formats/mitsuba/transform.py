@@ -19,12 +19,14 @@ _NEARLY_UNIT = 0.01
 
 
 def translation(x: float, y: float, z: float) -> Matrix:
+    """(4, 4) that moves points and leaves directions."""
     m = np.eye(4)
     m[:3, 3] = x, y, z
     return m
 
 
 def scaling(x: float, y: float, z: float) -> Matrix:
+    """(4, 4) about the origin."""
     return np.diag([x, y, z, 1.0])
 
 
