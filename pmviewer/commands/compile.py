@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pmviewer.commands.options import DEFAULT_SCENE
+from pmviewer.commands.view import DEFAULT_SCENE
 
 
 def compile_() -> None:
