@@ -9,11 +9,11 @@ from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings
+from pmviewer.settings.schema.importance import Deposit
 
 MANY_LIGHTS = 8
 """From so many lights on, the automatic choice of lights asks the photons."""
 EXPONENTS = {"off": 0, "square": 2, "cube": 3}
-Deposit = Literal["all", "Keller-Wald", "density control", "constant density"]
 Emission = Literal["off", "Peter-Pietrek", "Christensen discard", "Christensen keep"]
 UNFOUND_BY_PATHS = (
     "The path tracer finds no light that comes from a point, spot or directional light over a mirror or through glass: "
