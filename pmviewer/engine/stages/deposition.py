@@ -31,6 +31,7 @@ from pmviewer.photons.deposition.rules import (
 )
 from pmviewer.render.record import eye_record
 from pmviewer.settings.access import Settings
+from pmviewer.settings.schema.importance import WITHOUT_IMPORTANCE
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ def rules_of(
     if plan.deposition == "all":
         return Rules()
     maps = importance.latest
-    needs_importance = plan.deposition != "constant density"
+    needs_importance = plan.deposition not in WITHOUT_IMPORTANCE
     assert maps is not None or not needs_importance
     growth = (first / radii["global"]) ** 2
     seed = settings.render.seed ^ ROUNDING_SALT

@@ -8,6 +8,8 @@ from pmviewer.settings.needs import CAUSTIC_MAP, GLOBAL_MAP, IMPORTANCE, PHOTONS
 from pmviewer.settings.schema.base import Auto, Group, setting
 
 Deposit = Literal["all", "Keller-Wald", "density control", "constant density"]
+WITHOUT_IMPORTANCE = ("all", "constant density")
+"""Rules that ask no importance map."""
 OF_A_PIXEL = Need(lambda f: f.settings.importance.of == "pixel", "Only for the importance of a pixel (importance.of).")
 DEPOSITION = Need(
     lambda f: f.plan.deposition == f.settings.importance.deposition,
