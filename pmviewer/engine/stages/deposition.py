@@ -36,10 +36,10 @@ from pmviewer.settings.schema.importance import WITHOUT_IMPORTANCE
 
 @dataclass(frozen=True)
 class Rules:
-    """The pass's `deposition` for the light pass, None where all photons are stored; `key` names it in caches, () where
-    it is None; `notes` are sentences for the log; `required` are the functions of required density by map, for density
-    control. For views: `f` of Keller and Wald by map, the constant density by map where it is required (`everywhere`),
-    and the `growth` of required densities since the first pass."""
+    """The pass's `deposition` for the light pass, None where all photons are stored; `key` names it in the stage store,
+    () where it is None; `notes` are sentences for the log; `required` are the functions of required density by map, for
+    density control. For views: `f` of Keller and Wald by map, the constant density by map where it is required
+    (`everywhere`), and the `growth` of required densities since the first pass."""
 
     deposition: Deposition | None = None
     key: tuple[Any, ...] = ()
