@@ -1,5 +1,5 @@
-"""Compiling the kernels that a scene and its settings need, or loading them from the kernel cache, one visible step at a
-time.
+"""Compiling the kernels that a scene and its settings need, or loading them from the kernel cache, one visible step at
+a time.
 
 A step calls a kernel for nothing, with records of the types that the passes will use; these types are its key, so that
 none is called twice for the same.
