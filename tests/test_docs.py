@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import runpy
 from pathlib import Path
 
@@ -29,3 +30,15 @@ def test_every_picture_is_shown_and_every_shown_picture_is_there():
     text = "\n".join(path.read_text("utf-8") for path in [*DOCS.glob("*.md"), DOCS.parent / "README.md"])
     for picture in sorted((DOCS / "images").iterdir()):
         assert f"images/{picture.name})" in text, f"{picture.name} is not shown anywhere"
+
+
+NAMED = [*DOCS.glob("*.md"), DOCS.parent / "README.md"]
+
+
+@pytest.mark.parametrize("document", NAMED, ids=lambda path: path.name)
+def test_files_that_the_documentation_names_are_there(document):
+    """By their path from the repository, the package or the folder that the sentence names before."""
+    there = [f"/{p.relative_to(DOCS.parent)}" for top in ("pmviewer", "tests", "docs", "scenes") for p in
+             (DOCS.parent / top).rglob("*.py")]  # fmt: skip
+    named = set(re.findall(r"`([\w/]+\.py)\b[^`]*`", document.read_text("utf-8")))
+    assert {name for name in named if not any(path.endswith(f"/{name}") for path in there)} == set()

@@ -9,11 +9,11 @@ from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings
+from pmviewer.settings.schema.importance import WITHOUT_IMPORTANCE, Deposit
 
 MANY_LIGHTS = 8
 """From so many lights on, the automatic choice of lights asks the photons."""
 EXPONENTS = {"off": 0, "square": 2, "cube": 3}
-Deposit = Literal["all", "Keller-Wald", "density control", "constant density"]
 Emission = Literal["off", "Peter-Pietrek", "Christensen discard", "Christensen keep"]
 UNFOUND_BY_PATHS = (
     "The path tracer finds no light that comes from a point, spot or directional light over a mirror or through glass: "
@@ -113,7 +113,7 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     how = settings.importance
     if how.deposition == "all":
         plan = replace(plan, skipped=(*plan.skipped, ("deposition rules", "all photons are stored")))
-    elif how.map == "off" and how.deposition != "constant density":
+    elif how.map == "off" and how.deposition not in WITHOUT_IMPORTANCE:
         why = f"{how.deposition} needs importance, and importance.map is off"
         skipped, warning = (*plan.skipped, ("deposition rules", why)), f"All photons are stored: {why}."
         plan = replace(plan, skipped=skipped, warnings=(*plan.warnings, warning))

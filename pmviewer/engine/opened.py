@@ -33,8 +33,8 @@ def nobody(of_record: np.dtype, traits: SceneTraits) -> None:
 
 @dataclass(frozen=True)
 class OpenScene:
-    """`source` is what the user named; `uid` tells scenes apart in caches. `projections` keeps projection maps by how
-    they were asked for (`pmviewer.engine.stages.projection`)."""
+    """`source` is what the user named; `uid` tells scenes apart in stage stores. `projections` keeps projection maps by
+    how they were asked for (`pmviewer.engine.stages.projection`)."""
 
     scene: Scene
     flat: FlatScene

@@ -1,4 +1,5 @@
-"""Compiling, or loading from the cache, the kernels that a scene and its settings need, one visible step at a time.
+"""Compiling the kernels that a scene and its settings need, or loading them from the kernel cache, one visible step at
+a time.
 
 A step calls a kernel for nothing, with records of the types that the passes will use; these types are its key, so that
 none is called twice for the same.

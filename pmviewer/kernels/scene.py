@@ -104,9 +104,6 @@ SCENE_DTYPE = scene_dtype()
 # Columns are numpy integers: numba would compile an accessor anew for each literal one.
 _columns = np.arange(48, dtype=np.int64)
 
-DIFFUSE, CONDUCTOR, DIELECTRIC = 0, 1, 2
-ROUGH_CONDUCTOR, ROUGH_DIELECTRIC, THIN_DIELECTRIC, PLASTIC, ROUGH_PLASTIC, SCHLICK, WARD = range(3, 10)
-PRINCIPLED, BLEND = 10, 11
 GGX, BECKMANN = 0, 1
 MATERIAL_COLUMNS = 48
 M_KIND, M_TWO_SIDED, M_ETA, M_REFLECTANCE, M_TRANSMITTANCE = _columns[[0, 1, 2, 4, 8]]
@@ -171,7 +168,7 @@ def light_of(scene, prim):
 
 @device
 def material_kind(scene, material):
-    """DIFFUSE, CONDUCTOR, … of `pmviewer.kernels.scene`."""
+    """One of the numbers of `pmviewer.kernels.bsdf.kinds`."""
     return np.int32(load_f4(scene.materials, material * MATERIAL_COLUMNS + M_KIND))
 
 

@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.kernels.bsdf.kinds import KINDS
 from pmviewer.scene.texture import LUMINANCE as LUMINANCE
 from pmviewer.scene.texture import Texture
 
@@ -93,22 +94,6 @@ class Parallelogram:
 Geometry = Mesh | Sphere | Cylinder | Disk | Parallelogram
 
 
-MaterialKind = Literal[
-    "diffuse",
-    "conductor",
-    "dielectric",
-    "rough conductor",
-    "rough dielectric",
-    "thin dielectric",
-    "plastic",
-    "rough plastic",
-    "schlick",
-    "ward",
-    "principled",
-    "blend",
-]
-
-
 @dataclass(frozen=True)
 class Principled:
     """What a principled material has beyond the numbers of others; names and ranges are Mitsuba 3's, all from 0 to 1.
@@ -130,7 +115,8 @@ class Principled:
 class Material:
     """A BSDF. `reflectance` scales reflection (albedo of a diffuse surface or base, specular reflectance of conductors
     and dielectrics), `transmittance` scales refraction; `eta` is inside IOR over outside IOR. `two_sided` makes the
-    back of an opaque material reflect like its front; without it the back is black.
+    back of an opaque material reflect like its front; without it the back is black. Raises ValueError for a `kind`
+    that is not in `pmviewer.kernels.bsdf.kinds.KINDS`.
 
     `specular` is the colour of a coat (plastic) or of the glossy lobe (ward; schlick: at normal incidence). `alpha` is
     the roughness along the tangent and across it; for `schlick` the square root of Schlick's factor. `metal` is the
@@ -145,7 +131,7 @@ class Material:
     """
 
     name: str
-    kind: MaterialKind
+    kind: str
     reflectance: RGB = (0.5, 0.5, 0.5)
     transmittance: RGB = (1.0, 1.0, 1.0)
     eta: float = 1.5
@@ -174,6 +160,10 @@ class Material:
     mirrored_maps: bool = False
     """Seen from behind, do mapped normals turn round only across the surface, as if its picture were mirrored
     (Mitsuba's `twosided` around a map), or as a whole, as those of a thin sheet with bumps do?"""
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ValueError(f"unknown kind of material: {self.kind}")
 
     @property
     def veiled(self) -> bool:

@@ -22,7 +22,7 @@ PACKAGE = Path(__file__).resolve().parents[2]
 
 
 def run(quick: bool = False) -> BenchResult:
-    """Start the real window in processes of its own; a cold start gets an empty cache folder. `quick` leaves out the
+    """Start the real window in processes of its own; a cold start gets an empty kernel cache. `quick` leaves out the
     clicks, which take minutes to compile."""
     rows: list[list[str | float | int]] = []
     warm_window, warm_image = [], []

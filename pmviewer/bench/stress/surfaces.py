@@ -103,7 +103,7 @@ def _glass(lab: Lab, eta: float, **values: Any) -> Outcome:
 
 
 def _coated(kind: str, alpha: float) -> Material:
-    return Material("coated", kind, (0.9,) * 3, (0.9,) * 3, two_sided=True, alpha=(alpha, alpha))  # type: ignore[arg-type]
+    return Material("coated", kind, (0.9,) * 3, (0.9,) * 3, two_sided=True, alpha=(alpha, alpha))
 
 
 def _rough(lab: Lab, kind: str, alpha: float, **values: Any) -> Outcome:

@@ -34,7 +34,7 @@ Truth = tuple[NDArray[np.float32], str]
 LONGER = 4
 """Passes of the run that tells the error, over those with importance."""
 KEPT = 1 << 28
-"""Bytes that a run's cache may keep: what serves all its passes."""
+"""Bytes that a run's stage store may keep: what serves all its passes."""
 PROBE = 50_000
 """Trajectories that tell how many photons one stores without importance."""
 STEP = 1.1

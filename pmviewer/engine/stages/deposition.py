@@ -31,14 +31,15 @@ from pmviewer.photons.deposition.rules import (
 )
 from pmviewer.render.record import eye_record
 from pmviewer.settings.access import Settings
+from pmviewer.settings.schema.importance import WITHOUT_IMPORTANCE
 
 
 @dataclass(frozen=True)
 class Rules:
-    """The pass's `deposition` for the light pass, None where all photons are stored; `key` names it in caches, () where
-    it is None; `notes` are sentences for the log; `required` are the functions of required density by map, for density
-    control. For views: `f` of Keller and Wald by map, the constant density by map where it is required (`everywhere`),
-    and the `growth` of required densities since the first pass."""
+    """The pass's `deposition` for the light pass, None where all photons are stored; `key` names it in the stage store,
+    () where it is None; `notes` are sentences for the log; `required` are the functions of required density by map, for
+    density control. For views: `f` of Keller and Wald by map, the constant density by map where it is required
+    (`everywhere`), and the `growth` of required densities since the first pass."""
 
     deposition: Deposition | None = None
     key: tuple[Any, ...] = ()
@@ -62,7 +63,7 @@ def rules_of(
     if plan.deposition == "all":
         return Rules()
     maps = importance.latest
-    needs_importance = plan.deposition != "constant density"
+    needs_importance = plan.deposition not in WITHOUT_IMPORTANCE
     assert maps is not None or not needs_importance
     growth = (first / radii["global"]) ** 2
     seed = settings.render.seed ^ ROUNDING_SALT

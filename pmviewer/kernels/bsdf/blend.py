@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.kinds import BLEND, DIELECTRIC, PRINCIPLED, ROUGH_DIELECTRIC
 from pmviewer.kernels.bsdf.material import beer_lambert
 from pmviewer.kernels.bsdf.plain import FOLLOWED, NOTHING, STORED
 from pmviewer.kernels.compile.jit import device
@@ -18,9 +19,7 @@ from pmviewer.kernels.dimensions import BLEND_SALT
 from pmviewer.kernels.memory import bits_of_float, load_f4
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.scene import (
-    BLEND,
     BY_SIDE,
-    DIELECTRIC,
     M_FOLLOWS_BACK,
     M_FOLLOWS_FRONT,
     M_PART_0,
@@ -30,8 +29,6 @@ from pmviewer.kernels.scene import (
     M_WEIGHT,
     M_WEIGHT_MAP,
     MATERIAL_COLUMNS,
-    PRINCIPLED,
-    ROUGH_DIELECTRIC,
     material_kind,
 )
 from pmviewer.kernels.textures.texture import texture_value

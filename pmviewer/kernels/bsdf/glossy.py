@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from pmviewer.kernels.bsdf.fresnel import fresnel_conductor
+from pmviewer.kernels.bsdf.kinds import GLOSSY, ROUGH_PLASTIC, SCHLICK, WARD
 from pmviewer.kernels.bsdf.microfacet import facet_density, g1_over_cos, half_vector, reflect_at, sample_visible_normal
 from pmviewer.kernels.bsdf.schlick import schlick_bound, schlick_fresnel, schlick_shadowing, schlick_shadowing_over_cos
 from pmviewer.kernels.bsdf.specular import fresnel_dielectric
 from pmviewer.kernels.bsdf.ward import sample_ward_normal, ward_f_pdf
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.scene import ROUGH_CONDUCTOR, ROUGH_PLASTIC, SCHLICK, WARD
 from pmviewer.kernels.vector import scale
 
 _f4 = np.float32
@@ -78,4 +78,4 @@ def schlick_limit(p, cos_o, cos_i):
 @device
 def is_glossy(kind):
     """Does this kind have a glossy reflection?"""
-    return kind in (ROUGH_CONDUCTOR, ROUGH_PLASTIC, SCHLICK, WARD)
+    return kind in GLOSSY

@@ -24,13 +24,7 @@ from pmviewer.kernels.bsdf.glossy import (
     schlick_diffuse,
     schlick_limit,
 )
-from pmviewer.kernels.bsdf.material import beer_lambert, interior_attenuation, material_params
-from pmviewer.kernels.bsdf.plastic import coat_transmittance, coated_diffuse, under_coat
-from pmviewer.kernels.bsdf.rough_dielectric import rough_dielectric_f_pdf, sample_rough_dielectric
-from pmviewer.kernels.bsdf.schlick import schlick_shadowing
-from pmviewer.kernels.bsdf.smooth import sample_smooth
-from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.scene import (
+from pmviewer.kernels.bsdf.kinds import (
     CONDUCTOR,
     DIELECTRIC,
     DIFFUSE,
@@ -41,6 +35,12 @@ from pmviewer.kernels.scene import (
     SCHLICK,
     THIN_DIELECTRIC,
 )
+from pmviewer.kernels.bsdf.material import beer_lambert, interior_attenuation, material_params
+from pmviewer.kernels.bsdf.plastic import coat_transmittance, coated_diffuse, under_coat
+from pmviewer.kernels.bsdf.rough_dielectric import rough_dielectric_f_pdf, sample_rough_dielectric
+from pmviewer.kernels.bsdf.schlick import schlick_shadowing
+from pmviewer.kernels.bsdf.smooth import sample_smooth
+from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.textures.normal_map import reflecting_normal
 from pmviewer.kernels.vector import add, basis, cross, dot, largest, mul, scale
 from pmviewer.kernels.warp import square_to_cosine_hemisphere

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.kinds import DIELECTRIC, ROUGH_DIELECTRIC
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.scene import (
     BSDF_TABLE_SIZE,
-    DIELECTRIC,
     M_ALPHA_X,
     M_ALPHA_Y,
     M_DISTRIBUTION,
@@ -28,7 +28,6 @@ from pmviewer.kernels.scene import (
     M_TRANSMITTANCE,
     M_TWO_SIDED,
     MATERIAL_COLUMNS,
-    ROUGH_DIELECTRIC,
     load3,
     material_kind,
 )

@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.kinds import CONDUCTOR, DIFFUSE
 from pmviewer.kernels.bsdf.specular import scatter_specular
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.scene import CONDUCTOR, DIFFUSE, material_kind, material_two_sided, reflectance
+from pmviewer.kernels.scene import material_kind, material_two_sided, reflectance
 from pmviewer.kernels.textures.normal_map import reflecting_normal
 from pmviewer.kernels.vector import dot, from_basis, scale
 from pmviewer.kernels.warp import square_to_cosine_hemisphere

@@ -12,10 +12,11 @@ import math
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.kinds import PLASTIC
 from pmviewer.kernels.bsdf.specular import fresnel_dielectric
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.memory import load_f4
-from pmviewer.kernels.scene import BSDF_TABLE_SIZE, PLASTIC
+from pmviewer.kernels.scene import BSDF_TABLE_SIZE
 
 _f4 = np.float32
 _INV_PI = _f4(1.0 / math.pi)

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pmviewer.kernels.bsdf import lobes
+from pmviewer.kernels.bsdf.kinds import PRINCIPLED
 from pmviewer.kernels.bsdf.lobes import FOLLOWED, NOTHING, STORED, Bsdf
 from pmviewer.kernels.bsdf.material import MaterialParams
 from pmviewer.kernels.bsdf.microfacet import half_vector, reflect_at
@@ -32,7 +33,7 @@ from pmviewer.kernels.bsdf.principled_lobes import (
 )
 from pmviewer.kernels.bsdf.rough_dielectric import rough_dielectric_f_pdf, sample_rough_dielectric
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.scene import GGX, PRINCIPLED
+from pmviewer.kernels.scene import GGX
 from pmviewer.kernels.textures.normal_map import reflecting_normal
 from pmviewer.kernels.vector import add, dot, scale
 from pmviewer.kernels.warp import square_to_cosine_hemisphere

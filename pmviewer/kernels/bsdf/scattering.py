@@ -22,6 +22,7 @@ import numpy as np
 from pmviewer.kernels.bsdf import lobes
 from pmviewer.kernels.bsdf import principled as principled_bsdf
 from pmviewer.kernels.bsdf.blend import blend_keeps, chosen_part, inside_attenuation
+from pmviewer.kernels.bsdf.kinds import BLEND
 from pmviewer.kernels.bsdf.material_textures import texture_params
 from pmviewer.kernels.bsdf.plain import (
     FOLLOWED,
@@ -36,7 +37,7 @@ from pmviewer.kernels.bsdf.plain import (
 from pmviewer.kernels.bsdf.principled_lobes import metallic_at
 from pmviewer.kernels.compile.specialise import has, is_a, specialised
 from pmviewer.kernels.random import draw1, draw4
-from pmviewer.kernels.scene import BLEND, material_kind
+from pmviewer.kernels.scene import material_kind
 from pmviewer.kernels.textures.normal_map import shading_frame
 from pmviewer.kernels.vector import dot, scale
 

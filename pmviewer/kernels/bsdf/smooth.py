@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from pmviewer.kernels.bsdf.fresnel import fresnel_conductor
+from pmviewer.kernels.bsdf.kinds import CONDUCTOR, PLASTIC, THIN_DIELECTRIC
 from pmviewer.kernels.bsdf.specular import fresnel_dielectric
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.scene import CONDUCTOR, PLASTIC, THIN_DIELECTRIC
 from pmviewer.kernels.vector import mul, scale
 
 _f4 = np.float32

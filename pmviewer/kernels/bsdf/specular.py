@@ -6,14 +6,9 @@ import math
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.kinds import CONDUCTOR
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.scene import (
-    CONDUCTOR,
-    material_eta,
-    material_kind,
-    reflectance,
-    transmittance,
-)
+from pmviewer.kernels.scene import material_eta, material_kind, reflectance, transmittance
 from pmviewer.kernels.vector import dot
 
 _f4 = np.float32

@@ -17,16 +17,7 @@ from pmviewer.maps.photon_words import decode_powers
 from pmviewer.maps.power import encode_powers, luminances, write_power
 from pmviewer.maps.search.kdtree import PhotonKdTree
 from pmviewer.photons.deposition.deposited import DISCARDED, REJECTED, STORED, Deposited, weight_histogram
-from pmviewer.photons.deposition.rules import (
-    SMALLEST_EPSILON,
-    Codes,
-    Density,
-    Float,
-    Homogeneous,
-    KellerWald,
-    Rule,
-    constant,
-)
+from pmviewer.photons.deposition.rules import Codes, Density, Float, KellerWald, Rule, Thinning, constant
 from pmviewer.scene.description import LUMINANCE
 from pmviewer.tasks import Runner, in_turn
 
@@ -81,16 +72,11 @@ def _thin(words, normals, p, epsilon, discard, seed, kept, kept_normals, powers)
 
 
 def probabilities(
-    rule: KellerWald | Homogeneous, photons: Float, normals: Codes, index: int
+    rule: Thinning, photons: Float, normals: Codes, index: int
 ) -> tuple[Float, np.float32, bool, np.uint32]:
     """For kernels: probabilities of storing photons (n, 6) with normal codes (n,), cut-off, whether it discards, and
     the seed of their batch, whose first trajectory is `index`."""
-    discard, epsilon = False, np.float32(min(max(rule.epsilon, SMALLEST_EPSILON), 1.0))
-    if isinstance(rule, Homogeneous):
-        p, epsilon = rule.probability(photons, normals, epsilon), np.float32(SMALLEST_EPSILON)
-    else:
-        p = rule.probability(photons[:, :3], normals) if len(photons) else np.empty(0, np.float32)
-        discard = rule.discard
+    p, epsilon, discard = rule.odds(photons, normals)
     seed = np.uint32((rule.seed * 0x9E3779B1 + index * 0x85EBCA77 + (index >> 32)) & 0xFFFFFFFF)
     return p, epsilon, discard, seed
 

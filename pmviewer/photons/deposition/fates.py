@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.photons.deposition.deposited import REDISTRIBUTED, STORED
 from pmviewer.photons.deposition.depositor import Depositor, Judged, judged, probabilities
-from pmviewer.photons.deposition.rules import Codes, Density, Deposition, Float, Homogeneous, KellerWald, Rule
+from pmviewer.photons.deposition.rules import Codes, Density, Deposition, Float, Rule, Thinning
 from pmviewer.tasks import Runner
 
 FATE_BITS = 3
@@ -40,7 +40,7 @@ class WatchedDepositor(Depositor):
 
     def judge(self, photons: Float, normals: Codes, index: int) -> Judged:
         fates = np.full(len(photons), STORED, np.uint8)
-        if isinstance(self.rule, KellerWald | Homogeneous):
+        if isinstance(self.rule, Thinning):
             _judge(*probabilities(self.rule, np.ascontiguousarray(photons), normals, index), fates)
         return (*super().judge(photons, normals, index), photons, fates)
 

@@ -18,8 +18,10 @@ threads.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,14 +39,42 @@ SMALLEST_EPSILON = 1e-3
 """Powers grow by at most its inverse, for which the photon's code has room."""
 
 
+class Thinning(ABC):
+    """A rule that judges every photon by itself: it is stored with a probability p, and then has the power Φ/p."""
+
+    seed: int
+
+    @abstractmethod
+    def odds(self, photons: Float, normals: Codes) -> Odds:
+        """Of photons (n, 6) with normal codes (n,), n perhaps 0."""
+
+
+class Odds(NamedTuple):
+    """`p` (n,) float32, above 1 where the photon is stored for certain. Where it is below `cut_off`, it is raised to
+    that, or the photon is discarded (`discard`)."""
+
+    p: Float
+    cut_off: np.float32
+    discard: bool = False
+
+
+def cut_off(epsilon: float) -> np.float32:
+    """The cut-off as kernels take it: powers grow by at most its inverse."""
+    return np.float32(min(max(epsilon, SMALLEST_EPSILON), 1.0))
+
+
 @dataclass(frozen=True)
-class KellerWald:
+class KellerWald(Thinning):
     """`probability` gives f·ΣW, above 1 where the photon is stored for certain."""
 
     probability: Evaluate
     epsilon: float
     discard: bool = False
     seed: int = 0
+
+    def odds(self, photons: Float, normals: Codes) -> Odds:
+        p = self.probability(photons[:, :3], normals) if len(photons) else np.empty(0, np.float32)
+        return Odds(p, cut_off(self.epsilon), self.discard)
 
 
 @dataclass(frozen=True)
@@ -68,7 +98,7 @@ class Density:
 
 
 @dataclass(frozen=True)
-class Homogeneous:
+class Homogeneous(Thinning):
     """`importance` gives I, above 1 likewise; a photon of luminance Φ is stored with probability p = I·Φ/Φ₁, if below
     1, and then has Φ/p. I is at least `epsilon`. `power` is Φ₁ in units of the map's."""
 
@@ -87,8 +117,11 @@ class Homogeneous:
             relative[weak] *= np.maximum(self.importance(np.ascontiguousarray(photons[weak, :3]), normals[weak]), least)
         return relative
 
+    def odds(self, photons: Float, normals: Codes) -> Odds:
+        return Odds(self.probability(photons, normals, cut_off(self.epsilon)), np.float32(SMALLEST_EPSILON))
 
-Rule = KellerWald | Density | Homogeneous
+
+Rule = Thinning | Density
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,11 @@ import math
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.kinds import KINDS
 from pmviewer.kernels.bsdf.microfacet import SMOOTHEST
 from pmviewer.kernels.bsdf.principled_lobes import LEAST_ALPHA
 from pmviewer.scene.description import LUMINANCE, Material, Principled
 from pmviewer.scene.texture import Checkerboard, Texture
-
-_GLOSSY = {"rough conductor": "reflectance", "rough plastic": "specular", "schlick": "specular", "ward": "specular"}
-_BASED = ("diffuse", "plastic", "rough plastic", "schlick", "ward")
 
 
 def principled_of(material: Material) -> Principled:
@@ -41,7 +39,7 @@ def has_diffuse_lobe(material: Material) -> bool:
         p = principled_of(material)
         opaque = (1 - _least_metallic(material)) * (1 - p.spec_trans)
         return opaque > 0 and max(*material.reflectance, p.sheen) > 0
-    return material.kind in _BASED and max(material.reflectance) > 0
+    return KINDS[material.kind].based and max(material.reflectance) > 0
 
 
 def always_followed(material: Material) -> bool:
@@ -69,7 +67,7 @@ def glossy_roughness(material: Material) -> tuple[float, ...]:
     """Roughness of the material's glossy reflections as kernels compare it with the setting, none without one. Where a
     texture gives it, the least and the greatest."""
     if material.kind != "principled":
-        colour = _GLOSSY.get(material.kind)
+        colour = KINDS[material.kind].glossy
         return _specular_roughness(material, 0.0) if colour and max(getattr(material, colour)) > 0 else ()
     p = principled_of(material)
     metal = "metallic" in material.textures or p.metallic > 0

@@ -9,6 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels import scene as K
+from pmviewer.kernels.bsdf.kinds import (
+    BLEND,
+    CONDUCTOR,
+    DIELECTRIC,
+    KINDS,
+    PLASTIC,
+    PRINCIPLED,
+    ROUGH_DIELECTRIC,
+    ROUGH_PLASTIC,
+    SCHLICK,
+    THIN_DIELECTRIC,
+)
 from pmviewer.kernels.bsdf.microfacet import SMOOTHEST
 from pmviewer.kernels.bsdf.tables import fill_coat, fill_schlick
 from pmviewer.scene.arrays.blends import fill_blend, with_parts
@@ -16,20 +28,6 @@ from pmviewer.scene.arrays.material_lobes import coat_alpha, principled_of
 from pmviewer.scene.description import Material, Scene
 
 Float = NDArray[np.float32]
-KINDS = {
-    "diffuse": K.DIFFUSE,
-    "conductor": K.CONDUCTOR,
-    "dielectric": K.DIELECTRIC,
-    "rough conductor": K.ROUGH_CONDUCTOR,
-    "rough dielectric": K.ROUGH_DIELECTRIC,
-    "thin dielectric": K.THIN_DIELECTRIC,
-    "plastic": K.PLASTIC,
-    "rough plastic": K.ROUGH_PLASTIC,
-    "schlick": K.SCHLICK,
-    "ward": K.WARD,
-    "principled": K.PRINCIPLED,
-    "blend": K.BLEND,
-}
 _DISTRIBUTIONS = {"ggx": K.GGX, "beckmann": K.BECKMANN}
 _PERFECT_MIRROR = ((0.0,) * 3, (1.0,) * 3)
 """The complex index that reflects everything: Mitsuba's metal 'none'."""
@@ -98,14 +96,14 @@ def material_table(scene: Scene) -> MaterialTable:
 
 def _row(m: Material, tables: list[Float] | None) -> list[float]:
     row = [0.0] * K.MATERIAL_COLUMNS
-    kind = KINDS[m.kind]
-    if kind == K.ROUGH_DIELECTRIC and abs(m.eta - 1) < _CLEAR:
-        kind = K.DIELECTRIC
+    kind = KINDS[m.kind].number
+    if kind == ROUGH_DIELECTRIC and abs(m.eta - 1) < _CLEAR:
+        kind = DIELECTRIC
     row[K.M_KIND], row[K.M_TWO_SIDED], row[K.M_ETA] = kind, m.two_sided, m.eta
     row[K.M_REFLECTANCE : K.M_REFLECTANCE + 3] = m.reflectance
     row[K.M_TRANSMITTANCE : K.M_TRANSMITTANCE + 3] = m.transmittance
     row[K.M_OPACITY : K.M_COLOURED + 1] = [*opacity_numbers(m), m.vertex_colours]
-    if kind == K.BLEND or (is_plain(m) and kind != K.CONDUCTOR):
+    if kind == BLEND or (is_plain(m) and kind != CONDUCTOR):
         return row
     alpha_x, alpha_y = (max(float(SMOOTHEST), a) for a in m.alpha)
     row[K.M_ALPHA_X], row[K.M_ALPHA_Y] = alpha_x, alpha_y
@@ -114,17 +112,17 @@ def _row(m: Material, tables: list[Float] | None) -> list[float]:
         row[K.M_MAPPED] = K.MIRRORED_MAPS if m.mirrored_maps else 1
     eta, k = m.metal if m.metal is not None else _PERFECT_MIRROR
     row[K.M_ETA_RGB : K.M_ETA_RGB + 3], row[K.M_K_RGB : K.M_K_RGB + 3] = eta, k
-    transparent = kind in (K.DIELECTRIC, K.ROUGH_DIELECTRIC, K.THIN_DIELECTRIC)
-    row[K.M_SPECULAR : K.M_SPECULAR + 3] = m.absorption if transparent or kind == K.PRINCIPLED else m.specular
-    if kind == K.PRINCIPLED:
+    transparent = kind in (DIELECTRIC, ROUGH_DIELECTRIC, THIN_DIELECTRIC)
+    row[K.M_SPECULAR : K.M_SPECULAR + 3] = m.absorption if transparent or kind == PRINCIPLED else m.specular
+    if kind == PRINCIPLED:
         _fill_principled(row, m)
-    if kind == K.PLASTIC:
+    if kind == PLASTIC:
         row[K.M_INNER] = inner_reflectance(m.eta)
-    elif kind == K.ROUGH_PLASTIC and tables is not None:
+    elif kind == ROUGH_PLASTIC and tables is not None:
         table, row[K.M_INNER] = _coat(alpha_x, alpha_y, row[K.M_DISTRIBUTION], m.eta)
         row[K.M_TABLE] = len(tables)
         tables.append(table)
-    elif kind == K.SCHLICK and tables is not None:
+    elif kind == SCHLICK and tables is not None:
         row[K.M_TABLE] = len(tables)
         tables.append(_schlick(alpha_x * alpha_y))
     return row

@@ -7,6 +7,9 @@ from typing import ClassVar, Literal
 from pmviewer.settings.needs import CAUSTIC_MAP, GLOBAL_MAP, IMPORTANCE, PHOTONS, Need, Needs
 from pmviewer.settings.schema.base import Auto, Group, setting
 
+Deposit = Literal["all", "Keller-Wald", "density control", "constant density"]
+WITHOUT_IMPORTANCE = ("all", "constant density")
+"""Rules that ask no importance map."""
 OF_A_PIXEL = Need(lambda f: f.settings.importance.of == "pixel", "Only for the importance of a pixel (importance.of).")
 DEPOSITION = Need(
     lambda f: f.plan.deposition == f.settings.importance.deposition,
@@ -129,7 +132,7 @@ class Importance(Group):
             CAUSTIC_MAP,
         ),
     )
-    deposition: Literal["all", "Keller-Wald", "density control", "constant density"] = setting(
+    deposition: Deposit = setting(
         "all",
         "Which photons the maps store. all: every one. Keller-Wald: with a probability by importance, the power of the "
         "stored ones raised (Keller and Wald §2.2). density control: up to the required density by importance, the "
