@@ -468,7 +468,7 @@ def test_files_on_the_recent_list_that_are_gone_are_taken_off(app, session, tmp_
 
 
 def test_compiling_ahead_is_told_and_can_be_stopped_or_turned_off(app, session):
-    """What is being compiled stands in the status bar while it is, with a button that ends it; the menu turns it off."""
+    """What is being compiled stands in the status bar, with a button that ends it; the menu turns it off."""
     session.ahead = "estimate.lookup = nearest (3 of 20)"
 
     def script(c):
