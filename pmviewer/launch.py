@@ -20,6 +20,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 MOST_PROCESSES = 4
 """For tests: each grows to some two gigabytes."""
+EVERYTHING = ["-m", ""]
+"""Pytest's option for slow tests too; a later -m counts instead."""
 ENVIRONMENT = Path(os.environ.get("PMVIEWER_VENV", ROOT / ".venv"))
 SCENE = "cornell_caustic"
 WITHOUT_KERNELS = "--without-kernels"
@@ -101,12 +103,13 @@ def install(python: Path, extras: str) -> None:
 
 
 def side_by_side(options: list[str]) -> list[str]:
-    """pytest's options for several processes, each with files of its own: most of the time is single-threaded
-    compilation. One process where the user asks for what has none: output, the debugger, a number of their own."""
+    """pytest's options for several processes, each with files of its own, in the order of `tests/conftest.py`: most of
+    the time is single-threaded. One process where the user asks for what has none: output, the debugger, a number of
+    their own."""
     single = ("-s", "-n", "--pdb", "--capture", "--trace")
     if any(option.startswith(single) for option in options):
         return []
-    return ["-n", str(min(os.cpu_count() or 1, MOST_PROCESSES)), "--dist", "loadfile"]
+    return ["-n", str(min(os.cpu_count() or 1, MOST_PROCESSES)), "--dist", "loadfile", "--no-loadscope-reorder"]
 
 
 def main(arguments: list[str]) -> int:
@@ -123,7 +126,7 @@ def main(arguments: list[str]) -> int:
         print("compiling what the window's first clicks need (about a minute the first time)", flush=True)
         return subprocess.run([str(python), "-m", "pmviewer", "compile"], check=False, cwd=ROOT).returncode
     if testing:
-        command = [str(python), "-m", "pytest", *side_by_side(arguments[1:]), *arguments[1:]]
+        command = [str(python), "-m", "pytest", *EVERYTHING, *side_by_side(arguments[1:]), *arguments[1:]]
     else:
         command = [str(python), "-m", "pmviewer", *(arguments or [SCENE])]
     return subprocess.run(command, check=False, cwd=ROOT).returncode

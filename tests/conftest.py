@@ -1,10 +1,12 @@
-"""What a run of the tests costs: `pytest --costs 20` lists the tests that took the most CPU time, with how many
-functions they had to compile because nobody had before."""
+"""In which order files of tests run, and what a run costs: `pytest --costs 20` lists the tests that took the most CPU
+time, with how many functions they had to compile because nobody had before."""
 
 from __future__ import annotations
 
 import os
 import sys
+from collections import defaultdict
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,6 +19,16 @@ _compiled: list[int] = []
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--costs", type=int, default=0, metavar="N", help="list the N tests of the most CPU time")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Spread each room's files evenly over the run. Files side by side run at the same time, and those of one room wait
+    for each other to compile the same kernels."""
+    rooms: dict[Path, dict[Path, None]] = defaultdict(dict)
+    for item in items:
+        rooms[item.path.parent][item.path] = None
+    place = {path: ((i + 0.5) / len(files), str(path)) for files in rooms.values() for i, path in enumerate(files)}
+    items.sort(key=lambda item: place[item.path])
 
 
 @pytest.hookimpl(tryfirst=True)

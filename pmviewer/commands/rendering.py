@@ -10,6 +10,7 @@ from pmviewer.commands.job import Job, check_output, overrides
 from pmviewer.commands.patience import patiently, print_warnings
 from pmviewer.commands.progress_bar import progress_bar
 from pmviewer.commands.statistics import pass_report, statistics_report
+from pmviewer.engine.ahead.beside import beside
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.frame import Frame
 from pmviewer.engine.opened import OpenScene, open_scene
@@ -53,7 +54,7 @@ def render_job(
         check_output(path, FORMATS)
     settings = with_values(job.settings, overrides(passes, seconds, size, seed, job.passes))
     with patiently() as tell, watched(tell, threads=threads):
-        opened = open_scene(job.scene, job.parameters, settings.light.rig)
+        opened = open_scene(job.scene, job.parameters, settings.light.rig, beside(settings, threads))
     print_warnings(opened.scene.warnings, opened.scene.dropped)
     target = None if reference is None else _reference(reference, opened.scene, settings)
     view = _view(settings, opened)

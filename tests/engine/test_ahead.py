@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from pmviewer.commands import compiling
 from pmviewer.engine.ahead import ahead as ahead_module
 from pmviewer.engine.ahead.ahead import Ahead
 from pmviewer.engine.ahead.clicks import clicks, other_kinds
@@ -18,6 +19,7 @@ from pmviewer.engine.ahead.requests import Clicks, NextSteps
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.session import Session
+from pmviewer.errors import PmviewerError
 from pmviewer.kernels.compile import jit
 from pmviewer.settings.access import Settings, with_values
 from tests.support.scenes import diffuse_box, settings_of
@@ -209,3 +211,33 @@ def test_a_change_of_a_number_is_no_other_state(box, quick):
     Fake.made[0].finish()
     until(lambda: not ahead.text)
     assert len(Fake.made) == 1
+
+
+def test_compile_shares_the_clicks_among_processes(quick, monkeypatch, capsys):
+    monkeypatch.setattr(compiling, "Helper", Ready)
+    monkeypatch.setattr(compiling, "available_threads", lambda: 3)
+    compiling.compile_clicks("cornell_caustic")
+    assert [(each.request.every, each.request.offset) for each in Fake.made] == [(3, 0), (3, 1), (3, 2)]
+    assert capsys.readouterr().out.splitlines() == ["compiling estimate.lookup = nearest"] * 3
+    compiling.compile_clicks("cornell_caustic")
+    assert len(Fake.made) == 3, "what is marked as done is not done again"
+
+
+def test_compile_says_when_a_process_failed(quick, monkeypatch):
+    monkeypatch.setattr(compiling, "Helper", Failing)
+    with pytest.raises(PmviewerError, match="not compiled ahead"):
+        compiling.compile_clicks("cornell_caustic")
+
+
+class Ready(Fake):
+    """Done at once."""
+
+    def wait(self):
+        self.finish()
+
+
+class Failing(Fake):
+    """Dies."""
+
+    def wait(self):
+        self.stop()

@@ -21,7 +21,7 @@ from pmviewer.scene.describe import describe
 from pmviewer.scene.description import Camera, Parallelogram, Scene, Shape, Sphere
 from pmviewer.settings.access import CameraSettings, Settings, with_values
 from pmviewer.viewer.viewport import controls
-from tests.importance.paths import SHOWN, traced
+from tests.support.importon_paths import SHOWN, traced
 from tests.support.scenes import diffuse, diffuse_box, rendered, settings_of
 
 ORTHOGRAPHIC = CameraPose(

@@ -12,7 +12,7 @@ from pmviewer.importance.importons import IMPORTON_COLUMNS, IMPORTON_PASS_DTYPE,
 from pmviewer.importance.trace import trace_importons
 from pmviewer.kernels.dimensions import IMPORTON_SALT
 from pmviewer.scene.description import Camera, Cylinder, Group, Instance, Mesh, Scene, Shape, Sphere
-from tests.importance.paths import GATHER, SHOWN, traced
+from tests.support.importon_paths import GATHER, SHOWN, traced
 from tests.support.scenes import GLASS, MIRROR, box_walls, diffuse, diffuse_box
 
 STEP = 0.05

@@ -14,7 +14,7 @@ from pmviewer.maps.importance.build import build_importance
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.description import Camera, Material, Parallelogram, Scene, Shape, Sphere
 from pmviewer.settings.access import Settings
-from tests.importance.paths import (
+from tests.support.importon_paths import (
     GATHER,
     SHOWN,
     area_of,

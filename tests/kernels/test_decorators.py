@@ -50,7 +50,7 @@ def test_an_edit_in_an_imported_source_makes_compiled_code_stale(tmp_path):
         return run.stdout.split()
 
     before = stamps()
-    (package / "maps" / "grid.py").open("a").write("# edited\n")
+    (package / "maps" / "search" / "grid.py").open("a").write("# edited\n")
     after = stamps()
     assert [a == b for a, b in zip(before, after, strict=True)] == [False, True, True]
 

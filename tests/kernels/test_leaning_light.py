@@ -10,18 +10,11 @@ import pytest
 
 from pmviewer.kernels.random import INDEPENDENT
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
-from pmviewer.scene.description import Mesh, Shape
-from tests.kernels.test_light_sampling import emit, look, sample, uniform_sphere
+from pmviewer.scene.description import Shape
+from tests.support.light_probe import AREA, CORNERS, LEANING, NG, NORMALS, emit, look, sample, uniform_sphere
 from tests.support.scenes import light_scene
 
 RADIANCE = (2.0, 1.5, 1.0)
-CORNERS = np.array([[-0.5, 1.0, -0.4], [0.6, 1.1, -0.3], [0.0, 1.3, 0.7]])
-NORMALS = np.array([[-0.8, -0.6, 0.0], [0.9, -0.1, 0.4], [0.0, -0.3, 0.95]])
-NORMALS /= np.linalg.norm(NORMALS, axis=1, keepdims=True)
-ACROSS = np.cross(CORNERS[1] - CORNERS[0], CORNERS[2] - CORNERS[0])
-AREA = np.linalg.norm(ACROSS) / 2
-NG = ACROSS / np.linalg.norm(ACROSS)
-LEANING = Mesh(CORNERS, np.array([[0, 1, 2]], np.int32), NORMALS)
 POINTS = {"below": (0.1, 0.2, 0.1), "beside": (1.6, 1.2, 0.3), "above": (0.2, 2.0, 0.9)}
 
 

@@ -8,95 +8,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pmviewer.kernels.accel.raycast import closest_hit
-from pmviewer.kernels.compile.jit import kernel
-from pmviewer.kernels.dimensions import EMITTER
-from pmviewer.kernels.lights.light import emit_photon, emitted, light_pdf, sample_light
-from pmviewer.kernels.random import INDEPENDENT, SOBOL, draw1, draw4
-from pmviewer.kernels.scene import light_of
-from pmviewer.kernels.surface import surface_at
+from pmviewer.kernels.random import INDEPENDENT
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
+from tests.support.light_probe import axes_of, emit, look, p_uniform, sample, turn, uniform_sphere
 from tests.support.scenes import LIGHTS, light_scene
 
 MANY = 1_000_000
 """Samples of the chi-square tests."""
 RADIANCE = np.array([2.0, 1.5, 1.0])
 AREA_LIGHTS = [name for name in LIGHTS if name not in ("point", "environment")]
-
-
-@kernel
-def _emit_many(scenes, sequence, seed, position, direction, beta, light):
-    for i in range(len(position)):
-        index = np.uint32(i)
-        u0, u1, u2, u3 = draw4(sequence, seed, index, 0)
-        u_pick = draw1(sequence, seed, index, EMITTER)
-        position[i], direction[i], beta[i], light[i] = emit_photon(scenes[0], u_pick, (u2, u3), (u0, u1))
-
-
-@kernel
-def _sample_many(scenes, x, seed, wi, end, radiance, pdf, other_pdf, found):
-    """Light samples at x; for each, what a ray in that direction finds: `found`, and `light_pdf` there."""
-    scene = scenes[0]
-    p = (x[0], x[1], x[2])
-    zero = np.float32(0.0)
-    for i in range(len(wi)):
-        u_pick, u, v, _ = draw4(INDEPENDENT, seed, np.uint32(i), 0)
-        d, end[i], radiance[i], pdf[i], findable = sample_light(scene, p, u_pick, u, v)
-        wi[i] = d
-        found[i] = 0
-        t, prim, b1, b2 = closest_hit(scene, p[0], p[1], p[2], d[0], d[1], d[2], zero, np.float32(np.inf))
-        light = scene.environment
-        q, ng = p, d
-        if prim >= 0:
-            light = light_of(scene, prim)
-            q, ng, _, _ = surface_at(scene, prim, b1, b2, p[0], p[1], p[2], d[0], d[1], d[2], t)
-        if light >= 0 and findable:
-            found[i] = 1
-            other_pdf[i] = light_pdf(scene, light, p, q, ng, d)
-
-
-@kernel
-def _look(scenes, x, directions, radiance, pdf):
-    """Emission found by rays from x, and the density with which light sampling would have chosen them."""
-    scene = scenes[0]
-    zero = np.float32(0.0)
-    for i in range(len(directions)):
-        d = (directions[i, 0], directions[i, 1], directions[i, 2])
-        t, prim, b1, b2 = closest_hit(scene, x[0], x[1], x[2], d[0], d[1], d[2], zero, np.float32(np.inf))
-        radiance[i], pdf[i] = (zero, zero, zero), zero
-        if prim >= 0 and light_of(scene, prim) >= 0:
-            q, ng, _, _ = surface_at(scene, prim, b1, b2, x[0], x[1], x[2], d[0], d[1], d[2], t)
-            light = light_of(scene, prim)
-            radiance[i] = emitted(scene, light, prim, q, ng, d)
-            if radiance[i, 0] > zero:
-                pdf[i] = light_pdf(scene, light, (x[0], x[1], x[2]), q, ng, d)
-
-
-def emit(flat, n, sequence=SOBOL, seed=1):
-    out = [np.empty((n, 3), np.float32) for _ in range(3)]
-    light = np.empty(n, np.int64)
-    _emit_many(flat.record, sequence, np.uint32(seed), *out, light)
-    return *(a.astype(float) for a in out), light
-
-
-def sample(flat, x, n, seed=1):
-    wi, end, radiance = (np.empty((n, 3), np.float32) for _ in range(3))
-    pdf, other = np.empty(n, np.float32), np.zeros(n, np.float32)
-    found = np.empty(n, np.int64)
-    _sample_many(flat.record, np.array(x, np.float32), np.uint32(seed), wi, end, radiance, pdf, other, found)
-    return wi.astype(float), end.astype(float), radiance.astype(float), pdf.astype(float), other, found
-
-
-def look(flat, x, directions):
-    directions = np.ascontiguousarray(directions, np.float32)
-    radiance, pdf = np.empty_like(directions), np.empty(len(directions), np.float32)
-    _look(flat.record, np.array(x, np.float32), directions, radiance, pdf)
-    return radiance.astype(float), pdf.astype(float)
-
-
-def uniform_sphere(n, seed=3):
-    d = np.random.default_rng(seed).normal(size=(n, 3))
-    return d / np.linalg.norm(d, axis=1, keepdims=True)
 
 
 def analytic_power(name, radius):
@@ -114,22 +34,6 @@ def analytic_power(name, radius):
         "mesh": lambda: 6 * 0.8**2,
     }[name.split()[0]]()
     return math.pi * area * RADIANCE
-
-
-def p_uniform(values, bins=32):
-    return stats.chisquare(np.bincount(np.clip((values * bins).astype(int), 0, bins - 1), minlength=bins)).pvalue
-
-
-def turn(x, y):
-    return np.arctan2(y, x) / (2 * math.pi) % 1.0
-
-
-def axes_of(normal):
-    """Two unit vectors across `normal` (n, 3)."""
-    helper = np.where(np.abs(normal[:, :1]) < 0.5, [[1.0, 0, 0]], [[0, 1.0, 0]])
-    s = np.cross(normal, helper)
-    s /= np.linalg.norm(s, axis=1, keepdims=True)
-    return s, np.cross(normal, s)
 
 
 def test_emitted_power_of_all_lights_together():

@@ -13,37 +13,12 @@ from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.lights.light import environment_radiance, one_light_pdf
 from pmviewer.kernels.random import INDEPENDENT
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
-from pmviewer.scene.description import DirectionalLight, ImageEnvironment, SpotLight
+from pmviewer.scene.description import ImageEnvironment
 from pmviewer.scene.emission import emitted_power
-from pmviewer.scene.formats.mitsuba.transform import rotation
-from tests.kernels.test_light_sampling import axes_of, emit, p_uniform, sample, turn
+from tests.support.light_probe import MORE, TURN, axes_of, emit, p_uniform, sample, turn
 from tests.support.scenes import LIGHTS, light_scene
 
 MANY = 1_000_000
-TURN = rotation((0.48, 0.64, -0.6), 70.0)[:3, :3]
-
-
-def unit(*v):
-    return tuple(float(c) for c in np.array(v) / np.linalg.norm(v))
-
-
-def sky_pixels(width=16, height=9, seed=5):
-    """Uneven, coloured, with a bright spot, a black patch and a black row."""
-    pixels = np.random.default_rng(seed).uniform(0, 1, (height, width, 3)) ** 3
-    pixels[2, 3] = 30.0, 25.0, 20.0
-    pixels[5:7, 8:12] = 0.0
-    pixels[-1] = 0.0
-    return pixels.astype(np.float32)
-
-
-MORE = {
-    "spot": SpotLight("spot", (0.3, 1.2, -0.4), unit(-0.2, -1.0, 0.3), (2.0, 3.0, 1.0), 35.0, 20.0),
-    "sharp spot": SpotLight("sharp spot", (0.3, 1.2, -0.4), unit(-0.2, -1.0, 0.3), (2.0, 3.0, 1.0), 25.0, 25.0),
-    "soft spot": SpotLight("soft spot", (0.3, 1.2, -0.4), unit(-0.2, -1.0, 0.3), (2.0, 3.0, 1.0), 150.0, 0.0),
-    "thin spot": SpotLight("thin spot", (0.3, 1.2, -0.4), unit(-0.2, -1.0, 0.3), (2e6, 3e6, 1e6), 0.05, 0.02),
-    "directional": DirectionalLight("directional", unit(0.4, -1.0, 0.2), (2.0, 1.5, 1.0)),
-    "image": ImageEnvironment("image", sky_pixels(), TURN),
-}
 
 
 def scene_of(*lights, floor=True):

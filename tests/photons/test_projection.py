@@ -22,10 +22,8 @@ from pmviewer.photons.projection.projection import projection_of
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.scene.description import Disk, Parallelogram, PointLight, Shape, Sphere
 from pmviewer.settings.access import Photons
-from tests.kernels.test_leaning_light import LEANING
-from tests.kernels.test_light_sampling import emit
-from tests.kernels.test_more_lights import MORE
 from tests.support.device import from_python
+from tests.support.light_probe import LEANING, MORE, emit
 from tests.support.scenes import GLASS, LIGHTS, ball_mesh, diffuse_box, light_scene, settings_of
 
 BALL = Sphere((-0.2, 0.25, 0.15), 0.12)

@@ -18,3 +18,10 @@ def display() -> Iterator[None]:
         yield
     if before is None:
         del os.environ["DISPLAY"]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests that drive a window are marked so."""
+    for item in items:
+        if hasattr(getattr(item, "module", None), "drive"):
+            item.add_marker(pytest.mark.window)

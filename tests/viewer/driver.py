@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -113,3 +114,14 @@ def window_pixels(app: ViewerApp, context: Context, path: Path) -> Pixels:
 def chord(key: int, modifier: int) -> int:
     """A key with a modifier, as a number: Python 3.11.2 (Debian 12) can't combine these enums."""
     return int(key) | int(modifier)
+
+
+def wait_until(context, condition, seconds=480.0):
+    """Let the window run until the condition holds. Kernels may have to be compiled first."""
+    engine = imgui.test_engine.get_io(hello_imgui.get_imgui_test_engine())
+    engine.config_watchdog_warning = engine.config_watchdog_kill_test = 1e6
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it takes too long"
+        context.yield_(1)
+        time.sleep(0.02)  # leave the processor to the engine

@@ -14,8 +14,7 @@ from pmviewer.output.frame_export import gain_sheet
 from pmviewer.output.png import read_png
 from pmviewer.output.tone import to_uint8, tone_map
 from pmviewer.settings.access import Settings, with_values
-from tests.viewer.driver import drag_picture, drive, make_app, on_window_thread
-from tests.viewer.test_real_session import wait_until
+from tests.viewer.driver import drag_picture, drive, make_app, on_window_thread, wait_until
 
 SIZE = 48
 VALUES = {

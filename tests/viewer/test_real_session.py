@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
-from imgui_bundle import hello_imgui, imgui
+from imgui_bundle import imgui
 
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.session import Session
 from pmviewer.output.png import read_png
 from pmviewer.output.tone import to_uint8, tone_map
 from pmviewer.settings.access import Settings, with_values
-from tests.viewer.driver import chord, drag, drive, item, make_app, on_window_thread, viewport_pixels
+from tests.viewer.driver import chord, drag, drive, item, make_app, on_window_thread, viewport_pixels, wait_until
 
 K = imgui.Key
-
-
-def wait_until(context, condition, seconds=480.0):
-    """Let the window run until the condition holds. Kernels may have to be compiled first."""
-    engine = imgui.test_engine.get_io(hello_imgui.get_imgui_test_engine())
-    engine.config_watchdog_warning = engine.config_watchdog_kill_test = 1e6
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "it takes too long"
-        context.yield_(1)
-        time.sleep(0.02)  # leave the processor to the engine
 
 
 @pytest.fixture

@@ -22,8 +22,7 @@ from pmviewer.viewer.overlays.irradiance_cache import circles
 from pmviewer.viewer.overlays.projection_maps import cell_corners
 from pmviewer.viewer.panels.light_list import top_lights
 from tests.support import naive_maps as naive
-from tests.viewer.driver import chord, drive, make_app, on_window_thread, overlay_item, viewport_pixels
-from tests.viewer.test_real_session import wait_until
+from tests.viewer.driver import chord, drive, make_app, on_window_thread, overlay_item, viewport_pixels, wait_until
 
 K = imgui.Key
 SIZE = 64

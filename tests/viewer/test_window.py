@@ -465,3 +465,20 @@ def test_files_on_the_recent_list_that_are_gone_are_taken_off(app, session, tmp_
     from pmviewer.viewer.dialogs.recent import RecentFiles
 
     assert RecentFiles(tmp_path / "recent.txt").entries == []
+
+
+def test_compiling_ahead_is_told_and_can_be_stopped_or_turned_off(app, session):
+    """What is being compiled stands in the status bar, with a button that ends it; the menu turns it off."""
+    session.ahead = "estimate.lookup = nearest (3 of 20)"
+
+    def script(c):
+        c.yield_(2)
+        c.item_click("//**/Stop##ahead")
+        c.yield_(2)
+        assert session.stops_ahead == 1
+        assert not c.item_exists("//**/Stop##ahead")
+        c.menu_click("//##MainMenuBar/Render/Compile ahead")
+        c.yield_(2)
+
+    drive(app, script)
+    assert session.settings.display.compile_ahead is False

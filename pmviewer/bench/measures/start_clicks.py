@@ -51,6 +51,7 @@ def main() -> int:
     for click in clicks(opened, Settings()):
         before, compiled = time.perf_counter(), compiling.seconds
         session.set(with_values(click.settings, {"render.passes": 1}))
+        session.restart()  # what only changes the display needs no new pass
         if not session.wait(1, PATIENCE):
             print(f"{click.text}: {session.status.text}", file=sys.stderr)
             return 1

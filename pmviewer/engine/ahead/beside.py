@@ -12,7 +12,9 @@ import numpy as np
 from pmviewer.engine.ahead.helper import Helper
 from pmviewer.engine.ahead.requests import NextSteps
 from pmviewer.engine.method import plan_of
+from pmviewer.engine.opened import OnType
 from pmviewer.engine.prepare import eye_steps
+from pmviewer.progress import available_threads
 from pmviewer.render.eye import eye_pass
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings
@@ -37,3 +39,12 @@ def compile_beside(
     helper = helper or Helper()
     helper.ask(NextSteps(of_record, traits, settings))
     return helper
+
+
+def beside(settings: Settings, threads: int | None = None) -> OnType:
+    """For `open_scene`, of whoever renders without a session: the process ends by itself, or with this one."""
+
+    def on_type(of_record: np.dtype, traits: SceneTraits) -> None:
+        compile_beside(None, of_record, traits, settings, threads or available_threads())
+
+    return on_type

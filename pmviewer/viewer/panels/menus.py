@@ -115,6 +115,9 @@ class Menus:
     def _render(self) -> None:
         self._item("Resume" if self._state.session.paused else "Pause", "toggle_pause")
         self._item("Restart", "restart")
+        ahead = self._state.settings.display.compile_ahead
+        if imgui.menu_item("Compile ahead", "", ahead)[0]:
+            self._state.change({"display.compile_ahead": not ahead})
         self._item("Compare with and without importance", "compare_importance", self._state.gain.running)
         if imgui.begin_menu("Light rig"):
             rig = self._state.settings.light.rig
