@@ -75,7 +75,7 @@ def test_maps_by_method():
     no_caustics = Scene("d", None, (*box_walls(), panel()), (diffuse(),), (), cornell_box().camera, SIZE, SIZE)
     plain = rendered(no_caustics, settings("gather"), 1).importance.latest
     assert plain.caustic is None
-    assert plain.record("caustic").dtype.names == ("none",)
+    assert plain.record("caustic").dtype.names == ("absent",)
 
 
 def test_cloud_and_statistics():

@@ -13,7 +13,8 @@ PROGRAM = """
 import json, warnings
 from types import SimpleNamespace
 import numpy as np
-from pmviewer.kernels import bsdf, random, vector, warp
+from pmviewer.kernels import random, vector, warp
+from pmviewer.kernels.bsdf import specular
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
 
 from tests.support.device import from_python
@@ -24,7 +25,7 @@ def callable_from_python(module, names):
 vector = callable_from_python(vector, "normalize from_basis luminance dot cross")
 names = "square_to_sphere square_to_disk square_to_cosine_hemisphere square_to_cone square_to_triangle"
 warp = callable_from_python(warp, names)
-fresnel_dielectric, reflect = vars(callable_from_python(bsdf, "fresnel_dielectric reflect")).values()
+fresnel_dielectric, reflect = vars(callable_from_python(specular, "fresnel_dielectric reflect")).values()
 draw1, draw4, hash3 = vars(callable_from_python(random, "draw1 draw4 hash3")).values()
 
 warnings.simplefilter("ignore", RuntimeWarning)  # uint32 products are meant to overflow

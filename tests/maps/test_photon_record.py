@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from pmviewer.maps import record
+from pmviewer.maps import photon_words, record
 from tests.support import naive_maps as naive
 from tests.support.device import from_python
 
-encode_direction, decode_direction = from_python(record.encode_direction), from_python(record.decode_direction)
-encode_power, decode_power = from_python(record.encode_power), from_python(record.decode_power)
+encode_direction, decode_direction = from_python(photon_words.encode_direction), from_python(photon_words.decode_direction)
+encode_power, decode_power = from_python(photon_words.encode_power), from_python(photon_words.decode_power)
 
 f4 = np.float32
 WORST_ANGLE = 0.06  # degrees

@@ -75,7 +75,7 @@ def test_path_tracer_agrees_with_the_reference(scene, block, pool):
     target = reference(scene)
     opened = open_scene(scene)
     images = []
-    for seed in range(1, 25):
+    for seed in range(1, 13):
         settings = with_values(Settings(), {"render.method": "path", "render.seed": seed})
         renderer = Renderer(opened, settings, pool, StageStore(0))
         for _ in range(8):

@@ -16,7 +16,7 @@ def test_hostile_files_are_opened_or_refused_in_words():
     special cases one in four is tried here."""
     found = [
         f"{trial.index} {trial.case}: {finding.kind}, {finding.detail}"
-        for trial in tried(1, range(QUICK_FILES), every_special=False)
+        for trial in tried(1, range(QUICK_FILES // 2), every_special=False)
         for finding in trial.findings
     ]
     assert not found, "\n".join(found)
