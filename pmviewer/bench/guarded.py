@@ -178,10 +178,11 @@ def cpu_seconds(pid: int) -> float:
 
 
 def works(pid: int) -> bool:
-    """Whether a thread of a process runs, waits for a processor or for a disk; true where the system doesn't tell."""
+    """Whether a thread of a process runs, waits for a processor or for a disk, or was stopped by somebody; true where
+    the system doesn't tell."""
     try:
         stats = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/stat")]
-        return not stats or any(text.rsplit(")", 1)[1].split()[0] in "RD" for text in stats)
+        return not stats or any(text.rsplit(")", 1)[1].split()[0] in "RDT" for text in stats)
     except (OSError, IndexError):
         return True
 

@@ -1,7 +1,10 @@
 """The watchdog: a process that hangs, computes for ever, grows or dies is ended, and the next request is answered."""
 
+import os
+import signal
 import subprocess
 import sys
+import threading
 
 import pytest
 
@@ -39,6 +42,16 @@ def test_a_process_without_an_answer_is_ended_and_started_again(server, do, kind
         server.ask({"do": do}, LIMITS)
     assert ended.value.kind == kind
     assert server.ask({"do": "answer"}, LIMITS)["pid"] != before
+
+
+@linux
+def test_a_process_that_somebody_stops_does_not_hang(server):
+    pid = server.ask({"do": "answer"}, LIMITS)["pid"]
+    os.kill(pid, signal.SIGSTOP)
+    going_on = threading.Timer(2 * LIMITS.idle, os.kill, (pid, signal.SIGCONT))
+    going_on.start()
+    assert server.ask({"do": "answer"}, LIMITS)["pid"] == pid
+    going_on.join()
 
 
 def test_the_clock_ends_what_the_system_does_not_watch(server, monkeypatch):
