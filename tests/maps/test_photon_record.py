@@ -7,7 +7,8 @@ from pmviewer.maps import photon_words, record
 from tests.support import naive_maps as naive
 from tests.support.device import from_python
 
-encode_direction, decode_direction = from_python(photon_words.encode_direction), from_python(photon_words.decode_direction)
+encode_direction = from_python(photon_words.encode_direction)
+decode_direction = from_python(photon_words.decode_direction)
 encode_power, decode_power = from_python(photon_words.encode_power), from_python(photon_words.decode_power)
 
 f4 = np.float32
