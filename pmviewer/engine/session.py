@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 
 from pmviewer.engine.ahead.ahead import Ahead
+from pmviewer.engine.ahead.helper import Helper
 from pmviewer.engine.frame import Frame, Message, State, Status
 from pmviewer.engine.guarded import guarded
 from pmviewer.engine.inspection import Wanted
@@ -40,9 +41,14 @@ class Session:
     """See the module. All public attributes may be read from any thread."""
 
     def __init__(
-        self, threads: int | None = None, settings: Settings | None = None, *, compiles_ahead: bool = False
+        self,
+        threads: int | None = None,
+        settings: Settings | None = None,
+        *,
+        compiles_ahead: bool = False,
+        helper: Helper | None = None,
     ) -> None:
-        """compiles_ahead: in a process beside this one, `pmviewer.engine.ahead`."""
+        """compiles_ahead: in a process beside this one, `pmviewer.engine.ahead`, first in `helper` if that waits."""
         self.geometry: DrawGeometry | None = None
         self._published = Published()
         self._changed = self._published.changed
@@ -63,7 +69,7 @@ class Session:
         self._pool = WorkPool(threads, behind_window=True)
         self._store = StageStore()
         self._renderer: Renderer | None = None
-        self._ahead = Ahead(self._pool.threads, self._published.notify) if compiles_ahead else None
+        self._ahead = Ahead(self._pool.threads, self._published.notify, helper) if compiles_ahead else None
         self._worker = threading.Thread(target=self._work, name="pmviewer session", daemon=True)
         self._worker.start()
 

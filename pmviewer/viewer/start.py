@@ -58,9 +58,12 @@ def check_screen() -> None:
 
 def _make_session(threads: int | None, settings: Settings | None) -> Callable[[], SessionLike]:
     def make() -> SessionLike:
+        from pmviewer.engine.ahead.early import early_helper
+
+        helper = early_helper(threads)  # imports while this process does
         from pmviewer.engine.session import Session
 
-        return Session(threads, settings, compiles_ahead=True)
+        return Session(threads, settings, compiles_ahead=True, helper=helper)
 
     return make
 

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from pmviewer.commands import compiling
+from pmviewer.engine import prepare
 from pmviewer.engine.ahead import ahead as ahead_module
 from pmviewer.engine.ahead.ahead import Ahead
+from pmviewer.engine.ahead.beside import compile_beside
 from pmviewer.engine.ahead.clicks import clicks, other_kinds
 from pmviewer.engine.ahead.helper import Helper
 from pmviewer.engine.ahead.requests import Clicks, NextSteps
@@ -144,7 +146,6 @@ def quick(monkeypatch, tmp_path):
     monkeypatch.setattr(ahead_module, "QUIET", 0.0)
     monkeypatch.setattr(ahead_module, "Helper", Fake)
     monkeypatch.setattr(ahead_module, "CACHE_FOLDER", tmp_path)
-    monkeypatch.setattr(ahead_module, "early_helper", lambda threads: None)
     Fake.made = []
 
 
@@ -211,6 +212,18 @@ def test_a_change_of_a_number_is_no_other_state(box, quick):
     Fake.made[0].finish()
     until(lambda: not ahead.text)
     assert len(Fake.made) == 1
+
+
+def test_a_helper_that_waits_is_used_or_ended(box, quick, monkeypatch):
+    """It was started before it was known whether there is something to compile."""
+    waiting = Fake()
+    monkeypatch.setattr(prepare.Step, "is_kept", False)
+    assert compile_beside(waiting, box.flat.record.dtype, box.traits, Settings(), 2) is waiting
+    assert isinstance(waiting.request, NextSteps)
+    needless = Fake()
+    monkeypatch.setattr(prepare.Step, "is_kept", True)
+    assert compile_beside(needless, box.flat.record.dtype, box.traits, Settings(), 2) is None
+    assert needless.stopped
 
 
 def test_compile_shares_the_clicks_among_processes(quick, monkeypatch, capsys):

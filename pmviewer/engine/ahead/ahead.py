@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from pmviewer.engine import prepare as prepare_module
-from pmviewer.engine.ahead.beside import compile_beside, early_helper
+from pmviewer.engine.ahead.beside import compile_beside
 from pmviewer.engine.ahead.helper import Helper
 from pmviewer.engine.ahead.requests import Clicks
 from pmviewer.engine.opened import OpenScene
@@ -32,11 +32,12 @@ QUIET = 10.0
 class Ahead:
     """`text` says what is being compiled, "" when nothing is. `on_change` is called from any thread."""
 
-    def __init__(self, threads: int | None, on_change: Callable[[], None]) -> None:
+    def __init__(self, threads: int | None, on_change: Callable[[], None], early: Helper | None = None) -> None:
+        """early: a process that waits to be asked (`early`), ended here if it is not needed."""
         self._threads = threads or available_threads()
         self._on_change = on_change
         self._lock = threading.Lock()
-        self._early = early_helper(self._threads)
+        self._early = early
         self._helper: Helper | None = None
         self._timer: threading.Timer | None = None
         self._waiting: tuple[int, str] | None = None

@@ -15,15 +15,8 @@ from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OnType
 from pmviewer.engine.prepare import eye_steps
 from pmviewer.progress import available_threads
-from pmviewer.render.eye import eye_pass
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings
-
-
-def early_helper(threads: int) -> Helper | None:
-    """A process that imports what it needs before it is known what to compile, where it looks like a first start on
-    several processors."""
-    return Helper() if threads > 1 and not eye_pass.has_code else None
 
 
 def compile_beside(

@@ -12,13 +12,10 @@ from typing import IO
 
 import numpy as np
 
-from pmviewer.engine.ahead.clicks import clicks, other_kinds
 from pmviewer.engine.ahead.requests import Clicks, NextSteps, Request
 from pmviewer.engine.method import plan_of
-from pmviewer.engine.opened import open_scene
-from pmviewer.engine.pool import WorkPool, lower_priority
+from pmviewer.engine.pool import lower_priority
 from pmviewer.engine.prepare import eye_steps
-from pmviewer.errors import PmviewerError
 
 
 def _say(**what: object) -> None:
@@ -35,6 +32,11 @@ def next_steps(request: NextSteps) -> None:
 
 def all_clicks(request: Clicks) -> None:
     """Try every click on the miniature."""
+    from pmviewer.engine.ahead.clicks import clicks, other_kinds  # the renderer, which the eye pass doesn't wait for
+    from pmviewer.engine.opened import open_scene
+    from pmviewer.engine.pool import WorkPool
+    from pmviewer.errors import PmviewerError
+
     opened = open_scene(request.scene)
     if opened.flat.record.dtype != request.record:
         _say(failed="the stand-in compiles other kernels")

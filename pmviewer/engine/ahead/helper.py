@@ -11,9 +11,12 @@ import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from pmviewer.engine.ahead.requests import Request
 from pmviewer.kernels.compile.sources import PACKAGE
+
+if TYPE_CHECKING:  # takes time
+    from pmviewer.engine.ahead.requests import Request
 
 
 @dataclass(frozen=True)

@@ -85,14 +85,18 @@ _used: set[str] = set()
 """Folders of modules that this process has imported."""
 
 
+def folder_of(source: Path) -> Path:
+    """Where the code compiled from a source file is kept, for the state of all sources that it depends on."""
+    module = source.relative_to(PACKAGE).with_suffix("") if source.is_relative_to(PACKAGE) else Path(source.stem)
+    return CACHE_FOLDER / f"{'.'.join(module.parts)}-{stamp(source)}"
+
+
 class _Locator(UserProvidedCacheLocator):
     """One folder for each module and state of the sources that it depends on."""
 
     def __init__(self, py_func: Any, py_file: str) -> None:
         super().__init__(py_func, py_file)
-        source = Path(py_file).resolve()
-        module = source.relative_to(PACKAGE).with_suffix("") if source.is_relative_to(PACKAGE) else Path(source.stem)
-        self._cache_path = str(CACHE_FOLDER / f"{'.'.join(module.parts)}-{stamp(source)}")
+        self._cache_path = str(folder_of(Path(py_file).resolve()))
 
     def ensure_cache_path(self) -> None:
         # Numba's own writes a file for each function that is defined; the folder above is known to be writable.
@@ -147,11 +151,6 @@ class _KernelCache(FunctionCache):
         self._cache_file = _OneFileEach(self._cache_path, impl.filename_base, impl.locator.get_source_stamp())
         self._held: list[int] = []
 
-    @property
-    def has_any(self) -> bool:
-        """Whether there is compiled code on disk, for whatever types."""
-        return any(Path(self._cache_path).glob(self._cache_file._data_name_pattern.replace("{number:d}", "*")))
-
     def has(self, sig: Any, target_context: Any) -> bool:
         """Whether there is compiled code on disk."""
         name = self._cache_file._name(self._index_key(sig, target_context.codegen()))
@@ -184,11 +183,6 @@ class _KernelDispatcher(CPUDispatcher):
     """Compiles what no other process is compiling."""
 
     _cache: _KernelCache
-
-    @property
-    def has_code(self) -> bool:
-        """Whether it is compiled for any arguments, by any process."""
-        return bool(self.overloads) or self._cache.has_any
 
     def is_kept(self, *arguments: Any) -> bool:
         """Whether code for such arguments is compiled already, by any process."""
