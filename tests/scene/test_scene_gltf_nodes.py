@@ -78,6 +78,29 @@ def test_shared_meshes_become_instances_where_that_saves_memory(tmp_path: Path, 
     assert alone.camera == scene.camera
 
 
+def test_thousands_of_copies_that_are_no_instances_are_one_shape(tmp_path: Path, monkeypatch) -> None:
+    """The same triangles, normals and coordinates as apart; mirrored and squeezed ones too. A shape a primitive."""
+    places = [{"translation": [3, 0, 0]}, {"scale": [-1, 2, 1], "rotation": [0, 0.6, 0, 0.8]}, {"scale": [1, 1, 0]}]
+    f = Gltf(materials=[{"emissiveFactor": [1, 1, 1]}, {}])
+    attributes = {
+        "POSITION": f.array(TRIANGLE),
+        "NORMAL": f.array([[0, 0.6, 0.8]] * 3),
+        "TEXCOORD_0": f.array(TRIANGLE[:, :2]),
+    }
+    f.mesh([{"attributes": attributes, "material": i} for i in range(2)])
+    path = f.write(tmp_path, nodes=[{"mesh": 0, **place} for place in places])
+    apart = meshes(load_scene(path))
+    monkeypatch.setattr("pmviewer.scene.formats.gltf.load.MOST_APART", 2)
+    scene = load_scene(path)
+    assert [shape.radiance for shape in scene.shapes[:2]] == [(1.0, 1.0, 1.0), None]
+    for i, joined in enumerate(meshes(scene)):
+        own = apart[i::2]
+        assert corners(joined) == [triangle for mesh in own for triangle in corners(mesh)]
+        for name in ("normals", "uv"):
+            together = np.concatenate([getattr(mesh, name)[mesh.faces] for mesh in own])
+            np.testing.assert_allclose(getattr(joined, name)[joined.faces], together, atol=1e-12)
+
+
 def test_copies_of_gpu_instancing(tmp_path: Path) -> None:
     f = simple(extensionsUsed=["EXT_mesh_gpu_instancing"])
     attributes = {

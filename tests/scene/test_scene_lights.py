@@ -12,6 +12,7 @@ from PIL import Image
 from pmviewer.errors import SceneError
 from pmviewer.output.exr import write_exr
 from pmviewer.scene.analysis import analyse
+from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.describe import describe
 from pmviewer.scene.description import DirectionalLight, ImageEnvironment, SpotLight
 from pmviewer.scene.emission import emitted_power, spot_solid_angle
@@ -36,6 +37,16 @@ def sky_file(folder: Path, pixels: np.ndarray | None = None) -> np.ndarray:
 
 def hdr(rows: bytes, width: int, height: int) -> bytes:
     return b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n" % (height, width) + rows
+
+
+def test_a_light_whose_surface_lets_all_light_pass_shines(tmp_path: Path) -> None:
+    """As Blender's exporter writes them."""
+    lamp = '<shape type="rectangle"><emitter type="area"/><bsdf type="null"/></shape>'
+    scene = load(tmp_path, lamp, '<shape type="sphere"><bsdf type="null"/></shape>', sky="")
+    light, clear = (scene.materials[shape.material] for shape in scene.shapes)
+    assert (light.reflectance, light.opacity, clear.opacity) == ((0, 0, 0), 1, 0)
+    assert flatten(scene).light_power.min() > 0
+    assert '<bsdf type="null"> on a light is black here' in scene.warnings[0]
 
 
 def test_spot_and_directional_light(tmp_path: Path) -> None:

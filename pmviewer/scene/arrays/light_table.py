@@ -23,6 +23,7 @@ from pmviewer.scene.description import (
     Parallelogram,
     PointLight,
     Scene,
+    Shape,
     Sphere,
     SpotLight,
 )
@@ -31,6 +32,17 @@ from pmviewer.scene.emission import emitted_power
 Float = NDArray[np.float32]
 BRIGHTEST = 1e32
 """Radiance or intensity, a factor of a million from the end of float32: squares of small distances divide it."""
+
+
+def _glows(shape: Shape) -> bool:
+    return shape.radiance is not None and any(c > 0 for c in shape.radiance)
+
+
+def _areas(corners: Float) -> NDArray[np.float64]:
+    """Of triangles (n, 3, 3)."""
+    corners64 = corners.astype(float)
+    cross = np.cross(corners64[:, 1] - corners64[:, 0], corners64[:, 2] - corners64[:, 0])
+    return np.asarray(np.linalg.norm(cross, axis=1) / 2)
 
 
 class LightTable:
@@ -49,21 +61,24 @@ class LightTable:
         cdfs: list[NDArray[np.float64]] = [np.zeros(0)]
         listed = 0
         shape_of_triangle = shape_of_prim[: len(vertices)]  # in ascending order
+        ends = np.searchsorted(shape_of_triangle, np.arange(len(scene.shapes) + 1, dtype=shape_of_prim.dtype))
+        glows = np.array([_glows(shape) for shape in scene.shapes], bool)
+        areas = np.zeros(len(vertices))
+        if glows.any():
+            lit = np.flatnonzero(np.repeat(glows, np.diff(ends)))
+            areas[lit] = _areas(vertices[lit])
         for index, shape in enumerate(scene.shapes):
-            if shape.radiance is None or not any(c > 0 for c in shape.radiance):
+            if shape.radiance is None or not glows[index]:
                 continue
             row = [0.0] * K.LIGHT_COLUMNS
             row[K.L_RADIANCE : K.L_RADIANCE + 3] = shape.radiance
             if isinstance(shape.geometry, Mesh):
-                own = np.arange(*np.searchsorted(shape_of_triangle, (index, index + 1)))
-                corners = vertices[own].astype(float)
-                cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-                areas = np.linalg.norm(cross, axis=1) / 2
-                area = float(areas.sum())
-                row[K.L_KIND], row[K.L_FIRST], row[K.L_COUNT] = K.MESH, listed, len(own)
-                triangles.append(own)
-                cdfs.append(np.cumsum(areas) / area)
-                listed += len(own)
+                own = slice(ends[index], ends[index + 1])
+                area = float(areas[own].sum())
+                row[K.L_KIND], row[K.L_FIRST], row[K.L_COUNT] = K.MESH, listed, own.stop - own.start
+                triangles.append(np.arange(own.start, own.stop))
+                cdfs.append(np.cumsum(areas[own]) / area)
+                listed += own.stop - own.start
             else:
                 area = _fill_shape(row, shape.geometry)
             row[K.L_AREA] = area

@@ -25,9 +25,13 @@ from pmviewer.scene.formats.gltf.pose import Pose, joint_matrices, pose_at_start
 from pmviewer.scene.formats.gltf.primitive import Decoded, Primitives, numbers_of
 from pmviewer.scene.formats.gltf.shared import SharedMeshes
 from pmviewer.scene.formats.meshfile import MeshFile
+from pmviewer.scene.formats.mitsuba.transform import Matrix
+from pmviewer.scene.meshes.copies import joined_copies
 
 CHOICES = ("scene", "camera", "variant")
 """What a user can choose in a glTF file, by name or number from 0 on."""
+MOST_APART = 5000
+"""Copies of a mesh that are shapes of their own where they can't be instances; more are joined in one."""
 _LIGHTS, _VARIANTS = "KHR_lights_punctual", "KHR_materials_variants"
 _SPARE_TRIANGLES, _TRIANGLES_PER_BYTE = 1 << 22, 16
 """Triangles that a file may be written out to: so many, and more by its size (compressed ones take under a byte)."""
@@ -57,6 +61,8 @@ class _Reader:
         self._result = MeshFile()
         self._numbers: dict[int, int] = {}
         self._decoded: dict[int, list[tuple[Decoded, Json]]] = {}
+        self._joined: dict[int, list[Matrix]] = {}
+        """By mesh, the places of copies that are written out as one shape."""
 
     def read(self) -> MeshFile:
         document, result = self._document, self._result
@@ -70,10 +76,14 @@ class _Reader:
         triangles = {index: self._triangles(index) for index in {p.node["mesh"] for p in placed if "mesh" in p.node}}
         shared = SharedMeshes(uses, triangles, self._own_shapes)
         self._check_size(placed, shared, triangles)
+        self._joined = {index: [] for index, count in uses.items() if count > MOST_APART}
         for place in placed:
             self._add_mesh(place, nodes, shared)
             self._add_camera(place)
             self._add_light(place)
+        for index, matrices in self._joined.items():
+            if matrices:
+                result.shapes += [_copies(shape, np.stack(matrices)) for shape in self._own_shapes(index)[1]]
         if scenes:
             row = scenes[scene if scene is not None else document.header.get("scene", 0)]
             sky = image_based(document, self._buffers, row)
@@ -202,6 +212,8 @@ class _Reader:
             instance = shared.instance(index, name, matrix)
             if instance is not None:
                 result.instances.append(instance)
+            elif index in self._joined:
+                self._joined[index].append(matrix)
             else:
                 result.shapes += [_moved(shape, name, matrix) for shape in self._own_shapes(index)[1]]
 
@@ -263,3 +275,9 @@ def _primitives_of(row: Json) -> list[Json]:
 def _moved(shape: Shape, name: str, matrix: np.ndarray) -> Shape:
     assert isinstance(shape.geometry, Mesh)
     return Shape(name, transformed(shape.geometry, matrix), shape.material, shape.radiance, shape.emission)
+
+
+def _copies(shape: Shape, matrices: np.ndarray) -> Shape:
+    assert isinstance(shape.geometry, Mesh)
+    mesh = joined_copies(shape.geometry, matrices)
+    return Shape(shape.name, mesh, shape.material, shape.radiance, shape.emission)

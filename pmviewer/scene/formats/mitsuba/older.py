@@ -20,6 +20,11 @@ def clear(name: str, opacity: float = 0.0) -> Material:
     return Material(name, "diffuse", BLACK, opacity=opacity)
 
 
+def is_clear(material: Material) -> bool:
+    """Does all light pass the surface, as that of `null`?"""
+    return material.kind == "diffuse" and material.opacity == 0 and "opacity" not in material.textures
+
+
 def cut_diffuse(p: Properties, diffuse: RGB, specular: RGB) -> RGB:
     """The diffuse reflectance that the specular one leaves, with a warning when that changes it."""
     if max(d + s for d, s in zip(diffuse, specular)) <= 1 + 1e-9:

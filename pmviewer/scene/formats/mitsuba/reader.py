@@ -11,6 +11,7 @@ from pmviewer.scene.formats.mitsuba.document import SILENT_TAGS, Document, Missi
 from pmviewer.scene.formats.mitsuba.emitter import add_lights
 from pmviewer.scene.formats.mitsuba.group import GROUP, INSTANCE, Groups
 from pmviewer.scene.formats.mitsuba.mesh_file import BrokenMesh
+from pmviewer.scene.formats.mitsuba.older import is_clear
 from pmviewer.scene.formats.mitsuba.shape import SUPPORTED, geometry
 from pmviewer.scene.formats.mitsuba.xml import Element
 from pmviewer.scene.texture import Texture
@@ -122,7 +123,12 @@ class Reader:
         if not bsdfs or id(bsdfs[0]) in self._grey:
             return self.materials.default(emits=radiance is not None and not bsdfs)
         try:
-            return self.materials.of(bsdfs[0])
+            number = self.materials.of(bsdfs[0])
+            if radiance is not None and is_clear(self.materials.list[number]):
+                # What rays never stop at would never be seen to shine.
+                self.document.warn(f"{bsdfs[0]} on a light is black here: light does not pass it.", bsdfs[0])
+                return self.materials.default(emits=True)
+            return number
         except SceneError as error:
             self._grey.add(id(bsdfs[0]))
             self._failed(bsdfs[0], error, "A grey diffuse surface replaces it.")
