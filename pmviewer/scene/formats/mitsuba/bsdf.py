@@ -19,6 +19,8 @@ from pmviewer.scene.optics import IOR, METALS, metal
 _AROUND_ONE = frozenset(("twosided", "mask", "bumpmap", "bump", "normalmap", "coating", "roughcoating"))
 _COMPOUND = _AROUND_ONE | {"blendbsdf", "mixturebsdf"}
 _GREY = (0.5, 0.5, 0.5)
+_ELSEWHERE = {"glass": "dielectric", "mirror": "conductor", "lambertian": "diffuse", "matte": "diffuse"}
+"""Types of other renderers that read Mitsuba's format."""
 
 
 class Materials:
@@ -80,9 +82,12 @@ class Materials:
         return Material(name, "diffuse", _GREY)
 
     def _similar(self, p: Properties) -> str:
-        """The longest known type that the name of an unknown one begins with: others' plugins are called so."""
+        """What an unknown type is elsewhere, or the longest known one that its name begins with: others' plugins are
+        called so."""
         word = p.type.lower()
-        known = max((t for t in (*SIMPLE, *_COMPOUND) if word.startswith(t)), key=len, default=p.type)
+        known = _ELSEWHERE.get(word) or max(
+            (t for t in (*SIMPLE, *_COMPOUND) if word.startswith(t)), key=len, default=p.type
+        )
         if known != p.type:
             self.document.warn(f"{p.element} is not supported: it is read as '{known}'.", p.element)
         return known
