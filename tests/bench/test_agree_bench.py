@@ -19,7 +19,8 @@ from pmviewer.bench.agree.generate import needs_particles, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.statistics import Outcome
 from pmviewer.bench.agree.tree import from_json
-from pmviewer.bench.agree.trial import STAGES, Comparison, Question, Verdict, methods_of, questions
+from pmviewer.bench.agree.trial import STAGES, Question, methods_of, questions
+from pmviewer.bench.agree.verdict import Comparison, Verdict
 from pmviewer.bench.agree.workers import try_scenes
 from pmviewer.bench.registry import run_bench
 from pmviewer.errors import PmviewerError, SettingError
@@ -186,7 +187,7 @@ def test_known_deviations_explain_only_what_agrees_without_them(monkeypatch):
 
 WORK = """
 import os
-from pmviewer.bench.agree.trial import Verdict
+from pmviewer.bench.agree.verdict import Verdict
 
 def work(seed, index):
     if index == 2:

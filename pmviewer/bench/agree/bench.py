@@ -17,7 +17,8 @@ from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH
 from pmviewer.bench.agree.statistics import LEVEL, rejected
 from pmviewer.bench.agree.triage import save, smallest, without_all
-from pmviewer.bench.agree.trial import FORGIVEN, STAGES, Comparison, Verdict
+from pmviewer.bench.agree.trial import FORGIVEN, STAGES
+from pmviewer.bench.agree.verdict import Comparison, Verdict
 from pmviewer.bench.agree.workers import try_scenes
 from pmviewer.bench.agree.xml import MAX_DEPTH, SIZE
 from pmviewer.bench.report import BenchResult, Cell, Target

@@ -17,7 +17,7 @@ a bright and a dark surface meet, the limit for r = 0 counts, twice the last sta
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -29,6 +29,7 @@ from pmviewer.bench.agree.mitsuba_client import Mitsuba, MitsubaError
 from pmviewer.bench.agree.ours import METHODS, PHOTON_METHODS, Effort, our_runs, picture, term
 from pmviewer.bench.agree.statistics import Outcome, compared, summaries
 from pmviewer.bench.agree.tree import Node
+from pmviewer.bench.agree.verdict import Comparison, Verdict
 from pmviewer.bench.agree.xml import write_scene
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
@@ -58,35 +59,6 @@ TERMS = {"emission": ("emission",), "direct": ("direct",), "specular": ("specula
          "caustic + indirect": ("caustic", "indirect")}  # fmt: skip
 SAFE_TERMS = ("emission", "direct")
 """Those that hold no caustics."""
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """`method` against `peer` in `what`; the outcome of the last stage that was needed, counted from 1. `final`:
-    whether it may be a disagreement, because all stages were suspicious or path tracers differ beyond doubt. `known`:
-    the known deviation that it comes from, if it does."""
-
-    method: str
-    peer: str
-    what: str
-    outcome: Outcome
-    stage: int
-    final: bool
-    known: str = ""
-
-    @property
-    def p(self) -> float:
-        """Chance of the difference where there is none; 1 where it is gone after another look."""
-        return self.outcome.p if self.final else 1.0
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Comparisons of a scene. `refused`: why a program could not open it."""
-
-    comparisons: list[Comparison] = field(default_factory=list)
-    refused: str = ""
-    lit: float = 0.0
 
 
 class Runs:

@@ -18,7 +18,8 @@ from pathlib import Path
 from pmviewer.bench.agree.generate import scene_of
 from pmviewer.bench.agree.process import end_with, tools
 from pmviewer.bench.agree.triage import explained
-from pmviewer.bench.agree.trial import Verdict, tried
+from pmviewer.bench.agree.trial import tried
+from pmviewer.bench.agree.verdict import Verdict
 from pmviewer.engine.pool import available_threads
 
 
