@@ -66,8 +66,8 @@ def bsdf_of(scene, virtual, row, glossy):
 
 @specialised
 def scattered(scene, virtual, row, glossy, wo):
-    """BRDF of the light towards wo (red, green, blue), which is on its lit side, and its albedo seen from there, 0 where
-    its weight does not ask for it."""
+    """BRDF of the light towards wo (red, green, blue), which is on its lit side, and its albedo seen from there, 0
+    where its weight does not ask for it."""
     if not has(scene, "bsdfs"):
 
         def plain(scene, virtual, row, glossy, wo):
