@@ -66,7 +66,8 @@ def bsdf_of(scene, virtual, row, glossy):
 
 @specialised
 def scattered(scene, virtual, row, glossy, wo):
-    """BRDF of the light towards wo (red, green, blue), which is on its lit side, and its albedo seen from there."""
+    """BRDF of the light towards wo (red, green, blue), which is on its lit side, and its albedo seen from there, 0
+    where its weight does not ask for it."""
     if not has(scene, "bsdfs"):
 
         def plain(scene, virtual, row, glossy, wo):
@@ -81,17 +82,25 @@ def scattered(scene, virtual, row, glossy, wo):
             return f, _f4(math.pi) * luminance(f)
         b, wi = bsdf_of(scene, virtual, row, glossy)
         f = bsdf_f(b, STORED, wi, wo)
-        return f, albedo_seen(scene, virtual, b, wo)
+        return f, albedo_seen(scene, virtual, row, b, wo)
 
     return any_bsdf
 
 
 @specialised
-def albedo_seen(scene, virtual, b, wo):
-    """The albedo, where an estimator asks for it."""
-    if has(virtual, "paths"):
-        return lambda scene, virtual, b, wo: stored_albedo(scene, b, wo)
-    return lambda scene, virtual, b, wo: _f4(0.0)
+def albedo_seen(scene, virtual, row, b, wo):
+    """The albedo, where the light's weight asks for it: it is a sum over samples."""
+    if not has(virtual, "paths"):
+        return lambda scene, virtual, row, b, wo: _f4(0.0)
+
+    def of_path(scene, virtual, row, b, wo):
+        first, blocked = load_f4(virtual.lights, row + V_FIRST), load_f4(virtual.lights, row + V_BLOCKED)
+        stops = virtual.estimator == FULL or virtual.estimator == MODIFIED
+        if (stops and first != _f4(0.0)) or blocked != _f4(0.0):
+            return stored_albedo(scene, b, wo)
+        return _f4(0.0)
+
+    return of_path
 
 
 @specialised
