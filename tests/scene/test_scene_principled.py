@@ -63,6 +63,14 @@ def test_odd_numbers_are_cut(tmp_path: Path) -> None:
     assert glass.eta == 1.001
 
 
+def test_a_colour_in_a_numbers_place_counts_by_its_luminance(tmp_path: Path) -> None:
+    """As Blender's exporter once wrote tints."""
+    tint = '<rgb name="{}" value="{}"/>'
+    found, warnings = material(tmp_path, tint.format("spec_tint", "1 1 1") + tint.format("sheen_tint", "1 0 0"))
+    assert found.principled == Principled(spec_tint=pytest.approx(1.0), sheen_tint=pytest.approx(0.2126))
+    assert warnings == ()
+
+
 def test_its_textures(tmp_path: Path) -> None:
     rough = np.uint8([[[51, 51, 51], [255, 0, 0]]])
     Image.fromarray(rough).save(tmp_path / "rough.png")

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from pmviewer.scene.description import BLACK, Material
 from pmviewer.scene.formats.mitsuba.document import Properties
-from pmviewer.scene.formats.mitsuba.interface import bounded, share
+from pmviewer.scene.formats.mitsuba.interface import share
 from pmviewer.scene.formats.mitsuba.values import parse_float
 from pmviewer.scene.texture import limited
 
@@ -62,7 +62,7 @@ def two_sided(p: Properties, inner: Material, others: list[Material]) -> Materia
 
 def mask(p: Properties, inner: Material) -> Material:
     """Opacity of a number, a colour's mean luminance or a texture; that of the BSDF inside multiplies it."""
-    opacity = _share_of(p, "opacity", 0.5)
+    opacity = share(p, "opacity", 0.5)
     texture = p.textures.get("opacity")
     p.warn_unused("bsdf", "texture")
     textures = dict(inner.textures)
@@ -82,17 +82,9 @@ def mask(p: Properties, inner: Material) -> Material:
     return replace(inner, opacity=opacity * inner.opacity)
 
 
-def _share_of(p: Properties, name: str, default: float) -> float:
-    """A number from 0 to 1, written as a number, a colour (its luminance counts) or a texture (its mean)."""
-    if p.tag_of(name) in (None, "float", "integer", "texture"):
-        return share(p, name, default)
-    r, g, b = p.colour(name, default)
-    return bounded(p, name, 0.2126 * r + 0.7152 * g + 0.0722 * b, 0.0, 1.0)
-
-
 def blend(p: Properties, name: str, parts: list[Material]) -> Material:
     """`weight` of the second BSDF, the rest of the first."""
-    weight = _share_of(p, "weight", 0.5)
+    weight = share(p, "weight", 0.5)
     texture = p.textures.get("weight")
     p.warn_unused("bsdf", "texture")
     parts = [_not_too_deep(p, part) for part in parts]

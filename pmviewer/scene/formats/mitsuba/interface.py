@@ -56,8 +56,11 @@ def bounded(p: Properties, name: str, value: float, least: float, most: float) -
 
 
 def share(p: Properties, name: str, default: float = 0.0) -> float:
-    """A number from 0 to 1, or a texture's mean."""
-    return bounded(p, name, p.roughness(name, default), 0.0, 1.0)
+    """A number from 0 to 1, written as a number, a colour (its luminance counts) or a texture (its mean)."""
+    if p.tag_of(name) in (None, "float", "integer", "texture"):
+        return bounded(p, name, p.roughness(name, default), 0.0, 1.0)
+    r, g, b = p.colour(name, default)
+    return bounded(p, name, 0.2126 * r + 0.7152 * g + 0.0722 * b, 0.0, 1.0)
 
 
 def relative_ior(p: Properties, inside: str) -> float:
