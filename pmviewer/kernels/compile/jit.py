@@ -85,10 +85,16 @@ _used: set[str] = set()
 """Folders of modules that this process has imported."""
 
 
+@functools.cache
 def folder_of(source: Path) -> Path:
     """Where the code compiled from a source file is kept, for the state of all sources that it depends on."""
     module = source.relative_to(PACKAGE).with_suffix("") if source.is_relative_to(PACKAGE) else Path(source.stem)
     return CACHE_FOLDER / f"{'.'.join(module.parts)}-{stamp(source)}"
+
+
+@functools.cache
+def _resolved(file: str) -> Path:
+    return Path(file).resolve()
 
 
 class _Locator(UserProvidedCacheLocator):
@@ -96,7 +102,8 @@ class _Locator(UserProvidedCacheLocator):
 
     def __init__(self, py_func: Any, py_file: str) -> None:
         super().__init__(py_func, py_file)
-        self._cache_path = str(folder_of(Path(py_file).resolve()))
+        self._source = _resolved(py_file)
+        self._cache_path = str(folder_of(self._source))
 
     def ensure_cache_path(self) -> None:
         # Numba's own writes a file for each function that is defined; the folder above is known to be writable.
@@ -106,7 +113,7 @@ class _Locator(UserProvidedCacheLocator):
             os.utime(self._cache_path)
 
     def get_source_stamp(self) -> str:
-        return stamp(Path(self._py_file).resolve())
+        return stamp(self._source)
 
 
 class _KernelCacheImpl(CompileResultCacheImpl):

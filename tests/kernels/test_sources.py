@@ -1,0 +1,43 @@
+"""What compiled code depends on is read from the sources' text: as Python's own parser reads it, and in no case less."""
+
+import ast
+
+import pytest
+
+from pmviewer.kernels.compile.sources import PACKAGE, imported_names, sources_of
+
+
+def parsed(source: str | bytes) -> set[str]:
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+        elif isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+    return names
+
+
+def test_of_every_file_of_the_package():
+    for file in PACKAGE.rglob("*.py"):
+        source = file.read_bytes()
+        ours = {name for name in imported_names(source) if name.startswith(PACKAGE.name)}
+        assert ours == {name for name in parsed(source) if name.startswith(PACKAGE.name)}, file
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import a.b as c, d",
+        "from a.b import (\n    c as e,  # and (some) text\n    d,\n)\n",
+        "def f():\n\tfrom a import b\n",
+        "from a import b  # c\nimport d",
+    ],
+)
+def test_of_every_way_to_write_an_import(source):
+    assert imported_names(source.encode()) == parsed(source)
+
+
+def test_what_is_imported_by_what_is_imported_counts():
+    reached = sources_of(PACKAGE / "engine" / "session.py")
+    assert PACKAGE / "kernels" / "vector.py" in reached
+    assert PACKAGE / "viewer" / "app.py" not in reached
