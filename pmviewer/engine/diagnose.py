@@ -34,7 +34,7 @@ from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.photons.deposition.rules import SMALLEST_EPSILON
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.diagnostics.density import WIDEST, counting_eye, counting_tree, density_view
-from pmviewer.render.diagnostics.diagnostics import FAMILY_CHANNELS, lookup_view, shadow_view, site_view
+from pmviewer.render.diagnostics.diagnostics import FAMILY_CHANNELS, lookup_view, radiance_view, shadow_view
 from pmviewer.render.film import Film
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL
 from pmviewer.render.virtual_lights.film import WeightedFilm
@@ -143,10 +143,10 @@ def _drawn(
     return np.ascontiguousarray(out.T).reshape(-1, film.height, film.width)
 
 
-def cells_of(sites: RadianceMap) -> PhotonGrid:
+def cells_of(radiance: RadianceMap) -> PhotonGrid:
     """Radiance photons in a grid whose look-ups reach some dozen of them nearly everywhere."""
-    photons = sites.grid.photons
-    return build_grid(photons, max(neighbourhood(photons[:, :3], CELL_NEIGHBOURS), sites.grid.radius))
+    photons = radiance.grid.photons
+    return build_grid(photons, max(neighbourhood(photons[:, :3], CELL_NEIGHBOURS), radiance.grid.radius))
 
 
 def _kernel(wanted: Wanted, looked: Looked, out: NDArray[np.float32]) -> Callable[[int, int], Any]:
@@ -159,7 +159,7 @@ def _kernel(wanted: Wanted, looked: Looked, out: NDArray[np.float32]) -> Callabl
         radiance = looked.rendered.maps.radiance
         assert radiance is not None
         cells = cells_of(radiance)
-        draw = partial(site_view, scene, eye, given.global_map, given.sites, cells.record, out)
+        draw = partial(radiance_view, scene, eye, given.global_map, given.radiance, cells.record, out)
         return lambda first, last: (draw(first, last), cells)  # the grid lives as long as its record is used
     latest, how = looked.importance.latest, looked.settings.importance
     if wanted.family == "importance":

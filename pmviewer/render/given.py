@@ -12,9 +12,9 @@ class PassData(NamedTuple):
     """What is constant in a pass. Python holds arrays of one record each, kernels the records (`opened`).
 
     scene: SCENE_DTYPE; eye: EYE_DTYPE; caustic_map, global_map: of grids or kd-trees; choice_map: of the grid of
-    photons that choose lights; sites: of the radiance photons, or NO_SITES; cache: of the irradiance cache, or
-    NO_CACHE; shadows: of the shadow photons, or NO_SHADOWS; guides: of the photons that guide gather rays, or
-    NO_GUIDES; corner: CORNERS or NO_CORNERS; virtual: of the virtual lights, or NO_VIRTUAL.
+    photons that choose lights; radiance: of the radiance photons, or NO_RADIANCE_PHOTONS; cache: of the irradiance
+    cache, or NO_CACHE; shadows: of the shadow photons, or NO_SHADOWS; guides: of the photons that guide gather rays,
+    or NO_GUIDES; corner: CORNERS or NO_CORNERS; virtual: of the virtual lights, or NO_VIRTUAL.
     """
 
     scene: Any
@@ -22,7 +22,7 @@ class PassData(NamedTuple):
     caustic_map: Any
     global_map: Any
     choice_map: Any
-    sites: Any
+    radiance: Any
     cache: Any
     shadows: Any
     guides: Any
@@ -79,7 +79,7 @@ def opened(given):
         given.caustic_map[0],
         given.global_map[0],
         given.choice_map[0],
-        given.sites[0],
+        given.radiance[0],
         given.cache[0],
         given.shadows[0],
         given.guides[0],

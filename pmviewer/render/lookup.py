@@ -16,7 +16,14 @@ from pmviewer.maps.estimate.filters import Filter
 from pmviewer.maps.estimate.hull import hull_irradiance
 from pmviewer.maps.estimate.nearest import Neighbours
 from pmviewer.maps.estimate.neighbours import BATCH_WORDS, FOUND_WORDS, SQUARED_WORDS, next_batch, search
-from pmviewer.maps.radiance import UNKNOWN, nearest_site, site_irradiance, site_place, site_slot, store_irradiance
+from pmviewer.maps.radiance import (
+    UNKNOWN,
+    nearest_radiance_photon,
+    radiance_photon_irradiance,
+    radiance_photon_place,
+    radiance_photon_slot,
+    store_irradiance,
+)
 from pmviewer.maps.search.disc import Place
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.maps.variant import ABSENT, is_kdtree
@@ -121,7 +128,7 @@ def looked_up(photons, eye, radius, p, n, class_mask):
     return within
 
 
-NO_SITES = ABSENT
+NO_RADIANCE_PHOTONS = ABSENT
 """Stands for radiance photons where there are none."""
 
 
@@ -132,25 +139,25 @@ def gathered_irradiance(given, p, n):
     Where the pass has radiance photons, that of the nearest one, made by the first ray that needs it, and where none is
     near a look-up of its own; without them always that.
     """
-    if absent(part(given, "sites")):
+    if absent(part(given, "radiance")):
 
         def plain(given, p, n):
             return irradiance(given.global_map, given.eye, given.eye.global_radius, p, n, np.int32(ALL_CLASSES))
 
         return plain
 
-    def through_sites(given, p, n):
-        sites, eye = given.sites, given.eye
-        site = nearest_site(sites, p, n, eye.site_radius, eye.flatness, eye.site_similarity)
-        if site >= 0:
-            word = site_slot(sites, site)
+    def through_radiance_photons(given, p, n):
+        radiance, eye = given.radiance, given.eye
+        index = nearest_radiance_photon(radiance, p, n, eye.radiance_cutoff, eye.flatness, eye.radiance_similarity)
+        if index >= 0:
+            word = radiance_photon_slot(radiance, index)
             if word != UNKNOWN:
-                return site_irradiance(sites, word)
-            p, n = site_place(sites, site)
+                return radiance_photon_irradiance(radiance, word)
+            p, n = radiance_photon_place(radiance, index)
         E = irradiance(given.global_map, eye, eye.global_radius, p, n, np.int32(ALL_CLASSES))
-        if site < 0:
+        if index < 0:
             return E
         # What was stored, not E: it must not matter who comes first.
-        return site_irradiance(sites, store_irradiance(sites, site, E))
+        return radiance_photon_irradiance(radiance, store_irradiance(radiance, index, E))
 
-    return through_sites
+    return through_radiance_photons

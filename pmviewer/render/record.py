@@ -56,8 +56,8 @@ EYE_DTYPE = np.dtype(
         ("boundary", "f4"),  # what photons on a convex hull's boundary count
         ("caustic_radius", "f4"),
         ("global_radius", "f4"),
-        ("site_radius", "f4"),  # radiance photons farther away are not used
-        ("site_similarity", "f4"),  # least cosine between their normals and the surface's
+        ("radiance_cutoff", "f4"),  # radiance photons farther away are not used
+        ("radiance_similarity", "f4"),  # least cosine between their normals and the surface's
     ],
     align=True,
 )
@@ -96,7 +96,7 @@ class Evaluation:
     share: float = 0.0
     caustic_radius: float = 0.0
     global_radius: float = 0.0
-    site_radius: float = 0.0
+    radiance_cutoff: float = 0.0
 
 
 NOTHING_EVALUATED = Evaluation()
@@ -120,7 +120,7 @@ def eye_record(
     r["filter"], r["rim"] = FILTERS.index(estimate.filter), RIMS.index(estimate.rim)
     r["cone_k"], r["flatness"], r["boundary"] = estimate.cone_k, estimate.flatness, estimate.boundary
     r["roulette"] = settings.gather.roulette
-    r["site_similarity"] = settings.gather.similarity
+    r["radiance_similarity"] = settings.gather.similarity
     for field in fields(evaluation):
         r[field.name] = getattr(evaluation, field.name)
     return record

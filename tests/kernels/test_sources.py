@@ -1,4 +1,4 @@
-"""What compiled code depends on is read from the sources' text: as Python's own parser reads it, and in no case less."""
+"""What compiled code depends on is read from the text of the sources, as Python's own parser reads it."""
 
 import ast
 

@@ -15,12 +15,12 @@ from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.photon_words import encode_direction
 from pmviewer.maps.radiance import (
     SHARES,
-    build_sites,
+    build_radiance_map,
     chosen,
-    nearest_site,
-    site_irradiance,
-    site_place,
-    site_slot,
+    nearest_radiance_photon,
+    radiance_photon_irradiance,
+    radiance_photon_place,
+    radiance_photon_slot,
     store_irradiance,
 )
 from pmviewer.maps.record import decode_directions, unpack
@@ -49,15 +49,17 @@ def nearest_all(records, points, normals, radius, flatness, similarity, found):
     for i in range(len(points)):
         p = (points[i, 0], points[i, 1], points[i, 2])
         n = (normals[i, 0], normals[i, 1], normals[i, 2])
-        found[i] = nearest_site(records[0], p, n, radius, flatness, similarity)
+        found[i] = nearest_radiance_photon(records[0], p, n, radius, flatness, similarity)
 
 
 @kernel
-def store_and_read(records, sites, values, read, places, normals):
-    for i in range(len(sites)):
-        store_irradiance(records[0], sites[i], (values[i, 0], values[i, 1], values[i, 2]))
-        read[i, 0], read[i, 1], read[i, 2] = site_irradiance(records[0], site_slot(records[0], sites[i]))
-        p, n = site_place(records[0], sites[i])
+def store_and_read(records, radiance, values, read, places, normals):
+    for i in range(len(radiance)):
+        store_irradiance(records[0], radiance[i], (values[i, 0], values[i, 1], values[i, 2]))
+        read[i, 0], read[i, 1], read[i, 2] = radiance_photon_irradiance(
+            records[0], radiance_photon_slot(records[0], radiance[i])
+        )
+        p, n = radiance_photon_place(records[0], radiance[i])
         for axis in range(3):
             places[i, axis], normals[i, axis] = p[axis], n[axis]
 
@@ -72,12 +74,14 @@ def made(positions, normals, radius):
     encode_all(normals, codes)
     photons = np.zeros((len(positions), 6), np.float32)
     photons[:, :3] = positions
-    return build_sites(photons, codes, "all", radius, 1.0), decode_directions(codes)
+    return build_radiance_map(photons, codes, "all", radius, 1.0), decode_directions(codes)
 
 
-def found_by(sites, points, normals, radius, flatness=1.0, similarity=0.9):
+def found_by(radiance, points, normals, radius, flatness=1.0, similarity=0.9):
     found = np.empty(len(points), np.int64)
-    nearest_all(sites.record, points, normals, np.float32(radius), np.float32(flatness), np.float32(similarity), found)
+    nearest_all(
+        radiance.record, points, normals, np.float32(radius), np.float32(flatness), np.float32(similarity), found
+    )
     return found
 
 
@@ -86,9 +90,9 @@ def test_nearest_is_that_of_brute_force(flatness, similarity):
     rng = np.random.default_rng(5)
     radius = 0.08
     positions = rng.random((4000, 3), np.float32)
-    sites, normals = made(positions, directions(rng, 4000), radius)
+    radiance, normals = made(positions, directions(rng, 4000), radius)
     points, point_normals = rng.random((1000, 3), np.float32), directions(rng, 1000)
-    found = found_by(sites, points, point_normals, radius, flatness, similarity)
+    found = found_by(radiance, points, point_normals, radius, flatness, similarity)
     offset = positions[None] - points[:, None]
     distance = np.linalg.norm(offset, axis=2)
     height = np.abs((offset * point_normals[:, None]).sum(axis=2))
@@ -97,51 +101,51 @@ def test_nearest_is_that_of_brute_force(flatness, similarity):
     expected = distance.min(axis=1)
     # Where two pass a threshold by rounding alone the answers may differ.
     got = np.full(len(points), np.inf)
-    places = sites.grid.photons[:, :3]
+    places = radiance.grid.photons[:, :3]
     got[found >= 0] = np.linalg.norm(places[found[found >= 0]] - points[found >= 0], axis=1)
     assert 50 < np.isfinite(expected).sum() < 1000
     assert np.isclose(got, expected, rtol=1e-4).mean() > 0.998
 
 
 def test_sides_of_a_thin_wall_stay_apart():
-    """The site of the other side lies nearer, and is not taken."""
+    """The radiance photon of the other side lies nearer, and is not taken."""
     up, down = (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)
     positions = np.array([(0, 0, 0), (0.05, 0, 0), (0.0, 0.05, 0.0)], np.float32)
-    sites, _ = made(positions, np.array([down, up, (1.0, 0.0, 0.0)], np.float32), 0.2)
+    radiance, _ = made(positions, np.array([down, up, (1.0, 0.0, 0.0)], np.float32), 0.2)
     points = np.zeros((3, 3), np.float32)
-    found = found_by(sites, points, np.array([up, down, (0.0, 0.0, 1.0)], np.float32), 0.2)
+    found = found_by(radiance, points, np.array([up, down, (0.0, 0.0, 1.0)], np.float32), 0.2)
     assert found[2] == -1
-    assert np.array_equal(sites.grid.photons[found[:2], :3], positions[[1, 0]])
+    assert np.array_equal(radiance.grid.photons[found[:2], :3], positions[[1, 0]])
 
 
 def test_nothing_is_found_in_an_empty_map():
-    sites, _ = made(np.empty((0, 3), np.float32), np.empty((0, 3), np.float32), 0.2)
+    radiance, _ = made(np.empty((0, 3), np.float32), np.empty((0, 3), np.float32), 0.2)
     up = np.array([(0.0, 1.0, 0.0)], np.float32)
-    assert found_by(sites, np.zeros((1, 3), np.float32), up, 0.2)[0] == -1
-    assert sites.known().shape == (0, 6)
+    assert found_by(radiance, np.zeros((1, 3), np.float32), up, 0.2)[0] == -1
+    assert radiance.known().shape == (0, 6)
 
 
 def test_stored_irradiance_position_and_normal_are_read_back():
     rng = np.random.default_rng(7)
     positions, normals = rng.random((100, 3), np.float32), directions(rng, 100)
-    sites, decoded = made(positions, normals, 0.3)
-    assert len(sites.known()) == 0
+    radiance, decoded = made(positions, normals, 0.3)
+    assert len(radiance.known()) == 0
     some = np.arange(0, 100, 3)
     values = np.exp(rng.uniform(-15, 15, (len(some), 3))).astype(np.float32)
     values[0] = 0
     read, places, read_normals = (np.empty((len(some), 3), np.float32) for _ in range(3))
-    store_and_read(sites.record, some, values, read, places, read_normals)
+    store_and_read(radiance.record, some, values, read, places, read_normals)
     assert read == pytest.approx(values, rel=2**-11)
     original = [int(np.flatnonzero((positions == p).all(axis=1))[0]) for p in places]
     assert np.abs(read_normals - decoded[original]).max() < 1e-5
-    known = unpack(sites.known(), sites.grid.power_unit)
+    known = unpack(radiance.known(), radiance.grid.power_unit)
     assert np.array_equal(known["position"], places)
     assert np.array_equal(known["Phi"], read)
     assert np.abs(known["wi"] - read_normals).max() < 1e-5
 
 
 @pytest.mark.parametrize("share", SHARE_NAMES)
-def test_share_of_photons_that_become_sites(share):
+def test_share_of_photons_that_become_radiance_photons(share):
     picked = chosen(100_000, share)
     assert picked.mean() == pytest.approx(1 / SHARES[share], rel=0.03)
     assert np.array_equal(picked[:5000], chosen(5000, share))

@@ -122,16 +122,16 @@ def test_radiance_photons_are_the_nearest_and_nothing_is_filled_in(box, pool):
     np.testing.assert_array_equal(frame.clouds["radiance"].photons, before.clouds["radiance"].photons)
     cells = frame.image("radiance cells").reshape(-1)
     irradiance = frame.image("radiance photons").reshape(-1, 3)
-    sites = renderer.latest.maps.radiance.grid.photons
-    normals = decode_directions(sites.view(np.uint32)[:, 3])
+    radiance = renderer.latest.maps.radiance.grid.photons
+    normals = decode_directions(radiance.view(np.uint32)[:, 3])
     found = {}
     for pixel, (p, n) in enumerate(zip(*hits(frame.camera), strict=True)):
         if np.isnan(p[0]):
             continue
-        similar = (normals @ n >= 0.9) & (np.abs((sites[:, :3] - p) @ n) < 0.01)
-        distance = np.where(similar, np.linalg.norm(sites[:, :3] - p, axis=1), np.inf)
+        similar = (normals @ n >= 0.9) & (np.abs((radiance[:, :3] - p) @ n) < 0.01)
+        distance = np.where(similar, np.linalg.norm(radiance[:, :3] - p, axis=1), np.inf)
         nearest = int(distance.argmin())
-        assert (cells[pixel] % 1 == 0) == (distance[nearest] < renderer.latest.given.eye[0]["site_radius"])
+        assert (cells[pixel] % 1 == 0) == (distance[nearest] < renderer.latest.given.eye[0]["radiance_cutoff"])
         assert found.setdefault(int(cells[pixel]), nearest) == nearest, "one cell, one radiance photon"
         assert np.all(irradiance[pixel] >= 0)
     assert len(set(found.values())) == len(found) > 50

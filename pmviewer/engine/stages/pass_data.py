@@ -20,7 +20,7 @@ from pmviewer.render.camera import CameraPose
 from pmviewer.render.direct.choice import CHOICES
 from pmviewer.render.direct.shadow import NO_SHADOWS
 from pmviewer.render.given import PassData
-from pmviewer.render.lookup import NO_SITES
+from pmviewer.render.lookup import NO_RADIANCE_PHOTONS
 from pmviewer.render.record import EYE_DTYPE, Evaluation, eye_record
 from pmviewer.settings.access import Settings
 
@@ -64,7 +64,7 @@ def _evaluation(settings: Settings, plan: Plan, maps: PassMaps) -> Evaluation:
         share=maps.share,
         caustic_radius=maps.caustic.radius if maps.caustic is not None else 0.0,
         global_radius=maps.global_.radius if maps.global_ is not None else 0.0,
-        site_radius=maps.radiance_reach,
+        radiance_cutoff=maps.radiance_reach,
     )
 
 
@@ -89,7 +89,7 @@ def pass_data(
         caustic_map=photon_map(maps.caustic),
         global_map=photon_map(maps.global_),
         choice_map=(maps.chooser if maps.chooser is not None else maps.empty_grid).record,
-        sites=maps.radiance.record if maps.radiance is not None else NO_SITES,
+        radiance=maps.radiance.record if maps.radiance is not None else NO_RADIANCE_PHOTONS,
         cache=NO_CACHE,
         shadows=shadows if shadows is not None else NO_SHADOWS,
         guides=guides,

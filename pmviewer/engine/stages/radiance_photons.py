@@ -12,7 +12,7 @@ from pmviewer.engine.stages.pass_maps import LookUpMap
 from pmviewer.maps.estimate.estimate import irradiance_at_knn
 from pmviewer.maps.estimate.filters import FILTERS, Filter
 from pmviewer.maps.estimate.nearest import Neighbours
-from pmviewer.maps.radiance import RadianceMap, build_sites
+from pmviewer.maps.radiance import RadianceMap, build_radiance_map
 from pmviewer.maps.record import decode_directions
 from pmviewer.maps.search.kdtree import PhotonKdTree
 from pmviewer.maps.search.stored import ALL_CLASSES
@@ -47,7 +47,7 @@ def radiance_photons_of(
         cutoff = float(settings.gather.cutoff)
     cutoff *= radius
     unit = photons.global_unit / (math.pi * radius * radius)
-    return build_sites(photons.global_, photons.normals, share, cutoff, unit), cutoff
+    return build_radiance_map(photons.global_, photons.normals, share, cutoff, unit), cutoff
 
 
 def median_radius(

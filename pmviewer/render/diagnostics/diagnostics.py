@@ -17,7 +17,7 @@ from pmviewer.kernels.memory import bits_of_float, stack_i4
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import dot, largest
 from pmviewer.maps.photon_words import encode_direction
-from pmviewer.maps.radiance import nearest_site, site_place
+from pmviewer.maps.radiance import nearest_radiance_photon, radiance_photon_place
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.render.cast import Hit, cast
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow
@@ -102,15 +102,15 @@ def cell_number(p):
 
 
 @kernel
-def site_view(scenes, eyes, maps, site_maps, cell_maps, out, first, last):
+def radiance_view(scenes, eyes, maps, radiance_maps, cell_maps, out, first, last):
     """What a gather ray would take from the first surface: irradiance (W per unit area) of the nearest radiance photon,
     or of a look-up where none is near; and the `cell_number` of the nearest radiance photon, plus a half where it is
     beyond the cut-off, −1 where there is none at all. All −1 where no surface stores photons.
 
-    maps: record (1,) of the global map; site_maps: record (1,) of the radiance photons; cell_maps: of the same in a
+    maps: record (1,) of the global map; radiance_maps: record (1,) of the radiance photons; cell_maps: of the same in a
     grid for look-ups farther out; out: float32 (pixels, 4); the rest as for `lookup_view`.
     """
-    scene, eye, photons, sites, cells = scenes[0], eyes[0], maps[0], site_maps[0], cell_maps[0]
+    scene, eye, photons, radiance, cells = scenes[0], eyes[0], maps[0], radiance_maps[0], cell_maps[0]
     for pixel in range(first, last):
         hit, ng, _ = stored_hit(scene, eye, pixel)
         for c in range(4):
@@ -118,14 +118,14 @@ def site_view(scenes, eyes, maps, site_maps, cell_maps, out, first, last):
         if hit.prim < 0:
             continue
         p = hit.p
-        site = nearest_site(sites, p, ng, eye.site_radius, eye.flatness, eye.site_similarity)
-        if site >= 0:
-            p, ng = site_place(sites, site)
+        index = nearest_radiance_photon(radiance, p, ng, eye.radiance_cutoff, eye.flatness, eye.radiance_similarity)
+        if index >= 0:
+            p, ng = radiance_photon_place(radiance, index)
             out[pixel, 3] = cell_number(p)
         else:
-            cell = nearest_site(cells, p, ng, cells.radius, eye.flatness, eye.site_similarity)
+            cell = nearest_radiance_photon(cells, p, ng, cells.radius, eye.flatness, eye.radiance_similarity)
             if cell >= 0:
-                q, _ = site_place(cells, cell)
+                q, _ = radiance_photon_place(cells, cell)
                 out[pixel, 3] = cell_number(q) + _f4(BEYOND)
         E = irradiance(photons, eye, eye.global_radius, p, ng, _i4(ALL_CLASSES))
         out[pixel, 0], out[pixel, 1], out[pixel, 2] = E
