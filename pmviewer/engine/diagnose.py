@@ -66,8 +66,8 @@ class Looked:
 
     def required(self, name: str) -> tuple[np.float32, np.float32]:
         """Photons wanted per pixel in the map of that name, and the density wanted everywhere instead, −1 for none."""
-        how, rules = self.settings.importance, self.rendered.maps.rules
-        M_r = how.caustic_M_r if name == "caustic" else how.M_r
+        importance, rules = self.settings.importance, self.rendered.maps.rules
+        M_r = importance.caustic_M_r if name == "caustic" else importance.M_r
         return np.float32(M_r * rules.growth), np.float32(rules.everywhere.get(name, -1.0))
 
 
@@ -161,14 +161,14 @@ def _kernel(wanted: Wanted, looked: Looked, out: NDArray[np.float32]) -> Callabl
         cells = cells_of(radiance)
         draw = partial(radiance_view, scene, eye, given.global_map, given.radiance, cells.record, out)
         return lambda first, last: (draw(first, last), cells)  # the grid lives as long as its record is used
-    latest, how = looked.importance.latest, looked.settings.importance
+    latest, asked = looked.importance.latest, looked.settings.importance
     if wanted.family == "importance":
         importance = NO_IMPORTANCE if latest is None else latest.record(wanted.map)
         return partial(importance_view, scene, eye, importance, *looked.required(wanted.map), out)
     if wanted.family == "storing":
         assert latest is not None
         f = np.float32(looked.rendered.maps.rules.f[wanted.map])
-        epsilon, discard = np.float32(max(how.epsilon, SMALLEST_EPSILON)), how.cut_off == "discard"
+        epsilon, discard = np.float32(max(asked.epsilon, SMALLEST_EPSILON)), asked.cut_off == "discard"
         return partial(probability_view, scene, eye, latest.record(wanted.map), f, epsilon, discard, out)
     if wanted.family == "density":
         tree = counting_tree(looked.light.stored(wanted.map))

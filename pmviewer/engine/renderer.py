@@ -168,8 +168,8 @@ class Renderer:
             virtual = tally.timed(pool, "virtual lights", lambda: self.virtual.run(index))
             given = given._replace(virtual=virtual.record)
         if plan.cache:
-            how = recipe(settings.gather, camera, index)
-            cache, counts = tally.timed(pool, "irradiance cache", lambda: fill_cache(given, how, pool))
+            record = recipe(settings.gather, camera, index)
+            cache, counts = tally.timed(pool, "irradiance cache", lambda: fill_cache(given, record, pool))
             tally.add_cache(cache.n, cache.bytes)
             tally.add_counts(counts)
             given = given._replace(cache=cache.record)

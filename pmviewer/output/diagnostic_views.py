@@ -164,15 +164,15 @@ def scalar(values: NDArray[np.floating]) -> NDArray[np.float32]:
 
 def view_scale(view: str, plane: NDArray[np.floating]) -> Scale:
     """The scale on which a plane of that view is shown."""
-    how = DIAGNOSTICS[view]
-    if how.fixed is not None:
-        return Scale(*how.fixed, unit=how.unit)
+    info = DIAGNOSTICS[view]
+    if info.fixed is not None:
+        return Scale(*info.fixed, unit=info.unit)
     values = scalar(plane)
-    if how.diverging:
-        return scale_around_one(values, unit=how.unit)
-    scale = scale_of(values[values >= 0], how.log, how.unit)
-    if how.unit == "photons":  # counts start at none
-        return Scale(0.0, max(scale.upper, 1.0), unit=how.unit)
+    if info.diverging:
+        return scale_around_one(values, unit=info.unit)
+    scale = scale_of(values[values >= 0], info.log, info.unit)
+    if info.unit == "photons":  # counts start at none
+        return Scale(0.0, max(scale.upper, 1.0), unit=info.unit)
     return scale
 
 

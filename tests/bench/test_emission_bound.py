@@ -28,12 +28,12 @@ def test_value_of_photons():
     """Squared power times the worth of the pixels in reach, on the photon's side."""
     places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     up = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]], np.float32)
-    worth = np.array([[1.0, 2.0, 3.0], [10.0, 0.0, 0.0]])
+    weights = np.array([[1.0, 2.0, 3.0], [10.0, 0.0, 0.0]])
     photons = pack(np.array([[0.1, 0, 0], [0.5, 0, 0], [5, 0, 0]], np.float32))
     words = photons.view(np.uint32)
     words[:, 3] = 2047 << 20 | 2047 << 8  # from above
     words[:, 4], words[:, 5] = 48 << 10 | 47 << 26, 47 << 10  # powers 2, 1, 1
-    found = Seen(cKDTree(places), up, worth, 0.6).value(photons)
+    found = Seen(cKDTree(places), up, weights, 0.6).value(photons)
     np.testing.assert_allclose(found, [4 + 2 + 3, 4 + 2 + 3 + 40, 0])
-    below = Seen(cKDTree(places), -up, worth, 0.6).value(photons)
+    below = Seen(cKDTree(places), -up, weights, 0.6).value(photons)
     np.testing.assert_allclose(below, 0)

@@ -70,9 +70,9 @@ def case(seed: int, index: int, every_special: bool = True) -> Case:
     of = _seeds()[(index - len(listed)) % len(_seeds())]
     chance = random.Random(f"{seed} {index - len(listed)} {of.name}")
     victim = chance.choice(of.victims)
-    content, how = mutated(of.files[victim], victim, chance)
+    content, mutation = mutated(of.files[victim], victim, chance)
     files = {**of.files, victim: content}
-    return Case(f"{of.name}: {victim} {how}", of.format, of.main, files, seed=of.name)
+    return Case(f"{of.name}: {victim} {mutation}", of.format, of.main, files, seed=of.name)
 
 
 def mutated(data: bytes, name: str, chance: random.Random) -> tuple[bytes, str]:

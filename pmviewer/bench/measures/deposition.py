@@ -52,8 +52,8 @@ RULES: dict[str, dict[str, Any]] = {
     "density control, step": CONTROL,
     "density control, cosine": CONTROL | {"importance.acceptance": "cosine"},
 }
-CONTROLS = {rule: how for rule, how in RULES.items() if "control" in rule}
-SOURCES = {f"{rule}, nearest": how | {"importance.around": "nearest"} for rule, how in CONTROLS.items()}
+CONTROLS = {rule: changes for rule, changes in RULES.items() if "control" in rule}
+SOURCES = {f"{rule}, nearest": changes | {"importance.around": "nearest"} for rule, changes in CONTROLS.items()}
 CLAMP, DISCARD = list(RULES)[:2]
 Z_SEEDS, Z_SIZE = 32, 64
 
@@ -169,8 +169,8 @@ def rooms(quick: bool, pool: WorkPool) -> tuple[list[list[Any]], list[Target]]:
         curve = [made({"photons.N": round(share * N)}) for share in SHARES]
         for share, some in zip(SHARES, curve, strict=True):
             rows.append(_row(ROOMS, method, "all", round(share * N), some, curve[0], target))
-        for rule, how in RULES.items():
-            thinned = made(how)
+        for rule, changes in RULES.items():
+            thinned = made(changes)
             rows.append(_row(ROOMS, method, rule, N, thinned, curve[0], target))
             if rule not in (CLAMP, DISCARD):
                 continue
@@ -178,8 +178,8 @@ def rooms(quick: bool, pool: WorkPool) -> tuple[list[list[Any]], list[Target]]:
                 errors, held = [error(some, target) for some in curve], [some.held for some in curve]
                 share = thinned.held / held_for(error(thinned, target), errors, held)
                 if rule == CLAMP:
-                    how_made = f"{said(values | how)}, {size[0]} × {size[1]} pixels"
-                    note = f"{ROOMS}, {how_made}: photons held at the same error of the {what}, over storing all"
+                    setup = f"{said(values | changes)}, {size[0]} × {size[1]} pixels"
+                    note = f"{ROOMS}, {setup}: photons held at the same error of the {what}, over storing all"
                     targets.append(Target("I4", share, 0.25, "×", False, note))
     return rows, targets
 
@@ -196,8 +196,8 @@ def unbiased(method: str, pool: WorkPool) -> list[Target]:
     a, b = (np.array([block_means(image) for image in images]) for images in (thinned, others))
     variances = a.var(axis=0, ddof=1) / Z_SEEDS, b.var(axis=0, ddof=1) / Z_SEEDS
     blocks = z_test(a.mean(axis=0), variances[0], b.mean(axis=0), variances[1], block=1)
-    how_made = f"{said({'render.method': method} | KELLER_WALD)}, {Z_SIZE} × {Z_SIZE} pixels"
-    note = f"{ROOMS}, {how_made}, {Z_SEEDS} seeds: against storing all"
+    setup = f"{said({'render.method': method} | KELLER_WALD)}, {Z_SIZE} × {Z_SIZE} pixels"
+    note = f"{ROOMS}, {setup}, {Z_SEEDS} seeds: against storing all"
     return [
         Target("I4", abs(z), 3.0, "σ", False, f"{note}, mean luminance"),
         Target("I4", blocks.p_value, 0.01, "", True, f"{note}, p-value of {blocks.blocks} blocks, max z "
@@ -225,10 +225,10 @@ def office(quick: bool, pool: WorkPool) -> tuple[list[list[Any]], list[Target]]:
         rows.append(_row(OFFICE, method, "all", n, all_, all_, target))
         rows.append(_row(OFFICE, method, "all, other seed", n, other, all_, target))
         noise = rows[-1][COLUMNS.index("difference %")]
-        for rule, how in rules.items():
-            made = measure(opened, base | how, range(1, 2), passes, pool, size)
+        for rule, changes in rules.items():
+            made = measure(opened, base | changes, range(1, 2), passes, pool, size)
             rows.append(row := _row(OFFICE, method, rule, n, made, all_, target))
-            note = f"{OFFICE}, {said(base | how)}"
+            note = f"{OFFICE}, {said(base | changes)}"
             targets.append(Target("I5", 100 * made.power_off, 0.01, "% of the power", False, note))
             if rule in CONTROLS:
                 fewer, differs = 1 / row[COLUMNS.index("of all")], row[COLUMNS.index("difference %")]
@@ -239,7 +239,7 @@ def office(quick: bool, pool: WorkPool) -> tuple[list[list[Any]], list[Target]]:
     for method in METHODS:
         compared(method, {}, CONTROLS | SOURCES)
     constant = {"importance.deposition": "constant density", "importance.density": OFFICE_DENSITY}
-    rules = {rule: how | {"importance.M_r": CLASSICAL_M_R[rule]} for rule, how in CONTROLS.items()}
+    rules = {rule: changes | {"importance.M_r": CLASSICAL_M_R[rule]} for rule, changes in CONTROLS.items()}
     compared("gather", CLASSICAL, rules | {"constant density": constant})
     return rows, targets
 

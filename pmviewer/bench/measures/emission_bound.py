@@ -50,7 +50,7 @@ class Seen:
 
     tree: cKDTree
     normals: NDArray[np.float32]
-    worth: Float
+    weights: Float
     radius: float
 
     def value(self, photons: NDArray[np.float32]) -> Float:
@@ -63,7 +63,7 @@ class Seen:
             return out
         which, pixel = np.repeat(np.arange(len(photons)), counts), np.concatenate([f for f in found if f]).astype(int)
         front = (said["wi"][which] * self.normals[pixel]).sum(axis=1) > 0
-        each = (said["Phi"][which].astype(np.float64) ** 2 * self.worth[pixel]).sum(axis=1) * front
+        each = (said["Phi"][which].astype(np.float64) ** 2 * self.weights[pixel]).sum(axis=1) * front
         return np.asarray(np.bincount(which, each, len(photons)), np.float64)
 
 
@@ -76,8 +76,8 @@ def seen_of(renderer: Renderer, weight: Float) -> Seen:
     seen_places(scene.record, eye_record(camera, renderer.settings, 0), points, codes, found, 0, pixels)
     albedo = renderer.frame(0).image("albedo").astype(np.float64).reshape(pixels, 3)
     share = (albedo / np.pi / (np.pi * radius * radius)) ** 2
-    worth = (share * weight.reshape(pixels, 3))[found]
-    return Seen(cKDTree(points[found]), decode_directions(codes[found]), worth, radius)
+    weights = (share * weight.reshape(pixels, 3))[found]
+    return Seen(cKDTree(points[found]), decode_directions(codes[found]), weights, radius)
 
 
 def value_of_strata(renderer: Renderer, seen: Seen, strata: Strata, each: int) -> Float:

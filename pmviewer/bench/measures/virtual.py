@@ -75,9 +75,9 @@ class Lab:
         image = renderer.frame(0).image("indirect").astype(np.float64) @ LUMINANCE
         return image, renderer.tally.cpu_seconds / passes
 
-    def lit(self, how: Mapping[str, Any], passes: int, seeds: int, lights: int | None = None) -> tuple[F8, float]:
+    def lit(self, changes: Mapping[str, Any], passes: int, seeds: int, lights: int | None = None) -> tuple[F8, float]:
         """Pictures (seeds, h, w) by virtual lights; the least CPU seconds of a pass."""
-        values = {"render.method": "virtual lights", "virtual.number": lights or self.effort.lights, **how}
+        values = {"render.method": "virtual lights", "virtual.number": lights or self.effort.lights, **changes}
         made = [self.render({**values, "render.seed": 100 + seed}, passes) for seed in range(seeds)]
         return np.stack([image for image, _ in made]), min(seconds for _, seconds in made)
 
@@ -128,19 +128,19 @@ def run(quick: bool = False) -> BenchResult:
 def measured(lab: Lab, name: str) -> tuple[list[list[str | float | int]], list[Target]]:
     """The rows of a scene, and the targets that they decide."""
     effort = lab.effort
-    once = {estimator: lab.lit(how, 1, effort.seeds) for estimator, how in ESTIMATORS.items()}
+    once = {estimator: lab.lit(changes, 1, effort.seeds) for estimator, changes in ESTIMATORS.items()}
     budget = 2 * max(seconds for _, seconds in once.values())
     rows: list[list[str | float | int]] = []
     found: dict[str, tuple[float, float, float, float]] = {}
-    for estimator, how in ESTIMATORS.items():
+    for estimator, changes in ESTIMATORS.items():
         images, seconds = once[estimator]
         error, percentile, bias = lab.errors(images)
-        fewer = lab.errors(lab.lit(how, 1, effort.seeds, max(1, effort.lights // 4))[0])[2]
+        fewer = lab.errors(lab.lit(changes, 1, effort.seeds, max(1, effort.lights // 4))[0])[2]
         passes = max(1, round(budget / seconds))
-        timed = lab.errors(lab.lit(how, passes, max(2, effort.seeds // 4))[0])[0]
+        timed = lab.errors(lab.lit(changes, passes, max(2, effort.seeds // 4))[0])[0]
         off = np.nan
         if estimator in CONVERGING:
-            off = lab.errors(lab.lit(how, effort.passes, 1)[0])[2]
+            off = lab.errors(lab.lit(changes, effort.passes, 1)[0])[2]
         found[estimator] = error, percentile, timed, off
         plain = found["unweighted"]
         cells: list[str | float | int] = [

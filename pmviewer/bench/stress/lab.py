@@ -158,10 +158,10 @@ class Lab:
         return np.array(found), finite
 
     def measure(
-        self, scene: Scene | OpenScene, expected: float | None, bias: str = "", scale: float = 1.0, **how: Any
+        self, scene: Scene | OpenScene, expected: float | None, bias: str = "", scale: float = 1.0, **options: Any
     ) -> Outcome:
         """The mean picture over `scale` against its truth."""
-        found, finite = self.means(scene, **how)
+        found, finite = self.means(scene, **options)
         found = found / scale
         error = float(found.std(ddof=1) / np.sqrt(len(found))) if len(found) > 1 else 0.0
         return Outcome(float(found.mean()), error, expected, samples=len(found), finite=finite, bias=bias)

@@ -172,9 +172,9 @@ def _touching_mirror(lab: Lab) -> Outcome:
 
 def _low_light(lab: Lab, gap: float, values: dict[str, Any]) -> Outcome:
     """The room lit from next to the ceiling, or from its plane, where a ray meets the one or the other."""
-    how = {"photons__N": 20_000, "estimate__radius": 0.02, "terms": ("direct", "indirect", "caustic"), **values}
-    one = lab.measure(room(light=panel(1 - gap)), None, **how)
-    two = lab.measure(room(light=panel(1 - 1e-3)), None, **{**how, "passes": 2 * values["passes"]})
+    options = {"photons__N": 20_000, "estimate__radius": 0.02, "terms": ("direct", "indirect", "caustic"), **values}
+    one = lab.measure(room(light=panel(1 - gap)), None, **options)
+    two = lab.measure(room(light=panel(1 - 1e-3)), None, **{**options, "passes": 2 * values["passes"]})
     if gap == 0:
         return replace(one, bias=f"{one.value / two.value - 1:+.1%} of the light, and said so")
     return replace(one, expected=two.value, expected_error=two.error)

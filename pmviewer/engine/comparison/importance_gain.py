@@ -124,34 +124,34 @@ def compare(opened: OpenScene, settings: Settings, pool: WorkPool, tell: Tell, t
     why = refusal(settings, opened.traits)
     if why is not None:
         raise SettingError(f"No comparison: {why}")
-    how = settings.compare
+    asked = settings.compare
     calm = with_values(settings, {"render.passes": 1_000_000, "render.time_limit": 0.0, "display.view": "beauty"})
     notes: list[str] = []
     for each in (calm, plain(calm)):
         prepare(opened, each, pool, lambda text, share: tell(text, 0.0))
 
     with_ = Renderer(opened, calm, pool, StageStore(KEPT))
-    _passes(with_, how.passes, "with importance", tell, 0.0, 0.3)
+    _passes(with_, asked.passes, "with importance", tell, 0.0, 0.3)
     stored = sum(with_.tally.stored.values())
     if stored == 0:
         raise SettingError("No comparison: with importance no photon is stored.")
 
     if truth is None:
         tell("measuring the error", 0.3)
-        truth = _longer(opened, plain(calm), how.passes, pool, tell)
+        truth = _longer(opened, plain(calm), asked.passes, pool, tell)
     target = truth[0]
 
-    N, note = _equal_N(opened, plain(calm), stored, how.passes, pool)
+    N, note = _equal_N(opened, plain(calm), stored, asked.passes, pool)
     notes += note
     without = Renderer(opened, with_values(plain(calm), {"photons.N": N}), pool, StageStore(KEPT))
     error = metrics(_image(with_), target)
-    if how.equal == "photons":
-        _passes(without, how.passes, "without importance", tell, 0.7, 0.3)
+    if asked.equal == "photons":
+        _passes(without, asked.passes, "without importance", tell, 0.7, 0.3)
     else:
-        notes += _until(without, error.relmse_all, target, how.passes, how.limit, tell)
+        notes += _until(without, error.relmse_all, target, asked.passes, asked.limit, tell)
     tell("finished", 1.0)
     sides = _side(with_, error), _side(without, metrics(_image(without), target))
-    return Gain(*sides, how.equal, truth[1], tuple(notes))
+    return Gain(*sides, asked.equal, truth[1], tuple(notes))
 
 
 def _image(renderer: Renderer) -> NDArray[np.float32]:

@@ -59,7 +59,7 @@ def rules_of(
     look-up finds as many photons as before (the k nearest are fewer, in less space), and the blur by redistributed
     power vanishes with that of the look-ups.
     """
-    how = settings.importance
+    asked = settings.importance
     if plan.deposition == "all":
         return Rules()
     maps = importance.latest
@@ -78,36 +78,45 @@ def rules_of(
     everywhere: dict[str, float] = {}
     if plan.deposition == "Keller-Wald":
         assert maps is not None
-        key += (how.epsilon, how.cut_off, how.f)
-        if how.f == "auto":
+        key += (asked.epsilon, asked.cut_off, asked.f)
+        if asked.f == "auto":
             f, notes = factors(settings, importance, maps)
     else:
-        key += (how.acceptance, how.around, how.contrast, how.reach, how.M_r, how.caustic_M_r, how.density, growth)
-        key += tuple(radii.values()) if plan.deposition == "constant density" and how.density == "auto" else ()
+        key += (
+            asked.acceptance,
+            asked.around,
+            asked.contrast,
+            asked.reach,
+            asked.M_r,
+            asked.caustic_M_r,
+            asked.density,
+            growth,
+        )
+        key += tuple(radii.values()) if plan.deposition == "constant density" and asked.density == "auto" else ()
     for name, mask in classes.items():
         if not mask:
             continue
         chosen = importance_of(maps, name) if needs_importance else None
         if plan.deposition == "Keller-Wald":
             assert chosen is not None
-            factor = f[name] = f[name] if how.f == "auto" else float(how.f)
+            factor = f[name] = f[name] if asked.f == "auto" else float(asked.f)
             rules[name] = KellerWald(
-                probability_of(chosen, factor), how.epsilon, how.cut_off == "discard", seed + (name == "global")
+                probability_of(chosen, factor), asked.epsilon, asked.cut_off == "discard", seed + (name == "global")
             )
             continue
         around, beyond = NEAREST, None
-        if how.around == "guarded":
-            around = Around(True, how.contrast)
+        if asked.around == "guarded":
+            around = Around(True, asked.contrast)
         if chosen is not None:
-            M_r = growth * (how.M_r if name == "global" else how.caustic_M_r)
+            M_r = growth * (asked.M_r if name == "global" else asked.caustic_M_r)
             required[name] = density_of(chosen, M_r)
-            if how.around == "guarded":
-                beyond = density_beyond(chosen, M_r, how.reach)
+            if asked.around == "guarded":
+                beyond = density_beyond(chosen, M_r, asked.reach)
         else:
             automatic = constant_density(settings, radii[name])
-            everywhere[name] = automatic if how.density == "auto" else growth * float(how.density)
+            everywhere[name] = automatic if asked.density == "auto" else growth * float(asked.density)
             required[name] = constant(everywhere[name])
-        acceptance = ACCEPTANCE.index(how.acceptance)
+        acceptance = ACCEPTANCE.index(asked.acceptance)
         rules[name] = Density(required[name], acceptance, around, beyond, seed + (name == "global"))
     criterion = None
     sample = sampled_classes(plan)

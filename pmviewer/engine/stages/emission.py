@@ -33,11 +33,11 @@ LEAST = 0.2
 
 def emission_key(settings: Settings, plan: Plan, importance: ImportanceStage) -> tuple[Any, ...]:
     """What guided emission depends on besides the pass and the light pass's own settings; () while it is off."""
-    maps, how = importance.latest, settings.importance
+    maps, asked = importance.latest, settings.importance
     if plan.emission == "off" or maps is None:
         return ()
-    key = "emission", plan.emission, importance.key, maps.traced, how.tests, how.important
-    return (*key, how.caustic_M_r / how.M_r)
+    key = "emission", plan.emission, importance.key, maps.traced, asked.tests, asked.important
+    return (*key, asked.caustic_M_r / asked.M_r)
 
 
 def guidance_of(settings: Settings, plan: Plan, importance: ImportanceStage) -> Guidance | None:
@@ -45,13 +45,13 @@ def guidance_of(settings: Settings, plan: Plan, importance: ImportanceStage) -> 
 
     A photon of the caustic map counts as many as more of it are wanted (`importance.caustic_M_r` over `M_r`).
     """
-    maps, how = importance.latest, settings.importance
+    maps, asked = importance.latest, settings.importance
     if plan.emission == "off" or maps is None or maps.n == 0:
         return None
     sought, first = [], 1 << DIRECT | 1 << CAUSTIC
     if classes := plan.caustic_classes:
         made = importance_of(maps, "caustic")
-        weight = how.caustic_M_r / how.M_r if plan.global_classes else 1.0
+        weight = asked.caustic_M_r / asked.M_r if plan.global_classes else 1.0
         evaluate = relative_importance(made, full_importance(made))
         sought.append(Sought("caustic", evaluate, classes, classes, weight))
     if classes := plan.global_classes:
@@ -59,7 +59,7 @@ def guidance_of(settings: Settings, plan: Plan, importance: ImportanceStage) -> 
         full, further = full_importance(made), _scattered(settings, importance, made)
         sought.append(Sought("global", relative_importance(made, full), classes & first, classes))
         sought.append(Sought("global", relative_importance(further, full, np.inf), first, 0))
-    return Guidance(plan.emission, sought, how.tests, how.important)
+    return Guidance(plan.emission, sought, asked.tests, asked.important)
 
 
 def _scattered(settings: Settings, importance: ImportanceStage, made: ImportanceMap) -> ImportanceMap:

@@ -114,7 +114,7 @@ class ImportanceStage:
         if not self.plan.importance:
             return ()
         s, p = self.settings, self.plan
-        how = s.importance.map, s.importance.N, s.importance.neighbours
+        chosen = s.importance.map, s.importance.N, s.importance.neighbours
         gather = p.gather, s.gather.secondary if p.corners else 0.0
         rule = (
             bool(p.caustic_classes),
@@ -123,16 +123,16 @@ class ImportanceStage:
             s.photons.glossy,
             self.pixel,
         )
-        return (self.scene.uid, self.camera, s.render.seed, s.render.max_depth, how, gather, rule)
+        return (self.scene.uid, self.camera, s.render.seed, s.render.max_depth, chosen, gather, rule)
 
     @property
     def pixel(self) -> tuple[int, int] | None:
         """The only pixel (x, y) whose importance is asked for, None for the whole image."""
-        how = self.settings.importance
-        if how.of == "image":
+        chosen = self.settings.importance
+        if chosen.of == "image":
             return None
         width, height = self.camera.width, self.camera.height
-        return min(int(how.x * width), width - 1), min(int(how.y * height), height - 1)
+        return min(int(chosen.x * width), width - 1), min(int(chosen.y * height), height - 1)
 
     def run(self, index: int) -> None:
         """Bring `latest` to pass `index`."""
@@ -185,9 +185,9 @@ class ImportanceStage:
         return self.store.get((*key, "maps", count), build, lambda made: made.bytes)
 
     def _build(self, importons: Importons, even: bool) -> ImportanceMap:
-        how = self.settings.importance
-        assert how.map != "off"
-        return build_importance(importons, how.map, self.scene.flat.radius, how.neighbours, even, self.pool.run)
+        chosen = self.settings.importance
+        assert chosen.map != "off"
+        return build_importance(importons, chosen.map, self.scene.flat.radius, chosen.neighbours, even, self.pool.run)
 
 
 def prepare_importance(scene: OpenScene, settings: Settings) -> None:

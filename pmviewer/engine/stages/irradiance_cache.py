@@ -72,12 +72,12 @@ def lattices(width: int, height: int, seed: int, index: int) -> list[NDArray[np.
     return rounds
 
 
-def fill_cache(given: PassData, how: NDArray[np.void], pool: WorkPool) -> tuple[IrradianceCache, NDArray[np.int64]]:
+def fill_cache(given: PassData, record: NDArray[np.void], pool: WorkPool) -> tuple[IrradianceCache, NDArray[np.int64]]:
     """The cache of a pass and the rays counted; `how` is the pass's recipe."""
     camera = given.eye[0]
-    cache = build_cache(np.empty((0, ROW), np.float32), how)
+    cache = build_cache(np.empty((0, ROW), np.float32), record)
     total = np.zeros(N_COUNTS, np.int64)
-    batch = max(1, BATCH_RAYS // int(how["rings"][0] * how["sectors"][0]))
+    batch = max(1, BATCH_RAYS // int(record["rings"][0] * record["sectors"][0]))
     for pixels in lattices(int(camera["width"]), int(camera["height"]), int(camera["seed"]), int(camera["index"])):
         rows, made = np.empty((len(pixels), ROW), np.float32), np.empty(len(pixels), bool)
 

@@ -94,23 +94,23 @@ class VirtualStage:
         return VirtualMap(lights, virtual_record(flat, s, lights.rows))
 
 
-def virtual_dtype(how: Virtual) -> np.dtype:
+def virtual_dtype(virtual: Virtual) -> np.dtype:
     """Type of the record of virtual lights for that estimator."""
-    return PATHS_DTYPE if ESTIMATORS.index(how.estimator) in OF_PATHS else VIRTUAL_DTYPE
+    return PATHS_DTYPE if ESTIMATORS.index(virtual.estimator) in OF_PATHS else VIRTUAL_DTYPE
 
 
 def virtual_record(flat: FlatScene, settings: Settings, rows: NDArray[np.float32]) -> NDArray[np.void]:
     """The record (1,) for kernels of virtual lights (n, COLUMNS)."""
-    how = settings.virtual
-    estimator = ESTIMATORS.index(how.estimator)
-    record = np.zeros(1, virtual_dtype(how))
+    virtual = settings.virtual
+    estimator = ESTIMATORS.index(virtual.estimator)
+    record = np.zeros(1, virtual_dtype(virtual))
     r = record[0]
     r["virtual"], r["lights"], r["n"] = 1, rows.ctypes.data, len(rows)
-    r["per_pixel"] = how.per_pixel or len(rows)
+    r["per_pixel"] = virtual.per_pixel or len(rows)
     r["estimator"] = estimator
-    r["normalised"] = how.normalisation != "none" and estimator not in PRINTED
-    r["walks"], r["max_bounces"] = how.walks, settings.photons.max_bounces
-    r["clamp"] = how.clamp / flat.radius**2
+    r["normalised"] = virtual.normalisation != "none" and estimator not in PRINTED
+    r["walks"], r["max_bounces"] = virtual.walks, settings.photons.max_bounces
+    r["clamp"] = virtual.clamp / flat.radius**2
     r["objects"], r["n_objects"] = flat.shape_of_prim.ctypes.data, int(flat.shape_of_prim.max(initial=-1)) + 1
     return record
 
@@ -127,12 +127,12 @@ def film_of(settings: Settings, plan: Plan, width: int, height: int) -> Film:
 
 def bias_of(settings: Settings) -> tuple[str, ...]:
     """A sentence for each reason why the picture does not converge to the right one."""
-    how = settings.virtual
-    if how.estimator in PRINTED_BIAS:
-        return (PRINTED_BIAS[how.estimator],)
-    if ESTIMATORS.index(how.estimator) in (UNWEIGHTED, CLAMPED):
+    virtual = settings.virtual
+    if virtual.estimator in PRINTED_BIAS:
+        return (PRINTED_BIAS[virtual.estimator],)
+    if ESTIMATORS.index(virtual.estimator) in (UNWEIGHTED, CLAMPED):
         return ()
-    return {"none": (UNNORMALISED,), "per object": (FALSE_SHADOWS,)}.get(how.normalisation, ())
+    return {"none": (UNNORMALISED,), "per object": (FALSE_SHADOWS,)}.get(virtual.normalisation, ())
 
 
 def prepare_virtual(scene: OpenScene, settings: Settings) -> None:

@@ -35,19 +35,19 @@ PER_CELL = 16
 """Candidates of a cell, roughly."""
 
 
-def worths(rows: Float, estimator: int, scene_radius: float | None) -> NDArray[np.float64]:
+def choice_probabilities(rows: Float, estimator: int, scene_radius: float | None) -> NDArray[np.float64]:
     """Probabilities (n,) of the candidates (n, COLUMNS), which sum to 1; `scene_radius` where the density of their map
     weighs them."""
     power = rows[:, V_PHI : V_PHI + 3].astype(np.float64) @ LUMINANCE
-    worth = _normalised(power)
+    probabilities = _normalised(power)
     if estimator in OF_PATHS:
         q = rows[:, V_Q].astype(np.float64)
         beyond = rows[:, V_F : V_F + 3].astype(np.float64) @ LUMINANCE
         weights = np.where(rows[:, V_FIRST] != 0, q, q * beyond)
-        return _mixed(worth, weights)
+        return _mixed(probabilities, weights)
     if scene_radius is not None and len(rows):
-        return _mixed(worth, 1.0 / _neighbours(rows, scene_radius))
-    return worth
+        return _mixed(probabilities, 1.0 / _neighbours(rows, scene_radius))
+    return probabilities
 
 
 def _mixed(power: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -72,7 +72,7 @@ def _neighbours(rows: Float, scene_radius: float) -> NDArray[np.int64]:
     return np.asarray(counts[places])
 
 
-def chosen(worth: NDArray[np.float64], M: int, start: float) -> tuple[NDArray[np.int64], Float]:
+def chosen(probabilities: NDArray[np.float64], M: int, start: float) -> tuple[NDArray[np.int64], Float]:
     """M candidates by their probabilities, and how many candidates each stands for, (M,).
 
     Evenly spaced along the sums of the probabilities, `start` in [0, 1) of a step from the first: of one trajectory, or
@@ -80,10 +80,10 @@ def chosen(worth: NDArray[np.float64], M: int, start: float) -> tuple[NDArray[np
     """
     if M == 0:
         return np.empty(0, np.int64), np.empty(0, np.float32)
-    sums = np.cumsum(worth)
+    sums = np.cumsum(probabilities)
     at = (np.arange(M) + start) * (sums[-1] / M)
-    kept = np.minimum(np.searchsorted(sums, at, side="right"), len(worth) - 1)
-    return kept, (sums[-1] / (M * worth[kept])).astype(np.float32)
+    kept = np.minimum(np.searchsorted(sums, at, side="right"), len(probabilities) - 1)
+    return kept, (sums[-1] / (M * probabilities[kept])).astype(np.float32)
 
 
 def as_photons(photons: Float, share: Float) -> Float:

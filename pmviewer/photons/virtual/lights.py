@@ -24,7 +24,7 @@ from pmviewer.maps.virtual_lights import (
     V_PHI,
     V_Q,
 )
-from pmviewer.photons.virtual.choice import as_photons, chosen, worths
+from pmviewer.photons.virtual.choice import as_photons, choice_probabilities, chosen
 from pmviewer.photons.virtual.density import lit_areas
 from pmviewer.photons.virtual.trace import C_DROPPED, C_RAYS, C_STORED, N_COUNTS, TRACE_DTYPE, trace_virtual_lights
 from pmviewer.scene.arrays.flatten import FlatScene
@@ -70,50 +70,52 @@ class VirtualLights:
         return self.rows.nbytes + self.photons.nbytes
 
 
-def trajectories(how: Virtual, index: int) -> int:
+def trajectories(virtual: Virtual, index: int) -> int:
     """Trajectories of pass `index`.
 
     A disc of k photons blurs the density by its area, and no number of passes mends that. So both its k and its area
     shrink: k with the cube root of the passes down to FEWEST, while the map's photons grow with it up to MOST.
     """
-    if _grows(how):
-        return max(min(round(how.photons * (index + 1) ** (1 / 3)), max(MOST, how.photons)), SPARE * how.number)
-    return SPARE * how.number
+    if _grows(virtual):
+        return max(
+            min(round(virtual.photons * (index + 1) ** (1 / 3)), max(MOST, virtual.photons)), SPARE * virtual.number
+        )
+    return SPARE * virtual.number
 
 
-def neighbours(how: Virtual, index: int) -> int:
+def neighbours(virtual: Virtual, index: int) -> int:
     """Photons of the disc that tells the density in pass `index`."""
-    return max(round(how.k / (index + 1) ** (1 / 3)), min(how.k, FEWEST)) if _grows(how) else how.k
+    return max(round(virtual.k / (index + 1) ** (1 / 3)), min(virtual.k, FEWEST)) if _grows(virtual) else virtual.k
 
 
-def _first_index(how: Virtual, index: int) -> int:
+def _first_index(virtual: Virtual, index: int) -> int:
     """Trajectories of all passes before `index`."""
-    if not _grows(how):
-        return index * trajectories(how, 0)
-    return sum(trajectories(how, i) for i in range(index))
+    if not _grows(virtual):
+        return index * trajectories(virtual, 0)
+    return sum(trajectories(virtual, i) for i in range(index))
 
 
-def _grows(how: Virtual) -> bool:
-    return ESTIMATORS.index(how.estimator) == SINGLE and how.density == "photon map"
+def _grows(virtual: Virtual) -> bool:
+    return ESTIMATORS.index(virtual.estimator) == SINGLE and virtual.density == "photon map"
 
 
 def virtual_lights(
-    scene: FlatScene, how: Virtual, photons: Photons, seed: int, index: int, run: Runner
+    scene: FlatScene, virtual: Virtual, photons: Photons, seed: int, index: int, run: Runner
 ) -> VirtualLights:
     """The virtual lights of pass `index`, chosen from P candidates (`pmviewer.photons.virtual.choice`). Open scenes
     have fewer candidates than trajectories, and may have fewer than the lights asked for."""
-    N, estimator = trajectories(how, index), ESTIMATORS.index(how.estimator)
+    N, estimator = trajectories(virtual, index), ESTIMATORS.index(virtual.estimator)
     record = np.zeros(1, TRACE_DTYPE)
     sequence = SOBOL if photons.sequence == "sobol" else INDEPENDENT
     own = (seed ^ VIRTUAL_SALT) & 0xFFFFFFFF
-    record[0] = (own, _first_index(how, index), sequence, photons.max_bounces, photons.glossy, estimator)
+    record[0] = (own, _first_index(virtual, index), sequence, photons.max_bounces, photons.glossy, estimator)
     results = run([partial(_batch, scene, record, i0, min(i0 + BATCH, N)) for i0 in range(0, N, BATCH)])
     found = np.concatenate([r[0] for r in results])
     rows = np.concatenate([r[1] for r in results])
     counts = sum((r[2] for r in results), np.zeros(N_COUNTS, np.int64))
-    of_map = _grows(how)
-    worth = worths(rows, estimator, scene.radius if of_map else None)
-    kept, share = chosen(worth, min(how.number, len(rows)), np.random.default_rng([own, index]).random())
+    of_map = _grows(virtual)
+    probabilities = choice_probabilities(rows, estimator, scene.radius if of_map else None)
+    kept, share = chosen(probabilities, min(virtual.number, len(rows)), np.random.default_rng([own, index]).random())
     lights = np.ascontiguousarray(rows[kept])
     unit = scene.total_luminance / N
     lights[:, V_PHI : V_PHI + 3] *= (unit * share)[:, None]
@@ -122,7 +124,7 @@ def virtual_lights(
     elif estimator in OF_DENSITY and len(kept):
         thinned = np.ascontiguousarray(found[kept])
         whole = estimator == PRINTED_SINGLE
-        areas = areas_of(scene, found if of_map else thinned, lights, neighbours(how, index), whole, run)
+        areas = areas_of(scene, found if of_map else thinned, lights, neighbours(virtual, index), whole, run)
         lights[:, V_Q] = areas * (share if of_map else np.float32(1.0))
         if not whole:
             lights[:, V_Q] *= lights[:, V_OPACITY]

@@ -95,11 +95,11 @@ def ratio(numerator: NDArray[Any], denominator: NDArray[Any]) -> F8:
 class WeightedFilm(Film):
     """The film of the method "virtual lights": SUMS columns beyond the planes, see `pmviewer.maps.virtual_lights`."""
 
-    def __init__(self, width: int, height: int, how: Virtual) -> None:
+    def __init__(self, width: int, height: int, virtual: Virtual) -> None:
         super().__init__(width, height, SUMS)
         self.sums[:, CHANNELS + W_OBJECT] = -1.0
-        self.how = how
-        self.estimator = ESTIMATORS.index(how.estimator)
+        self.virtual = virtual
+        self.estimator = ESTIMATORS.index(virtual.estimator)
 
     @property
     def weighted(self) -> bool:
@@ -125,15 +125,15 @@ class WeightedFilm(Film):
 
     def normalisation(self, base: int) -> F8:
         """c (n,) of the term whose sums begin at that column."""
-        sums, how = self.sums, self.how.normalisation
+        sums, normalisation = self.sums, self.virtual.normalisation
         A, C = sums[:, base + W_A], sums[:, base + W_C]
-        if self.estimator in PRINTED or how == "none":
+        if self.estimator in PRINTED or normalisation == "none":
             return np.ones(len(sums))
-        if how == "per object":
+        if normalisation == "per object":
             numbers = sums[:, CHANNELS + W_OBJECT].astype(np.int64) + 1
             return ratio(np.bincount(numbers, C), np.bincount(numbers, A))[numbers]
-        if how == "interpolated":
-            radius = self.how.window / max(self.passes, 1) ** 0.25
+        if normalisation == "interpolated":
+            radius = self.virtual.window / max(self.passes, 1) ** 0.25
             shared = np.empty((len(sums), 2))
             shared_sums(sums, self.width, self.height, radius, base, shared)
             return ratio(shared[:, 1], shared[:, 0])

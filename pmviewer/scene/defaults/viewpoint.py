@@ -62,9 +62,9 @@ def chosen_viewpoint(proxy: Proxy, up: Up) -> Viewpoint:
     """The best view of the scene, the same every time."""
     subjects = _subjects(proxy)
     around = [
-        (rated, points, worth * (_DETAIL if i else 1.0))
+        (rated, points, rating * (_DETAIL if i else 1.0))
         for i, points in enumerate(subjects)
-        for rated, worth in _outside(proxy, points, up)
+        for rated, rating in _outside(proxy, points, up)
     ]
     outside, points, _ = max(around, key=lambda found: found[2])
     places = [place for subject in subjects for place in _places(proxy, subject, up)]
@@ -215,16 +215,16 @@ def _places(proxy: Proxy, points: Float, up: Up) -> list[tuple[Float, float]]:
     met, front = hits.met.reshape(-1, 24), hits.front.reshape(-1, 24)
     open_to = np.percentile(np.where(met, hits.distance.reshape(-1, 24), 0.0), 20, axis=1)
     enclosed = (met.mean(axis=1) >= _ENCLOSED) & (front.mean(axis=1) >= _SOME_FRONT)
-    worth = np.where(enclosed, open_to, 0.0)
-    order = np.argsort(-worth, kind="stable")
+    rating = np.where(enclosed, open_to, 0.0)
+    order = np.argsort(-rating, kind="stable")
     chosen: list[int] = []
     for i in order:
-        if worth[i] < 0.05 * extent.min() or worth[i] < 0.3 * worth[order[0]] or len(chosen) == _PLACES:
+        if rating[i] < 0.05 * extent.min() or rating[i] < 0.3 * rating[order[0]] or len(chosen) == _PLACES:
             break
-        if all(np.linalg.norm(lattice[i] - lattice[j]) >= 1.5 * worth[i] for j in chosen):
+        if all(np.linalg.norm(lattice[i] - lattice[j]) >= 1.5 * rating[i] for j in chosen):
             chosen.append(int(i))
     top = axes_of(up)[1]
-    return [(_at_eye_height(proxy, lattice[i], top), float(worth[i])) for i in chosen]
+    return [(_at_eye_height(proxy, lattice[i], top), float(rating[i])) for i in chosen]
 
 
 def _at_eye_height(proxy: Proxy, place: Float, top: Float) -> Float:

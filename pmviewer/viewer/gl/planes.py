@@ -18,7 +18,7 @@ from pmviewer.viewer.gl.program import Shaders, set_uniforms
 from pmviewer.viewer.gl.reference_plane import COLOUR_UNIT, REFERENCE_UNIT, ReferencePlane
 
 _CONTENT = {"albedo": 1, "normal": 2, "depth": 3, "error": 4} | {
-    view: 7 if how.classes else 6 if how.cells else 5 for view, how in DIAGNOSTICS.items()
+    view: 7 if info.classes else 6 if info.cells else 5 for view, info in DIAGNOSTICS.items()
 }
 _CURVE = {"sRGB": 0, "Reinhard": 1, "filmic": 2, "linear": 3}
 NEAREST_FROM = 3.0

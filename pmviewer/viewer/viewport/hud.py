@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from pmviewer.viewer.viewport.viewport import Viewport
 
 _TITLES = {"error": "error: (I–R)²/(R²+0.01) of each pixel, no unit"} | {
-    view: f"{view}: {how.text}; grey: {how.none}" for view, how in DIAGNOSTICS.items()
+    view: f"{view}: {info.text}; grey: {info.none}" for view, info in DIAGNOSTICS.items()
 }
-_UNITS = {"albedo": "", "normal": "", "depth": "m"} | {view: how.unit for view, how in DIAGNOSTICS.items()}
+_UNITS = {"albedo": "", "normal": "", "depth": "m"} | {view: info.unit for view, info in DIAGNOSTICS.items()}
 
 
 def draw_hud(viewport: Viewport, hovered: bool) -> None:

@@ -120,7 +120,7 @@ class _Reader:
     def _check_size(self, placed: list[Placed], shared: SharedMeshes, triangles: dict[int, int]) -> None:
         """Raises SceneError for more triangles than a file of this size can mean."""
         written = sum(
-            triangles[p.node["mesh"]] * (1 if self._is_own(p) and p.node["mesh"] in shared.worth else len(p.matrices))
+            triangles[p.node["mesh"]] * (1 if self._is_own(p) and p.node["mesh"] in shared.saving else len(p.matrices))
             for p in placed
             if "mesh" in p.node
         )

@@ -31,13 +31,13 @@ class SharedMeshes:
         shapes: Callable[[int], tuple[str, list[Shape]]],
     ) -> None:
         self._shapes = shapes
-        self.worth = {index for index, count in uses.items() if (count - 1) * triangles[index] >= FEWEST_SAVED}
+        self.saving = {index for index, count in uses.items() if (count - 1) * triangles[index] >= FEWEST_SAVED}
         self._groups: dict[int, Group | None] = {}
 
     def instance(self, index: int, name: str, matrix: Matrix) -> Instance | None:
         """A copy of the mesh as an instance; None when it is to be written out: if that saves too little, if the mesh
         shines or has no triangles, or if the matrix squeezes it flat."""
-        if index not in self.worth:
+        if index not in self.saving:
             return None
         if index not in self._groups:
             called, shapes = self._shapes(index)
