@@ -68,6 +68,7 @@ CAUSTIC_PHOTONS = Need(
 )
 RADIANCE_SHOWN = Need(lambda f: f.plan.radiance, "Only the method 'gather' has radiance photons, where they are on.")
 CACHE_SHOWN = Need(lambda f: f.plan.cache, "Only the method 'gather' has an irradiance cache, where it is on.")
+VIRTUAL_LIGHTS = Need(lambda f: f.plan.virtual, "Only the method 'virtual lights' has them.")
 IMPORTANCE_OF_EACH_MAP = Need(
     lambda f: f.plan.caustic_classes and f.plan.global_classes and f.plan.gather,
     "One importance serves both maps: they are shown at the same places.",
@@ -400,6 +401,7 @@ class Overlays(Group):
     radiance: RadianceOverlay = subgroup(RadianceOverlay, "radiance photons", TRACED, RADIANCE_SHOWN)
     cache: CacheOverlay = subgroup(CacheOverlay, "irradiance cache", TRACED, CACHE_SHOWN)
     shadow: ShadowOverlay = subgroup(ShadowOverlay, "shadow photons", SHADOW_PHOTONS)
+    virtual: PointOverlay = subgroup(PointOverlay, "virtual lights", VIRTUAL_LIGHTS)
     importons: ImportonOverlay = subgroup(ImportonOverlay, "importons", TRACED, IMPORTANCE)
     fates: FateOverlay = subgroup(FateOverlay, "photons by fate", TRACED, JUDGED)
     lights: LightOverlay = subgroup(LightOverlay, "light importance", TRACED, IMPORTANCE)

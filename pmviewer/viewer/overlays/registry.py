@@ -14,6 +14,7 @@ from pmviewer.viewer.overlays.photon_paths import Paths
 from pmviewer.viewer.overlays.projection_maps import ProjectionMaps
 from pmviewer.viewer.overlays.radiance_photons import RadiancePhotons
 from pmviewer.viewer.overlays.shadow_photons import ShadowPhotons
+from pmviewer.viewer.overlays.virtual_lights import VirtualLights
 
 OVERLAYS: tuple[type[Overlay], ...] = (
     CausticPhotons,
@@ -21,6 +22,7 @@ OVERLAYS: tuple[type[Overlay], ...] = (
     RadiancePhotons,
     IrradianceCache,
     ShadowPhotons,
+    VirtualLights,
     Importons,
     Fates,
     Lights,
