@@ -63,6 +63,8 @@ NEEDS: Mapping[str, Needs] = {
     "cornell_fractal": Needs(outline=True, fields=("bsdfs", "instances")),
     "ring_caustic": Needs(caustics=True, outline=True),
     "cardioid_010": Needs(caustics=True, fields=("bsdfs",)),
+    "corner_room": Needs(outline=True),
+    "glossy_room": Needs(outline=True, fields=("bsdfs",)),
     "rooms_10x10": Needs(choice="photons", outline=True),
     "skylight_room": Needs(),
     "three_glasses": Needs(caustics=True, fields=("bsdfs",)),
