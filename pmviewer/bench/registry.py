@@ -35,6 +35,7 @@ BENCHES: dict[str, tuple[str, str]] = {
     "corners": ("Secondary gathering: error at edges and elsewhere (R5)", "pmviewer.bench.measures.corners:run"),
     "cache": ("Irradiance cache against the plain final gather (R6)", "pmviewer.bench.measures.irradiance_cache:run"),
     "gather": ("Radiance photons against the plain final gather (R3)", "pmviewer.bench.measures.gather:run"),
+    "denoise": ("Denoised pictures: error against time (P16)", "pmviewer.bench.measures.denoise:run"),
     "virtual": ("Virtual lights: estimators against the plain sum (R10)", "pmviewer.bench.measures.virtual:run"),
     "importance": ("Importance against the path tracer, and its cost (I1)", "pmviewer.bench.measures.importance:run"),
     "deposition": (

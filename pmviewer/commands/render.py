@@ -21,6 +21,9 @@ def render(
     seed: Annotated[int | None, typer.Option(help="Seed of the random streams.")] = None,
     set_: SetOption = None,
     half: Annotated[bool, typer.Option(help="Half-precision EXR.")] = False,
+    denoise: Annotated[
+        bool, typer.Option("--denoise", help="Add the picture without its noise to EXR files, as the layer 'denoised'.")
+    ] = False,
     define: ParameterOption = None,
     reference: Annotated[
         str | None,
@@ -44,6 +47,7 @@ def render(
         threads=threads,
         seed=seed,
         half=half,
+        denoise=denoise,
         reference=reference,
         stats=stats,
     )

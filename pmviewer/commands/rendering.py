@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -18,9 +19,10 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
+from pmviewer.engine.wanted import wanted_of
 from pmviewer.errors import SceneError, SettingError
 from pmviewer.output.compare import ERROR_COLUMNS, Reference, error_row, load_reference
-from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.output.diagnostic_views import DENOISED, HELD_WHILE_SHOWN
 from pmviewer.output.frame_export import LAYERS, write_frame_exr, write_frame_png
 from pmviewer.output.metric import metrics
 from pmviewer.progress import watched
@@ -42,11 +44,14 @@ def render_job(
     threads: int | None = None,
     seed: int | None = None,
     half: bool = False,
+    denoise: bool = False,
     reference: str | None = None,
     stats: bool = False,
 ) -> Frame:
     """Render and write the files; with a reference (a file or "auto") also print the error at passes 1, 2, 4, … and at
     the end; with `stats` photons, rays, times and the energy ledger.
+
+    `denoise` adds the picture without its noise as a layer of EXR files.
 
     Raises PmviewerError; refuses bad file names and references that don't fit before rendering.
     """
@@ -58,7 +63,9 @@ def render_job(
     print_warnings(opened.scene.warnings, opened.scene.dropped)
     target = None if reference is None else _reference(reference, opened.scene, settings)
     view = _view(settings, opened)
-    frame = _rendered(opened, settings, threads, target)
+    if denoise and (reason := inactive_reason(f"display.view={DENOISED}", settings, opened.traits)) is not None:
+        raise SettingError(f"--denoise: {reason}")
+    frame = _rendered(opened, settings, threads, target, denoise)
     if said := pass_report(frame.statistics):
         print(said)
     if stats:
@@ -73,14 +80,17 @@ def render_job(
     return frame
 
 
-def _rendered(opened: OpenScene, settings: Settings, threads: int | None, target: Reference | None) -> Frame:
+def _rendered(
+    opened: OpenScene, settings: Settings, threads: int | None, target: Reference | None, denoise: bool
+) -> Frame:
     pool = WorkPool(threads)
     try:
         renderer = Renderer(opened, settings, pool, StageStore(0))
         if opened.scene.exposure is None and settings.display.exposure == "auto":
             renderer.coarse_frame(0)  # as in the window it decides the exposure
         _run(renderer, pool, None if target is None else partial(_print_error, target))
-        return renderer.frame(1)
+        wanted = wanted_of(renderer.facts)
+        return renderer.frame(1, replace(wanted, denoised=True) if denoise else wanted)
     finally:
         pool.close()
 
@@ -105,7 +115,7 @@ def _view(settings: Settings, opened: OpenScene) -> str:
     """The view to write as PNG; what the window alone draws gives the image. Raises SettingError for a diagnostic view
     that has nothing to show."""
     view = settings.display.view
-    if view in DIAGNOSTICS:
+    if view in HELD_WHILE_SHOWN:
         reason = inactive_reason(f"display.view={view}", settings, opened.traits)
         if reason is not None:
             raise SettingError(f"display.view = {view}: {reason}")

@@ -31,12 +31,15 @@ from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import neighbourhood
 from pmviewer.maps.search.grid import PhotonGrid, build_grid
 from pmviewer.maps.search.stored import ALL_CLASSES
+from pmviewer.output.denoise import denoised
+from pmviewer.output.diagnostic_views import DENOISED
 from pmviewer.photons.deposition.rules import SMALLEST_EPSILON
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.diagnostics.density import WIDEST, counting_eye, counting_tree, density_view
 from pmviewer.render.diagnostics.diagnostics import FAMILY_CHANNELS, lookup_view, radiance_view, shadow_view
 from pmviewer.render.film import Film
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL
+from pmviewer.render.planes import view_of
 from pmviewer.render.virtual_lights.film import WeightedFilm
 from pmviewer.settings.access import Settings
 
@@ -78,7 +81,7 @@ def inspected(wanted: Wanted, looked: Looked, pool: WorkPool) -> Inspection:
     tracer, maps, importance = looked.light.tracer, looked.latest.maps, looked.importance
     return Inspection(
         wanted,
-        planes=diagnostic_planes(wanted, looked, pool),
+        planes=diagnostic_planes(wanted, looked, pool) | (_denoised(looked, pool) if wanted.denoised else {}),
         paths=paths_of(tracer, maps, wanted.paths) if wanted.paths else None,
         gathered=gather_rays_of(looked.latest.given, *wanted.pixel, pool) if wanted.pixel else None,
         fates=fates_of(tracer, maps, importance, wanted.fates) if wanted.fates else None,
@@ -122,6 +125,13 @@ def diagnostic_planes(wanted: Wanted, looked: Looked, pool: WorkPool) -> dict[st
             made["density ratio"] = ratio(made["achieved density"], required)
         return made
     return {"radiance photons": plane(0, 1, 2), "radiance cells": plane(3)}
+
+
+def _denoised(looked: Looked, pool: WorkPool) -> dict[str, NDArray[np.float32]]:
+    """The picture without its noise."""
+    planes = looked.film.planes()
+    image, albedo, normal = (view_of(planes, view) for view in ("beauty", "albedo", "normal"))
+    return {DENOISED: denoised(image, albedo, normal, pool.threads)}
 
 
 def ratio(achieved: NDArray[np.float32], required: NDArray[np.float32]) -> NDArray[np.float32]:

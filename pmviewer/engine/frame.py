@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.energy import Energy
 from pmviewer.engine.inspection import Inspection
-from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.output.diagnostic_views import HELD_WHILE_SHOWN
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.planes import beauty_of, view_of
 from pmviewer.settings.access import Settings
@@ -133,13 +133,13 @@ class Frame:
     def image(self, view: str = "beauty") -> NDArray[np.float32]:
         """(height, width, 3), or 1 channel for depth; view is `beauty`, a term or a first-hit property, or one of
         `diagnostics`."""
-        if view in DIAGNOSTICS:
+        if view in HELD_WHILE_SHOWN:
             return self.inspection.planes[view]
         return self.beauty if view == "beauty" else view_of(self.planes, view)
 
     @property
     def diagnostics(self) -> Mapping[str, NDArray[np.float32]]:
-        """Planes of the diagnostic views that are there (`pmviewer.output.diagnostic_views`)."""
+        """Planes of the views that are there only while they are shown (`pmviewer.output.diagnostic_views`)."""
         return self.inspection.planes
 
     @cached_property

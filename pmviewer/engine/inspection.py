@@ -22,7 +22,8 @@ if TYPE_CHECKING:  # numba, which the window doesn't wait for
 @dataclass(frozen=True)
 class Wanted:
     """What the display asks for: a family of diagnostic planes (of which map, for look-ups), so many photon paths, the
-    gather rays of a pixel (x, y), the fates of the photons of so many trajectories, the importance of the lights."""
+    gather rays of a pixel (x, y), the fates of the photons of so many trajectories, the importance of the lights, the
+    picture without its noise."""
 
     family: Family | None = None
     map: str = ""
@@ -30,6 +31,7 @@ class Wanted:
     pixel: tuple[int, int] | None = None
     fates: int = 0
     lights: bool = False
+    denoised: bool = False
 
     def lacks(self, held: Wanted) -> bool:
         """Whether a frame that holds `held` lacks something of this."""
@@ -41,12 +43,15 @@ class Wanted:
             return True
         if self.lights and not held.lights:
             return True
+        if self.denoised and not held.denoised:
+            return True
         return self.paths > 0 and self.paths != held.paths
 
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """`planes` by view, (h, w, channels) float32, see `pmviewer.output.diagnostic_views`; `gathered`: the gather rays
+    """`planes` by view, (h, w, channels) float32, see `pmviewer.output.diagnostic_views`, the picture without its noise
+    among them; `gathered`: the gather rays
     of the pixel, (n, 10) float32, see `pmviewer.render.gather.gather_points`; `fates`: photons (n, 6) float32, see
     `pmviewer.photons.deposition.fates`; `lights`: importance of the lights as photons tell it."""
 

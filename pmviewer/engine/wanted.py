@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.method import Plan
-from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.output.diagnostic_views import DENOISED, DIAGNOSTICS
 from pmviewer.settings.access import Settings, get, needs_of
 from pmviewer.settings.needs import Facts, unmet
 from pmviewer.settings.schema.display import MAP_VIEWS
@@ -25,6 +25,8 @@ def wanted_of(facts: Facts, pixel: tuple[int, int] | None = None) -> Wanted:
     wanted = Wanted()
     if view in DIAGNOSTICS and unmet(needs_of(f"display.view={view}"), facts) is None:
         wanted = Wanted(DIAGNOSTICS[view].family, looked_map(settings, facts.plan) if view in MAP_VIEWS else "")
+    if view == DENOISED and unmet(needs_of(f"display.view={view}"), facts) is None:
+        wanted = replace(wanted, denoised=True)
     if shown("paths"):
         wanted = replace(wanted, paths=overlays.paths.count)
     if shown("fates"):

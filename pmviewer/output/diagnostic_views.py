@@ -25,6 +25,8 @@ Family = Literal[
     "convergence",
     "virtual lights",
 ]
+DENOISED = "denoised"
+"""The one view of those that a frame holds only while it is shown that is a picture (`pmviewer.output.denoise`)."""
 NOTHING = -1.0
 DIMMED = 0.4
 """Brightness of cells whose radiance photon is the nearest, but not near enough to be used."""
@@ -153,6 +155,7 @@ DIAGNOSTICS: Mapping[str, DiagnosticView] = {
         "no weighted light",
     ),
 }
+HELD_WHILE_SHOWN = (DENOISED, *DIAGNOSTICS)
 
 
 def scalar(values: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pmviewer import __version__
 from pmviewer.errors import OutputError
-from pmviewer.output.diagnostic_views import DIAGNOSTICS, coloured
+from pmviewer.output.diagnostic_views import DENOISED, DIAGNOSTICS, HELD_WHILE_SHOWN, coloured
 from pmviewer.output.exr import BEAUTY, PREFIX, Value, write_exr
 from pmviewer.output.png import write_png
 from pmviewer.output.side_by_side import side_by_side
@@ -118,7 +118,7 @@ class Exportable(Protocol):
 
     @property
     def diagnostics(self) -> Mapping[str, NDArray[np.float32]]:
-        """Planes of diagnostic views that the frame holds, (h, w, c) by view."""
+        """Planes of `HELD_WHILE_SHOWN` that the frame holds, (h, w, c) by view."""
 
     def image(self, view: str = ...) -> NDArray[np.float32]:
         """A layer of `LAYERS` or a plane of `diagnostics`, (h, w, c) float32; the image without a name."""
@@ -167,7 +167,9 @@ def frame_metadata(frame: Exportable) -> dict[str, Value]:
     about |= {f"photons_stored.{name}": count for name, count in counts.stored.items()}
     about |= {f"radius.{name}": float(radius) for name, radius in counts.radius.items()}
     about |= {f"dropped.{place}": count for place, count in counts.dropped.items()}
-    about |= {f"units.{layer_name(view)}": DIAGNOSTICS[view].unit for view in frame.diagnostics}
+    about |= {f"units.{layer_name(view)}": DIAGNOSTICS[view].unit for view in frame.diagnostics if view in DIAGNOSTICS}
+    if DENOISED in frame.diagnostics:
+        about["denoiser"] = "Open Image Denoise; a guess, no estimate"
     return about | {path: _plain(value) for path, value in flat(frame.settings).items()}
 
 
@@ -195,9 +197,9 @@ def write_frame_png(
     """
     display = display or frame.settings.display
     view = view or display.view
-    if view in DIAGNOSTICS and view not in frame.diagnostics:
+    if view in HELD_WHILE_SHOWN and view not in frame.diagnostics:
         raise OutputError(f"{path}: this frame holds nothing for the view '{view}': see when it is available.")
-    if view not in LAYERS and view not in DIAGNOSTICS:
+    if view not in LAYERS and view not in HELD_WHILE_SHOWN:
         raise OutputError(f"{path}: the view '{view}' is drawn by the window alone. Choose one of {', '.join(LAYERS)}.")
     if view in DIAGNOSTICS:
         pixels = coloured(view, frame.image(view))

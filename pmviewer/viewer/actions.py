@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from imgui_bundle import hello_imgui
 
+from pmviewer.output.diagnostic_views import DENOISED
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.free_camera import as_perspective, plan_pose
 from pmviewer.settings.access import SETTINGS, get
@@ -54,6 +55,7 @@ class Commands:
             "exposure_up": lambda: self._expose(EXPOSURE_STEP),
             "exposure_down": lambda: self._expose(-EXPOSURE_STEP),
             "next_tone": self._next_tone,
+            "toggle_denoised": self._toggle_denoised,
             **{f"toggle_{o.name}": partial(self._toggle, f"overlays.{o.name}.show") for o in SWITCHED},
             "fit_picture": self._fit,
             "compare_importance": self._compare_importance,
@@ -130,6 +132,15 @@ class Commands:
         choices = SETTINGS["display.tone"].choices
         now = choices.index(self.state.settings.display.tone)
         self.state.change({"display.tone": choices[(now + 1) % len(choices)]})
+
+    def _toggle_denoised(self) -> None:
+        """The picture without its noise, or the picture as it is again."""
+        if self.state.settings.display.view == DENOISED:
+            self.state.change({"display.view": "beauty"})
+        elif (reason := self.state.refused_view(DENOISED)) is None:
+            self.state.change({"display.view": DENOISED})
+        else:
+            self.state.say("warning", reason)
 
     def _compare_importance(self) -> None:
         """Start the comparison and bring its panel to the front."""

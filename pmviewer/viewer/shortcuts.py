@@ -49,6 +49,7 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Picture", "E", "Exposure up by half a stop", "exposure_up", K.e, repeat=True),
     Binding("Picture", "Shift+E", "Exposure down by half a stop", "exposure_down", K.e, shift=True, repeat=True),
     Binding("Picture", "T", "Next tone curve", "next_tone", K.t),
+    Binding("Picture", "D", "Denoised picture, or as it is", "toggle_denoised", K.d),
     Binding("Picture", "V held", "The reference instead of the picture"),
     *(_switching(overlay.name, overlay.switch) for overlay in OVERLAYS if overlay.switch is not None),
     Binding("Picture", "I held", "Gather rays of the pixel under the mouse"),

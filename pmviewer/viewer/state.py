@@ -11,7 +11,7 @@ from typing import Any
 
 from pmviewer.engine.frame import Frame, Level, Message
 from pmviewer.errors import PmviewerError, SettingError
-from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.output.diagnostic_views import HELD_WHILE_SHOWN
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.planes import AOVS, TERMS
@@ -160,7 +160,9 @@ class ViewerState:
         display = self._exposed(self.settings.display, self.frame)
         if self.flipped and self.refused_view("reference") is None:
             return display.model_copy(update={"view": "reference"})
-        missing = display.view in DIAGNOSTICS and (self.frame is None or display.view not in self.frame.diagnostics)
+        missing = display.view in HELD_WHILE_SHOWN and (
+            self.frame is None or display.view not in self.frame.diagnostics
+        )
         if missing or self.refused_view(display.view) is not None:
             return display.model_copy(update={"view": "beauty"})
         return display
@@ -181,7 +183,7 @@ class ViewerState:
 
     def refused_view(self, view: str) -> str | None:
         """Why that view can't be shown now, or None."""
-        if view in DIAGNOSTICS:
+        if view in HELD_WHILE_SHOWN:
             return self.inactive_reason(f"display.view={view}", self.settings, self.session.traits)
         return self.comparison.problem(self.frame) if view in COMPARED_VIEWS else None
 

@@ -14,7 +14,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.errors import SettingError
-from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.output.diagnostic_views import DIAGNOSTICS, HELD_WHILE_SHOWN
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, get, with_values
 from pmviewer.settings.schema.display import MAP_VIEWS, VIEW_NEEDS
@@ -107,6 +107,6 @@ def test_no_scene_no_reason_and_unknown_settings_are_named():
 
 def test_the_schema_knows_the_views():
     """What it declares of each and which show one map is what the table of views has."""
-    assert list(VIEW_NEEDS) == list(DIAGNOSTICS)
+    assert tuple(VIEW_NEEDS) == HELD_WHILE_SHOWN
     of_a_map = {"look-up", "importance", "density", "storing"}
     assert tuple(name for name, view in DIAGNOSTICS.items() if view.family in of_a_map) == MAP_VIEWS

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pmviewer.bench import peer
 from pmviewer.bench.report import BenchResult, Target
@@ -89,9 +91,10 @@ def measure(
     threads: int | None = None,
     limit: int = 4096,
     values: dict[str, Any] | None = None,
+    show: Callable[[Renderer], tuple[NDArray[np.float32], float]] | None = None,
 ) -> Curve:
     """Render until `budget` CPU seconds are spent; the error is taken at passes 1, 2, 4, … and at the end. `values` are
-    further settings."""
+    further settings; `show` makes another picture of the renderer's than the image, in so many CPU seconds."""
     settings = with_values(Settings(), {"render.method": method, "render.passes": limit, **(values or {})})
     pool = WorkPool(threads)
     target = reference(opened.scene.name)
@@ -105,10 +108,10 @@ def measure(
             spent = renderer.tally.cpu_seconds
             last = spent >= budget or renderer.finished
             if last or renderer.passes & (renderer.passes - 1) == 0:
-                image = renderer.frame(0).image().astype(np.float64)
-                measured = metrics(image, target)
+                image, more = show(renderer) if show is not None else (renderer.frame(0).image(), 0.0)
+                measured = metrics(image.astype(np.float64), target)
                 curve.passes.append(renderer.passes)
-                curve.cpu.append(spent)
+                curve.cpu.append(spent + more)
                 curve.error.append(measured.relmse_all)
                 curve.ratio.append(measured.mean_ratio)
             if last:

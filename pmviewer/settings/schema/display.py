@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import Any, Literal
 
 from pydantic import ConfigDict
@@ -29,7 +30,9 @@ CONVERGENCE = Need(
 RADIANCE_PHOTONS = Need(
     lambda f: f.plan.radiance, "Only with the method 'gather' and radiance photons (gather.radiance_photons)."
 )
+DENOISER = Need(lambda f: find_spec("pyoidn") is not None, "Needs Open Image Denoise: pip install 'pmviewer[denoise]'.")
 VIEW_NEEDS: dict[str, Needs] = {
+    "denoised": (DENOISER,),
     "look-up radius": (LOOKED_UP,),
     "photon count": (LOOKED_UP,),
     "shadow rays skipped": (SHADOW_PHOTONS,),
@@ -45,7 +48,7 @@ VIEW_NEEDS: dict[str, Needs] = {
     "sum of weights": (VIRTUAL_LIGHTS, WEIGHTED),
     "normalisation": (VIRTUAL_LIGHTS, WEIGHTED),
 }
-"""Of the views that tell how the picture was made."""
+"""Of the views that a frame holds only while they are shown."""
 MAP_VIEWS = (
     "look-up radius",
     "photon count",
@@ -68,7 +71,6 @@ CAUSTIC_PHOTONS = Need(
 )
 RADIANCE_SHOWN = Need(lambda f: f.plan.radiance, "Only the method 'gather' has radiance photons, where they are on.")
 CACHE_SHOWN = Need(lambda f: f.plan.cache, "Only the method 'gather' has an irradiance cache, where it is on.")
-VIRTUAL_LIGHTS = Need(lambda f: f.plan.virtual, "Only the method 'virtual lights' has them.")
 IMPORTANCE_OF_EACH_MAP = Need(
     lambda f: f.plan.caustic_classes and f.plan.global_classes and f.plan.gather,
     "One importance serves both maps: they are shown at the same places.",
@@ -104,6 +106,7 @@ class Display(Group):
         "geometry",
         "reference",
         "error",
+        "denoised",
         "look-up radius",
         "photon count",
         "shadow rays skipped",
@@ -121,8 +124,8 @@ class Display(Group):
     ] = setting(
         "beauty",
         "What the viewport shows: the image, one of its terms, a property of the first hit, the shaded geometry, the "
-        "loaded reference, the error against it, or, in false colours with a legend, how the latest pass made the "
-        "picture.",
+        "loaded reference, the error against it, the image without its noise as a denoiser guesses it, or, in false "
+        "colours with a legend, how the latest pass made the picture.",
         stage="display",
         scale="choice",
         choice_needs=VIEW_NEEDS,

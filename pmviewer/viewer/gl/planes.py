@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.frame import Frame
-from pmviewer.output.diagnostic_views import CLASS_COLOURS, DIAGNOSTICS, GREY, LUMINANCE, view_scale
+from pmviewer.output.diagnostic_views import (
+    CLASS_COLOURS,
+    DIAGNOSTICS,
+    GREY,
+    HELD_WHILE_SHOWN,
+    LUMINANCE,
+    view_scale,
+)
 from pmviewer.output.falsecolour import ERROR_SCALE, Scale
 from pmviewer.output.tone import depth_bounds
 from pmviewer.settings.access import Display
@@ -50,7 +57,7 @@ class Planes:
         """Take that view of the frame. True when it is another one than before."""
         if view in ("reference", "error"):
             view = "beauty"  # the error is that of the image; the reference is there already
-        if view in DIAGNOSTICS and view not in frame.diagnostics:
+        if view in HELD_WHILE_SHOWN and view not in frame.diagnostics:
             view = "beauty"  # until it is there
         if view == "geometry" or self._shown == (frame.serial, view):
             return False

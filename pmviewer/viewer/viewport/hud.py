@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 from numpy.typing import NDArray
 
 from pmviewer.engine.frame import Frame
-from pmviewer.output.diagnostic_views import CLASS_COLOURS, DIAGNOSTICS
+from pmviewer.output.diagnostic_views import CLASS_COLOURS, DENOISED, DIAGNOSTICS
 from pmviewer.output.falsecolour import COLOURS, ERROR_SCALE, Scale
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import duration, si
@@ -21,9 +21,10 @@ if TYPE_CHECKING:
     from pmviewer.output.compare import Reference
     from pmviewer.viewer.viewport.viewport import Viewport
 
-_TITLES = {"error": "error: (I–R)²/(R²+0.01) of each pixel, no unit"} | {
-    view: f"{view}: {info.text}; grey: {info.none}" for view, info in DIAGNOSTICS.items()
-}
+_TITLES = {
+    "error": "error: (I–R)²/(R²+0.01) of each pixel, no unit",
+    DENOISED: "denoised by Open Image Denoise: a guess, no estimate",
+} | {view: f"{view}: {info.text}; grey: {info.none}" for view, info in DIAGNOSTICS.items()}
 _UNITS = {"albedo": "", "normal": "", "depth": "m"} | {view: info.unit for view, info in DIAGNOSTICS.items()}
 
 
@@ -158,6 +159,8 @@ def _value_under_mouse(viewport: Viewport) -> str:
             return f"{pixel[0]}, {pixel[1]}    {DIAGNOSTICS[view].classes[int(values[0])]}"
         if DIAGNOSTICS[view].cells:
             return f"{pixel[0]}, {pixel[1]}    cell {int(values[0])}{', beyond the cut-off' if values[0] % 1 else ''}"
+    elif view == DENOISED:
+        values = frame.image(view)[y, x]
     else:
         values = view_of(frame.planes[y : y + 1, x : x + 1], view)[0, 0]
     unit = _UNITS.get(view, "W/(m² sr)")

@@ -1,0 +1,66 @@
+"""Error against time of denoised pictures, the denoiser's own time included (P16)."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.bench.measures.error import SCENES, Curve, measure
+from pmviewer.bench.report import BenchResult, Cell, Target
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.renderer import Renderer
+from pmviewer.output.denoise import denoised
+
+METHODS: dict[str, dict[str, Any]] = {
+    "progressive": {},
+    "gather": {},
+    "gather, cache": {"gather.cache": "on"},
+}
+"""By name, with the settings beside the method that are no defaults."""
+TARGETS = (
+    ("cornell_caustic", 1e-2, 0.3),
+    ("cornell_caustic", 1e-3, 2.3),
+    ("cornell_diffuse", 1e-2, 0.2),
+    ("cornell_diffuse", 1e-3, 0.7),
+    ("rooms_10x10", 1e-2, 0.5),
+    ("ring_caustic", 5e-3, 1.0),
+)
+BUDGETS = {"cornell_diffuse": 3.0, "cornell_caustic": 8.0, "ring_caustic": 3.0, "rooms_10x10": 3.0}
+"""CPU seconds a curve, several times the slowest target of the scene."""
+QUICK_SHARE = 0.25
+
+
+def picture(renderer: Renderer) -> tuple[NDArray[np.float32], float]:
+    """The renderer's picture without its noise, and the CPU seconds that the denoiser took for it."""
+    frame = renderer.frame(0)
+    start = time.process_time()
+    image = denoised(frame.image(), frame.image("albedo"), frame.image("normal"), renderer.pool.threads)
+    return image, time.process_time() - start
+
+
+def run(quick: bool = False) -> BenchResult:
+    """Curves of the photon methods on every scene of `bench error`, denoised after 1, 2, 4 … passes. Raises OutputError
+    without Open Image Denoise."""
+    nothing = np.zeros((16, 16, 3), np.float32)
+    denoised(nothing, nothing, nothing)  # its weights are unpacked with the first picture
+    curves: dict[tuple[str, str], Curve] = {}
+    rows: list[list[Cell]] = []
+    for scene in SCENES:
+        budget = BUDGETS[scene] * (QUICK_SHARE if quick else 1.0)
+        for name, values in METHODS.items():
+            opened = open_scene(scene)
+            plain = measure(opened, name.split(",")[0], budget, values=values)
+            curve = curves[scene, name] = measure(opened, name.split(",")[0], budget, values=values, show=picture)
+            for i, passes in enumerate(curve.passes):
+                before = plain.error[plain.passes.index(passes)] if passes in plain.passes else ""
+                rows.append([scene, name, passes, curve.cpu[i], before, curve.error[i], f"{curve.ratio[i]:.4f}"])
+    targets = []
+    for scene, error, bound in TARGETS:
+        best = min(METHODS, key=lambda name: curves[scene, name].time_to(error))
+        note = f"{scene} denoised to relMSE {error:g}, best method: {best}"
+        targets.append(Target("P16", curves[scene, best].time_to(error), bound, "CPU s", False, note))
+    columns = ["scene", "method", "passes", "CPU s", "relMSE before", "relMSE", "mean ratio"]
+    return BenchResult("Denoised pictures: error against time", columns, rows, targets)

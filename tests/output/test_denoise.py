@@ -1,0 +1,53 @@
+"""The denoiser on pictures whose truth is known."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from pmviewer.errors import OutputError
+from pmviewer.output.denoise import denoised
+
+
+def two_walls(noise: float):
+    """A bright and a dark wall, half a picture each, with the noise of few samples: truth, picture, albedo, normal."""
+    truth = np.full((64, 96, 3), 0.2, np.float32)
+    truth[:, 48:] = (2.0, 1.5, 1.0)
+    rng = np.random.default_rng(3)
+    noisy = (truth * rng.gamma(1 / noise**2, noise**2, truth.shape[:2] + (1,))).astype(np.float32)
+    albedo, normal = np.where(truth > 0.5, 0.9, 0.3).astype(np.float32), np.zeros_like(truth)
+    normal[..., 0], normal[:, 48:, 0], normal[:, 48:, 2] = 1.0, 0.0, 1.0
+    return truth, noisy, albedo, normal
+
+
+def test_noise_goes_and_edges_stay():
+    truth, noisy, albedo, normal = two_walls(0.5)
+    kept = noisy.copy()
+    clean = denoised(noisy, albedo, normal, threads=1)
+    assert clean.dtype == np.float32
+    assert np.array_equal(noisy, kept), "what is given stays as it is"
+
+    def error(image):
+        return float((((image - truth) / truth) ** 2).mean())
+
+    assert error(noisy) == pytest.approx(0.25, rel=0.1)
+    assert error(clean) < error(noisy) / 50
+    columns = clean.mean(axis=(0, 2))
+    assert columns[47] < 0.4
+    assert columns[48] > 1.2
+    assert clean.mean() == pytest.approx(truth.mean(), rel=0.03)
+
+
+def test_without_it_the_sentence_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    nothing = np.zeros((4, 4, 3), np.float32)
+    with pytest.raises(OutputError, match=r"pip install 'pmviewer\[denoise\]'"):
+        denoised(nothing, nothing, nothing)
+
+
+def test_negative_samples_and_small_pictures_are_no_trouble():
+    colour = np.full((3, 5, 3), 0.5, np.float32)
+    colour[1, 2] = -4.0
+    clean = denoised(colour, np.full_like(colour, 2.0), np.zeros_like(colour))
+    assert np.isfinite(clean).all()
+    assert clean.min() >= 0
