@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 
 import pytest
 
@@ -38,9 +39,10 @@ def test_answers_come_from_one_process(server):
     ],
 )
 def test_a_process_without_an_answer_is_ended_and_started_again(server, do, kind, said):
+    limits = replace(LIMITS, cpu=1.0 if kind == "cpu" else 60.0)
     before = server.ask({"do": "answer"}, LIMITS)["pid"]
     with pytest.raises(Ended, match=said) as ended:
-        server.ask({"do": do}, LIMITS)
+        server.ask({"do": do}, limits)
     assert ended.value.kind == kind
     assert server.ask({"do": "answer"}, LIMITS)["pid"] != before
 
