@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.bench.agree.statistics import compared, rejected, summaries
+from pmviewer.bench.agree.statistics import compared, negligible, rejected, summaries
 
 PIXELS = (16, 16, 3)
 
@@ -65,6 +65,17 @@ def test_blocks_that_no_photon_met_say_nothing_where_light_is_sparse():
     ours = theirs + 0.01 * runs(2, 12, 16)
     assert compared(summaries(ours), summaries(theirs)).tests == 3 + 12
     assert compared(summaries(ours), summaries(theirs), sparse=True).tests == 3 + 3
+
+
+def test_a_term_may_lack_what_is_nothing_beside_the_picture():
+    """A ten-thousandth of the picture, wherever it lies; a thousandth is found, even in one block of four."""
+    picture = summaries(runs(1, 12, 16))
+    faint, black = np.zeros((12, *PIXELS)), np.zeros((12, *PIXELS))
+    faint[:, 8:, 8:] = 1e-4 * runs(2, 12, 16)[:, 8:, 8:]
+    lacking = summaries(black), summaries(faint)
+    assert compared(*lacking, sparse=True).p < 1e-6
+    assert compared(*lacking, sparse=True, floor=negligible(picture)).p == 1
+    assert compared(10 * lacking[1], lacking[0], floor=negligible(picture)).p < 1e-6
 
 
 def test_pixels_that_are_not_seen_do_not_count():

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from pmviewer.bench.agree.generate import has_distant_lights, needs_particles
 from pmviewer.bench.agree.mitsuba_client import Mitsuba, MitsubaError
 from pmviewer.bench.agree.ours import METHODS, PHOTON_METHODS, Effort, our_runs, picture, term
-from pmviewer.bench.agree.statistics import Outcome, compared, summaries
+from pmviewer.bench.agree.statistics import Outcome, compared, negligible, summaries
 from pmviewer.bench.agree.tree import Node
 from pmviewer.bench.agree.verdict import Comparison, Verdict
 from pmviewer.bench.agree.xml import write_scene
@@ -114,20 +114,23 @@ class Question:
     peer: str
     what: str
     pair: Pair
+    floor: Callable[[], NDArray[np.float64] | None] = lambda: None
+    """What the difference of each test may be, see `negligible`."""
 
     def answer(self, stage: int) -> Outcome:
         """The outcome of one stage."""
         if self.method == "path":
             return compared(*self.pair(stage))
-        forgiven = FORGIVEN * STAGES[stage].radius
+        forgiven, floor = FORGIVEN * STAGES[stage].radius, self.floor()
         ours, theirs = self.pair(stage)
-        found = compared(ours, theirs, forgiven, sparse=True)
+        found = compared(ours, theirs, forgiven, sparse=True, floor=floor)
         if stage < len(STAGES) - 1 or found.p >= SUSPICIOUS[-1]:
             return found
         ours_before, theirs_before = self.pair(stage - 1)
         if self.peer in PHOTON_METHODS:
             theirs = _limit(theirs, theirs_before)
-        return max(found, compared(_limit(ours, ours_before), theirs, forgiven, sparse=True), key=lambda o: o.p)
+        limit = compared(_limit(ours, ours_before), theirs, forgiven, sparse=True, floor=floor)
+        return max(found, limit, key=lambda o: o.p)
 
     def asked(self, stages: int) -> Comparison:
         """Stage after stage while the answer is suspicious, at most `stages` of them."""
@@ -196,7 +199,7 @@ def questions(runs: Runs) -> Iterator[Question]:
             ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
                 return part(method, name, stage), part("path", name, stage)
 
-            yield Question(method, "our path", name, by_term)
+            yield Question(method, "our path", name, by_term, lambda: negligible(whole("path", 0)))
 
 
 def tried(
