@@ -25,6 +25,10 @@ def shot(
     pixel: Annotated[
         str | None, typer.Option(metavar="X,Y", help="Pixel whose gather rays overlays.gather.show draws.")
     ] = None,
+    pin: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y", help="Pixel that is pinned: its photons, and the inspector with --window."),
+    ] = None,
     captions: Annotated[bool, typer.Option(help="Say in the picture which view it is.")] = True,
     threads: ThreadsOption = None,
     set_: SetOption = None,
@@ -34,7 +38,7 @@ def shot(
     """Open the window, wait for the last pass, write the picture with all overlays, captions and legends, close it."""
     from pmviewer.commands.job import load_job
 
-    take_shot(load_job(scene, set_ or [], define or []), output, passes, size, window, pixel, captions, threads)
+    take_shot(load_job(scene, set_ or [], define or []), output, passes, size, window, (pixel, pin), captions, threads)
 
 
 def take_shot(
@@ -43,12 +47,12 @@ def take_shot(
     passes: int | None,
     size: str | None,
     window: bool,
-    pixel: str | None,
+    pixels: tuple[str | None, str | None],
     captions: bool,
     threads: int | None,
 ) -> None:
-    """Open the window, take its picture (`pmviewer.viewer.shot`), close it. Raises PmviewerError; WindowError without a
-    display."""
+    """Open the window, take its picture (`pmviewer.viewer.shot`), close it. `pixels`: of --pixel and --pin. Raises
+    PmviewerError; WindowError without a display."""
     from pmviewer.commands.job import check_output, overrides
     from pmviewer.render.camera import resolve_camera
     from pmviewer.scene.load import load_scene  # numba; the window itself comes up before
@@ -59,14 +63,9 @@ def take_shot(
 
     check_output(output, (".png",))
     settings = with_values(job.settings, overrides(passes, None, size, None, job.passes))
-    chosen = None
-    if pixel is not None:
-        match = re.fullmatch(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*", pixel)
-        if not match:
-            raise SettingError(f"--pixel {pixel} is not a pixel: write X,Y, for example 120,80.")
-        chosen = int(match[1]), int(match[2])
+    chosen, pinned = (_pixel(option, text) for option, text in zip(("--pixel", "--pin"), pixels, strict=True))
     camera = resolve_camera(load_scene(job.scene, job.parameters, rig=settings.light.rig), settings.camera)
-    shot = Shot(output, chosen)
+    shot = Shot(output, chosen, pinned)
     picture_size = None if window else (camera.width, camera.height)
     make = partial(ViewerApp, remember=False, shot=shot, picture_size=picture_size, captions=captions)
     start_viewer(make, job.scene, settings, threads, job.parameters)
@@ -75,3 +74,13 @@ def take_shot(
     if shot.error is not None:
         raise shot.error
     print(f"wrote {output.absolute()}{shot.stored}")
+
+
+def _pixel(option: str, text: str | None) -> tuple[int, int] | None:
+    """The pixel that an option names, if it was given."""
+    if text is None:
+        return None
+    match = re.fullmatch(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*", text)
+    if not match:
+        raise SettingError(f"{option} {text} is not a pixel: write X,Y, for example 120,80.")
+    return int(match[1]), int(match[2])

@@ -7,7 +7,7 @@ nothing; the session adds what is missing to the frame that is there.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.inspection import Inspection, Wanted
+from pmviewer.engine.inspector.pixel import pixel_report
+from pmviewer.engine.inspector.watched import Watched
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
@@ -32,7 +34,7 @@ from pmviewer.maps.radius import neighbourhood
 from pmviewer.maps.search.grid import PhotonGrid, build_grid
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.output.denoise import denoised
-from pmviewer.output.diagnostic_views import DENOISED
+from pmviewer.output.diagnostic_views import DENOISED, Family
 from pmviewer.photons.deposition.rules import SMALLEST_EPSILON
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.diagnostics.density import WIDEST, counting_eye, counting_tree, density_view
@@ -41,7 +43,8 @@ from pmviewer.render.film import Film
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL
 from pmviewer.render.planes import view_of
 from pmviewer.render.virtual_lights.film import WeightedFilm
-from pmviewer.settings.access import Settings
+from pmviewer.settings.access import Settings, needs_of
+from pmviewer.settings.needs import Facts, unmet
 
 TILE = 2048
 CELL_NEIGHBOURS = 12
@@ -50,7 +53,8 @@ CELL_NEIGHBOURS = 12
 @dataclass(frozen=True, eq=False)
 class Looked:
     """What there is to be looked into: scene and settings, the stages behind the latest pass, and that pass itself,
-    None before the first. `camera` sees the full picture; the `film` may be smaller."""
+    None before the first. `camera` sees the full picture; the `film` may be smaller. `watched` remembers the pixel that
+    is pinned."""
 
     scene: OpenScene
     settings: Settings
@@ -60,6 +64,7 @@ class Looked:
     light: LightStage
     importance: ImportanceStage
     latest: RenderedPass | None
+    watched: Watched = field(default_factory=Watched)
 
     @property
     def rendered(self) -> RenderedPass:
@@ -86,7 +91,29 @@ def inspected(wanted: Wanted, looked: Looked, pool: WorkPool) -> Inspection:
         gathered=gather_rays_of(looked.latest.given, *wanted.pixel, pool) if wanted.pixel else None,
         fates=fates_of(tracer, maps, importance, wanted.fates) if wanted.fates else None,
         lights=contributions_of(tracer, maps, importance) if wanted.lights else None,
+        pixel=pixel_report(looked, wanted.pinned, partial(measures_at, looked, pool), pool) if wanted.pinned else None,
     )
+
+
+def measures_at(looked: Looked, pool: WorkPool, map_: str, pixel: int) -> dict[str, float]:
+    """What importance says of a pixel of the film, by the name of the view; nothing without importance. Values below 0
+    say that there is none."""
+    if not looked.plan.importance:
+        return {}
+
+    def at(family: Family, channels: int) -> list[float]:
+        out = np.empty((looked.film.width * looked.film.height, channels), np.float32)
+        draw = _kernel(Wanted(family, map_), looked, out)
+        pool.run([partial(draw, pixel, pixel + 1)])
+        return [float(value) for value in out[pixel]]
+
+    importance, required = at("importance", IMPORTANCE_CHANNELS)
+    (achieved,) = at("density", 1)
+    made = {"importance": importance, "required density": required, "achieved density": achieved}
+    facts = Facts(looked.settings, looked.plan, looked.scene.traits)
+    if unmet(needs_of("display.view=storing probability"), facts) is None:
+        (made["storing probability"],) = at("storing", 1)
+    return made
 
 
 def diagnostic_planes(wanted: Wanted, looked: Looked, pool: WorkPool) -> dict[str, NDArray[np.float32]]:

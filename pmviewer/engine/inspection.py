@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.inspector.report import Pinned, PixelReport
 from pmviewer.output.diagnostic_views import Family
 
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
@@ -23,7 +24,7 @@ if TYPE_CHECKING:  # numba, which the window doesn't wait for
 class Wanted:
     """What the display asks for: a family of diagnostic planes (of which map, for look-ups), so many photon paths, the
     gather rays of a pixel (x, y), the fates of the photons of so many trajectories, the importance of the lights, the
-    picture without its noise."""
+    picture without its noise, and what made a pixel."""
 
     family: Family | None = None
     map: str = ""
@@ -32,6 +33,7 @@ class Wanted:
     fates: int = 0
     lights: bool = False
     denoised: bool = False
+    pinned: Pinned | None = None
 
     def lacks(self, held: Wanted) -> bool:
         """Whether a frame that holds `held` lacks something of this."""
@@ -45,6 +47,8 @@ class Wanted:
             return True
         if self.denoised and not held.denoised:
             return True
+        if self.pinned is not None and self.pinned != held.pinned:
+            return True
         return self.paths > 0 and self.paths != held.paths
 
 
@@ -53,7 +57,8 @@ class Inspection:
     """`planes` by view, (h, w, channels) float32, see `pmviewer.output.diagnostic_views`, the picture without its noise
     among them; `gathered`: the gather rays
     of the pixel, (n, 10) float32, see `pmviewer.render.gather.gather_points`; `fates`: photons (n, 6) float32, see
-    `pmviewer.photons.deposition.fates`; `lights`: importance of the lights as photons tell it."""
+    `pmviewer.photons.deposition.fates`; `lights`: importance of the lights as photons tell it; `pixel`: what made the
+    pixel that is pinned."""
 
     wanted: Wanted = Wanted()
     planes: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
@@ -61,3 +66,4 @@ class Inspection:
     gathered: NDArray[np.float32] | None = None
     fates: NDArray[np.float32] | None = None
     lights: LightImportance | None = None
+    pixel: PixelReport | None = None

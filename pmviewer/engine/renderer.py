@@ -16,6 +16,7 @@ from pmviewer.engine.diagnose import Looked, inspected
 from pmviewer.engine.exposure import metered
 from pmviewer.engine.frame import Frame
 from pmviewer.engine.inspection import Inspection, Wanted
+from pmviewer.engine.inspector.watched import Watched
 from pmviewer.engine.make_frame import frame_of
 from pmviewer.engine.memory import check_memory
 from pmviewer.engine.method import Plan, plan_of
@@ -85,6 +86,7 @@ class Renderer:
         self.shadows = ShadowStage(scene, settings, pool, store, self.tally)
         self.virtual = VirtualStage(scene, settings, pool, store, self.tally)
         self.latest: RenderedPass | None = None
+        self._watched = Watched()
 
     @property
     def passes(self) -> int:
@@ -126,7 +128,7 @@ class Renderer:
         film.passes = 1
         if self.scene.scene.exposure is None:
             self.scene.exposures.setdefault(self.settings.camera.name, metered(film.planes()))
-        wanted = replace(wanted or wanted_of(self.facts), pixel=None)  # its pixels are others
+        wanted = replace(wanted or wanted_of(self.facts), pixel=None, pinned=None)  # its pixels are others
         return quick._frame(serial, film, True, wanted)
 
     def frame(self, serial: int, wanted: Wanted | None = None) -> Frame:
@@ -152,7 +154,8 @@ class Renderer:
         return replace(frame_of(looked, self.tally, inspection), serial=serial, version=self.version, coarse=coarse)
 
     def _looked(self, film: Film) -> Looked:
-        return Looked(self.scene, self.settings, self.plan, self.camera, film, self.light, self.importance, self.latest)
+        stages = self.light, self.importance, self.latest
+        return Looked(self.scene, self.settings, self.plan, self.camera, film, *stages, self._watched)
 
     def _pass(self, film: Film, camera: CameraPose, index: int, N: int) -> None:
         settings, plan, tally, pool = self.settings, self.plan, self.tally, self.pool

@@ -19,6 +19,7 @@ from pmviewer.engine.ahead.helper import Helper
 from pmviewer.engine.frame import Frame, Message, State, Status
 from pmviewer.engine.guarded import guarded
 from pmviewer.engine.inspection import Wanted
+from pmviewer.engine.inspector.report import Pinned
 from pmviewer.engine.loader import Loaded, Loader
 from pmviewer.engine.opened import OpenScene, nobody, open_scene, relit
 from pmviewer.engine.pool import WorkPool, lower_priority
@@ -60,6 +61,7 @@ class Session:
         self._version = 0
         self._restart = False
         self._pixel: tuple[int, int] | None = None
+        self._pinned: Pinned | None = None
         self._paused = False
         self._closed = False
         self._first_picture = False
@@ -123,6 +125,12 @@ class Session:
         """Frames shall hold the gather rays of this pixel (x, y) of the image, while that overlay is shown."""
         with self._changed:
             self._pixel = pixel
+            self._changed.notify_all()
+
+    def pin(self, pinned: Pinned | None) -> None:
+        """Frames shall tell what made this pixel, and a photon's life; nothing more with None."""
+        with self._changed:
+            self._pinned = pinned
             self._changed.notify_all()
 
     def pause(self) -> None:
@@ -317,7 +325,7 @@ class Session:
 
     def _wanted(self, renderer: Renderer) -> Wanted:
         """What the display asks for now."""
-        return wanted_of(Facts(self._settings, renderer.plan, renderer.scene.traits), self._pixel)
+        return wanted_of(Facts(self._settings, renderer.plan, renderer.scene.traits), self._pixel, self._pinned)
 
     def _unseen(self) -> Wanted | None:
         """What the display asks for, if the newest frame lacks it. The pass that follows a coarse frame brings it."""
@@ -333,7 +341,8 @@ class Session:
     def _adopt(self, loaded: Loaded) -> None:
         """Make a loaded scene the open one."""
         self._store.clear()
-        self._opened, self.geometry, self._renderer, self._pixel = loaded.opened, loaded.geometry, None, None
+        self._opened, self.geometry, self._renderer = loaded.opened, loaded.geometry, None
+        self._pixel = self._pinned = None
         if loaded.settings is not None:
             self._settings = loaded.settings
         self._version += 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from pmviewer.engine.inspection import Wanted
+from pmviewer.engine.inspector.report import Pinned
 from pmviewer.engine.method import Plan
 from pmviewer.output.diagnostic_views import DENOISED, DIAGNOSTICS
 from pmviewer.settings.access import Settings, get, needs_of
@@ -12,9 +13,9 @@ from pmviewer.settings.needs import Facts, unmet
 from pmviewer.settings.schema.display import MAP_VIEWS
 
 
-def wanted_of(facts: Facts, pixel: tuple[int, int] | None = None) -> Wanted:
-    """What the settings show of what the plan makes, with `pixel` the one whose gather rays were asked for; what can't
-    be shown is not asked for."""
+def wanted_of(facts: Facts, pixel: tuple[int, int] | None = None, pinned: Pinned | None = None) -> Wanted:
+    """What the settings show of what the plan makes, with `pixel` the one whose gather rays were asked for and what is
+    `pinned`; what can't be shown is not asked for."""
     settings: Settings = facts.settings
     view, overlays = settings.display.view, settings.overlays
 
@@ -22,9 +23,10 @@ def wanted_of(facts: Facts, pixel: tuple[int, int] | None = None) -> Wanted:
         path = f"overlays.{overlay}.show"
         return get(settings, path) and unmet(needs_of(path), facts) is None
 
-    wanted = Wanted()
+    wanted = Wanted(pinned=pinned)
     if view in DIAGNOSTICS and unmet(needs_of(f"display.view={view}"), facts) is None:
-        wanted = Wanted(DIAGNOSTICS[view].family, looked_map(settings, facts.plan) if view in MAP_VIEWS else "")
+        map_ = looked_map(settings, facts.plan) if view in MAP_VIEWS else ""
+        wanted = replace(wanted, family=DIAGNOSTICS[view].family, map=map_)
     if view == DENOISED and unmet(needs_of(f"display.view={view}"), facts) is None:
         wanted = replace(wanted, denoised=True)
     if shown("paths"):

@@ -216,4 +216,6 @@ class Commands:
         self.state.help_open = not self.state.help_open
 
     def _escape(self) -> None:
+        if not (self.state.flying or self.state.help_open):
+            self.state.inspector.unpin()
         self.state.flying = self.state.help_open = False

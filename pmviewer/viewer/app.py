@@ -27,6 +27,7 @@ from pmviewer.viewer.panels.error_panel import ErrorPanel
 from pmviewer.viewer.panels.gain_panel import GainPanel
 from pmviewer.viewer.panels.help_overlay import draw_help
 from pmviewer.viewer.panels.importance_panel import ImportancePanel
+from pmviewer.viewer.panels.inspector.panel import InspectorPanel, follow_pin
 from pmviewer.viewer.panels.log_panel import LogPanel, draw_toasts
 from pmviewer.viewer.panels.menus import Menus
 from pmviewer.viewer.panels.settings_panel import SettingsPanel
@@ -89,6 +90,7 @@ class ViewerApp:
         panels = {
             "Settings": self.settings_panel.gui,
             "Overlays": OverlayPanel(self.viewport, self.settings_panel).gui,
+            "Inspector": InspectorPanel(self.state).gui,
             "Statistics": StatisticsPanel(self.state).gui,
             "Importance": ImportancePanel(self.state).gui,
             "Error": ErrorPanel(self.state, actions).gui,
@@ -159,6 +161,8 @@ class ViewerApp:
         free_collected(self.context)
         self._shares.keep()
         self.state.poll()
+        if not self.viewport.alone:
+            follow_pin(self.state)
         try:
             self.viewport.render()
         except PmviewerError as error:

@@ -12,8 +12,8 @@ from pmviewer.viewer import theme
 from pmviewer.viewer.viewport.viewport import VIEWPORT
 
 Draw = Callable[[], None]
-PANELS = ("Settings", "Overlays", "Statistics", "Importance", "Error", "Comparison", "Log")
-_PLACE = {"Settings": "Left", "Overlays": "Right"}
+PANELS = ("Settings", "Overlays", "Inspector", "Statistics", "Importance", "Error", "Comparison", "Log")
+_PLACE = {"Settings": "Left", "Overlays": "Right", "Inspector": "Right"}
 """Where panels are docked; the others at the bottom."""
 WINDOW_SIZE = (1440, 900)
 SMALLEST_WINDOW = (800, 600)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from pmviewer.engine.frame import Frame, Message, Status
+from pmviewer.engine.inspector.report import Pinned
 from pmviewer.errors import PmviewerError
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import Settings
@@ -95,6 +96,9 @@ class SessionLike(Protocol):
 
     def inspect(self, pixel: tuple[int, int] | None) -> None:
         """Frames shall hold the gather rays of this pixel (x, y) of the image, of none with None."""
+
+    def pin(self, pinned: Pinned | None) -> None:
+        """Frames shall tell what made this pixel, of none with None."""
 
     def take_messages(self) -> list[Message]:
         """Messages since the last call."""
@@ -200,6 +204,11 @@ class SessionLink(SessionLike):
         with self._lock:
             if self._session is not None:
                 self._session.inspect(pixel)
+
+    def pin(self, pinned: Pinned | None) -> None:
+        with self._lock:
+            if self._session is not None:
+                self._session.pin(pinned)
 
     def close(self) -> None:
         with self._lock:

@@ -52,6 +52,8 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Picture", "D", "Denoised picture, or as it is", "toggle_denoised", K.d),
     Binding("Picture", "V held", "The reference instead of the picture"),
     *(_switching(overlay.name, overlay.switch) for overlay in OVERLAYS if overlay.switch is not None),
+    Binding("Picture", "Click", "Pin a pixel to the inspector; again or Esc: let it go"),
+    Binding("Picture", "Alt+click", "The life of the photon under the mouse, of those that are shown"),
     Binding("Picture", "I held", "Gather rays of the pixel under the mouse"),
     Binding("Picture", "Ctrl+wheel, Ctrl+drag", "Magnify the picture's pixels and move it"),
     Binding("Picture", "Z", "Fit the picture again", "fit_picture", K.z),
@@ -70,7 +72,7 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Window", "H or F1", "This overview", "toggle_help", K.h, alternative=K.f1),
     Binding("Settings", "Double click or Ctrl+click", "Type an exact value"),
     Binding("Settings", "Right click", "Reset to the default, copy the setting's name"),
-    Binding("Settings", "Esc", "Leave fly mode, close this overview", "escape", K.escape),
+    Binding("Settings", "Esc", "Leave fly mode, close this overview, let the pinned pixel go", "escape", K.escape),
 )
 
 _DIGITS = (K._1, K._2, K._3, K._4, K._5, K._6, K._7, K._8, K._9, K._0)

@@ -29,11 +29,12 @@ SETTLING = 4
 
 @dataclass
 class Shot:
-    """What to write; `pixel` is the one whose gather rays are shown. `error` is why there is no file, once the window
-    has closed, `stored` what the last pass stored."""
+    """What to write; `pixel` is the one whose gather rays are shown, `pinned` the one in the inspector. `error` is why
+    there is no file, once the window has closed, `stored` what the last pass stored."""
 
     path: Path
     pixel: tuple[int, int] | None = None
+    pinned: tuple[int, int] | None = None
     error: PmviewerError | None = None
     stored: str = ""
     done: bool = field(default=False, init=False)
@@ -59,23 +60,33 @@ class Shot:
         status, frame = state.session.status, state.frame
         if status.state == "failed":
             raise SceneError(status.text)
+        if frame is not None and not frame.coarse and not self._asked:
+            self._asked = True
+            self._ask(state, viewport, frame)
         if status.state != "finished" or frame is None:
             return False
         view = state.settings.display.view
         refusal = state.refused_view(view)
         if refusal is not None:
             raise SettingError(f"display.view = {view}: {refusal}")
-        if self.pixel is not None and not self._asked:
-            self._asked = True
-            if not (0 <= self.pixel[0] < frame.camera.width and 0 <= self.pixel[1] < frame.camera.height):
-                raise SettingError(f"The pixel {self.pixel} is outside of {frame.camera.width}x{frame.camera.height}.")
-            viewport.inspected = self.pixel
-            state.session.inspect(self.pixel)
         waiting = self.pixel is not None and frame.inspection.gathered is None
+        waiting = waiting or (self.pinned is not None and state.inspector.report is None)
         key = frame.serial, viewport.redraws
         self._still = self._still + 1 if key == self._key and not waiting else 0
         self._key = key
         return self._still >= SETTLING and state.shown_display.view == view
+
+    def _ask(self, state: ViewerState, viewport: Viewport, frame: Frame) -> None:
+        """Have the frame hold what is told of pixels."""
+        width, height = frame.camera.width, frame.camera.height
+        for pixel in (self.pixel, self.pinned):
+            if pixel is not None and not (0 <= pixel[0] < width and 0 <= pixel[1] < height):
+                raise SettingError(f"The pixel {pixel} is outside of {width}x{height}.")
+        if self.pixel is not None:
+            viewport.inspected = self.pixel
+            state.session.inspect(self.pixel)
+        if self.pinned is not None:
+            state.inspector.pin(self.pinned)
 
     def _end(self) -> None:
         self.done = True

@@ -30,6 +30,7 @@ from pmviewer.viewer.background import Background
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.dialogs.recent import RecentFiles
 from pmviewer.viewer.importance_gain import GainRun
+from pmviewer.viewer.inspector import Inspector
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.viewport.controls import camera_values
 
@@ -82,6 +83,7 @@ class ViewerState:
         self.background = Background(self.say)
         self.comparison = Comparison(session, self.background, self.say)
         self.gain = GainRun(session, self.background, self.say)
+        self.inspector = Inspector(session, lambda: self.frame)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
         self._toasts_of = session.scene

@@ -105,6 +105,7 @@ class FakeSession:
         self.version = 1
         self.closed = False
         self.inspected: tuple[int, int] | None = None
+        self.pinned = None
         self._messages: list[Message] = []
 
     def cancel_loading(self) -> None:
@@ -185,6 +186,9 @@ class FakeSession:
 
     def inspect(self, pixel: tuple[int, int] | None) -> None:
         self.inspected = pixel
+
+    def pin(self, pinned) -> None:
+        self.pinned = pinned
 
     def take_messages(self) -> list[Message]:
         taken, self._messages = self._messages, []

@@ -13,9 +13,9 @@ from pmviewer.output.png import read_png
 SMALL = ["camera.width=200", "camera.height=160", "photons.N=2000", "importance.N=500"]
 
 
-def take(tmp_path, *settings, pixel=None, window=False, captions=True):
+def take(tmp_path, *settings, pixel=None, pin=None, window=False, captions=True):
     path = tmp_path / "shot.png"
-    take_shot(load_job("cornell_diffuse", [*SMALL, *settings], []), path, 1, None, window, pixel, captions, 1)
+    take_shot(load_job("cornell_diffuse", [*SMALL, *settings], []), path, 1, None, window, (pixel, pin), captions, 1)
     return read_png(path)[0]
 
 
@@ -29,6 +29,18 @@ def test_overlays_and_legends_are_in_the_picture(tmp_path):
     assert (view[5:40, 5:100] != unnamed[5:40, 5:100]).any(axis=-1).mean() > 0.3
     legend = view[10:80, -22:-12]
     assert np.abs(np.diff(legend.mean(axis=1), axis=0)).sum() > 100, "no colour bar"
+
+
+def test_a_pinned_pixel_is_in_the_picture(tmp_path):
+    """Its frame and the disc of its look-up: around the pixel and nowhere else."""
+    settings = "render.method=progressive", "camera.width=120", "camera.height=120", "estimate.radius=0.1"
+    plain, pinned = (take(tmp_path, *settings, pin=pin).astype(int) for pin in (None, "60,100"))
+    rows, columns = np.nonzero((plain != pinned).any(axis=-1))
+    assert len(rows) > 100
+    assert abs(columns.mean() - 60) < 6
+    assert rows.min() > 60
+    with pytest.raises(PmviewerError, match="outside"):
+        take(tmp_path, *settings, pin="120,5")
 
 
 @pytest.mark.parametrize(

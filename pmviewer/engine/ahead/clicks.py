@@ -11,6 +11,7 @@ import numpy as np
 
 from pmviewer.engine.effects import facts_of
 from pmviewer.engine.inspection import Wanted
+from pmviewer.engine.inspector.report import Pinned
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare, steps_of
@@ -46,7 +47,8 @@ class Click:
         renderer = Renderer(self.opened, with_values(self.settings, small), pool, StageStore(0))
         renderer.coarse_frame(1)
         renderer.step()
-        renderer.frame(2, replace(wanted_of(renderer.facts), pixel=(SIDE // 2, SIDE // 2)))
+        pinned = None if self.text else Pinned(SIDE // 2, SIDE // 2)  # with the settings as they are
+        renderer.frame(2, replace(wanted_of(renderer.facts), pixel=(SIDE // 2, SIDE // 2), pinned=pinned))
 
 
 def clicks(opened: OpenScene, settings: Settings) -> list[Click]:

@@ -11,7 +11,7 @@ from pmviewer.photons.emission.guided import Guidance, Guided, Known
 from pmviewer.photons.light_pass.light_pass import guided_emission_of, trace_pass
 from pmviewer.photons.light_pass.paths import PhotonPaths
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
-from pmviewer.photons.light_pass.plan import trajectories
+from pmviewer.photons.light_pass.plan import PassPlan, plan_pass, trajectories
 from pmviewer.photons.projection.projection import Projection
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import Settings
@@ -64,6 +64,14 @@ class Tracer:
             guided=guided,
             watch=watch,
         )
+
+    def planned(self, index: int, N: int, guided: Guided | None) -> PassPlan:
+        """What `trace` traces as pass `index`."""
+        settings = self.settings
+        first = index * self.trajectories(N, guided)
+        projection = None if guided is not None else self.projection
+        args = first, N, self.caustics, projection, guided
+        return plan_pass(self.flat, settings.photons, settings.render.seed, *args)
 
     def guided_emission(self, index: int, N: int, guidance: Guidance, before: Known | None) -> Guided | None:
         """How the photons of pass `index` leave the lights, by test photons and what is known from the passes `before`;

@@ -44,7 +44,7 @@ class Exports:
     def png(self, path: Path, *, overlays: bool) -> None:
         """The picture at its own resolution as it is shown, with or without the points over it."""
         settings, frame = self._state.settings, self._state.frame
-        points = overlays and any_shown(settings)
+        points = overlays and (any_shown(settings) or self._state.inspector.pinned is not None)
         display = self._state.shown_display
         pair, gain = self._state.shown_pair(), self._state.gain.gain
         if pair is not None and gain is not None:

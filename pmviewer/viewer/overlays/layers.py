@@ -11,8 +11,8 @@ from pmviewer.viewer.overlays.registry import OVERLAYS
 
 
 def any_shown(settings: Settings) -> bool:
-    """Whether anything is drawn over the picture."""
-    return any(overlay.is_shown(settings) for overlay in OVERLAYS)
+    """Whether the settings have anything drawn over the picture."""
+    return any(overlay.is_shown(settings) for overlay in OVERLAYS if overlay.by_settings)
 
 
 class Layers:
@@ -34,7 +34,7 @@ class Layers:
 
     def shown(self, settings: Settings) -> list[Overlay]:
         """Those that are switched on, in the panel's order."""
-        return [overlay for overlay in self.by_name.values() if overlay.is_shown(settings)]
+        return [one for one in self.by_name.values() if one.is_shown(settings) and one.active]
 
     def cover_surfaces(self, settings: Settings) -> bool:
         """Whether shaded surfaces have to be dim, for what lies on them to be seen. A frustum has a rim of its own."""

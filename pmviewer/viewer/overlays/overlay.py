@@ -18,6 +18,7 @@ from pmviewer.settings.access import SETTINGS, SettingInfo, Settings
 from pmviewer.viewer.gl.program import Drawing, Shaders
 
 if TYPE_CHECKING:
+    from pmviewer.viewer.inspector import Inspector
     from pmviewer.viewer.viewport.viewport import Viewport
 
 Needs = tuple[Any, ...]
@@ -27,13 +28,14 @@ _BY_VALUE = (int, float, str, CameraPose)
 @dataclass(frozen=True)
 class Source:
     """What overlays take their data from. `scene_radius` is that of the bounding sphere, in scene units; `pixel` the
-    one that was asked for with I."""
+    one that was asked for with I, `inspector` what is pinned."""
 
     settings: Settings
     frame: Frame | None = None
     scene_radius: float = 1.0
     render_camera: Callable[[], CameraPose | None] = lambda: None
     pixel: tuple[int, int] | None = None
+    inspector: Inspector | None = None
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,8 @@ class Overlay(ABC):
     """None: it has no row in the panel and no settings in `overlays`."""
     things: ClassVar[str] = ""
     """What the number beside its name counts."""
+    by_settings: ClassVar[bool] = True
+    """Whether settings switch it; what is pinned is shown whenever something is."""
     rank: ClassVar[int] = 0
     """Of what is drawn translucently: smaller ones lie under larger ones."""
 
@@ -91,6 +95,11 @@ class Overlay(ABC):
     @abstractmethod
     def release(self) -> None:
         """Free what lies on the GPU."""
+
+    @property
+    def active(self) -> bool:
+        """Whether it takes part in drawing while it is shown."""
+        return True
 
     def upload(self, source: Source) -> bool:
         """Take what the source has, if it is something else than before. True when anything changed."""

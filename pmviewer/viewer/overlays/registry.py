@@ -6,6 +6,7 @@ from pmviewer.viewer.overlays.fates import Fates
 from pmviewer.viewer.overlays.frustum import Frustum
 from pmviewer.viewer.overlays.gather_rays import GatherRays
 from pmviewer.viewer.overlays.importons import Importons
+from pmviewer.viewer.overlays.inspected import Inspected
 from pmviewer.viewer.overlays.irradiance_cache import IrradianceCache
 from pmviewer.viewer.overlays.light_importance import Lights
 from pmviewer.viewer.overlays.overlay import Overlay
@@ -30,6 +31,7 @@ OVERLAYS: tuple[type[Overlay], ...] = (
     GatherRays,
     ProjectionMaps,
     Frustum,
+    Inspected,
 )
 SWITCHED = tuple(overlay for overlay in OVERLAYS if overlay.switch is not None)
 """Those with a row in the panel, settings in `overlays` and an action that switches them."""

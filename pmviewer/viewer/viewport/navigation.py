@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -100,6 +101,27 @@ class Navigation:
             self._viewport.fit = replace(
                 self._viewport.fit, center=(min(max(u - dx / width, 0), 1), min(max(v - dy / height, 0), 1))
             )
+
+
+class Clicks:
+    """Tells a click of the left button from a drag: the mouse has stayed where it was pressed."""
+
+    def __init__(self) -> None:
+        self._pressed: tuple[float, float] | None = None
+
+    def clicked(self, active: bool) -> bool:
+        """Once per window frame, after the picture's button: whether it was clicked now. `active`: it is held."""
+        mouse, io = imgui.get_mouse_pos(), imgui.get_io()
+        if imgui.is_item_activated():
+            left = imgui.is_mouse_down(imgui.MouseButton_.left)
+            self._pressed = (mouse.x, mouse.y) if left and not (io.key_ctrl or io.key_shift) else None
+        at = self._pressed
+        if at is not None and math.hypot(mouse.x - at[0], mouse.y - at[1]) >= DRAG_THRESHOLD:
+            self._pressed = at = None
+        if active or at is None:
+            return False
+        self._pressed = None
+        return True
 
 
 def _dragged() -> tuple[float, float]:

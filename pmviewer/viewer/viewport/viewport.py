@@ -18,7 +18,8 @@ from pmviewer.viewer.overlays.overlay import Source
 from pmviewer.viewer.shortcuts import INSPECT_KEY, is_held
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport.hud import draw_hud
-from pmviewer.viewer.viewport.navigation import Navigation
+from pmviewer.viewer.viewport.navigation import Clicks, Navigation
+from pmviewer.viewer.viewport.picking import picked
 from pmviewer.viewer.viewport.picture import Picture
 from pmviewer.viewer.viewport.target import Fit, Target
 
@@ -48,6 +49,7 @@ class Viewport:
         self._texture: moderngl.Texture | None = None
         self._drawn_key: Any = None
         self._navigation = Navigation(self)
+        self._clicks = Clicks()
         self._splitting = False
         self.draw_toasts: Callable[[], None] = lambda: None
 
@@ -65,7 +67,7 @@ class Viewport:
         geometry = state.session.geometry
         radius = float(geometry.radius) if geometry is not None else 1.0
         camera = state.render_camera if geometry is not None else lambda: None
-        return Source(state.settings, state.frame, radius, camera, self.inspected)
+        return Source(state.settings, state.frame, radius, camera, self.inspected, state.inspector)
 
     def shown_camera(self) -> CameraPose | None:
         """The frame's camera, so that points lie on the picture; the newest one when only geometry is shown."""
@@ -97,6 +99,7 @@ class Viewport:
         if self.state.scene_changed():
             picture.forget_frame()
             self.inspected = None
+            self.state.inspector.unpin()
             self.fit = Fit()
         settings, frame = self.state.settings, self.state.frame
         changed = picture.surfaces.upload(self.state.session.geometry)
@@ -169,6 +172,8 @@ class Viewport:
             pose = None
         if pose is not None:
             self._navigation.handle(pose, hovered, active)
+        if self._clicks.clicked(active) and not (self.state.flying or self.split_x() is not None):
+            self._pin()
         draw_hud(self, hovered and not self.alone)
         self.draw_toasts()
 
@@ -211,15 +216,34 @@ class Viewport:
             self.inspected = pixel
             self.state.session.inspect(pixel)
 
+    def _pin(self) -> None:
+        """The pixel under the mouse to the inspector; with Alt the photon there."""
+        pixel = self.pixel_under_mouse()
+        if pixel is None:
+            return
+        if not imgui.get_io().key_alt:
+            self.state.inspector.click(pixel)
+            return
+        photon = picked(self.source(), self.shown_camera(), self.mouse_in_picture())
+        if photon is None:
+            self.state.say(
+                "warning", "No photon is drawn there: show a photon map (C, G) and Alt+click one of its points."
+            )
+        else:
+            self.state.inspector.pin(pixel, photon)
+
+    def mouse_in_picture(self) -> tuple[float, float]:
+        """The mouse's place in the picture, 0 to 1 from its left and top."""
+        mouse = imgui.get_mouse_pos()
+        left, top, width, height = self.rectangle()
+        return (mouse.x - self.origin[0] - left) / width, (mouse.y - self.origin[1] - top) / height
+
     def pixel_under_mouse(self) -> tuple[int, int] | None:
         """Pixel (x, y) of the image, or None when the mouse is elsewhere."""
         frame = self.state.frame
         if frame is None:
             return None
-        mouse = imgui.get_mouse_pos()
-        left, top, width, height = self.rectangle()
-        u = (mouse.x - self.origin[0] - left) / width
-        v = (mouse.y - self.origin[1] - top) / height
+        u, v = self.mouse_in_picture()
         if not (0 <= u < 1 and 0 <= v < 1):
             return None
         return int(u * frame.camera.width), int(v * frame.camera.height)

@@ -1,0 +1,157 @@
+"""The look-ups of a pixel with their photons: the pixel is replayed, and the photons are looked for naively."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.engine.inspector.curves import WEIGHTS, WIDER, curves_of, disc_mean
+from pmviewer.engine.inspector.near import Chosen, Disc, Near, nearest, photons_near, within
+from pmviewer.engine.inspector.report import Float, Found, LookUp, luminance
+from pmviewer.engine.method import estimator_of
+from pmviewer.engine.stages.pass_data import RenderedPass
+from pmviewer.engine.stages.pass_maps import LookUpMap
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED
+from pmviewer.maps.estimate.filters import FILTERS
+from pmviewer.maps.record import UNFOUND, unpack
+from pmviewer.maps.search.kdtree import PhotonKdTree
+from pmviewer.render.diagnostics.pixel_replay import (
+    AS_CAUSTICS,
+    AS_DIRECT,
+    AS_INDIRECT,
+    GATHERED,
+    NOT_FOUND,
+    OF_CAUSTICS,
+    as_look_ups,
+    empty_rows,
+    replay_pixel,
+)
+from pmviewer.settings.access import Settings
+
+MOST_LOOK_UPS, MOST_POINTS = 64, 64
+_SHOWS = {
+    OF_CAUSTICS: "caustic",
+    AS_INDIRECT: "indirect",
+    AS_DIRECT: "direct",
+    AS_CAUSTICS: "caustic",
+    NOT_FOUND: "specular",
+    GATHERED: "indirect",
+}
+Shares = Callable[[int, int, NDArray[np.float32]], NDArray[np.float32]]
+
+
+class Replay:
+    """A pixel of a pass, replayed: `rows` are its look-ups (`pmviewer.render.diagnostics.pixel_replay.ROW`), `way`
+    (v, 3) the camera ray's origin and the points met, `prims` (v − 1,) the primitives there, `samples` (n_lights,) the
+    light samples that are expected on each light where light is sampled, None where it is nowhere."""
+
+    def __init__(self, rendered: RenderedPass, radii: NDArray[np.float32] | None, pixel: int, n_lights: int) -> None:
+        self._arguments = rendered.given, radii, np.int64(pixel)
+        self._expected = np.zeros(n_lights, np.float32)
+        self.samples: NDArray[np.float32] | None = None
+        self.rows, self.way, self.prims = self._run(-1, 0, np.zeros((0, 3), np.float32))[:3]
+
+    def shares(self, depth: int, group: int, wi: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(m, 3), 1/sr: what the lobes of that group reflect at that surface of light from wi (m, 3)."""
+        return self._run(depth, group, wi)[3]
+
+    def _run(
+        self, depth: int, group: int, wi: NDArray[np.float32]
+    ) -> tuple[np.ndarray, Float, NDArray[np.int64], NDArray[np.float32]]:
+        asked, counts = np.array([depth, group], np.int64), np.zeros(3, np.int64)
+        rows, shares = empty_rows(MOST_LOOK_UPS), np.zeros((len(wi), 3), np.float32)
+        way, prims = np.zeros((MOST_POINTS, 3), np.float32), np.full(MOST_POINTS, -1, np.int64)
+        wi = np.ascontiguousarray(wi, np.float32)
+        replay_pixel(*self._arguments, asked, wi, shares, rows, way, prims, self._expected, counts)
+        self.samples = self._expected if counts[2] else None
+        made = as_look_ups(rows[: counts[0]])
+        return made, way[: counts[1]].astype(np.float64), prims[1 : counts[1]].copy(), shares
+
+
+def look_ups_of(replay: Replay, rendered: RenderedPass, settings: Settings) -> tuple[LookUp, ...]:
+    """Everything that the pixel looked up, in the order of the eye pass."""
+    return tuple(_look_up(row, replay, rendered, settings) for row in replay.rows)
+
+
+def _look_up(row: np.void, replay: Replay, rendered: RenderedPass, settings: Settings) -> LookUp:
+    eye, maps, purpose = rendered.given.eye[0], rendered.maps, int(row["purpose"])
+    name = "caustic" if purpose in (OF_CAUSTICS, NOT_FOUND) else "global"
+    made, photons = maps.by_name.get(name), maps.photons
+    stored, unit = np.zeros((0, 6), np.float32), 1.0
+    if made is not None and photons is not None:
+        stored = photons.caustic if name == "caustic" else photons.global_
+        unit = photons.caustic_unit if name == "caustic" else photons.global_unit
+    group, flags = (FOLLOWED, UNFOUND) if purpose == NOT_FOUND else (STORED, 0)
+    both = bool(row["both_sides"])
+    disc = Disc(row["p"], row["n"], float(eye["flatness"]), int(row["class_mask"]), both, flags)
+    near, chosen = _chosen(stored, disc, made, float(row["radius"]), eye)
+    unpacked = unpack(np.ascontiguousarray(stored[near.rows]), unit)
+    share = replay.shares(int(row["depth"]), int(group), unpacked["wi"]).astype(np.float64)
+    beta = row["beta"].astype(np.float64)
+    brings = beta * share * unpacked["Phi"]
+    kernel, cone_k = FILTERS[int(eye["filter"])], float(eye["cone_k"])
+    weight = chosen.factor * WEIGHTS[kernel](chosen.x2, cone_k)
+    adds = weight[:, None] * brings[chosen.places] / (disc_mean(kernel, cone_k) * math.pi * chosen.radius**2)
+    return LookUp(
+        map=name,
+        shows=_SHOWS[purpose] if int(row["depth"]) == 0 else "specular",
+        used=purpose != GATHERED,
+        exact=estimator_of(settings) == "disc",
+        depth=int(row["depth"]),
+        p=row["p"].astype(np.float64),
+        n=row["n"].astype(np.float64),
+        wo=row["wo"].astype(np.float64),
+        radius=chosen.radius,
+        flatness=disc.flatness,
+        k=int(eye["k"]) if made is not None and isinstance(made.structure, PhotonKdTree) else 0,
+        kernel=kernel,
+        value=beta * row["L"],
+        found=_found(stored, near, chosen, unpacked, share, weight, adds),
+        curves=curves_of(near.d2, near.reach, luminance(brings), chosen.radius, cone_k),
+    )
+
+
+def _chosen(
+    stored: NDArray[np.float32], disc: Disc, made: LookUpMap | None, radius: float, eye: np.void
+) -> tuple[Near, Chosen]:
+    """The photons around the place, farther than the look-up goes, and those that it takes."""
+    structure = made.structure if made is not None else None
+    if not isinstance(structure, PhotonKdTree):
+        radius = min(radius, structure.radius) if structure is not None else radius
+        near = photons_near(stored, disc, WIDER * radius)
+        return near, within(near, radius)
+    near = photons_near(stored, disc, radius)
+    smallest = float(structure.record["smallest_radius"][0])
+    return near, nearest(near, int(eye["k"]), radius, float(eye["share"]), int(eye["rim"]), smallest)
+
+
+def _found(
+    stored: NDArray[np.float32],
+    near: Near,
+    chosen: Chosen,
+    unpacked: dict[str, np.ndarray],
+    share: Float,
+    weight: Float,
+    adds: Float,
+) -> Found:
+    """The chosen photons as the inspector lists them, nearest first."""
+    at = chosen.places
+    distance = np.sqrt(near.d2[at].astype(np.float64))
+    order = np.argsort(distance, kind="stable")
+    at, index = at[order], near.rows[at][order]
+    return Found(
+        index=index,
+        records=np.ascontiguousarray(stored[index]),
+        wi=unpacked["wi"][at],
+        Phi=unpacked["Phi"][at].astype(np.float64),
+        distance=distance[order],
+        weight=weight[order],
+        share=share[at],
+        adds=adds[order],
+        bounces=unpacked["bounces"][at].astype(np.int64),
+        path_class=unpacked["path_class"][at].astype(np.int64),
+        light=unpacked["light"][at].astype(np.int64),
+    )

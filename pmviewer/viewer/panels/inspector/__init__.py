@@ -1,0 +1,1 @@
+"""The tab "Inspector": what made the pinned pixel."""
