@@ -23,6 +23,8 @@ OWN_ORTHOGRAPHIC = Need(
     "The scene's camera is perspective (camera.projection).",
 )
 
+LENS = Need(lambda f: f.plan.lens, "Everything is sharp: the camera has no lens (camera.aperture).")
+
 
 class CameraSettings(Group):
     """Camera"""
@@ -93,6 +95,28 @@ class CameraSettings(Group):
         ge=-1000.0,
         le=1000.0,
         title="shift down",
+    )
+    aperture: float | Auto = setting(
+        "auto",
+        "Radius of the lens: what is nearer or farther than camera.focus gets blurred. 0 is a pinhole, which shows all "
+        "sharp. Automatic: the scene file's.",
+        stage="image",
+        scale="linear",
+        unit="units",
+        ge=0.0,
+        le=1e15,
+    )
+    focus: float | Auto = setting(
+        "auto",
+        "Distance of what the lens shows sharp, along the view. Automatic: the scene file's, or that of the surface in "
+        "the middle of the picture.",
+        stage="image",
+        scale="log",
+        unit="units",
+        ge=1e-12,
+        le=1e15,
+        title="focus distance",
+        needs=(LENS,),
     )
     width: int | Auto = setting(
         "auto", "Image width; auto is the scene file's.", stage="image", scale="integer", unit="px", ge=1, le=16384
