@@ -10,7 +10,8 @@ from pmviewer.render.planes import CHANNELS, PLANES, TERMS
 
 LEAST_WEIGHT = 0.5
 """Mean weight from which a pixel's samples are divided by it."""
-_TERMS = slice(0, PLANES[TERMS[-1]].stop)
+_WEIGHED = PLANES["emission"], slice(PLANES["emission"].stop, PLANES[TERMS[-1]].stop)
+"""Channels by the two columns of weights."""
 
 
 @kernel
@@ -25,8 +26,9 @@ def resolve(sums, passes, out, first, last):
 class Film:
     """Sums of `passes` samples per pixel: `sums` (height·width, CHANNELS + further) float64, `further` being sums that
     a method keeps beside the planes; `radii` of the pixels' look-ups in the latest pass
-    (`pmviewer.render.pixel_radius`), None where all have that of the pass; `weights` (height·width,) float64, sums of
-    what samples count by a filter with negative parts (`pmviewer.render.filter`), None where each counts 1."""
+    (`pmviewer.render.pixel_radius`), None where all have that of the pass; `weights` (height·width, 2) float64, sums
+    of what samples count by a filter with negative parts (`pmviewer.render.filter`), in the term emission and in all
+    others, None where each counts 1."""
 
     def __init__(self, width: int, height: int, further: int = 0) -> None:
         self.width, self.height = width, height
@@ -49,12 +51,11 @@ class Film:
         """
         if self.weights is None:
             return planes
-        weights = self.weights.reshape(self.height, self.width) / max(self.passes, 1)
-        known = np.abs(weights) >= LEAST_WEIGHT
-        terms = np.where(known[..., None], planes[..., _TERMS] / np.where(known, weights, 1.0)[..., None], 0.0)
-        if not known.all():
-            terms = np.where(known[..., None], terms, _around(terms, known))
-        planes[..., _TERMS] = terms
+        means = self.weights.reshape(self.height, self.width, 2) / max(self.passes, 1)
+        for channels, weights in zip(_WEIGHED, np.moveaxis(means, 2, 0), strict=True):
+            known = np.abs(weights) >= LEAST_WEIGHT
+            terms = np.where(known[..., None], planes[..., channels] / np.where(known, weights, 1.0)[..., None], 0.0)
+            planes[..., channels] = terms if known.all() else np.where(known[..., None], terms, _around(terms, known))
         return planes
 
 

@@ -36,7 +36,7 @@ def render_into(
     pixels = len(film.sums)
     signed = has_signs(given.eye)
     if signed and film.weights is None:
-        film.weights = np.zeros(pixels)
+        film.weights = np.zeros((pixels, 2))
     tile = tile_size(pixels, given.eye[0], pool.threads, lights_asked(given.virtual))
 
     def task(first: int) -> Callable[[], NDArray[np.int64]]:
@@ -48,7 +48,7 @@ def render_into(
             else:
                 eye_pass(given, outline, film.radii, film.sums, counts, first, last)
             if signed:
-                add_weights(given.eye, film.weights, first, last)
+                add_weights(given.eye, outline, film.weights, first, last)
             return counts
 
         return run
