@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pmviewer.settings.needs import Need
+from pmviewer.settings.needs import LENS, Need
 from pmviewer.settings.schema.base import Auto, Group, Vec3, setting
 
 PERSPECTIVE = Need(
@@ -22,8 +22,6 @@ OWN_ORTHOGRAPHIC = Need(
     lambda f: f.settings.camera.projection != "auto" or f.traits.orthographic,
     "The scene's camera is perspective (camera.projection).",
 )
-
-LENS = Need(lambda f: f.plan.lens, "Everything is sharp: the camera has no lens (camera.aperture).")
 
 
 class CameraSettings(Group):
