@@ -79,6 +79,11 @@ def filter_of(own: PixelFilter | None, render: Render) -> PixelFilter:
     return replace(chosen, radius=radius, shape=shape)
 
 
+def is_own(own: PixelFilter | None, render: Render) -> bool:
+    """Whether the settings leave the file's filter as it is, or the box where it names none."""
+    return filter_of(own, render) == (own or BOX)
+
+
 def has_signs(eye: NDArray[np.void]) -> bool:
     """Whether samples may count negatively by the filter of an eye record (1,)."""
     return "filter_weight" in (eye.dtype.names or ()) and bool((eye[0]["filter_weight"] < 0).any())

@@ -1,9 +1,9 @@
 """The thin lens: rays from a disc in the eye's plane that meet where the pinhole's ray meets the plane in focus.
 
-The camera's picture is that of a pinhole in the lens's middle, each point of it blurred to a disc (course guide §1.3;
-Pharr, Jakob and Humphreys, §5.2.3). With R the lens's radius and F the distance in focus, a ray starts at the lens's
-point a, |a| ≤ R, and goes to o + F·d, d being the pinhole's direction with a part of 1 along the view: along d − a/F.
-An orthographic camera's rays start around their pixel's place (a telecentric lens).
+The camera's picture is that of a pinhole in the lens's middle, each point of it blurred to a disc (Cook, Porter and
+Carpenter 1984, as Mitsuba's `thinlens` has it). With R the lens's radius and F the distance in focus, a ray starts at
+the lens's point a, |a| ≤ R, and goes to o + F·d, d being the pinhole's direction with a part of 1 along the view: along
+d − a/F. An orthographic camera's rays start around their pixel's place (a telecentric lens).
 
 Records without the field `inverse_focus` are pinholes, and nothing of this is compiled for them.
 """

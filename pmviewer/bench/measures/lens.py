@@ -139,8 +139,9 @@ def scene_file(sensor: str, rfilter: str) -> str:
 """
 
 
-def files(folder: Path) -> Iterator[tuple[Case, tuple[str, ...]]]:
-    """Cases by lens and by filter, their files in the folder, with the methods that are compared."""
+def files(folder: Path, quick: bool) -> Iterator[tuple[Case, tuple[str, ...]]]:
+    """Cases by lens and by filter, their files in the folder, with the methods that are compared: where time is
+    short none of photons, which compile kernels of their own."""
     cases: list[tuple[str, str, int, tuple[str, ...]]] = []
     for name, (aperture, focus) in LENSES.items():
         lens = f'type="thinlens"><float name="aperture_radius" value="{aperture}"/>'
@@ -153,12 +154,9 @@ def files(folder: Path) -> Iterator[tuple[Case, tuple[str, ...]]]:
     for i, (name, text, block, methods) in enumerate(cases):
         file = folder / f"{i}.xml"
         file.write_text(text, "utf-8")
-        yield Case(name, {}, 128, 16, block, 0.03, file), methods
-
-
-def shown(methods: tuple[str, ...], quick: bool) -> tuple[str, ...]:
-    """Without the photon methods where time is short: they compile kernels of their own."""
-    return tuple(method for method in methods if not quick or method == "path")
+        wanted = tuple(method for method in methods if not quick or method == "path")
+        if wanted:
+            yield Case(name, {}, 128, 16, block, 0.03, file), wanted
 
 
 def run(quick: bool = False) -> BenchResult:
@@ -175,8 +173,8 @@ def run(quick: bool = False) -> BenchResult:
             note = f"circle of confusion, {blur.name}: {found:.3f} of {blur.radius:.3f} pixels"
             targets.append(Target("R13", error, MOST_ERROR, "%", False, note))
         with tempfile.TemporaryDirectory() as folder:
-            for case, methods in files(Path(folder)):
-                for method, _, tolerance, same, _ in compare(case, shown(methods, quick), runs, pool):
+            for case, methods in files(Path(folder), quick):
+                for method, _, tolerance, same, _ in compare(case, methods, runs, pool):
                     what = f"{case.scene}, {method}"
                     rows.append(["against Mitsuba", what, runs, f"{same.ratio:.4f}", 1, same.p_value])
                     within = f" within {tolerance:.0%} of a block" if tolerance else ""
