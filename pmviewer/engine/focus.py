@@ -12,12 +12,19 @@ from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.render.camera import CameraPose
 from pmviewer.scene.arrays.flatten import FlatScene
 
+NEAREST = 1e-12
+"""Of focus distances relative to the lens's radius: nearer ones make the same picture, all rays being sideways, and
+float32 overflows."""
+
 
 def focused(scene: FlatScene, camera: CameraPose) -> CameraPose:
     """The camera with a focus distance, if it has a lens."""
-    if camera.aperture == 0 or camera.focus is not None:
+    if camera.aperture == 0:
         return camera
-    return replace(camera, focus=distance_at(scene, camera, camera.width / 2, camera.height / 2))
+    focus = camera.focus
+    if focus is None:
+        focus = distance_at(scene, camera, camera.width / 2, camera.height / 2)
+    return replace(camera, focus=max(focus, NEAREST * camera.aperture))
 
 
 def distance_at(scene: FlatScene, camera: CameraPose, x: float, y: float) -> float:

@@ -144,6 +144,18 @@ def test_automatic_focus_is_on_the_surface_in_the_middle():
     assert distance_at(flat, open_lens, 24.0, 20.0) == pytest.approx(depth, rel=1e-4)
 
 
+@pytest.mark.parametrize(("aperture", "focus"), [(1e15, 1e-12), (1e15, 1e15), (1e-300, 1.0)])
+def test_lenses_that_no_one_has(aperture, focus):
+    """The largest and the least numbers that the settings take: nothing is lost, and no pixel is no number."""
+    camera = {"aperture": aperture, "focus": focus}
+    values = {"render": {"filter": "box", "filter_radius": 0.75}, "photons": {"N": 100}, "camera": camera}
+    for method in ("path", "progressive"):
+        values["render"]["method"] = method
+        made = rendered(half_plane(2.0), settings_of(**values), 2)
+        assert np.isfinite(made.film.planes()).all()
+        assert made.tally.dropped["samples"] == 0
+
+
 def test_a_footprint_is_the_pixel_and_its_circle_of_confusion():
     """Seen straight from above, distance z: pixel area s² plus πR²(1 − z/F)²; in focus the pixel's alone."""
     z, n = 3.0, 64
