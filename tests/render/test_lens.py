@@ -18,7 +18,7 @@ from pmviewer.render.planes import PLANES
 from pmviewer.render.record import EYE_DTYPE, eye_record
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.arrays.flatten import flatten
-from pmviewer.scene.description import Camera, Parallelogram, Scene, Shape, Sphere
+from pmviewer.scene.description import Camera, NamedCamera, Parallelogram, Scene, Shape, Sphere
 from pmviewer.settings.access import CameraSettings, Settings
 from tests.support.importon_paths import SHOWN, traced
 from tests.support.scenes import cornell_box, diffuse, rendered, settings_of
@@ -175,6 +175,8 @@ def test_what_else_sees_the_lens():
     own, without = (resolve_camera(s, CameraSettings()) for s in (scene, plain))
     assert analyse(scene).lenses == {"auto"}
     assert analyse(plain).lenses == frozenset()
+    named = tuple(NamedCamera(name, s.camera, 64, 32) for name, s in (("sharp", plain), ("soft", scene)))
+    assert analyse(replace(plain, cameras=named)).lenses == {"2", "soft"}
     assert not own.sees_like(without)
     assert not own.sees_like(replace(own, focus=3.0))
     assert own.sees_like(replace(own, target=(0, 0, -5)))

@@ -64,7 +64,7 @@ class Blur:
 BLURS = (
     Blur("behind the focus", 6.0, 0.12, 3.0),
     Blur("before the focus", 2.0, 0.1, 8.0),
-    Blur("focus at infinity", 4.0, 0.15, 1e12),
+    Blur("focus at infinity", 4.0, 0.2, 1e12),
     Blur("little blur", 5.0, 0.06, 3.5),
     Blur("telecentric", 3.0, 0.05, 1.5, True),
 )
