@@ -36,6 +36,7 @@ BENCHES: dict[str, tuple[str, str]] = {
     "cache": ("Irradiance cache against the plain final gather (R6)", "pmviewer.bench.measures.irradiance_cache:run"),
     "gather": ("Radiance photons against the plain final gather (R3)", "pmviewer.bench.measures.gather:run"),
     "denoise": ("Denoised pictures: error against time (P16)", "pmviewer.bench.measures.denoise:run"),
+    "lens": ("Lens and filters: circle of confusion, and against Mitsuba (R13)", "pmviewer.bench.measures.lens:run"),
     "virtual": ("Virtual lights: estimators against the plain sum (R10)", "pmviewer.bench.measures.virtual:run"),
     "importance": ("Importance against the path tracer, and its cost (I1)", "pmviewer.bench.measures.importance:run"),
     "deposition": (

@@ -27,6 +27,7 @@ from pmviewer.output.frame_export import LAYERS, write_frame_exr, write_frame_pn
 from pmviewer.output.metric import metrics
 from pmviewer.progress import watched
 from pmviewer.render.camera import resolve_camera, size_only
+from pmviewer.render.filter import is_own
 from pmviewer.scene.description import Scene
 from pmviewer.scene.load import reference_of
 from pmviewer.settings.access import Settings, with_values
@@ -134,6 +135,10 @@ def _reference(source: str, scene: Scene, settings: Settings) -> Reference:
     if source == "auto" and not camera.sees_like(resolve_camera(scene, size_only(settings.camera))):
         raise SceneError(
             "The scene's reference is seen by the scene's own camera: leave out the camera settings.", path
+        )
+    if source == "auto" and not is_own(camera.filter, settings.render):
+        raise SceneError(
+            "The scene's reference has the scene's own reconstruction filter: leave out render.filter.", path
         )
     reference = load_reference(path)
     reference.check_size((camera.width, camera.height))

@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
+from pmviewer.render.filter import BOX, filter_of
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings
 from pmviewer.settings.schema.importance import WITHOUT_IMPORTANCE, Deposit
@@ -34,7 +35,8 @@ class Plan:
     `cache` whether diffuse surfaces gather through an irradiance cache, `shadows` whether shadow photons save shadow
     rays, `importance` whether there are importance maps, `deposition` which photons maps store, `emission` how
     importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0 without; `virtual`
-    is whether virtual lights bring the indirect light; `warnings`
+    is whether virtual lights bring the indirect light; `lens` whether the render camera has one, `filtered` whether the
+    film has another reconstruction filter than the plain box; `warnings`
     are sentences for the log about what was asked for and can't be."""
 
     path: bool = False
@@ -54,6 +56,8 @@ class Plan:
     deposition: Deposit = "all"
     emission: Emission = "off"
     convergence: int = 0
+    lens: bool = False
+    filtered: bool = False
     caustic_mask: int = 0
     global_mask: int = 0
     direct_mask: int = 0
@@ -107,7 +111,9 @@ class Plan:
 
 def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     """The stages that the method needs in this scene."""
-    plan = _photon_plan(settings, traits)
+    plan = replace(
+        _photon_plan(settings, traits), lens=_has_lens(settings, traits), filtered=_filtered(settings, traits)
+    )
     if not plan.photons:
         return plan
     how = settings.importance
@@ -132,6 +138,15 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     if how.map == "off":
         return replace(plan, skipped=(*plan.skipped, ("importance", "importance.map is off")))
     return replace(plan, importance=True)
+
+
+def _has_lens(settings: Settings, traits: SceneTraits) -> bool:
+    camera = settings.camera
+    return camera.name in traits.lenses if camera.aperture == "auto" else camera.aperture > 0
+
+
+def _filtered(settings: Settings, traits: SceneTraits) -> bool:
+    return filter_of(dict(traits.filters).get(settings.camera.name), settings.render) != BOX
 
 
 def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:

@@ -21,7 +21,7 @@ from pmviewer.engine.radius import radii_of_pixels
 from pmviewer.engine.stages.convergence import prepare_convergence
 from pmviewer.engine.stages.importance import prepare_importance
 from pmviewer.engine.stages.irradiance_cache import prepare_cache
-from pmviewer.engine.stages.pass_data import blank_pass
+from pmviewer.engine.stages.pass_data import blank_eye, blank_pass
 from pmviewer.engine.stages.projection import projection_for
 from pmviewer.engine.stages.virtual_lights import prepare_virtual
 from pmviewer.kernels.accel.raycast import cast_closest
@@ -35,9 +35,9 @@ from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE, N_COUNTS, Photon
 from pmviewer.photons.projection.projected import NO_PROJECTION
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
+from pmviewer.render.filter import add_weights
 from pmviewer.render.path import path_pass
 from pmviewer.render.pixel_radius import first_radii
-from pmviewer.render.record import EYE_DTYPE
 from pmviewer.render.record import N_COUNTS as N_EYE_COUNTS
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings
@@ -140,11 +140,12 @@ def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]
 def eye_steps(record: NDArray[np.void], traits: SceneTraits, settings: Settings, plan: Plan) -> list[Step]:
     """What the eye pass runs for a scene with such a `record`, whose contents don't count."""
     film, counts = np.zeros((1, 1)), np.zeros(N_EYE_COUNTS, np.int64)
+    eye, outline = blank_eye(settings, plan), np.zeros(0, np.uint8)
+    steps = [Step("filter", add_weights, (eye, outline, np.zeros((1, 2)), 0, 0))] if plan.filtered else []
     if plan.path:
-        return [Step("path tracer", path_pass, (record, np.zeros(1, EYE_DTYPE), film, counts, 0, 0))]
-    given, steps = blank_pass(record, settings, plan), []
+        return [*steps, Step("path tracer", path_pass, (record, eye, film, counts, 0, 0))]
+    given = blank_pass(record, settings, plan)
     if plan.cache:
         steps.append(Step("irradiance cache", prepare_cache, (given,)))
     radii = first_radii(1, 0.0, 0.0) if radii_of_pixels(Facts(settings, plan, traits)) else None
-    outline = np.zeros(0, np.uint8)
     return [*steps, Step("eye pass", eye_pass, (given, outline, radii, film, counts, 0, 0))]

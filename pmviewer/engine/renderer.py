@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.diagnose import Looked, inspected
 from pmviewer.engine.exposure import metered
+from pmviewer.engine.focus import focused
 from pmviewer.engine.frame import Frame
 from pmviewer.engine.inspection import Inspection, Wanted
 from pmviewer.engine.inspector.watched import Watched
@@ -67,8 +68,8 @@ class Renderer:
         """plan: what runs, where that is not what settings and scene ask for. Raises SettingError when the camera is
         impossible or the image can't fit into memory."""
         self.scene, self.settings, self.pool, self.store, self.version = scene, settings, pool, store, version
-        self.render_camera = resolve_camera(scene.scene, settings.camera)
-        self.camera = resolve_view(scene.scene, settings, scene.flat.center, scene.flat.radius)
+        self.render_camera = focused(scene.flat, resolve_camera(scene.scene, settings.camera))
+        self.camera = focused(scene.flat, resolve_view(scene.scene, settings, scene.flat.center, scene.flat.radius))
         check_memory(self.camera.width, self.camera.height, settings.photons.N)
         self.plan: Plan = plan or plan_of(settings, scene.traits)
         self.facts = Facts(settings, self.plan, scene.traits)

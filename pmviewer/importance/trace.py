@@ -37,6 +37,7 @@ from pmviewer.importance.footprint import (
 )
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, pick_group, shading_normal
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import IMAGE_PLACE, IMPORTON_SCATTER
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import SOBOL, draw4
@@ -45,10 +46,12 @@ from pmviewer.kernels.vector import add, along, dot, luminance, scale
 from pmviewer.maps.photon_words import encode_direction
 from pmviewer.render.cast import Ray, cast, leaving
 from pmviewer.render.chain import WHITE, arrive, scatter
+from pmviewer.render.lens import through_lens
 
 _f4 = np.float32
 _u4 = np.uint32
 _INF = _f4(np.inf)
+_ROOT_PI = _f4(math.sqrt(math.pi))
 
 IMPORTON_PASS_DTYPE = np.dtype(
     [
@@ -75,10 +78,41 @@ N_COUNTS = 4
 C_CAUSTIC, C_GLOBAL, C_RAYS, C_DROPPED = range(N_COUNTS)
 
 
+@specialised
+def image_ray(eye, x, y, a, b):
+    """The ray through the place (x, y) of the image, in pixels, and (a, b) in [0, 1)² of the lens, from the near to the
+    far plane, and the changes of its place and direction with these (`pmviewer.importance.footprint.start`)."""
+    if has(eye, "inverse_focus"):
+        return lambda eye, x, y, a, b: _ray_of_lens(eye, x, y, a, b)
+    return lambda eye, x, y, a, b: _ray_of_pinhole(eye, x, y)
+
+
 @device
-def image_ray(eye, x, y):
-    """The ray through the place (x, y) of the image, in pixels, from the near to the far plane, and the changes of its
-    place and direction with the image's coordinates (`pmviewer.importance.footprint.start`)."""
+def _ray_of_lens(eye, x, y, a, b):
+    """The lens's part of the changes is that over all of it: two vectors that span its area."""
+    right = (eye.x_right, eye.y_right, eye.z_right)
+    down = (eye.x_down, eye.y_down, eye.z_down)
+    raw = along(along((eye.x_corner, eye.y_corner, eye.z_corner), right, x), down, y)
+    ray, towards = through_lens(eye, raw, a, b)
+    d, inv = ray.d, _f4(1.0) / _f4(math.sqrt(dot(towards, towards)))
+    across = scale((eye.x_lens_right, eye.y_lens_right, eye.z_lens_right), _ROOT_PI)
+    up = scale((eye.x_lens_top, eye.y_lens_top, eye.z_lens_top), _ROOT_PI)
+    bend = -eye.inverse_focus * inv
+    zero = (_f4(0.0), _f4(0.0), _f4(0.0))
+    px, py, dx, dy = right, down, zero, zero
+    if eye.orthographic == 0:
+        px, py, dx, dy = zero, zero, _turned(right, d, inv), _turned(down, d, inv)
+    return ray, (px, py, across, up), (dx, dy, _turned(across, d, bend), _turned(up, d, bend))
+
+
+@device
+def _turned(change, d, inv):
+    """Change of a unit vector d when what it was made from, 1/inv long, changes."""
+    return scale(along(change, d, -dot(change, d)), inv)
+
+
+@device
+def _ray_of_pinhole(eye, x, y):
     o = (eye.x_eye, eye.y_eye, eye.z_eye)
     right = (eye.x_right, eye.y_right, eye.z_right)
     down = (eye.x_down, eye.y_down, eye.z_down)
@@ -214,7 +248,7 @@ def trace_importons(scenes, eyes, passes, i0, i1, caustic_out, global_out, count
     for i in range(i0, i1):
         if counts[C_CAUSTIC] + most > len(caustic_out) or counts[C_GLOBAL] + most > len(global_out):
             return i
-        x, y, _, _ = draw4(SOBOL, pass_.seed, _u4(i), IMAGE_PLACE)
-        ray, P, D = image_ray(eye, pass_.left + x * pass_.across, pass_.top + y * pass_.down)
+        x, y, a, b = draw4(SOBOL, pass_.seed, _u4(i), IMAGE_PLACE)
+        ray, P, D = image_ray(eye, pass_.left + x * pass_.across, pass_.top + y * pass_.down, a, b)
         _trace(scene, pass_, i, ray, P, D, (caustic_out, global_out), counts)
     return i1

@@ -70,7 +70,8 @@ GATHER_GUIDED = _dimension((EYE,), 2002, "gather ray guided by photons")
 GATHER_FORK = _dimension((EYE, CACHE_RECORD), 2999, "which chain of a gather ray goes on, after a secondary gather")
 GATHER_CHAIN = _dimension((EYE, CACHE_RECORD), 3000, "lobe that a gather ray follows", DEPTH)
 CHAIN_LIGHT = _dimension((EYE,), 4000, "first light sample at followed lobes", DEPTH)
-OUTLINE = _dimension((EYE,), 5000, "camera ray for emission alone")
+OUTLINE = _dimension((EYE,), 5000, "camera ray for emission alone, and its place on the lens")
+LENS = _dimension((EYE, PATH), 5001, "place on the lens")
 FURTHER_LIGHT = _dimension((EYE, PATH, SECOND_GATHER), 6000, "light sample after a surface's first", LIGHT_SAMPLE)
 VIRTUAL_SUBSET = _dimension((EYE,), 0x10000, "which virtual lights a pixel asks for")
 WALK = _dimension((EYE,), 0x20000, "gathering walk's way from the surface that it normalises")
@@ -102,7 +103,7 @@ SEEN_LIGHT = _dimension((VIRTUAL_LIGHT,), 0x30000, "light sample at a hit", BOUN
 SEEN_EMITTER = _dimension((VIRTUAL_LIGHT,), 0x40000, "its choice of light", BOUNCE)
 
 # Importons: seed of the render (IMPORTON_SALT), index of the importon.
-IMAGE_PLACE = _dimension((IMPORTON,), 0, "place in the image")
+IMAGE_PLACE = _dimension((IMPORTON,), 0, "place in the image and on the lens")
 IMPORTON_SCATTER = _dimension((IMPORTON,), 1, "scattering and roulette", IMPORTON_DEPTH)
 
 # Salts: hashed with a seed or, where marked, added to it by exclusive or.

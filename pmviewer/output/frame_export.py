@@ -92,6 +92,14 @@ class Pose(Protocol):
     def shift(self) -> tuple[float, float]:
         """Of the picture on the film, in widths and heights."""
 
+    @property
+    def aperture(self) -> float:
+        """Radius of the lens, 0 for a pinhole."""
+
+    @property
+    def focus(self) -> float | None:
+        """Distance that the lens shows sharp."""
+
 
 class Exportable(Protocol):
     """What an exporter reads of `pmviewer.engine.frame.Frame`."""
@@ -164,6 +172,8 @@ def frame_metadata(frame: Exportable) -> dict[str, Value]:
         about["view.fov"] = float(camera.fov)
     if any(camera.shift):
         about["view.shift"] = f"{camera.shift[0]:.9g} {camera.shift[1]:.9g}"
+    if camera.aperture > 0 and camera.focus is not None:
+        about |= {"view.aperture": float(camera.aperture), "view.focus": float(camera.focus)}
     about |= {f"photons_stored.{name}": count for name, count in counts.stored.items()}
     about |= {f"radius.{name}": float(radius) for name, radius in counts.radius.items()}
     about |= {f"dropped.{place}": count for place, count in counts.dropped.items()}

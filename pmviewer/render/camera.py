@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SettingError
-from pmviewer.scene.description import Camera, NamedCamera, Scene, Vec3
+from pmviewer.scene.description import Camera, NamedCamera, PixelFilter, Scene, Vec3
 from pmviewer.settings.access import CameraSettings
 
 Matrix = NDArray[np.float64]
@@ -54,6 +54,13 @@ class CameraPose:
     projection: Literal["perspective", "orthographic"] = "perspective"
     view_width: float = 1.0
     shift: tuple[float, float] = (0.0, 0.0)
+    aperture: float = 0.0
+    """Radius of the thin lens in the eye's plane, 0 for a pinhole."""
+    focus: float | None = None
+    """Distance along the view of the plane that the lens shows sharp. None: that of the surface in the middle of the
+    picture, which `pmviewer.engine.focus` finds."""
+    filter: PixelFilter | None = None
+    """Reconstruction filter of the file's film, None where it names none."""
 
     @property
     def orthographic(self) -> bool:
@@ -115,8 +122,11 @@ class CameraPose:
         return np.broadcast_to(eye, places.shape).copy(), places / np.linalg.norm(places, axis=1, keepdims=True)
 
     def sees_like(self, other: CameraPose) -> bool:
-        """Whether every pixel looks at the same point as the other's. A target farther away changes nothing."""
+        """Whether every pixel looks at the same point as the other's, through the same lens. A target farther away
+        changes nothing."""
         if (self.width, self.height, self.projection) != (other.width, other.height, other.projection):
+            return False
+        if self.aperture != other.aperture or (self.aperture > 0 and self.focus != other.focus):
             return False
         mine, theirs = self.ray_frame(), other.ray_frame()
         length = float(np.linalg.norm(np.subtract(other.target, other.origin)))
@@ -133,6 +143,18 @@ class CameraPose:
     def pixel_size(self) -> float:
         """Width of a pixel at distance 0: an orthographic camera's at any distance."""
         return self.view_width / self.width if self.orthographic else 0.0
+
+    def confusion(self, depth: NDArray[np.floating]) -> Matrix:
+        """Radius of the circle of confusion, in pixels, of points at those distances (n,) along the view, all above 0:
+        R·f·|1/depth − 1/focus|, R being the lens's radius and f the distance at which a pixel is one unit wide (of an
+        orthographic camera R·|depth/focus − 1| in pixels). 0 for a pinhole."""
+        depth = np.asarray(depth, float)
+        if self.aperture == 0:
+            return np.zeros_like(depth)
+        assert self.focus is not None
+        if self.orthographic:
+            return self.aperture * np.abs(depth / self.focus - 1) / self.pixel_size()
+        return self.aperture * np.abs(1 / depth - 1 / self.focus) / self.pixel_angle()
 
     def view_matrix(self) -> Matrix:
         """World to eye space (OpenGL: the camera looks along −z), row-major (4, 4)."""
@@ -236,6 +258,9 @@ def resolve_camera(scene: Scene, settings: CameraSettings) -> CameraPose:
         projection=camera.projection if settings.projection == "auto" else settings.projection,
         view_width=_view_width(camera, settings, width, height),
         shift=(shift_x, shift_y),
+        aperture=camera.aperture if settings.aperture == "auto" else float(settings.aperture),
+        focus=camera.focus if settings.focus == "auto" else float(settings.focus),
+        filter=camera.filter,
     )
 
 

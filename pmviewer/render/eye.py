@@ -15,6 +15,7 @@ import numpy as np
 
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import BSDF, CHAIN_LIGHT, OUTLINE
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4
@@ -24,6 +25,7 @@ from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow_camera_path
 from pmviewer.render.direct.choice import LIST_WORDS, choose, choose_by_power
 from pmviewer.render.direct.direct import direct_light, found_light, met_light, radiance_of
+from pmviewer.render.filter import place_in_filter
 from pmviewer.render.gather.cached import cached, surface_rays
 from pmviewer.render.gather.guide import AIM_WORDS, aim
 from pmviewer.render.given import Aim, GatherRays, Sampler, opened
@@ -34,8 +36,8 @@ from pmviewer.render.pixel import (
     INDIRECT,
     SPECULAR,
     Pixel,
-    camera_ray,
     deposit,
+    lens_ray,
     properties,
     sampled_ray,
 )
@@ -51,18 +53,41 @@ _CAUSTICS = np.int32(1 << CAUSTIC_CLASS)
 
 
 @device
+def _outline_ray(scene, eye, pixel, j):
+    """Radiance that camera ray j for emission meets at a light or the environment, and what it counts."""
+    index = _u4(eye.index * _u4(eye.outline_rays) + _u4(j))
+    ux, uy, a, b = draw4(eye.sequence, pixel.seed, index, OUTLINE)
+    x, y, weight = place_in_filter(eye, ux, uy)
+    ray = lens_ray(eye, pixel.number, x, y, a, b)
+    hit = cast(scene, ray)
+    light = met_light(scene, hit)
+    if light >= 0:
+        return radiance_of(scene, light, hit, ray.d), weight
+    return BLACK, weight
+
+
+@specialised
 def outline_emission(scene, eye, pixel):
-    """Mean radiance that camera rays through the pixel meet at lights and the environment."""
-    total = BLACK
-    for j in range(eye.outline_rays):
-        index = _u4(eye.index * _u4(eye.outline_rays) + _u4(j))
-        ux, uy, _, _ = draw4(eye.sequence, pixel.seed, index, OUTLINE)
-        ray = camera_ray(eye, pixel.number, ux, uy)
-        hit = cast(scene, ray)
-        light = met_light(scene, hit)
-        if light >= 0:
-            total = add(total, radiance_of(scene, light, hit, ray.d))
-    return scale(total, _f4(1.0) / _f4(eye.outline_rays))
+    """Deposit the mean radiance that camera rays through the pixel meet at lights and the environment."""
+    if has(eye, "filter_cdf"):
+
+        def counted_each(scene, eye, pixel):
+            share = _f4(1.0) / _f4(eye.outline_rays)
+            for j in range(eye.outline_rays):
+                L, weight = _outline_ray(scene, eye, pixel, j)
+                one = Pixel(pixel.number, pixel.seed, pixel.film, pixel.radii, pixel.counts, weight)
+                deposit(one, EMISSION, scale(L, share))
+
+        return counted_each
+
+    def alike(scene, eye, pixel):
+        total = BLACK
+        for j in range(eye.outline_rays):
+            L, _ = _outline_ray(scene, eye, pixel, j)
+            total = add(total, L)
+        deposit(pixel, EMISSION, scale(total, _f4(1.0) / _f4(eye.outline_rays)))
+
+    return alike
 
 
 @device
@@ -166,11 +191,11 @@ def eye_pass(given, outline, radii, film, counts, first, last):
     scene, eye = given.scene, given.eye
     lights, found = stack_i4(LIST_WORDS), stack_i4(AIM_WORDS)
     for number in range(first, last):
-        seed, ray, place = sampled_ray(eye, number)
-        pixel = Pixel(number, seed, film, radii, counts)
+        seed, ray, place, weight = sampled_ray(eye, number)
+        pixel = Pixel(number, seed, film, radii, counts, weight)
         outlined = len(outline) > 0 and outline[number] != 0
         if outlined:
-            deposit(pixel, EMISSION, outline_emission(scene, eye, pixel))
+            outline_emission(scene, eye, pixel)
             counts[C_RAYS] += eye.outline_rays
         beta = WHITE
         left, pdf = ray.o, _f4(0.0)  # where, and with which density, a lobe was left that is not a delta

@@ -6,7 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.render.planes import CHANNELS
+from pmviewer.render.planes import CHANNELS, PLANES, TERMS
+
+LEAST_WEIGHT = 0.5
+"""Mean weight from which a pixel's samples are divided by it."""
+_WEIGHED = PLANES["emission"], slice(PLANES["emission"].stop, PLANES[TERMS[-1]].stop)
+"""Channels by the two columns of weights."""
 
 
 @kernel
@@ -21,16 +26,46 @@ def resolve(sums, passes, out, first, last):
 class Film:
     """Sums of `passes` samples per pixel: `sums` (height·width, CHANNELS + further) float64, `further` being sums that
     a method keeps beside the planes; `radii` of the pixels' look-ups in the latest pass
-    (`pmviewer.render.pixel_radius`), None where all have that of the pass."""
+    (`pmviewer.render.pixel_radius`), None where all have that of the pass; `weights` (height·width, 2) float64, sums
+    of what samples count by a filter with negative parts (`pmviewer.render.filter`), in the term emission and in all
+    others, None where each counts 1."""
 
     def __init__(self, width: int, height: int, further: int = 0) -> None:
         self.width, self.height = width, height
         self.sums: NDArray[np.float64] = np.zeros((width * height, CHANNELS + further), np.float64)
         self.radii: NDArray[np.float32] | None = None
+        self.weights: NDArray[np.float64] | None = None
         self.passes = 0
 
     def planes(self) -> NDArray[np.float32]:
         """Means (height, width, CHANNELS) float32."""
         out = np.empty((self.height * self.width, CHANNELS), np.float32)
         resolve(self.sums, float(max(self.passes, 1)), out, 0, len(out))
-        return out.reshape(self.height, self.width, CHANNELS)
+        return self.weighed(out.reshape(self.height, self.width, CHANNELS))
+
+    def weighed(self, planes: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The planes with their terms divided by the mean weight of each pixel's samples in place of 1.
+
+        So that a plain wall is plain after one pass; the mean goes to 1 and both to the same picture. Where weights
+        nearly cancel each other, as they may in the first passes, a pixel has the mean of those around it.
+        """
+        if self.weights is None:
+            return planes
+        means = self.weights.reshape(self.height, self.width, 2) / max(self.passes, 1)
+        for channels, weights in zip(_WEIGHED, np.moveaxis(means, 2, 0), strict=True):
+            known = np.abs(weights) >= LEAST_WEIGHT
+            terms = np.where(known[..., None], planes[..., channels] / np.where(known, weights, 1.0)[..., None], 0.0)
+            planes[..., channels] = terms if known.all() else np.where(known[..., None], terms, _around(terms, known))
+        return planes
+
+
+def _around(values: NDArray[np.floating], known: NDArray[np.bool_]) -> NDArray[np.floating]:
+    """Means (h, w, n) of what is known of the pixels beside each."""
+    h, w = known.shape
+    total, count = np.zeros(values.shape), np.zeros((h, w, 1))
+    padded, counted = np.pad(values, ((1, 1), (1, 1), (0, 0))), np.pad(known, 1)
+    for y in range(3):
+        for x in range(3):
+            total += padded[y : y + h, x : x + w]
+            count += counted[y : y + h, x : x + w, None]
+    return total / np.maximum(count, 1)

@@ -1,6 +1,7 @@
 """The free camera: where it looks from, and the frustum of the render camera that it sees.
 
-The render camera decides what is stored and how it is looked up; the free camera only decides what the film shows.
+The render camera decides what is stored and how it is looked up; the free camera only decides what the film shows. It
+is a pinhole, whatever lens the render camera has.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ def free_pose(render: CameraPose, free: FreeCamera, center: NDArray[np.floating]
     if origin == target and free.target == "auto":  # where a given eye point is the automatic target
         target = _vec3(np.asarray(target) - np.asarray(_behind(render)) * radius)
     up = _vec3(_level(render)[1]) if free.up == "auto" else free.up
-    pose = CameraPose(origin, target, up, fov, render.width, render.height)
+    pose = CameraPose(origin, target, up, fov, render.width, render.height, filter=render.filter)
     return with_cut(pose, render, free, radius)
 
 
@@ -57,10 +58,10 @@ def as_perspective(pose: CameraPose) -> CameraPose:
     """A perspective camera without a shift for what the pose sees: its own, or one as far before an orthographic
     camera's target as spans its width there."""
     if not pose.orthographic:
-        return replace(pose, shift=(0.0, 0.0))
+        return replace(pose, shift=(0.0, 0.0), aperture=0.0)
     distance = pose.view_width / (2 * math.tan(math.radians(FOV) / 2))
     origin = np.asarray(pose.target, float) - pose.axes()[2] * distance
-    return replace(pose, origin=_vec3(origin), fov=FOV, projection="perspective", shift=(0.0, 0.0))
+    return replace(pose, origin=_vec3(origin), fov=FOV, projection="perspective", shift=(0.0, 0.0), aperture=0.0)
 
 
 def plan_pose(render: CameraPose, center: NDArray[np.floating], radius: float) -> CameraPose:

@@ -56,8 +56,8 @@ def path_pass(scenes, eyes, film, counts, first, last):
     scene, eye = scenes[0], eyes[0]
     choice = choose_by_power(stack_i4(LIST_WORDS), eye.light_samples)
     for number in range(first, last):
-        seed, ray, _ = sampled_ray(eye, number)
-        pixel, sampler = Pixel(number, seed, film, None, counts), Sampler(eye.sequence, seed, eye.index)
+        seed, ray, _, weight = sampled_ray(eye, number)
+        pixel, sampler = Pixel(number, seed, film, None, counts, weight), Sampler(eye.sequence, seed, eye.index)
         beta = WHITE
         stored = 0  # how often the path took lobes that photons are stored for
         mirrored = False  # whether it took a followed lobe before the first of these

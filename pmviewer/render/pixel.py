@@ -8,11 +8,14 @@ import numpy as np
 
 from pmviewer.kernels.bsdf.scattering import shading_normal
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.dimensions import PIXEL, PIXEL_SALT
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.surface import face
 from pmviewer.kernels.vector import add, dot, is_good, normalize
 from pmviewer.render.cast import Ray
+from pmviewer.render.filter import place_in_filter
+from pmviewer.render.lens import lens_numbers, through_lens
 from pmviewer.render.planes import PLANES
 from pmviewer.render.record import C_DROPPED
 
@@ -30,13 +33,15 @@ EMISSION, DIRECT, SPECULAR, CAUSTIC, INDIRECT, ALBEDO, NORMAL, DEPTH = (
 
 class Pixel(NamedTuple):
     """A pixel that is sampled: its number and seed, and where its samples go: film, float64 (pixels, CHANNELS); radii,
-    of its look-ups, or None (`pmviewer.render.pixel_radius`); counts, int64 (N_COUNTS,)."""
+    of its look-ups, or None (`pmviewer.render.pixel_radius`); counts, int64 (N_COUNTS,); and what its sample counts by
+    the reconstruction filter, None for 1 (`pmviewer.render.filter`)."""
 
     number: Any
     seed: Any
     film: Any
     radii: Any
     counts: Any
+    weight: Any
 
 
 @device
@@ -46,16 +51,23 @@ def pixel_seed(eye, pixel):
 
 
 @device
-def camera_ray(eye, pixel, u, v):
-    """The ray through the pixel at (u, v) in [0, 1)², from the near to the far plane."""
+def _raw_direction(eye, pixel, u, v):
+    """Of the ray through the pixel at (u, v), 1 along the view; of an orthographic camera its place from the eye."""
     x = _f4(pixel % eye.width) + u
     y = _f4(pixel // eye.width) + v
-    o = (eye.x_eye, eye.y_eye, eye.z_eye)
-    d = (
+    return (
         eye.x_corner + x * eye.x_right + y * eye.x_down,
         eye.y_corner + x * eye.y_right + y * eye.y_down,
         eye.z_corner + x * eye.z_right + y * eye.z_down,
     )
+
+
+@device
+def camera_ray(eye, pixel, u, v):
+    """The pinhole's ray through the pixel at (u, v), which is the pixel's own for [0, 1)², from the near to the far
+    plane."""
+    o = (eye.x_eye, eye.y_eye, eye.z_eye)
+    d = _raw_direction(eye, pixel, u, v)
     if eye.orthographic != 0:
         return Ray(add(o, d), (eye.x_forward, eye.y_forward, eye.z_forward), eye.near, eye.far)
     d = normalize(d)
@@ -67,12 +79,36 @@ def camera_ray(eye, pixel, u, v):
     return Ray(o, d, near, far)
 
 
+@specialised
+def lens_ray(eye, pixel, u, v, a, b):
+    """The camera ray through the pixel at (u, v) and the lens at (a, b) in [0, 1)²; without a lens `camera_ray`."""
+    if not has(eye, "inverse_focus"):
+        return lambda eye, pixel, u, v, a, b: camera_ray(eye, pixel, u, v)
+
+    def of_lens(eye, pixel, u, v, a, b):
+        ray, _ = through_lens(eye, _raw_direction(eye, pixel, u, v), a, b)
+        return ray
+
+    return of_lens
+
+
 @device
 def sampled_ray(eye, pixel):
-    """The pixel's seed, its camera ray in the pass of the eye record, and two numbers for its first light sample."""
+    """The pixel's seed, its camera ray in the pass of the eye record, two numbers for its first light sample, and what
+    the sample counts (`Pixel.weight`)."""
     seed = pixel_seed(eye, pixel)
     ux, uy, u_light, v_light = draw4(eye.sequence, seed, eye.index, PIXEL)
-    return seed, camera_ray(eye, pixel, ux, uy), (u_light, v_light)
+    x, y, weight = place_in_filter(eye, ux, uy)
+    a, b = lens_numbers(eye, seed)
+    return seed, lens_ray(eye, pixel, x, y, a, b), (u_light, v_light), weight
+
+
+@specialised
+def weighed(pixel, value):
+    """What a float64 of a sample adds to the pixel's film."""
+    if absent(part(pixel, "weight")):
+        return lambda pixel, value: value
+    return lambda pixel, value: value * _f8(pixel.weight)
 
 
 @device
@@ -80,7 +116,7 @@ def deposit(pixel, plane, value):
     """Add a sample to a plane of the film, or count it when it is not finite or negative."""
     if is_good(value):
         for k in range(3):
-            pixel.film[pixel.number, plane + k] += _f8(value[k])
+            pixel.film[pixel.number, plane + k] += weighed(pixel, _f8(value[k]))
     else:
         pixel.counts[C_DROPPED] += 1
 
@@ -88,7 +124,7 @@ def deposit(pixel, plane, value):
 @device
 def properties(eye, pixel, si):
     """Add the properties of the first surface that the pixel sees: albedo, normal towards the eye, distance along the
-    view."""
+    view. They are means over the samples, however the filter counts these: others work with them."""
     p, albedo, n = si.p, si.bsdf.albedo, face(shading_normal(si.bsdf), si.wo)
     depth = (p[0] - eye.x_eye) * eye.x_forward + (p[1] - eye.y_eye) * eye.y_forward + (p[2] - eye.z_eye) * eye.z_forward
     for k in range(3):

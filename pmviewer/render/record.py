@@ -10,57 +10,67 @@ from numpy.typing import NDArray
 from pmviewer.kernels.random import SOBOL
 from pmviewer.maps.estimate.filters import FILTERS
 from pmviewer.render.camera import CameraPose
+from pmviewer.render.filter import BOX, FILTER_FIELDS, filter_of, set_filter
+from pmviewer.render.lens import LENS_FIELDS
 from pmviewer.settings.access import Settings
 
-EYE_DTYPE = np.dtype(
-    [
-        *[(f"{axis}_{part}", "f4") for part in ("eye", "corner", "right", "down", "forward", "near") for axis in "xyz"],
-        ("near", "f4"),
-        ("far", "f4"),
-        ("width", "i4"),
-        ("height", "i4"),
-        ("orthographic", "i4"),
-        ("sequence", "i4"),
-        ("seed", "u4"),
-        ("index", "u4"),  # the pass: the sample index of every pixel's sequences
-        ("max_depth", "i4"),
-        ("glossy", "f4"),  # roughness from which glossy lobes are looked up
-        ("outline_rays", "i4"),  # camera rays for emission in pixels on a light's outline
-        ("direct", "i4"),  # whether direct light is sampled at lobes that photons are stored for
-        ("followed_direct", "i4"),  # and at those that are followed
-        ("light_samples", "i4"),
-        ("mis", "i4"),
-        ("choice", "i4"),  # of lights: index into `pmviewer.render.direct.choice.CHOICES`
-        ("con_samples", "i4"),
-        ("noncon_samples", "i4"),
-        ("biased", "i4"),  # whether lights without photons near are left out
-        ("choice_radius", "f4"),
-        ("caustic_mask", "i4"),  # path classes shown from the caustic map, 0 for none
-        ("unfound", "i4"),  # whether followed lobes look up what no path finds (`pmviewer.render.reflect.unfound`)
-        ("global_mask", "i4"),  # path classes shown directly from the global map, as indirect light
-        ("direct_mask", "i4"),  # and as direct light
-        ("global_caustics", "i4"),  # and as caustics
-        ("indirect_caustics", "i4"),  # whether caustics after a diffuse bounce belong to the term "caustic"
-        ("gather_rays", "i4"),  # final-gather rays, 0 for none
-        ("gather_specular", "i4"),  # whether gather rays follow mirrors and glass
-        ("guided_rays", "i4"),  # how many of them photons guide
-        ("guide_mask", "i4"),  # path classes of these photons
-        ("roulette", "f4"),  # gather rays that may bring less than this are thinned out
-        ("corner", "f4"),  # gather rays shorter than this gather again where they land
-        ("filter", "i4"),
-        ("rim", "i4"),
-        ("k", "i4"),  # nearest photons that are looked up in this pass
-        ("share", "f4"),  # of their disc's area, in which they count
-        ("cone_k", "f4"),
-        ("flatness", "f4"),
-        ("boundary", "f4"),  # what photons on a convex hull's boundary count
-        ("caustic_radius", "f4"),
-        ("global_radius", "f4"),
-        ("radiance_cutoff", "f4"),  # radiance photons farther away are not used
-        ("radiance_similarity", "f4"),  # least cosine between their normals and the surface's
-    ],
-    align=True,
-)
+_FIELDS: list[tuple] = [
+    *[(f"{axis}_{part}", "f4") for part in ("eye", "corner", "right", "down", "forward", "near") for axis in "xyz"],
+    ("near", "f4"),
+    ("far", "f4"),
+    ("width", "i4"),
+    ("height", "i4"),
+    ("orthographic", "i4"),
+    ("sequence", "i4"),
+    ("seed", "u4"),
+    ("index", "u4"),  # the pass: the sample index of every pixel's sequences
+    ("max_depth", "i4"),
+    ("glossy", "f4"),  # roughness from which glossy lobes are looked up
+    ("outline_rays", "i4"),  # camera rays for emission in pixels on a light's outline
+    ("direct", "i4"),  # whether direct light is sampled at lobes that photons are stored for
+    ("followed_direct", "i4"),  # and at those that are followed
+    ("light_samples", "i4"),
+    ("mis", "i4"),
+    ("choice", "i4"),  # of lights: index into `pmviewer.render.direct.choice.CHOICES`
+    ("con_samples", "i4"),
+    ("noncon_samples", "i4"),
+    ("biased", "i4"),  # whether lights without photons near are left out
+    ("choice_radius", "f4"),
+    ("caustic_mask", "i4"),  # path classes shown from the caustic map, 0 for none
+    ("unfound", "i4"),  # whether followed lobes look up what no path finds (`pmviewer.render.reflect.unfound`)
+    ("global_mask", "i4"),  # path classes shown directly from the global map, as indirect light
+    ("direct_mask", "i4"),  # and as direct light
+    ("global_caustics", "i4"),  # and as caustics
+    ("indirect_caustics", "i4"),  # whether caustics after a diffuse bounce belong to the term "caustic"
+    ("gather_rays", "i4"),  # final-gather rays, 0 for none
+    ("gather_specular", "i4"),  # whether gather rays follow mirrors and glass
+    ("guided_rays", "i4"),  # how many of them photons guide
+    ("guide_mask", "i4"),  # path classes of these photons
+    ("roulette", "f4"),  # gather rays that may bring less than this are thinned out
+    ("corner", "f4"),  # gather rays shorter than this gather again where they land
+    ("filter", "i4"),
+    ("rim", "i4"),
+    ("k", "i4"),  # nearest photons that are looked up in this pass
+    ("share", "f4"),  # of their disc's area, in which they count
+    ("cone_k", "f4"),
+    ("flatness", "f4"),
+    ("boundary", "f4"),  # what photons on a convex hull's boundary count
+    ("caustic_radius", "f4"),
+    ("global_radius", "f4"),
+    ("radiance_cutoff", "f4"),  # radiance photons farther away are not used
+    ("radiance_similarity", "f4"),  # least cosine between their normals and the surface's
+]
+
+
+def eye_dtype(lens: bool = False, filtered: bool = False) -> np.dtype:
+    """The record of a camera with a lens or without, and a reconstruction filter other than the plain box or not:
+    kernels are compiled for the record's type, so that what is not there costs nothing."""
+    # In front, since numba warns where one record begins like another.
+    return np.dtype([*(LENS_FIELDS if lens else []), *(FILTER_FIELDS if filtered else []), *_FIELDS], align=True)
+
+
+EYE_DTYPE = eye_dtype()
+"""Of a pinhole and the box filter."""
 
 RIMS = ("left out", "half", "whole")
 
@@ -105,10 +115,16 @@ NOTHING_EVALUATED = Evaluation()
 def eye_record(
     camera: CameraPose, settings: Settings, index: int, evaluation: Evaluation = NOTHING_EVALUATED
 ) -> NDArray[np.void]:
-    """The record (1,) of EYE_DTYPE of pass `index`, complete: nobody writes to it afterwards."""
-    record = np.zeros(1, EYE_DTYPE)
+    """The record (1,) of an `eye_dtype` of pass `index`, complete: nobody writes to it afterwards. A lens must have
+    been focused (`pmviewer.engine.focus`)."""
+    chosen = filter_of(camera.filter, settings.render)
+    record = np.zeros(1, eye_dtype(camera.aperture > 0, chosen != BOX))
     r = record[0]
     _set_camera(r, camera)
+    if camera.aperture > 0:
+        _set_lens(r, camera)
+    if chosen != BOX:
+        set_filter(r, chosen)
     r["sequence"], r["seed"], r["index"] = SOBOL, settings.render.seed & 0xFFFFFFFF, index & 0xFFFFFFFF
     r["max_depth"] = settings.render.max_depth
     r["outline_rays"] = settings.render.outline_rays
@@ -135,3 +151,12 @@ def _set_camera(r: np.void, camera: CameraPose) -> None:
             r[f"{axis}_{part}"] = value
     r["near"], r["far"] = camera.near, camera.far
     r["width"], r["height"], r["orthographic"] = camera.width, camera.height, camera.orthographic
+
+
+def _set_lens(r: np.void, camera: CameraPose) -> None:
+    assert camera.focus is not None
+    right, top, _ = camera.axes()
+    for part, vector in (("right", right), ("top", top)):
+        for axis, value in zip("xyz", vector * camera.aperture, strict=True):
+            r[f"{axis}_lens_{part}"] = value
+    r["inverse_focus"] = 1 / camera.focus

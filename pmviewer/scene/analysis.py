@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pmviewer.scene.arrays.material_lobes import (
@@ -12,7 +13,7 @@ from pmviewer.scene.arrays.material_lobes import (
     is_rough_glass,
 )
 from pmviewer.scene.arrays.material_row import is_rich, used_materials
-from pmviewer.scene.description import DirectionalLight, Environment, PointLight, Scene, SpotLight
+from pmviewer.scene.description import Camera, DirectionalLight, Environment, PixelFilter, PointLight, Scene, SpotLight
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,8 @@ class SceneTraits:
     be stored on whatever the settings; `many_lights`: more than one light to choose from; `rich`: materials beyond
     diffuse, mirrors that reflect the same at all angles, and clear smooth glass; `has_delta`: a smooth mirror, glass or
     coat; `has_rough_glass`; `has_delta_lights`: point, spot or directional lights, which no ray can meet;
-    `orthographic`: the scene's own camera.
+    `orthographic`: the scene's own camera; `lenses`: the names, as `camera.name` takes them, of cameras with a lens;
+    `filters`: the reconstruction filters of cameras whose film has one, by the same names.
 
     `glossy_roughness`: the roughness of every glossy reflection, ascending; those below the setting `glossy` are
     followed like mirrors, the others store photons.
@@ -38,6 +40,8 @@ class SceneTraits:
     has_rough_glass: bool = False
     has_delta_lights: bool = False
     orthographic: bool = False
+    lenses: frozenset[str] = frozenset()
+    filters: tuple[tuple[str, PixelFilter], ...] = ()
 
     @property
     def many_lights(self) -> bool:
@@ -76,5 +80,16 @@ def analyse(scene: Scene) -> SceneTraits:
         has_rough_glass=any(is_rough_glass(m) for m in used),
         has_delta_lights=any(isinstance(light, PointLight | SpotLight | DirectionalLight) for light in scene.lights),
         orthographic=scene.camera.projection == "orthographic",
+        lenses=frozenset(name for name, camera in _cameras(scene) if camera.aperture > 0),
+        filters=tuple((name, camera.filter) for name, camera in _cameras(scene) if camera.filter is not None),
         glossy_roughness=tuple(sorted({alpha for m in used for alpha in glossy_roughness(m)})),
     )
+
+
+def _cameras(scene: Scene) -> Iterator[tuple[str, Camera]]:
+    """The file's cameras by all names that `camera.name` has for them."""
+    yield "auto", scene.camera
+    for i, named in enumerate(scene.cameras):
+        yield str(i + 1), named.camera
+    for named in reversed(scene.cameras):  # of two with one name the first is meant
+        yield named.name, named.camera

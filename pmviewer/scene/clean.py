@@ -203,6 +203,10 @@ def check_camera(camera: Camera, path: Path | None, line: int | None = None) -> 
     if not all(math.isfinite(s) and abs(s) <= LARGEST_SHIFT for s in camera.shift):
         what = f"The camera's picture is shifted by {camera.shift[0]:g} widths and {camera.shift[1]:g} heights."
         raise SceneError(what, path, line, f"Correct its offset: at most {LARGEST_SHIFT:g}.")
+    if not (math.isfinite(camera.aperture) and camera.aperture >= 0):
+        raise SceneError(f"The lens can't have the radius {camera.aperture:g}.", path, line, "Correct its aperture.")
+    if camera.focus is not None and not camera.focus > 0:
+        raise SceneError(f"The lens can't be focused at the distance {camera.focus:g}.", path, line, "Correct it.")
     if camera.projection == "orthographic":
         if not (math.isfinite(camera.width) and 1e-15 < camera.width <= LARGEST_COORDINATE):
             what = f"The orthographic camera's picture is {camera.width:g} units wide: that can't be shown."

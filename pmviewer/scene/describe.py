@@ -164,4 +164,7 @@ def _camera(scene: Scene) -> str:
     if c.projection == "orthographic":
         lens = f"orthographic, {c.width:.4g} wide"
     shift = f", shifted by {_numbers(c.shift)}" if any(c.shift) else ""
+    if c.aperture > 0:
+        sharp = "" if c.focus is None else f" focused at {c.focus:.4g}"
+        lens += f", aperture radius {c.aperture:.4g}{sharp}"
     return f"at {_numbers(c.origin)} looking at {_numbers(c.target)}, {lens}{shift}{mirrored}"

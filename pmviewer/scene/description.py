@@ -266,6 +266,20 @@ Environment = ConstantEnvironment | ImageEnvironment
 Light = PointLight | SpotLight | DirectionalLight | Environment
 
 
+FilterKind = Literal["box", "tent", "Gaussian", "Mitchell-Netravali", "Catmull-Rom", "Lanczos"]
+
+
+@dataclass(frozen=True)
+class PixelFilter:
+    """A reconstruction filter, separable, 0 farther than `radius` pixels from the pixel's middle on either axis; its
+    formula is in `pmviewer.render.filter`. `shape`: the standard deviation of a Gaussian; B and C of
+    Mitchell-Netravali; empty for all others."""
+
+    kind: FilterKind
+    radius: float
+    shape: tuple[float, ...] = ()
+
+
 @dataclass(frozen=True)
 class Camera:
     """Perspective or orthographic camera. `up` need not be orthogonal to the view direction. `fov` in degrees,
@@ -289,6 +303,12 @@ class Camera:
     shift: tuple[float, float] = (0.0, 0.0)
     mirrored: bool = False
     """True when the file's camera frame has the other handedness: the image is then flipped left to right."""
+    aperture: float = 0.0
+    """Radius of the thin lens, 0 for a pinhole."""
+    focus: float | None = None
+    """Distance along the view of the plane that the lens shows sharp; None: the file does not say."""
+    filter: PixelFilter | None = None
+    """Of the film; None: the file does not say."""
 
 
 @dataclass(frozen=True)

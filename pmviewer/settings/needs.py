@@ -53,5 +53,6 @@ PHOTONS = Need(
     lambda f: f.plan.photons,
     lambda f: "The path tracer uses no photons." if f.plan.path else "No surface of this scene stores photons.",
 )
+LENS = Need(lambda f: f.plan.lens, "Everything is sharp: the camera has no lens (camera.aperture).")
 IMPORTANCE = Need(lambda f: f.plan.importance, "Only with importance (importance.map).")
 SHADOW_PHOTONS = Need(lambda f: f.plan.shadows, "Only with shadow photons (direct.shadow_photons).")

@@ -160,7 +160,7 @@ class Commands:
         group = "free_camera" if self.state.settings.free_camera.on else "camera"
         names = ["origin", "target", "up", "fov"]
         if group == "camera":
-            names += ["projection", "view_width", "shift_x", "shift_y"]
+            names += ["projection", "view_width", "shift_x", "shift_y", "aperture", "focus"]
         self.state.change({f"{group}.{name}": "auto" for name in names})
 
     def _free_from_above(self) -> None:

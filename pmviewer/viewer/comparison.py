@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pmviewer.engine.frame import Frame, Level
 from pmviewer.render.camera import CameraPose, resolve_camera, size_only
+from pmviewer.render.filter import is_own
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import SETTINGS, flat
 from pmviewer.viewer.background import MEASURING, READING, Background
@@ -211,10 +212,17 @@ def _mismatch(reference: Reference, scene: Scene, frame: Frame) -> str | None:
     if (width, height) != reference.size:
         wanted = "×".join(str(side) for side in reference.size)
         return f"The reference has {wanted} pixels, the picture {width}×{height}: only the same size can be compared."
-    if not frame.camera.sees_like(resolve_camera(scene, size_only(frame.settings.camera))):
+    own = resolve_camera(scene, size_only(frame.settings.camera))
+    if not frame.camera.sees_like(own):
         if frame.settings.free_camera.on:
             return "The free camera is on: the reference is seen by the scene's own camera."
+        if replace(frame.camera, aperture=own.aperture, focus=own.focus).sees_like(own):
+            return (
+                "The lens was changed: the reference is seen through the scene's own. Press Backspace to return to it."
+            )
         return "The camera was moved: the reference is seen by the scene's own. Press Backspace to return to it."
+    if not is_own(own.filter, frame.settings.render):
+        return "The reconstruction filter was changed: the reference has the scene's own (render.filter = auto)."
     return None
 
 

@@ -60,6 +60,7 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Camera", "Left drag", "Orbit around the target"),
     Binding("Camera", "Middle or Shift+left drag", "Pan"),
     Binding("Camera", "Wheel or right drag", "Zoom"),
+    Binding("Camera", "Ctrl+click", "Focus the lens on what is there"),
     Binding("Camera", "F", "Fly: W A S D, Q down, E up, drag to look; Shift is faster", "toggle_fly", K.f),
     Binding("Camera", "Right button + W A S D Q E", "Fly while the button is held"),
     Binding("Camera", "Home or A", "Frame the whole scene", "frame_all", K.home, alternative=K.a),

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pmviewer.engine.focus import focused, surface_at
 from pmviewer.engine.frame import Frame, Level, Message
 from pmviewer.errors import PmviewerError, SettingError
 from pmviewer.output.diagnostic_views import HELD_WHILE_SHOWN
@@ -208,11 +209,31 @@ class ViewerState:
         return self._resolved(scene) if scene is not None else None
 
     def _resolved(self, scene: Scene) -> CameraPose:
-        """The chosen camera; the scene's own if there is no such one, which the session says."""
+        """The chosen camera; the scene's own if there is no such one, which the session says. A lens is focused."""
         try:
-            return resolve_camera(scene, self.settings.camera)
+            pose = resolve_camera(scene, self.settings.camera)
         except SettingError:
-            return resolve_camera(scene, self.settings.camera.model_copy(update={"name": "auto"}))
+            pose = resolve_camera(scene, self.settings.camera.model_copy(update={"name": "auto"}))
+        opened = self.session.opened_scene
+        return pose if opened is None or opened.scene is not scene else focused(opened.flat, pose)
+
+    def focus_at(self, shown: CameraPose, x: float, y: float) -> None:
+        """Focus the render camera's lens on the surface at a place of the picture of the camera `shown`, in pixels."""
+        opened, render = self.session.opened_scene, self.render_camera()
+        if opened is None or render is None:
+            return
+        if render.aperture == 0:
+            self.say("warning", "Everything is sharp: the camera has no lens to focus. Give camera.aperture a radius.")
+            return
+        point = surface_at(opened.flat, shown, x, y)
+        if point is None:
+            self.say("warning", "There is no surface to focus on there.")
+            return
+        distance = float(render.project(point[None])[0, 2])
+        if distance <= 0:
+            self.say("warning", "That lies behind the render camera: its lens can't be focused there.")
+            return
+        self.change({"camera.focus": distance})
 
     def shown_pair(self) -> tuple[tuple[Frame, Frame], Display] | None:
         """The frames with and without importance while the viewport compares them, with a view that both have."""

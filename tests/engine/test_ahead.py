@@ -39,7 +39,9 @@ def test_clicks_are_those_that_run_something_else(box):
     assert next(iter(found)) == ""
     assert {"render.method = gather", "render.method = path", "estimate.lookup = nearest"} <= found.keys()
     assert found["estimate.lookup = nearest"] == with_values(Settings(), {"estimate.lookup": "nearest"})
-    assert not [text for text in found if text.startswith(("camera.", "free_camera.", "display.tone", "render.passes"))]
+    assert not [text for text in found if text.startswith(("free_camera.", "display.tone", "render.passes"))]
+    assert [text for text in found if text.startswith("camera.")] == ["camera.aperture = 1000000000000000.0"], "a lens"
+    assert "render.filter = tent" in found
 
 
 def test_from_another_state_other_clicks_matter(box):

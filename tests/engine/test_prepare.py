@@ -14,8 +14,9 @@ from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare, steps_of, types_of
 from pmviewer.engine.renderer import Renderer
-from pmviewer.engine.stages.pass_data import blank_pass
+from pmviewer.engine.stages.pass_data import blank_eye, blank_pass
 from pmviewer.engine.store import StageStore
+from pmviewer.render.record import eye_record
 from pmviewer.settings.access import Settings, with_values
 from tests.support.scenes import cornell_box
 
@@ -67,6 +68,22 @@ def test_blank_records_have_the_types_of_a_pass(variant, box, pool):
     renderer.step()
     blank = blank_pass(box.flat.record, settings, plan_of(settings, box.traits))
     assert types_of(blank) == types_of(renderer.latest.given)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"camera.aperture": 0.1},
+        {"render.filter": "Lanczos"},
+        {"camera.aperture": 0.1, "render.filter": "box", "render.filter_radius": 1.0},
+        {"camera.aperture": 0.1, "free_camera.on": True},
+        {"render.filter": "box"},
+    ],
+)
+def test_blank_eyes_have_the_types_of_lens_and_filter(values, box, pool):
+    settings = with_values(Settings(), values)
+    renderer = Renderer(box, settings, pool, StageStore(0))
+    assert blank_eye(settings, renderer.plan).dtype == eye_record(renderer.camera, settings, 0).dtype
 
 
 def signatures() -> set[tuple[str, Any]]:

@@ -10,7 +10,7 @@ import pytest
 from pmviewer.errors import SettingError
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.clean import clean_mesh
-from pmviewer.scene.description import Mesh, Scene
+from pmviewer.scene.description import Mesh, PixelFilter, Scene
 from pmviewer.settings.access import CameraSettings
 from tests.scene.helpers import load
 
@@ -81,7 +81,7 @@ def test_missing_and_unsupported_sensors_are_replaced(tmp_path: Path) -> None:
     lens = sensor(
         tmp_path, f'<float name="fov" value="30"/><float name="aperture_radius" value="1"/>{FILM}', kind="thinlens"
     )
-    assert len(lens.warnings) == 1
+    assert lens.warnings == ()
     assert lens.camera.fov == 30
     odd = sensor(tmp_path, f'<float name="fov" value="30"/>{FILM}', kind="fisheye")
     assert "approximated by a perspective camera" in odd.warnings[0]
@@ -98,6 +98,68 @@ def test_orthographic_cameras(tmp_path: Path) -> None:
     uneven = sensor(tmp_path, FILM, '<scale x="2" y="3"/><translate z="-9"/>', kind="telecentric")
     assert uneven.camera.width == 4
     assert len(uneven.warnings) == 2
+
+
+def test_cameras_with_a_lens(tmp_path: Path) -> None:
+    """Mitsuba 3.9.1 says of a thinlens without a distance: focus_distance = 10000, its far_clip."""
+    lens = '<float name="aperture_radius" value="0.25"/>'
+    given = sensor(tmp_path, lens + '<float name="focusDistance" value="3.5"/>' + FILM, kind="thinlens")
+    assert (given.camera.aperture, given.camera.focus, given.warnings) == (0.25, 3.5, ())
+    left = sensor(tmp_path, lens + FILM, kind="thinlens")
+    assert (left.camera.aperture, left.camera.focus, left.warnings) == (0.25, 10000, ())
+    clipped = sensor(tmp_path, lens + '<float name="far_clip" value="70"/>' + FILM, kind="thinlens")
+    assert clipped.camera.focus == 70
+    flat = sensor(tmp_path, lens + '<float name="focus_distance" value="2"/>' + FILM, kind="telecentric")
+    assert (flat.camera.projection, flat.camera.aperture, flat.camera.focus) == ("orthographic", 0.25, 2)
+    assert flat.warnings == ()
+    none = sensor(tmp_path, FILM, kind="thinlens")
+    assert (none.camera.aperture, len(none.warnings)) == (0, 1)
+    assert "has no 'aperture_radius'" in none.warnings[0]
+    odd = '<float name="aperture_radius" value="-1"/><float name="focus_distance" value="0"/>'
+    wrong = sensor(tmp_path, odd + FILM, kind="thinlens")
+    assert (wrong.camera.aperture, wrong.camera.focus) == (0, None)
+    assert "can't be -1" in wrong.warnings[0]
+    assert "can't be 0" in wrong.warnings[1]
+    pinhole = sensor(tmp_path, lens + FILM)
+    assert (pinhole.camera.aperture, pinhole.warnings) == (0, ())
+
+
+FILTERS = {
+    "box": ('type="box"/>', PixelFilter("box", 0.5)),
+    "tent": ('type="tent"><float name="radius" value="1.5"/></rfilter>', PixelFilter("tent", 1.5)),
+    "gaussian": ('type="gaussian"><float name="stddev" value="0.4"/></rfilter>', PixelFilter("Gaussian", 1.6, (0.4,))),
+    "mitchell": (
+        'type="mitchell"><float name="B" value="0.2"/><float name="C" value="0.4"/></rfilter>',
+        PixelFilter("Mitchell-Netravali", 2.0, (0.2, 0.4)),
+    ),
+    "catmullrom": ('type="catmullrom"/>', PixelFilter("Catmull-Rom", 2.0)),
+    "lanczos": ('type="lanczos"><integer name="lobes" value="2"/></rfilter>', PixelFilter("Lanczos", 2.0)),
+}
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_reconstruction_filters_of_the_film(tmp_path: Path, name: str) -> None:
+    text, expected = FILTERS[name]
+    scene = sensor(tmp_path, FILM.replace("</film>", f"<rfilter {text}</film>"))
+    assert scene.warnings == ()
+    assert scene.camera.filter is not None
+    assert (scene.camera.filter.kind, scene.camera.filter.radius) == (expected.kind, pytest.approx(expected.radius))
+    assert scene.camera.filter.shape == expected.shape
+
+
+def test_filters_that_can_not_be(tmp_path: Path) -> None:
+    assert sensor(tmp_path, FILM).camera.filter is None
+    unknown = sensor(tmp_path, FILM.replace("</film>", '<rfilter type="sinc"/></film>'))
+    assert unknown.camera.filter is None
+    assert "the box filter replaces it" in unknown.warnings[0]
+    wide = '<rfilter type="lanczos"><integer name="lobes" value="900"/></rfilter></film>'
+    scene = sensor(tmp_path, FILM.replace("</film>", wide))
+    assert scene.camera.filter == PixelFilter("Lanczos", 8.0)
+    assert "can't reach 900 pixels" in scene.warnings[0]
+    flat = '<rfilter type="gaussian"><float name="stddev" value="0"/></rfilter></film>'
+    scene = sensor(tmp_path, FILM.replace("</film>", flat))
+    assert scene.camera.filter == PixelFilter("Gaussian", 2.0, (0.5,))
+    assert "must be above zero" in scene.warnings[0]
 
 
 CROP = (

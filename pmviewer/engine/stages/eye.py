@@ -18,6 +18,7 @@ from pmviewer.render.direct.choice import CHOICES
 from pmviewer.render.direct.outline import outline_pixels
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
+from pmviewer.render.filter import BOX, add_weights, filter_of, has_signs
 from pmviewer.render.gather.gather_points import POINT_COLUMNS, gather_points
 from pmviewer.render.given import PassData
 from pmviewer.render.path import path_pass
@@ -33,6 +34,9 @@ def render_into(
 ) -> NDArray[np.int64]:
     """One sample a pixel more, of the path tracer or by maps. Returns the counts of `pmviewer.render.record`."""
     pixels = len(film.sums)
+    signed = has_signs(given.eye)
+    if signed and film.weights is None:
+        film.weights = np.zeros((pixels, 2))
     tile = tile_size(pixels, given.eye[0], pool.threads, lights_asked(given.virtual))
 
     def task(first: int) -> Callable[[], NDArray[np.int64]]:
@@ -43,6 +47,8 @@ def render_into(
                 path_pass(given.scene, given.eye, film.sums, counts, first, last)
             else:
                 eye_pass(given, outline, film.radii, film.sums, counts, first, last)
+            if signed:
+                add_weights(given.eye, outline, film.weights, first, last)
             return counts
 
         return run
@@ -65,8 +71,9 @@ def outline_of(scene: OpenScene, camera: CameraPose, film: Film, settings: Setti
         return np.zeros(0, np.uint8)
     if (film.width, film.height) != (camera.width, camera.height):
         camera = replace(camera, width=film.width, height=film.height)
-    key = ("outline", scene.uid, camera)
-    return store.get(key, lambda: outline_pixels(scene.scene, camera), lambda pixels: pixels.nbytes)
+    reach = max(filter_of(camera.filter, settings.render).radius - BOX.radius, 0.0)
+    key = ("outline", scene.uid, camera, reach)
+    return store.get(key, lambda: outline_pixels(scene.scene, camera, reach), lambda pixels: pixels.nbytes)
 
 
 def gather_rays_of(given: PassData, x: int, y: int, pool: WorkPool) -> NDArray[np.float32]:

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.focus import focused
 from pmviewer.engine.frame import PhotonCloud
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
@@ -195,7 +196,8 @@ def prepare_importance(scene: OpenScene, settings: Settings) -> None:
     pool = WorkPool(1)
     try:
         few = settings.model_copy(update={"importance": settings.importance.model_copy(update={"N": 4})})
-        camera, plan = resolve_camera(scene.scene, settings.camera), plan_of(settings, scene.traits)
+        camera = focused(scene.flat, resolve_camera(scene.scene, settings.camera))
+        plan = plan_of(settings, scene.traits)
         stage = ImportanceStage(scene, few, plan, camera, 0.0, pool, StageStore(0), Tally())
         stage.run(0)
         one = np.ones(1, np.float32)

@@ -21,7 +21,7 @@ from pmviewer.render.direct.choice import CHOICES
 from pmviewer.render.direct.shadow import NO_SHADOWS
 from pmviewer.render.given import PassData
 from pmviewer.render.lookup import NO_RADIANCE_PHOTONS
-from pmviewer.render.record import EYE_DTYPE, Evaluation, eye_record
+from pmviewer.render.record import Evaluation, eye_dtype, eye_record
 from pmviewer.settings.access import Settings
 
 
@@ -37,7 +37,7 @@ class RenderedPass:
 
 
 def pass_record(camera: CameraPose, settings: Settings, plan: Plan, maps: PassMaps, index: int) -> NDArray[np.void]:
-    """The EYE_DTYPE record (1,) of pass `index`, which looks these maps up."""
+    """The eye record (1,) of pass `index`, which looks these maps up."""
     return eye_record(camera, settings, index, _evaluation(settings, plan, maps))
 
 
@@ -97,11 +97,16 @@ def pass_data(
     )
 
 
+def blank_eye(settings: Settings, plan: Plan) -> NDArray[np.void]:
+    """An eye record (1,) without contents. The free camera is a pinhole."""
+    return np.zeros(1, eye_dtype(plan.lens and not settings.free_camera.on, plan.filtered))
+
+
 def blank_pass(scene: NDArray[np.void], settings: Settings, plan: Plan) -> PassData:
     """The records of a pass with these settings, of the types that kernels compile for and without contents: for calls
     for no pixel."""
     shadows = shadow_record(blank_grid(), 1) if plan.shadows else None
-    given = pass_data(scene, np.zeros(1, EYE_DTYPE), settings, plan, blank_maps(settings, plan), shadows)
+    given = pass_data(scene, blank_eye(settings, plan), settings, plan, blank_maps(settings, plan), shadows)
     if plan.virtual:
         given = given._replace(virtual=np.zeros(1, virtual_dtype(settings.virtual)))
     return given._replace(cache=np.zeros(1, CACHE_RECORD)) if plan.cache else given

@@ -111,8 +111,9 @@ class WeightedFilm(Film):
         planes = super().planes()
         if self.weighted:
             for term, base in (("indirect", W_INDIRECT), ("specular", W_SPECULAR)):
-                light = self._light(CHANNELS + base)
-                planes[..., PLANES[term]] += light.reshape(self.height, self.width, 3).astype(np.float32)
+                light = np.zeros_like(planes)
+                light[..., PLANES[term]] = self._light(CHANNELS + base).reshape(self.height, self.width, 3)
+                planes += self.weighed(light)
         return planes
 
     def _light(self, base: int) -> F8:

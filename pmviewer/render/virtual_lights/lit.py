@@ -36,7 +36,7 @@ from pmviewer.maps.virtual_lights import (
     W_SUM,
 )
 from pmviewer.render.direct.direct import visible
-from pmviewer.render.pixel import INDIRECT, SPECULAR
+from pmviewer.render.pixel import INDIRECT, SPECULAR, weighed
 from pmviewer.render.planes import CHANNELS
 from pmviewer.render.record import C_DROPPED, C_RAYS, C_SHADOW_RAYS
 from pmviewer.render.virtual_lights.light import scattered, towards, weight_of
@@ -121,9 +121,9 @@ def from_virtual_lights(given, si, beta, pixel, whole):
         if weighted and _f4(0.0) < G:
             target = _i8(base + W_F)
             film[pixel.number, base + W_G] += _f8(throughput * each * G)
-        film[pixel.number, target] += _f8(F[0])
-        film[pixel.number, target + 1] += _f8(F[1])
-        film[pixel.number, target + 2] += _f8(F[2])
+        film[pixel.number, target] += weighed(pixel, _f8(F[0]))
+        film[pixel.number, target + 1] += weighed(pixel, _f8(F[1]))
+        film[pixel.number, target + 2] += weighed(pixel, _f8(F[2]))
     film[pixel.number, CHANNELS + W_LIGHTS] += _f8(m)
     if weighted:
         albedo, counted = normalisation(given, si, pixel)

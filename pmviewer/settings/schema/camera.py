@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pmviewer.settings.needs import Need
+from pmviewer.settings.needs import LENS, Need
 from pmviewer.settings.schema.base import Auto, Group, Vec3, setting
 
 PERSPECTIVE = Need(
@@ -93,6 +93,28 @@ class CameraSettings(Group):
         ge=-1000.0,
         le=1000.0,
         title="shift down",
+    )
+    aperture: float | Auto = setting(
+        "auto",
+        "Radius of the lens: what is nearer or farther than camera.focus gets blurred. 0 is a pinhole, which shows all "
+        "sharp. Automatic: the scene file's.",
+        stage="image",
+        scale="linear",
+        unit="units",
+        ge=0.0,
+        le=1e15,
+    )
+    focus: float | Auto = setting(
+        "auto",
+        "Distance of what the lens shows sharp, along the view. Automatic: the scene file's, or that of the surface in "
+        "the middle of the picture.",
+        stage="image",
+        scale="log",
+        unit="units",
+        ge=1e-12,
+        le=1e15,
+        title="focus distance",
+        needs=(LENS,),
     )
     width: int | Auto = setting(
         "auto", "Image width; auto is the scene file's.", stage="image", scale="integer", unit="px", ge=1, le=16384

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict
 
-from pmviewer.settings.needs import BOTH_MAPS, IMPORTANCE, SHADOW_PHOTONS, Need, Needs, never
+from pmviewer.settings.needs import BOTH_MAPS, IMPORTANCE, LENS, SHADOW_PHOTONS, Need, Needs, never
 from pmviewer.settings.schema.base import Auto, Group, setting, subgroup
 from pmviewer.settings.schema.virtual import VIRTUAL_LIGHTS, WEIGHTED
 
@@ -396,6 +396,19 @@ class ProjectionOverlay(Group):
     depth: bool = setting(True, "Hide cells behind surfaces.", stage="display", scale="switch", title="depth test")
 
 
+class FocusOverlay(Group):
+    """Focal plane of the lens"""
+
+    show: bool = setting(
+        False,
+        "Draw the plane that the lens shows sharp: what lies behind it is tinted. Ctrl+click in the picture moves it.",
+        stage="display",
+        scale="switch",
+    )
+    opacity: float = setting(0.35, "Opacity of the plane.", stage="display", scale="linear", ge=0.05, le=1.0)
+    depth: bool = setting(True, "Hide it behind surfaces.", stage="display", scale="switch", title="depth test")
+
+
 class Overlays(Group):
     """Overlays"""
 
@@ -411,6 +424,7 @@ class Overlays(Group):
     paths: PathOverlay = subgroup(PathOverlay, "photon paths", TRACED)
     gather: GatherOverlay = subgroup(GatherOverlay, "gather rays", TRACED, GATHER_RAYS)
     projection: ProjectionOverlay = subgroup(ProjectionOverlay, "projection maps", TRACED, PLAIN_EMISSION, PROJECTED)
+    focal: FocusOverlay = subgroup(FocusOverlay, "focal plane", LENS)
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from pmviewer.settings.needs import FOLLOWED, Need
-from pmviewer.settings.schema.base import Group, setting
+from pmviewer.settings.schema.base import Auto, Group, setting
 
 FOLLOWED_OR_PATHS = Need(lambda f: f.plan.path or FOLLOWED.holds(f), "No mirror or glass in this scene.")
 NO_PATHS = Need(lambda f: not f.plan.path, "The path tracer treats all pixels alike.")
@@ -47,6 +47,24 @@ class Render(Group):
         ge=0,
         le=256,
         needs=(NO_PATHS,),
+    )
+    filter: Literal["auto", "box", "tent", "Gaussian", "Mitchell-Netravali", "Catmull-Rom", "Lanczos"] = setting(
+        "auto",
+        "Reconstruction filter: how what lies around a pixel counts in it. box: the pixel alone. tent, Gaussian: "
+        "softer. Mitchell-Netravali, Catmull-Rom, Lanczos: ever sharper, with negative parts that ring at edges. "
+        "Automatic: the scene file's, or box.",
+        stage="image",
+        scale="choice",
+    )
+    filter_radius: float | Auto = setting(
+        "auto",
+        "How far from its middle a pixel sees; other radii than the automatic one stretch the filter, and give Lanczos "
+        "as many lobes. Automatic: the scene file's, or box 0.5, tent 1, Lanczos 3, all others 2.",
+        stage="image",
+        scale="linear",
+        unit="px",
+        ge=0.1,
+        le=8.0,
     )
     seed: int = setting(1, "Seed of every random stream.", stage="photons", scale="integer", ge=0, le=2**31 - 1)
     passes: int = setting(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pmviewer.viewer.overlays.fates import Fates
+from pmviewer.viewer.overlays.focal_plane import FocalPlane
 from pmviewer.viewer.overlays.frustum import Frustum
 from pmviewer.viewer.overlays.gather_rays import GatherRays
 from pmviewer.viewer.overlays.importons import Importons
@@ -30,6 +31,7 @@ OVERLAYS: tuple[type[Overlay], ...] = (
     Paths,
     GatherRays,
     ProjectionMaps,
+    FocalPlane,
     Frustum,
     Inspected,
 )

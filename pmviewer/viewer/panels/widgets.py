@@ -180,7 +180,7 @@ class SettingWidgets:
         elif info.kind is int:
             changed, number = imgui.slider_int(name, int(current), int(low), int(high), text, _FLAGS)
         elif relative:
-            changed, number = imgui.drag_float(name, current, 0.1, low, high, text, _FLAGS)
+            changed, number = imgui.drag_float(name, current, _speed(info, current), low, high, text, _FLAGS)
         else:
             changed, number = imgui.slider_float(name, current, low, high, text, _FLAGS)
             number = round(number, max(0, 3 - math.floor(math.log10(high - low))))
@@ -188,6 +188,12 @@ class SettingWidgets:
             return None
         number = info.kind(round(number)) if info.kind is int else float(number)
         return number if number != current else None
+
+
+def _speed(info: SettingInfo, value: float) -> float:
+    """Change per point of dragging over a range too wide for a slider: of lengths, which scenes have of any size, a
+    hundredth."""
+    return max(0.01 * abs(value), 1e-3) if info.unit == "units" else 0.1
 
 
 def slider_share(info: SettingInfo, value: float) -> float:

@@ -18,7 +18,7 @@ from pmviewer.viewer.overlays.overlay import Source
 from pmviewer.viewer.shortcuts import INSPECT_KEY, is_held
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport.hud import draw_hud
-from pmviewer.viewer.viewport.navigation import Clicks, Navigation
+from pmviewer.viewer.viewport.navigation import DRAG_THRESHOLD, Clicks, Navigation
 from pmviewer.viewer.viewport.picking import picked
 from pmviewer.viewer.viewport.picture import Picture
 from pmviewer.viewer.viewport.target import Fit, Target
@@ -167,6 +167,8 @@ class Viewport:
             imgui.set_item_key_owner(imgui.Key.mouse_wheel_y)
         if hovered and self.state.settings.overlays.gather.show and is_held(INSPECT_KEY):
             self._inspect()
+        if hovered and _clicked_with_ctrl():
+            self._focus()
         pose = self.state.live_camera() if hovered or active or self.state.flying else None
         if self._drags_split(hovered, active):
             pose = None
@@ -238,15 +240,30 @@ class Viewport:
         left, top, width, height = self.rectangle()
         return (mouse.x - self.origin[0] - left) / width, (mouse.y - self.origin[1] - top) / height
 
+    def _focus(self) -> None:
+        """Focus the lens on what is under the mouse."""
+        place, camera = self._place_under_mouse(), self.shown_camera()
+        if place is not None and camera is not None:
+            self.state.focus_at(camera, place[0] * camera.width, place[1] * camera.height)
+
     def pixel_under_mouse(self) -> tuple[int, int] | None:
         """Pixel (x, y) of the image, or None when the mouse is elsewhere."""
-        frame = self.state.frame
-        if frame is None:
+        frame, place = self.state.frame, self._place_under_mouse()
+        if frame is None or place is None:
             return None
+        return int(place[0] * frame.camera.width), int(place[1] * frame.camera.height)
+
+    def _place_under_mouse(self) -> tuple[float, float] | None:
+        """Place in the picture from (0, 0) top left to (1, 1), or None when the mouse is elsewhere."""
         u, v = self.mouse_in_picture()
-        if not (0 <= u < 1 and 0 <= v < 1):
-            return None
-        return int(u * frame.camera.width), int(v * frame.camera.height)
+        return (u, v) if 0 <= u < 1 and 0 <= v < 1 else None
+
+
+def _clicked_with_ctrl() -> bool:
+    """Whether the left button was released where it was pressed, with Ctrl held."""
+    io = imgui.get_io()
+    still = io.mouse_drag_max_distance_sqr[imgui.MouseButton_.left] < DRAG_THRESHOLD**2
+    return io.key_ctrl and imgui.is_mouse_released(imgui.MouseButton_.left) and still
 
 
 def is_data_view(display: Display) -> bool:

@@ -25,12 +25,14 @@ _FILM_DIAGONAL_MM = math.hypot(36, 24)
 _LEAST_FOV, _LARGEST_FOV = 1e-3, 179.0
 _UNPOINTED = frozenset(("irradiancemeter", "fluencemeter", "distant", "mdistant"))
 _INSTEAD = {
-    "thinlens": "everything is sharp, the size of its lens has no effect",
     "perspective_rdist": "it is shown without its distortion",
-    "telecentric": "it is shown as an orthographic camera, everything is sharp",
     "spherical": "a perspective camera 120° wide in its direction replaces it",
     "radiancemeter": "a perspective camera in its direction replaces it",
 }
+_LENSES = {"thinlens": "perspective", "telecentric": "orthographic"}
+"""Cameras with a lens, and what they would be without."""
+_FAR_CLIP = 1e4
+"""Mitsuba's own, which is also where its lenses are focused by default."""
 _A = {"perspective": "a perspective", "orthographic": "an orthographic"}
 _SPHERICAL_FOV = 120.0
 _PROBE_SIDE = 512
@@ -78,18 +80,19 @@ def _camera(p: Properties, film: Film, center: NDArray[np.float64]) -> NamedCame
         raise _Unusable(f"{element} looks nowhere in particular")
     if p.type in _INSTEAD:
         document.warn(f"{element}: {_INSTEAD[p.type]}.", element)
-    elif p.type not in ("perspective", "orthographic"):
+    elif p.type not in ("perspective", "orthographic", *_LENSES):
         p.type = "orthographic" if "orthographic" in p.type.lower() else "perspective"
         document.warn(f"{element} is approximated by {_A[p.type]} camera.", element)
-    p.known("aperture_radius", "focus_distance", "kc", "shutter_open", "shutter_close", "srf")
+    p.known("kc", "shutter_open", "shutter_close", "srf")
     if p.type == "radiancemeter" and (film.width, film.height) == (1, 1):
         film = Film(_PROBE_SIDE, _PROBE_SIDE, (_PROBE_SIDE, _PROBE_SIDE))
     origin, target, up, m = _placed(p, center)
     camera = Camera(origin, target, up, fov=40.0, mirrored=mirrors(m))
     camera = _orthographic(p, camera, film, m) if p.type in ("orthographic", "telecentric") else _lens(p, camera, film)
     near, far = _clip(p)
+    aperture, focus = _thin_lens(p, far)
     p.warn_unused("film")
-    camera = replace(camera, near=near, far=far)
+    camera = replace(camera, near=near, far=far, aperture=aperture, focus=focus, filter=film.filter)
     try:
         check_camera(camera, document.diagnostics.path, element.line)
     except SceneError as error:
@@ -152,6 +155,25 @@ def _clip(p: Properties) -> tuple[float, float]:
         return near, far
     p.document.warn(f"'near_clip' and 'far_clip' of {p.element} leave nothing to see: nothing is clipped.", p.element)
     return 0.0, math.inf
+
+
+def _thin_lens(p: Properties, far: float) -> tuple[float, float | None]:
+    """Radius of the lens and distance in focus. Sensors of other types may name both, and have no lens."""
+    if p.type not in _LENSES:
+        p.known("aperture_radius", "focus_distance")
+        return 0.0, None
+    if "aperture_radius" not in p:
+        p.document.warn(f"{p.element} has no 'aperture_radius': everything is sharp.", p.element)
+    aperture, focus = p.number("aperture_radius", 0.0), p.number("focus_distance", min(far, _FAR_CLIP))
+    if not aperture >= 0:
+        what = f"'aperture_radius' of {p.element} can't be {aperture:g}: everything is sharp."
+        p.document.warn(what, p.values["aperture_radius"])
+        aperture = 0.0
+    if not focus > 0:
+        what = f"'focus_distance' of {p.element} can't be {focus:g}: the middle of the picture is sharp."
+        p.document.warn(what, p.values["focus_distance"])
+        return aperture, None
+    return aperture, focus
 
 
 def _orthographic(p: Properties, camera: Camera, film: Film, m: Matrix) -> Camera:

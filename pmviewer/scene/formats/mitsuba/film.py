@@ -1,25 +1,32 @@
-"""Film elements: the size of the picture, and which part of the film it is."""
+"""Film elements: the size of the picture, which part of the film it is, and how pixels are reconstructed."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 from pmviewer.scene.clean import LARGEST_SIDE
+from pmviewer.scene.description import PixelFilter
 from pmviewer.scene.formats.mitsuba.document import Properties
 
 DEFAULT_SIZE = (768, 576)
+WIDEST = 8.0
+"""Pixels; the setting of a filter's radius has the same bound."""
+_NARROWEST = 0.1
 _KNOWN = ("hdrfilm", "ldrfilm", "tiledhdrfilm", "mfilm", "specfilm")
 
 
 @dataclass(frozen=True)
 class Film:
-    """`width` × `height` pixels cut out of `full` at the offset `left`, `top`."""
+    """`width` × `height` pixels cut out of `full` at the offset `left`, `top`, with a reconstruction filter, None where
+    the file names none."""
 
     width: int
     height: int
     full: tuple[int, int]
     left: int = 0
     top: int = 0
+    filter: PixelFilter | None = None
 
     @property
     def cropped(self) -> bool:
@@ -43,14 +50,54 @@ def read_film(sensor: Properties) -> Film:
     film = Properties(films[0], sensor.document)
     if film.type not in _KNOWN:
         film.document.warn(f"{film.element} is read as an hdrfilm.", film.element)
+    chosen = _filter(film)
     default = (1, 1) if film.type == "mfilm" else DEFAULT_SIZE
     width, height = _size(film, film.integer("width", default[0]), film.integer("height", default[1]))
     across, down = film.integer("crop_width", width), film.integer("crop_height", height)
     left, top = film.integer("crop_offset_x", 0), film.integer("crop_offset_y", 0)
     if not (0 <= left < left + across <= width and 0 <= top < top + down <= height):
         film.document.warn(f"The crop window of {film.element} leaves the film: it is ignored.", film.element)
-        return Film(width, height, (width, height))
-    return Film(across, down, (width, height), left, top)
+        return Film(width, height, (width, height), filter=chosen)
+    return Film(across, down, (width, height), left, top, chosen)
+
+
+def _filter(film: Properties) -> PixelFilter | None:
+    """The film's <rfilter>. Where there is none Mitsuba 3 takes a Gaussian, and this program the box."""
+    given = film.objects("rfilter")
+    if not given:
+        return None
+    p = Properties(given[0], film.document)
+    kinds: dict[str, Callable[[], PixelFilter]] = {
+        "box": lambda: PixelFilter("box", _positive(p, "radius", 0.5)),
+        "tent": lambda: PixelFilter("tent", _positive(p, "radius", 1.0)),
+        "gaussian": lambda: _gaussian(_positive(p, "stddev", 0.5)),
+        "mitchell": lambda: PixelFilter("Mitchell-Netravali", 2.0, (p.number("b", 1 / 3), p.number("c", 1 / 3))),
+        "catmullrom": lambda: PixelFilter("Catmull-Rom", 2.0),
+        "lanczos": lambda: PixelFilter("Lanczos", float(p.integer("lobes", 3))),
+    }
+    if p.type not in kinds:
+        p.document.warn(f"{p.element} is not known: the box filter replaces it.", p.element)
+        return None
+    found = kinds[p.type]()
+    p.warn_unused()
+    radius = min(max(found.radius, _NARROWEST), WIDEST)
+    if radius != found.radius:
+        what = f"{p.element} can't reach {found.radius:g} pixels far: {radius:g} are taken."
+        p.document.warn(what, p.element)
+        found = _gaussian(radius / 4) if p.type == "gaussian" else replace(found, radius=radius)
+    return found
+
+
+def _gaussian(deviation: float) -> PixelFilter:
+    return PixelFilter("Gaussian", 4 * deviation, (deviation,))
+
+
+def _positive(p: Properties, name: str, default: float) -> float:
+    value = p.number(name, default)
+    if value > 0:
+        return value
+    p.document.warn(f"'{name}' of {p.element} must be above zero: {default:g} replaces it.", p.values[name])
+    return default
 
 
 def _size(film: Properties, width: int, height: int) -> tuple[int, int]:

@@ -1,0 +1,178 @@
+"""Reconstruction filters: their formulas against Mitsuba's, where samples fall, and the edge that a film shows."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pmviewer.kernels.compile.jit import kernel
+from pmviewer.render.film import Film
+from pmviewer.render.filter import BOX, DEFAULTS, evaluate, filter_of, has_signs, place_in_filter
+from pmviewer.render.planes import CHANNELS, PLANES
+from pmviewer.render.record import EYE_DTYPE, eye_record
+from pmviewer.scene.analysis import analyse
+from pmviewer.scene.description import Camera, Parallelogram, PixelFilter, Scene, Shape
+from pmviewer.settings.access import Settings
+from tests.render.test_lens import PINHOLE
+from tests.support.scenes import diffuse, rendered, settings_of
+
+X = np.array([0, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 1.9, 2.5])
+MITSUBA = {  # mitsuba 3.9.1: load_dict({"type": …}).eval(x) for x in X
+    PixelFilter("tent", 1.0): [1, 0.75, 0.5, 0.25, 0, 0, 0, 0, 0],
+    PixelFilter("tent", 2.0): [1, 0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.05, 0],
+    PixelFilter("Gaussian", 2.0, (0.5,)): [
+        0.999247, 0.882167, 0.606423, 0.324243, 0.13496, 0.043603, 0.010758, 0.000388, 0],
+    PixelFilter("Gaussian", 4.0, (1.0,)): [
+        0.999247, 0.968614, 0.882167, 0.754728, 0.606423, 0.45757, 0.324243, 0.164071, 0.043603],
+    PixelFilter("Mitchell-Netravali", 2.0, (1 / 3, 1 / 3)): [
+        0.888889, 0.782118, 0.534722, 0.256076, 0.055556, -0.023437, -0.034722, -0.002944, 0],
+    PixelFilter("Mitchell-Netravali", 2.0, (0.2, 0.4)): [
+        0.933333, 0.816146, 0.545833, 0.244271, 0.033333, -0.042188, -0.045834, -0.003567, 0],
+    PixelFilter("Catmull-Rom", 2.0): [1, 0.867188, 0.5625, 0.226562, 0, -0.070312, -0.0625, -0.0045, 0],
+    PixelFilter("Lanczos", 3.0): [
+        1, 0.890067, 0.607927, 0.27019, 0, -0.132871, -0.135095, -0.02377, 0.024317],
+    PixelFilter("Lanczos", 2.0): [1, 0.877354, 0.573159, 0.235347, 0, -0.084725, -0.063684, -0.002714, 0],
+}  # fmt: skip
+NAMED = {"tent": 0, "Gaussian": 2, "Mitchell-Netravali": 4, "Catmull-Rom": 6, "Lanczos": 7}
+
+
+@pytest.mark.parametrize("chosen", MITSUBA)
+def test_formulas_are_mitsubas(chosen):
+    near = 1e-3 if chosen.kind == "Gaussian" else 1e-5  # Mitsuba's is a fitted polynomial
+    assert evaluate(chosen, X) == pytest.approx(MITSUBA[chosen], abs=near)
+    assert evaluate(chosen, -X) == pytest.approx(MITSUBA[chosen], abs=near)
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_defaults_are_mitsubas(name):
+    assert list(MITSUBA)[NAMED[name]] == DEFAULTS[name]
+
+
+def test_what_the_settings_choose():
+    def of(own, **render):
+        return filter_of(own, Settings(render=render).render)
+
+    lanczos = PixelFilter("Lanczos", 2.0)
+    assert of(None) == BOX
+    assert of(lanczos) == lanczos
+    assert of(lanczos, filter="box") == BOX
+    assert of(None, filter="Gaussian", filter_radius=1.0) == PixelFilter("Gaussian", 1.0, (0.25,))
+    assert of(lanczos, filter_radius=4.0) == PixelFilter("Lanczos", 4.0)
+    wide = of(None, filter="Catmull-Rom", filter_radius=4.0)
+    assert evaluate(wide, 2 * X) == pytest.approx(MITSUBA[PixelFilter("Catmull-Rom", 2.0)], abs=1e-5)
+
+
+def record_of(**render):
+    return eye_record(PINHOLE, Settings(render=render), 0)
+
+
+def test_the_box_has_no_part_in_the_record():
+    assert record_of().dtype == EYE_DTYPE
+    assert record_of(filter="box").dtype == EYE_DTYPE
+    assert record_of(filter="tent").dtype != EYE_DTYPE
+    assert [name for name in DEFAULTS if has_signs(record_of(filter=name))] == [
+        "Mitchell-Netravali",
+        "Catmull-Rom",
+        "Lanczos",
+    ]
+
+
+@kernel
+def _places(eyes, out):
+    """Rows of place and weight on a lattice of the unit square, out (n·n, 3)."""
+    n = int(math.sqrt(len(out)))
+    for i in range(len(out)):
+        u, v = np.float32((i % n + 0.5) / n), np.float32((i // n + 0.5) / n)
+        out[i, 0], out[i, 1], out[i, 2] = place_in_filter(eyes[0], u, v)
+
+
+@pytest.mark.parametrize("name", ["box", *NAMED])
+def test_weighted_places_are_distributed_as_the_filter(name):
+    """The weighted share of places left of x is ∫f up to x over all of ∫f, and the weights have the mean 1."""
+    radius = {"box": 0.8}.get(name, DEFAULTS[name].radius)
+    out = np.empty((2000 * 2000, 3))
+    _places(record_of(filter=name, filter_radius=radius), out)
+    fine = (np.arange(200_000) + 0.5) / 100_000 * radius - radius
+    f = evaluate(PixelFilter(name, radius, DEFAULTS[name].shape), fine)
+    integral = np.cumsum(f) / f.sum()
+    assert out[:, 2].mean() == pytest.approx(1, abs=4e-3)
+    for axis in (0, 1):
+        place = out[:, axis] - 0.5
+        assert np.abs(place).max() <= radius * (1 + 1e-6)
+        for x in np.linspace(-radius, radius, 13)[1:-1]:
+            expected = np.interp(x, fine, integral)
+            assert out[place < x, 2].sum() / len(out) == pytest.approx(expected, abs=4e-3), (name, x)
+
+
+EDGE = 15.3
+"""Where the light begins, in pixels from the left."""
+
+
+def edge_scene(own=None, aperture=1e-6):
+    """A light on the right of a sharp edge across the picture's columns; the camera looks along −z. Its lens makes no
+    difference but that kernels are compiled for all tests at once."""
+    width = 2 * math.tan(math.radians(20)) * 5.0
+    left = (EDGE / 32 - 0.5) * width
+    light = Shape("light", Parallelogram((left, -9, -5.0), (9, 0, 0), (0, 18, 0)), 0, (1.0,) * 3)
+    pose = Camera((0, 0, 0), (0, 0, -1), (0, 1, 0), 40.0, aperture=aperture, focus=5.0, filter=own)
+    return Scene("edge", None, (light,), (diffuse(),), (), pose, 32, 32)
+
+
+def small_box(name):
+    """A box that is not the plain one."""
+    return {"filter_radius": 0.75} if name == "box" else {}
+
+
+def edge_of(name, x):
+    """Light of a pixel whose middle lies x pixels from the edge, by a sum over the filter that Mitsuba's numbers
+    above were compared with."""
+    chosen = PixelFilter("box", 0.75) if name == "box" else DEFAULTS[name]
+    fine = np.linspace(-chosen.radius, chosen.radius, 20_001)
+    f = evaluate(chosen, fine)
+    return np.array([f[fine > -d].sum() for d in x]) / f.sum()
+
+
+@pytest.mark.parametrize("method", ["path", "progressive"])
+@pytest.mark.parametrize("name", DEFAULTS)
+def test_an_edge_has_the_filters_shape(name, method):
+    """Overshoots of the signed ones included; the progressive method with its extra rays at outlines."""
+    settings = settings_of(render={"method": method, "filter": name, **small_box(name)}, photons={"N": 100})
+    passes = 64 if name in ("box", "tent", "Gaussian") else 256
+    row = rendered(edge_scene(), settings, passes).film.planes()[..., PLANES["emission"]].mean(axis=(0, 2), dtype=float)
+    expected = edge_of(name, np.arange(32) + 0.5 - EDGE)
+    print(f"{name}, {method}: deviation {np.abs(row - expected).max():.4f}, lowest {row.min():.4f}")
+    assert row == pytest.approx(expected, abs=0.008)
+    if name == "Lanczos":
+        assert row.min() < -0.02
+        assert row.max() > 1.02
+
+
+def test_a_plain_wall_is_plain_after_one_pass():
+    """Though its samples count ±1.5 each: they are divided by what they count."""
+    settings = settings_of(render={"method": "path", "filter": "Lanczos"})
+    for passes in (1, 3):
+        image = rendered(edge_scene(), settings, passes).film.planes()[..., PLANES["emission"]]
+        assert image[:, 20:].min() > 0.999
+        assert image[:, 20:].max() < 1.001
+
+
+def test_pixels_whose_weights_cancel_have_the_mean_of_those_around():
+    film = Film(3, 1)
+    film.passes = 2
+    film.sums[:, :3] = [[4.0] * 3, [0.3] * 3, [8.0] * 3]
+    film.weights = np.array([[2.0, 2.0], [0.1, 2.0], [2.0, 2.0]])
+    assert film.planes()[0, :, 0] == pytest.approx([2.0, 3.0, 4.0])
+    assert film.planes().shape == (1, 3, CHANNELS)
+
+
+def test_threads_change_nothing():
+    """A lens and a signed filter together, with the extra rays of outlines."""
+    scene = edge_scene(PixelFilter("Mitchell-Netravali", 2.0, (1 / 3, 1 / 3)), 0.2)
+    assert analyse(scene).filters == (("auto", scene.camera.filter),)
+    settings = settings_of(camera={"focus": 3.0}, photons={"N": 500})
+    one, two = (rendered(scene, settings, 3, threads) for threads in (1, 2))
+    assert np.array_equal(one.film.sums, two.film.sums)
+    assert np.array_equal(one.film.weights, two.film.weights)
+    assert one.film.planes().tobytes() == two.film.planes().tobytes()
