@@ -8,11 +8,13 @@ from typing import Literal, NamedTuple
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
 from pmviewer.scene.analysis import SceneTraits
-from pmviewer.settings.access import Settings
+from pmviewer.settings.access import Settings, with_values
 from pmviewer.settings.schema.importance import WITHOUT_IMPORTANCE, Deposit
 
 MANY_LIGHTS = 8
 """From so many lights on, the automatic choice of lights asks the photons."""
+EXACT_GLASS = ("path", "virtual lights")
+"""Methods that let no light pass thin glass by other rules than it would."""
 EXPONENTS = {"off": 0, "square": 2, "cube": 3}
 Emission = Literal["off", "Peter-Pietrek", "Christensen discard", "Christensen keep"]
 UNFOUND_BY_PATHS = (
@@ -34,7 +36,8 @@ class Plan:
     `cache` whether diffuse surfaces gather through an irradiance cache, `shadows` whether shadow photons save shadow
     rays, `importance` whether there are importance maps, `deposition` which photons maps store, `emission` how
     importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0 without; `virtual`
-    is whether virtual lights bring the indirect light; `warnings`
+    is whether virtual lights bring the indirect light; `thin_glass` are the rules other than "exact" by which light
+    passes some panes; `warnings`
     are sentences for the log about what was asked for and can't be."""
 
     path: bool = False
@@ -49,6 +52,7 @@ class Plan:
     corners: bool = False
     cache: bool = False
     virtual: bool = False
+    thin_glass: tuple[str, ...] = ()
     shadows: bool = False
     importance: bool = False
     deposition: Deposit = "all"
@@ -108,6 +112,9 @@ class Plan:
 def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     """The stages that the method needs in this scene."""
     plan = _photon_plan(settings, traits)
+    plan = replace(
+        plan, thin_glass=thin_rules(settings, traits), warnings=(*plan.warnings, *_of_thin(settings, traits))
+    )
     if not plan.photons:
         return plan
     how = settings.importance
@@ -134,6 +141,27 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     return replace(plan, importance=True)
 
 
+def thin_rules(settings: Settings, traits: SceneTraits) -> tuple[str, ...]:
+    """The rules "ignored" and "tinted" that some panes of the scene go by; the path tracer and virtual lights take all
+    glass as it is."""
+    if settings.render.method in EXACT_GLASS:
+        return ()
+    by_setting = settings.render.thin_glass
+    rules = {by_setting if rule == "by setting" else rule for rule in traits.thin_glass}
+    return tuple(sorted(rules - {"exact"}))
+
+
+def _of_thin(settings: Settings, traits: SceneTraits) -> tuple[str, ...]:
+    """A sentence for what was asked of thin glass and is not done."""
+    if settings.render.method == "virtual lights" and thin_rules(
+        with_values(settings, {"render.method": "progressive"}), traits
+    ):
+        return ("Virtual lights take thin glass as it is: the light behind it comes from the caustic map.",)
+    if thin_rules(settings, traits) and settings.direct.shadow_photons:
+        return ("Shadow rays are all cast: shadow photons don't know what thin glass lets through.",)
+    return ()
+
+
 def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
     """The plan without importance."""
     method, glossy = settings.render.method, settings.photons.glossy
@@ -147,7 +175,11 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
     if method == "path":
         warnings = (UNFOUND_BY_PATHS,) if traits.has_delta_lights and traits.has_delta else ()
         return Plan(path=True, skipped=(("light pass", "the path tracer uses no photons"),), warnings=warnings)
-    if not traits.follows(glossy):
+    thin = thin_rules(settings, traits)
+    if thin == ("ignored",) and not traits.follows_beside_thin(glossy):
+        caustics = 0
+        skipped.append(("caustic map", "thin glass is ignored, and there is no other glass, mirror or smooth gloss"))
+    elif not traits.follows(glossy):
         caustics = 0
         skipped.append(("caustic map", "no mirror or glass, nor smooth gloss, in the scene"))
     if method in ("global map", "caustic map"):
@@ -171,9 +203,10 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
     if choice == "power":
         skipped.append(("light choice by photons", why))
     how = _terms(settings)
-    shadows = settings.direct.shadow_photons and traits.n_lights > 0
+    shadows = settings.direct.shadow_photons and traits.n_lights > 0 and not thin
     if not shadows:
-        skipped.append(("shadow photons", "direct.shadow_photons is off"))
+        why = "they don't know what thin glass lets through" if thin else "direct.shadow_photons is off"
+        skipped.append(("shadow photons", why))
     shown = Plan(
         direct=how.direct == "accurate",
         followed_direct=True,

@@ -15,7 +15,7 @@ from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian, sh
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import CACHE_SALT, HEMISPHERE
 from pmviewer.kernels.random import draw4, hash3
-from pmviewer.kernels.vector import dot, largest, luminance
+from pmviewer.kernels.vector import dot, largest, luminance, mul
 from pmviewer.maps.hemisphere import cell_direction, irradiance_and_gradients
 from pmviewer.maps.irradiance_cache import (
     FOOTPRINT,
@@ -28,12 +28,13 @@ from pmviewer.maps.irradiance_cache import (
     interpolate,
     reach_of,
 )
-from pmviewer.render.cast import cast, ray_from
+from pmviewer.render.cast import ray_from
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow_camera_path
 from pmviewer.render.gather.gather import gather_light
 from pmviewer.render.given import opened
 from pmviewer.render.pixel import pixel_seed, sampled_ray
 from pmviewer.render.record import C_DROPPED, C_RAYS
+from pmviewer.render.straight import cast_on, way
 
 _f4 = np.float32
 _f8 = np.float64
@@ -56,12 +57,14 @@ def uncovered_hit(given, pixel, counts):
     seed, ray, _ = sampled_ray(eye, pixel)
     beta = WHITE
     travelled = _f4(0.0)
+    straight = False
     for depth in range(eye.max_depth + 1):
-        hit = cast(scene, ray)
+        hit, tint = cast_on(scene, ray, straight)
+        beta = mul(beta, tint)
         counts[C_RAYS] += 1
         if hit.prim < 0:
             break
-        travelled += hit.t
+        travelled += way(scene, ray.o, ray.d, hit)
         si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
         if si.bsdf.groups & STORED != 0 and is_lambertian(si.bsdf):
             n = shading_normal(si.bsdf)
@@ -70,7 +73,8 @@ def uncovered_hit(given, pixel, counts):
                 return True, si.p, si.ng, n, si.gap, cache.pixel_size + travelled * cache.pixel_angle
         if si.bsdf.groups & FOLLOWED == 0 or depth == eye.max_depth:
             break
-        ray, beta, _ = follow_camera_path(given, si, beta, seed, depth)
+        ray, beta, pdf = follow_camera_path(given, si, beta, seed, depth)
+        straight = pdf > _f4(0.0)
         if not largest(beta) > _f4(0.0):
             break
     return NO_HIT
@@ -91,10 +95,12 @@ def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
             if dot(wi, ng) <= _f4(0.0):
                 continue
             counts[C_RAYS] += 1
-            hit = cast(given.scene, ray_from(p, ng, gap, wi))
+            ray = ray_from(p, ng, gap, wi)
+            hit, tint = cast_on(given.scene, ray, True)
             if hit.prim >= 0:
-                cells[here, 3] = hit.t
-                cells[here, 0], cells[here, 1], cells[here, 2] = gather_light(given, hit, wi, seed, _u4(here), counts)
+                cells[here, 3] = way(given.scene, ray.o, wi, hit)
+                L = mul(tint, gather_light(given, hit, wi, seed, _u4(here), counts))
+                cells[here, 0], cells[here, 1], cells[here, 2] = L
 
 
 @kernel

@@ -15,6 +15,15 @@ TWO_WAYS = Need(
 )
 GLOBAL_MAP_STORED = Need(lambda f: f.plan.global_classes or f.plan.virtual, "No surface of this scene stores photons.")
 
+THIN_GLASS = Need(
+    lambda f: "by setting" in f.traits.thin_glass and f.settings.render.method not in ("path", "virtual lights"),
+    lambda f: (
+        "The path tracer and virtual lights take all glass as it is."
+        if "by setting" in f.traits.thin_glass
+        else "No thin glass in this scene that goes by this setting (a thindielectric does)."
+    ),
+)
+
 
 class Render(Group):
     """Method"""
@@ -36,6 +45,19 @@ class Render(Group):
         ge=1,
         le=1000,
         needs=(FOLLOWED_OR_PATHS,),
+    )
+    thin_glass: Literal["exact", "ignored", "tinted"] = setting(
+        "exact",
+        "How light gets through thin glass, which fills closed cabins and rooms with noisy caustics (course guide "
+        "§6.2.3). exact: as through all glass, by the caustic map. ignored: photons, light samples and gather rays meet "
+        "no pane; too bright by what it absorbs and reflects, without its colour and its reflections. tinted: photons "
+        "refract without becoming caustics, light samples and gather rays go straight on, weakened and coloured; exact "
+        "for a thindielectric, while behind a slab of dielectric shadows lie where unbent light would cast them. Seen by the camera "
+        "and by mirrors glass stays as it is.",
+        stage="photons",
+        scale="choice",
+        title="thin glass",
+        needs=(THIN_GLASS,),
     )
     outline_rays: int = setting(
         16,
