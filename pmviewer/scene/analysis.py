@@ -12,7 +12,7 @@ from pmviewer.scene.arrays.material_lobes import (
     is_rough_glass,
 )
 from pmviewer.scene.arrays.material_row import is_rich, used_materials
-from pmviewer.scene.description import DirectionalLight, Environment, PointLight, Scene, SpotLight
+from pmviewer.scene.description import DirectionalLight, Environment, Material, PointLight, Scene, SpotLight
 
 
 @dataclass(frozen=True)

@@ -48,12 +48,12 @@ class Render(Group):
     )
     thin_glass: Literal["exact", "ignored", "tinted"] = setting(
         "exact",
-        "How light gets through thin glass, which fills closed cabins and rooms with noisy caustics (course guide "
-        "§6.2.3). exact: as through all glass, by the caustic map. ignored: photons, light samples and gather rays meet "
-        "no pane; too bright by what it absorbs and reflects, without its colour and its reflections. tinted: photons "
-        "refract without becoming caustics, light samples and gather rays go straight on, weakened and coloured; exact "
-        "for a thindielectric, while behind a slab of dielectric shadows lie where unbent light would cast them. Seen by the camera "
-        "and by mirrors glass stays as it is.",
+        "How light gets through thin glass, which fills closed cabins and rooms with noisy caustics (course guide, "
+        "6.2.3). exact: by the caustic map, as through all glass. ignored: photons, light samples and gather rays meet "
+        "no pane: too bright by what panes absorb and reflect, without their colour and their reflections. tinted: "
+        "photons refract without becoming caustics, light samples and gather rays go straight on, weakened and "
+        "coloured: as it is behind a thindielectric, without displacement and focus behind glass of two faces. What "
+        "the camera sees of glass itself stays exact.",
         stage="photons",
         scale="choice",
         title="thin glass",
