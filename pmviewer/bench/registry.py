@@ -37,7 +37,10 @@ BENCHES: dict[str, tuple[str, str]] = {
     "gather": ("Radiance photons against the plain final gather (R3)", "pmviewer.bench.measures.gather:run"),
     "denoise": ("Denoised pictures: error against time (P16)", "pmviewer.bench.measures.denoise:run"),
     "virtual": ("Virtual lights: estimators against the plain sum (R10)", "pmviewer.bench.measures.virtual:run"),
-    "thin-glass": ("Thin glass ignored or tinted against exact caustics (R9)", "pmviewer.bench.measures.thin_glass:run"),
+    "thin-glass": (
+        "Thin glass ignored or tinted against exact caustics (R9)",
+        "pmviewer.bench.measures.thin_glass:run",
+    ),
     "importance": ("Importance against the path tracer, and its cost (I1)", "pmviewer.bench.measures.importance:run"),
     "deposition": (
         "Deposition rules: photons at equal error, power, cost (I4, I5)",

@@ -13,6 +13,7 @@ from pmviewer.settings.schema.importance import WITHOUT_IMPORTANCE, Deposit
 
 MANY_LIGHTS = 8
 """From so many lights on, the automatic choice of lights asks the photons."""
+REFLECTING = "tinted and reflecting"
 EXACT_GLASS = ("path", "virtual lights")
 """Methods that let no light pass thin glass by other rules than it would."""
 EXPONENTS = {"off": 0, "square": 2, "cube": 3}
@@ -36,8 +37,8 @@ class Plan:
     `cache` whether diffuse surfaces gather through an irradiance cache, `shadows` whether shadow photons save shadow
     rays, `importance` whether there are importance maps, `deposition` which photons maps store, `emission` how
     importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0 without; `virtual`
-    is whether virtual lights bring the indirect light; `thin_glass` are the rules other than "exact" by which light
-    passes some panes; `warnings`
+    is whether virtual lights bring the indirect light; `thin_glass` are the rules by which light passes
+    panes of glass, () where all of it is exact; `warnings`
     are sentences for the log about what was asked for and can't be."""
 
     path: bool = False
@@ -142,13 +143,13 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
 
 
 def thin_rules(settings: Settings, traits: SceneTraits) -> tuple[str, ...]:
-    """The rules "ignored" and "tinted" that some panes of the scene go by; the path tracer and virtual lights take all
-    glass as it is."""
+    """The rules that the scene's panes go by, () where all of them are exact; the path tracer and virtual lights take
+    all glass as it is."""
     if settings.render.method in EXACT_GLASS:
         return ()
     by_setting = settings.render.thin_glass
     rules = {by_setting if rule == "by setting" else rule for rule in traits.thin_glass}
-    return tuple(sorted(rules - {"exact"}))
+    return () if rules <= {"exact"} else tuple(sorted(rules))
 
 
 def _of_thin(settings: Settings, traits: SceneTraits) -> tuple[str, ...]:
@@ -176,9 +177,9 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
         warnings = (UNFOUND_BY_PATHS,) if traits.has_delta_lights and traits.has_delta else ()
         return Plan(path=True, skipped=(("light pass", "the path tracer uses no photons"),), warnings=warnings)
     thin = thin_rules(settings, traits)
-    if thin == ("ignored",) and not traits.follows_beside_thin(glossy):
+    if thin and "exact" not in thin and REFLECTING not in thin and not traits.follows_beside_thin(glossy):
         caustics = 0
-        skipped.append(("caustic map", "thin glass is ignored, and there is no other glass, mirror or smooth gloss"))
+        skipped.append(("caustic map", "thin glass makes none, and there is no other, no mirror or smooth gloss"))
     elif not traits.follows(glossy):
         caustics = 0
         skipped.append(("caustic map", "no mirror or glass, nor smooth gloss, in the scene"))

@@ -70,7 +70,7 @@ OPACITY_FIELDS: list[tuple[str, str]] = [
 ]
 
 THIN_FIELDS: list[tuple[str, str]] = [
-    ("thin", "i8"),  # what becomes of rays at panes that go by the setting: THIN_EXACT, THIN_IGNORED or THIN_TINTED
+    ("thin", "i8"),  # the rule of panes that go by the setting, THIN_EXACT to THIN_REFLECTING
 ]
 """Of scenes where some rays pass panes of glass straight, see `pmviewer.kernels.bsdf.thin_glass`."""
 
@@ -136,7 +136,7 @@ STORED lobes, and that above which one has FOLLOWED lobes that are no deltas. M_
 BY_SIDE = 2.0
 """M_WEIGHT of a blend whose first part is the front and whose second is the back."""
 M_THIN = _columns[42]
-THIN_EXACT, THIN_IGNORED, THIN_TINTED, THIN_BY_SETTING = range(4)
+THIN_EXACT, THIN_IGNORED, THIN_TINTED, THIN_REFLECTING, THIN_BY_SETTING = range(5)
 """What M_THIN may be, see `pmviewer.kernels.bsdf.thin_glass`."""
 M_METALLIC_MAP, M_WEIGHT_MAP = _columns[40:42]
 BSDF_TABLE_SIZE = 64

@@ -17,7 +17,7 @@ from pmviewer.kernels.bsdf.scattering import attenuation
 from pmviewer.kernels.bsdf.thin_glass import has_thin_glass, straight_transmittance, thin_rule
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
-from pmviewer.kernels.scene import THIN_EXACT, THIN_TINTED, material_of
+from pmviewer.kernels.scene import THIN_EXACT, THIN_IGNORED, material_of
 from pmviewer.kernels.surface import leave
 from pmviewer.kernels.vector import dot, largest, mul, scale, sub
 from pmviewer.render.cast import Ray, cast, leaving
@@ -70,7 +70,7 @@ def _behind(scene, hit, d, length, tint):
     rule = thin_rule(scene, hit.prim, material)
     if rule == THIN_EXACT:
         return BLACK
-    if rule == THIN_TINTED:
+    if rule != THIN_IGNORED:
         tint = attenuation(scene, material, hit.ng, d, length, tint)
         cos = min(abs(dot(hit.ns, d)), _f4(1.0))
         tint = mul(tint, straight_transmittance(scene, hit.prim, material, hit.u, hit.v, hit.p, cos))

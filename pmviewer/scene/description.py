@@ -111,7 +111,7 @@ class Principled:
     clearcoat_gloss: float = 0.0
 
 
-ThinGlass = Literal["", "by setting", "exact", "ignored", "tinted"]
+ThinGlass = Literal["", "by setting", "exact", "ignored", "tinted", "tinted and reflecting"]
 THIN_GLASS: tuple[ThinGlass, ...] = get_args(ThinGlass)
 """How light passes a pane of glass; "" is not said."""
 

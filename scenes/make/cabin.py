@@ -114,7 +114,7 @@ def _meshes() -> dict[str, Mesh]:
             *(_side((0.3, 1.35), (0.3, 0.82), sign) for sign in (-1.0, 1.0)),
             quad((w, WAIST, REAR), (-w, WAIST, REAR), (-r, ROOF, BACKLIGHT), (r, ROOF, BACKLIGHT)),
         ),
-        "ground": quad((-5, 0, 5), (5, 0, 5), (5, 0, -5), (-5, 0, -5)),
+        "ground": quad((-8, 0, 8), (8, 0, 8), (8, 0, -8), (-8, 0, -8)),
         "wall": joined(block((-3.4, 0, -4.6), (-0.6, 1.5, -4.3)), block((0.9, 0, -4.9), (3.2, 2.2, -4.6))),
     }
 
@@ -163,8 +163,8 @@ def car_cabin() -> MadeScene:
         ],
         [
             *(mesh(stem, material, flat=flat[stem]) for stem, material in materials.items()),
-            lamp((2.6, 4.2, -2.4), (0.0, 0.8, 0.0), (0.7, 0.7), (70, 66, 58)),
-            f'<emitter type="constant">{rgb("radiance", 0.7, 0.85, 1.1)}</emitter>',
+            lamp((2.6, 4.2, -2.4), (0.0, 0.8, 0.0), (1.0, 1.0), (40, 37, 32)),
+            f'<emitter type="constant">{rgb("radiance", 0.6, 0.72, 0.94)}</emitter>',
         ],
         _meshes(),
         aspect=(320, 240),

@@ -1,11 +1,17 @@
 """Panes of glass so thin that rays may go straight through them (R9; course guide §6.2.3).
 
-By the rule of its material a pane is glass like any other (EXACT), not there (IGNORED, solution A) or passed straight
-(TINTED, solution B). A tinted pane refracts photons, which keep their path class behind it, so that they are stored
-without the caustic map; every ray that leaves a diffuse or rough surface goes straight on, times what the pane
-transmits in its direction: (1 − R)·t, R being a thin pane's reflectance with all reflections between its faces, or that
-of the one face met. So the light of a `thindielectric` is exact, and that of a slab of dielectric lacks its
-displacement alone. What panes reflect is a caustic as with all glass. A pane that is a light is always exact.
+By the rule of its material a pane is
+
+- THIN_EXACT: glass like any other;
+- THIN_IGNORED: not there (solution A);
+- THIN_TINTED: passed straight (solution B). Photons refract and reflect there and keep their path class, so that they
+  are stored without the caustic map. Every ray that leaves a diffuse or rough surface goes straight on, times what the
+  pane transmits in its direction: (1 − R)·t, R being a thin pane's reflectance with all reflections between its faces,
+  or that of the one face met. Light that goes through a `thindielectric` is exact, that through a slab of dielectric
+  lacks displacement and focus; what panes reflect onto the surface seen is missing, as in the source;
+- THIN_REFLECTING: the same, but what panes reflect is a caustic as that of all glass is, and nothing is missing.
+
+A pane that is a light is always exact.
 
 Scenes' records without the field `thin` compile none of this.
 """
@@ -29,6 +35,7 @@ from pmviewer.kernels.scene import (
     THIN_BY_SETTING,
     THIN_EXACT,
     THIN_IGNORED,
+    THIN_REFLECTING,
     THIN_TINTED,
     light_of,
     material_eta,
@@ -48,7 +55,7 @@ def has_thin_glass(scene: Any) -> bool:
 
 @device
 def thin_rule(scene, prim, material):
-    """What becomes of rays at the primitive: THIN_EXACT, THIN_IGNORED or THIN_TINTED."""
+    """What becomes of rays at the primitive: one of the rules above."""
     rule = _i4(load_f4(scene.materials, material * MATERIAL_COLUMNS + M_THIN))
     if rule == THIN_BY_SETTING:
         rule = _i4(scene.thin)
@@ -66,16 +73,16 @@ def is_ignored(scene, prim, material):
 
 
 @specialised
-def passes_straight(scene, prim, material, ng, d):
-    """Whether a photon that goes on in direction d, from the side of the normal ng, has passed a tinted pane, so that
-    rays the other way meet it behind the pane."""
+def keeps_class(scene, prim, material, ng, d):
+    """Whether a photon that goes on in direction d, from the side of the normal ng, has the path class that it had."""
     if not has_thin_glass(scene):
         return lambda scene, prim, material, ng, d: False
 
-    def through(scene, prim, material, ng, d):
-        return dot(ng, d) < _f4(0.0) and thin_rule(scene, prim, material) == THIN_TINTED
+    def of_pane(scene, prim, material, ng, d):
+        rule = thin_rule(scene, prim, material)
+        return rule == THIN_TINTED or (rule == THIN_REFLECTING and dot(ng, d) < _f4(0.0))
 
-    return through
+    return of_pane
 
 
 @specialised

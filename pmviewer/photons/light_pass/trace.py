@@ -29,7 +29,7 @@ from pmviewer.kernels.bsdf.scattering import (
     same_side,
     shading_normal,
 )
-from pmviewer.kernels.bsdf.thin_glass import is_ignored, passes_straight
+from pmviewer.kernels.bsdf.thin_glass import is_ignored, keeps_class
 from pmviewer.kernels.compile.jit import inlined, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import COPIES, EMISSION, EMITTER, FURTHER_PHOTONS_SALT, PHOTON_SCATTER, STORE
@@ -190,7 +190,7 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
             d, weight = _scattered(scene, b, group, wi, ng, u_lobe, (u0, u1))
             if group != FOLLOWED:
                 flags = _u4(HAD_DIFFUSE)
-            elif not passes_straight(scene, prim, material, ng, d):
+            elif not keeps_class(scene, prim, material, ng, d):
                 flags = _u4(flags | _u4(LAST_SPECULAR))
             after = scale(mul(beta, weight), share)
             if not is_good(after):

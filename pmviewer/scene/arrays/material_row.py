@@ -32,6 +32,7 @@ THIN_RULES = {
     "exact": K.THIN_EXACT,
     "ignored": K.THIN_IGNORED,
     "tinted": K.THIN_TINTED,
+    "tinted and reflecting": K.THIN_REFLECTING,
     "by setting": K.THIN_BY_SETTING,
 }
 """`Material.thin_rule` for kernels."""

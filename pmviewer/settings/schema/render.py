@@ -46,14 +46,14 @@ class Render(Group):
         le=1000,
         needs=(FOLLOWED_OR_PATHS,),
     )
-    thin_glass: Literal["exact", "ignored", "tinted"] = setting(
+    thin_glass: Literal["exact", "ignored", "tinted", "tinted and reflecting"] = setting(
         "exact",
         "How light gets through thin glass, which fills closed cabins and rooms with noisy caustics (course guide, "
         "6.2.3). exact: by the caustic map, as through all glass. ignored: photons, light samples and gather rays meet "
-        "no pane: too bright by what panes absorb and reflect, without their colour and their reflections. tinted: "
-        "photons refract without becoming caustics, light samples and gather rays go straight on, weakened and "
-        "coloured: as it is behind a thindielectric, without displacement and focus behind glass of two faces. What "
-        "the camera sees of glass itself stays exact.",
+        "no pane: too bright by what panes absorb and reflect, without their colour. tinted: photons refract without "
+        "becoming caustics, light samples and gather rays go straight on, weakened and coloured; what panes reflect "
+        "onto the surface seen is missing. tinted and reflecting: that is a caustic still, and noisier. Behind glass of "
+        "two faces both lack its displacement and focus. What the camera sees of glass itself stays exact.",
         stage="photons",
         scale="choice",
         title="thin glass",
