@@ -9,8 +9,8 @@ from pmviewer.settings.access import Settings
 
 _ASKED = "(render.thin_glass, or the glass says so)"
 THIN_GLASS = {
-    "ignored": f"Light meets no thin glass {_ASKED}: behind it there is too much light by what it absorbs and reflects, "
-    "without its colour, and what it would reflect is missing.",
+    "ignored": f"Light meets no thin glass {_ASKED}: behind it there is too much light by what it absorbs and "
+    "reflects, without its colour, and what it would reflect is missing.",
     "tinted": f"Light goes straight through thin glass {_ASKED}: what panes reflect onto what is seen is missing, and "
     "glass of two faces doesn't displace or focus the light behind it.",
     "tinted and reflecting": f"Light goes straight through thin glass {_ASKED}: glass of two faces doesn't displace or "

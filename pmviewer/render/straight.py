@@ -19,7 +19,7 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.scene import THIN_EXACT, THIN_IGNORED, material_of
 from pmviewer.kernels.surface import leave
-from pmviewer.kernels.vector import dot, largest, mul, scale, sub
+from pmviewer.kernels.vector import dot, largest, mul, sub
 from pmviewer.render.cast import Ray, cast, leaving
 from pmviewer.render.chain import BLACK, WHITE
 

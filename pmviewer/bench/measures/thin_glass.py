@@ -96,8 +96,8 @@ def run(quick: bool = False) -> BenchResult:
         "red, green, blue",
     ]
     notes = [
-        f"{width} × {3 * width // 4} pixels, {seeds} seeds of {passes} passes, {SAMPLES} light samples; bias against the "
-        f"path tracer, {path_passes} samples in each of {path_width} × {3 * path_width // 4} pixels",
+        f"{width} × {3 * width // 4} pixels, {seeds} seeds of {passes} passes, {SAMPLES} light samples; bias against "
+        f"the path tracer, {path_passes} samples in each of {path_width} × {3 * path_width // 4} pixels",
         "exact / this: variance times CPU seconds of exact caustics over that of this rule",
         "the bias holds that of the look-ups' radius, too, which falls with the passes",
     ]

@@ -52,8 +52,8 @@ class Render(Group):
         "6.2.3). exact: by the caustic map, as through all glass. ignored: photons, light samples and gather rays meet "
         "no pane: too bright by what panes absorb and reflect, without their colour. tinted: photons refract without "
         "becoming caustics, light samples and gather rays go straight on, weakened and coloured; what panes reflect "
-        "onto the surface seen is missing. tinted and reflecting: that is a caustic still, and noisier. Behind glass of "
-        "two faces both lack its displacement and focus. What the camera sees of glass itself stays exact.",
+        "onto the surface seen is missing. tinted and reflecting: that is a caustic still, and noisier. Behind glass "
+        "of two faces both lack its displacement and focus. What the camera sees of glass itself stays exact.",
         stage="photons",
         scale="choice",
         title="thin glass",
