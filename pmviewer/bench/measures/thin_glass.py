@@ -33,7 +33,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 LESS = 20.0
 """By how much the variance is to be less at equal time, where caustics are not kept."""
 OFF, COLOUR_OFF = 2.0, 2.0
-"""Per cent that the mean's luminance may be off where nothing is left out, and a channel against it with tinted glass."""
+"""Per cent that the mean may be off where nothing is left out, and a channel against luminance with tinted glass."""
 F8 = NDArray[np.float64]
 
 
