@@ -42,7 +42,6 @@ from pmviewer.render.pixel import (
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius
 from pmviewer.render.record import C_CUT, C_RAYS
 from pmviewer.render.reflect import reflected, unfound
-from pmviewer.render.straight import cast_on
 from pmviewer.render.virtual_lights.lit import note_object, virtual_light
 
 _f4 = np.float32
@@ -176,10 +175,8 @@ def eye_pass(given, outline, radii, film, counts, first, last):
         beta = WHITE
         left, pdf = ray.o, _f4(0.0)  # where, and with which density, a lobe was left that is not a delta
         choice = choose_by_power(lights, eye.light_samples)
-        straight = False  # whether thin glass lets the ray pass: after such a lobe
         for depth in range(eye.max_depth + 1):
-            hit, tint = cast_on(scene, ray, straight)
-            beta = mul(beta, tint)
+            hit = cast(scene, ray)
             counts[C_RAYS] += 1
             whole = depth == 0
             seen = EMISSION if whole else SPECULAR
@@ -206,7 +203,6 @@ def eye_pass(given, outline, radii, film, counts, first, last):
             if not is_delta(si.bsdf):
                 choice = _followed(given, si, beta, pixel, depth, choice, lights)
             ray, beta, pdf = follow_camera_path(given, si, beta, seed, depth)
-            straight = pdf > _f4(0.0)
             if eye.followed_direct == 0:
                 pdf = _f4(0.0)
             if not largest(beta) > _f4(0.0):

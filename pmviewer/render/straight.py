@@ -1,9 +1,10 @@
-"""Rays that leave a diffuse or rough surface, and go straight through thin glass where there is any (R9).
+"""Rays that leave surfaces by their STORED lobes, and go straight through thin glass where there is any (R9).
 
-Camera rays, and what mirrors and clear glass make of them, see every pane as it is. What comes after a lobe that is no
-delta does not: light samples and the rays that find the same light by the BSDF, gather rays and those that find corners
-all go straight on, weakened and coloured by the panes on their way (`pmviewer.kernels.bsdf.thin_glass`). Scenes whose
-records have no such panes compile none of it.
+Camera rays, and what FOLLOWED lobes make of them, see every pane as it is. What comes after a STORED lobe does not:
+light samples and the rays that find the same light by the BSDF, gather rays and those that find corners all go straight
+on, weakened and coloured by the panes on their way (`pmviewer.kernels.bsdf.thin_glass`). Light samples of FOLLOWED
+lobes do so on the way to lights that no ray can meet, whose light nothing else would find. Scenes whose records have no
+such panes compile none of it.
 """
 
 from __future__ import annotations
@@ -40,13 +41,15 @@ def visible(scene, p, ng, gap, wi, end):
 
 
 @specialised
-def transmission(scene, p, ng, gap, wi, end):
+def transmission(scene, p, ng, gap, wi, end, straight):
     """The share (red, green, blue) of light from `end`, in direction wi, that reaches the surface point p: all, none,
-    or what panes let through."""
+    or what panes let through where it may go `straight`."""
     if not has_thin_glass(scene):
-        return lambda scene, p, ng, gap, wi, end: WHITE if visible(scene, p, ng, gap, wi, end) else BLACK
+        return lambda scene, p, ng, gap, wi, end, straight: WHITE if visible(scene, p, ng, gap, wi, end) else BLACK
 
-    def through(scene, p, ng, gap, wi, end):
+    def through(scene, p, ng, gap, wi, end, straight):
+        if not straight:
+            return WHITE if visible(scene, p, ng, gap, wi, end) else BLACK
         tint = WHITE
         for _ in range(MOST_PANES):
             o = leave(p, ng, gap, wi[0], wi[1], wi[2])

@@ -22,6 +22,7 @@ from tests.support.scenes import box_camera, box_walls, diffuse, panel, rendered
 
 TINT = (0.9, 0.5, 0.2)
 NEAR = PointLight("near", (0.3, 2.0, 0.2), (3.0, 3.0, 3.0))
+SKY = ConstantEnvironment("sky", (1.0, 1.0, 1.0))
 DEGREES = 40.0
 FAR = PointLight(
     "far", (0.0, 1e3 * math.cos(math.radians(DEGREES)), 1e3 * math.sin(math.radians(DEGREES))), (3e6, 3e6, 3e6)
@@ -118,9 +119,8 @@ def test_a_sky_over_a_dome_of_tinted_glass(method):
     """Light samples and gather rays that find the sky pass the dome alike: albedo × tint × radiance, whatever the
     direction."""
     dome = Sphere((0, 0, 0), 50.0)
-    sky = ConstantEnvironment("sky", (1.0, 1.0, 1.0))
     image = image_of(
-        floor_below(pane("tinted", eta=1.0), dome, light=sky), 16, render={"method": method}, photons={"N": 200}
+        floor_below(pane("tinted", eta=1.0), dome, light=SKY), 16, render={"method": method}, photons={"N": 200}
     )
     assert image.mean(axis=(0, 1)) == pytest.approx(0.5 * np.array(TINT), rel=0.01)
 
@@ -135,6 +135,19 @@ def test_a_pane_that_shines_is_seen_by_light_samples_and_rays():
         images.append(image_of(replace(scene, shapes=(*scene.shapes, lamp, unseen), lights=()), 16))
     assert images[0].mean() > 0.05
     assert images[1].mean() == pytest.approx(images[0].mean(), rel=0.01)
+
+
+def test_rough_mirrors_see_panes_as_they_are():
+    """Below a pane that reflects nearly as much as it lets through, a rough mirror shows what the path tracer does: its
+    reflections in the pane's underside, too."""
+    scene = floor_below(pane("tinted and reflecting", eta=4.0), sheet(1.0), light=SKY)
+    rough = Material("rough", "rough conductor", (0.9,) * 3, two_sided=True, alpha=(0.2, 0.2))
+    scene = replace(scene, materials=(rough, scene.materials[1]))
+    photons = {"N": 200, "glossy": 0.3}
+    path = image_of(scene, 400, render={"method": "path"}, photons=photons)
+    ours = image_of(scene, 400, photons=photons)
+    assert path.mean() > 0.2
+    assert ours.mean(axis=(0, 1)) == pytest.approx(path.mean(axis=(0, 1)), rel=0.02)
 
 
 def divided_box(rule, size=12):

@@ -5,8 +5,8 @@ By the rule of its material a pane is
 - THIN_EXACT: glass like any other;
 - THIN_IGNORED: not there (solution A);
 - THIN_TINTED: passed straight (solution B). Photons refract and reflect there and keep their path class, so that they
-  are stored without the caustic map. Every ray that leaves a diffuse or rough surface goes straight on, times what the
-  pane transmits in its direction: (1 − R)·t, R being a thin pane's reflectance with all reflections between its faces,
+  are stored without the caustic map. Rays that leave a surface by its STORED lobes go straight on, times what the pane
+  transmits in its direction: (1 − R)·t, R being a thin pane's reflectance with all reflections between its faces,
   or that of the one face met. Light that goes through a `thindielectric` is exact, that through a slab of dielectric
   lacks displacement and focus; what panes reflect onto the surface seen is missing, as in the source;
 - THIN_REFLECTING: the same, but what panes reflect is a caustic as that of all glass is, and nothing is missing.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.bsdf.scattering import bsdf_f, bsdf_pdf, compressed, same_side, shading_normal
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, bsdf_f, bsdf_pdf, compressed, same_side, shading_normal
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.dimensions import FURTHER_LIGHT
 from pmviewer.kernels.lights.light import emitted, environment_radiance, one_light_pdf, sample_one_light
@@ -72,7 +72,7 @@ def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, numbers):
                 saved += 1
             tint = WHITE if known == LIT else BLACK
             if known == UNKNOWN:
-                tint = transmission(scene, p, ng, gap, wi, end)
+                tint = transmission(scene, p, ng, gap, wi, end, group != FOLLOWED or not findable)
             if largest(tint) > _f4(0.0):
                 weight = cos / (m * pdf)
                 if findable and n_bsdf > 0:

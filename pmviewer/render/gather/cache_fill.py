@@ -28,7 +28,7 @@ from pmviewer.maps.irradiance_cache import (
     interpolate,
     reach_of,
 )
-from pmviewer.render.cast import ray_from
+from pmviewer.render.cast import cast, ray_from
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow_camera_path
 from pmviewer.render.gather.gather import gather_light
 from pmviewer.render.given import opened
@@ -57,14 +57,12 @@ def uncovered_hit(given, pixel, counts):
     seed, ray, _ = sampled_ray(eye, pixel)
     beta = WHITE
     travelled = _f4(0.0)
-    straight = False
     for depth in range(eye.max_depth + 1):
-        hit, tint = cast_on(scene, ray, straight)
-        beta = mul(beta, tint)
+        hit = cast(scene, ray)
         counts[C_RAYS] += 1
         if hit.prim < 0:
             break
-        travelled += way(scene, ray.o, ray.d, hit)
+        travelled += hit.t
         si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
         if si.bsdf.groups & STORED != 0 and is_lambertian(si.bsdf):
             n = shading_normal(si.bsdf)
@@ -73,8 +71,7 @@ def uncovered_hit(given, pixel, counts):
                 return True, si.p, si.ng, n, si.gap, cache.pixel_size + travelled * cache.pixel_angle
         if si.bsdf.groups & FOLLOWED == 0 or depth == eye.max_depth:
             break
-        ray, beta, pdf = follow_camera_path(given, si, beta, seed, depth)
-        straight = pdf > _f4(0.0)
+        ray, beta, _ = follow_camera_path(given, si, beta, seed, depth)
         if not largest(beta) > _f4(0.0):
             break
     return NO_HIT

@@ -8,12 +8,13 @@ from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.vector import dot, largest, mul, scale
+from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow_camera_path
 from pmviewer.render.gather.gather import gather_light, gather_survival
 from pmviewer.render.gather.guide import AIM_WORDS, aim, gather_direction
 from pmviewer.render.given import GatherRays, opened
 from pmviewer.render.pixel import sampled_ray
-from pmviewer.render.straight import cast_on, cast_straight
+from pmviewer.render.straight import cast_straight
 
 _f4 = np.float32
 _i8 = np.int64
@@ -58,10 +59,9 @@ def gather_points(given, pixel, counts, rows):
     scene, eye = given.scene, given.eye
     seed, ray, _ = sampled_ray(eye, pixel)
     beta = WHITE
-    row, straight = _i8(0), False
+    row = _i8(0)
     for depth in range(eye.max_depth + 1):
-        hit, tint = cast_on(scene, ray, straight)
-        beta = mul(beta, tint)
+        hit = cast(scene, ray)
         if hit.prim < 0:
             break
         si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
@@ -69,8 +69,7 @@ def gather_points(given, pixel, counts, rows):
             row = _replay(given, si, beta, seed, rows, row, counts)
         if si.bsdf.groups & FOLLOWED == 0:
             break
-        ray, beta, pdf = follow_camera_path(given, si, beta, seed, depth)
-        straight = pdf > _f4(0.0)
+        ray, beta, _ = follow_camera_path(given, si, beta, seed, depth)
         if not largest(beta) > _f4(0.0):
             break
     return row
