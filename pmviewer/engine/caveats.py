@@ -28,6 +28,11 @@ def caveats(
 ) -> list[str]:
     """What to know about the passes so far. scene_radius: of the bounding sphere; pixels: of the picture."""
     said = [THIN_GLASS[rule] for rule in plan.thin_glass if rule in THIN_GLASS]
+    if "tinted and reflecting" in plan.thin_glass and plan.gather and not settings.photons.indirect_caustics:
+        said.append(
+            "Gather rays go straight through thin glass: light that it reflects after a diffuse bounce is missing. "
+            "Turn photons.indirect_caustics on, or choose the method progressive."
+        )
     said += [_dropped(place, count) for place, count in tally.dropped.items() if count]
     cut = tally.cut / max(pixels * passes, 1)
     if cut > CUT_PATHS:

@@ -121,6 +121,13 @@ def test_the_picture_says_what_is_wrong_with_it(rule):
     assert len(said) == (rule != "exact")
 
 
+def test_gather_rays_that_follow_mirrors_miss_what_panes_reflect():
+    for method, on, sentences in (("gather", False, 2), ("gather", True, 1), ("progressive", False, 1)):
+        chosen = settings("tinted and reflecting", method, **{"photons.N": 1000, "photons.indirect_caustics": on})
+        said = rendered(box_with(PANE), chosen, 1).frame(0).statistics.warnings
+        assert sum("thin glass" in warning for warning in said) == sentences
+
+
 def test_the_picture_is_the_same_for_any_number_of_threads():
     box = replace(box_with(PANE), width=64, height=48)
     chosen = settings("tinted and reflecting", **{"photons.N": 20_000})

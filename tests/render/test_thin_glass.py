@@ -8,6 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.scene.description import (
     Camera,
     ConstantEnvironment,
@@ -123,6 +127,26 @@ def test_a_sky_over_a_dome_of_tinted_glass(method):
         floor_below(pane("tinted", eta=1.0), dome, light=SKY), 16, render={"method": method}, photons={"N": 200}
     )
     assert image.mean(axis=(0, 1)) == pytest.approx(0.5 * np.array(TINT), rel=0.01)
+
+
+def test_replayed_gather_rays_bring_what_the_picture_has():
+    """The rays of a pixel, shown in the window, pass panes as those of the picture do: their light adds up to it."""
+    wall = Shape("wall", Parallelogram((-50, 3, -50), (100, 0, 0), (0, 0, 100)), 0)
+    scene = floor_below(pane("tinted"), sheet(1.0))
+    lamp = PointLight("lamp", (0.0, 2.5, 0.0), (9.0, 9.0, 9.0))
+    scene = replace(scene, shapes=(*scene.shapes, wall), lights=(lamp,), width=1, height=1)
+    settings = settings_of(render={"method": "gather"}, photons={"N": 20_000}, gather={"rays": 64})
+    pool = WorkPool(1)
+    try:
+        renderer = Renderer(open_scene(scene), settings, pool, StageStore(0))
+        renderer.step()
+        rays = renderer.gather_points(0, 0)
+    finally:
+        pool.close()
+    indirect = renderer.frame(0).image("indirect")[0, 0]
+    assert indirect.min() > 0
+    assert rays[:, 6:9].sum(axis=0) == pytest.approx(indirect, rel=1e-4)
+    assert (rays[:, 4] > 2.9).any(), "they end on the wall above the pane"
 
 
 def test_a_pane_that_shines_is_seen_by_light_samples_and_rays():
