@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
-TEXTS = ("importance.md", "inspector.md", "virtual.md", "views.md")
+TEXTS = ("importance.md", "inspector.md", "thin-glass.md", "virtual.md", "views.md")
 _BLOCK = re.compile(r"^```sh figure=(\S+) columns=(\d+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _SHARED = re.compile(r"(\w+)='([^']*)'")
 _USE = re.compile(r"\$(\w+)")

@@ -38,6 +38,10 @@ BENCHES: dict[str, tuple[str, str]] = {
     "denoise": ("Denoised pictures: error against time (P16)", "pmviewer.bench.measures.denoise:run"),
     "lens": ("Lens and filters: circle of confusion, and against Mitsuba (R13)", "pmviewer.bench.measures.lens:run"),
     "virtual": ("Virtual lights: estimators against the plain sum (R10)", "pmviewer.bench.measures.virtual:run"),
+    "thin-glass": (
+        "Thin glass ignored or tinted against exact caustics (R9)",
+        "pmviewer.bench.measures.thin_glass:run",
+    ),
     "importance": ("Importance against the path tracer, and its cost (I1)", "pmviewer.bench.measures.importance:run"),
     "deposition": (
         "Deposition rules: photons at equal error, power, cost (I4, I5)",

@@ -7,6 +7,16 @@ from pmviewer.engine.method import Plan
 from pmviewer.engine.tally import Tally
 from pmviewer.settings.access import Settings
 
+_ASKED = "(render.thin_glass, or the glass says so)"
+THIN_GLASS = {
+    "ignored": f"Light meets no thin glass {_ASKED}: behind it there is too much light by what it absorbs and "
+    "reflects, without its colour, and what it would reflect is missing.",
+    "tinted": f"Light goes straight through thin glass {_ASKED}: what panes reflect onto what is seen is missing, and "
+    "glass of two faces doesn't displace or focus the light behind it.",
+    "tinted and reflecting": f"Light goes straight through thin glass {_ASKED}: glass of two faces doesn't displace or "
+    "focus the light behind it.",
+}
+"""By rule, what is wrong with the light behind such panes."""
 CUT_PATHS = 1e-3
 """Share of the paths from the camera that may end at the depth allowed before a sentence says so."""
 CUT_OFF = 0.01
@@ -17,7 +27,13 @@ def caveats(
     settings: Settings, plan: Plan, tally: Tally, energy: Energy | None, scene_radius: float, pixels: int, passes: int
 ) -> list[str]:
     """What to know about the passes so far. scene_radius: of the bounding sphere; pixels: of the picture."""
-    said = [_dropped(place, count) for place, count in tally.dropped.items() if count]
+    said = [THIN_GLASS[rule] for rule in plan.thin_glass if rule in THIN_GLASS]
+    if "tinted and reflecting" in plan.thin_glass and plan.gather and not settings.photons.indirect_caustics:
+        said.append(
+            "Gather rays go straight through thin glass: light that it reflects after a diffuse bounce is missing. "
+            "Turn photons.indirect_caustics on, or choose the method progressive."
+        )
+    said += [_dropped(place, count) for place, count in tally.dropped.items() if count]
     cut = tally.cut / max(pixels * passes, 1)
     if cut > CUT_PATHS:
         said.append(

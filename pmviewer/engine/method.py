@@ -9,11 +9,14 @@ from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
 from pmviewer.render.filter import BOX, filter_of
 from pmviewer.scene.analysis import SceneTraits
-from pmviewer.settings.access import Settings
+from pmviewer.settings.access import Settings, with_values
 from pmviewer.settings.schema.importance import WITHOUT_IMPORTANCE, Deposit
 
 MANY_LIGHTS = 8
 """From so many lights on, the automatic choice of lights asks the photons."""
+REFLECTING = "tinted and reflecting"
+EXACT_GLASS = ("path", "virtual lights")
+"""Methods that let no light pass thin glass by other rules than it would."""
 EXPONENTS = {"off": 0, "square": 2, "cube": 3}
 Emission = Literal["off", "Peter-Pietrek", "Christensen discard", "Christensen keep"]
 UNFOUND_BY_PATHS = (
@@ -36,7 +39,8 @@ class Plan:
     rays, `importance` whether there are importance maps, `deposition` which photons maps store, `emission` how
     importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0 without; `virtual`
     is whether virtual lights bring the indirect light; `lens` whether the render camera has one, `filtered` whether the
-    film has another reconstruction filter than the plain box; `warnings`
+    film has another reconstruction filter than the plain box; `thin_glass` are the rules by which light passes panes of
+    glass, () where all of it is exact; `warnings`
     are sentences for the log about what was asked for and can't be."""
 
     path: bool = False
@@ -51,6 +55,7 @@ class Plan:
     corners: bool = False
     cache: bool = False
     virtual: bool = False
+    thin_glass: tuple[str, ...] = ()
     shadows: bool = False
     importance: bool = False
     deposition: Deposit = "all"
@@ -111,8 +116,13 @@ class Plan:
 
 def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     """The stages that the method needs in this scene."""
+    plan = _photon_plan(settings, traits)
     plan = replace(
-        _photon_plan(settings, traits), lens=_has_lens(settings, traits), filtered=_filtered(settings, traits)
+        plan,
+        lens=_has_lens(settings, traits),
+        filtered=_filtered(settings, traits),
+        thin_glass=thin_rules(settings, traits),
+        warnings=(*plan.warnings, *_of_thin(settings, traits)),
     )
     if not plan.photons:
         return plan
@@ -149,6 +159,27 @@ def _filtered(settings: Settings, traits: SceneTraits) -> bool:
     return filter_of(dict(traits.filters).get(settings.camera.name), settings.render) != BOX
 
 
+def thin_rules(settings: Settings, traits: SceneTraits) -> tuple[str, ...]:
+    """The rules that the scene's panes go by, () where all of them are exact; the path tracer and virtual lights take
+    all glass as it is."""
+    if settings.render.method in EXACT_GLASS:
+        return ()
+    by_setting = settings.render.thin_glass
+    rules = {by_setting if rule == "by setting" else rule for rule in traits.thin_glass}
+    return () if rules <= {"exact"} else tuple(sorted(rules))
+
+
+def _of_thin(settings: Settings, traits: SceneTraits) -> tuple[str, ...]:
+    """A sentence for what was asked of thin glass and is not done."""
+    if settings.render.method == "virtual lights" and thin_rules(
+        with_values(settings, {"render.method": "progressive"}), traits
+    ):
+        return ("Virtual lights take thin glass as it is: the light behind it comes from the caustic map.",)
+    if thin_rules(settings, traits) and settings.direct.shadow_photons:
+        return ("Shadow rays are all cast: shadow photons don't know what thin glass lets through.",)
+    return ()
+
+
 def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
     """The plan without importance."""
     method, glossy = settings.render.method, settings.photons.glossy
@@ -162,7 +193,11 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
     if method == "path":
         warnings = (UNFOUND_BY_PATHS,) if traits.has_delta_lights and traits.has_delta else ()
         return Plan(path=True, skipped=(("light pass", "the path tracer uses no photons"),), warnings=warnings)
-    if not traits.follows(glossy):
+    thin = thin_rules(settings, traits)
+    if thin and "exact" not in thin and REFLECTING not in thin and not traits.follows_beside_thin(glossy):
+        caustics = 0
+        skipped.append(("caustic map", "thin glass makes none, and there is no other, no mirror or smooth gloss"))
+    elif not traits.follows(glossy):
         caustics = 0
         skipped.append(("caustic map", "no mirror or glass, nor smooth gloss, in the scene"))
     if method in ("global map", "caustic map"):
@@ -186,9 +221,10 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
     if choice == "power":
         skipped.append(("light choice by photons", why))
     how = _terms(settings)
-    shadows = settings.direct.shadow_photons and traits.n_lights > 0
+    shadows = settings.direct.shadow_photons and traits.n_lights > 0 and not thin
     if not shadows:
-        skipped.append(("shadow photons", "direct.shadow_photons is off"))
+        why = "they don't know what thin glass lets through" if thin else "direct.shadow_photons is off"
+        skipped.append(("shadow photons", why))
     shown = Plan(
         direct=how.direct == "accurate",
         followed_direct=True,

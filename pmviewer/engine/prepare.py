@@ -23,6 +23,7 @@ from pmviewer.engine.stages.importance import prepare_importance
 from pmviewer.engine.stages.irradiance_cache import prepare_cache
 from pmviewer.engine.stages.pass_data import blank_eye, blank_pass
 from pmviewer.engine.stages.projection import projection_for
+from pmviewer.engine.stages.thin_glass import thin_record, with_thin_glass
 from pmviewer.engine.stages.virtual_lights import prepare_virtual
 from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.maps.search.grid import build_grid
@@ -102,7 +103,7 @@ def steps_of(scene: OpenScene, settings: Settings) -> list[Step]:
     plan = plan_of(settings, scene.traits)
     steps = [Step("film", lambda: Film(1, 1).planes())]
     if plan.importance:
-        steps.append(Step("importance", prepare_importance, (scene, settings)))
+        steps.append(Step("importance", prepare_importance, (with_thin_glass(scene, settings, plan), settings)))
     if plan.photons:
         steps += _light_steps(scene, settings, plan)
     if plan.virtual:
@@ -111,10 +112,10 @@ def steps_of(scene: OpenScene, settings: Settings) -> list[Step]:
 
 
 def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]:
-    record, photons = scene.flat.record, np.zeros((1, 6), np.float32)
+    record, photons = thin_record(scene.flat.record, settings, plan), np.zeros((1, 6), np.float32)
     points, ends = np.empty((0, 3), np.float32), np.empty(0, np.float32)
     hits = ends, np.empty(0, np.int32), np.empty((0, 2), np.float32)
-    steps = [Step("ray casting", cast_closest, (record[0], points, points, ends, ends, *hits))]
+    steps = [Step("ray casting", cast_closest, (scene.flat.record[0], points, points, ends, ends, *hits))]
     light_pass, codes = np.zeros(1, LIGHT_PASS_DTYPE), np.zeros(1, np.uint32)
     out = PhotonBuffers(photons, photons, codes, codes, np.zeros(N_COUNTS, np.int64), empty_ledger())
     maps = projection_for(scene, settings)
@@ -142,6 +143,7 @@ def eye_steps(record: NDArray[np.void], traits: SceneTraits, settings: Settings,
     film, counts = np.zeros((1, 1)), np.zeros(N_EYE_COUNTS, np.int64)
     eye, outline = blank_eye(settings, plan), np.zeros(0, np.uint8)
     steps = [Step("filter", add_weights, (eye, outline, np.zeros((1, 2)), 0, 0))] if plan.filtered else []
+    record = thin_record(record, settings, plan)
     if plan.path:
         return [*steps, Step("path tracer", path_pass, (record, eye, film, counts, 0, 0))]
     given = blank_pass(record, settings, plan)

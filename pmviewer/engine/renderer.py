@@ -30,6 +30,7 @@ from pmviewer.engine.stages.irradiance_cache import fill_cache, recipe
 from pmviewer.engine.stages.light import LightStage
 from pmviewer.engine.stages.pass_data import RenderedPass, pass_data, pass_record
 from pmviewer.engine.stages.shadow_photons import ShadowStage
+from pmviewer.engine.stages.thin_glass import with_thin_glass
 from pmviewer.engine.stages.virtual_lights import VirtualStage, film_of
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
@@ -80,6 +81,7 @@ class Renderer:
             else 0.0
         )
         self.tally = Tally()
+        scene = self._lit = with_thin_glass(scene, settings, self.plan)
         self.light = LightStage(scene, settings, self.plan, pool, store, self.tally)
         self.importance = ImportanceStage(
             scene, settings, self.plan, self.render_camera, self.first_radius, pool, store, self.tally
@@ -165,7 +167,7 @@ class Renderer:
         maps = self.light.run(index, N, self.first_radius, self.importance, widest)
         eye = pass_record(camera, settings, plan, maps, index)
         shadows = tally.timed(pool, "shadow photons", lambda: self.shadows.run(index)) if plan.shadows else None
-        scene = self.scene.flat.record
+        scene = self._lit.flat.record
         given = pass_data(scene, eye, settings, plan, maps, shadows.record if shadows is not None else None)
         cache = virtual = None
         if plan.virtual:

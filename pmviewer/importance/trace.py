@@ -42,11 +42,12 @@ from pmviewer.kernels.dimensions import IMAGE_PLACE, IMPORTON_SCATTER
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import SOBOL, draw4
 from pmviewer.kernels.surface import face
-from pmviewer.kernels.vector import add, along, dot, luminance, scale
+from pmviewer.kernels.vector import add, along, dot, luminance, mul, scale
 from pmviewer.maps.photon_words import encode_direction
-from pmviewer.render.cast import Ray, cast, leaving
+from pmviewer.render.cast import Ray, leaving
 from pmviewer.render.chain import WHITE, arrive, scatter
 from pmviewer.render.lens import through_lens
+from pmviewer.render.straight import cast_on, way
 
 _f4 = np.float32
 _u4 = np.uint32
@@ -187,7 +188,8 @@ def _trace(scene, pass_, i, ray, P, D, out, counts):
     bounces = 0
     while left > 0:
         left -= 1
-        hit = cast(scene, ray)
+        hit, tint = cast_on(scene, ray, bounced)
+        beta = mul(beta, tint)
         counts[C_RAYS] += 1
         if hit.prim < 0:
             break
@@ -195,7 +197,7 @@ def _trace(scene, pass_, i, ray, P, D, out, counts):
         groups = si.bsdf.groups
         if groups == NOTHING:
             break
-        P = travel(P, D, ray.d, hit.t, hit.ng)
+        P = travel(P, D, ray.d, way(scene, ray.o, ray.d, hit), hit.ng)
         length += hit.t
         before = luminance(beta)
         weight = before * compressed

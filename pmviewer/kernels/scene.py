@@ -69,6 +69,11 @@ OPACITY_FIELDS: list[tuple[str, str]] = [
     ("passable", "i8"),  # 1; its presence says that rays pass some surfaces, see `pmviewer.kernels.accel.opacity`
 ]
 
+THIN_FIELDS: list[tuple[str, str]] = [
+    ("thin", "i8"),  # the rule of panes that go by the setting, THIN_EXACT to THIN_REFLECTING
+]
+"""Of scenes where some rays pass panes of glass straight, see `pmviewer.kernels.bsdf.thin_glass`."""
+
 
 def scene_dtype(
     bsdfs: bool = False,
@@ -98,6 +103,11 @@ def scene_dtype(
     return np.dtype([*extra, *_FIELDS], align=True)
 
 
+def thin_dtype(of_record: np.dtype) -> np.dtype:
+    """The type of such a record with THIN_FIELDS."""
+    return np.dtype([*THIN_FIELDS, *((name, of_record[name].str) for name in of_record.names or ())], align=True)
+
+
 SCENE_DTYPE = scene_dtype()
 """Of a scene of diffuse surfaces, mirrors and smooth glass under uniform area, point and environment lights."""
 
@@ -125,6 +135,9 @@ M_PART_0, M_PART_1, M_WEIGHT, M_STORES_FRONT, M_STORES_BACK, M_FOLLOWS_FRONT, M_
 STORED lobes, and that above which one has FOLLOWED lobes that are no deltas. M_SPECULAR is the absorption inside."""
 BY_SIDE = 2.0
 """M_WEIGHT of a blend whose first part is the front and whose second is the back."""
+M_THIN = _columns[42]
+THIN_EXACT, THIN_IGNORED, THIN_TINTED, THIN_REFLECTING, THIN_BY_SETTING = range(5)
+"""What M_THIN may be, see `pmviewer.kernels.bsdf.thin_glass`."""
 M_METALLIC_MAP, M_WEIGHT_MAP = _columns[40:42]
 BSDF_TABLE_SIZE = 64
 

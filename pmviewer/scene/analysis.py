@@ -13,7 +13,16 @@ from pmviewer.scene.arrays.material_lobes import (
     is_rough_glass,
 )
 from pmviewer.scene.arrays.material_row import is_rich, used_materials
-from pmviewer.scene.description import Camera, DirectionalLight, Environment, PixelFilter, PointLight, Scene, SpotLight
+from pmviewer.scene.description import (
+    Camera,
+    DirectionalLight,
+    Environment,
+    Material,
+    PixelFilter,
+    PointLight,
+    Scene,
+    SpotLight,
+)
 
 
 @dataclass(frozen=True)
@@ -24,6 +33,9 @@ class SceneTraits:
     coat; `has_rough_glass`; `has_delta_lights`: point, spot or directional lights, which no ray can meet;
     `orthographic`: the scene's own camera; `lenses`: the names, as `camera.name` takes them, of cameras with a lens;
     `filters`: the reconstruction filters of cameras whose film has one, by the same names.
+
+    `thin_glass`: rules of the panes that light may pass straight (`Material.thin_rule`), ascending;
+    `has_other_specular`: `has_specular` without these.
 
     `glossy_roughness`: the roughness of every glossy reflection, ascending; those below the setting `glossy` are
     followed like mirrors, the others store photons.
@@ -42,6 +54,8 @@ class SceneTraits:
     orthographic: bool = False
     lenses: frozenset[str] = frozenset()
     filters: tuple[tuple[str, PixelFilter], ...] = ()
+    thin_glass: tuple[str, ...] = ()
+    has_other_specular: bool = False
 
     @property
     def many_lights(self) -> bool:
@@ -51,6 +65,10 @@ class SceneTraits:
     def follows(self, glossy: float) -> bool:
         """Are lobes followed, so that there may be caustics, when roughness from `glossy` on is stored?"""
         return self.has_specular or any(alpha < glossy for alpha in self.glossy_roughness)
+
+    def follows_beside_thin(self, glossy: float) -> bool:
+        """The same without the panes that light may pass straight."""
+        return self.has_other_specular or any(alpha < glossy for alpha in self.glossy_roughness)
 
     def stores(self, glossy: float) -> bool:
         """Are photons stored for any lobe, when roughness from `glossy` on is stored?"""
@@ -66,9 +84,16 @@ class SceneTraits:
         return self.has_rough_glass or any(alpha < glossy for alpha in self.glossy_roughness)
 
 
+def thin_panes(scene: Scene) -> list[Material]:
+    """Materials of shapes that light may pass straight; a part of a blend never lets it."""
+    shown = sorted({s.material for s in scene.all_shapes if s.material < len(scene.materials)})
+    return [m for m in (scene.materials[i] for i in shown) if m.thin_rule != "exact"]
+
+
 def analyse(scene: Scene) -> SceneTraits:
     """Traits of what is actually used by the scene's shapes."""
     used = [m for m in used_materials(scene) if m.kind != "blend"]  # what blends do, their parts do
+    panes = thin_panes(scene)
     return SceneTraits(
         has_specular=any(always_followed(m) for m in used),
         has_diffuse=any(has_diffuse_lobe(m) for m in used),
@@ -82,6 +107,8 @@ def analyse(scene: Scene) -> SceneTraits:
         orthographic=scene.camera.projection == "orthographic",
         lenses=frozenset(name for name, camera in _cameras(scene) if camera.aperture > 0),
         filters=tuple((name, camera.filter) for name, camera in _cameras(scene) if camera.filter is not None),
+        thin_glass=tuple(sorted({m.thin_rule for m in panes})),
+        has_other_specular=any(always_followed(m) and not any(m is pane for pane in panes) for m in used),
         glossy_roughness=tuple(sorted({alpha for m in used for alpha in glossy_roughness(m)})),
     )
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +111,11 @@ class Principled:
     clearcoat_gloss: float = 0.0
 
 
+ThinGlass = Literal["", "by setting", "exact", "ignored", "tinted", "tinted and reflecting"]
+THIN_GLASS: tuple[ThinGlass, ...] = get_args(ThinGlass)
+"""How light passes a pane of glass; "" is not said."""
+
+
 @dataclass(frozen=True)
 class Material:
     """A BSDF. `reflectance` scales reflection (albedo of a diffuse surface or base, specular reflectance of conductors
@@ -157,6 +162,8 @@ class Material:
     weight: float = 0.5
     by_side: bool = False
     """Of a blend: is `parts[0]` what the front shows and `parts[1]` what the back does, whatever the weight?"""
+    thin_glass: ThinGlass = ""
+    """Of a dielectric or thin dielectric: what becomes of light and rays there (`thin_rule`)."""
     mirrored_maps: bool = False
     """Seen from behind, do mapped normals turn round only across the surface, as if its picture were mirrored
     (Mitsuba's `twosided` around a map), or as a whole, as those of a thin sheet with bumps do?"""
@@ -175,6 +182,14 @@ class Material:
         """Do some rays pass straight through it? None do where its inside absorbs light, for then a ray would have to
         know where it entered."""
         return self.veiled and not (self.kind in ("dielectric", "rough dielectric") and any(self.absorption))
+
+    @property
+    def thin_rule(self) -> ThinGlass:
+        """How light passes it (`pmviewer.kernels.bsdf.thin_glass`); a thin dielectric that does not say goes by the
+        setting `render.thin_glass`, all other glass is exact."""
+        if self.kind not in ("dielectric", "thin dielectric"):
+            return "exact"
+        return self.thin_glass or ("by setting" if self.kind == "thin dielectric" else "exact")
 
     @property
     def transparent(self) -> bool:

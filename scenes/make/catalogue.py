@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from make.boxes import glossy, lights, water
+from make.cabin import car_cabin
 from make.cardioid import cardioid
 from make.corners import corner_room, glossy_room
 from make.document import MadeScene
@@ -19,6 +20,7 @@ from make.plane import lit_plane
 from make.room import skylight_room
 
 SCENES: dict[str, Callable[[], MadeScene]] = {
+    "car_cabin": car_cabin,
     "cardioid_100": partial(cardioid, 1.0),
     "cardioid_050": partial(cardioid, 0.5),
     "cardioid_010": partial(cardioid, 0.1),

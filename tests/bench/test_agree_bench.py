@@ -19,7 +19,7 @@ from pmviewer.bench.agree.generate import needs_particles, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.statistics import Outcome
 from pmviewer.bench.agree.tree import from_json
-from pmviewer.bench.agree.trial import STAGES, Question, methods_of, questions
+from pmviewer.bench.agree.trial import STAGES, Question, has_panes, methods_of, questions
 from pmviewer.bench.agree.verdict import Comparison, Verdict
 from pmviewer.bench.agree.workers import try_scenes
 from pmviewer.bench.registry import run_bench
@@ -86,13 +86,24 @@ class FakeRuns:
         return np.ones((STAGES[stage].runs, 32, 32, 3))
 
 
+def test_thin_glass_is_compared_where_rays_straight_through_see_all_of_it():
+    panes = [scene for i in range(60) if has_panes(scene := scene_of(5, i))]
+    assert panes
+    assert not all(has_panes(scene_of(5, i)) for i in range(60))
+    for scene in panes[:3]:
+        wrong = [q.asked(3) for q in questions(FakeRuns(scene, "thin glass"))]
+        found = {c.method for c in wrong if c.p == pytest.approx(0)}
+        assert found == {"thin glass"}
+
+
 @pytest.mark.parametrize("particles", [False, True])
 @pytest.mark.parametrize("plain", [1.0, 0.0])
 def test_every_method_is_compared_in_every_scene_and_a_wrong_one_is_found(particles, plain):
     scene = next(s for i in range(100) if needs_particles(s := scene_of(1, i)) == particles)
     runs = FakeRuns(scene, plain=plain)
     found = [q.asked(3) for q in questions(runs)]
-    assert methods_of(Verdict(found)) == {"path", "gather", "progressive", "nearest"}
+    everywhere = {"path", "gather", "progressive", "nearest"}
+    assert methods_of(Verdict(found)) == everywhere | ({"thin glass"} if has_panes(scene) else set())
     assert all(c.outcome.p > 0.5 for c in found)
     assert ("ptracer" in runs.modes) == (particles and plain > 0)
     for wrong in ("path", "gather", "progressive", "nearest"):

@@ -36,7 +36,7 @@ def test_unknown_scene_is_answered_with_the_known_ones(tmp_path: Path) -> None:
     command = [sys.executable, SCENES / "make", "--to", tmp_path, "teapot"]
     answer = subprocess.run(command, capture_output=True, text=True)
     assert answer.returncode == 2
-    assert "there is no scene teapot; there are cardioid_100" in answer.stderr
+    assert "there is no scene teapot; there are car_cabin" in answer.stderr
     assert not list(tmp_path.iterdir())
 
 

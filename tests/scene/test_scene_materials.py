@@ -229,3 +229,25 @@ def test_lights_without_power_are_dropped_and_counted(tmp_path: Path) -> None:
     scene = load(tmp_path, dark, flat)
     assert [s.radiance for s in scene.shapes] == [None]
     assert scene.dropped == {"light of no power": 1, "zero-area light": 1}
+
+
+def test_thin_glass_says_how_light_passes_it(tmp_path: Path) -> None:
+    """Not Mitsuba's: a property of smooth glass of either kind."""
+
+    def of(kind: str, value: str = "") -> tuple[Material, tuple[str, ...]]:
+        rule = f'<string name="thin_glass" value="{value}"/>' if value else ""
+        return material(tmp_path, f'<bsdf type="{kind}">{rule}</bsdf>')
+
+    assert (of("thindielectric")[0].thin_rule, of("dielectric")[0].thin_rule) == ("by setting", "exact")
+    for kind in ("thindielectric", "dielectric"):
+        for rule in ("exact", "ignored", "tinted", "tinted and reflecting", "by setting"):
+            found, warnings = of(kind, rule)
+            assert (found.thin_rule, warnings) == (rule, ())
+        found, warnings = of(kind, "clear")
+        assert found.thin_rule == of(kind)[0].thin_rule
+        assert len(warnings) == 1
+        assert "'thin_glass'" in warnings[0]
+        assert "'clear'" in warnings[0]
+    found, warnings = of("roughdielectric", "tinted")
+    assert found.thin_rule == "exact"
+    assert len(warnings) == 1

@@ -24,6 +24,10 @@ METHODS: Mapping[str, Mapping[str, object]] = {
     "nearest": {"render.method": "progressive", "estimate.lookup": "nearest", "estimate.k": 10},
 }
 """Settings by method; "nearest" is `progressive` with the other look-up."""
+THIN_GLASS: Mapping[str, Mapping[str, object]] = {
+    "thin glass": {"render.method": "gather", "render.thin_glass": "tinted and reflecting"},
+}
+"""A method of scenes with thin glass alone: its light is all there, under the names of other terms."""
 PHOTON_METHODS = tuple(name for name in METHODS if name != "path")
 NEAREST_REACH = 4.0
 """Largest radius of a nearest look-up relative to that of a fixed one."""
@@ -45,7 +49,7 @@ def our_runs(
     opened: OpenScene, method: str, effort: Effort, seeds: list[int], pool: WorkPool, max_depth: int = MAX_DEPTH
 ) -> NDArray[np.float32]:
     """(runs, h, w, 15): the terms of `pmviewer.render.planes`, a run a seed."""
-    values: dict[str, object] = {**DEPTH, **METHODS[method], "render.max_depth": max_depth}
+    values: dict[str, object] = {**DEPTH, **{**METHODS, **THIN_GLASS}[method], "render.max_depth": max_depth}
     passes = effort.spp
     if method != "path":
         passes = effort.passes

@@ -5,6 +5,7 @@
   or coats, no path tracer finds the caustics. There they are compared with Mitsuba's particle tracer instead, in the
   pixels that see nothing of the kind; with each other where no such pixel is left, where lights at infinity shine,
   which Mitsuba's particles show wrong, or where these bring less than its own paths.
+* With thin glass, `gather` with panes that light passes straight (`render.thin_glass`), as the photon methods.
 * The photon methods with our `path`, term by term: with such caustics only what the camera sees without them.
 
 Photon methods are consistent: what their look-ups blur or lose at edges goes with the radius r. A disc over a straight
@@ -25,10 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench.agree.generate import has_distant_lights, needs_particles
+from pmviewer.bench.agree.materials import is_mapped
 from pmviewer.bench.agree.mitsuba_client import Mitsuba, MitsubaError
-from pmviewer.bench.agree.ours import METHODS, PHOTON_METHODS, Effort, our_runs, picture, term
+from pmviewer.bench.agree.ours import METHODS, PHOTON_METHODS, THIN_GLASS, Effort, our_runs, picture, term
 from pmviewer.bench.agree.statistics import Outcome, compared, negligible, summaries
-from pmviewer.bench.agree.tree import Node
+from pmviewer.bench.agree.tree import Node, innermost, shapes_of
 from pmviewer.bench.agree.verdict import Comparison, Verdict
 from pmviewer.bench.agree.xml import write_scene
 from pmviewer.engine.opened import OpenScene, open_scene
@@ -156,6 +158,13 @@ def particles_hold(runs: Runs) -> bool:
     return bool(particles >= LEAST_OF_PATHS * paths)
 
 
+def has_panes(scene: Node) -> bool:
+    """Whether there is thin glass; a map around it tilts what it reflects, which rays straight through don't see."""
+    bsdfs = [shape["bsdf"] for shape in shapes_of(scene) if "bsdf" in shape]
+    panes = [bsdf for bsdf in bsdfs if innermost(bsdf)["type"] == "thindielectric"]
+    return bool(panes) and not any(map(is_mapped, panes))
+
+
 def questions(runs: Runs) -> Iterator[Question]:
     """All that is compared for a scene."""
 
@@ -174,7 +183,7 @@ def questions(runs: Runs) -> Iterator[Question]:
     yield Question("path", "Mitsuba path", "picture", lambda s: (whole("path", s), paths(s)))
     yield Question("path", "Mitsuba path", "one scattering", one_scattering)
     particles = needs_particles(runs.scene)
-    for method in PHOTON_METHODS:
+    for method in (*PHOTON_METHODS, *(THIN_GLASS if has_panes(runs.scene) else ())):
 
         def by_particles(stage: int, method: str = method) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
             seen = runs.seen_plainly
@@ -192,6 +201,8 @@ def questions(runs: Runs) -> Iterator[Question]:
             yield Question(method, "Mitsuba particles", "plain pixels", by_particles)
         elif method != "progressive":
             yield Question(method, "progressive", "picture", by_other)
+        if method in THIN_GLASS:
+            continue
         for name in SAFE_TERMS if particles else TERMS:
 
             def by_term(

@@ -65,6 +65,7 @@ NEEDS: Mapping[str, Needs] = {
     "cardioid_010": Needs(caustics=True, fields=("bsdfs",)),
     "corner_room": Needs(outline=True),
     "glossy_room": Needs(outline=True, fields=("bsdfs",)),
+    "car_cabin": Needs(caustics=True, fields=("bsdfs",)),
     "rooms_10x10": Needs(choice="photons", outline=True),
     "skylight_room": Needs(),
     "three_glasses": Needs(caustics=True, fields=("bsdfs",)),

@@ -18,6 +18,7 @@ from pmviewer.engine.frame import PhotonCloud
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.stages.thin_glass import thin_key
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.importance.importons import Rule, Traced, joined, trace
@@ -124,7 +125,8 @@ class ImportanceStage:
             s.photons.glossy,
             self.pixel,
         )
-        return (self.scene.uid, self.camera, s.render.seed, s.render.max_depth, chosen, gather, rule)
+        glass = thin_key(s, p)
+        return (self.scene.uid, self.camera, s.render.seed, s.render.max_depth, chosen, gather, rule, glass)
 
     @property
     def pixel(self) -> tuple[int, int] | None:

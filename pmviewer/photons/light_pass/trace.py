@@ -29,6 +29,7 @@ from pmviewer.kernels.bsdf.scattering import (
     same_side,
     shading_normal,
 )
+from pmviewer.kernels.bsdf.thin_glass import is_ignored, keeps_class
 from pmviewer.kernels.compile.jit import inlined, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import COPIES, EMISSION, EMITTER, FURTHER_PHOTONS_SALT, PHOTON_SCATTER, STORE
@@ -151,6 +152,9 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 break
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
+            if is_ignored(scene, prim, material):
+                o = leave(p, ng, gap, d[0], d[1], d[2])
+                continue
             beta = _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledgers, kind)
             extend_path(paths, i, prim, p, d, scale(beta, factor), word, light)
             wi = (-d[0], -d[1], -d[2])
@@ -162,10 +166,9 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 break
             ng = face(ng, wi)
             u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, PHOTON_SCATTER + bounces)
-            unfound = deltas and bounces > 0 and kept & FOLLOWED != 0
+            unfound = deltas and flags != 0 and kept & FOLLOWED != 0
             if kept & STORED != 0 or unfound:
-                if unfound:
-                    word = _u4(word | _u4(UNFOUND))
+                word = _u4(word | _u4(UNFOUND)) if unfound else word
                 times, stored = _copies(pass_, beta, seed, index, bounces)
                 # As many photons as the opacity says meet the surface; looked up, it is taken to be there.
                 stored = over_opacity(scene, prim, u, v, p, scale(stored, factor))
@@ -181,14 +184,14 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 break
             group, share, u_lobe = pick_group(b, wi, u_lobe)
             deltas = deltas and group == FOLLOWED and is_delta(b)
-            if group == FOLLOWED:
-                flags = _u4(flags | _u4(LAST_SPECULAR))
-            elif not to_global and pass_.only_direct != 0:
+            if group != FOLLOWED and not to_global and pass_.only_direct != 0:
                 ledgers[kind, E_TERMINATED] += _f8(before * factor)
                 break
-            else:
-                flags = _u4(HAD_DIFFUSE)
             d, weight = _scattered(scene, b, group, wi, ng, u_lobe, (u0, u1))
+            if group != FOLLOWED:
+                flags = _u4(HAD_DIFFUSE)
+            elif not keeps_class(scene, prim, material, ng, d):
+                flags = _u4(flags | _u4(LAST_SPECULAR))
             after = scale(mul(beta, weight), share)
             if not is_good(after):
                 counts[C_DROPPED] += 1

@@ -7,24 +7,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.accel.occlusion import occluded
-from pmviewer.kernels.bsdf.scattering import bsdf_f, bsdf_pdf, compressed, same_side, shading_normal
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, bsdf_f, bsdf_pdf, compressed, same_side, shading_normal
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.dimensions import FURTHER_LIGHT
 from pmviewer.kernels.lights.light import emitted, environment_radiance, one_light_pdf, sample_one_light
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.scene import light_of
-from pmviewer.kernels.surface import leave
-from pmviewer.kernels.vector import add, dot, mul, scale, sub
-from pmviewer.render.chain import BLACK
+from pmviewer.kernels.vector import add, dot, largest, mul, scale
+from pmviewer.render.chain import BLACK, WHITE
 from pmviewer.render.direct.choice import chosen_light, expected_samples
 from pmviewer.render.direct.shadow import LIT, UNKNOWN, known_visibility
 from pmviewer.render.record import C_RAYS, C_SAVED, C_SHADOW_RAYS
+from pmviewer.render.straight import transmission
 
 _f4 = np.float32
 _u4 = np.uint32
-BEFORE_LIGHT = _f4(1.0 - 2.0**-13)
-"""Shadow rays end a little before the light's own surface."""
 
 
 @device
@@ -44,14 +41,6 @@ def met_light(scene, hit):
 def radiance_of(scene, light, hit, d):
     """Radiance that the light which a ray of direction d met sends back along it."""
     return environment_radiance(scene, d) if hit.prim < 0 else emitted(scene, light, hit.prim, hit.p, hit.ng, d)
-
-
-@device
-def visible(scene, p, ng, gap, wi, end):
-    """Whether nothing stands between the surface point p and the point `end`, seen from p in direction wi."""
-    o = leave(p, ng, gap, wi[0], wi[1], wi[2])
-    d = sub(end, o)
-    return not occluded(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), BEFORE_LIGHT)
 
 
 @device
@@ -81,11 +70,14 @@ def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, numbers):
                 rays += 1
             else:
                 saved += 1
-            if known == LIT or (known == UNKNOWN and visible(scene, p, ng, gap, wi, end)):
+            tint = WHITE if known == LIT else BLACK
+            if known == UNKNOWN:
+                tint = transmission(scene, p, ng, gap, wi, end, group != FOLLOWED or not findable)
+            if largest(tint) > _f4(0.0):
                 weight = cos / (m * pdf)
                 if findable and n_bsdf > 0:
                     weight *= power_heuristic(m, pdf, _f4(n_bsdf), bsdf_pdf(b, group, wo, wi))
-                total = add(total, scale(mul(f, L), weight))
+                total = add(total, scale(mul(mul(f, L), tint), weight))
     return total, rays, saved
 
 

@@ -15,7 +15,7 @@ from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian, sh
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import CACHE_SALT, HEMISPHERE
 from pmviewer.kernels.random import draw4, hash3
-from pmviewer.kernels.vector import dot, largest, luminance
+from pmviewer.kernels.vector import dot, largest, luminance, mul
 from pmviewer.maps.hemisphere import cell_direction, irradiance_and_gradients
 from pmviewer.maps.irradiance_cache import (
     FOOTPRINT,
@@ -34,6 +34,7 @@ from pmviewer.render.gather.gather import gather_light
 from pmviewer.render.given import opened
 from pmviewer.render.pixel import pixel_seed, sampled_ray
 from pmviewer.render.record import C_DROPPED, C_RAYS
+from pmviewer.render.straight import cast_on, way
 
 _f4 = np.float32
 _f8 = np.float64
@@ -91,10 +92,12 @@ def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
             if dot(wi, ng) <= _f4(0.0):
                 continue
             counts[C_RAYS] += 1
-            hit = cast(given.scene, ray_from(p, ng, gap, wi))
+            ray = ray_from(p, ng, gap, wi)
+            hit, tint = cast_on(given.scene, ray, True)
             if hit.prim >= 0:
-                cells[here, 3] = hit.t
-                cells[here, 0], cells[here, 1], cells[here, 2] = gather_light(given, hit, wi, seed, _u4(here), counts)
+                cells[here, 3] = way(given.scene, ray.o, wi, hit)
+                L = mul(tint, gather_light(given, hit, wi, seed, _u4(here), counts))
+                cells[here, 0], cells[here, 1], cells[here, 2] = L
 
 
 @kernel

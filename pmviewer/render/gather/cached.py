@@ -13,11 +13,11 @@ from pmviewer.kernels.bsdf.scattering import STORED, bsdf_sample, is_lambertian,
 from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.kernels.vector import dot, largest, mul, scale
 from pmviewer.maps.irradiance_cache import interpolate
-from pmviewer.render.cast import cast, leaving
 from pmviewer.render.chain import BLACK
 from pmviewer.render.direct.direct import found_light
 from pmviewer.render.gather.gather import gather_rays
 from pmviewer.render.record import C_CACHED, C_GATHERED, C_RAYS
+from pmviewer.render.straight import cast_straight
 
 _f4 = np.float32
 
@@ -57,7 +57,8 @@ def surface_rays(given, known, gather, si, beta, rays, counts):
             wi, weight, pdf, _ = bsdf_sample(scene, si.bsdf, STORED, si.wo, u_lobe, u, v)
             if dot(wi, si.ng) > _f4(0.0) and largest(weight) > _f4(0.0):
                 counts[C_RAYS] += 1
-                hit = cast(scene, leaving(si, wi))
+                hit, tint = cast_straight(scene, si, wi)
+                weight = mul(weight, tint)
                 direct = mul(weight, found_light(scene, si.p, wi, pdf, rays.n, rays.choice, eye.biased, hit))
         return direct, scale(mul(si.bsdf.albedo, known), INV_PI)
 

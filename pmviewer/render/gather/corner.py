@@ -20,13 +20,13 @@ from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import add, dot, largest, mul
 from pmviewer.maps.variant import ABSENT
-from pmviewer.render.cast import cast, leaving
 from pmviewer.render.chain import BLACK
 from pmviewer.render.direct.choice import LIST_WORDS, choose
 from pmviewer.render.direct.direct import direct_light, found_light
 from pmviewer.render.given import Sampler
 from pmviewer.render.record import C_RAYS
 from pmviewer.render.reflect import reflected
+from pmviewer.render.straight import cast_straight
 
 _f4 = np.float32
 _u4 = np.uint32
@@ -68,7 +68,8 @@ def _again(given, si, seed, index, counts, hit):
     if dot(d, si.ng) <= _f4(0.0) or not largest(weight) > _f4(0.0):
         return L, BLACK, d, hit
     counts[C_RAYS] += 1
-    hit = cast(scene, leaving(si, d))
+    hit, tint = cast_straight(scene, si, d)
+    weight = mul(weight, tint)
     if eye.mis != 0:
         L = add(L, mul(weight, found_light(scene, si.p, d, pdf, eye.mis, choice, eye.biased, hit)))
     return L, weight, d, hit

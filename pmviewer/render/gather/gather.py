@@ -12,13 +12,14 @@ from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, chain_nu
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.dimensions import GATHER_CHAIN, GATHER_FORK
 from pmviewer.kernels.vector import add, dot, largest, mul, scale
-from pmviewer.render.cast import cast, leaving
+from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow
 from pmviewer.render.direct.direct import found_light
 from pmviewer.render.gather.corner import gather_again, is_corner
 from pmviewer.render.gather.guide import gather_direction
 from pmviewer.render.record import C_RAYS
 from pmviewer.render.reflect import gathered
+from pmviewer.render.straight import cast_straight
 
 _f4 = np.float32
 LEAST_SURVIVAL = np.float32(0.05)
@@ -111,7 +112,8 @@ def gather_rays(given, si, beta, rays, counts):
                 continue
             weight = scale(weight, _f4(1.0) / survival)
         counts[C_RAYS] += 1
-        hit = cast(scene, leaving(si, wi))
+        hit, tint = cast_straight(scene, si, wi)
+        weight = mul(weight, tint)
         if eye.direct != 0 and eye.mis != 0 and pdf > _f4(0.0):
             L = found_light(scene, si.p, wi, pdf, n_bsdf, rays.choice, eye.biased, hit)
             direct = add(direct, mul(weight, L))

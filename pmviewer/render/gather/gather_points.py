@@ -8,12 +8,13 @@ from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.vector import dot, largest, mul, scale
-from pmviewer.render.cast import cast, leaving
+from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow_camera_path
 from pmviewer.render.gather.gather import gather_light, gather_survival
 from pmviewer.render.gather.guide import AIM_WORDS, aim, gather_direction
 from pmviewer.render.given import GatherRays, opened
 from pmviewer.render.pixel import sampled_ray
+from pmviewer.render.straight import cast_straight
 
 _f4 = np.float32
 _i8 = np.int64
@@ -35,10 +36,10 @@ def _replay(given, si, beta, seed, rows, row, counts):
         survival = gather_survival(given.eye, beta, weight, share)
         if not u_end < survival:
             continue
-        hit = cast(given.scene, leaving(si, wi))
+        hit, tint = cast_straight(given.scene, si, wi)
         if hit.prim < 0:
             continue
-        L = gather_light(given, hit, wi, seed, sample, counts)
+        L = mul(tint, gather_light(given, hit, wi, seed, sample, counts))
         L = scale(mul(mul(beta, weight), L), share / (survival * _f4(n)))
         for k in range(3):
             rows[row, k], rows[row, 3 + k], rows[row, 6 + k] = si.p[k], hit.p[k], L[k]

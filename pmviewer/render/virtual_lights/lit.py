@@ -35,10 +35,10 @@ from pmviewer.maps.virtual_lights import (
     W_SQUARES,
     W_SUM,
 )
-from pmviewer.render.direct.direct import visible
 from pmviewer.render.pixel import INDIRECT, SPECULAR, weighed
 from pmviewer.render.planes import CHANNELS
 from pmviewer.render.record import C_DROPPED, C_RAYS, C_SHADOW_RAYS
+from pmviewer.render.straight import visible
 from pmviewer.render.virtual_lights.light import scattered, towards, weight_of
 from pmviewer.render.virtual_lights.walk import normalisation
 

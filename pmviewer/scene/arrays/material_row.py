@@ -28,6 +28,14 @@ from pmviewer.scene.arrays.material_lobes import coat_alpha, principled_of
 from pmviewer.scene.description import Material, Scene
 
 Float = NDArray[np.float32]
+THIN_RULES = {
+    "exact": K.THIN_EXACT,
+    "ignored": K.THIN_IGNORED,
+    "tinted": K.THIN_TINTED,
+    "tinted and reflecting": K.THIN_REFLECTING,
+    "by setting": K.THIN_BY_SETTING,
+}
+"""`Material.thin_rule` for kernels."""
 _DISTRIBUTIONS = {"ggx": K.GGX, "beckmann": K.BECKMANN}
 _PERFECT_MIRROR = ((0.0,) * 3, (1.0,) * 3)
 """The complex index that reflects everything: Mitsuba's metal 'none'."""
@@ -103,6 +111,7 @@ def _row(m: Material, tables: list[Float] | None) -> list[float]:
     row[K.M_REFLECTANCE : K.M_REFLECTANCE + 3] = m.reflectance
     row[K.M_TRANSMITTANCE : K.M_TRANSMITTANCE + 3] = m.transmittance
     row[K.M_OPACITY : K.M_COLOURED + 1] = [*opacity_numbers(m), m.vertex_colours]
+    row[K.M_THIN] = THIN_RULES[m.thin_rule]
     if kind == BLEND or (is_plain(m) and kind != CONDUCTOR):
         return row
     alpha_x, alpha_y = (max(float(SMOOTHEST), a) for a in m.alpha)

@@ -15,6 +15,15 @@ TWO_WAYS = Need(
 )
 GLOBAL_MAP_STORED = Need(lambda f: f.plan.global_classes or f.plan.virtual, "No surface of this scene stores photons.")
 
+THIN_GLASS = Need(
+    lambda f: "by setting" in f.traits.thin_glass and f.settings.render.method not in ("path", "virtual lights"),
+    lambda f: (
+        "The path tracer and virtual lights take all glass as it is."
+        if "by setting" in f.traits.thin_glass
+        else "No thin glass in this scene that goes by this setting (a thindielectric does)."
+    ),
+)
+
 
 class Render(Group):
     """Method"""
@@ -36,6 +45,19 @@ class Render(Group):
         ge=1,
         le=1000,
         needs=(FOLLOWED_OR_PATHS,),
+    )
+    thin_glass: Literal["exact", "ignored", "tinted", "tinted and reflecting"] = setting(
+        "exact",
+        "How light gets through thin glass, which fills closed cabins and rooms with noisy caustics (course guide, "
+        "6.2.3). exact: by the caustic map, as through all glass. ignored: photons, light samples and gather rays meet "
+        "no pane: too bright by what panes absorb and reflect, without their colour. tinted: photons refract without "
+        "becoming caustics, light samples and gather rays go straight on, weakened and coloured; what panes reflect "
+        "onto the surface seen is missing. tinted and reflecting: that is a caustic still, and noisier. Behind glass "
+        "of two faces both lack its displacement and focus. What the camera sees of glass itself stays exact.",
+        stage="photons",
+        scale="choice",
+        title="thin glass",
+        needs=(THIN_GLASS,),
     )
     outline_rays: int = setting(
         16,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from pmviewer.scene.description import BLACK, RGB, Material
+from pmviewer.scene.description import BLACK, RGB, THIN_GLASS, Material, ThinGlass
 from pmviewer.scene.formats.mitsuba import older
 from pmviewer.scene.formats.mitsuba.compound import blend, mask, mixture, two_sided
 from pmviewer.scene.formats.mitsuba.document import Document, Properties
@@ -155,7 +155,18 @@ def _dielectric(p: Properties, name: str) -> Material:
         material = replace(material, absorption=p.bounded_colour("absorption", 0.0, None))
     if p.type == "roughdielectric":
         return replace(material, kind="rough dielectric", alpha=alphas(p), distribution=distribution(p))
-    return material
+    return replace(material, thin_glass=_thin_glass(p))
+
+
+def _thin_glass(p: Properties) -> ThinGlass:
+    """Not Mitsuba's: how light passes the glass (`Material.thin_rule`)."""
+    asked = p.string("thin_glass", "")
+    for rule in THIN_GLASS:
+        if asked == rule:
+            return rule
+    known = ", ".join(THIN_GLASS[1:])
+    p.document.warn(f"'thin_glass' of {p.element} is '{asked[:40]}', none of {known}: it is left out.", p.element)
+    return ""
 
 
 def _plastic(p: Properties, name: str) -> Material:
