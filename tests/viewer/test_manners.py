@@ -41,7 +41,8 @@ def test_a_click_turns_nothing_and_a_drag_is_counted_from_the_press(app, session
         assert session.settings.camera == camera, "less than the threshold"
         before = app.state.live_camera()
         drag_picture(c, app, 60, 0)
-        expected = controls.orbit(before, 60 / app.viewport.rectangle()[3], 0.0)
+        pivot = np.array([0.0, 0.0, -1.0])  # on the back wall, in the picture's middle
+        expected = controls.orbit(before, 60 / app.viewport.rectangle()[3], 0.0, pivot)
         np.testing.assert_allclose(session.settings.camera.origin, expected.origin, rtol=1e-4)
         moved = session.settings.camera
         x, y = app.viewport.origin

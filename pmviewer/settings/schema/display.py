@@ -156,6 +156,14 @@ class Display(Group):
     tone: Literal["sRGB", "Reinhard", "filmic", "linear"] = setting(
         "sRGB", "Tone curve from radiance to the screen.", stage="display", scale="choice", title="tone curve"
     )
+    through_surfaces: bool = setting(
+        False,
+        "The mouse and the keys of flight move the camera through walls and objects. Without it they stop before "
+        "them; the free camera passes everything.",
+        stage="display",
+        scale="switch",
+        title="through surfaces",
+    )
     compile_ahead: bool = setting(
         True,
         "While nothing is asked for, compile in the background what the next click may need: other methods, look-ups, "

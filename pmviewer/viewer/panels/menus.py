@@ -92,6 +92,9 @@ class Menus:
         self._item("Frame the whole scene", "frame_all")
         self._item("Reset the camera", "reset_camera")
         self._item("Fly", "toggle_fly", self._state.flying)
+        through = self._state.settings.display.through_surfaces
+        if imgui.menu_item("Move through surfaces", "", through)[0]:
+            self._state.change({"display.through_surfaces": not through})
         self._item("Fit the picture", "fit_picture")
         if imgui.begin_menu("Free camera"):
             free = self._state.settings.free_camera

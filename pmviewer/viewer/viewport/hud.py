@@ -73,6 +73,9 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         source = viewport.source()
         for overlay in viewport.picture.layers.shown(state.settings):
             overlay.annotate(viewport, source)
+    advice = viewport.advice()
+    if advice:
+        caption(viewport, advice, (width / 2, 0.5 * height), anchor=0.5, colour=theme.WARNING)
     if state.flying:
         text = "flying: W A S D, Q down, E up, drag to look, Shift faster, F or Esc to leave"
         caption(viewport, text, (width / 2, height - line - 2 * margin), anchor=0.5, colour=theme.ACCENT)
