@@ -150,12 +150,15 @@ class Frame:
 
 @dataclass(frozen=True)
 class Status:
-    """What the session is doing now. `progress` is 0–1 of the current activity, None when unknown."""
+    """What the session is doing now. `progress` is 0–1 of the current activity, None when unknown. In a pass that
+    takes long, `stage` is what it is at and `stage_progress` how much of that is through, None when unknown."""
 
     state: State = "empty"
     text: str = ""
     passes: int = 0
     progress: float | None = None
+    stage: str = ""
+    stage_progress: float | None = None
 
 
 @dataclass(frozen=True)

@@ -102,6 +102,7 @@ class FakeSession:
         self.threads = None
         self.paused = False
         self.restarts = 0
+        self.stops = 0
         self.version = 1
         self.closed = False
         self.inspected: tuple[int, int] | None = None
@@ -180,6 +181,10 @@ class FakeSession:
 
     def resume(self) -> None:
         self.paused = False
+
+    def stop(self) -> None:
+        self.paused = True
+        self.stops += 1
 
     def restart(self) -> None:
         self.restarts += 1

@@ -102,11 +102,15 @@ def _height_at_target(pose: CameraPose) -> float:
     return 2 * distance * pose.half_width() * pose.height / pose.width
 
 
+def shifted(pose: CameraPose, way: Vector) -> CameraPose:
+    """Eye and target moved by the vector (3,)."""
+    return replace(pose, origin=_vec3(pose.origin + way), target=_vec3(pose.target + way))
+
+
 def pan(pose: CameraPose, dx: float, dy: float) -> CameraPose:
     """Move eye and target so that the target's plane follows the mouse."""
     right, top, _ = pose.axes()
-    shift = (-right * dx + top * dy) * _height_at_target(pose)
-    return replace(pose, origin=_vec3(pose.origin + shift), target=_vec3(pose.target + shift))
+    return shifted(pose, (-right * dx + top * dy) * _height_at_target(pose))
 
 
 def zoom(pose: CameraPose, steps: float, radius: float) -> CameraPose:
@@ -129,8 +133,7 @@ def zoom(pose: CameraPose, steps: float, radius: float) -> CameraPose:
 def fly(pose: CameraPose, right: float, up: float, forward: float, step: float) -> CameraPose:
     """Move eye and target along the camera's axes; each argument is −1, 0 or 1, `step` a distance."""
     x, y, z = pose.axes()
-    shift = (x * right + y * up + z * forward) * step
-    return replace(pose, origin=_vec3(pose.origin + shift), target=_vec3(pose.target + shift))
+    return shifted(pose, (x * right + y * up + z * forward) * step)
 
 
 def frame_all(pose: CameraPose, center: Vector, radius: float) -> CameraPose:

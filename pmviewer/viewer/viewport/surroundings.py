@@ -3,7 +3,6 @@ where there is anything to see."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from pmviewer.engine.frame import Frame
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.planes import PLANES
 from pmviewer.viewer.background import Background, Lane
+from pmviewer.viewer.viewport import controls
 from pmviewer.viewer.viewport.surface_rays import SurfaceRays, Vector
 
 GAP = 0.005
@@ -98,9 +98,7 @@ class Surroundings:
             wanted = eye + left - normal * float(left @ normal)
         if not stopped:
             return after, False
-        shift = eye - np.asarray(after.origin, float)
-        origin, target = (tuple(float(v) for v in np.asarray(at, float) + shift) for at in (after.origin, after.target))
-        return replace(after, origin=origin, target=target), True
+        return controls.shifted(after, eye - np.asarray(after.origin, float)), True
 
     def _towards(self, eye: Vector, wanted: Vector) -> tuple[Vector, Vector | None]:
         """How far the eye gets on a straight way, and the normal of what stops it."""
