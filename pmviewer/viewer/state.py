@@ -54,21 +54,6 @@ class Toast:
         return time.monotonic() - self.born > TOAST_SECONDS
 
 
-def _first_radius(frame: Frame, scene_radius: float) -> float | None:
-    """Look-up radius of the first pass relative to the scene, from the one of the latest pass."""
-    from pmviewer.maps.radius import progressive_radius  # numba; there by the time of the first frame
-
-    estimate, radius = frame.settings.estimate, frame.statistics.radius
-    if "global" in radius:
-        latest = radius["global"]
-    elif "caustic" in radius:
-        latest = radius["caustic"] / estimate.caustic_radius
-    else:
-        return None
-    shrunk = progressive_radius(1.0, max(frame.statistics.passes, 1), estimate.alpha, 0.0)
-    return latest / shrunk / scene_radius
-
-
 def is_gone(scene: str | Path) -> bool:
     """Whether that is a file which isn't there; bundled scenes have names."""
     return Path(scene).is_absolute() and not Path(scene).exists()
@@ -140,13 +125,8 @@ class ViewerState:
             free = self.live_camera() if self.settings.free_camera.on else None
             pose = self.render_camera() if group == "camera" else free
             return getattr(pose, name) if pose else None
-        frame, geometry = self.frame, self.session.geometry
-        if path == "estimate.radius" and frame is not None and geometry is not None:
-            return _first_radius(frame, float(geometry.radius))
-        if path == "direct.choice_radius" and frame is not None and geometry is not None:
-            radius = frame.statistics.radius.get("light choice")
-            return radius / float(geometry.radius) if radius else None
-        return None
+        frame = self.frame
+        return frame.automatic.get(path) if frame is not None else None
 
     # what is shown ----------------------------------------------------------------------------------------------
 

@@ -165,6 +165,7 @@ class FakeSession:
             statistics=statistics,
             clouds=clouds,
             scene_name=self.scene.name,
+            automatic={"estimate.radius": 0.0081, "photons.projection": "off", "light.rig": "file"},
         )
         self.status = Status("paused" if self.paused else "rendering", "", serial, serial / 1024)
         if self.on_update:

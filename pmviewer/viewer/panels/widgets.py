@@ -78,7 +78,7 @@ class SettingWidgets:
             changed, new = imgui.checkbox(f"##{info.path}", value)
             return new if changed else None
         if info.scale in ("choice", "name"):
-            return self._choice(info, value)
+            return self._choice(info, value, resolved)
         if info.scale == "vector":
             return self._vector(info, value, resolved)
         if self.typing is not None and self.typing.path == info.path:
@@ -90,9 +90,10 @@ class SettingWidgets:
         text = f"{value}" if info.kind is int or isinstance(value, str) else f"{value:.6g}"
         self.typing = Typing(info.path, text)
 
-    def _choice(self, info: SettingInfo, value: str) -> str | None:
+    def _choice(self, info: SettingInfo, value: str, resolved: Any) -> str | None:
         chosen = None
-        if imgui.begin_combo(f"##{info.path}", value):
+        known = value == "auto" and isinstance(resolved, str) and resolved != "auto"
+        if begin_combo(f"##{info.path}", f"auto · {resolved}" if known else value):
             for choice in self.choices(info):
                 refusal = self.refused_view(choice) if info.path == "display.view" else None
                 flags = imgui.SelectableFlags_.none if refusal is None else imgui.SelectableFlags_.disabled
@@ -194,6 +195,15 @@ def _speed(info: SettingInfo, value: float) -> float:
     """Change per point of dragging over a range too wide for a slider: of lengths, which scenes have of any size, a
     hundredth."""
     return max(0.01 * abs(value), 1e-3) if info.unit == "units" else 0.1
+
+
+def begin_combo(label: str, preview: str) -> bool:
+    """`imgui.begin_combo` whose value is told by a tooltip where there is no room for it."""
+    room = imgui.calc_item_width() - imgui.get_frame_height() - 2 * imgui.get_style().frame_padding.x
+    is_open = imgui.begin_combo(label, preview)
+    if not is_open and imgui.calc_text_size(preview).x > room:
+        imgui.set_item_tooltip(preview)
+    return is_open
 
 
 def slider_share(info: SettingInfo, value: float) -> float:
