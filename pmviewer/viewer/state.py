@@ -38,6 +38,7 @@ from pmviewer.viewer.viewport.controls import camera_values
 InactiveReason = Callable[[str, Settings, Any], str | None]
 LAYERS = ("beauty", *TERMS, *AOVS)
 LOG_LINES = 2000
+COMPARING_LAYERS = "While two pictures are compared, the image, its terms and what the first surface is can be shown."
 TOAST_SECONDS = 12.0
 MOST_TOASTS = 2
 
@@ -164,8 +165,16 @@ class ViewerState:
         names = [camera.name for camera in self.session.scene.cameras] if self.session.scene is not None else []
         return ("auto", *(name if names.count(name) == 1 else str(i + 1) for i, name in enumerate(names)))
 
+    @property
+    def named_view(self) -> str:
+        """The view that menus and toolbar name: the one asked for; while two pictures are compared, the one shown."""
+        pair = self.shown_pair()
+        return self.settings.display.view if pair is None else pair[1].view
+
     def refused_view(self, view: str) -> str | None:
         """Why that view can't be shown now, or None."""
+        if self.gain.frames() is not None and view not in LAYERS:
+            return COMPARING_LAYERS
         if view in HELD_WHILE_SHOWN:
             return self.inactive_reason(f"display.view={view}", self.settings, self.session.traits)
         return self.comparison.problem(self.frame) if view in COMPARED_VIEWS else None

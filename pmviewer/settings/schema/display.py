@@ -64,6 +64,10 @@ VIEW_OF_A_MAP = Need(
     f"Only with the views {', '.join(repr(view) for view in MAP_VIEWS)}.",
 )
 
+FALSE_COLOURS = Need(
+    lambda f: f.settings.display.view == "error" or f.settings.display.view in VIEW_NEEDS,
+    "Only with views in false colours.",
+)
 TRACED = Need(lambda f: f.plan.photons, "This method traces no photons.")
 CAUSTIC_PHOTONS = Need(
     lambda f: f.plan.caustic_classes,
@@ -155,6 +159,15 @@ class Display(Group):
     )
     tone: Literal["sRGB", "Reinhard", "filmic", "linear"] = setting(
         "sRGB", "Tone curve from radiance to the screen.", stage="display", scale="choice", title="tone curve"
+    )
+    shading: float = setting(
+        0.5,
+        "How much of the surfaces' shading lies under false colours; 0 shows the colours of the legend alone.",
+        stage="display",
+        scale="linear",
+        ge=0,
+        le=1,
+        needs=(FALSE_COLOURS,),
     )
     through_surfaces: bool = setting(
         False,

@@ -80,7 +80,7 @@ class Menus:
         imgui.set_item_tooltip(entry)
 
     def _view(self) -> None:
-        view = self._state.settings.display.view
+        view = self._state.named_view
         for number, name in enumerate(SETTINGS["display.view"].choices):
             refusal = self._state.refused_view(name)
             key = str((number + 1) % 10) if number < 10 else ""

@@ -125,6 +125,8 @@ class Toolbar:
 
     def _edit(self, path: str, label: str, width_em: float, faded: bool) -> None:
         info, value = SETTINGS[path], get(self._state.settings, path)
+        if path == "display.view":
+            value = self._state.named_view
         imgui.push_style_var(imgui.StyleVar_.alpha, 0.5 if faded else 1.0)
         imgui.begin_group()
         imgui.align_text_to_frame_padding()
