@@ -14,6 +14,7 @@ from pmviewer.output.diagnostic_views import DENOISED
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.free_camera import as_perspective, plan_pose
 from pmviewer.settings.access import SETTINGS, get
+from pmviewer.viewer import layout
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.exports import Exports, default_path, fresh_path
 from pmviewer.viewer.overlays.registry import SWITCHED
@@ -39,6 +40,7 @@ class Commands:
         self.window_shot: Path | None = None
         """Where the next frame of the whole window goes."""
         self._hidden: list[str] = []
+        self._layout = layout.Layout()
         self.table: dict[str, Callable[[], None]] = {
             "open": self._open,
             "load_reference": self._load_reference,
@@ -70,6 +72,10 @@ class Commands:
             "toggle_help": self._toggle_help,
             "escape": self._escape,
         }
+
+    def between_frames(self) -> None:
+        """Before each window frame."""
+        self._layout.restore_now()
 
     def choose_view(self, number: int) -> None:
         """The view of that number in the schema's order."""
@@ -206,7 +212,9 @@ class Commands:
         if self.state.panels_hidden:
             for window in windows:
                 window.is_visible = window.is_visible or window.label in self._hidden
+            self._layout.restore_soon()
         else:
+            self._layout.remember()
             self._hidden = [w.label for w in windows if w.is_visible and w.label != VIEWPORT]
             for window in windows:
                 window.is_visible = window.label == VIEWPORT

@@ -159,6 +159,7 @@ class ViewerApp:
     def _pre_new_frame(self) -> None:
         assert self.context is not None
         free_collected(self.context)
+        self.commands.between_frames()
         self._shares.keep()
         self.state.poll()
         if not self.viewport.alone:

@@ -150,10 +150,10 @@ class SettingsPanel:
         imgui.table_next_row()
         imgui.table_next_column()
         if reason:
-            imgui.push_style_var(imgui.StyleVar_.alpha, 0.45)
+            imgui.push_style_var(imgui.StyleVar_.alpha, theme.GREYED)
         imgui.align_text_to_frame_padding()
         differs = value != info.default
-        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*(theme.TEXT if differs else (0.76, 0.76, 0.76, 1.0))))
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.TEXT) if differs else theme.grey(theme.look.name))
         imgui.text_unformatted(theme.drawable(info.title))
         imgui.pop_style_color()
         described = self._is_hovered()

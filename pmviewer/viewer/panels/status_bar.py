@@ -9,7 +9,8 @@ from pmviewer.viewer import theme
 from pmviewer.viewer.format import duration, grouped, si
 from pmviewer.viewer.state import ViewerState
 
-_COLOURS = {"rendering": theme.ACCENT, "finished": theme.GOOD, "failed": theme.ERROR, "paused": theme.WARNING}
+_COLOURS = {"rendering": "accent", "finished": "good", "failed": "error", "paused": "warning"}
+"""Of states, as looks name them."""
 
 
 def status_parts(state: ViewerState) -> list[str]:
@@ -54,7 +55,7 @@ def draw_status_bar(state: ViewerState) -> None:
     """Draw the session's state with its progress, what is being loaded, figures of the picture, and work beside it."""
     status = state.session.status
     imgui.align_text_to_frame_padding()
-    colour = _COLOURS.get(status.state, theme.TEXT)
+    colour = getattr(theme.look, _COLOURS.get(status.state, "text"))
     head: str = status.state
     text = status.text
     if text.startswith(head):

@@ -127,7 +127,7 @@ class Toolbar:
         info, value = SETTINGS[path], get(self._state.settings, path)
         if path == "display.view":
             value = self._state.named_view
-        imgui.push_style_var(imgui.StyleVar_.alpha, 0.5 if faded else 1.0)
+        imgui.push_style_var(imgui.StyleVar_.alpha, theme.GREYED if faded else 1.0)
         imgui.begin_group()
         imgui.align_text_to_frame_padding()
         imgui.text_colored(imgui.ImVec4(*theme.DIM), label)

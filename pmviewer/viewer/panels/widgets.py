@@ -157,8 +157,8 @@ class SettingWidgets:
         """The slider or drag field; None when it didn't move."""
         name = f"##{info.path}"
         imgui.push_style_color(imgui.Col_.frame_bg, theme.grey(0, 0))
-        imgui.push_style_color(imgui.Col_.frame_bg_hovered, theme.grey(1, 0.06))
-        imgui.push_style_color(imgui.Col_.frame_bg_active, theme.grey(1, 0.10))
+        imgui.push_style_color(imgui.Col_.frame_bg_hovered, theme.grey(theme.look.lighter, 0.06))
+        imgui.push_style_color(imgui.Col_.frame_bg_active, theme.grey(theme.look.lighter, 0.10))
         try:
             return self._slide_over_bar(info, name, current, text, width)
         finally:
@@ -200,8 +200,9 @@ def _speed(info: SettingInfo, value: float) -> float:
 def begin_combo(label: str, preview: str) -> bool:
     """`imgui.begin_combo` whose value is told by a tooltip where there is no room for it."""
     room = imgui.calc_item_width() - imgui.get_frame_height() - 2 * imgui.get_style().frame_padding.x
-    is_open = imgui.begin_combo(label, preview)
-    if not is_open and imgui.calc_text_size(preview).x > room:
+    narrow = imgui.calc_text_size(preview).x > room
+    is_open = imgui.begin_combo(label, preview, imgui.ComboFlags_.no_arrow_button if narrow else 0)
+    if not is_open and imgui.calc_text_size(preview).x > room + imgui.get_frame_height():
         imgui.set_item_tooltip(preview)
     return is_open
 
@@ -224,13 +225,13 @@ def filled_bar(width: float, share: float) -> None:
     rounding = imgui.get_style().frame_rounding
     draw = imgui.get_window_draw_list()
     alpha = imgui.get_style().alpha
-    draw.add_rect_filled((x, y), (x + size, bottom), imgui.get_color_u32(theme.grey(0.235, alpha)), rounding)
+    draw.add_rect_filled((x, y), (x + size, bottom), imgui.get_color_u32(theme.ground("frame_bg", alpha)), rounding)
     if share > 0:
         end = x + max(size * share, 2)
         fill = imgui.get_color_u32(theme.with_alpha(theme.ACCENT, 0.30 * alpha))
         edge = imgui.get_color_u32(theme.with_alpha(theme.ACCENT, 0.85 * alpha))
         draw.add_rect_filled((x, y), (end, bottom), fill, rounding)
-        draw.add_rect_filled((end - 2, y), (end, bottom), edge)
+        draw.add_rect_filled((end - 2, bottom - 4), (end, bottom), edge)  # below the digits
 
 
 def icon_button(icon: str, name: str, tooltip: str, *, on: bool = False, enabled: bool = True) -> bool:

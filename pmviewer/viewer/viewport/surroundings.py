@@ -62,7 +62,7 @@ class Surroundings:
             background.start(BOXING, "boxing the surfaces", work)
 
     def under(self, pose: CameraPose, pixel: tuple[float, float]) -> Vector | None:
-        """The surface point (3,) that the camera sees at that place of the image, in pixels; None where it sees none."""
+        """The surface point (3,) that the camera sees at that place of the image, in pixels; None without one."""
         if self._rays is None:
             return None
         origins, directions = pose.rays(np.array([pixel[0]]), np.array([pixel[1]]))
