@@ -52,6 +52,8 @@ class Commands:
             "screenshot": self._screenshot,
             "screenshot_picture": lambda: self.exports.png(self._fresh(".png"), overlays=True),
             "quit": self._quit,
+            "undo": self.state.undo,
+            "redo": self.state.redo,
             "toggle_pause": self._toggle_pause,
             "restart": self.state.session.restart,
             "exposure_up": lambda: self._expose(EXPOSURE_STEP),

@@ -182,7 +182,7 @@ class ViewerApp:
 
     def _over_everything(self) -> None:
         if not self.dialogs.is_open:
-            run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying)
+            run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying, self.state.history)
         self.state.flipped = not self.dialogs.is_open and is_held(FLIP_KEY)
         self.commands.locate_scene()
         self.dialogs.poll()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
+from pmviewer.viewer.history import History
 from pmviewer.viewer.overlays.overlay import Switch
 from pmviewer.viewer.overlays.registry import OVERLAYS
 
@@ -42,6 +43,9 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("File", "F12", "Screenshot of the window", "screenshot", K.f12),
     Binding("File", "Ctrl+F12", "Screenshot of the picture with overlays", "screenshot_picture", K.f12, ctrl=True),
     Binding("File", "Ctrl+Q", "Quit", "quit", K.q, ctrl=True),
+    Binding("Edit", "Ctrl+Z", "Undo the last change of a setting or the camera", "undo", K.z, ctrl=True),
+    Binding("Edit", "Ctrl+Shift+Z", "Redo it", "redo", K.z, ctrl=True, shift=True),
+    Binding("Edit", "Ctrl+Y", "Redo it, too", "redo", K.y, ctrl=True),
     Binding("Render", "Space", "Pause or resume", "toggle_pause", K.space),
     Binding("Render", "R", "Restart", "restart", K.r),
     Binding("Render", "N", "Compare with and without importance", "compare_importance", K.n),
@@ -93,8 +97,11 @@ def is_held(key: imgui.Key) -> bool:
     return imgui.is_key_down(key) and not (io.want_text_input or io.key_ctrl or io.key_shift or io.key_alt)
 
 
-def run_shortcuts(actions: Mapping[str, Callable[[], None]], choose_view: Callable[[int], None], flying: bool) -> None:
-    """Run the actions of the keys pressed in this frame. Typing into a field and flying keep their letters."""
+def run_shortcuts(
+    actions: Mapping[str, Callable[[], None]], choose_view: Callable[[int], None], flying: bool, history: History
+) -> None:
+    """Run the actions of the keys pressed in this frame, each press a step of its own to undo. Typing into a field and
+    flying keep their letters."""
     io = imgui.get_io()
     if io.want_text_input:
         return
@@ -104,8 +111,17 @@ def run_shortcuts(actions: Mapping[str, Callable[[], None]], choose_view: Callab
                 continue
             if io.key_ctrl == binding.ctrl and io.key_shift == binding.shift and not io.key_alt:
                 if imgui.is_key_pressed(key, binding.repeat):
+                    history.gesture += imgui.is_key_pressed(key, False)
                     actions[binding.action]()
     if not (io.key_ctrl or io.key_shift or io.key_alt):
         for number, key in enumerate(_DIGITS):
             if imgui.is_key_pressed(key, False):
+                history.gesture += 1
                 choose_view(number)
+
+
+def follow_mouse(history: History) -> None:
+    """Once per window frame: what is changed while a button is down is one step to undo."""
+    buttons = (imgui.MouseButton_.left, imgui.MouseButton_.right, imgui.MouseButton_.middle)
+    history.gesture += any(imgui.is_mouse_clicked(b) or imgui.is_mouse_released(b) for b in buttons)
+    history.held = any(imgui.is_mouse_down(button) for button in buttons)

@@ -30,6 +30,7 @@ from pmviewer.settings.access import (
 from pmviewer.viewer.background import Background
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.dialogs.recent import RecentFiles
+from pmviewer.viewer.history import History
 from pmviewer.viewer.importance_gain import GainRun
 from pmviewer.viewer.inspector import Inspector
 from pmviewer.viewer.session_link import SessionLike
@@ -71,6 +72,7 @@ class ViewerState:
         self.comparison = Comparison(session, self.background, self.say)
         self.gain = GainRun(session, self.background, self.say)
         self.inspector = Inspector(session, lambda: self.frame)
+        self.history = History()
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
         self._toasts_of = session.scene
@@ -113,6 +115,19 @@ class ViewerState:
             self.say("error", str(error))
             return
         if settings != self.settings:
+            self.history.changed(self.settings, settings)
+            self.session.set(settings)
+
+    def undo(self) -> None:
+        """Take the last step of the user's back."""
+        self._step(self.history.undo(self.settings))
+
+    def redo(self) -> None:
+        """Take it again."""
+        self._step(self.history.redo(self.settings))
+
+    def _step(self, settings: Settings | None) -> None:
+        if settings is not None and settings != self.settings:
             self.session.set(settings)
 
     def resolved(self, path: str) -> Any:
@@ -250,6 +265,7 @@ class ViewerState:
         if self._opening is not None:
             path, self.parameters = self._opening
             self.recent.add(path)
+            self.history.clear()
             if before is not None and self.session.paused:
                 self.session.resume()  # it was the scene before that was to stand still
             self._opening = None

@@ -9,8 +9,9 @@ from imgui_bundle import hello_imgui, imgui
 from pmviewer.settings.access import SETTINGS, get
 from pmviewer.viewer import theme
 from pmviewer.viewer.overlays.registry import SWITCHED
+from pmviewer.viewer.panels.edit_menu import EditMenu
 from pmviewer.viewer.panels.toolbar import Actions
-from pmviewer.viewer.shortcuts import keys_of
+from pmviewer.viewer.shortcuts import follow_mouse, keys_of
 from pmviewer.viewer.state import ViewerState
 
 
@@ -21,11 +22,16 @@ class Menus:
         self._state = state
         self._actions = actions
         self._panels = panels
+        self._edit = EditMenu(state, self._item)
 
     def gui(self) -> None:
         """Draw the bar's menus, between imgui's begin and end of a menu bar."""
+        follow_mouse(self._state.history)
         if imgui.begin_menu("File"):
             self._file()
+            imgui.end_menu()
+        if imgui.begin_menu("Edit"):
+            self._edit.gui()
             imgui.end_menu()
         if imgui.begin_menu("View"):
             self._view()

@@ -16,9 +16,9 @@ from pmviewer.viewer.panels.widgets import (
     range_text,
     reset_button,
     tooltip_text,
-    value_text,
 )
 from pmviewer.viewer.state import ViewerState
+from pmviewer.viewer.value_text import value_text
 
 _ASK = "Reset every setting"
 PINNED = ("photons.N", "photons.q", "estimate.radius")

@@ -13,24 +13,11 @@ from imgui_bundle import imgui
 from pmviewer.settings.access import SettingInfo
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import grouped, short
+from pmviewer.viewer.value_text import value_text
 
 _FLAGS = imgui.SliderFlags_.no_input | imgui.SliderFlags_.always_clamp
 WIDE_RANGE = 1000
 """A linear range with more steps than this is dragged relatively: a slider would jump over most of its values."""
-
-
-def value_text(info: SettingInfo, value: Any) -> str:
-    """The value with separators and unit, as shown in widgets and tooltips."""
-    if value is None:
-        return "not known yet"
-    if isinstance(value, str):
-        return value
-    if isinstance(value, bool):
-        return "on" if value else "off"
-    if isinstance(value, tuple | list):
-        return ", ".join(f"{v:.4g}" for v in value)
-    number = grouped(value) if info.kind is int else short(value)
-    return f"{number} {info.unit}".rstrip()
 
 
 def range_text(info: SettingInfo) -> str:
