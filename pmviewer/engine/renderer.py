@@ -184,7 +184,7 @@ class Renderer:
             tally.add_cache(cache.n, cache.bytes)
             tally.add_counts(counts)
             given = given._replace(cache=cache.record)
-        tally.timed(pool, "eye pass", lambda: self._eye_pass(given, film))
+        tally.timed(pool, "camera pass", lambda: self._eye_pass(given, film))
         self.latest = RenderedPass(given, maps, shadows, cache, virtual)
 
     def _eye_pass(self, given: PassData, film: Film) -> None:

@@ -18,13 +18,14 @@ from pmviewer.viewer import layout
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.exports import Exports, default_path, fresh_path
 from pmviewer.viewer.overlays.registry import SWITCHED
+from pmviewer.viewer.panels.palette import Palette
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport import controls
 from pmviewer.viewer.viewport.target import Fit
 from pmviewer.viewer.viewport.viewport import VIEWPORT, Viewport
 
-COMPARISON = "Comparison"
-"""The panel's label."""
+COMPARISON, SETTINGS_PANEL = "Comparison", "Settings"
+"""Labels of panels."""
 SCENE_PATTERNS = ["*.xml", "*.toml", "*.glb", "*.gltf", "*.obj", "*.ply", "*.stl"]
 EXPOSURE_STEP = 0.5
 
@@ -39,6 +40,7 @@ class Commands:
         self.exports = Exports(state, viewport)
         self.window_shot: Path | None = None
         """Where the next frame of the whole window goes."""
+        self.palette = Palette(state)
         self._hidden: list[str] = []
         self._layout = layout.Layout()
         self.table: dict[str, Callable[[], None]] = {
@@ -54,6 +56,8 @@ class Commands:
             "quit": self._quit,
             "undo": self.state.undo,
             "redo": self.state.redo,
+            "list_changed": self._list_changed,
+            "open_palette": self.palette.open,
             "toggle_pause": self._toggle_pause,
             "restart": self.state.session.restart,
             "exposure_up": lambda: self._expose(EXPOSURE_STEP),
@@ -222,10 +226,16 @@ class Commands:
                 window.is_visible = window.label == VIEWPORT
         self.state.panels_hidden = not self.state.panels_hidden
 
+    def _list_changed(self) -> None:
+        """Only the changed settings in their panel, which comes to the front; or all of them again."""
+        self.state.only_changed = not self.state.only_changed
+        window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(SETTINGS_PANEL)
+        window.is_visible = window.focus_window_at_next_frame = True
+
     def _toggle_help(self) -> None:
         self.state.help_open = not self.state.help_open
 
     def _escape(self) -> None:
         if not (self.state.flying or self.state.help_open):
             self.state.inspector.unpin()
-        self.state.flying = self.state.help_open = False
+        self.state.flying = self.state.help_open = self.palette.is_open = False

@@ -81,6 +81,8 @@ class ViewerState:
         self.flying = False
         self.panels_hidden = False
         self.help_open = False
+        self.only_changed = False
+        """Whether the settings panel lists changed settings alone."""
         self.flipped = False
         """While the key that shows the reference is held."""
         self.last_camera_move = -1e9

@@ -301,7 +301,7 @@ def test_exports_png_exr_and_session(app, session, tmp_path):
 
     def script(c):
         app.dialogs.save = lambda title, default, chosen: chosen(default)
-        c.key_press(chord(K.p, K.mod_ctrl))
+        c.key_press(chord(chord(K.e, K.mod_ctrl), K.mod_shift))
         c.key_press(chord(K.e, K.mod_ctrl))
         c.key_press(chord(K.s, K.mod_ctrl))
         c.yield_(2)

@@ -197,7 +197,7 @@ class PointOverlay(Group):
     size: float = setting(2.0, "Point size.", stage="display", scale="linear", unit="px", ge=1, le=12)
     colour: Colour = setting(
         "power",
-        "Colour by power (radiance photons and cache: irradiance), by number of bounces or by light.",
+        "Colour by power, by number of bounces or by light.",
         stage="display",
         scale="choice",
     )
@@ -216,7 +216,7 @@ class PointOverlay(Group):
 def coloured_by_irradiance(what: str) -> Any:
     """The colour of points that are light of many photons."""
     return setting(
-        "power",
+        "irradiance",
         "Colour by irradiance.",
         stage="display",
         scale="choice",
@@ -227,13 +227,13 @@ def coloured_by_irradiance(what: str) -> Any:
 class RadianceOverlay(PointOverlay):
     """Radiance photons drawn as points"""
 
-    colour: Colour = coloured_by_irradiance("Radiance photons")
+    colour: Literal["irradiance"] = coloured_by_irradiance("Radiance photons")  # type: ignore[assignment]
 
 
 class CacheOverlay(PointOverlay):
     """Records of the irradiance cache drawn as points"""
 
-    colour: Colour = coloured_by_irradiance("Records")
+    colour: Literal["irradiance"] = coloured_by_irradiance("Records")  # type: ignore[assignment]
     circles: bool = setting(
         False,
         "Circles as wide as records reach, for at most 2,000 of them, evenly thinned.",

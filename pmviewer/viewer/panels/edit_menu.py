@@ -1,4 +1,4 @@
-"""The menu "Edit": undo and redo with the names of the steps."""
+"""The menu "Edit": undo and redo with the names of the steps, presets, what is changed."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ from collections.abc import Callable
 
 from imgui_bundle import imgui
 
+from pmviewer.settings.access import get
+from pmviewer.settings.presets import PRESETS
 from pmviewer.viewer import theme
+from pmviewer.viewer.panels.widgets import tooltip_text
 from pmviewer.viewer.state import ViewerState
 
 LISTED = 20
@@ -30,6 +33,23 @@ class EditMenu:
         if imgui.begin_menu("History", bool(history.done or history.undone)):
             self._steps()
             imgui.end_menu()
+        imgui.separator()
+        if imgui.begin_menu("Presets"):
+            self._presets()
+            imgui.end_menu()
+        self._item("Changed settings", "list_changed", self._state.only_changed)
+        self._item("Find a command or setting …", "open_palette")
+
+    def _presets(self) -> None:
+        """Ways of rendering; the one in force is ticked. Camera, display, seed and stop rules stay."""
+        settings = self._state.settings
+        for preset in PRESETS:
+            assignments = preset.assignments()
+            in_force = all(get(settings, path) == value for path, value in assignments.items())
+            if imgui.menu_item(preset.name, "", in_force)[0]:
+                self._state.change(assignments)
+            if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
+                tooltip_text([(preset.text, theme.TEXT)])
 
     def _steps(self) -> None:
         """Steps to come above, those done below, the newest first: a click goes there."""

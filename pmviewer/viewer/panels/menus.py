@@ -9,6 +9,7 @@ from imgui_bundle import hello_imgui, imgui
 from pmviewer.settings.access import SETTINGS, get
 from pmviewer.viewer import theme
 from pmviewer.viewer.overlays.registry import SWITCHED
+from pmviewer.viewer.panels.bundled_menu import BundledMenu
 from pmviewer.viewer.panels.edit_menu import EditMenu
 from pmviewer.viewer.panels.toolbar import Actions
 from pmviewer.viewer.shortcuts import follow_mouse, keys_of
@@ -22,6 +23,7 @@ class Menus:
         self._state = state
         self._actions = actions
         self._panels = panels
+        self._bundled = BundledMenu(state)
         self._edit = EditMenu(state, self._item)
 
     def gui(self) -> None:
@@ -55,6 +57,9 @@ class Menus:
     def _file(self) -> None:
         self._item("Open …", "open")
         self._item("Load reference …", "load_reference")
+        if imgui.begin_menu("Bundled scenes"):
+            self._bundled.gui()
+            imgui.end_menu()
         if imgui.begin_menu("Open recent", bool(self._state.recent.entries)):
             for entry in list(self._state.recent.entries):
                 self._recent(entry)
