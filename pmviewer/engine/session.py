@@ -22,6 +22,7 @@ from pmviewer.engine.guarded import guarded
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.inspector.report import Pinned
 from pmviewer.engine.loader import Loaded, Loader
+from pmviewer.engine.memory import give_back
 from pmviewer.engine.opened import OpenScene, nobody, open_scene, relit
 from pmviewer.engine.pool import WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
@@ -38,6 +39,8 @@ from pmviewer.settings.needs import Facts
 Source = str | Path | Scene
 LONG_PASS, TELL_EVERY = 0.7, 0.2
 """Seconds after which a pass says what it is at, and how often."""
+MUCH_LESS, KEPT_BYTES = 8, 1 << 26
+"""From which factor fewer photons make results of before unwanted, and how many bytes of them are kept then."""
 NO_MEMORY = "Not enough memory for these settings: lower N or the image size."
 
 
@@ -74,7 +77,8 @@ class Session:
         self._pool = WorkPool(threads, behind_window=True)
         self._pool.on_progress = self._within_pass
         self._pass_began = self._told = 0.0
-        self._stepping = self._stopped = False
+        self._stepping = self._stopped = self._gives_back = False
+        self._N = 0
         self._store = StageStore()
         self._renderer: Renderer | None = None
         self._ahead = Ahead(self._pool.threads, self._published.notify, helper) if compiles_ahead else None
@@ -406,6 +410,7 @@ class Session:
         try:
             prepare(self._opened, settings, self._pool, lambda text, share: self._tell("preparing", text, share))
             renderer = Renderer(self._opened, settings, self._pool, self._store, version)
+            self._make_room(settings.photons.N)
             self._tell("rendering", "first picture")
             frame = renderer.coarse_frame(self._published.serial + 1, self._wanted(renderer))
             self._published.show(frame, self._version)
@@ -418,6 +423,13 @@ class Session:
         self._renderer = renderer
         if self._paused and not self._is_stale():
             self._step(renderer)
+
+    def _make_room(self, N: int) -> None:
+        """After a pass of far more photons, its maps are not kept for a return."""
+        if self._N >= MUCH_LESS * N:
+            self._store.shrink(KEPT_BYTES)
+            self._gives_back = True
+        self._N = N
 
     def _within_pass(self, stage: str, share: float | None) -> None:
         """What the pool is at. Said of passes that somebody may be waiting for."""
@@ -433,6 +445,9 @@ class Session:
             renderer.step()
             with self._changed:
                 self._stopped = False  # too late
+            if self._gives_back:  # the frame before, with its photons, is gone after this one
+                self._gives_back = renderer.passes < 2
+                give_back()
         finally:
             with self._changed:
                 self._stepping = False
