@@ -74,6 +74,9 @@ class Commands:
             "free_from_above": self._free_from_above,
             "free_to_render": self._free_to_render,
             "free_becomes_render": self._free_becomes_render,
+            "toggle_look": self._toggle_look,
+            "larger": lambda: self.state.appearance.larger(1),
+            "smaller": lambda: self.state.appearance.larger(-1),
             "toggle_panels": self._toggle_panels,
             "toggle_help": self._toggle_help,
             "escape": self._escape,
@@ -231,6 +234,10 @@ class Commands:
         self.state.only_changed = not self.state.only_changed
         window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(SETTINGS_PANEL)
         window.is_visible = window.focus_window_at_next_frame = True
+
+    def _toggle_look(self) -> None:
+        appearance = self.state.appearance
+        appearance.choose(look="dark" if appearance.look == "light" else "light")
 
     def _toggle_help(self) -> None:
         self.state.help_open = not self.state.help_open

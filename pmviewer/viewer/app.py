@@ -71,7 +71,7 @@ class ViewerApp:
         picture_size: tuple[int, int] | None = None,
         captions: bool = True,
     ) -> None:
-        self.state = ViewerState(session, inactive_reason, recent or RecentFiles())
+        self.state = ViewerState(session, inactive_reason, recent or RecentFiles(), remember=remember)
         self.viewport = Viewport(self.state)
         self.dialogs = FileDialogs()
         self.commands = Commands(self.state, self.viewport, self.dialogs)
@@ -151,6 +151,7 @@ class ViewerApp:
         width, height = (round(side * scale) for side in layout.SMALLEST_WINDOW)
         if not self.viewport.alone:
             glfw.set_window_size_limits(glfw_window_hello_imgui(), width, height, glfw.DONT_CARE, glfw.DONT_CARE)
+        self.state.appearance.load()
         self._running = True
         self.state.session.on_update = self.wake
         self.state.gain.on_update = self.wake
@@ -160,6 +161,7 @@ class ViewerApp:
         assert self.context is not None
         free_collected(self.context)
         self.commands.between_frames()
+        self.state.appearance.show()
         self._shares.keep()
         self.state.poll()
         if not self.viewport.alone:
@@ -211,6 +213,7 @@ class ViewerApp:
     def _before_exit(self) -> None:
         """End what runs beside the window; what the user has asked for is finished first, without the window."""
         self._running = False
+        self.state.appearance.keep()
         self.state.session.on_update = self.state.gain.on_update = None
         self._release()
         if self.state.background.running(FILES):

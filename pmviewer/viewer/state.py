@@ -27,6 +27,7 @@ from pmviewer.settings.access import (
     parse_assignments,
     with_values,
 )
+from pmviewer.viewer.appearance import Appearance
 from pmviewer.viewer.background import Background
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.dialogs.recent import RecentFiles
@@ -64,8 +65,11 @@ def is_gone(scene: str | Path) -> bool:
 class ViewerState:
     """Lives as long as the window."""
 
-    def __init__(self, session: SessionLike, inactive_reason: InactiveReason, recent: RecentFiles) -> None:
+    def __init__(
+        self, session: SessionLike, inactive_reason: InactiveReason, recent: RecentFiles, *, remember: bool = False
+    ) -> None:
         self.session = session
+        self.appearance = Appearance(remember=remember)
         self.inactive_reason = inactive_reason
         self.recent = recent
         self.background = Background(self.say)

@@ -190,12 +190,17 @@ def load_fonts() -> None:
 
 def apply() -> None:
     """Colours and spacing of the whole window."""
+    colours()
+    _spacing(imgui.get_style())
+
+
+def colours() -> None:
+    """Those of the look that is used."""
     if look is LIGHT:
         imgui.style_colors_light()
     else:
         imgui.style_colors_dark()
     style = imgui.get_style()
-    _spacing(style)
     c, k = imgui.Col_, style.set_color_
     for name in look.grounds:
         if hasattr(c, name):

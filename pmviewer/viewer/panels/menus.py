@@ -8,6 +8,7 @@ from imgui_bundle import hello_imgui, imgui
 
 from pmviewer.settings.access import SETTINGS, get
 from pmviewer.viewer import theme
+from pmviewer.viewer.appearance import SCALES
 from pmviewer.viewer.overlays.registry import SWITCHED
 from pmviewer.viewer.panels.bundled_menu import BundledMenu
 from pmviewer.viewer.panels.edit_menu import EditMenu
@@ -122,6 +123,17 @@ class Menus:
         for label in self._panels:
             window = params.docking_params.dockable_window_of_name(label)
             _, window.is_visible = imgui.menu_item(label, "", window.is_visible)
+        imgui.separator()
+        appearance = self._state.appearance
+        self._item("Light interface", "toggle_look", appearance.look == "light")
+        if imgui.begin_menu("Size of the interface"):
+            for scale in SCALES:
+                if imgui.menu_item(f"{scale:.0%}", "", scale == appearance.scale)[0]:
+                    appearance.choose(scale=scale)
+            imgui.separator()
+            self._item("Larger", "larger")
+            self._item("Smaller", "smaller")
+            imgui.end_menu()
         self._item("Hide the panels", "toggle_panels", self._state.panels_hidden)
         if imgui.menu_item_simple("Reset the layout"):
             params.docking_params.layout_reset = True
