@@ -70,6 +70,7 @@ class Commands:
             "toggle_fly": self._toggle_fly,
             "frame_all": self._frame_all,
             "reset_camera": self._reset_camera,
+            "save_view": self.state.save_view,
             "toggle_free": lambda: self._toggle("free_camera.on"),
             "free_from_above": self._free_from_above,
             "free_to_render": self._free_to_render,

@@ -108,6 +108,9 @@ class Menus:
         if imgui.menu_item("Move through surfaces", "", through)[0]:
             self._state.change({"display.through_surfaces": not through})
         self._item("Fit the picture", "fit_picture")
+        if imgui.begin_menu("Saved views"):
+            self._views()
+            imgui.end_menu()
         if imgui.begin_menu("Free camera"):
             free = self._state.settings.free_camera
             self._item("Free camera", "toggle_free", free.on)
@@ -137,6 +140,21 @@ class Menus:
         self._item("Hide the panels", "toggle_panels", self._state.panels_hidden)
         if imgui.menu_item_simple("Reset the layout"):
             params.docking_params.layout_reset = True
+
+    def _views(self) -> None:
+        """Of the open scene: a click goes there."""
+        self._item("Save this view", "save_view")
+        names = list(self._state.views.of(self._state.session.scene_path))
+        if names:
+            imgui.separator()
+        for name in names:
+            if imgui.menu_item(name, "", False)[0]:
+                self._state.go_to_view(name)
+        if imgui.begin_menu("Forget", bool(names)):
+            for name in names:
+                if imgui.menu_item(f"{name}##forget", "", False)[0]:
+                    self._state.forget_view(name)
+            imgui.end_menu()
 
     def _render(self) -> None:
         self._item("Resume" if self._state.session.paused else "Pause", "toggle_pause")
