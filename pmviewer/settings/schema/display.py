@@ -65,7 +65,7 @@ VIEW_OF_A_MAP = Need(
 )
 
 FALSE_COLOURS = Need(
-    lambda f: f.settings.display.view == "error" or f.settings.display.view in VIEW_NEEDS,
+    lambda f: f.settings.display.view == "error" or f.settings.display.view in VIEW_NEEDS.keys() - {"denoised"},
     "Only with views in false colours.",
 )
 TRACED = Need(lambda f: f.plan.photons, "This method traces no photons.")

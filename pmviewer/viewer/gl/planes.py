@@ -59,7 +59,7 @@ class Planes:
 
     def upload(self, frame: Frame, view: str) -> bool:
         """Take that view of the frame. True when it is another one than before."""
-        shaded = (view == "error" or view in frame.diagnostics) and self._upload_shades(frame)
+        shaded = (view == "error" or (view in DIAGNOSTICS and view in frame.diagnostics)) and self._upload_shades(frame)
         if view in ("reference", "error"):
             view = "beauty"  # the error is that of the image; the reference is there already
         if view in HELD_WHILE_SHOWN and view not in frame.diagnostics:

@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 from pmviewer.settings.access import SETTINGS, SettingInfo, get
 from pmviewer.settings.presets import PRESETS
 from pmviewer.viewer import theme
-from pmviewer.viewer.panels.widgets import SettingWidgets
+from pmviewer.viewer.panels.widgets import SettingWidgets, tooltip_text
 from pmviewer.viewer.shortcuts import BINDINGS
 from pmviewer.viewer.state import ViewerState
 
@@ -149,7 +149,13 @@ class Palette:
         """Its field; Enter flips a switch, goes on to the next choice, or begins to type a number."""
         value = get(self._state.settings, info.path)
         resolved = self._state.resolved(info.path) if value == "auto" else value
+        reason = self._state.inactive_reason(info.path, self._state.settings, self._state.session.traits)
+        imgui.push_style_var(imgui.StyleVar_.alpha, theme.GREYED if reason else 1.0)
         new = self._widgets.edit(info, value, resolved)
+        imgui.pop_style_var()
+        if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip) and not imgui.is_item_active():
+            more = [(f"No effect now: {reason}", theme.WARNING)] if reason else []
+            tooltip_text([(info.path, theme.ACCENT), (info.description, theme.TEXT), *more])
         if entered:
             self._state.history.gesture += 1
             self._fresh = True
