@@ -126,7 +126,7 @@ PRESETS: tuple[Preset, ...] = (
         },
     ),
     Preset(
-        "Pharr 2005",
+        "Pharr",
         "Extended Photon Map Implementation: one map, 50 nearest photons, Simpson's kernel, radiance photons at one in "
         "eight, gather rays guided by cones around photons.",
         {

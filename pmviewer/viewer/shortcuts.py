@@ -63,7 +63,7 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Picture", "I held", "Gather rays of the pixel under the mouse"),
     Binding("Picture", "Ctrl+wheel, Ctrl+drag", "Magnify the picture's pixels and move it"),
     Binding("Picture", "Z", "Fit the picture again", "fit_picture", K.z),
-    Binding("Camera", "Left drag", "Orbit around the target"),
+    Binding("Camera", "Left drag", "Orbit around what is under the mouse"),
     Binding("Camera", "Middle or Shift+left drag", "Pan"),
     Binding("Camera", "Wheel or right drag", "Zoom"),
     Binding("Camera", "Ctrl+click", "Focus the lens on what is there"),

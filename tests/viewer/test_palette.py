@@ -97,10 +97,10 @@ def test_changed_settings_are_listed_and_reset_each(app, session):
 
 
 def test_presets_and_bundled_scenes_are_in_the_menus(app, session):
-    preset = next(p for p in PRESETS if p.name == "Pharr 2005")
+    preset = next(p for p in PRESETS if p.name == "Pharr")
 
     def script(c):
-        c.menu_click("//##MainMenuBar/Edit/Presets/Pharr 2005")
+        c.menu_click("//##MainMenuBar/Edit/Presets/Pharr")
         c.yield_(2)
         assert session.settings == with_values(Settings(), preset.assignments())
         c.key_press(chord(K.z, K.mod_ctrl))

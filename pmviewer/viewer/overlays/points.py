@@ -20,12 +20,7 @@ from pmviewer.viewer.overlays.overlay import Needs, Overlay, Source
 class Points(Overlay):
     """Records of photons, or of what is stored as they are."""
 
-    colourings: ClassVar[Mapping[str, Colouring]] = {
-        "power": POWER,
-        "irradiance": POWER,
-        "bounce": BOUNCES,
-        "light": LIGHTS,
-    }
+    colourings: ClassVar[Mapping[str, Colouring]] = {"power": POWER, "bounce": BOUNCES, "light": LIGHTS}
     """What the choices of its setting `colour` mean."""
     unit: ClassVar[str] = "W"
     """Of the power that it is coloured by."""

@@ -1,7 +1,7 @@
 """Rays against the triangles that the window draws: what lies under the mouse, ahead of the camera, in its way.
 
 The engine's own tree isn't used: its kernels may have to be compiled, and the window doesn't wait for that. A few rays
-a frame are cheap enough without: triangles in the order of a Z curve (Morton 1966) are boxed by 64s, and only those are
+a frame are cheap enough without: triangles in the order of a Z curve are boxed by 64s, and only those are
 tested whose box a ray meets.
 """
 
