@@ -20,6 +20,7 @@ from pmviewer.viewer.dialogs.exports import Exports, default_path, fresh_path
 from pmviewer.viewer.overlays.registry import SWITCHED
 from pmviewer.viewer.panels.palette import Palette
 from pmviewer.viewer.state import ViewerState
+from pmviewer.viewer.view_actions import save_view
 from pmviewer.viewer.viewport import controls
 from pmviewer.viewer.viewport.target import Fit
 from pmviewer.viewer.viewport.viewport import VIEWPORT, Viewport
@@ -70,7 +71,7 @@ class Commands:
             "toggle_fly": self._toggle_fly,
             "frame_all": self._frame_all,
             "reset_camera": self._reset_camera,
-            "save_view": self.state.save_view,
+            "save_view": partial(save_view, state),
             "toggle_free": lambda: self._toggle("free_camera.on"),
             "free_from_above": self._free_from_above,
             "free_to_render": self._free_to_render,

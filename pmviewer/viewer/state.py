@@ -34,7 +34,7 @@ from pmviewer.viewer.dialogs.recent import RecentFiles
 from pmviewer.viewer.history import History
 from pmviewer.viewer.importance_gain import GainRun
 from pmviewer.viewer.inspector import Inspector
-from pmviewer.viewer.saved_views import FILE, SavedViews, settings_of
+from pmviewer.viewer.saved_views import FILE, SavedViews
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.viewport.controls import camera_values
 
@@ -287,30 +287,6 @@ class ViewerState:
         self.last_camera_move = time.monotonic()
         group = "free_camera" if self.settings.free_camera.on else "camera"
         self.change(dict(camera_values(pose, group)))
-
-    def save_view(self) -> None:
-        """Keep the camera that is looked through, for this scene."""
-        pose = self.live_camera()
-        if pose is None:
-            self.say("error", "There is no camera yet: open a scene first.")
-            return
-        try:
-            self.say("info", f"saved the camera as {self.views.add(self.session.scene_path, pose)}")
-        except (PmviewerError, OSError) as error:
-            self.say("error", f"The view was not saved: {error}")
-
-    def forget_view(self, name: str) -> None:
-        """Remove a saved view of this scene."""
-        try:
-            self.views.remove(self.session.scene_path, name)
-        except (PmviewerError, OSError) as error:
-            self.say("error", f"The view was not removed: {error}")
-
-    def go_to_view(self, name: str) -> None:
-        """Look from a saved view of this scene, with the camera that is looked through."""
-        view = self.views.of(self.session.scene_path).get(name)
-        if view is not None:
-            self.change(settings_of(view, "free_camera" if self.settings.free_camera.on else "camera"))
 
     @property
     def navigating(self) -> bool:

@@ -15,6 +15,7 @@ from pmviewer.viewer.panels.edit_menu import EditMenu
 from pmviewer.viewer.panels.toolbar import Actions
 from pmviewer.viewer.shortcuts import follow_mouse, keys_of
 from pmviewer.viewer.state import ViewerState
+from pmviewer.viewer.view_actions import forget_view, go_to_view
 
 
 class Menus:
@@ -149,11 +150,11 @@ class Menus:
             imgui.separator()
         for name in names:
             if imgui.menu_item(name, "", False)[0]:
-                self._state.go_to_view(name)
+                go_to_view(self._state, name)
         if imgui.begin_menu("Forget", bool(names)):
             for name in names:
                 if imgui.menu_item(f"{name}##forget", "", False)[0]:
-                    self._state.forget_view(name)
+                    forget_view(self._state, name)
             imgui.end_menu()
 
     def _render(self) -> None:
