@@ -73,7 +73,7 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         source = viewport.source()
         for overlay in viewport.picture.layers.shown(state.settings):
             overlay.annotate(viewport, source)
-    advice = viewport.advice()
+    advice = "" if viewport.alone else viewport.advice()
     if advice:
         caption(viewport, advice, (width / 2, 0.5 * height), anchor=0.5, colour=theme.DARK.warning)
     if state.flying:
