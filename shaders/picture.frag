@@ -15,6 +15,8 @@ uniform int value_log;     // whether they are
 uniform vec3 value_weights; // of the channels in the quantity
 uniform vec3 grey;         // where there is nothing to tell: below zero
 uniform vec3 class_colours[3];
+uniform sampler2D shades;  // how much surfaces face the camera (pmviewer/output/shading.py)
+uniform float shading;     // how much of that lies under false colours
 uniform vec2 error_range;  // logarithms of the errors at the ends of the colours
 
 in vec2 uv;
@@ -81,5 +83,6 @@ void main() {
         float span = max(depth_range.y - depth_range.x, 1e-30);
         shown = vec3(value.r > 0.0 ? 1.0 - 0.9 * clamp((value.r - depth_range.x) / span, 0.0, 1.0) : 0.0);
     }
+    if (content >= 4) shown *= 1.0 + shading * (texture(shades, uv).r - 1.0);
     colour = vec4(shown, 1.0);
 }

@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,6 +122,8 @@ class Frame:
     """EV that it is shown with where the setting is automatic."""
     lights: LightImportance | None = None
     """Importance of the lights in the latest pass, with guided emission."""
+    automatic: Mapping[str, Any] = field(default_factory=dict)
+    """What automatic settings came to, by full name (`pmviewer.engine.automatic`)."""
     light_places: NDArray[np.float64] | None = None
     """(n, 3) middles of the lights, NaN where they shine from outside; None without importance."""
 
@@ -150,12 +152,15 @@ class Frame:
 
 @dataclass(frozen=True)
 class Status:
-    """What the session is doing now. `progress` is 0–1 of the current activity, None when unknown."""
+    """What the session is doing now. `progress` is 0–1 of the current activity, None when unknown. In a pass that
+    takes long, `stage` is what it is at and `stage_progress` how much of that is through, None when unknown."""
 
     state: State = "empty"
     text: str = ""
     passes: int = 0
     progress: float | None = None
+    stage: str = ""
+    stage_progress: float | None = None
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,10 @@
-"""Refusing what would not fit into memory before it is tried: an overcommitting system would end the whole program."""
+"""Refusing what would not fit into memory before it is tried, as an overcommitting system would end the whole program;
+giving back what is not needed any more."""
 
 from __future__ import annotations
+
+import ctypes
+import sys
 
 from pmviewer.errors import SceneError, SettingError
 from pmviewer.render.planes import CHANNELS
@@ -17,6 +21,16 @@ BYTES_PER_TRIANGLE = 300
 """Vertices and normals in float64 and float32, and the tree with what building it takes (`pmviewer bench load`)."""
 
 BYTES_PER_INSTANCE = 1200
+
+
+def give_back() -> None:
+    """Return to the system what has been freed. The C library of Linux keeps it otherwise: arrays of a batch are below
+    the size from which it would not. Elsewhere nothing is done."""
+    if not sys.platform.startswith("linux"):
+        return
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # musl has none
+    if trim is not None:
+        trim(0)
 
 
 def check_scene_memory(scene: Scene) -> None:

@@ -18,6 +18,10 @@ BEHIND_WINDOW = 10
 """Niceness of threads that work beside a window."""
 
 
+FEW_TASKS = 8
+"""With fewer, a share says nothing."""
+
+
 def lower_priority() -> None:
     """Let the window's thread go first (measured: steady 60 frames a second beside full load). Where the system has
     no priority per thread, or the thread has a lower one already, nothing changes."""
@@ -29,6 +33,7 @@ def lower_priority() -> None:
 class WorkPool:
     """Runs tasks on `threads` threads. `cpu_seconds` adds up the time that threads spent in tasks.
 
+    `on_progress` hears which stage runs, and which share of its current tasks is through (None: they are few).
     `behind_window` lowers the threads' priority; without a window nobody waits, and they keep the process's own.
     """
 
@@ -36,13 +41,15 @@ class WorkPool:
         self.threads = threads or available_threads()
         self.cancel = threading.Event()
         self.cpu_seconds = 0.0
+        self.stage = ""
+        self.on_progress: Callable[[str, float | None], None] | None = None
         self._lock = threading.Lock()
         self._executor = ThreadPoolExecutor(
             self.threads, "pmviewer", initializer=lower_priority if behind_window else None
         )
 
-    def run(self, tasks: Sequence[Task], on_done: Callable[[int], None] | None = None) -> list[Any]:
-        """Results in the order of the tasks; `on_done` hears how many have finished.
+    def run(self, tasks: Sequence[Task]) -> list[Any]:
+        """Results in the order of the tasks.
 
         Raises Cancelled as soon as the running tasks are through when `cancel` is set, and whatever a task raises.
         """
@@ -51,8 +58,8 @@ class WorkPool:
         try:
             for count, future in enumerate(futures, start=1):
                 results.append(future.result())
-                if on_done:
-                    on_done(count)
+                if self.on_progress is not None:
+                    self.on_progress(self.stage, count / len(tasks) if len(tasks) >= FEW_TASKS else None)
         finally:
             if len(results) < len(futures):
                 for future in futures:

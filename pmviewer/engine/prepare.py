@@ -150,4 +150,4 @@ def eye_steps(record: NDArray[np.void], traits: SceneTraits, settings: Settings,
     if plan.cache:
         steps.append(Step("irradiance cache", prepare_cache, (given,)))
     radii = first_radii(1, 0.0, 0.0) if radii_of_pixels(Facts(settings, plan, traits)) else None
-    return [*steps, Step("eye pass", eye_pass, (given, outline, radii, film, counts, 0, 0))]
+    return [*steps, Step("camera pass", eye_pass, (given, outline, radii, film, counts, 0, 0))]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 from pmviewer.engine.frame import Frame, Level, Message, State, Status
 from pmviewer.engine.guarded import unexpected
@@ -39,6 +40,12 @@ class Published:
         with self.changed:
             self.status = Status(state, text, passes, progress)
             self.changed.notify_all()
+        self.notify()
+
+    def stage(self, stage: str, share: float | None) -> None:
+        """Which stage of a pass goes on, and how much of it is through."""
+        with self.changed:
+            self.status = replace(self.status, stage=stage, stage_progress=share)
         self.notify()
 
     def show(self, frame: Frame, version: int) -> None:

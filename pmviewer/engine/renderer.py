@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.automatic import automatic_values
 from pmviewer.engine.diagnose import Looked, inspected
 from pmviewer.engine.exposure import metered
 from pmviewer.engine.focus import focused
@@ -80,6 +81,8 @@ class Renderer:
             if self.plan.photons
             else 0.0
         )
+        self.settled_radius = self.first_radius
+        """Of the film's first pass; the first radius of a coarse picture is larger."""
         self.tally = Tally()
         scene = self._lit = with_thin_glass(scene, settings, self.plan)
         self.light = LightStage(scene, settings, self.plan, pool, store, self.tally)
@@ -126,6 +129,7 @@ class Renderer:
         film = film_of(self.settings, self.plan, small.width, small.height)
         N = min(self.settings.photons.N, COARSE_PHOTONS)
         quick = Renderer(self.scene, self.settings, self.pool, self.store, self.version, self.plan)
+        quick.settled_radius = self.first_radius
         quick.first_radius = self.first_radius * min(2.0, (self.settings.photons.N / N) ** 0.25)
         quick._pass(film, small, 0, N)
         film.passes = 1
@@ -154,7 +158,8 @@ class Renderer:
     def _frame(self, serial: int, film: Film, coarse: bool, wanted: Wanted | None) -> Frame:
         looked = self._looked(film)
         inspection = inspected(wanted or wanted_of(self.facts), looked, self.pool)
-        return replace(frame_of(looked, self.tally, inspection), serial=serial, version=self.version, coarse=coarse)
+        made = replace(frame_of(looked, self.tally, inspection), serial=serial, version=self.version, coarse=coarse)
+        return replace(made, automatic=automatic_values(looked, self.settled_radius))
 
     def _looked(self, film: Film) -> Looked:
         stages = self.light, self.importance, self.latest
@@ -179,7 +184,7 @@ class Renderer:
             tally.add_cache(cache.n, cache.bytes)
             tally.add_counts(counts)
             given = given._replace(cache=cache.record)
-        tally.timed(pool, "eye pass", lambda: self._eye_pass(given, film))
+        tally.timed(pool, "camera pass", lambda: self._eye_pass(given, film))
         self.latest = RenderedPass(given, maps, shadows, cache, virtual)
 
     def _eye_pass(self, given: PassData, film: Film) -> None:

@@ -9,6 +9,7 @@ never show one.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -21,6 +22,7 @@ from pmviewer.engine.guarded import guarded
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.inspector.report import Pinned
 from pmviewer.engine.loader import Loaded, Loader
+from pmviewer.engine.memory import give_back
 from pmviewer.engine.opened import OpenScene, nobody, open_scene, relit
 from pmviewer.engine.pool import WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
@@ -35,6 +37,10 @@ from pmviewer.settings.access import Settings, changed_stages
 from pmviewer.settings.needs import Facts
 
 Source = str | Path | Scene
+LONG_PASS, TELL_EVERY = 0.7, 0.2
+"""Seconds after which a pass says what it is at, and how often."""
+MUCH_LESS, KEPT_BYTES = 8, 1 << 26
+"""From which factor fewer photons make results of before unwanted, and how many bytes of them are kept then."""
 NO_MEMORY = "Not enough memory for these settings: lower N or the image size."
 
 
@@ -69,6 +75,10 @@ class Session:
         self._failed_version = -1
         self._warned: set[str] = set()
         self._pool = WorkPool(threads, behind_window=True)
+        self._pool.on_progress = self._within_pass
+        self._pass_began = self._told = 0.0
+        self._stepping = self._stopped = self._gives_back = False
+        self._N = 0
         self._store = StageStore()
         self._renderer: Renderer | None = None
         self._ahead = Ahead(self._pool.threads, self._published.notify, helper) if compiles_ahead else None
@@ -97,6 +107,7 @@ class Session:
         """Use these settings from now on; returns the version that frames made with them will carry."""
         with self._changed:
             before, self._settings = self._settings, settings
+            self._stopped = self._stopped and before == settings
             changed = changed_stages(before, settings)
             if not settings.display.compile_ahead:
                 self.stop_compiling_ahead()
@@ -118,7 +129,7 @@ class Session:
     def restart(self) -> None:
         """Forget the film and begin with pass 0."""
         with self._changed:
-            self._restart = True
+            self._restart, self._stopped = True, False
             self._outdate()
 
     def inspect(self, pixel: tuple[int, int] | None) -> None:
@@ -139,10 +150,20 @@ class Session:
             self._paused = True
             self._settle()
 
+    def stop(self) -> None:
+        """Pause at once: what the running pass has done is dropped. Going on begins with the first pass."""
+        with self._changed:
+            self._paused = True
+            self._stopped = self._stepping
+            if self._stepping:
+                self._interrupt()
+            else:
+                self._settle()
+
     def resume(self) -> None:
         """Go on after a pause."""
         with self._changed:
-            self._paused = False
+            self._paused = self._stopped = False
             self._settle()
 
     def close(self) -> None:
@@ -306,13 +327,17 @@ class Session:
             raise
 
     def _drop(self) -> None:
-        """What was being rendered is out of date."""
+        """What was being rendered is out of date, or unwanted."""
         self._renderer = None
+        if self._stopped:
+            self._tell("paused", "stopped within a pass; going on begins anew")
 
     def _has_work(self) -> bool:
         if self._closed or self._loader.loaded is not None:
             return True
         if self._opened is None:
+            return False
+        if self._stopped:
             return False
         if self._is_stale():
             return self._failed_version != self._version
@@ -346,6 +371,7 @@ class Session:
         if loaded.settings is not None:
             self._settings = loaded.settings
         self._version += 1
+        self._stopped = False
 
     def _welcome(self, opened: OpenScene, before: OpenScene | None) -> None:
         """What the log says of a newly opened scene; of one with other lights than before only what is new."""
@@ -384,6 +410,7 @@ class Session:
         try:
             prepare(self._opened, settings, self._pool, lambda text, share: self._tell("preparing", text, share))
             renderer = Renderer(self._opened, settings, self._pool, self._store, version)
+            self._make_room(settings.photons.N)
             self._tell("rendering", "first picture")
             frame = renderer.coarse_frame(self._published.serial + 1, self._wanted(renderer))
             self._published.show(frame, self._version)
@@ -397,8 +424,33 @@ class Session:
         if self._paused and not self._is_stale():
             self._step(renderer)
 
+    def _make_room(self, N: int) -> None:
+        """After a pass of far more photons, its maps are not kept for a return."""
+        if self._N >= MUCH_LESS * N:
+            self._store.shrink(KEPT_BYTES)
+            self._gives_back = True
+        self._N = N
+
+    def _within_pass(self, stage: str, share: float | None) -> None:
+        """What the pool is at. Said of passes that somebody may be waiting for."""
+        now = time.monotonic()
+        if self._stepping and now - self._pass_began > LONG_PASS and now - self._told > TELL_EVERY:
+            self._told = now
+            self._published.stage(stage, share)
+
     def _step(self, renderer: Renderer) -> None:
-        renderer.step()
+        with self._changed:
+            self._pass_began, self._stepping = time.monotonic(), True
+        try:
+            renderer.step()
+            with self._changed:
+                self._stopped = False  # too late
+            if self._gives_back:  # the frame before, with its photons, is gone after this one
+                self._gives_back = renderer.passes < 2
+                give_back()
+        finally:
+            with self._changed:
+                self._stepping = False
         self._published.show(renderer.frame(self._published.serial + 1, self._wanted(renderer)), self._version)
         if self._ahead is not None:
             self._ahead.shown(renderer.scene, self._settings)

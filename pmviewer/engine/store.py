@@ -28,10 +28,14 @@ class StageStore:
         if needed <= self.budget // 2:
             self._entries[key] = value, needed
             self.bytes += needed
-            while self.bytes > self.budget:
-                _, (_, freed) = self._entries.popitem(last=False)
-                self.bytes -= freed
+            self.shrink(self.budget)
         return value
+
+    def shrink(self, size: int) -> None:
+        """Forget what was unused for longest, down to so many bytes."""
+        while self.bytes > size:
+            _, (_, freed) = self._entries.popitem(last=False)
+            self.bytes -= freed
 
     def clear(self) -> None:
         """Forget all results."""

@@ -43,7 +43,7 @@ class Tally:
 
     def timed(self, pool: WorkPool, stage: str, run: Callable[[], Any]) -> Any:
         """What `run` returns; the CPU seconds that the pool spends on it count for the stage."""
-        before = pool.cpu_seconds
+        before, pool.stage = pool.cpu_seconds, stage
         result = run()
         spent = pool.cpu_seconds - before
         self.stage_seconds[stage] = self.stage_seconds.get(stage, 0.0) + spent

@@ -14,6 +14,7 @@ from pmviewer.errors import OutputError
 from pmviewer.output.diagnostic_views import DENOISED, DIAGNOSTICS, HELD_WHILE_SHOWN, coloured
 from pmviewer.output.exr import BEAUTY, PREFIX, Value, write_exr
 from pmviewer.output.png import write_png
+from pmviewer.output.shading import shaded, shades
 from pmviewer.output.side_by_side import side_by_side
 from pmviewer.output.tone import display_image, to_uint8
 from pmviewer.settings.access import Display, Settings, flat
@@ -213,6 +214,7 @@ def write_frame_png(
         raise OutputError(f"{path}: the view '{view}' is drawn by the window alone. Choose one of {', '.join(LAYERS)}.")
     if view in DIAGNOSTICS:
         pixels = coloured(view, frame.image(view))
+        pixels = shaded(pixels, shades(frame.image("normal"), frame.camera), display.shading)
     else:
         pixels = display_image(view, frame.image(view), exposure_of(frame, display), display.tone).pixels
     texts = {PREFIX + name: _text(value) for name, value in frame_metadata(frame).items()}

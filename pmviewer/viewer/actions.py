@@ -14,16 +14,19 @@ from pmviewer.output.diagnostic_views import DENOISED
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.free_camera import as_perspective, plan_pose
 from pmviewer.settings.access import SETTINGS, get
+from pmviewer.viewer import layout
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.exports import Exports, default_path, fresh_path
 from pmviewer.viewer.overlays.registry import SWITCHED
+from pmviewer.viewer.panels.palette import Palette
 from pmviewer.viewer.state import ViewerState
+from pmviewer.viewer.view_actions import save_view
 from pmviewer.viewer.viewport import controls
 from pmviewer.viewer.viewport.target import Fit
 from pmviewer.viewer.viewport.viewport import VIEWPORT, Viewport
 
-COMPARISON = "Comparison"
-"""The panel's label."""
+COMPARISON, SETTINGS_PANEL = "Comparison", "Settings"
+"""Labels of panels."""
 SCENE_PATTERNS = ["*.xml", "*.toml", "*.glb", "*.gltf", "*.obj", "*.ply", "*.stl"]
 EXPOSURE_STEP = 0.5
 
@@ -38,7 +41,9 @@ class Commands:
         self.exports = Exports(state, viewport)
         self.window_shot: Path | None = None
         """Where the next frame of the whole window goes."""
+        self.palette = Palette(state)
         self._hidden: list[str] = []
+        self._layout = layout.Layout()
         self.table: dict[str, Callable[[], None]] = {
             "open": self._open,
             "load_reference": self._load_reference,
@@ -50,6 +55,10 @@ class Commands:
             "screenshot": self._screenshot,
             "screenshot_picture": lambda: self.exports.png(self._fresh(".png"), overlays=True),
             "quit": self._quit,
+            "undo": self.state.undo,
+            "redo": self.state.redo,
+            "list_changed": self._list_changed,
+            "open_palette": self.palette.open,
             "toggle_pause": self._toggle_pause,
             "restart": self.state.session.restart,
             "exposure_up": lambda: self._expose(EXPOSURE_STEP),
@@ -62,14 +71,22 @@ class Commands:
             "toggle_fly": self._toggle_fly,
             "frame_all": self._frame_all,
             "reset_camera": self._reset_camera,
+            "save_view": partial(save_view, state),
             "toggle_free": lambda: self._toggle("free_camera.on"),
             "free_from_above": self._free_from_above,
             "free_to_render": self._free_to_render,
             "free_becomes_render": self._free_becomes_render,
+            "toggle_look": self._toggle_look,
+            "larger": lambda: self.state.appearance.larger(1),
+            "smaller": lambda: self.state.appearance.larger(-1),
             "toggle_panels": self._toggle_panels,
             "toggle_help": self._toggle_help,
             "escape": self._escape,
         }
+
+    def between_frames(self) -> None:
+        """Before each window frame."""
+        self._layout.restore_now()
 
     def choose_view(self, number: int) -> None:
         """The view of that number in the schema's order."""
@@ -206,11 +223,23 @@ class Commands:
         if self.state.panels_hidden:
             for window in windows:
                 window.is_visible = window.is_visible or window.label in self._hidden
+            self._layout.restore_soon()
         else:
+            self._layout.remember()
             self._hidden = [w.label for w in windows if w.is_visible and w.label != VIEWPORT]
             for window in windows:
                 window.is_visible = window.label == VIEWPORT
         self.state.panels_hidden = not self.state.panels_hidden
+
+    def _list_changed(self) -> None:
+        """Only the changed settings in their panel, which comes to the front; or all of them again."""
+        self.state.only_changed = not self.state.only_changed
+        window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(SETTINGS_PANEL)
+        window.is_visible = window.focus_window_at_next_frame = True
+
+    def _toggle_look(self) -> None:
+        appearance = self.state.appearance
+        appearance.choose(look="dark" if appearance.look == "light" else "light")
 
     def _toggle_help(self) -> None:
         self.state.help_open = not self.state.help_open
@@ -218,4 +247,4 @@ class Commands:
     def _escape(self) -> None:
         if not (self.state.flying or self.state.help_open):
             self.state.inspector.unpin()
-        self.state.flying = self.state.help_open = False
+        self.state.flying = self.state.help_open = self.palette.is_open = False

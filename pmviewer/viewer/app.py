@@ -71,7 +71,7 @@ class ViewerApp:
         picture_size: tuple[int, int] | None = None,
         captions: bool = True,
     ) -> None:
-        self.state = ViewerState(session, inactive_reason, recent or RecentFiles())
+        self.state = ViewerState(session, inactive_reason, recent or RecentFiles(), remember=remember)
         self.viewport = Viewport(self.state)
         self.dialogs = FileDialogs()
         self.commands = Commands(self.state, self.viewport, self.dialogs)
@@ -151,6 +151,7 @@ class ViewerApp:
         width, height = (round(side * scale) for side in layout.SMALLEST_WINDOW)
         if not self.viewport.alone:
             glfw.set_window_size_limits(glfw_window_hello_imgui(), width, height, glfw.DONT_CARE, glfw.DONT_CARE)
+        self.state.appearance.load()
         self._running = True
         self.state.session.on_update = self.wake
         self.state.gain.on_update = self.wake
@@ -159,6 +160,8 @@ class ViewerApp:
     def _pre_new_frame(self) -> None:
         assert self.context is not None
         free_collected(self.context)
+        self.commands.between_frames()
+        self.state.appearance.show()
         self._shares.keep()
         self.state.poll()
         if not self.viewport.alone:
@@ -180,12 +183,13 @@ class ViewerApp:
             self._title = title
 
     def _over_everything(self) -> None:
-        if not self.dialogs.is_open:
-            run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying)
+        if not (self.dialogs.is_open or self.commands.palette.is_open):
+            run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying, self.state.history)
         self.state.flipped = not self.dialogs.is_open and is_held(FLIP_KEY)
         self.commands.locate_scene()
         self.dialogs.poll()
         draw_help(self.state)
+        self.commands.palette.gui(self.commands.table)
 
     def _before_swap(self) -> None:
         path, self.commands.window_shot = self.commands.window_shot, None
@@ -209,6 +213,7 @@ class ViewerApp:
     def _before_exit(self) -> None:
         """End what runs beside the window; what the user has asked for is finished first, without the window."""
         self._running = False
+        self.state.appearance.keep()
         self.state.session.on_update = self.state.gain.on_update = None
         self._release()
         if self.state.background.running(FILES):

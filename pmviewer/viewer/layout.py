@@ -53,7 +53,7 @@ def runner_params(
     params.ini_filename = "pmviewer/window.ini"
     params.renderer_backend_options.open_gl_options = _opengl()
     _pace(params.fps_idling)
-    params.imgui_window_params.background_color = theme.grey(0.105)
+    params.imgui_window_params.background_color = theme.ground("background")
     if alone is None:
         _bars(params, callbacks)
         _dock(params.docking_params, callbacks)
@@ -101,7 +101,7 @@ def _bars(params: hello_imgui.RunnerParams, callbacks: Callbacks) -> None:
     options = hello_imgui.EdgeToolbarOptions()
     options.size_em = 2.4
     options.window_padding_em = imgui.ImVec2(0.5, 0.3)
-    options.window_bg = theme.grey(0.15)
+    options.window_bg = theme.ground("toolbar")
     params.callbacks.add_edge_toolbar(hello_imgui.EdgeToolbarType.top, callbacks.toolbar, options)
 
 
@@ -138,6 +138,43 @@ class Shares:
             if node is not root:
                 size = node.size.x * across, node.size.y * down
                 imgui.internal.dock_builder_set_node_size(number, size)
+
+
+class Layout:
+    """Where panels are docked, in which order of tabs and which is in front: windows that are hidden and shown again
+    would line up anew."""
+
+    FRAMES = 4
+    """That shown panels take to be there again, and then to be docked."""
+
+    def __init__(self) -> None:
+        self._saved = ""
+        self._in_front: list[str] = []
+        self._waits = -1
+
+    def remember(self) -> None:
+        """As it is now."""
+        self._saved = imgui.save_ini_settings_to_memory()
+        windows = {label: imgui.internal.find_window_by_name(label) for label in PANELS}
+        self._in_front = [
+            label
+            for label, window in windows.items()
+            if window is not None and window.dock_node is not None and window.dock_node.selected_tab_id == window.tab_id
+        ]
+
+    def restore_soon(self) -> None:
+        """Once the panels are back."""
+        self._waits = self.FRAMES
+
+    def restore_now(self) -> None:
+        """Between window frames: when it is time."""
+        self._waits -= self._waits >= 0
+        if self._waits == self.FRAMES // 2 and self._saved:
+            imgui.load_ini_settings_from_memory(self._saved)
+        if self._waits == 0:
+            for label in self._in_front:
+                docking = hello_imgui.get_runner_params().docking_params
+                docking.dockable_window_of_name(label).focus_window_at_next_frame = True
 
 
 def _dock_nodes() -> dict[int, Any]:

@@ -88,6 +88,9 @@ class SessionLike(Protocol):
     def pause(self) -> None:
         """Stop after the current pass."""
 
+    def stop(self) -> None:
+        """Pause at once, without the pass that is running. Going on begins anew."""
+
     def resume(self) -> None:
         """Go on after a pause."""
 
@@ -188,6 +191,12 @@ class SessionLink(SessionLike):
             self._paused = True
             if self._session is not None:
                 self._session.pause()
+
+    def stop(self) -> None:
+        self.pause()
+        with self._lock:
+            if self._session is not None:
+                self._session.stop()
 
     def resume(self) -> None:
         with self._lock:

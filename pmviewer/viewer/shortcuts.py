@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
+from pmviewer.viewer.history import History
 from pmviewer.viewer.overlays.overlay import Switch
 from pmviewer.viewer.overlays.registry import OVERLAYS
 
@@ -38,10 +39,15 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("File", "Ctrl+R", "Load a reference to compare with", "load_reference", K.r, ctrl=True),
     Binding("File", "Ctrl+S", "Save the session", "save_session", K.s, ctrl=True),
     Binding("File", "Ctrl+E", "Export the layers as EXR", "export_exr", K.e, ctrl=True),
-    Binding("File", "Ctrl+P", "Export the picture as PNG", "export_png", K.p, ctrl=True),
+    Binding("File", "Ctrl+Shift+E", "Export the picture as PNG", "export_png", K.e, ctrl=True, shift=True),
     Binding("File", "F12", "Screenshot of the window", "screenshot", K.f12),
     Binding("File", "Ctrl+F12", "Screenshot of the picture with overlays", "screenshot_picture", K.f12, ctrl=True),
     Binding("File", "Ctrl+Q", "Quit", "quit", K.q, ctrl=True),
+    Binding("Edit", "Ctrl+Z", "Undo the last change of a setting or the camera", "undo", K.z, ctrl=True),
+    Binding("Edit", "Ctrl+Shift+Z", "Redo it", "redo", K.z, ctrl=True, shift=True),
+    Binding("Edit", "Ctrl+Y", "Redo it, too", "redo", K.y, ctrl=True),
+    Binding("Edit", "Ctrl+P", "Find a command or setting by name", "open_palette", K.p, ctrl=True),
+    Binding("Edit", "Ctrl+L", "List the changed settings, or all again", "list_changed", K.l, ctrl=True),
     Binding("Render", "Space", "Pause or resume", "toggle_pause", K.space),
     Binding("Render", "R", "Restart", "restart", K.r),
     Binding("Render", "N", "Compare with and without importance", "compare_importance", K.n),
@@ -57,7 +63,7 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Picture", "I held", "Gather rays of the pixel under the mouse"),
     Binding("Picture", "Ctrl+wheel, Ctrl+drag", "Magnify the picture's pixels and move it"),
     Binding("Picture", "Z", "Fit the picture again", "fit_picture", K.z),
-    Binding("Camera", "Left drag", "Orbit around the target"),
+    Binding("Camera", "Left drag", "Orbit around what is under the mouse"),
     Binding("Camera", "Middle or Shift+left drag", "Pan"),
     Binding("Camera", "Wheel or right drag", "Zoom"),
     Binding("Camera", "Ctrl+click", "Focus the lens on what is there"),
@@ -65,11 +71,15 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Camera", "Right button + W A S D Q E", "Fly while the button is held"),
     Binding("Camera", "Home or A", "Frame the whole scene", "frame_all", K.home, alternative=K.a),
     Binding("Camera", "Backspace", "The scene file's camera; the free one's overview", "reset_camera", K.backspace),
+    Binding("Camera", "Ctrl+B", "Save the view (View > Saved views)", "save_view", K.b, ctrl=True),
     Binding("Free camera", "O", "The render camera's importance from elsewhere", "toggle_free", K.o),
     Binding("Free camera", "Shift+Home", "From above", "free_from_above", K.home, shift=True),
     Binding("Free camera", "Shift+Backspace", "To the render camera", "free_to_render", K.backspace, shift=True),
     Binding("Free camera", "Shift+O", "Becomes the render camera", "free_becomes_render", K.o, shift=True),
     Binding("Window", "Tab", "Hide or show the panels", "toggle_panels", K.tab),
+    Binding("Window", "Ctrl++", "Larger interface", "larger", K.equal, ctrl=True, alternative=K.keypad_add),
+    Binding("Window", "Ctrl+-", "Smaller interface", "smaller", K.minus, ctrl=True, alternative=K.keypad_subtract),
+    Binding("Window", "Ctrl+Shift+L", "Light or dark interface", "toggle_look", K.l, ctrl=True, shift=True),
     Binding("Window", "H or F1", "This overview", "toggle_help", K.h, alternative=K.f1),
     Binding("Settings", "Double click or Ctrl+click", "Type an exact value"),
     Binding("Settings", "Right click", "Reset to the default, copy the setting's name"),
@@ -93,8 +103,11 @@ def is_held(key: imgui.Key) -> bool:
     return imgui.is_key_down(key) and not (io.want_text_input or io.key_ctrl or io.key_shift or io.key_alt)
 
 
-def run_shortcuts(actions: Mapping[str, Callable[[], None]], choose_view: Callable[[int], None], flying: bool) -> None:
-    """Run the actions of the keys pressed in this frame. Typing into a field and flying keep their letters."""
+def run_shortcuts(
+    actions: Mapping[str, Callable[[], None]], choose_view: Callable[[int], None], flying: bool, history: History
+) -> None:
+    """Run the actions of the keys pressed in this frame, each press a step of its own to undo. Typing into a field and
+    flying keep their letters."""
     io = imgui.get_io()
     if io.want_text_input:
         return
@@ -104,8 +117,17 @@ def run_shortcuts(actions: Mapping[str, Callable[[], None]], choose_view: Callab
                 continue
             if io.key_ctrl == binding.ctrl and io.key_shift == binding.shift and not io.key_alt:
                 if imgui.is_key_pressed(key, binding.repeat):
+                    history.gesture += imgui.is_key_pressed(key, False)
                     actions[binding.action]()
     if not (io.key_ctrl or io.key_shift or io.key_alt):
         for number, key in enumerate(_DIGITS):
             if imgui.is_key_pressed(key, False):
+                history.gesture += 1
                 choose_view(number)
+
+
+def follow_mouse(history: History) -> None:
+    """Once per window frame: what is changed while a button is down is one step to undo."""
+    buttons = (imgui.MouseButton_.left, imgui.MouseButton_.right, imgui.MouseButton_.middle)
+    history.gesture += any(imgui.is_mouse_clicked(b) or imgui.is_mouse_released(b) for b in buttons)
+    history.held = any(imgui.is_mouse_down(button) for button in buttons)

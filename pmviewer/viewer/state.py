@@ -27,17 +27,21 @@ from pmviewer.settings.access import (
     parse_assignments,
     with_values,
 )
+from pmviewer.viewer.appearance import Appearance
 from pmviewer.viewer.background import Background
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.dialogs.recent import RecentFiles
+from pmviewer.viewer.history import History
 from pmviewer.viewer.importance_gain import GainRun
 from pmviewer.viewer.inspector import Inspector
+from pmviewer.viewer.saved_views import FILE, SavedViews
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.viewport.controls import camera_values
 
 InactiveReason = Callable[[str, Settings, Any], str | None]
 LAYERS = ("beauty", *TERMS, *AOVS)
 LOG_LINES = 2000
+COMPARING_LAYERS = "While two pictures are compared, the image, its terms and what the first surface is can be shown."
 TOAST_SECONDS = 12.0
 MOST_TOASTS = 2
 
@@ -54,21 +58,6 @@ class Toast:
         return time.monotonic() - self.born > TOAST_SECONDS
 
 
-def _first_radius(frame: Frame, scene_radius: float) -> float | None:
-    """Look-up radius of the first pass relative to the scene, from the one of the latest pass."""
-    from pmviewer.maps.radius import progressive_radius  # numba; there by the time of the first frame
-
-    estimate, radius = frame.settings.estimate, frame.statistics.radius
-    if "global" in radius:
-        latest = radius["global"]
-    elif "caustic" in radius:
-        latest = radius["caustic"] / estimate.caustic_radius
-    else:
-        return None
-    shrunk = progressive_radius(1.0, max(frame.statistics.passes, 1), estimate.alpha, 0.0)
-    return latest / shrunk / scene_radius
-
-
 def is_gone(scene: str | Path) -> bool:
     """Whether that is a file which isn't there; bundled scenes have names."""
     return Path(scene).is_absolute() and not Path(scene).exists()
@@ -77,14 +66,19 @@ def is_gone(scene: str | Path) -> bool:
 class ViewerState:
     """Lives as long as the window."""
 
-    def __init__(self, session: SessionLike, inactive_reason: InactiveReason, recent: RecentFiles) -> None:
+    def __init__(
+        self, session: SessionLike, inactive_reason: InactiveReason, recent: RecentFiles, *, remember: bool = False
+    ) -> None:
         self.session = session
+        self.appearance = Appearance(remember=remember)
         self.inactive_reason = inactive_reason
         self.recent = recent
+        self.views = SavedViews(recent.folder / FILE)
         self.background = Background(self.say)
         self.comparison = Comparison(session, self.background, self.say)
         self.gain = GainRun(session, self.background, self.say)
         self.inspector = Inspector(session, lambda: self.frame)
+        self.history = History()
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
         self._toasts_of = session.scene
@@ -93,6 +87,8 @@ class ViewerState:
         self.flying = False
         self.panels_hidden = False
         self.help_open = False
+        self.only_changed = False
+        """Whether the settings panel lists changed settings alone."""
         self.flipped = False
         """While the key that shows the reference is held."""
         self.last_camera_move = -1e9
@@ -127,6 +123,19 @@ class ViewerState:
             self.say("error", str(error))
             return
         if settings != self.settings:
+            self.history.changed(self.settings, settings)
+            self.session.set(settings)
+
+    def undo(self) -> None:
+        """Take the last step of the user's back."""
+        self._step(self.history.undo(self.settings))
+
+    def redo(self) -> None:
+        """Take it again."""
+        self._step(self.history.redo(self.settings))
+
+    def _step(self, settings: Settings | None) -> None:
+        if settings is not None and settings != self.settings:
             self.session.set(settings)
 
     def resolved(self, path: str) -> Any:
@@ -140,13 +149,8 @@ class ViewerState:
             free = self.live_camera() if self.settings.free_camera.on else None
             pose = self.render_camera() if group == "camera" else free
             return getattr(pose, name) if pose else None
-        frame, geometry = self.frame, self.session.geometry
-        if path == "estimate.radius" and frame is not None and geometry is not None:
-            return _first_radius(frame, float(geometry.radius))
-        if path == "direct.choice_radius" and frame is not None and geometry is not None:
-            radius = frame.statistics.radius.get("light choice")
-            return radius / float(geometry.radius) if radius else None
-        return None
+        frame = self.frame
+        return frame.automatic.get(path) if frame is not None else None
 
     # what is shown ----------------------------------------------------------------------------------------------
 
@@ -184,8 +188,16 @@ class ViewerState:
         names = [camera.name for camera in self.session.scene.cameras] if self.session.scene is not None else []
         return ("auto", *(name if names.count(name) == 1 else str(i + 1) for i, name in enumerate(names)))
 
+    @property
+    def named_view(self) -> str:
+        """The view that menus and toolbar name: the one asked for; while two pictures are compared, the one shown."""
+        pair = self.shown_pair()
+        return self.settings.display.view if pair is None else pair[1].view
+
     def refused_view(self, view: str) -> str | None:
         """Why that view can't be shown now, or None."""
+        if self.gain.frames() is not None and view not in LAYERS:
+            return COMPARING_LAYERS
         if view in HELD_WHILE_SHOWN:
             return self.inactive_reason(f"display.view={view}", self.settings, self.session.traits)
         return self.comparison.problem(self.frame) if view in COMPARED_VIEWS else None
@@ -261,6 +273,7 @@ class ViewerState:
         if self._opening is not None:
             path, self.parameters = self._opening
             self.recent.add(path)
+            self.history.clear()
             if before is not None and self.session.paused:
                 self.session.resume()  # it was the scene before that was to stand still
             self._opening = None

@@ -2,20 +2,122 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 from imgui_bundle import hello_imgui, imgui
 
 Colour = tuple[float, float, float, float]
+LIGHTEST, SPAN = 0.98, 0.75
+"""A light ground is as far below white as the dark one is above black, nearly."""
 
-ACCENT: Colour = (0.91, 0.60, 0.20, 1.0)
-TEXT: Colour = (0.88, 0.88, 0.88, 1.0)
-DIM: Colour = (0.60, 0.60, 0.60, 1.0)
-FAINT: Colour = (0.42, 0.42, 0.42, 1.0)
-GOOD: Colour = (0.56, 0.78, 0.48, 1.0)
-WARNING: Colour = (0.95, 0.77, 0.36, 1.0)
-FREE: Colour = (1.0, 0.82, 0.25, 1.0)
-"""Of the free camera: its label and the frustum that it sees."""
-ERROR: Colour = (0.95, 0.45, 0.40, 1.0)
-LEVELS: dict[str, Colour] = {"info": TEXT, "warning": WARNING, "error": ERROR}
+TRANSPARENT: Colour = (0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colours of text, and the neutral levels of what it stands on, by imgui's names and some of our own: `background`
+    behind the panels, `toolbar`, `plot`, `name` of settings at their default."""
+
+    text: Colour
+    dim: Colour
+    faint: Colour
+    accent: Colour
+    good: Colour
+    warning: Colour
+    error: Colour
+    free: Colour
+    grounds: Mapping[str, float]
+    name: float = 0.76
+    lighter: float = 1.0
+    """Level towards which what the mouse is over turns."""
+
+
+DARK = Look(
+    text=(0.88, 0.88, 0.88, 1.0),
+    dim=(0.70, 0.70, 0.70, 1.0),
+    faint=(0.66, 0.66, 0.66, 1.0),
+    accent=(0.91, 0.60, 0.20, 1.0),
+    good=(0.56, 0.78, 0.48, 1.0),
+    warning=(0.95, 0.77, 0.36, 1.0),
+    error=(0.98, 0.55, 0.50, 1.0),
+    free=(1.0, 0.82, 0.25, 1.0),
+    grounds={
+        "background": 0.105,
+        "toolbar": 0.15,
+        "plot": 0.12,
+        "window_bg": 0.165,
+        "popup_bg": 0.19,
+        "menu_bar_bg": 0.135,
+        "title_bg": 0.135,
+        "title_bg_active": 0.135,
+        "title_bg_collapsed": 0.135,
+        "border": 0.09,
+        "separator": 0.25,
+        "frame_bg": 0.235,
+        "frame_bg_hovered": 0.28,
+        "frame_bg_active": 0.31,
+        "button": 0.25,
+        "button_hovered": 0.32,
+        "button_active": 0.38,
+        "header": 0.225,
+        "header_hovered": 0.28,
+        "header_active": 0.31,
+        "scrollbar_bg": 0.15,
+        "scrollbar_grab": 0.30,
+        "scrollbar_grab_hovered": 0.38,
+        "scrollbar_grab_active": 0.45,
+        "tab": 0.135,
+        "tab_hovered": 0.28,
+        "tab_selected": 0.165,
+        "tab_dimmed": 0.135,
+        "tab_dimmed_selected": 0.165,
+        "docking_empty_bg": 0.105,
+        "table_header_bg": 0.20,
+        "table_border_strong": 0.25,
+        "table_border_light": 0.22,
+        "table_row_bg_alt": 0.18,
+        "checkbox_selected_bg": 0.235,
+    },
+)
+LIGHT = Look(
+    text=(0.08, 0.08, 0.08, 1.0),
+    dim=(0.20, 0.20, 0.20, 1.0),
+    faint=(0.28, 0.28, 0.28, 1.0),
+    accent=(0.50, 0.26, 0.0, 1.0),
+    good=(0.08, 0.34, 0.08, 1.0),
+    warning=(0.44, 0.28, 0.0, 1.0),
+    error=(0.60, 0.06, 0.05, 1.0),
+    free=(0.44, 0.28, 0.0, 1.0),
+    grounds={name: LIGHTEST - SPAN * level for name, level in DARK.grounds.items()},
+    name=0.2,
+    lighter=0.0,
+)
+LOOKS: Mapping[str, Look] = {"dark": DARK, "light": LIGHT}
+ACCENT = TEXT = DIM = FAINT = GOOD = WARNING = FREE = ERROR = DARK.text
+"""Of the look that is used, see `use`."""
+LEVELS: dict[str, Colour] = {}
+"""Of lines in the log."""
+look = DARK
+_ON_FRAMES = (
+    "hovered",
+    "active",
+    "scrollbar",
+    "border",
+    "separator",
+    "button",
+    "plot",
+    "docking",
+    "checkbox",
+    "toolbar",
+)
+
+GREYED = 0.76
+"""Opacity of settings that have no effect now: weaker, but to be read."""
+OVER_PICTURE = (0.08, 0.85)
+"""Level and opacity of the ground of captions and legends, whatever lies under it."""
+READABLE = 4.5
+"""Contrast that text has at least (WCAG 2.2, 1.4.3)."""
 
 FONT_SIZE = 15.0
 _UNDRAWABLE = str.maketrans({"ᵢ": "_i", "₊": "+", "₁": "1", "→": "›", "\u202f": " ", "\u2009": " "})
@@ -36,6 +138,50 @@ def grey(level: float, alpha: float = 1.0) -> imgui.ImVec4:
     return imgui.ImVec4(level, level, level, alpha)
 
 
+def contrast(text: Colour, ground: Colour) -> float:
+    """Ratio of luminances, 1 to 21 (WCAG 2.2). Both colours are sRGB-encoded and opaque."""
+    light, dark = sorted((_luminance(text), _luminance(ground)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def over(colour: Colour, ground: Colour) -> Colour:
+    """What is seen of a translucent colour on an opaque one."""
+    red, green, blue = (a * colour[3] + b * (1 - colour[3]) for a, b in zip(colour[:3], ground[:3], strict=True))
+    return red, green, blue, 1.0
+
+
+def _luminance(colour: Colour) -> float:
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour[:3]]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def text_grounds(of: str) -> dict[str, Colour]:
+    """The grounds on which any text of that look stands, by name: resting ones, not what the mouse is over."""
+    grounds = LOOKS[of].grounds
+    return {
+        name: (level, level, level, 1.0)
+        for name, level in grounds.items()
+        if not any(part in name for part in _ON_FRAMES)
+    }
+
+
+def use(name: str) -> None:
+    """Another look for all that is drawn from now on, of LOOKS."""
+    global look, TEXT, DIM, FAINT, ACCENT, GOOD, WARNING, ERROR, FREE
+    look = LOOKS[name]
+    TEXT, DIM, FAINT, ACCENT = look.text, look.dim, look.faint, look.accent
+    GOOD, WARNING, ERROR, FREE = look.good, look.warning, look.error, look.free
+    LEVELS.update(info=TEXT, warning=WARNING, error=ERROR)
+
+
+use("dark")
+
+
+def ground(name: str, alpha: float = 1.0) -> imgui.ImVec4:
+    """The look's ground of that name."""
+    return grey(look.grounds[name], alpha)
+
+
 def load_fonts() -> None:
     """Roboto with the Font Awesome icons merged in; hello_imgui scales it with the screen."""
     hello_imgui.get_runner_params().callbacks.default_icon_font = hello_imgui.DefaultIconFont.font_awesome6
@@ -44,45 +190,21 @@ def load_fonts() -> None:
 
 def apply() -> None:
     """Colours and spacing of the whole window."""
-    imgui.style_colors_dark()
+    colours()
+    _spacing(imgui.get_style())
+
+
+def colours() -> None:
+    """Those of the look that is used."""
+    if look is LIGHT:
+        imgui.style_colors_light()
+    else:
+        imgui.style_colors_dark()
     style = imgui.get_style()
-    _spacing(style)
     c, k = imgui.Col_, style.set_color_
-    for item, level in {
-        c.window_bg: 0.165,
-        c.popup_bg: 0.19,
-        c.menu_bar_bg: 0.135,
-        c.title_bg: 0.135,
-        c.title_bg_active: 0.135,
-        c.title_bg_collapsed: 0.135,
-        c.border: 0.09,
-        c.separator: 0.25,
-        c.frame_bg: 0.235,
-        c.frame_bg_hovered: 0.28,
-        c.frame_bg_active: 0.31,
-        c.button: 0.25,
-        c.button_hovered: 0.32,
-        c.button_active: 0.38,
-        c.header: 0.225,
-        c.header_hovered: 0.28,
-        c.header_active: 0.31,
-        c.scrollbar_bg: 0.15,
-        c.scrollbar_grab: 0.30,
-        c.scrollbar_grab_hovered: 0.38,
-        c.scrollbar_grab_active: 0.45,
-        c.tab: 0.135,
-        c.tab_hovered: 0.28,
-        c.tab_selected: 0.165,
-        c.tab_dimmed: 0.135,
-        c.tab_dimmed_selected: 0.165,
-        c.docking_empty_bg: 0.105,
-        c.table_header_bg: 0.20,
-        c.table_border_strong: 0.25,
-        c.table_border_light: 0.22,
-        c.table_row_bg_alt: 0.18,
-        c.checkbox_selected_bg: 0.235,
-    }.items():
-        k(item, grey(level))
+    for name in look.grounds:
+        if hasattr(c, name):
+            k(getattr(c, name), ground(name))
     k(c.text, imgui.ImVec4(*TEXT))
     k(c.text_disabled, imgui.ImVec4(*FAINT))
     k(c.resize_grip, grey(0.3, 0.4))

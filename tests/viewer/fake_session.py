@@ -102,6 +102,7 @@ class FakeSession:
         self.threads = None
         self.paused = False
         self.restarts = 0
+        self.stops = 0
         self.version = 1
         self.closed = False
         self.inspected: tuple[int, int] | None = None
@@ -164,6 +165,7 @@ class FakeSession:
             statistics=statistics,
             clouds=clouds,
             scene_name=self.scene.name,
+            automatic={"estimate.radius": 0.0081, "photons.projection": "off", "light.rig": "file"},
         )
         self.status = Status("paused" if self.paused else "rendering", "", serial, serial / 1024)
         if self.on_update:
@@ -180,6 +182,10 @@ class FakeSession:
 
     def resume(self) -> None:
         self.paused = False
+
+    def stop(self) -> None:
+        self.paused = True
+        self.stops += 1
 
     def restart(self) -> None:
         self.restarts += 1

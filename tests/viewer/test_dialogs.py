@@ -55,7 +55,7 @@ def test_saving_suggests_a_name_and_replacing_takes_a_click(app, tmp_path):
     path.write_bytes(b"old")
 
     def script(c):
-        c.key_press(chord(K.p, K.mod_ctrl))
+        c.key_press(chord(chord(K.e, K.mod_ctrl), K.mod_shift))
         c.yield_(4)
         c.item_click("//Save as/##name")
         c.key_press(K.enter)

@@ -12,6 +12,7 @@ from pmviewer.output.exr import write_exr
 from pmviewer.output.falsecolour import ERROR_SCALE, false_colour
 from pmviewer.output.metric import relmse, squared_error
 from pmviewer.output.tone import to_uint8, tone_map
+from pmviewer.render.planes import PLANES
 from pmviewer.settings.access import with_values
 from pmviewer.viewer.comparison import EARLIER_RUNS, next_mark, run_of
 from pmviewer.viewer.panels.error_panel import log_limits
@@ -104,7 +105,7 @@ def test_the_error_view_shows_the_exporters_false_colours_and_v_the_reference(ap
         c.key_up(K.v)
         c.yield_(4)
         seen["after"] = viewport_pixels(c, app)
-        session.settings = with_values(session.settings, {"display.view": "error"})
+        session.settings = with_values(session.settings, {"display.view": "error", "display.shading": 0.0})
         c.yield_(4)
         seen["error"] = on_window_thread(c, lambda: app.viewport.capture(overlays=False))
 
@@ -117,6 +118,24 @@ def test_the_error_view_shows_the_exporters_false_colours_and_v_the_reference(ap
     assert off.max() <= 8, "one step of the colour table where rounding differs"
     assert (off <= 1).mean() > 0.99
     assert tuple(seen["error"][1, 2]) == (255, 0, 255)
+
+
+def test_shading_lies_under_the_errors_and_follows_its_slider(app, session, truth, tmp_path):
+    seen, planes = {}, session.frame.planes.copy()
+    planes[:, :32, PLANES["normal"]] = (0.6, 0.0, 0.8)
+    session.publish(planes)
+
+    def script(c):
+        load(c, app, tmp_path / "truth.exr")
+        for strength in (0.0, 0.5, 1.0):
+            session.settings = with_values(session.settings, {"display.view": "error", "display.shading": strength})
+            c.yield_(4)
+            seen[strength] = on_window_thread(c, lambda: app.viewport.capture(overlays=False)).astype(float)
+
+    drive(app, script)
+    for strength, factor in ((0.5, 0.92), (1.0, 0.84)):  # 0.2 + 0.8 · 0.8 of the whole
+        assert np.abs(seen[strength][:, :32] - factor * seen[0.0][:, :32]).max() <= 1
+        np.testing.assert_array_equal(seen[strength][:, 32:], seen[0.0][:, 32:])
 
 
 @pytest.mark.parametrize("name", ["small.exr", "gone.exr", "broken.exr"])

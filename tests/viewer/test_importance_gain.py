@@ -71,6 +71,14 @@ def test_one_click_shows_both_and_leaves_the_session_alone(app, tmp_path):
         assert app.viewport.frame_at((1, 1)) is gain.with_.frame
         assert app.viewport.frame_at((SIZE - 1, 1)) is gain.without.frame
 
+        shown = app.state.settings.display.view
+        app.state.change({"display.view": "error"})
+        assert app.state.named_view == "beauty", "menus name what is shown"
+        assert "compared" in app.state.refused_view("error")
+        app.state.change({"display.view": "normal"})
+        assert app.state.named_view == "normal"
+        assert app.state.refused_view("normal") is None
+        app.state.change({"display.view": shown})
         app.commands.exports.png(tmp_path / "sheet.png", overlays=False)
         wait_until(c, lambda: (tmp_path / "sheet.png").exists() and not app.state.background.running())
         app.state.change({"importance.epsilon": 0.5})

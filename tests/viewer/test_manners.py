@@ -11,10 +11,11 @@ from imgui_bundle import ImVec2, imgui
 from pmviewer.output.exr import read_exr
 from pmviewer.output.session_file import write_session
 from pmviewer.settings.access import Settings, with_values
+from pmviewer.viewer import layout
 from pmviewer.viewer import state as viewer_state
 from pmviewer.viewer.dialogs import dialogs
 from pmviewer.viewer.viewport import controls
-from tests.viewer.driver import drag_picture, drive, item, make_app
+from tests.viewer.driver import drag_picture, drive, item, make_app, on_window_thread
 from tests.viewer.fake_session import FakeSession
 
 K = imgui.Key
@@ -41,7 +42,8 @@ def test_a_click_turns_nothing_and_a_drag_is_counted_from_the_press(app, session
         assert session.settings.camera == camera, "less than the threshold"
         before = app.state.live_camera()
         drag_picture(c, app, 60, 0)
-        expected = controls.orbit(before, 60 / app.viewport.rectangle()[3], 0.0)
+        pivot = np.array([0.0, 0.0, -1.0])  # on the back wall, in the picture's middle
+        expected = controls.orbit(before, 60 / app.viewport.rectangle()[3], 0.0, pivot)
         np.testing.assert_allclose(session.settings.camera.origin, expected.origin, rtol=1e-4)
         moved = session.settings.camera
         x, y = app.viewport.origin
@@ -163,5 +165,26 @@ def test_a_search_leaves_the_groups_as_they_were(app):
         app.settings_panel.find = ""
         c.yield_(3)
         assert c.item_info(ref, imgui.test_engine.TestOpFlags_.no_error).id_ == 0
+
+    drive(app, script)
+
+
+def test_hiding_and_showing_the_panels_keeps_their_tabs(app):
+    def tabs():
+        found = [imgui.internal.find_window_by_name(label) for label in layout.PANELS]
+        places = [(w.dock_id, w.dock_order, w.dock_node and w.dock_node.selected_tab_id) for w in found]
+        return places, (app.viewport.size, app.viewport.origin)
+
+    def script(c):
+        c.item_click("**/Error")
+        c.yield_(4)
+        before = on_window_thread(c, tabs)
+        for _ in range(2):
+            c.key_press(K.tab)
+            c.yield_(6)
+            assert app.viewport.size[0] > before[1][0][0] + 100
+            c.key_press(K.tab)
+            c.yield_(10)
+            assert on_window_thread(c, tabs) == before
 
     drive(app, script)

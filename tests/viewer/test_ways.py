@@ -42,6 +42,7 @@ VALUES = {
     "importance.deposition": "density control",
     "importance.convergence": "square",
     "importance.f": 0.05,
+    "display.shading": 0.0,
 }
 
 

@@ -263,18 +263,21 @@ def test_camera_moves_with_the_mouse_and_keys(app, session):
         drag_picture(c, app, 60, 0)
         orbited = session.settings.camera
         assert orbited.origin != "auto"
-        assert np.linalg.norm(np.subtract(orbited.origin, orbited.target)) == pytest.approx(4.0, rel=1e-5)
+        assert np.linalg.norm(np.subtract(orbited.origin, orbited.target)) == pytest.approx(5.0, rel=1e-5)
         assert orbited.origin[0] < -0.3, "the scene follows the mouse to the right"
         drag_picture(c, app, 0, 40, button=2)
         panned = session.settings.camera
         assert panned.target[1] > 0.1
         x, y = app.viewport.origin
-        c.mouse_move_to_pos(ImVec2(x + 100, y + 100))
+        w, h = app.viewport.size
+        c.mouse_move_to_pos(ImVec2(x + w / 2, y + h / 2))  # on the back wall
+        before = app.state.live_camera()
         c.mouse_wheel_y(3)
         c.yield_(2)
         zoomed = session.settings.camera
-        ratio = np.linalg.norm(np.subtract(zoomed.origin, zoomed.target)) / 4.0
-        assert ratio == pytest.approx(0.9**3, rel=1e-3)
+        depth = app.viewport.surroundings.under(before, (SIZE / 2, SIZE / 2)) - before.origin
+        travelled = np.linalg.norm(np.subtract(zoomed.origin, before.origin))
+        assert travelled / (depth @ before.axes()[2]) == pytest.approx(1 - 0.9**3, rel=1e-3)
         c.key_press(K.home)
         c.yield_(2)
         np.testing.assert_allclose(session.settings.camera.target, (0, 0, 0), atol=1e-6)
@@ -298,7 +301,7 @@ def test_exports_png_exr_and_session(app, session, tmp_path):
 
     def script(c):
         app.dialogs.save = lambda title, default, chosen: chosen(default)
-        c.key_press(chord(K.p, K.mod_ctrl))
+        c.key_press(chord(chord(K.e, K.mod_ctrl), K.mod_shift))
         c.key_press(chord(K.e, K.mod_ctrl))
         c.key_press(chord(K.s, K.mod_ctrl))
         c.yield_(2)

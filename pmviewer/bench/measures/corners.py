@@ -88,7 +88,7 @@ def run(quick: bool = False) -> BenchResult:
                 a, b = (indirect(one) for one in made)
                 inside, outside = bias(a, b, r, s, near), bias(a, b, r, s, ~near)
                 signed = 100 * float(((a + b - r - s)[near].mean()) / (r + s)[near].mean())
-                seconds = sum(one.tally.stage_seconds["eye pass"] for one in made) / (2 * passes)
+                seconds = sum(one.tally.stage_seconds["camera pass"] for one in made) / (2 * passes)
                 rows.append([scene, threshold, inside, outside, f"{signed:+.2f}", seconds])
                 if threshold == CHOSEN:
                     note = f"{scene}, below {threshold:g} radii: error in corners over that elsewhere"
@@ -99,5 +99,5 @@ def run(quick: bool = False) -> BenchResult:
         f"look-up radius {RADIUS:g} of the scene, {passes} passes of 16 rays, {size} × {size} pixels; corners are "
         f"the pixels within {NEAR} of an edge, elsewhere all others"
     ]
-    columns = ["scene", "secondary below", "error in corners %", "elsewhere %", "bias in corners %", "eye pass s"]
+    columns = ["scene", "secondary below", "error in corners %", "elsewhere %", "bias in corners %", "camera pass s"]
     return BenchResult("Secondary gathering", columns, rows, targets, notes)

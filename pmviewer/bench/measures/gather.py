@@ -69,7 +69,7 @@ def gathered(opened: OpenScene, pool: WorkPool, values: dict[str, Any], passes: 
         renderer.step()
     image = renderer.frame(0).image("indirect") + renderer.frame(0).image("specular")
     return Gathered(
-        renderer.tally.stage_seconds["eye pass"], renderer.tally.stage_seconds["maps"], image.astype(np.float64)
+        renderer.tally.stage_seconds["camera pass"], renderer.tally.stage_seconds["maps"], image.astype(np.float64)
     )
 
 
@@ -151,7 +151,7 @@ def run(quick: bool = False) -> BenchResult:
         "look-up",
         "photons",
         "look-ups s",
-        "eye pass s",
+        "camera pass s",
         "maps s",
         "faster",
         "difference % or relMSE",

@@ -58,7 +58,7 @@ def measured(opened: OpenScene, pool: WorkPool, values: dict[str, Any], seeds: i
         renderer = Renderer(opened, settings, pool, StageStore(0))
         renderer.step()
         images.append(renderer.frame(0).image("indirect").astype(np.float64))
-        eye += renderer.tally.stage_seconds["eye pass"] / seeds
+        eye += renderer.tally.stage_seconds["camera pass"] / seeds
         maps += renderer.tally.stage_seconds["maps"] / seeds
     return Measured(np.array(images), eye, maps)
 
@@ -107,7 +107,18 @@ def run(quick: bool = False) -> BenchResult:
                     targets.append(Target("R4", z, MOST_Z, "", False, f"{scene}, {rays} rays, {rule}: largest z"))
     finally:
         pool.close()
-    columns = ["scene", "rays", "rule", "variance", "lower", "eye pass s", "maps s", "efficiency", "mean", "largest z"]
+    columns = [
+        "scene",
+        "rays",
+        "rule",
+        "variance",
+        "lower",
+        "camera pass s",
+        "maps s",
+        "efficiency",
+        "mean",
+        "largest z",
+    ]
     notes = [
         f"{seeds} seeds, {size} × {size} pixels, one pass; efficiency is variance times CPU seconds of eye pass and "
         "maps, relative to BSDF"

@@ -70,7 +70,7 @@ def _gathers(opened: OpenScene, pool: WorkPool, passes: int) -> tuple[list[list[
     first, plain = _plain(opened, pool, 1, passes)
     second, _ = _plain(opened, pool, 2, passes)
     name = opened.scene.name
-    plain_cpu = plain.tally.stage_seconds["eye pass"] / passes
+    plain_cpu = plain.tally.stage_seconds["camera pass"] / passes
     rows: list[list[str | float | int]] = [[name, "off", passes, "", 1.0, "", plain_cpu, "", ""]]
     cached = _renderer(opened, pool, {"gather.cache": "on", "gather.cache_samples": RAYS, "gather.rays": RAYS})
     fewer = percent = math.nan
@@ -83,7 +83,7 @@ def _gathers(opened: OpenScene, pool: WorkPool, passes: int) -> tuple[list[list[
             rms = 100 * difference(image, first, second)
             fewer = (cached.tally.cached + cached.tally.gathered) / (cached.tally.records + cached.tally.gathered)
             spent = (
-                cached.tally.stage_seconds["eye pass"] + cached.tally.stage_seconds["irradiance cache"]
+                cached.tally.stage_seconds["camera pass"] + cached.tally.stage_seconds["irradiance cache"]
             ) / cached.passes
             share = 100 * statistics.interpolated
             rows.append([name, "on", cached.passes, statistics.cache_records, fewer, share, spent, percent, rms])

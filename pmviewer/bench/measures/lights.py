@@ -66,7 +66,7 @@ def measure_rule(opened: OpenScene, rule: str, passes: int, size: int, pool: Wor
             curve.passes.append(n)
             curve.rays.append(n * _mean([frame.statistics.shadow_rays_per_pixel for frame in frames]))
             curve.error.append(float(((a - b) ** 2 / 2 * weight).mean()))
-            curve.cpu.append(_mean([frame.statistics.stage_seconds["eye pass"] for frame in frames]))
+            curve.cpu.append(_mean([frame.statistics.stage_seconds["camera pass"] for frame in frames]))
     return curve
 
 
@@ -90,6 +90,13 @@ def run(quick: bool = False) -> BenchResult:
     photons = curves[1]
     ratio = photons.rays[0] / curves[0].rays_to(photons.error[0])
     note = f"{SCENE}, rule photons against power at relMSE {photons.error[0]:.3g} of direct light"
-    columns = ["rule", "passes", "shadow rays/pixel", "relMSE (direct)", "eye pass CPU s", "rays/power's at this error"]
+    columns = [
+        "rule",
+        "passes",
+        "shadow rays/pixel",
+        "relMSE (direct)",
+        "camera pass CPU s",
+        "rays/power's at this error",
+    ]
     notes = [f"{size} × {size} pixels, two seeds; lights of nearly equal power, so that power is nearly uniform"]
     return BenchResult("Choice of lights", columns, rows, [Target("R2", ratio, 0.25, "", False, note)], notes)

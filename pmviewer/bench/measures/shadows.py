@@ -48,7 +48,7 @@ def render(opened: OpenScene, size: int, passes: int, pool: WorkPool, values: di
     image = frame.image("direct").astype(np.float64) + frame.image("specular")
     seconds = frame.statistics.stage_seconds
     rays, saved = frame.statistics.shadow_rays, frame.statistics.saved_rays
-    return Run(image, rays, saved, seconds["eye pass"], seconds.get("shadow photons", 0.0))
+    return Run(image, rays, saved, seconds["camera pass"], seconds.get("shadow photons", 0.0))
 
 
 def run(quick: bool = False) -> BenchResult:
@@ -90,7 +90,7 @@ def run(quick: bool = False) -> BenchResult:
         "difference %",
         "mean ratio",
         "relMSE to the truth",
-        "eye pass CPU s",
+        "camera pass CPU s",
         "shadow photons CPU s",
     ]
     notes = [

@@ -34,6 +34,7 @@ class Compare(Group):
     passes: int = setting(
         8,
         "Passes with importance. Without a reference that fits, four times as many at full N tell the error.",
+        title="passes compared",
         stage="display",
         scale="log",
         unit="passes",

@@ -64,6 +64,10 @@ VIEW_OF_A_MAP = Need(
     f"Only with the views {', '.join(repr(view) for view in MAP_VIEWS)}.",
 )
 
+FALSE_COLOURS = Need(
+    lambda f: f.settings.display.view == "error" or f.settings.display.view in VIEW_NEEDS.keys() - {"denoised"},
+    "Only with views in false colours.",
+)
 TRACED = Need(lambda f: f.plan.photons, "This method traces no photons.")
 CAUSTIC_PHOTONS = Need(
     lambda f: f.plan.caustic_classes,
@@ -156,6 +160,23 @@ class Display(Group):
     tone: Literal["sRGB", "Reinhard", "filmic", "linear"] = setting(
         "sRGB", "Tone curve from radiance to the screen.", stage="display", scale="choice", title="tone curve"
     )
+    shading: float = setting(
+        0.5,
+        "How much of the surfaces' shading lies under false colours; 0 shows the colours of the legend alone.",
+        stage="display",
+        scale="linear",
+        ge=0,
+        le=1,
+        needs=(FALSE_COLOURS,),
+    )
+    through_surfaces: bool = setting(
+        False,
+        "The mouse and the keys of flight move the camera through walls and objects. Without it they stop before "
+        "them; the free camera passes everything.",
+        stage="display",
+        scale="switch",
+        title="through surfaces",
+    )
     compile_ahead: bool = setting(
         True,
         "While nothing is asked for, compile in the background what the next click may need: other methods, look-ups, "
@@ -176,7 +197,7 @@ class PointOverlay(Group):
     size: float = setting(2.0, "Point size.", stage="display", scale="linear", unit="px", ge=1, le=12)
     colour: Colour = setting(
         "power",
-        "Colour by power (radiance photons and cache: irradiance), by number of bounces or by light.",
+        "Colour by power, by number of bounces or by light.",
         stage="display",
         scale="choice",
     )
@@ -195,7 +216,7 @@ class PointOverlay(Group):
 def coloured_by_irradiance(what: str) -> Any:
     """The colour of points that are light of many photons."""
     return setting(
-        "power",
+        "irradiance",
         "Colour by irradiance.",
         stage="display",
         scale="choice",
@@ -206,13 +227,13 @@ def coloured_by_irradiance(what: str) -> Any:
 class RadianceOverlay(PointOverlay):
     """Radiance photons drawn as points"""
 
-    colour: Colour = coloured_by_irradiance("Radiance photons")
+    colour: Literal["irradiance"] = coloured_by_irradiance("Radiance photons")  # type: ignore[assignment]
 
 
 class CacheOverlay(PointOverlay):
     """Records of the irradiance cache drawn as points"""
 
-    colour: Colour = coloured_by_irradiance("Records")
+    colour: Literal["irradiance"] = coloured_by_irradiance("Records")  # type: ignore[assignment]
     circles: bool = setting(
         False,
         "Circles as wide as records reach, for at most 2,000 of them, evenly thinned.",

@@ -135,6 +135,7 @@ class Estimate(Group):
         "photons, half suits stratified ones, whole is too bright.",
         stage="image",
         scale="choice",
+        title="k-th photon",
         needs=(
             NEAREST,
             DISC,

@@ -66,6 +66,7 @@ class Gather(Group):
         0.0,
         "Gather rays that may add less than this share of what they meet end by Russian roulette before they are cast "
         "(Pharr, exercise 0.3): on dark surfaces, behind dark mirrors, or where guided rays do the work. 0 casts all.",
+        title="roulette of rays",
         section="Weak rays, corners",
         stage="image",
         scale="linear",

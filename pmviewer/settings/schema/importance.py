@@ -45,13 +45,14 @@ class Importance(Group):
         "both. Shown by the overlay 'importons' and the view 'required density'.",
         stage="photons",
         scale="choice",
-        title="importance",
+        title="importance map",
     )
     N: int = setting(
         20_000,
         "Importons traced from the camera for the first pass; so many more for each of the next three.",
         stage="photons",
         scale="log",
+        title="importons",
         unit="importons",
         ge=100,
         le=5_000_000,
@@ -62,6 +63,7 @@ class Importance(Group):
         "Importons that an estimate of the importance averages over: fewer are sharper, more are smoother.",
         stage="photons",
         scale="log",
+        title="nearest importons",
         unit="importons",
         ge=10,
         le=1024,
@@ -191,7 +193,7 @@ class Importance(Group):
         "many times over, since most of their light ends where nothing is required.",
         stage="photons",
         scale="choice",
-        title="neighbours of a photon",
+        title="photons around",
         needs=(DENSITY_CONTROL,),
     )
     contrast: float = setting(

@@ -141,6 +141,7 @@ class Virtual(Group):
         8,
         "Photons whose disc tells the density at a virtual light in the first pass; by the photon map it shrinks with "
         "the cube root of the passes.",
+        title="k at a light",
         stage="image",
         scale="integer",
         unit="photons",

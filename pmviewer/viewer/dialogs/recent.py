@@ -22,6 +22,11 @@ class RecentFiles:
             lines = self._store.read_text(encoding="utf-8").splitlines()
             self.entries = [line for line in lines if line.strip()][:LENGTH]
 
+    @property
+    def folder(self) -> Path:
+        """Where the list is kept, and what else the window remembers."""
+        return self._store.parent
+
     def add(self, path: str | Path) -> None:
         """Put a file or a bundled scene's name on top, and save the list."""
         entry = str(Path(path).absolute()) if Path(path).exists() else str(path)

@@ -18,6 +18,7 @@ from pmviewer.output.diagnostic_views import (
     view_scale,
 )
 from pmviewer.output.falsecolour import ERROR_SCALE, Scale
+from pmviewer.output.shading import shades
 from pmviewer.output.tone import depth_bounds
 from pmviewer.settings.access import Display
 from pmviewer.viewer.gl.pair import PairPlanes
@@ -28,6 +29,7 @@ _CONTENT = {"albedo": 1, "normal": 2, "depth": 3, "error": 4} | {
     view: 7 if info.classes else 6 if info.cells else 5 for view, info in DIAGNOSTICS.items()
 }
 _CURVE = {"sRGB": 0, "Reinhard": 1, "filmic": 2, "linear": 3}
+SHADE_UNIT = 3
 NEAREST_FROM = 3.0
 """Magnification from which pixels are shown as squares."""
 
@@ -45,6 +47,8 @@ class Planes:
         self.scale = Scale(0.0, 1.0)
         """Of the diagnostic view that is shown."""
         self._plane: moderngl.Texture | None = None
+        self._shade: moderngl.Texture | None = None
+        self._shade_of = -1
         self._shown: tuple[int, str] | None = None
         self._coarse = False
 
@@ -55,34 +59,47 @@ class Planes:
 
     def upload(self, frame: Frame, view: str) -> bool:
         """Take that view of the frame. True when it is another one than before."""
+        shaded = (view == "error" or (view in DIAGNOSTICS and view in frame.diagnostics)) and self._upload_shades(frame)
         if view in ("reference", "error"):
             view = "beauty"  # the error is that of the image; the reference is there already
         if view in HELD_WHILE_SHOWN and view not in frame.diagnostics:
             view = "beauty"  # until it is there
         if view == "geometry" or self._shown == (frame.serial, view):
-            return False
+            return shaded
         image = frame.image(view)
         if view == "depth":
             self.depth_range = depth_bounds(image)
         elif view in DIAGNOSTICS:
             self.scale = view_scale(view, image)
-        self._write(image)
+        self._plane = self._written(self._plane, image)
         self._shown, self._coarse = (frame.serial, view), frame.coarse
         return True
 
-    def _write(self, image: NDArray[np.float32]) -> None:
+    def _upload_shades(self, frame: Frame) -> bool:
+        """What lies under false colours. True when it is another frame's than before."""
+        if self._shade_of == frame.serial:
+            return False
+        shade = shades(frame.image("normal"), frame.camera)[..., None]
+        self._shade, self._shade_of = self._written(self._shade, shade), frame.serial
+        return True
+
+    def _written(self, plane: moderngl.Texture | None, image: NDArray[np.float32]) -> moderngl.Texture:
+        """The texture with the image (h, w, channels) in it, another one where it has another shape."""
         height, width, channels = image.shape
-        plane = self._plane
         if plane is None or plane.size != (width, height) or plane.components != channels:
-            self._free()
-            plane = self._plane = self._context.texture((width, height), channels, dtype="f4", alignment=4)
+            if plane is not None:
+                plane.release()
+            plane = self._context.texture((width, height), channels, dtype="f4", alignment=4)
             plane.repeat_x = plane.repeat_y = False
         plane.write(np.ascontiguousarray(image, np.float32))
+        return plane
 
     def _free(self) -> None:
-        if self._plane is not None:
-            self._plane.release()
-            self._plane = None
+        for plane in (self._plane, self._shade):
+            if plane is not None:
+                plane.release()
+        self._plane = self._shade = None
+        self._shade_of = -1
 
     def forget(self) -> None:
         """Another scene: free the frame's plane. The reference and the pair are told apart by themselves."""
@@ -109,6 +126,11 @@ class Planes:
         plane.use(0)
         if display.view == "error" or diagnostic:
             self.reference.bind()
+        is_false = bool(display.view == "error" or diagnostic) and self._shade is not None
+        if is_false:
+            assert self._shade is not None
+            self._shade.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            self._shade.use(SHADE_UNIT)
         low, high = self.scale.lower, self.scale.upper
         set_uniforms(
             self._program,
@@ -119,6 +141,8 @@ class Planes:
             depth_range=self.depth_range,
             reference=REFERENCE_UNIT,
             colours=COLOUR_UNIT,
+            shades=SHADE_UNIT,
+            shading=display.shading if is_false else 0.0,
             error_range=(math.log(ERROR_SCALE.lower), math.log(ERROR_SCALE.upper)),
             value_range=(math.log(low), math.log(high)) if self.scale.log else (low, high),
             value_log=int(self.scale.log),

@@ -15,7 +15,7 @@ from pmviewer.viewer import theme
 from pmviewer.viewer.gl.program import Drawing, Shaders, set_uniforms
 from pmviewer.viewer.overlays.overlay import Needs, Overlay, Source
 
-COLOUR = theme.FREE[:3]
+COLOUR = theme.DARK.free[:3]
 RIM_COLOUR = (0.0, 0.0, 0.0)
 WIDTH, RIM = 2.0, 4.5
 HIDDEN = 0.28

@@ -90,4 +90,4 @@ class GatherRays(Overlay):
             line = imgui.get_text_line_height()
             text = "hold I over the picture: gather rays of the pixel under the mouse"
             position = viewport.size[0] / 2, viewport.size[1] - 2.2 * line
-            caption(viewport, text, position, anchor=0.5, colour=theme.ACCENT)
+            caption(viewport, text, position, anchor=0.5, colour=theme.DARK.accent)

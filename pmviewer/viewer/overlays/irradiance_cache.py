@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 from imgui_bundle import imgui
 from numpy.typing import NDArray
 
 from pmviewer.settings.access import CacheOverlay, Settings
 from pmviewer.viewer.gl.lines import LineCloud
-from pmviewer.viewer.gl.palette import POWER
+from pmviewer.viewer.gl.palette import POWER, Colouring
 from pmviewer.viewer.gl.program import Drawing, Shaders
 from pmviewer.viewer.gl.records import directions
 from pmviewer.viewer.overlays.overlay import Needs, Source, Switch
@@ -43,6 +46,7 @@ class IrradianceCache(MapPoints):
     name = "cache"
     switch = Switch(imgui.Key.i, "Shift+I", "Irradiance cache on or off", shift=True)
     things = "Records of the irradiance cache in the latest pass"
+    colourings: ClassVar[Mapping[str, Colouring]] = {"irradiance": POWER}
     unit = "W/m²"
 
     def __init__(self, shaders: Shaders) -> None:

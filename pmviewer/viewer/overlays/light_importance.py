@@ -50,6 +50,16 @@ def projected(camera: CameraPose, point: NDArray[np.floating]) -> tuple[float, f
     return (float(x), float(y)) if 0 <= x <= 1 and 0 <= y <= 1 else None
 
 
+def clear_of(
+    place: tuple[float, float], taken: list[tuple[float, float]], size: tuple[float, float]
+) -> tuple[float, float]:
+    """The place, or the next one below it, where a label of that size covers none of those that are there."""
+    x, y = place
+    while any(abs(x - other[0]) < size[0] and abs(y - other[1]) < size[1] for other in taken):
+        y = min(other[1] for other in taken if abs(x - other[0]) < size[0] and other[1] > y - size[1]) + size[1]
+    return x, y
+
+
 class Lights(Points):
     """Those that have a place, coloured by their share of the picture's light or of the photons."""
 
@@ -90,11 +100,14 @@ class Lights(Points):
         if frame is None or camera is None or frame.known_lights is None or frame.light_places is None:
             return
         left, top, width, height = viewport.rectangle()
-        line = imgui.get_text_line_height()
+        line, taken = imgui.get_text_line_height(), list[tuple[float, float]]()
         for light in top_lights(frame.known_lights, style.labels):
             place = projected(camera, frame.light_places[light])
             if place is not None:
                 x, y = left + place[0] * width, top + place[1] * height
                 position = x + 0.5 * style.size + 0.4 * line, y - 0.5 * line
                 if 0 <= position[0] < viewport.size[0] and 0 <= position[1] < viewport.size[1] - line:
-                    caption(viewport, f"{light + 1}: {frame.known_lights.lit[light]:.1%}", position)
+                    text = f"{light + 1}: {frame.known_lights.lit[light]:.1%}"
+                    place = clear_of(position, taken, (imgui.calc_text_size(text).x + line, 1.6 * line))
+                    taken.append(place)
+                    caption(viewport, text, place)

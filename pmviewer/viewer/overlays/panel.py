@@ -51,7 +51,7 @@ class OverlayPanel:
 
     def _switch(self, overlay: type[Overlay], shown: bool, reason: str | None) -> None:
         info = SETTINGS[f"overlays.{overlay.name}.show"]
-        imgui.push_style_var(imgui.StyleVar_.alpha, 0.45 if reason else 1.0)
+        imgui.push_style_var(imgui.StyleVar_.alpha, theme.GREYED if reason else 1.0)
         changed, show = imgui.checkbox(f"{info.group}##{info.path}", shown)
         imgui.pop_style_var()
         if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):

@@ -122,8 +122,8 @@ class ErrorPanel:
         implot.push_style_var(implot.StyleVar_.plot_padding, (4, 4))
         implot.push_style_var(implot.StyleVar_.label_padding, (4, 2))
         implot.push_style_color(implot.Col_.frame_bg, theme.grey(0, 0))
-        implot.push_style_color(implot.Col_.plot_bg, theme.grey(0.12))
-        implot.push_style_color(implot.Col_.axis_grid, theme.grey(1, 0.12))
+        implot.push_style_color(implot.Col_.plot_bg, theme.ground("plot"))
+        implot.push_style_color(implot.Col_.axis_grid, theme.grey(theme.look.lighter, 0.12))
         flags = implot.Flags_.no_inputs | implot.Flags_.no_menus | implot.Flags_.no_mouse_text
         if implot.begin_plot("##curves", imgui.get_content_region_avail(), flags):
             _axis(implot.ImAxis_.x1, "passes" if self.by_passes else "rendering time (s)", x_limits)

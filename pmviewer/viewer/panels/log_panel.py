@@ -75,7 +75,7 @@ def draw_toasts(state: ViewerState, left: float, top: float, width: float) -> No
     for number, toast in enumerate(list(state.toasts)):
         imgui.set_next_window_pos((left + (width - wide) / 2, y))
         imgui.set_next_window_size((wide, 0))
-        imgui.push_style_color(imgui.Col_.window_bg, theme.grey(0.13, 0.96))
+        imgui.push_style_color(imgui.Col_.window_bg, theme.ground("menu_bar_bg", 0.96))
         imgui.push_style_color(imgui.Col_.border, imgui.ImVec4(*theme.LEVELS[toast.message.level]))
         flags = (
             imgui.WindowFlags_.no_decoration

@@ -8,10 +8,14 @@ from imgui_bundle import hello_imgui, imgui
 
 from pmviewer.settings.access import SETTINGS, get
 from pmviewer.viewer import theme
+from pmviewer.viewer.appearance import SCALES
 from pmviewer.viewer.overlays.registry import SWITCHED
+from pmviewer.viewer.panels.bundled_menu import BundledMenu
+from pmviewer.viewer.panels.edit_menu import EditMenu
 from pmviewer.viewer.panels.toolbar import Actions
-from pmviewer.viewer.shortcuts import keys_of
+from pmviewer.viewer.shortcuts import follow_mouse, keys_of
 from pmviewer.viewer.state import ViewerState
+from pmviewer.viewer.view_actions import forget_view, go_to_view
 
 
 class Menus:
@@ -21,11 +25,17 @@ class Menus:
         self._state = state
         self._actions = actions
         self._panels = panels
+        self._bundled = BundledMenu(state)
+        self._edit = EditMenu(state, self._item)
 
     def gui(self) -> None:
         """Draw the bar's menus, between imgui's begin and end of a menu bar."""
+        follow_mouse(self._state.history)
         if imgui.begin_menu("File"):
             self._file()
+            imgui.end_menu()
+        if imgui.begin_menu("Edit"):
+            self._edit.gui()
             imgui.end_menu()
         if imgui.begin_menu("View"):
             self._view()
@@ -49,6 +59,9 @@ class Menus:
     def _file(self) -> None:
         self._item("Open …", "open")
         self._item("Load reference …", "load_reference")
+        if imgui.begin_menu("Bundled scenes"):
+            self._bundled.gui()
+            imgui.end_menu()
         if imgui.begin_menu("Open recent", bool(self._state.recent.entries)):
             for entry in list(self._state.recent.entries):
                 self._recent(entry)
@@ -80,7 +93,7 @@ class Menus:
         imgui.set_item_tooltip(entry)
 
     def _view(self) -> None:
-        view = self._state.settings.display.view
+        view = self._state.named_view
         for number, name in enumerate(SETTINGS["display.view"].choices):
             refusal = self._state.refused_view(name)
             key = str((number + 1) % 10) if number < 10 else ""
@@ -92,7 +105,13 @@ class Menus:
         self._item("Frame the whole scene", "frame_all")
         self._item("Reset the camera", "reset_camera")
         self._item("Fly", "toggle_fly", self._state.flying)
+        through = self._state.settings.display.through_surfaces
+        if imgui.menu_item("Move through surfaces", "", through)[0]:
+            self._state.change({"display.through_surfaces": not through})
         self._item("Fit the picture", "fit_picture")
+        if imgui.begin_menu("Saved views"):
+            self._views()
+            imgui.end_menu()
         if imgui.begin_menu("Free camera"):
             free = self._state.settings.free_camera
             self._item("Free camera", "toggle_free", free.on)
@@ -108,9 +127,35 @@ class Menus:
         for label in self._panels:
             window = params.docking_params.dockable_window_of_name(label)
             _, window.is_visible = imgui.menu_item(label, "", window.is_visible)
+        imgui.separator()
+        appearance = self._state.appearance
+        self._item("Light interface", "toggle_look", appearance.look == "light")
+        if imgui.begin_menu("Size of the interface"):
+            for scale in SCALES:
+                if imgui.menu_item(f"{scale:.0%}", "", scale == appearance.scale)[0]:
+                    appearance.choose(scale=scale)
+            imgui.separator()
+            self._item("Larger", "larger")
+            self._item("Smaller", "smaller")
+            imgui.end_menu()
         self._item("Hide the panels", "toggle_panels", self._state.panels_hidden)
         if imgui.menu_item_simple("Reset the layout"):
             params.docking_params.layout_reset = True
+
+    def _views(self) -> None:
+        """Of the open scene: a click goes there."""
+        self._item("Save this view", "save_view")
+        names = list(self._state.views.of(self._state.session.scene_path))
+        if names:
+            imgui.separator()
+        for name in names:
+            if imgui.menu_item(name, "", False)[0]:
+                go_to_view(self._state, name)
+        if imgui.begin_menu("Forget", bool(names)):
+            for name in names:
+                if imgui.menu_item(f"{name}##forget", "", False)[0]:
+                    forget_view(self._state, name)
+            imgui.end_menu()
 
     def _render(self) -> None:
         self._item("Resume" if self._state.session.paused else "Pause", "toggle_pause")

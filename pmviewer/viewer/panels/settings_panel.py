@@ -10,15 +10,17 @@ from imgui_bundle import imgui
 
 from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, flat
 from pmviewer.viewer import theme
+from pmviewer.viewer.format import si
 from pmviewer.viewer.panels.widgets import (
     SettingWidgets,
     icon_button,
     range_text,
     reset_button,
     tooltip_text,
-    value_text,
 )
+from pmviewer.viewer.shortcuts import keys_of
 from pmviewer.viewer.state import ViewerState
+from pmviewer.viewer.value_text import value_text
 
 _ASK = "Reset every setting"
 PINNED = ("photons.N", "photons.q", "estimate.radius")
@@ -49,8 +51,11 @@ class SettingsPanel:
         self._filter_row()
         flags = imgui.WindowFlags_.always_vertical_scrollbar
         if imgui.begin_child("##groups", (0, 0), imgui.ChildFlags_.none, flags):
-            for heading, infos in self._groups:
-                self._group(heading, infos)
+            if self.state.only_changed:
+                self._changed()
+            else:
+                for heading, infos in self._groups:
+                    self._group(heading, infos)
         imgui.end_child()
 
     def _filter_row(self) -> None:
@@ -58,10 +63,15 @@ class SettingsPanel:
             p for p, info in SETTINGS.items() if not p.startswith(_ELSEWHERE) and self._value(p) != info.default
         ]
         size = imgui.get_frame_height() * 1.15 + imgui.get_style().item_spacing.x
-        imgui.set_next_item_width(-size)
+        imgui.set_next_item_width(-2 * size)
         _, self.find = imgui.input_text_with_hint(
             "##filter", f"{fa.ICON_FA_MAGNIFYING_GLASS}  find a setting", self.find
         )
+        imgui.same_line()
+        only = self.state.only_changed
+        tip = "List all settings" if only else f"List the changed settings alone ({keys_of('list_changed')})"
+        if icon_button(fa.ICON_FA_FILTER, "only.changed", tip, on=only):
+            self.state.only_changed = not only
         imgui.same_line()
         tip = "Reset every setting to its default" if everything else "Every setting has its default"
         if icon_button(fa.ICON_FA_ARROW_ROTATE_LEFT, "reset.all", tip, enabled=bool(everything)):
@@ -107,6 +117,19 @@ class SettingsPanel:
                 self.row(info)
             imgui.end_table()
 
+    def _changed(self) -> None:
+        """What differs from the defaults, group by group, each with its reset."""
+        wanted = self.find.strip().lower()
+        changed = [i for i in SETTINGS.values() if self._value(i.path) != i.default and wanted in i.path.lower()]
+        if not changed:
+            imgui.text_disabled("Every setting has its default.")
+        for heading, infos in groupby(changed, key=lambda info: info.group):
+            imgui.text_colored(imgui.ImVec4(*theme.ACCENT), theme.drawable(heading))
+            if self.begin_rows(f"changed {heading}"):
+                for info in infos:
+                    self.row(info)
+                imgui.end_table()
+
     @staticmethod
     def _section(heading: str) -> None:
         """A line over the settings that belong together within a group."""
@@ -150,10 +173,10 @@ class SettingsPanel:
         imgui.table_next_row()
         imgui.table_next_column()
         if reason:
-            imgui.push_style_var(imgui.StyleVar_.alpha, 0.45)
+            imgui.push_style_var(imgui.StyleVar_.alpha, theme.GREYED)
         imgui.align_text_to_frame_padding()
         differs = value != info.default
-        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*(theme.TEXT if differs else (0.76, 0.76, 0.76, 1.0))))
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.TEXT) if differs else theme.grey(theme.look.name))
         imgui.text_unformatted(theme.drawable(info.title))
         imgui.pop_style_color()
         described = self._is_hovered()
@@ -208,6 +231,10 @@ class SettingsPanel:
         lines = [(info.path, theme.ACCENT), (info.description, theme.TEXT)]
         if reason:
             lines.append((f"No effect now: {reason}", theme.WARNING))
+        resolved = self.state.resolved(info.path) if value == "auto" else value
+        geometry = self.state.session.geometry
+        if info.unit == "× scene" and geometry is not None and isinstance(resolved, int | float):
+            lines.append((f"In this scene {si(float(resolved) * float(geometry.radius), 'm')}.", theme.TEXT))
         allowed = range_text(info)
         default = f"Default {value_text(info, info.default)}"
         lines.append((f"{allowed}. {default}." if allowed else f"{default}.", theme.DIM))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from pmviewer.engine.frame import Status
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import duration, grouped, si
 from pmviewer.viewer.state import ViewerState
 
-_COLOURS = {"rendering": theme.ACCENT, "finished": theme.GOOD, "failed": theme.ERROR, "paused": theme.WARNING}
+_COLOURS = {"rendering": "accent", "finished": "good", "failed": "error", "paused": "warning"}
+"""Of states, as looks name them."""
 
 
 def status_parts(state: ViewerState) -> list[str]:
@@ -36,11 +38,24 @@ def status_parts(state: ViewerState) -> list[str]:
     return parts
 
 
+def _within_pass(state: ViewerState, status: Status) -> None:
+    """What a long pass is at, and a way out of it."""
+    share = "" if status.stage_progress is None else f" {status.stage_progress:.0%}"
+    imgui.same_line()
+    imgui.text_colored(imgui.ImVec4(*theme.ACCENT), f"pass {grouped(status.passes + 1)}: {status.stage}{share}")
+    imgui.same_line()
+    if imgui.small_button("Stop##pass"):
+        state.session.stop()
+    imgui.set_item_tooltip(
+        "Pause now: what this pass has done is dropped, and going on begins anew. Pausing (Space) lets it finish."
+    )
+
+
 def draw_status_bar(state: ViewerState) -> None:
     """Draw the session's state with its progress, what is being loaded, figures of the picture, and work beside it."""
     status = state.session.status
     imgui.align_text_to_frame_padding()
-    colour = _COLOURS.get(status.state, theme.TEXT)
+    colour = getattr(theme.look, _COLOURS.get(status.state, "text"))
     head: str = status.state
     text = status.text
     if text.startswith(head):
@@ -60,6 +75,8 @@ def draw_status_bar(state: ViewerState) -> None:
         imgui.pop_style_color()
         if not busy:
             imgui.set_item_tooltip(f"{grouped(status.passes)} of {grouped(state.settings.render.passes)} passes")
+    if status.stage:
+        _within_pass(state, status)
     loading = state.session.loading
     if loading:
         if status.state != "loading":

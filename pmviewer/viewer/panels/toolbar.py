@@ -9,6 +9,7 @@ from itertools import accumulate
 from imgui_bundle import icons_fontawesome_6 as fa
 from imgui_bundle import imgui
 
+from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.settings.access import SETTINGS, get
 from pmviewer.viewer import theme
 from pmviewer.viewer.panels.widgets import SettingWidgets, icon_button, tooltip_text
@@ -84,7 +85,7 @@ class Toolbar:
         return [
             *items,
             self._setting("display.exposure", "exposure", 6, faded=data),
-            self._setting("display.tone", "tone", 6, faded=data),
+            self._shading_or_tone(data),
             _gap(),
             self._button(fa.ICON_FA_EXPAND, "frame_all", "Frame the whole scene"),
             self._button(fa.ICON_FA_PAPER_PLANE, "toggle_fly", "Fly through the scene", on=state.flying),
@@ -98,6 +99,13 @@ class Toolbar:
             _gap(),
             self._button(fa.ICON_FA_KEYBOARD, "toggle_help", "Keys and mouse", on=state.help_open),
         ]
+
+    def _shading_or_tone(self, data: bool) -> Item:
+        """What matters to the view: false colours have shading under them, other views a tone curve."""
+        shown = self._state.shown_display.view
+        if shown == "error" or shown in DIAGNOSTICS:
+            return self._setting("display.shading", "shading", 6)
+        return self._setting("display.tone", "tone", 6, faded=data)
 
     def _button(self, icon: str, action: str, text: str, *, on: bool = False) -> Item:
         def draw() -> None:
@@ -125,7 +133,9 @@ class Toolbar:
 
     def _edit(self, path: str, label: str, width_em: float, faded: bool) -> None:
         info, value = SETTINGS[path], get(self._state.settings, path)
-        imgui.push_style_var(imgui.StyleVar_.alpha, 0.5 if faded else 1.0)
+        if path == "display.view":
+            value = self._state.named_view
+        imgui.push_style_var(imgui.StyleVar_.alpha, theme.GREYED if faded else 1.0)
         imgui.begin_group()
         imgui.align_text_to_frame_padding()
         imgui.text_colored(imgui.ImVec4(*theme.DIM), label)

@@ -13,24 +13,11 @@ from imgui_bundle import imgui
 from pmviewer.settings.access import SettingInfo
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import grouped, short
+from pmviewer.viewer.value_text import value_text
 
 _FLAGS = imgui.SliderFlags_.no_input | imgui.SliderFlags_.always_clamp
 WIDE_RANGE = 1000
 """A linear range with more steps than this is dragged relatively: a slider would jump over most of its values."""
-
-
-def value_text(info: SettingInfo, value: Any) -> str:
-    """The value with separators and unit, as shown in widgets and tooltips."""
-    if value is None:
-        return "not known yet"
-    if isinstance(value, str):
-        return value
-    if isinstance(value, bool):
-        return "on" if value else "off"
-    if isinstance(value, tuple | list):
-        return ", ".join(f"{v:.4g}" for v in value)
-    number = grouped(value) if info.kind is int else short(value)
-    return f"{number} {info.unit}".rstrip()
 
 
 def range_text(info: SettingInfo) -> str:
@@ -78,7 +65,7 @@ class SettingWidgets:
             changed, new = imgui.checkbox(f"##{info.path}", value)
             return new if changed else None
         if info.scale in ("choice", "name"):
-            return self._choice(info, value)
+            return self._choice(info, value, resolved)
         if info.scale == "vector":
             return self._vector(info, value, resolved)
         if self.typing is not None and self.typing.path == info.path:
@@ -90,9 +77,10 @@ class SettingWidgets:
         text = f"{value}" if info.kind is int or isinstance(value, str) else f"{value:.6g}"
         self.typing = Typing(info.path, text)
 
-    def _choice(self, info: SettingInfo, value: str) -> str | None:
+    def _choice(self, info: SettingInfo, value: str, resolved: Any) -> str | None:
         chosen = None
-        if imgui.begin_combo(f"##{info.path}", value):
+        known = value == "auto" and isinstance(resolved, str) and resolved != "auto"
+        if begin_combo(f"##{info.path}", f"auto · {resolved}" if known else value):
             for choice in self.choices(info):
                 refusal = self.refused_view(choice) if info.path == "display.view" else None
                 flags = imgui.SelectableFlags_.none if refusal is None else imgui.SelectableFlags_.disabled
@@ -156,8 +144,8 @@ class SettingWidgets:
         """The slider or drag field; None when it didn't move."""
         name = f"##{info.path}"
         imgui.push_style_color(imgui.Col_.frame_bg, theme.grey(0, 0))
-        imgui.push_style_color(imgui.Col_.frame_bg_hovered, theme.grey(1, 0.06))
-        imgui.push_style_color(imgui.Col_.frame_bg_active, theme.grey(1, 0.10))
+        imgui.push_style_color(imgui.Col_.frame_bg_hovered, theme.grey(theme.look.lighter, 0.06))
+        imgui.push_style_color(imgui.Col_.frame_bg_active, theme.grey(theme.look.lighter, 0.10))
         try:
             return self._slide_over_bar(info, name, current, text, width)
         finally:
@@ -196,6 +184,16 @@ def _speed(info: SettingInfo, value: float) -> float:
     return max(0.01 * abs(value), 1e-3) if info.unit == "units" else 0.1
 
 
+def begin_combo(label: str, preview: str) -> bool:
+    """`imgui.begin_combo` whose value is told by a tooltip where there is no room for it."""
+    room = imgui.calc_item_width() - imgui.get_frame_height() - 2 * imgui.get_style().frame_padding.x
+    narrow = imgui.calc_text_size(preview).x > room
+    is_open = imgui.begin_combo(label, preview, imgui.ComboFlags_.no_arrow_button if narrow else 0)
+    if not is_open and imgui.calc_text_size(preview).x > room + imgui.get_frame_height():
+        imgui.set_item_tooltip(preview)
+    return is_open
+
+
 def slider_share(info: SettingInfo, value: float) -> float:
     """Where the value lies between the setting's bounds, 0 to 1, on the setting's scale."""
     assert info.lower is not None
@@ -214,13 +212,13 @@ def filled_bar(width: float, share: float) -> None:
     rounding = imgui.get_style().frame_rounding
     draw = imgui.get_window_draw_list()
     alpha = imgui.get_style().alpha
-    draw.add_rect_filled((x, y), (x + size, bottom), imgui.get_color_u32(theme.grey(0.235, alpha)), rounding)
+    draw.add_rect_filled((x, y), (x + size, bottom), imgui.get_color_u32(theme.ground("frame_bg", alpha)), rounding)
     if share > 0:
         end = x + max(size * share, 2)
         fill = imgui.get_color_u32(theme.with_alpha(theme.ACCENT, 0.30 * alpha))
         edge = imgui.get_color_u32(theme.with_alpha(theme.ACCENT, 0.85 * alpha))
         draw.add_rect_filled((x, y), (end, bottom), fill, rounding)
-        draw.add_rect_filled((end - 2, y), (end, bottom), edge)
+        draw.add_rect_filled((end - 2, bottom - 4), (end, bottom), edge)  # below the digits
 
 
 def icon_button(icon: str, name: str, tooltip: str, *, on: bool = False, enabled: bool = True) -> bool:

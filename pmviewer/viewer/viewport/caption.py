@@ -23,7 +23,7 @@ def caption(
     position: tuple[float, float],
     *,
     anchor: float = 0.0,
-    colour: theme.Colour = theme.TEXT,
+    colour: theme.Colour = theme.DARK.text,
 ) -> None:
     """Text on a translucent ground, in lines that leave room for a legend; `anchor` 0.5 centres it on the position, in
     lines that fit into the viewport."""
@@ -36,7 +36,7 @@ def caption(
     x, y = viewport.origin[0] + position[0] - anchor * size.x, viewport.origin[1] + position[1]
     draw = imgui.get_window_draw_list()
     pad = 0.35 * imgui.get_text_line_height()
-    ground = imgui.get_color_u32(theme.grey(0.08, 0.7))
+    ground = imgui.get_color_u32(theme.grey(*theme.OVER_PICTURE))
     draw.add_rect_filled((x - pad, y - 0.5 * pad), (x + size.x + pad, y + size.y + 0.5 * pad), ground, 3)
     code = imgui.get_color_u32(imgui.ImVec4(*colour))
     draw.add_text(imgui.get_font(), imgui.get_font_size(), (x, y), code, text, wrap_width=wrap)

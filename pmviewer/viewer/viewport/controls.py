@@ -1,12 +1,13 @@
 """Moving the camera: pure functions from one pose to the next, in units of what is on the screen.
 
 Mouse distances come as fractions of the picture's height, so the feel doesn't depend on its size; speeds follow the
-distance to the target or the scene's size, so neither does it depend on the scene's.
+distance to what is under the mouse or near, so neither does it depend on the scene's.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -57,28 +58,42 @@ def with_pivot(pose: CameraPose, center: Vector, radius: float) -> CameraPose:
     return replace(pose, target=_vec3(origin + forward * depth))
 
 
-def _turn(pose: CameraPose, offset: Vector, sideways: float, away_from_up: float) -> Vector:
-    """`offset` turned clockwise about the up axis, then away from it but never past the poles. Angles in radians."""
+def aimed(pose: CameraPose, point: Vector) -> CameraPose:
+    """The same view with the target at the point's depth, so that panning and zooming follow what lies there. A point
+    that isn't ahead changes nothing."""
+    forward = pose.axes()[2]
+    origin = np.asarray(pose.origin, float)
+    depth = float((point - origin) @ forward)
+    return replace(pose, target=_vec3(origin + forward * depth)) if depth > 0 else pose
+
+
+def _turning(pose: CameraPose, offset: Vector, sideways: float, away_from_up: float) -> Callable[[Vector], Vector]:
+    """The rotation that turns `offset` clockwise about the up axis, then away from it but never past the poles. Angles
+    in radians."""
     up = _upright(pose)
-    turned = _rotate(offset, up, sideways if pose.mirrored else -sideways)
-    axis = np.cross(up, turned)
+    around = sideways if pose.mirrored else -sideways
+    turned = _rotate(offset, up, around)
+    axis = _unit(np.cross(up, turned))
     polar = math.acos(float(np.clip(_unit(turned) @ up, -1, 1)))
-    wanted = min(max(polar + away_from_up, POLE), math.pi - POLE)
-    return _rotate(turned, _unit(axis), wanted - polar)
+    tilt = min(max(polar + away_from_up, POLE), math.pi - POLE) - polar
+    return lambda v: _rotate(_rotate(v, up, around), axis, tilt)
 
 
-def orbit(pose: CameraPose, dx: float, dy: float) -> CameraPose:
-    """Turn the eye around the target, as if dragging the scene."""
-    target = np.asarray(pose.target, float)
-    offset = _turn(pose, np.asarray(pose.origin, float) - target, dx * ORBIT_SPEED, -dy * ORBIT_SPEED)
-    return replace(pose, origin=_vec3(target + offset), up=_vec3(_upright(pose)))
+def orbit(pose: CameraPose, dx: float, dy: float, pivot: Vector | None = None) -> CameraPose:
+    """Turn eye and view around a point, the target by default, as if dragging the scene."""
+    origin, target = np.asarray(pose.origin, float), np.asarray(pose.target, float)
+    held = target if pivot is None else pivot
+    turn = _turning(pose, origin - target, dx * ORBIT_SPEED, -dy * ORBIT_SPEED)
+    origin, target = held + turn(origin - held), held + turn(target - held)
+    return replace(pose, origin=_vec3(origin), target=_vec3(target), up=_vec3(_upright(pose)))
 
 
 def look(pose: CameraPose, dx: float, dy: float) -> CameraPose:
     """Turn the view about the eye."""
     origin = np.asarray(pose.origin, float)
-    offset = _turn(pose, np.asarray(pose.target, float) - origin, dx * LOOK_SPEED, dy * LOOK_SPEED)
-    return replace(pose, target=_vec3(origin + offset), up=_vec3(_upright(pose)))
+    offset = np.asarray(pose.target, float) - origin
+    turn = _turning(pose, offset, dx * LOOK_SPEED, dy * LOOK_SPEED)
+    return replace(pose, target=_vec3(origin + turn(offset)), up=_vec3(_upright(pose)))
 
 
 def _height_at_target(pose: CameraPose) -> float:
@@ -87,11 +102,15 @@ def _height_at_target(pose: CameraPose) -> float:
     return 2 * distance * pose.half_width() * pose.height / pose.width
 
 
+def shifted(pose: CameraPose, way: Vector) -> CameraPose:
+    """Eye and target moved by the vector (3,)."""
+    return replace(pose, origin=_vec3(pose.origin + way), target=_vec3(pose.target + way))
+
+
 def pan(pose: CameraPose, dx: float, dy: float) -> CameraPose:
     """Move eye and target so that the target's plane follows the mouse."""
     right, top, _ = pose.axes()
-    shift = (-right * dx + top * dy) * _height_at_target(pose)
-    return replace(pose, origin=_vec3(pose.origin + shift), target=_vec3(pose.target + shift))
+    return shifted(pose, (-right * dx + top * dy) * _height_at_target(pose))
 
 
 def zoom(pose: CameraPose, steps: float, radius: float) -> CameraPose:
@@ -114,8 +133,7 @@ def zoom(pose: CameraPose, steps: float, radius: float) -> CameraPose:
 def fly(pose: CameraPose, right: float, up: float, forward: float, step: float) -> CameraPose:
     """Move eye and target along the camera's axes; each argument is −1, 0 or 1, `step` a distance."""
     x, y, z = pose.axes()
-    shift = (x * right + y * up + z * forward) * step
-    return replace(pose, origin=_vec3(pose.origin + shift), target=_vec3(pose.target + shift))
+    return shifted(pose, (x * right + y * up + z * forward) * step)
 
 
 def frame_all(pose: CameraPose, center: Vector, radius: float) -> CameraPose:

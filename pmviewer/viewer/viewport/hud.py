@@ -56,7 +56,7 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
             caption(viewport, text, (margin, margin))
     elif view != state.settings.display.view and not state.flipped:
         refusal = state.refused_view(state.settings.display.view) or "to come with the next pass"
-        caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.WARNING)
+        caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.DARK.warning)
     elif view != "beauty" and viewport.captions:
         caption(viewport, _title(viewport, view), (margin, margin))
     if state.settings.free_camera.on and viewport.captions:
@@ -73,9 +73,12 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         source = viewport.source()
         for overlay in viewport.picture.layers.shown(state.settings):
             overlay.annotate(viewport, source)
+    advice = "" if viewport.alone else viewport.advice()
+    if advice:
+        caption(viewport, advice, (width / 2, 0.5 * height), anchor=0.5, colour=theme.DARK.warning)
     if state.flying:
         text = "flying: W A S D, Q down, E up, drag to look, Shift faster, F or Esc to leave"
-        caption(viewport, text, (width / 2, height - line - 2 * margin), anchor=0.5, colour=theme.ACCENT)
+        caption(viewport, text, (width / 2, height - line - 2 * margin), anchor=0.5, colour=theme.DARK.accent)
     elif hovered:
         text = _value_under_mouse(viewport)
         if text:
@@ -106,7 +109,7 @@ def _compared_pictures(viewport: Viewport) -> None:
         (f"with importance{view}", gain.with_, 1.0, x - gap),
         (f"without{view}", gain.without, 0.0, x + gap),
     ):
-        caption(viewport, title, (at, 0.6 * line), anchor=anchor, colour=theme.ACCENT)
+        caption(viewport, title, (at, 0.6 * line), anchor=anchor, colour=theme.DARK.accent)
         stored, error, spent = si(side.stored), f"{side.error.relmse_all:.2e}", duration(side.cpu_seconds)
         facts = (
             f"{stored} photons stored",
@@ -132,7 +135,7 @@ def _free_camera_label(viewport: Viewport) -> None:
     x = 0.6 * line
     wrap = max(viewport.size[0] - x - LEGEND_EMS * imgui.get_font_size(), 1.0)  # as the caption does
     lines = imgui.calc_text_size(text, wrap_width=wrap).y
-    caption(viewport, text, (x, viewport.size[1] - lines - 2.4 * line), colour=theme.FREE)
+    caption(viewport, text, (x, viewport.size[1] - lines - 2.4 * line), colour=theme.DARK.free)
 
 
 def _value_under_mouse(viewport: Viewport) -> str:
@@ -220,7 +223,7 @@ def _legend(viewport: Viewport, labels: list[tuple[float, str]], colours: NDArra
     y1 = y0 + 8 * line
     pad = 0.7 * line
     widest = max(imgui.calc_text_size(text).x for _, text in labels)
-    box = imgui.get_color_u32(theme.grey(0.1, 0.75))
+    box = imgui.get_color_u32(theme.grey(*theme.OVER_PICTURE))
     draw.add_rect_filled((x0 - widest - 0.4 * line - pad, y0 - pad), (x1 + pad, y1 + pad), box, 4)
     codes = [imgui.get_color_u32(imgui.ImVec4(float(r), float(g), float(b), 1.0)) for r, g, b in colours]
     edges = np.linspace(y0, y1, len(codes))

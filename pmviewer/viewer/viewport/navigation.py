@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from imgui_bundle import imgui
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 MOST_ZOOM = 64.0
 DRAG_THRESHOLD = 4.0
 """Points from where a button was pressed, from which on the mouse drags."""
+FLY_SPEED = 0.7
+"""Of the distance to what is ahead, a second."""
+_BUTTONS = (imgui.MouseButton_.left, imgui.MouseButton_.right, imgui.MouseButton_.middle)
 _FLY_AXES = {K.d: (1, 0, 0), K.a: (-1, 0, 0), K.e: (0, 1, 0), K.q: (0, -1, 0), K.w: (0, 0, 1), K.s: (0, 0, -1)}
 
 
@@ -30,6 +34,10 @@ class Navigation:
         self._viewport = viewport
         self._state = viewport.state
         self._flew_with_right = False
+        self._pivot: controls.Vector | None = None
+        """The surface point that was under the mouse when a drag began."""
+        self.stopped_at = -1e9
+        """When a surface last stopped the camera, by `time.monotonic`."""
 
     def handle(self, pose: CameraPose, hovered: bool, active: bool) -> None:
         """Once per window frame: move the camera from that pose on."""
@@ -37,16 +45,18 @@ class Navigation:
         before = pose
         geometry = self._state.session.geometry
         radius = float(geometry.radius) if geometry is not None else 1.0
-        if geometry is not None and self._target_is_automatic():
-            pose = controls.with_pivot(pose, geometry.center, radius)
-            before = pose
+        wheel = hovered and io.mouse_wheel and not io.key_ctrl
+        if geometry is not None and (wheel or (active and _pressed())):
+            self._grasp(pose)
+        if geometry is not None and (wheel or active or self._state.flying):
+            pose = before = self._held(pose, geometry)
         height = max(self._viewport.rectangle()[3], 1.0)
         moved = _dragged() if active else (0.0, 0.0)
         dx, dy = moved[0] / height, moved[1] / height
         right = active and imgui.is_mouse_down(imgui.MouseButton_.right)
         if hovered and io.mouse_wheel and io.key_ctrl:
             self._magnify(io.mouse_wheel)
-        elif hovered and io.mouse_wheel:
+        elif wheel:
             pose = controls.zoom(pose, io.mouse_wheel, radius)
         if active and io.key_ctrl:
             self._shift(*moved)
@@ -55,9 +65,32 @@ class Navigation:
         if not right:
             self._flew_with_right = False
         if (self._state.flying or right) and not io.want_text_input and not io.key_ctrl:
-            pose = self._fly(pose, radius, right)
+            pose = self._fly(pose, right)
         if pose != before:
-            self._state.move_camera(pose)
+            self._move(before, pose)
+
+    def _move(self, before: CameraPose, pose: CameraPose) -> None:
+        """Keep out of walls unless asked not to, or looking through them with the free camera."""
+        settings = self._state.settings
+        if not (settings.display.through_surfaces or settings.free_camera.on or pose.orthographic):
+            pose, stopped = self._viewport.surroundings.kept_out(before, pose)
+            if stopped:
+                self.stopped_at = time.monotonic()
+        self._state.move_camera(pose)
+
+    def _grasp(self, pose: CameraPose) -> None:
+        """Take hold of the surface under the mouse."""
+        place = self._viewport.place_under_mouse(pose)
+        self._pivot = self._viewport.surroundings.under(pose, place) if place is not None else None
+
+    def _held(self, pose: CameraPose, geometry: Any) -> CameraPose:
+        """The pose with its target at the depth of the surface that is held: orbits turn around that, pans and zooms go
+        by its depth. Without one, the target serves, which in a scene's file may lie anywhere along the view."""
+        if self._pivot is not None:
+            return controls.aimed(pose, self._pivot)
+        if self._target_is_automatic():
+            return controls.with_pivot(pose, geometry.center, float(geometry.radius))
+        return pose
 
     def _target_is_automatic(self) -> bool:
         """Whether the target is the scene file's, which may lie anywhere. An automatic free camera's is well placed."""
@@ -71,15 +104,16 @@ class Navigation:
             return controls.look(pose, dx, dy)
         if right:
             return controls.zoom(pose, (dx - dy) * 12, radius)
-        return controls.orbit(pose, dx, dy)
+        return controls.orbit(pose, dx, dy, self._pivot)
 
-    def _fly(self, pose: CameraPose, radius: float, right: bool) -> CameraPose:
+    def _fly(self, pose: CameraPose, right: bool) -> CameraPose:
         axes = np.sum([axis for key, axis in _FLY_AXES.items() if imgui.is_key_down(key)] or [(0, 0, 0)], axis=0)
         if not np.any(axes):
             return pose
         self._flew_with_right = self._flew_with_right or right
         io = imgui.get_io()
-        step = 0.5 * radius * min(io.delta_time, 0.1) * (4 if io.key_shift else 1)
+        ahead_of = self._viewport.surroundings.depth_ahead(pose)
+        step = FLY_SPEED * ahead_of * min(io.delta_time, 0.1) * (4 if io.key_shift else 1)
         across, up, ahead = (float(a) for a in axes)
         return controls.fly(pose, across, up, ahead, step)
 
@@ -124,11 +158,15 @@ class Clicks:
         return True
 
 
+def _pressed() -> bool:
+    """Whether a mouse button has just gone down."""
+    return any(imgui.is_mouse_clicked(button) for button in _BUTTONS)
+
+
 def _dragged() -> tuple[float, float]:
     """How far the mouse was dragged since the last call, in points: nothing until it is some points from where the
     button was pressed, so that a click turns nothing."""
-    buttons = (imgui.MouseButton_.left, imgui.MouseButton_.right, imgui.MouseButton_.middle)
-    button = next((b for b in buttons if imgui.is_mouse_down(b)), None)
+    button = next((b for b in _BUTTONS if imgui.is_mouse_down(b)), None)
     if button is None:
         return 0.0, 0.0
     moved = imgui.get_mouse_drag_delta(button, DRAG_THRESHOLD)

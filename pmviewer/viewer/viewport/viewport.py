@@ -3,6 +3,7 @@ moves."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -12,7 +13,7 @@ from imgui_bundle import imgui
 
 from pmviewer.engine.frame import Frame
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
-from pmviewer.render.camera import CameraPose
+from pmviewer.render.camera import CameraPose, resolve_camera, size_only
 from pmviewer.settings.access import Display
 from pmviewer.viewer.overlays.overlay import Source
 from pmviewer.viewer.shortcuts import INSPECT_KEY, is_held
@@ -21,9 +22,11 @@ from pmviewer.viewer.viewport.hud import draw_hud
 from pmviewer.viewer.viewport.navigation import DRAG_THRESHOLD, Clicks, Navigation
 from pmviewer.viewer.viewport.picking import picked
 from pmviewer.viewer.viewport.picture import Picture
+from pmviewer.viewer.viewport.surroundings import STOPPED, Surroundings
 from pmviewer.viewer.viewport.target import Fit, Target
 
 VIEWPORT = "Viewport"
+STOPPED_SECONDS = 1.5
 SPLIT_REACH = 8.0
 """Points from the line between compared pictures at which a drag moves it."""
 
@@ -48,9 +51,11 @@ class Viewport:
         self._ratio = 1.0
         self._texture: moderngl.Texture | None = None
         self._drawn_key: Any = None
+        self.surroundings = Surroundings()
         self._navigation = Navigation(self)
         self._clicks = Clicks()
         self._splitting = False
+        self._advice: tuple[Any, str] | None = None
         self.draw_toasts: Callable[[], None] = lambda: None
 
     # drawing ----------------------------------------------------------------------------------------------------
@@ -103,6 +108,7 @@ class Viewport:
             self.fit = Fit()
         settings, frame = self.state.settings, self.state.frame
         changed = picture.surfaces.upload(self.state.session.geometry)
+        self.surroundings.take(self.state.session.geometry, self.state.background)
         display, reference = self.state.shown_display, self.state.comparison.reference
         changed |= picture.planes.reference.upload(reference.image if reference is not None else None)
         if frame is not None:
@@ -245,6 +251,27 @@ class Viewport:
         place, camera = self._place_under_mouse(), self.shown_camera()
         if place is not None and camera is not None:
             self.state.focus_at(camera, place[0] * camera.width, place[1] * camera.height)
+
+    def advice(self) -> str:
+        """One sentence where a surface stops the camera or it shows nothing of use; else an empty one."""
+        state, pose = self.state, self.state.live_camera()
+        scene = state.session.scene
+        if pose is None or scene is None or state.settings.free_camera.on:
+            return ""
+        if time.monotonic() - self._navigation.stopped_at < STOPPED_SECONDS:
+            return STOPPED
+        if state.navigating:
+            return ""
+        key = (pose, state.frame.serial if state.frame is not None else 0, scene)
+        if self._advice is None or self._advice[0] != key:
+            own = resolve_camera(scene, size_only(state.settings.camera.model_copy(update={"name": "auto"})))
+            self._advice = key, self.surroundings.advice(pose, own, state.frame)
+        return self._advice[1]
+
+    def place_under_mouse(self, pose: CameraPose) -> tuple[float, float] | None:
+        """Where in the camera's image the mouse is, in pixels; None beside the picture."""
+        place = self._place_under_mouse()
+        return (place[0] * pose.width, place[1] * pose.height) if place is not None else None
 
     def pixel_under_mouse(self) -> tuple[int, int] | None:
         """Pixel (x, y) of the image, or None when the mouse is elsewhere."""

@@ -59,7 +59,7 @@ def _bar(share: float, colour: theme.Colour) -> None:
     width, height = imgui.get_content_region_avail().x, imgui.get_text_line_height()
     x, y = imgui.get_cursor_screen_pos()
     draw = imgui.get_window_draw_list()
-    draw.add_rect_filled((x, y + 2), (x + width, y + height - 2), imgui.get_color_u32(theme.grey(0.12)))
+    draw.add_rect_filled((x, y + 2), (x + width, y + height - 2), imgui.get_color_u32(theme.ground("plot")))
     if share > 0:
         right = x + max(share * width, 1.0)
         draw.add_rect_filled((x, y + 2), (right, y + height - 2), imgui.get_color_u32(imgui.ImVec4(*colour)))

@@ -28,8 +28,8 @@ def begin_plot(name: str, lines: float, x: Axis, y: Axis, *, log_x: bool = False
     implot.push_style_var(implot.StyleVar_.plot_padding, (4, 4))
     implot.push_style_var(implot.StyleVar_.label_padding, (4, 2))
     implot.push_style_color(implot.Col_.frame_bg, theme.grey(0, 0))
-    implot.push_style_color(implot.Col_.plot_bg, theme.grey(0.12))
-    implot.push_style_color(implot.Col_.axis_grid, theme.grey(1, 0.12))
+    implot.push_style_color(implot.Col_.plot_bg, theme.ground("plot"))
+    implot.push_style_color(implot.Col_.axis_grid, theme.grey(theme.look.lighter, 0.12))
     flags = implot.Flags_.no_inputs | implot.Flags_.no_menus | implot.Flags_.no_mouse_text | implot.Flags_.no_legend
     size = imgui.get_content_region_avail().x, lines * imgui.get_text_line_height_with_spacing()
     if not implot.begin_plot(name, size, flags):
@@ -124,8 +124,8 @@ def draw_directions(look_up: LookUp, gathered: NDArray[np.float32] | None) -> No
     radius = 0.46 * side
     cx, cy = x + imgui.get_content_region_avail().x / 2, y + side / 2
     draw = imgui.get_window_draw_list()
-    line = imgui.get_color_u32(theme.grey(1.0, 0.16))
-    draw.add_circle_filled((cx, cy), radius, imgui.get_color_u32(theme.grey(0.12)), 64)
+    line = imgui.get_color_u32(theme.grey(theme.look.lighter, 0.16))
+    draw.add_circle_filled((cx, cy), radius, imgui.get_color_u32(theme.ground("plot")), 64)
     for elevation in (0, 30, 60):
         draw.add_circle((cx, cy), radius * math.cos(math.radians(elevation)), line, 64)
     found = look_up.found
@@ -142,7 +142,7 @@ def draw_directions(look_up: LookUp, gathered: NDArray[np.float32] | None) -> No
         tint = imgui.get_color_u32(imgui.ImVec4(*(GUIDED_COLOUR if guided else GATHER_COLOUR)))
         draw.add_circle((cx + radius * u, cy - radius * v), 3.0, tint, 10, 1.2)
     u, v = on_hemisphere(look_up.wo[None], look_up.n, look_up.wo)[0].tolist()
-    white = imgui.get_color_u32(theme.grey(1.0))
+    white = imgui.get_color_u32(theme.grey(theme.look.lighter))
     at = cx + radius * u, cy - radius * v
     draw.add_line((at[0] - 4, at[1]), (at[0] + 4, at[1]), white, 1.5)
     draw.add_line((at[0], at[1] - 4), (at[0], at[1] + 4), white, 1.5)

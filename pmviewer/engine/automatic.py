@@ -1,0 +1,61 @@
+"""What settings that are automatic came to in the latest pass, in the settings' own units, for whoever shows them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pmviewer.engine.diagnose import Looked
+from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.stages.pass_data import RenderedPass
+from pmviewer.engine.stages.radiance_photons import AUTOMATIC_CUTOFF, AUTOMATIC_CUTOFF_NEAREST
+from pmviewer.maps.search.kdtree import PhotonKdTree
+from pmviewer.settings.access import Settings
+
+
+def automatic_values(looked: Looked, first_radius: float) -> dict[str, Any]:
+    """By the full names of settings, whether or not they are automatic now; what isn't used is left out.
+
+    first_radius: of look-ups in the first pass, in scene units; it stays the same from pass to pass.
+    """
+    plan, settings, radius = looked.plan, looked.settings, looked.scene.flat.radius
+    found: dict[str, Any] = {"light.rig": _rig(looked.scene)}
+    if plan.photons:
+        found["estimate.radius"] = first_radius / radius
+        found["photons.projection"] = "off" if looked.light.tracer.projection is None else "on"
+    found["direct.choice"] = plan.choice
+    if looked.latest is not None:
+        found |= _of_maps(looked.latest, settings, radius)
+    return found
+
+
+def _of_maps(latest: RenderedPass, settings: Settings, radius: float) -> dict[str, Any]:
+    """Of a pass, in a scene of that bounding-sphere radius."""
+    maps, found = latest.maps, dict[str, Any]()
+    widest = [made.radius for made in maps.by_name.values() if isinstance(made.structure, PhotonKdTree)]
+    if widest:
+        shrunk = math.sqrt(maps.neighbours / settings.estimate.k)
+        found["estimate.max_radius"] = max(widest) / shrunk / radius
+    if maps.chooser is not None:
+        found["direct.choice_radius"] = maps.chooser.radius / radius
+    if maps.guides is not None:
+        found["gather.guide_radius"] = maps.guides.radius / radius
+    if latest.shadows is not None:
+        found["direct.shadow_radius"] = latest.shadows.grid.radius / radius
+    if maps.radiance is not None:
+        nearest = settings.estimate.lookup == "nearest"
+        found["gather.cutoff"] = AUTOMATIC_CUTOFF_NEAREST if nearest else AUTOMATIC_CUTOFF
+    rules = maps.rules
+    if rules.f:
+        found["importance.f"] = next(iter(rules.f.values()))
+    if rules.everywhere:
+        found["importance.density"] = max(rules.everywhere.values()) / rules.growth
+    return found
+
+
+def _rig(scene: OpenScene) -> str:
+    """Which lights the scene got: the file's alone, or a studio's."""
+    content, lit = scene.content, scene.scene
+    if content is None or (len(content.shapes), len(content.lights)) == (len(lit.shapes), len(lit.lights)):
+        return "file"
+    return "studio" if scene.rig == "auto" else scene.rig
