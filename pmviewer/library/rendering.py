@@ -90,7 +90,7 @@ class Rendering:
     # settings ---------------------------------------------------------------------------------------------------
 
     def set(self, values: Mapping[str, Any] | None = None, /, **more: Any) -> None:
-        """Change settings: `s.set(N=200_000, q=0.5)`, `s.set({"gather.roulette": "off"})`.
+        """Change settings: `s.set(N=200_000, q=0.5)`, `s.set({"gather.roulette": 0.1})`.
 
         Names are full ("photons.N") or as short as they are unambiguous ("q", "radius", "caustic.show"); `pmviewer
         settings` lists them. Values are numbers, bools, texts, tuples of three. What was rendered is forgotten where
@@ -322,8 +322,8 @@ class Rendering:
                 warnings.warn(sentence, PictureWarning, stacklevel=4)
 
 
-def _check_number(what: str, value: Any, kind: type) -> None:
+def _check_number(what: str, value: Any, kind: type[Integral] | type[Real]) -> None:
     """Raises SettingError for what is no such number above 0."""
-    if isinstance(value, bool) or not isinstance(value, kind) or not value > 0:
+    if isinstance(value, bool) or not isinstance(value, kind) or not float(value) > 0:
         expected = "a whole number from 1" if kind is Integral else "a number above 0"
         raise SettingError(f"{what}={value!r}): expected {expected}.")
