@@ -30,6 +30,7 @@ Look = Callable[[Frame, str, str | None], Inspection]
 """Makes a diagnostic view, of a map if one is named, for a frame. Raises SettingError."""
 
 SUFFIXES = (".exr", ".png", ".toml")
+VIEWS = (*LAYERS, *HELD_WHILE_SHOWN)
 UNITS = {"albedo": "", "normal": "", "depth": "scene units"}
 """Of views that are no radiance."""
 
@@ -129,7 +130,7 @@ class RenderedFrame:
                 raise SettingError(f"The view '{name}' is of no map: leave out map={map!r}.")
             plane = self.frame.image(name)
         else:
-            raise SettingError(f"There is no view '{name}'. There are {', '.join((*LAYERS, *HELD_WHILE_SHOWN))}.")
+            raise _no_view(name)
         plane = plane[..., 0] if plane.shape[-1] == 1 else plane
         plane = plane.view()
         plane.flags.writeable = False
@@ -177,7 +178,14 @@ class RenderedFrame:
 
         Raises OutputError, SettingError for a view that there is not.
         """
-        suffix = check_target(path, SUFFIXES).suffix.lower() or Path(path).suffix.lower()
+        check_target(path, SUFFIXES)
+        suffix = Path(path).suffix.lower()
+        if half and suffix != ".exr":
+            raise SettingError(f"{path}: half precision is for .exr files.")
+        if view is not None and suffix == ".toml":
+            raise SettingError(f"{path}: a session holds no picture: leave out view={view!r}.")
+        if view is not None and view not in VIEWS:
+            raise _no_view(view)
         if suffix == ".toml":
             self._save_session(path)
         elif suffix == ".exr":
@@ -199,3 +207,7 @@ class RenderedFrame:
             write_session(path, self.settings, self.opened.source, self.passes, self.parameters)
         except SceneError as error:
             raise OutputError(str(error)) from None
+
+
+def _no_view(name: str) -> SettingError:
+    return SettingError(f"There is no view '{name}'. There are {', '.join(VIEWS)}.")

@@ -159,7 +159,7 @@ class Rendering:
             _check_number("render(seconds", seconds, Real)
         tell = progress or (lambda text, share: None)
         with self._alone():
-            renderer = self._ready(tell)
+            renderer: Renderer = self._within_memory(lambda: self._ready(tell))
             first, start = renderer.passes, renderer.tally.seconds
 
             def done() -> float:
@@ -197,8 +197,9 @@ class Rendering:
             reason = inactive_reason(f"overlays.{map}.show", self._settings, self._opened.traits)
             if reason is not None:
                 raise SettingError(f"photons('{map}'): {reason}")
-            renderer = Renderer(self._opened, self._settings, self._pool, self._store)
-            made = self._within_memory(lambda: renderer.photons_alone(passes))
+            made = self._within_memory(
+                lambda: Renderer(self._opened, self._settings, self._pool, self._store).photons_alone(passes)
+            )
             cloud = (
                 PhotonCloud(made.caustic, made.caustic_unit)
                 if map == "caustic"
@@ -262,7 +263,7 @@ class Rendering:
             renderer = Renderer(self._opened, self._settings, self._pool, self._store)
         display, camera = self._settings.display, self._settings.camera.name
         if display.exposure == "auto" and self.scene.exposure is None and camera not in self._opened.exposures:
-            self._within_memory(lambda: renderer.coarse_frame(0))  # as in the window it decides the exposure
+            renderer.coarse_frame(0)  # as in the window it decides the exposure
         self._renderer = renderer
         return renderer
 

@@ -208,6 +208,18 @@ def test_parameters_and_search_paths_reach_the_scene(tmp_path):
         assert len(s.scene.shapes) == 1
 
 
+def test_another_light_rig_lights_the_same_scene_anew():
+    with pmviewer.open("cornell_diffuse", {"width": 8, "height": 8, "N": 1000}, threads=2) as s:
+        lit = s.render(passes=1)
+        lamp = [shape for shape in s.scene.shapes if shape.radiance is not None]
+        s.set(rig="headlight")
+        assert s.passes == 0
+        assert lamp
+        assert len(s.scene.lights) == 1
+        assert s.scene.lights[0].position == pytest.approx(s.scene.camera.origin, abs=1)
+        assert not np.array_equal(lit.beauty, s.render(passes=1).beauty)
+
+
 def test_a_saved_session_opens_to_the_same_picture(tmp_path):
     size = {"width": 24, "height": 24}
     with pmviewer.open("cornell_diffuse", {"N": 2000, "display.exposure": 1.5, **size}) as s:
@@ -234,8 +246,13 @@ def test_frames_are_written_with_all_layers(box, tmp_path):
     assert (tmp_path / "box.png").read_bytes()[1:4] == b"PNG"
     with pytest.raises(OutputError, match="unknown format"):
         frame.save(tmp_path / "box.jpg")
+    box.set({"display.view": "geometry"})
     with pytest.raises(OutputError, match="drawn by the window alone"):
-        frame.save(tmp_path / "box.png", view="geometry")
+        box.frame().save(tmp_path / "box.png")
+    for name, asked in (("a.exr", {"view": "geometry"}), ("a.toml", {"view": "beauty"}), ("a.png", {"half": True})):
+        with pytest.raises(SettingError):
+            frame.save(tmp_path / name, **asked)
+        assert not (tmp_path / name).exists()
 
 
 def test_the_window_opens_on_the_same_scene_and_settings(monkeypatch):
