@@ -19,9 +19,10 @@ from pmviewer.errors import OutputError, SceneError, SettingError
 from pmviewer.library.photons import Photons, check_map, photons_of
 from pmviewer.output.diagnostic_views import DIAGNOSTICS, HELD_WHILE_SHOWN
 from pmviewer.output.files import check_target
-from pmviewer.output.frame_export import LAYERS, RADIANCE_UNIT, write_frame_exr, write_frame_png
+from pmviewer.output.frame_export import LAYERS, RADIANCE_UNIT, shown_pixels, write_frame_exr, write_frame_png
 from pmviewer.output.metric import Metrics, metrics
 from pmviewer.output.session_file import write_session
+from pmviewer.output.tone import to_uint8
 from pmviewer.render.camera import CameraPose
 from pmviewer.settings.access import Settings
 
@@ -35,7 +36,7 @@ UNITS = {"albedo": "", "normal": "", "depth": "scene units"}
 """Of views that are no radiance."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RenderedFrame:
     """What `Rendering.render` gives: the film after some passes. It stays as it is when the rendering goes on.
 
@@ -46,6 +47,10 @@ class RenderedFrame:
     frame: Frame
     parameters: Mapping[str, str]
     look: Look
+
+    def __repr__(self) -> str:
+        camera = self.camera
+        return f"<frame of {self.opened.scene.name}: {camera.width}×{camera.height} pixels, {self.passes} passes>"
 
     @property
     def beauty(self) -> Image:
@@ -135,6 +140,14 @@ class RenderedFrame:
         plane = plane.view()
         plane.flags.writeable = False
         return plane
+
+    def picture(self, view: str | None = None) -> NDArray[np.uint8]:
+        """A view as the window shows it, (h, w, 3) for a screen: with the exposure and tone curve of the settings
+        `display`, diagnostic views in false colours. That of `display.view` if None. Raises as `view` does."""
+        view = view or self.settings.display.view
+        if view not in VIEWS:
+            raise _no_view(view)
+        return to_uint8(shown_pixels(self._held(view, None), view, self.settings.display))
 
     def unit(self, view: str) -> str:
         """Unit of a view's numbers, "" for a mere number."""

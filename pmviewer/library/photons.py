@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ _OF_PICTURE = ("scene", "photons", "maps")
 """Stages whose settings decide what photons there are."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Photons:
     """Photons of one pass as they are stored in a map, n of them."""
 
@@ -43,7 +43,7 @@ class Photons:
     """(n,) numbers of `PATH_CLASSES`."""
     lights: NDArray[np.uint16]
     """(n,) numbers of the lights that they come from, in the order of the scene's light table."""
-    settings: Settings = field(repr=False)
+    settings: Settings
     scene_name: str = ""
     pass_number: int = 1
     """The pass that they were traced for, from 1."""
@@ -53,6 +53,9 @@ class Photons:
     def __len__(self) -> int:
         """How many there are."""
         return len(self.positions)
+
+    def __repr__(self) -> str:
+        return f"<{len(self):,} photons of the {self.map} map of {self.scene_name}, pass {self.pass_number}>"
 
     def save_ply(self, path: str | Path) -> None:
         """Write a PLY file, binary, little endian, with the vertex properties x y z, nx ny nz (`directions`), power_r

@@ -87,6 +87,9 @@ class Rendering:
         content = self._opened.scene
         self._warn(*content.warnings, *(f"{count} × {reason} left out" for reason, count in content.dropped.items()))
 
+    def __repr__(self) -> str:
+        return f"<rendering of {self.scene.name}: {self.passes} passes{', closed' if self._closed else ''}>"
+
     # settings ---------------------------------------------------------------------------------------------------
 
     def set(self, values: Mapping[str, Any] | None = None, /, **more: Any) -> None:

@@ -7,6 +7,7 @@ import pytest
 
 import pmviewer
 from pmviewer.errors import SceneError, SettingError
+from pmviewer.output.png import read_png
 from tests.support.scenes import cornell_box, diffuse_box
 
 TERMS = ("emission", "direct", "specular", "caustic", "indirect")
@@ -62,6 +63,24 @@ def test_diagnostic_views_are_made_on_demand(balls):
         frame.view("photon count")
     assert later.view("photon count").shape == (16, 16)
     assert np.array_equal(frame.beauty, frame.view("beauty"))
+
+
+def test_pictures_are_what_png_files_hold(balls, tmp_path):
+    s, _ = balls
+    frame = s.frame()
+    for view in ("direct", "depth", "photon count"):
+        frame.save(tmp_path / "a.png", view=view)
+        assert np.array_equal(frame.picture(view), read_png(tmp_path / "a.png")[0])
+    assert np.array_equal(frame.picture(), frame.picture("beauty"))
+    with pytest.raises(SettingError, match="no view"):
+        frame.picture("colours")
+
+
+def test_they_are_named_in_a_line(balls):
+    s, frame = balls
+    assert repr(frame) == "<frame of cornell box: 16×16 pixels, 2 passes>"
+    assert repr(s).startswith("<rendering of cornell box: ")
+    assert repr(frame.photons("caustic")).endswith("photons of the caustic map of cornell box, pass 2>")
 
 
 @pytest.mark.parametrize(
