@@ -122,7 +122,10 @@ class Renderer:
         """The photons of the last of so many passes, without a picture: what `step` would trace for it. None where the
         plan has none. For a renderer that is used for nothing else."""
         for index in range(passes):
-            self._light(self.film, index, self.settings.photons.N)
+            if index < passes - 1 and radii_of_pixels(self.facts):
+                self.step()  # what pixels found decides about the next pass
+            else:
+                self._light(self.film, index, self.settings.photons.N)
         return self.light.photons
 
     def coarse_frame(self, serial: int, wanted: Wanted | None = None) -> Frame:

@@ -45,8 +45,9 @@ def test_photons_lie_on_the_walls_and_carry_what_the_light_emits():
     assert all(np.array_equal(getattr(found, name), getattr(of_frame, name)) for name in COLUMNS)
 
 
-def test_a_later_pass_has_other_photons_the_same_as_its_frame():
-    with pmviewer.open(cornell_box(size=8), {"N": 2000}, threads=2) as s:
+@pytest.mark.parametrize("rule", ["pass", "pixel"])
+def test_a_later_pass_has_other_photons_the_same_as_its_frame(rule):
+    with pmviewer.open(cornell_box(size=8), {"N": 2000, "radius_rule": rule}, threads=2) as s:
         second = s.photons("caustic", passes=2)
         s.render(passes=1)
         frame = s.render(passes=1)

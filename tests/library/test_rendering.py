@@ -62,7 +62,7 @@ def test_rendering_goes_on_where_it_was(box):
 
 def test_only_what_changed_begins_anew(box):
     before = box.render(passes=1)
-    box.set(tone="linear")
+    box.set(tone="linear", N=3000)
     assert box.passes == 1
     assert box.frame().settings.display.tone == "linear"
     box.set(fov=60)
