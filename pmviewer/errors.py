@@ -36,3 +36,7 @@ class OutputError(PmviewerError):
 
 class WindowError(PmviewerError):
     """No window can be opened (no screen, no OpenGL)."""
+
+
+class PictureWarning(UserWarning):
+    """What a picture that was asked for in Python does not show, or shows otherwise than asked for, in one sentence."""

@@ -14,6 +14,7 @@ from pmviewer.commands.compare import compare
 from pmviewer.commands.compare_importance import compare_importance
 from pmviewer.commands.compile import compile_
 from pmviewer.commands.info import info
+from pmviewer.commands.photons import photons
 from pmviewer.commands.render import render
 from pmviewer.commands.scenes import scenes
 from pmviewer.commands.settings import settings
@@ -24,6 +25,7 @@ from pmviewer.errors import PmviewerError
 COMMANDS: dict[str, Callable[..., None]] = {
     "view": view,
     "render": render,
+    "photons": photons,
     "shot": shot,
     "compare": compare,
     "compare-importance": compare_importance,

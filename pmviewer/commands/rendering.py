@@ -12,6 +12,7 @@ from pmviewer.commands.patience import patiently, print_warnings
 from pmviewer.commands.progress_bar import progress_bar
 from pmviewer.commands.statistics import pass_report, statistics_report
 from pmviewer.engine.ahead.beside import beside
+from pmviewer.engine.comparison.reference import reference_for
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.frame import Frame
 from pmviewer.engine.opened import OpenScene, open_scene
@@ -20,16 +21,12 @@ from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.wanted import wanted_of
-from pmviewer.errors import SceneError, SettingError
-from pmviewer.output.compare import ERROR_COLUMNS, Reference, error_row, load_reference
+from pmviewer.errors import SettingError
+from pmviewer.output.compare import ERROR_COLUMNS, Reference, error_row
 from pmviewer.output.diagnostic_views import DENOISED, HELD_WHILE_SHOWN
 from pmviewer.output.frame_export import LAYERS, write_frame_exr, write_frame_png
 from pmviewer.output.metric import metrics
 from pmviewer.progress import watched
-from pmviewer.render.camera import resolve_camera, size_only
-from pmviewer.render.filter import is_own
-from pmviewer.scene.description import Scene
-from pmviewer.scene.load import reference_of
 from pmviewer.settings.access import Settings, with_values
 
 FORMATS = (".exr", ".png")
@@ -62,7 +59,9 @@ def render_job(
     with patiently() as tell, watched(tell, threads=threads):
         opened = open_scene(job.scene, job.parameters, settings.light.rig, beside(settings, threads))
     print_warnings(opened.scene.warnings, opened.scene.dropped)
-    target = None if reference is None else _reference(reference, opened.scene, settings)
+    target = None
+    if reference is not None:
+        target = reference_for(None if reference == "auto" else reference, opened.scene, settings)
     view = _view(settings, opened)
     if denoise and (reason := inactive_reason(f"display.view={DENOISED}", settings, opened.traits)) is not None:
         raise SettingError(f"--denoise: {reason}")
@@ -122,27 +121,6 @@ def _view(settings: Settings, opened: OpenScene) -> str:
             raise SettingError(f"display.view = {view}: {reason}")
         return view
     return view if view in LAYERS else "beauty"
-
-
-def _reference(source: str, scene: Scene, settings: Settings) -> Reference:
-    """Read the reference, checked against the picture that will be rendered. Raises SceneError."""
-    if settings.free_camera.on:
-        raise SettingError("References are seen by the render camera: leave out free_camera.on, or --reference.")
-    camera = resolve_camera(scene, settings.camera)
-    path = reference_of(scene) if source == "auto" else Path(source)
-    if path is None:
-        raise SceneError(f"The scene '{scene.name}' has no reference of its own.", hint="Name an EXR file.")
-    if source == "auto" and not camera.sees_like(resolve_camera(scene, size_only(settings.camera))):
-        raise SceneError(
-            "The scene's reference is seen by the scene's own camera: leave out the camera settings.", path
-        )
-    if source == "auto" and not is_own(camera.filter, settings.render):
-        raise SceneError(
-            "The scene's reference has the scene's own reconstruction filter: leave out render.filter.", path
-        )
-    reference = load_reference(path)
-    reference.check_size((camera.width, camera.height))
-    return reference
 
 
 def _print_error(reference: Reference, renderer: Renderer) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -60,12 +60,13 @@ def open_scene(
     parameters: Mapping[str, str] | None = None,
     rig: Rig = "auto",
     on_type: OnType = nobody,
+    search_paths: Sequence[Path] = (),
 ) -> OpenScene:
     """Load, add the camera that the file lacks and the lights of the rig, check, move to the origin and flatten. A
-    scene that is given instead of a file is taken as it is. Raises SceneError."""
+    scene that is given instead of a file is taken as it is. `search_paths` as for `read_scene`. Raises SceneError."""
     if isinstance(source, Scene):
         return _opened(source, source.name, None, "auto", on_type)
-    content = read_scene(source, parameters or {})
+    content = read_scene(source, parameters or {}, search_paths)
     check_scene_memory(content)
     return _opened(completed(content, rig), str(source), content, rig, on_type)
 

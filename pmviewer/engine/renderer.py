@@ -30,12 +30,14 @@ from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.irradiance_cache import fill_cache, recipe
 from pmviewer.engine.stages.light import LightStage
 from pmviewer.engine.stages.pass_data import RenderedPass, pass_data, pass_record
+from pmviewer.engine.stages.pass_maps import PassMaps
 from pmviewer.engine.stages.shadow_photons import ShadowStage
 from pmviewer.engine.stages.thin_glass import with_thin_glass
 from pmviewer.engine.stages.virtual_lights import VirtualStage, film_of
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.engine.wanted import wanted_of
+from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.film import Film
 from pmviewer.render.free_camera import resolve_view
@@ -119,6 +121,16 @@ class Renderer:
         self.film.passes += 1
         self.tally.seconds += time.perf_counter() - start
 
+    def photons_alone(self, passes: int) -> PhotonMaps | None:
+        """The photons of the last of so many passes, without a picture: what `step` would trace for it. None where the
+        plan has none. For a renderer that is used for nothing else."""
+        for index in range(passes):
+            if index < passes - 1 and radii_of_pixels(self.facts):
+                self.step()  # what pixels found decides about the next pass
+            else:
+                self._light(self.film, index, self.settings.photons.N)
+        return self.light.photons
+
     def coarse_frame(self, serial: int, wanted: Wanted | None = None) -> Frame:
         """A quick picture: a fraction of the pixels and photons, not part of the film. `wanted` as for `frame`."""
         pose = self.camera
@@ -167,9 +179,7 @@ class Renderer:
 
     def _pass(self, film: Film, camera: CameraPose, index: int, N: int) -> None:
         settings, plan, tally, pool = self.settings, self.plan, self.tally, self.pool
-        self.importance.run(0 if settings.photons.renew == "once" else index)
-        widest = self._radii_of_pixels(film, index)
-        maps = self.light.run(index, N, self.first_radius, self.importance, widest)
+        maps = self._light(film, index, N)
         eye = pass_record(camera, settings, plan, maps, index)
         shadows = tally.timed(pool, "shadow photons", lambda: self.shadows.run(index)) if plan.shadows else None
         scene = self._lit.flat.record
@@ -186,6 +196,11 @@ class Renderer:
             given = given._replace(cache=cache.record)
         tally.timed(pool, "camera pass", lambda: self._eye_pass(given, film))
         self.latest = RenderedPass(given, maps, shadows, cache, virtual)
+
+    def _light(self, film: Film, index: int, N: int) -> PassMaps:
+        self.importance.run(0 if self.settings.photons.renew == "once" else index)
+        widest = self._radii_of_pixels(film, index)
+        return self.light.run(index, N, self.first_radius, self.importance, widest)
 
     def _eye_pass(self, given: PassData, film: Film) -> None:
         outline = np.zeros(0, np.uint8)

@@ -212,13 +212,17 @@ def write_frame_png(
         raise OutputError(f"{path}: this frame holds nothing for the view '{view}': see when it is available.")
     if view not in LAYERS and view not in HELD_WHILE_SHOWN:
         raise OutputError(f"{path}: the view '{view}' is drawn by the window alone. Choose one of {', '.join(LAYERS)}.")
-    if view in DIAGNOSTICS:
-        pixels = coloured(view, frame.image(view))
-        pixels = shaded(pixels, shades(frame.image("normal"), frame.camera), display.shading)
-    else:
-        pixels = display_image(view, frame.image(view), exposure_of(frame, display), display.tone).pixels
+    pixels = shown_pixels(frame, view, display)
     texts = {PREFIX + name: _text(value) for name, value in frame_metadata(frame).items()}
     write_png(path, pixels, {"Software": f"pmviewer {__version__}", "Title": frame.scene_name, **texts})
+
+
+def shown_pixels(frame: Exportable, view: str, display: Display) -> NDArray[np.float32]:
+    """A view that the frame holds as it is shown: display-encoded, 0 … 1, (h, w, 3)."""
+    if view in DIAGNOSTICS:
+        pixels = coloured(view, frame.image(view))
+        return shaded(pixels, shades(frame.image("normal"), frame.camera), display.shading)
+    return display_image(view, frame.image(view), exposure_of(frame, display), display.tone).pixels
 
 
 class Pair(Protocol):
