@@ -33,8 +33,9 @@ def pool():
 def test_pool_keeps_the_order_of_tasks(pool):
     heard = []
     tasks = [lambda i=i: (time.sleep(0.001 * (10 - i)), i)[1] for i in range(10)]
-    assert pool.run(tasks, heard.append) == list(range(10))
-    assert heard == list(range(1, 11))
+    pool.on_progress = lambda stage, share: heard.append(share)
+    assert pool.run(tasks) == list(range(10))
+    assert heard == pytest.approx([i / 10 for i in range(1, 11)])
     assert pool.cpu_seconds >= 0
     assert pool.run([]) == []
 

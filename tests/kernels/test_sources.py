@@ -1,4 +1,5 @@
-"""What compiled code depends on is read from the text of the sources, as Python's own parser reads it."""
+"""What compiled code depends on is read from the text of the sources: all that Python's own parser finds, and hardly
+more."""
 
 import ast
 
@@ -21,7 +22,9 @@ def test_of_every_file_of_the_package():
     for file in PACKAGE.rglob("*.py"):
         source = file.read_bytes()
         ours = {name for name in imported_names(source) if name.startswith(PACKAGE.name)}
-        assert ours == {name for name in parsed(source) if name.startswith(PACKAGE.name)}, file
+        imported = {name for name in parsed(source) if name.startswith(PACKAGE.name)}
+        # A docstring may show how the package is imported.
+        assert imported <= ours <= imported | {PACKAGE.name}, file
 
 
 @pytest.mark.parametrize(

@@ -110,6 +110,15 @@ def test_progress_is_told_and_may_end_the_rendering(box):
         box.render(passes=1, progress=lambda text, share: box.set(N=10))
 
 
+@pytest.fixture
+def interruptible():
+    """Background processes of a shell ignore interrupts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_waits_for_the_pass_and_loses_nothing(box):
     def press(text, share):
         if text == "pass 2":
@@ -124,6 +133,7 @@ def test_an_interrupt_waits_for_the_pass_and_loses_nothing(box):
         assert np.array_equal(other.render(passes=3).beauty, box.render(passes=1).beauty)
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_a_second_interrupt_does_not_wait_and_the_film_begins_anew(box, monkeypatch):
     eye_pass = Renderer._eye_pass
 
