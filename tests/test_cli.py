@@ -165,6 +165,13 @@ def test_the_table_of_commands_is_light():
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
+def test_the_window_does_not_wait_for_the_compiler():
+    """It opens while the engine is being imported behind it."""
+    code = "import sys, pmviewer.viewer.app; print({'numba', 'scipy', 'trimesh', 'OpenEXR'} & {*sys.modules})"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert told.strip() == "set()"
+
+
 def test_the_window_is_given_scene_settings_threads_and_parameters(monkeypatch):
     given = {}
 

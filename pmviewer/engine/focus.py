@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.render.camera import CameraPose
-from pmviewer.scene.arrays.flatten import FlatScene
+
+if TYPE_CHECKING:  # numba, which the window doesn't wait for
+    from pmviewer.scene.arrays.flatten import FlatScene
 
 NEAREST = 1e-12
 """Of focus distances relative to the lens's radius: nearer ones make the same picture, all rays being sideways, and
@@ -38,6 +40,8 @@ def distance_at(scene: FlatScene, camera: CameraPose, x: float, y: float) -> flo
 def surface_at(scene: FlatScene, camera: CameraPose, x: float, y: float) -> NDArray[np.float64] | None:
     """The point (3,) of the first surface at a place of the picture, in pixels, for a pinhole; None where there is
     none."""
+    from pmviewer.kernels.accel.raycast import cast_closest
+
     origin, direction = (np.ascontiguousarray(part, np.float32) for part in camera.rays(np.array([x]), np.array([y])))
     forward = camera.axes()[2]
     facing = forward if camera.near_normal is None else np.asarray(camera.near_normal, float)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from pmviewer.engine.frame import Frame, Level
 from pmviewer.render.camera import CameraPose, resolve_camera, size_only
-from pmviewer.render.filter import is_own
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import SETTINGS, flat
 from pmviewer.viewer.background import MEASURING, READING, Background
@@ -221,6 +220,8 @@ def _mismatch(reference: Reference, scene: Scene, frame: Frame) -> str | None:
                 "The lens was changed: the reference is seen through the scene's own. Press Backspace to return to it."
             )
         return "The camera was moved: the reference is seen by the scene's own. Press Backspace to return to it."
+    from pmviewer.render.filter import is_own  # numba, which the window doesn't wait for
+
     if not is_own(own.filter, frame.settings.render):
         return "The reconstruction filter was changed: the reference has the scene's own (render.filter = auto)."
     return None
