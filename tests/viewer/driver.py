@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,9 @@ import numpy as np
 from imgui_bundle import ImVec2, hello_imgui, imgui
 from imgui_bundle.immapp import testing
 
+from pmviewer.engine.effects import inactive_reason
+from pmviewer.engine.session import Session
+from pmviewer.settings.access import Settings, with_values
 from pmviewer.viewer.app import ViewerApp
 from pmviewer.viewer.dialogs.recent import RecentFiles
 
@@ -33,6 +37,21 @@ def make_app(session: Any, folder: Path, **options: Any) -> ViewerApp:
 
     app.params.callbacks.pre_new_frame = pre_new_frame
     return app
+
+
+@contextmanager
+def app_on_engine(folder: Path, scene: str, values: Mapping[str, Any]) -> Iterator[ViewerApp]:
+    """A window on the real engine, with a bundled scene opened by these settings."""
+    session = Session(settings=with_values(Settings(), values))
+    app = make_app(session, folder, inactive_reason=inactive_reason)
+    app.state.open(scene, keep_camera=True)
+    yield app
+    session.close()
+
+
+def finished(app: ViewerApp) -> bool:
+    """Whether the last pass that was asked for is shown."""
+    return app.state.frame is not None and app.state.session.status.state == "finished"
 
 
 _work: list[Callable[[], None]] = []

@@ -8,12 +8,9 @@ from imgui_bundle import imgui
 
 from pmviewer.commands.job import load_job
 from pmviewer.commands.rendering import render_job
-from pmviewer.engine.effects import inactive_reason
-from pmviewer.engine.session import Session
 from pmviewer.errors import SettingError
 from pmviewer.output.exr import read_exr
-from pmviewer.settings.access import Settings, with_values
-from tests.viewer.driver import drive, make_app, on_window_thread, wait_until
+from tests.viewer.driver import app_on_engine, drive, on_window_thread, wait_until
 
 VALUES = {"camera.width": 64, "camera.height": 64, "photons.N": 5_000, "render.passes": 2}
 
@@ -21,11 +18,8 @@ VALUES = {"camera.width": 64, "camera.height": 64, "photons.N": 5_000, "render.p
 @pytest.fixture
 def app(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    session = Session(settings=with_values(Settings(), VALUES))
-    app = make_app(session, tmp_path, inactive_reason=inactive_reason)
-    app.state.open("cornell_diffuse", keep_camera=True)
-    yield app
-    session.close()
+    with app_on_engine(tmp_path, "cornell_diffuse", VALUES) as app:
+        yield app
 
 
 def test_its_key_shows_it_and_the_picture_again(app):

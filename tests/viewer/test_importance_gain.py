@@ -8,13 +8,10 @@ import pytest
 from imgui_bundle import ImVec2
 from imgui_bundle import icons_fontawesome_6 as fa
 
-from pmviewer.engine.effects import inactive_reason
-from pmviewer.engine.session import Session
 from pmviewer.output.frame_export import gain_sheet
 from pmviewer.output.png import read_png
 from pmviewer.output.tone import to_uint8, tone_map
-from pmviewer.settings.access import Settings, with_values
-from tests.viewer.driver import drag_picture, drive, make_app, on_window_thread, wait_until
+from tests.viewer.driver import app_on_engine, drag_picture, drive, finished, on_window_thread, wait_until
 
 SIZE = 48
 VALUES = {
@@ -33,15 +30,8 @@ BUTTON = f"**/{fa.ICON_FA_SCALE_BALANCED}##compare_importance"
 @pytest.fixture
 def app(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    session = Session(settings=with_values(Settings(), VALUES))
-    app = make_app(session, tmp_path, inactive_reason=inactive_reason)
-    app.state.open("cornell_diffuse", keep_camera=True)
-    yield app
-    session.close()
-
-
-def finished(app):
-    return app.state.frame is not None and app.state.session.status.state == "finished"
+    with app_on_engine(tmp_path, "cornell_diffuse", VALUES) as app:
+        yield app
 
 
 def test_one_click_shows_both_and_leaves_the_session_alone(app, tmp_path):

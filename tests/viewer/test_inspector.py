@@ -9,16 +9,13 @@ import pytest
 from imgui_bundle import ImVec2, hello_imgui, imgui
 
 from pmviewer.engine import diagnose
-from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.inspector.report import PhotonAt, Pinned
-from pmviewer.engine.session import Session
 from pmviewer.render.camera import resolve_camera
-from pmviewer.settings.access import Settings, with_values
 from pmviewer.viewer.overlays.inspected import CHOSEN_COLOUR, DISC_COLOUR, disc_lines
 from pmviewer.viewer.panels.inspector.photons import ordered, unit_of
 from pmviewer.viewer.panels.inspector.plots import on_hemisphere
 from pmviewer.viewer.viewport.picking import on_picture
-from tests.viewer.driver import drag_picture, drive, make_app, viewport_pixels, wait_until
+from tests.viewer.driver import app_on_engine, drag_picture, drive, finished, make_app, viewport_pixels, wait_until
 from tests.viewer.fake_session import FakeSession
 
 K = imgui.Key
@@ -107,15 +104,8 @@ def test_a_click_pins_a_pixel_and_lets_it_go(tmp_path):
 @pytest.fixture
 def app(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    session = Session(settings=with_values(Settings(), VALUES))
-    app = make_app(session, tmp_path, inactive_reason=inactive_reason)
-    app.state.open("cornell_caustic", keep_camera=True)
-    yield app
-    session.close()
-
-
-def finished(app):
-    return app.state.frame is not None and app.state.session.status.state == "finished"
+    with app_on_engine(tmp_path, "cornell_caustic", VALUES) as app:
+        yield app
 
 
 def share(pixels, colour):

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 from imgui_bundle import ImVec2, imgui
 
-from pmviewer.engine.effects import inactive_reason
-from pmviewer.engine.session import Session
 from pmviewer.output.diagnostic_views import DIAGNOSTICS, coloured
 from pmviewer.output.exr import read_exr
 from pmviewer.output.falsecolour import COLOURS
 from pmviewer.output.frame_export import layer_name
 from pmviewer.output.tone import to_uint8
 from pmviewer.photons.projection.projection import ProjectionMap
-from pmviewer.settings.access import Settings, get, with_values
+from pmviewer.settings.access import get
 from pmviewer.viewer.gl.palette import FATE_PALETTE, LIGHT_PALETTE, LIT_COLOUR, SHADOW_COLOUR
 from pmviewer.viewer.gl.records import directions, encoded
 from pmviewer.viewer.overlays.gather_rays import gather_lines
@@ -22,7 +20,16 @@ from pmviewer.viewer.overlays.irradiance_cache import circles
 from pmviewer.viewer.overlays.projection_maps import cell_corners
 from pmviewer.viewer.panels.light_list import top_lights
 from tests.support import naive_maps as naive
-from tests.viewer.driver import chord, drive, make_app, on_window_thread, overlay_item, viewport_pixels, wait_until
+from tests.viewer.driver import (
+    app_on_engine,
+    chord,
+    drive,
+    finished,
+    on_window_thread,
+    overlay_item,
+    viewport_pixels,
+    wait_until,
+)
 
 K = imgui.Key
 SIZE = 64
@@ -49,15 +56,8 @@ VALUES = {
 @pytest.fixture
 def app(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    session = Session(settings=with_values(Settings(), VALUES))
-    app = make_app(session, tmp_path, inactive_reason=inactive_reason)
-    app.state.open("cornell_caustic", keep_camera=True)
-    yield app
-    session.close()
-
-
-def finished(app):
-    return app.state.frame is not None and app.state.session.status.state == "finished"
+    with app_on_engine(tmp_path, "cornell_caustic", VALUES) as app:
+        yield app
 
 
 def test_views_are_made_on_demand_in_the_legends_colours(app, tmp_path):

@@ -121,11 +121,13 @@ def measured(
         less = exact / (variance * seconds)
         by_channel = ", ".join(f"{c:+.1f}" for c in off)
         rows.append([method, rule, variance, seconds, less, f"{bias:+.1f}", by_channel])
+        of = f"{SCENE}, {method}, direct.samples = {SAMPLES}, {rule}"
         if rule in ("ignored", "tinted"):
-            targets.append(Target("R9", less, LESS, "×", True, f"{rule}: variance at equal CPU time, exact over this"))
+            targets.append(Target("R9", less, LESS, "×", True, f"{of}: variance at equal CPU time, exact over this"))
         if rule.startswith("tinted"):
             worst = float(np.abs(off - bias).max())
-            targets.append(Target("R9", worst, COLOUR_OFF, "%", False, f"{rule}: colour, a channel against luminance"))
+            note = f"{of}: a channel against luminance; its mean is printed alone"
+            targets.append(Target("R9", worst, COLOUR_OFF, "%", False, note))
         if rule == "tinted and reflecting":
-            targets.append(Target("R9", abs(bias), OFF, "%", False, f"{rule}: mean against the path tracer"))
+            targets.append(Target("R9", abs(bias), OFF, "%", False, f"{of}: mean against the path tracer"))
     return rows, targets

@@ -14,7 +14,8 @@ from pmviewer.render.camera import CameraPose
 from pmviewer.settings.access import FocusOverlay, Settings
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import short
-from pmviewer.viewer.gl.program import Drawing, Shaders, set_uniforms
+from pmviewer.viewer.gl.cells import draw_cells
+from pmviewer.viewer.gl.program import Drawing, Shaders
 from pmviewer.viewer.overlays.legend import wrapped
 from pmviewer.viewer.overlays.overlay import Needs, Overlay, Source, Switch
 
@@ -75,12 +76,7 @@ class FocalPlane(Overlay):
         if self._array is None:
             return
         style: FocusOverlay = self.style(settings)
-        context, program = self.shaders.context, self.shaders.get("cells")
-        set_uniforms(program, view=drawing.view, projection=drawing.projection, opacity=style.opacity)
-        context.enable_only(moderngl.BLEND | (moderngl.DEPTH_TEST if style.depth else 0))
-        context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
-        self._array.render(moderngl.TRIANGLES)
-        context.disable(moderngl.BLEND)
+        draw_cells(self.shaders, self._array, drawing, style.opacity, style.depth)
 
     def legend(self, source: Source) -> None:
         camera = source.render_camera()

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from pmviewer.settings.access import ProjectionOverlay, Settings
 from pmviewer.viewer.format import grouped
+from pmviewer.viewer.gl.cells import draw_cells
 from pmviewer.viewer.gl.palette import light_colour
-from pmviewer.viewer.gl.program import Drawing, Shaders, set_uniforms
+from pmviewer.viewer.gl.program import Drawing, Shaders
 from pmviewer.viewer.overlays.legend import MOST_SWATCHES, swatches, wrapped
 from pmviewer.viewer.overlays.overlay import Needs, Overlay, Source, Switch
 
@@ -99,12 +100,7 @@ class ProjectionMaps(Overlay):
         if self._array is None:
             return
         style: ProjectionOverlay = self.style(settings)
-        context, program = self.shaders.context, self.shaders.get("cells")
-        set_uniforms(program, view=drawing.view, projection=drawing.projection, opacity=style.opacity)
-        context.enable_only(moderngl.BLEND | (moderngl.DEPTH_TEST if style.depth else 0))
-        context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
-        self._array.render(moderngl.TRIANGLES)
-        context.disable(moderngl.BLEND)
+        draw_cells(self.shaders, self._array, drawing, style.opacity, style.depth)
 
     def legend(self, source: Source) -> None:
         shown = self._lights[:MOST_SWATCHES]
