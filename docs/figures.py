@@ -1,8 +1,8 @@
 """`python docs/figures.py [NAME …]`: make the figures of the documentation by the commands that stand there.
 
 A block of commands that begins with ```sh figure=NAME columns=N gives images/NAME.png: each command writes one panel,
-in order, N of them a row; NAME='…' above them stands for words that they share. The commands open windows: without a
-display, run all of it under xvfb-run -a.
+or an EXR file that later ones open, in order, N panels a row; NAME='…' above them stands for words that they share. The
+commands open windows: without a display, run all of it under xvfb-run -a.
 """
 
 from __future__ import annotations
@@ -17,7 +17,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
-TEXTS = ("importance.md", "inspector.md", "thin-glass.md", "virtual.md", "views.md")
+TEXTS = (
+    "compare.md",
+    "editing.md",
+    "estimation.md",
+    "importance.md",
+    "inspector.md",
+    "series.md",
+    "thin-glass.md",
+    "virtual.md",
+    "views.md",
+)
 _BLOCK = re.compile(r"^```sh figure=(\S+) columns=(\d+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _SHARED = re.compile(r"(\w+)='([^']*)'")
 _USE = re.compile(r"\$(\w+)")
@@ -34,8 +44,13 @@ class Figure:
 
     @property
     def panels(self) -> list[str]:
-        """The file that each command writes."""
-        return [words[words.index("-o") + 1] for words in self.commands]
+        """The pictures among the files; EXR files are for commands that follow."""
+        return [file for file in self.files if file.endswith(".png")]
+
+    @property
+    def files(self) -> list[str]:
+        """What each command writes."""
+        return [words[words.index("--sheet" if "--sheet" in words else "-o") + 1] for words in self.commands]
 
 
 def figures(text: str) -> Iterator[Figure]:

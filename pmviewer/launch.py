@@ -112,6 +112,14 @@ def side_by_side(options: list[str]) -> list[str]:
     return ["-n", str(min(os.cpu_count() or 1, MOST_PROCESSES)), "--dist", "loadfile", "--no-loadscope-reorder"]
 
 
+def with_bytecode(environment: dict[str, str]) -> dict[str, str]:
+    """The environment of tests, which start Python some hundred times: where the user wants no bytecode in the
+    checkout, it lies in the environment's folder, or every start would translate all sources anew."""
+    if environment.pop("PYTHONDONTWRITEBYTECODE", ""):
+        environment.setdefault("PYTHONPYCACHEPREFIX", str(ENVIRONMENT / "bytecode"))
+    return environment
+
+
 def main(arguments: list[str]) -> int:
     """`[SCENE and options]`, `test [pytest options]` or `setup [--without-kernels]`."""
     if tuple(sys.version_info) < (3, 11):
@@ -127,9 +135,8 @@ def main(arguments: list[str]) -> int:
         return subprocess.run([str(python), "-m", "pmviewer", "compile"], check=False, cwd=ROOT).returncode
     if testing:
         command = [str(python), "-m", "pytest", *EVERYTHING, *side_by_side(arguments[1:]), *arguments[1:]]
-    else:
-        command = [str(python), "-m", "pmviewer", *(arguments or [SCENE])]
-    return subprocess.run(command, check=False, cwd=ROOT).returncode
+        return subprocess.run(command, check=False, cwd=ROOT, env=with_bytecode(dict(os.environ))).returncode
+    return subprocess.run([str(python), "-m", "pmviewer", *(arguments or [SCENE])], check=False, cwd=ROOT).returncode
 
 
 if __name__ == "__main__":

@@ -1,23 +1,23 @@
 #version 330 core
 // A plane of the frame on the screen. The tone curves are those of pmviewer/output/tone.py.
 uniform sampler2D plane;
-uniform int content;      // 0 radiance, 1 reflectance, 2 unit vector, 3 depth, 4 error against the reference,
-                          // 5 a quantity in false colours, 6 cells, each with a colour of its own,
-                          // 7 classes
+uniform int content;      // 0 radiance, 1 reflectance, 2 unit vector, 3 depth, 5 a quantity in false colours,
+                          // 6 cells, each with a colour of its own, 7 classes
 uniform int curve;        // 0 sRGB, 1 Reinhard, 2 filmic, 3 linear
 uniform float scale;      // 2^exposure
 uniform vec2 depth_range; // nearest and farthest finite depth
-uniform sampler2D reference;
-uniform sampler2D colours; // of errors and quantities, small to large (pmviewer/output/falsecolour.py): a table a row
+uniform sampler2D colours; // of quantities, small to large (pmviewer/output/colour_maps.py): a table a row
 uniform int colour_row;    // the table of quantities
 uniform vec2 value_range;  // quantities at the ends of the colours, or their logarithms
 uniform int value_log;     // whether they are
+uniform int value_signed;  // whether values below zero tell something
 uniform vec3 value_weights; // of the channels in the quantity
 uniform vec3 grey;         // where there is nothing to tell: below zero
 uniform vec3 class_colours[3];
 uniform sampler2D shades;  // how much surfaces face the camera (pmviewer/output/shading.py)
 uniform float shading;     // how much of that lies under false colours
-uniform vec2 error_range;  // logarithms of the errors at the ends of the colours
+uniform int marks;         // whether odd pixels are marked (pmviewer/output/marks.py)
+uniform float cut;         // exposed radiance that the tone curve shows no differences beyond
 
 in vec2 uv;
 out vec4 colour;
@@ -51,6 +51,11 @@ vec3 cell_colour(float cell) {
     return fract(cell) > 0.25 ? 0.4 * hue : hue;
 }
 
+// 1 in diagonal stripes on the screen, else 0.
+float stripes() {
+    return step(4.0, mod(gl_FragCoord.x + gl_FragCoord.y, 8.0));
+}
+
 void main() {
     vec4 value = texture(plane, uv);
     if (any(isnan(value)) || any(isinf(value))) {
@@ -60,20 +65,21 @@ void main() {
     vec3 shown;
     if (content == 0) {
         shown = tone(value.rgb);
+        if (marks == 1) {
+            if (any(greaterThan(value.rgb * scale, vec3(cut)))) shown = mix(shown, vec3(0.9, 0.1, 0.1), stripes());
+            if (any(lessThan(value.rgb, vec3(0.0)))) shown = vec3(0.0, 1.0, 1.0);
+        }
     } else if (content == 1) {
         shown = srgb_oetf(value.rgb);
     } else if (content == 2) {
         shown = value.rgb != vec3(0.0) ? value.rgb * 0.5 + 0.5 : vec3(0.0);
-    } else if (content == 4) {
-        // As in pmviewer/output/metric.py.
-        vec3 truth = texture(reference, uv).rgb, off = value.rgb - truth;
-        float error = dot(off * off / (truth * truth + 0.01), vec3(1.0 / 3.0));
-        shown = false_colour((log(max(error, 1e-30)) - error_range.x) / (error_range.y - error_range.x), 0);
     } else if (content == 5) {
         float quantity = dot(value.rgb, value_weights);
         float at = value_log == 1 ? log(max(quantity, 1e-30)) : quantity;
         float share = (at - value_range.x) / (value_range.y - value_range.x);
-        shown = quantity < 0.0 ? grey : false_colour(share, colour_row);
+        bool nothing = value_signed == 0 && quantity < 0.0;
+        shown = nothing ? grey : false_colour(share, colour_row);
+        if (marks == 1 && !nothing && (share < 0.0 || share > 1.0)) shown = mix(shown, vec3(share > 1.0), stripes());
     } else if (content == 6) {
         shown = value.r < 0.0 ? grey : cell_colour(value.r);
     } else if (content == 7) {

@@ -19,9 +19,10 @@ FIGURES = [figure for text in _MAKER["TEXTS"] for figure in _MAKER["figures"]((D
 @pytest.mark.parametrize("figure", FIGURES, ids=lambda figure: figure.name)
 def test_commands_of_figures_name_scenes_and_settings_that_there_are(figure):
     assert (DOCS / "images" / f"{figure.name}.png").is_file()
-    assert len(set(figure.panels)) == len(figure.commands) >= 1
+    assert len(set(figure.files)) == len(figure.commands)
+    assert figure.panels
     for words in figure.commands:
-        assert words[:2] in (("pmviewer", "shot"), ("pmviewer", "render"))
+        assert words[:2] in (("pmviewer", "shot"), ("pmviewer", "render"), ("pmviewer", "series"))
         assert words[2] in {scene.name for scene in bundled_scenes()}
         load_job(words[2], [words[i + 1] for i, word in enumerate(words) if word == "--set"], [])
 

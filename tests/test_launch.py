@@ -43,6 +43,14 @@ def test_test_runs_slow_tests_too_and_passes_options_on(ran):
     assert "-n" not in ran[1]
 
 
+def test_tests_translate_sources_once_where_no_bytecode_is_wanted_beside_them():
+    assert launch.with_bytecode({"A": "1"}) == {"A": "1"}
+    kept = {"PYTHONPYCACHEPREFIX": str(launch.ENVIRONMENT / "bytecode")}
+    assert launch.with_bytecode({"PYTHONDONTWRITEBYTECODE": "1"}) == kept
+    own = {"PYTHONPYCACHEPREFIX": "elsewhere"}
+    assert launch.with_bytecode({"PYTHONDONTWRITEBYTECODE": "1", **own}) == own
+
+
 def test_everything_else_opens_the_window(ran):
     launch.main([])
     launch.main(["office", "--set", "photons.N=1000"])

@@ -30,13 +30,14 @@ def test_the_code_runs_and_prints_what_the_page_says(tmp_path, monkeypatch, caps
         else:
             assert numbers(printed[-1]) == pytest.approx(numbers(text), rel=0.05)
             assert re.findall(r"[a-zA-Z]+", printed[-1]) == re.findall(r"[a-zA-Z]+", text)
-    first, table, passes, settings, photons = printed
+    first, table, passes, settings, edited, photons = printed
     assert "float32" in first
     errors = np.array([numbers(line)[2] for line in table.splitlines()[1:]])
     assert (errors[:-1] / errors[1:] > 5).all(), "the error falls with N"
     by_passes = [float(line.split()[1]) for line in passes.splitlines()]
     assert by_passes == sorted(by_passes, reverse=True)
     assert settings == "20000 gather 8\n"
+    assert not edited
     assert int(photons.split()[0]) > 100
     assert {path.name for path in tmp_path.iterdir()} == {"caustic.png", "caustic.ply"}
 

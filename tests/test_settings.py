@@ -33,11 +33,12 @@ def test_every_setting_is_described(path):
     assert len(info.description) > 9
     assert info.scale in typing.get_args(Scale)
     assert info.stage in typing.get_args(Stage)
-    assert info.kind in (int, float, bool, str, tuple)
+    assert info.kind in (int, float, bool, str, tuple, dict)
     assert (info.scale == "choice") == bool(info.choices)
     assert (info.scale in ("choice", "name")) == (info.kind is str)
     assert (info.scale == "switch") == (info.kind is bool)
     assert (info.scale == "vector") == (info.kind is tuple)
+    assert (info.scale == "edits") == (info.kind is dict)
     if info.kind in (int, float):
         assert info.lower is not None
         assert info.upper is not None
@@ -63,6 +64,8 @@ def test_defaults_and_bounds_are_accepted_and_what_lies_beyond_is_not(path):
     elif info.kind is bool:
         allowed += [True, False]
         refused += ["perhaps", 2, None]
+    elif info.kind is dict:
+        return  # sentences of their own: tests/scene/test_editing.py
     elif info.kind is tuple:
         allowed += [(1.0, 2.0, -3.0)]
         refused += [(1.0, 2.0), (1.0, float("nan"), 0.0), "here", 1.0, None]

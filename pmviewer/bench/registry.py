@@ -31,11 +31,20 @@ BENCHES: dict[str, tuple[str, str]] = {
     "start": ("Start to first image, cold and warm (P10)", "pmviewer.bench.measures.start:run"),
     "unused": ("Cost of what a scene does not use (P14)", "pmviewer.bench.measures.unused:run"),
     "window": ("Frames per second while computing (P11)", "pmviewer.bench.measures.window:run"),
+    "actions": (
+        "A thousand random actions in the window: nothing is lost",
+        "pmviewer.bench.measures.actions:run",
+    ),
     "guide": ("Directions of gather rays: variance at equal rays (R4)", "pmviewer.bench.measures.guide:run"),
     "corners": ("Secondary gathering: error at edges and elsewhere (R5)", "pmviewer.bench.measures.corners:run"),
     "cache": ("Irradiance cache against the plain final gather (R6)", "pmviewer.bench.measures.irradiance_cache:run"),
+    "estimation": (
+        "Estimated gathers against the plain one and the cache (R7)",
+        "pmviewer.bench.measures.estimation:run",
+    ),
     "gather": ("Radiance photons against the plain final gather (R3)", "pmviewer.bench.measures.gather:run"),
     "denoise": ("Denoised pictures: error against time (P16)", "pmviewer.bench.measures.denoise:run"),
+    "media": ("Media: formulas, against Mitsuba, error over time (T9, E7)", "pmviewer.bench.measures.media:run"),
     "lens": ("Lens and filters: circle of confusion, and against Mitsuba (R13)", "pmviewer.bench.measures.lens:run"),
     "virtual": ("Virtual lights: estimators against the plain sum (R10)", "pmviewer.bench.measures.virtual:run"),
     "thin-glass": (

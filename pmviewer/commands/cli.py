@@ -17,6 +17,7 @@ from pmviewer.commands.info import info
 from pmviewer.commands.photons import photons
 from pmviewer.commands.render import render
 from pmviewer.commands.scenes import scenes
+from pmviewer.commands.series import series
 from pmviewer.commands.settings import settings
 from pmviewer.commands.shot import shot
 from pmviewer.commands.view import view
@@ -26,6 +27,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "view": view,
     "render": render,
     "photons": photons,
+    "series": series,
     "shot": shot,
     "compare": compare,
     "compare-importance": compare_importance,

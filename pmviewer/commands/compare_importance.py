@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pmviewer.commands.options import ParameterOption, SceneArgument, SearchOption, SetOption, ThreadsOption
+from pmviewer.commands.options import EditOption, ParameterOption, SceneArgument, SearchOption, SetOption, ThreadsOption
 
 
 def compare_importance(
@@ -22,6 +22,7 @@ def compare_importance(
     ] = "auto",
     threads: ThreadsOption = None,
     set_: SetOption = None,
+    edit: EditOption = None,
     define: ParameterOption = None,
     search_path: SearchOption = None,
 ) -> None:
@@ -29,5 +30,5 @@ def compare_importance(
     from pmviewer.commands.comparing import compare_job
     from pmviewer.commands.job import load_job
 
-    job = load_job(scene, set_ or [], define or [])
+    job = load_job(scene, set_ or [], define or [], edit or [])
     compare_job(job, output, equal=equal, passes=passes, reference=reference, threads=threads)

@@ -7,7 +7,7 @@ from pathlib import Path
 from pmviewer.commands.job import Job, check_output
 from pmviewer.commands.progress_bar import progress_bar
 from pmviewer.engine.comparison.importance_gain import Gain, compare
-from pmviewer.engine.opened import OpenScene, open_scene
+from pmviewer.engine.opened import OpenScene, arrangement_of, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.output.compare import Reference, load_reference
 from pmviewer.output.frame_export import gain_sheet
@@ -34,7 +34,7 @@ def compare_job(
         check_output(output, (".png",))
     asked = {"compare.equal": equal, "compare.passes": passes}
     settings = with_values(job.settings, {path: value for path, value in asked.items() if value is not None})
-    opened = open_scene(job.scene, job.parameters, settings.light.rig)
+    opened = open_scene(job.scene, job.parameters, arrangement_of(settings))
     target = _reference(opened, settings, reference)
     pool = WorkPool(threads)
     try:

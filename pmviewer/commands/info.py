@@ -6,17 +6,22 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from pmviewer.commands.options import ParameterOption, SceneArgument, SearchOption
+from pmviewer.commands.options import EditOption, ParameterOption, SceneArgument, SearchOption
 
 if TYPE_CHECKING:
     from pmviewer.commands.job import Job
 
 
-def info(scene: SceneArgument, define: ParameterOption = None, search_path: SearchOption = None) -> None:
+def info(
+    scene: SceneArgument,
+    edit: EditOption = None,
+    define: ParameterOption = None,
+    search_path: SearchOption = None,
+) -> None:
     """Say what is in a scene, what was ignored, and which stages it needs or skips."""
     from pmviewer.commands.job import load_job
 
-    typer.echo(scene_report(load_job(scene, [], define or [])))
+    typer.echo(scene_report(load_job(scene, [], define or [], edit or [])))
 
 
 def scene_report(job: Job) -> str:
@@ -24,10 +29,13 @@ def scene_report(job: Job) -> str:
     from pmviewer.engine.method import plan_of
     from pmviewer.scene.analysis import analyse
     from pmviewer.scene.describe import describe
+    from pmviewer.scene.editing.apply import edited
     from pmviewer.scene.load import load_scene
     from pmviewer.scene.meshes.recentre import recentred
 
-    scene = recentred(load_scene(job.scene, job.parameters, rig=job.settings.light.rig))
+    scene = recentred(
+        edited(load_scene(job.scene, job.parameters, rig=job.settings.light.rig), job.settings.edit.changes)
+    )
     plan = plan_of(job.settings, analyse(scene))
     rows = describe(scene)
     rows.append((f"stages ({job.settings.render.method})", ", ".join(plan.running) or "none"))

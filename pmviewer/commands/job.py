@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from pmviewer.errors import OutputError, SettingError
+from pmviewer.errors import OutputError, SceneError, SettingError
 from pmviewer.output.session_file import read_session
-from pmviewer.settings.access import Settings, parse_assignments, with_values
+from pmviewer.settings.access import Settings, parse_assignments, parse_edits, with_values
 
 DEFAULT_PASSES = 64
 
@@ -22,17 +22,36 @@ class Job:
     settings: Settings
     parameters: Mapping[str, str] = field(default_factory=dict)
     passes: int | None = None
+    snapshots: tuple[tuple[int, Path], ...] = ()
+    """Numbers and files of a session file's snapshots, which the window alone reads."""
 
 
-def load_job(source: str, assignments: Iterable[str], defines: Iterable[str]) -> Job:
-    """A job from a scene or a session file (.toml). Raises SettingError and SceneError."""
+def load_job(source: str, assignments: Iterable[str], defines: Iterable[str], edits: Iterable[str] = ()) -> Job:
+    """A job from a scene or a session file (.toml). Edits come on top of the file's. Raises SettingError and
+    SceneError."""
     parameters = dict(_definition(text) for text in defines)
     values = parse_assignments(assignments)
+    changes = {**values.get("edit.changes", {}), **parse_edits(edits)}
+    if changes:
+        values["edit.changes"] = changes
     if source.lower().endswith(".toml"):
         session = read_session(Path(source))
+        if changes:
+            values["edit.changes"] = {**session.settings.edit.changes, **changes}
         settings = with_values(session.settings, values)
-        return Job(str(session.scene), settings, {**session.parameters, **parameters}, session.passes)
+        given = {**session.parameters, **parameters}
+        return Job(str(session.scene), settings, given, session.passes, session.snapshots)
     return Job(source, with_values(Settings(), values), parameters)
+
+
+def with_snapshots(job: Job, paths: Iterable[Path]) -> Job:
+    """The job with more pictures as snapshots, numbered on. Raises SceneError for a file that isn't there."""
+    numbered = list(job.snapshots)
+    for path in paths:
+        if not path.is_file():
+            raise SceneError("There is no such picture to open as a snapshot.", path)
+        numbered.append((1 + max((number for number, _ in numbered), default=0), path))
+    return replace(job, snapshots=tuple(numbered))
 
 
 def _definition(text: str) -> tuple[str, str]:

@@ -17,6 +17,14 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Change a setting, for example photons.N=200000."),
 ]
+EditOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--edit",
+        metavar="NAME=VALUE",
+        help="Change a light, material or object, for example light.1.power=2 or material.wall.colour=0.8,0.2,0.2.",
+    ),
+]
 ThreadsOption = Annotated[int | None, typer.Option(min=1, max=1024, help="Threads; all processors if not given.")]
 ParameterOption = Annotated[
     list[str] | None,
@@ -42,3 +50,7 @@ SearchOption = Annotated[
     typer.Option("--search-path", metavar="FOLDER", callback=_search, expose_value=False,
                  help="Look here too for the files that a scene names."),
 ]  # fmt: skip
+SnapshotOption = Annotated[
+    list[Path] | None,
+    typer.Option("--snapshot", metavar="FILE", help="EXR or PNG file to open as a snapshot; may be repeated."),
+]

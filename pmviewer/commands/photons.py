@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pmviewer.commands.options import ParameterOption, SceneArgument, SearchOption, SetOption, ThreadsOption
+from pmviewer.commands.options import EditOption, ParameterOption, SceneArgument, SearchOption, SetOption, ThreadsOption
 
 
 def photons(
@@ -18,6 +18,7 @@ def photons(
     seed: Annotated[int | None, typer.Option(help="Seed of the random streams.")] = None,
     threads: ThreadsOption = None,
     set_: SetOption = None,
+    edit: EditOption = None,
     define: ParameterOption = None,
     search_path: SearchOption = None,
 ) -> None:
@@ -32,7 +33,7 @@ def photons(
 
     check_output(output, (".ply",))
     check_map(map_)
-    job = load_job(scene, [*(set_ or []), *([] if seed is None else [f"render.seed={seed}"])], define or [])
+    job = load_job(scene, [*(set_ or []), *([] if seed is None else [f"render.seed={seed}"])], define or [], edit or [])
     with (
         warnings.catch_warnings(record=True, action="always") as said,
         Rendering(job.scene, flat(job.settings), parameters=job.parameters, threads=threads) as rendering,

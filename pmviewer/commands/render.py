@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pmviewer.commands.options import ParameterOption, SceneArgument, SetOption, ThreadsOption
+from pmviewer.commands.options import EditOption, ParameterOption, SceneArgument, SetOption, ThreadsOption
 from pmviewer.errors import SettingError
 
 
@@ -20,6 +20,7 @@ def render(
     threads: ThreadsOption = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random streams.")] = None,
     set_: SetOption = None,
+    edit: EditOption = None,
     half: Annotated[bool, typer.Option(help="Half-precision EXR.")] = False,
     denoise: Annotated[
         bool, typer.Option("--denoise", help="Add the picture without its noise to EXR files, as the layer 'denoised'.")
@@ -37,7 +38,7 @@ def render(
 
     if passes is not None and time is not None:
         raise SettingError("--passes and --time exclude each other: give one of them.")
-    job = load_job(scene, set_ or [], define or [])
+    job = load_job(scene, set_ or [], define or [], edit or [])
     render_job(
         job,
         output,

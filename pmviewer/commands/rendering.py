@@ -15,7 +15,7 @@ from pmviewer.engine.ahead.beside import beside
 from pmviewer.engine.comparison.reference import reference_for
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.frame import Frame
-from pmviewer.engine.opened import OpenScene, open_scene
+from pmviewer.engine.opened import OpenScene, arrangement_of, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
@@ -24,7 +24,7 @@ from pmviewer.engine.wanted import wanted_of
 from pmviewer.errors import SettingError
 from pmviewer.output.compare import ERROR_COLUMNS, Reference, error_row
 from pmviewer.output.diagnostic_views import DENOISED, HELD_WHILE_SHOWN
-from pmviewer.output.frame_export import LAYERS, write_frame_exr, write_frame_png
+from pmviewer.output.frame_export import LAYERS, VOLUME_LAYERS, write_frame_exr, write_frame_png
 from pmviewer.output.metric import metrics
 from pmviewer.progress import watched
 from pmviewer.settings.access import Settings, with_values
@@ -57,7 +57,7 @@ def render_job(
         check_output(path, FORMATS)
     settings = with_values(job.settings, overrides(passes, seconds, size, seed, job.passes))
     with patiently() as tell, watched(tell, threads=threads):
-        opened = open_scene(job.scene, job.parameters, settings.light.rig, beside(settings, threads))
+        opened = open_scene(job.scene, job.parameters, arrangement_of(settings), beside(settings, threads))
     print_warnings(opened.scene.warnings, opened.scene.dropped)
     target = None
     if reference is not None:
@@ -120,7 +120,7 @@ def _view(settings: Settings, opened: OpenScene) -> str:
         if reason is not None:
             raise SettingError(f"display.view = {view}: {reason}")
         return view
-    return view if view in LAYERS else "beauty"
+    return view if view in (*LAYERS, *VOLUME_LAYERS) else "beauty"
 
 
 def _print_error(reference: Reference, renderer: Renderer) -> None:

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pmviewer.commands.options import ParameterOption, SceneArgument, SearchOption, SetOption, ThreadsOption
+from pmviewer.commands.options import (
+    EditOption,
+    ParameterOption,
+    SceneArgument,
+    SearchOption,
+    SetOption,
+    SnapshotOption,
+    ThreadsOption,
+)
 from pmviewer.errors import SettingError, WindowError
 
 if TYPE_CHECKING:
@@ -22,6 +30,7 @@ def shot(
     passes: Annotated[int | None, typer.Option(min=1, help="Passes to render before.")] = None,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Image size, for example 1280x720.")] = None,
     window: Annotated[bool, typer.Option("--window", help="The whole window instead of the picture.")] = False,
+    panel: Annotated[str | None, typer.Option(metavar="NAME", help="Panel in front, with --window: Snapshots.")] = None,
     pixel: Annotated[
         str | None, typer.Option(metavar="X,Y", help="Pixel whose gather rays overlays.gather.show draws.")
     ] = None,
@@ -29,16 +38,20 @@ def shot(
         str | None,
         typer.Option(metavar="X,Y", help="Pixel that is pinned: its photons, and the inspector with --window."),
     ] = None,
+    hold: Annotated[str, typer.Option(metavar="OBJECT", help="Object that has handles, with --window.")] = "",
     captions: Annotated[bool, typer.Option(help="Say in the picture which view it is.")] = True,
     threads: ThreadsOption = None,
     set_: SetOption = None,
+    edit: EditOption = None,
     define: ParameterOption = None,
     search_path: SearchOption = None,
+    snapshot: SnapshotOption = None,
 ) -> None:
     """Open the window, wait for the last pass, write the picture with all overlays, captions and legends, close it."""
-    from pmviewer.commands.job import load_job
+    from pmviewer.commands.job import load_job, with_snapshots
 
-    take_shot(load_job(scene, set_ or [], define or []), output, passes, size, window, (pixel, pin), captions, threads)
+    job = with_snapshots(load_job(scene, set_ or [], define or [], edit or []), snapshot or [])
+    take_shot(job, output, passes, size, window, (pixel, pin, hold), captions, threads, panel or "")
 
 
 def take_shot(
@@ -47,12 +60,13 @@ def take_shot(
     passes: int | None,
     size: str | None,
     window: bool,
-    pixels: tuple[str | None, str | None],
+    shown: tuple[str | None, str | None, str],
     captions: bool,
     threads: int | None,
+    panel: str = "",
 ) -> None:
-    """Open the window, take its picture (`pmviewer.viewer.shot`), close it. `pixels`: of --pixel and --pin. Raises
-    PmviewerError; WindowError without a display."""
+    """Open the window, take its picture (`pmviewer.viewer.shot`), close it. `shown`: of --pixel, --pin and --hold.
+    Raises PmviewerError; WindowError without a display."""
     from pmviewer.commands.job import check_output, overrides
     from pmviewer.render.camera import resolve_camera
     from pmviewer.scene.load import load_scene  # numba; the window itself comes up before
@@ -63,12 +77,12 @@ def take_shot(
 
     check_output(output, (".png",))
     settings = with_values(job.settings, overrides(passes, None, size, None, job.passes))
-    chosen, pinned = (_pixel(option, text) for option, text in zip(("--pixel", "--pin"), pixels, strict=True))
+    chosen, pinned = (_pixel(option, text) for option, text in zip(("--pixel", "--pin"), shown, strict=False))
     camera = resolve_camera(load_scene(job.scene, job.parameters, rig=settings.light.rig), settings.camera)
-    shot = Shot(output, chosen, pinned)
+    shot = Shot(output, chosen, pinned, shown[2], panel)
     picture_size = None if window else (camera.width, camera.height)
     make = partial(ViewerApp, remember=False, shot=shot, picture_size=picture_size, captions=captions)
-    start_viewer(make, job.scene, settings, threads, job.parameters)
+    start_viewer(make, job.scene, settings, threads, job.parameters, snapshots=job.snapshots)
     if not shot.done:
         raise shot.error or WindowError("The window was closed before the picture was taken.")
     if shot.error is not None:

@@ -16,6 +16,8 @@ def pass_report(s: Statistics) -> str:
             f"irradiance cache: {s.cache_records:,} records in the last pass, "
             f"{s.gathers_per_pixel:.3f} gathers a pixel and pass, {s.interpolated:.1%} interpolated"
         )
+    if s.estimates:
+        lines.append(_estimation(s))
     if s.importons:
         lines.append(f"importance: {s.importons:,} importons, stored at {s.stored_in_pass['importons']:,} places")
     for name, map_ in s.deposited.items():
@@ -35,6 +37,16 @@ def pass_report(s: Statistics) -> str:
             else "caustic map: no photons, so nothing has converged"
         )
     return "\n".join(lines)
+
+
+def _estimation(s: Statistics) -> str:
+    """What became of the pixels with estimated gathers."""
+    pixels, safe = sum(s.estimates[name] for name in ("safe", "critical", "other")), max(s.estimates["safe"], 1)
+    gathered, interpolated, left = (s.estimates[name] / safe for name in ("gathered", "interpolated", "left"))
+    return (
+        f"gather estimation: {s.estimates['safe'] / max(pixels, 1):.1%} of the pixels safe; of these {gathered:.2%} "
+        f"fully gathered, {interpolated:.1%} interpolated, {left:.1%} gathered as usual, mean of all passes"
+    )
 
 
 def statistics_report(s: Statistics) -> str:

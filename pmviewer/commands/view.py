@@ -8,10 +8,12 @@ import typer
 
 from pmviewer.commands.options import (
     DEFAULT_SCENE,
+    EditOption,
     ParameterOption,
     SceneArgument,
     SearchOption,
     SetOption,
+    SnapshotOption,
     ThreadsOption,
 )
 from pmviewer.commands.render import render
@@ -24,22 +26,32 @@ FALLBACK_PASSES = 64
 def view(
     scene: SceneArgument = DEFAULT_SCENE,
     set_: SetOption = None,
+    edit: EditOption = None,
     threads: ThreadsOption = None,
     define: ParameterOption = None,
     search_path: SearchOption = None,
+    snapshot: SnapshotOption = None,
 ) -> None:
     """Open the window (the default command)."""
-    from pmviewer.commands.job import load_job
+    from pmviewer.commands.job import load_job, with_snapshots
 
-    job = load_job(scene, set_ or [], define or [])
+    job = with_snapshots(load_job(scene, set_ or [], define or [], edit or []), snapshot or [])
     try:
         from pmviewer.viewer.app import run_viewer
 
-        code = run_viewer(job.scene, job.settings, threads, job.parameters)
+        code = run_viewer(job.scene, job.settings, threads, job.parameters, job.snapshots)
     except WindowError as error:
         typer.echo(f"{error}", err=True)
         target = Path(f"{Path(job.scene).stem}.png")
         typer.echo(f"Rendering {FALLBACK_PASSES} passes to {target} instead.", err=True)
-        render(scene, [target, target.with_suffix(".exr")], FALLBACK_PASSES, set_=set_, threads=threads, define=define)
+        render(
+            scene,
+            [target, target.with_suffix(".exr")],
+            FALLBACK_PASSES,
+            set_=set_,
+            edit=edit,
+            threads=threads,
+            define=define,
+        )
         code = 0
     raise typer.Exit(code)

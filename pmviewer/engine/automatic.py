@@ -58,4 +58,4 @@ def _rig(scene: OpenScene) -> str:
     content, lit = scene.content, scene.scene
     if content is None or (len(content.shapes), len(content.lights)) == (len(lit.shapes), len(lit.lights)):
         return "file"
-    return "studio" if scene.rig == "auto" else scene.rig
+    return "studio" if scene.arrangement.rig == "auto" else scene.arrangement.rig

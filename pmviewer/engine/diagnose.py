@@ -125,6 +125,9 @@ def diagnostic_planes(wanted: Wanted, looked: Looked, pool: WorkPool) -> dict[st
     if wanted.family == "convergence":
         states = convergence_plane(looked.rendered, pool.run)
         return {"caustic convergence": states.reshape(looked.film.height, looked.film.width, 1)}
+    if wanted.family == "estimation":
+        estimates = looked.rendered.estimates
+        return estimates.views() if estimates is not None else {}
     channels = {**FAMILY_CHANNELS, "importance": IMPORTANCE_CHANNELS, "density": 1, "storing": 1}
     planes = _drawn(looked, channels[wanted.family], lambda out: _kernel(wanted, looked, out), pool)
 

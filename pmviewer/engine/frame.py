@@ -15,7 +15,7 @@ from pmviewer.engine.energy import Energy
 from pmviewer.engine.inspection import Inspection
 from pmviewer.output.diagnostic_views import HELD_WHILE_SHOWN
 from pmviewer.render.camera import CameraPose
-from pmviewer.render.planes import beauty_of, view_of
+from pmviewer.render.planes import MEDIA_CHANNELS, beauty_of, view_of
 from pmviewer.settings.access import Settings
 
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
@@ -49,9 +49,13 @@ class Statistics:
     cache_records: int = 0
     """Records of the irradiance cache in the latest pass; 0 without a cache."""
     gathers_per_pixel: float = 0.0
-    """In one pass, on average, with an irradiance cache: records made and pixels that gathered themselves."""
+    """In one pass, on average, with an irradiance cache or estimated gathers: records or full gathers made, and pixels
+    that gathered themselves."""
     interpolated: float = 0.0
-    """Share of the surface points seen that the irradiance cache served."""
+    """Share of the surface points seen that the irradiance cache or an estimate served."""
+    estimates: Mapping[str, int] = field(default_factory=dict)
+    """Pixels of all passes by what the estimation of gathers made of them: safe, critical, other; of the safe ones
+    gathered (sparse: on the undivided grid), interpolated, left. Empty without."""
     saved_rays: int = 0
     """Shadow rays that were not cast, because shadow photons knew."""
     seconds: float = 0.0
@@ -99,7 +103,7 @@ class PhotonCloud:
 
 @dataclass(frozen=True)
 class Frame:
-    """One published picture. `planes` is (height, width, 22) float32, see `pmviewer.render.planes`."""
+    """One published picture. `planes` is (height, width, 22) float32, with media 28: see `pmviewer.render.planes`."""
 
     serial: int
     """Grows by one with each frame of a session."""
@@ -126,6 +130,11 @@ class Frame:
     """What automatic settings came to, by full name (`pmviewer.engine.automatic`)."""
     light_places: NDArray[np.float64] | None = None
     """(n, 3) middles of the lights, NaN where they shine from outside; None without importance."""
+
+    @property
+    def has_media(self) -> bool:
+        """Whether it has the terms of media."""
+        return self.planes.shape[-1] >= MEDIA_CHANNELS
 
     @property
     def known_lights(self) -> LightImportance | None:

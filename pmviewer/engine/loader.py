@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from pmviewer.engine.frame import Level, Status
 from pmviewer.engine.guarded import guarded
-from pmviewer.engine.opened import OpenScene, relit
+from pmviewer.engine.opened import Arrangement, OpenScene, rearranged
 from pmviewer.engine.published import Published
+from pmviewer.errors import SceneError
 from pmviewer.progress import stage, watched
-from pmviewer.scene.arrays.tessellate import DrawGeometry, tessellate
-from pmviewer.scene.defaults.light_rigs import Rig
+from pmviewer.scene.arrays.stored_geometry import same_surfaces
+from pmviewer.scene.arrays.tessellate import DrawGeometry, recoloured, tessellate
+from pmviewer.scene.description import Scene
 from pmviewer.settings.access import Settings
 
 
@@ -26,25 +29,35 @@ class Loaded:
     settings: Settings | None
 
 
+PATIENCE = 0.5
+"""Seconds after which a scene that is arranged anew is said to be loading: edits come many a second."""
+
+
 class Loader:
     """`text` says what is being done ("ball.ply: building the tree …"), "" when nothing is being loaded; `loaded` is
-    what waits to be taken. Changes are made under `published.changed`."""
+    what waits to be taken. Changes are made under `published.changed`.
+
+    Arranging the open scene anew never waits for an end of the changes: what was arranged is handed over, and the
+    newest arrangement follows, for as long as there is a newer one.
+    """
 
     def __init__(
         self,
         published: Published,
-        rig: Callable[[], Rig],
+        arrangement: Callable[[], Arrangement],
         has_scene: Callable[[], bool],
-        on_loaded: Callable[[], None],
+        on_loaded: Callable[[bool], None],
     ) -> None:
-        """rig: the lights that are asked for now; has_scene: whether there is an open scene; on_loaded is called under
-        `published.changed`."""
+        """arrangement: what is asked for now; has_scene: whether there is an open scene; on_loaded is called under
+        `published.changed`, and told whether it is the open scene, arranged anew."""
         self.text = ""
         self.loaded: Loaded | None = None
         self.asked = self.done = self._cancelled = 0
-        self._closed = False
+        self._closed = self._rearranging = False
+        self._began = 0.0
+        self._drawn: tuple[Scene, DrawGeometry] | None = None
         self._published, self._changed = published, published.changed
-        self._rig, self._has_scene, self._on_loaded = rig, has_scene, on_loaded
+        self._arrangement, self._has_scene, self._on_loaded = arrangement, has_scene, on_loaded
 
     @property
     def pending(self) -> bool:
@@ -53,9 +66,20 @@ class Loader:
 
     def start(self, load: Callable[[], OpenScene], name: str, settings: Settings | None) -> None:
         """Load on a thread; what was asked for before is unwanted now."""
+        self._start(load, name, settings, rearranging=False)
+
+    def rearrange(self, opened: OpenScene, geometry: DrawGeometry | None) -> None:
+        """Arrange the open scene, with its geometry, as is asked for now. While a scene is being loaded or arranged
+        nothing is to be done: it gets the newest arrangement anyway."""
+        if not self.pending:
+            self._drawn = (opened.scene, geometry) if geometry is not None else None
+            self._start(lambda: opened, opened.source, None, rearranging=True)
+
+    def _start(self, load: Callable[[], OpenScene], name: str, settings: Settings | None, *, rearranging: bool) -> None:
         with self._changed:
             self.asked += 1
             ticket = self.asked
+            self._rearranging, self._began = rearranging, time.monotonic()
         threading.Thread(
             target=guarded,
             args=(
@@ -87,24 +111,45 @@ class Loader:
         self._tell(ticket, name)
         with watched(lambda text: self._tell(ticket, f"{name}: {text}"), lambda: self._is_unwanted(ticket)):
             opened = load()
+            if self._rearranging:
+                opened = self._newest(opened)
             while True:
-                stage("preparing the geometry view")
-                if self._hand_over(ticket, Loaded(opened, tessellate(opened.scene), settings)):
+                if self._hand_over(ticket, Loaded(opened, self._geometry(opened.scene), settings)):
                     return
-                opened = relit(opened, self._rig())
+                opened = self._newest(opened)
+
+    def _geometry(self, scene: Scene) -> DrawGeometry:
+        """For the window; that of the scene before, in other colours, where the surfaces are the same."""
+        stage("preparing the geometry view")
+        drawn = self._drawn if self._rearranging else None
+        again = drawn is not None and same_surfaces(drawn[0], scene)
+        geometry = recoloured(scene, drawn[1]) if again and drawn is not None else tessellate(scene)
+        self._drawn = scene, geometry
+        return geometry
+
+    def _newest(self, opened: OpenScene) -> OpenScene:
+        """The scene as it is asked for now. What can't be arranged is an error only if it is still asked for."""
+        while True:
+            arrangement = self._arrangement()
+            try:
+                return rearranged(opened, arrangement)
+            except SceneError:
+                if self._arrangement() == arrangement:
+                    raise
 
     def _hand_over(self, ticket: int, loaded: Loaded) -> bool:
-        """Offer a loaded scene, if it is still asked for. False if other lights are asked for meanwhile."""
+        """Offer a loaded scene, if it is still asked for. False if another arrangement is asked for meanwhile; a scene
+        that is shown already is offered then too."""
         with self._changed:
             if ticket != self.asked or self._closed:
                 return True
-            opened = loaded.opened
-            if loaded.settings is None and opened.content is not None and opened.rig != self._rig():
-                return False
-            self.loaded = loaded
-            self.done, self.text = ticket, ""
-            self._on_loaded()
-            return True
+            is_newest = loaded.settings is not None or loaded.opened.is_arranged(self._arrangement())
+            if is_newest or self._rearranging:
+                self.loaded = loaded
+                if is_newest:
+                    self.done, self.text = ticket, ""
+                self._on_loaded(self._rearranging)
+            return is_newest
 
     def _is_unwanted(self, ticket: int) -> bool:
         """Has the load been cancelled, or another scene been asked for?"""
@@ -113,7 +158,8 @@ class Loader:
     def _tell(self, ticket: int, text: str) -> None:
         """What is being done: the session's state, where there is no picture yet, and beside it where there is."""
         with self._changed:
-            if ticket != self.asked:
+            early = self._rearranging and time.monotonic() - self._began < PATIENCE
+            if ticket != self.asked or early:
                 return
             self.text = text
         if self._has_scene():

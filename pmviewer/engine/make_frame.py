@@ -48,6 +48,8 @@ def _clouds(looked: Looked) -> dict[str, PhotonCloud]:
     if maps.photons is not None:
         clouds["global"] = PhotonCloud(maps.photons.global_, maps.photons.global_unit)
         clouds["caustic"] = PhotonCloud(maps.photons.caustic, maps.photons.caustic_unit)
+        if looked.plan.volume:
+            clouds["volume"] = PhotonCloud(maps.photons.volume, maps.photons.volume_unit)
     if maps.radiance is not None:
         clouds["radiance"] = PhotonCloud(maps.radiance.known(), maps.radiance.grid.power_unit)
     if shadows is not None:
@@ -91,6 +93,7 @@ def _statistics(looked: Looked, tally: Tally, clouds: dict[str, PhotonCloud]) ->
         dropped=dict(tally.dropped),
         energy=energy,
         skipped=plan.skipped,
+        estimates=dict(tally.estimates),
         clamped=film.lost if isinstance(film, WeightedFilm) else 0.0,
         importons=importance.traced if importance is not None else 0,
         warnings=_warnings(looked, tally, energy),

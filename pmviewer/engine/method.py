@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
+from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, THIN, in_media
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
 from pmviewer.render.filter import BOX, filter_of
@@ -35,10 +36,13 @@ class Plan:
     followed; `unfound` whether these look up what no path finds (`pmviewer.render.reflect`). `choice` is how
     direct light chooses lights, `radiance` whether gather rays use radiance photons, `directions` how they look about:
     photons of the classes `guide_mask` guide `guided_rays` of them; `corners` is whether short ones gather again,
-    `cache` whether diffuse surfaces gather through an irradiance cache, `shadows` whether shadow photons save shadow
+    `cache` whether diffuse surfaces gather through an irradiance cache, `estimation` whether pixels that show them are
+    interpolated between sparse gathers, `shadows` whether shadow photons save shadow
     rays, `importance` whether there are importance maps, `deposition` which photons maps store, `emission` how
     importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0 without; `virtual`
-    is whether virtual lights bring the indirect light; `lens` whether the render camera has one, `filtered` whether the
+    is whether virtual lights bring the indirect light; `media` whether the scene has participating media, and `volume`
+    whether photons are stored in them and light that they scatter is looked up, `phase_rays` whether rays by phase
+    functions can meet a light; `lens` whether the render camera has one, `filtered` whether the
     film has another reconstruction filter than the plain box; `thin_glass` are the rules by which light passes panes of
     glass, () where all of it is exact; `warnings`
     are sentences for the log about what was asked for and can't be."""
@@ -54,6 +58,7 @@ class Plan:
     guide_mask: int = 0
     corners: bool = False
     cache: bool = False
+    estimation: bool = False
     virtual: bool = False
     thin_glass: tuple[str, ...] = ()
     shadows: bool = False
@@ -63,6 +68,9 @@ class Plan:
     convergence: int = 0
     lens: bool = False
     filtered: bool = False
+    media: bool = False
+    volume: bool = False
+    phase_rays: bool = False
     caustic_mask: int = 0
     global_mask: int = 0
     direct_mask: int = 0
@@ -85,7 +93,7 @@ class Plan:
     @property
     def photons(self) -> bool:
         """Whether any are traced."""
-        return bool(self.caustic_classes or self.global_classes)
+        return bool(self.caustic_classes or self.global_classes or self.volume)
 
     @property
     def judges(self) -> bool:
@@ -104,10 +112,12 @@ class Plan:
             "light pass": self.photons,
             "caustic map": self.caustic_classes,
             "global map": self.global_classes,
+            "volume map": self.volume,
             "direct light": self.direct,
             "light choice by photons": self.choice != "power",
             "final gather": self.gather,
             "irradiance cache": self.cache,
+            "gather estimation": self.estimation,
             "importance": self.importance,
             "path tracer": self.path,
         }
@@ -116,7 +126,28 @@ class Plan:
 
 def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     """The stages that the method needs in this scene."""
+    if not traits.has_media:
+        return _plan_of(settings, traits)
+    asked = settings
+    settings, said = in_media(settings)
+    plan = _plan_of(settings, traits)
+    if any(rule not in ("exact", "by setting") for rule in traits.thin_glass) or (
+        "by setting" in traits.thin_glass and asked.render.thin_glass != "exact"
+    ):
+        said = (*said, THIN)
+    return replace(plan, media=True, warnings=(*plan.warnings, *said))
+
+
+def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     plan = _photon_plan(settings, traits)
+    if traits.has_scattering and settings.render.method in ("progressive", "gather"):
+        plan = replace(
+            plan,
+            volume=True,
+            phase_rays=traits.has_findable_lights,
+            skipped=tuple(s for s in plan.skipped if s[0] != "light pass"),
+            warnings=(*plan.warnings, *((BLURRED,) if traits.straightest > BLURRED_FROM else ())),
+        )
     plan = replace(
         plan,
         lens=_has_lens(settings, traits),
@@ -162,7 +193,7 @@ def _filtered(settings: Settings, traits: SceneTraits) -> bool:
 def thin_rules(settings: Settings, traits: SceneTraits) -> tuple[str, ...]:
     """The rules that the scene's panes go by, () where all of them are exact; the path tracer and virtual lights take
     all glass as it is."""
-    if settings.render.method in EXACT_GLASS:
+    if settings.render.method in EXACT_GLASS or traits.has_media:
         return ()
     by_setting = settings.render.thin_glass
     rules = {by_setting if rule == "by setting" else rule for rule in traits.thin_glass}
@@ -254,6 +285,9 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
         cache = settings.gather.cache == "on"
         if not cache:
             skipped.append(("irradiance cache", "off"))
+        estimation, why = _estimation(settings, traits)
+        if not estimation:
+            skipped.append(("gather estimation", why))
         return replace(
             shown,
             gather=True,
@@ -263,6 +297,7 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
             guide_mask=diffuse if guided else 0,
             corners=settings.gather.secondary > 0,
             cache=cache,
+            estimation=estimation,
             global_classes=ALL,
             skipped=tuple(skipped),
         )
@@ -309,6 +344,15 @@ def _guided_rays(settings: Settings) -> int:
     if gather.directions == "BSDF" or gather.rays < 2:
         return 0
     return min(max(round(gather.guided * gather.rays), 1), gather.rays - 1)
+
+
+def _estimation(settings: Settings, traits: SceneTraits) -> tuple[bool, str]:
+    """Whether gathers are estimated, and why not."""
+    if settings.gather.estimation == "off":
+        return False, "off"
+    if settings.gather.cache == "on":
+        return False, "the irradiance cache interpolates instead"
+    return traits.has_diffuse, "no diffuse surface in the scene"
 
 
 def estimator_of(settings: Settings) -> Estimator:

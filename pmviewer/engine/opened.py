@@ -18,8 +18,11 @@ from pmviewer.scene.arrays.flatten import FlatScene, flatten
 from pmviewer.scene.defaults.completion import completed
 from pmviewer.scene.defaults.light_rigs import Rig
 from pmviewer.scene.description import Scene
+from pmviewer.scene.editing.apply import edited
 from pmviewer.scene.load import read_scene
 from pmviewer.scene.meshes.recentre import recentred
+from pmviewer.settings.access import Settings
+from pmviewer.settings.edits import Edits
 
 OnType = Callable[[np.dtype, SceneTraits], None]
 """Hears, while a scene is being opened, of what type its record will be and what is in it."""
@@ -29,6 +32,19 @@ _uids = itertools.count(1)
 
 def nobody(of_record: np.dtype, traits: SceneTraits) -> None:
     """Nobody needs to know."""
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """What settings make of a file's content: by which lights it is seen, and what is edited."""
+
+    rig: Rig = "auto"
+    edits: Edits = field(default_factory=dict)
+
+
+def arrangement_of(settings: Settings) -> Arrangement:
+    """What these settings ask for."""
+    return Arrangement(settings.light.rig, settings.edit.changes)
 
 
 @dataclass(frozen=True)
@@ -43,11 +59,17 @@ class OpenScene:
     uid: int = field(default_factory=lambda: next(_uids))
     content: Scene | None = None
     """What was in the file, before camera and light were added; None for a scene that was no file."""
-    rig: Rig = "auto"
-    """By which lights the file is seen."""
+    whole: Scene | None = None
+    """With camera and light, before it was edited and moved."""
+    arrangement: Arrangement = field(default_factory=Arrangement)
     exposures: dict[str, float] = field(default_factory=dict, compare=False, repr=False)
     """In EV, by the name of the camera, as first pictures decided; empty where the scene has its own."""
     projections: dict[tuple[str, bool], Projection | None] = field(default_factory=dict, compare=False, repr=False)
+
+    def is_arranged(self, arrangement: Arrangement) -> bool:
+        """Is it arranged like that? A scene that was no file has no other lights than its own."""
+        own = self.arrangement
+        return own.edits == arrangement.edits and (self.content is None or own.rig == arrangement.rig)
 
     def exposure(self, camera: str) -> float:
         """EV that the picture by that camera is shown with unless the user says otherwise; 0 until it is decided."""
@@ -58,32 +80,52 @@ class OpenScene:
 def open_scene(
     source: str | Path | Scene,
     parameters: Mapping[str, str] | None = None,
-    rig: Rig = "auto",
+    arrangement: Arrangement = Arrangement(),
     on_type: OnType = nobody,
     search_paths: Sequence[Path] = (),
 ) -> OpenScene:
-    """Load, add the camera that the file lacks and the lights of the rig, check, move to the origin and flatten. A
-    scene that is given instead of a file is taken as it is. `search_paths` as for `read_scene`. Raises SceneError."""
+    """Load, add the camera that the file lacks and the lights of the rig, edit, check, move to the origin and flatten.
+    A scene that is given instead of a file keeps its camera and lights. `search_paths` as for `read_scene`. Raises
+    SceneError."""
     if isinstance(source, Scene):
-        return _opened(source, source.name, None, "auto", on_type)
+        return _opened(source, source.name, None, replace(arrangement, rig="auto"), on_type)
     content = read_scene(source, parameters or {}, search_paths)
     check_scene_memory(content)
-    return _opened(completed(content, rig), str(source), content, rig, on_type)
+    return _opened(completed(content, arrangement.rig), str(source), content, arrangement, on_type)
 
 
-def relit(opened: OpenScene, rig: Rig) -> OpenScene:
-    """The scene with other lights, without reading its file again. Raises SceneError."""
-    if opened.content is None:
+def rearranged(opened: OpenScene, arrangement: Arrangement) -> OpenScene:
+    """The scene with other lights or edits, without reading its file again. Raises SceneError."""
+    if opened.is_arranged(arrangement):
         return opened
-    return _opened(completed(opened.content, rig), opened.source, opened.content, rig)
+    whole = opened.whole
+    assert whole is not None
+    if opened.content is None or arrangement.rig == opened.arrangement.rig:
+        arrangement = replace(arrangement, rig=opened.arrangement.rig)
+        again = _opened(whole, opened.source, opened.content, arrangement, like=opened.flat)
+        return replace(again, exposures=opened.exposures)  # edits shall be seen, not adapted to
+    return _opened(completed(opened.content, arrangement.rig), opened.source, opened.content, arrangement)
 
 
-def _opened(scene: Scene, source: str, content: Scene | None, rig: Rig, on_type: OnType = nobody) -> OpenScene:
+def is_edited(before: OpenScene | None, after: OpenScene) -> bool:
+    """Is it the scene from before, with other edits?"""
+    return before is not None and before.whole is after.whole
+
+
+def _opened(
+    whole: Scene,
+    source: str,
+    content: Scene | None,
+    arrangement: Arrangement,
+    on_type: OnType = nobody,
+    like: FlatScene | None = None,
+) -> OpenScene:
+    scene = edited(whole, arrangement.edits)
     check_scene_memory(scene)
     scene = without_unseen_lights(recentred(scene))
     traits = analyse(scene)
-    flat = flatten(scene, lambda of_record: on_type(of_record, traits))
-    said = (*hidden_lights(scene, flat), *ignored_opacity(scene))
+    flat = flatten(scene, lambda of_record: on_type(of_record, traits), like)
+    said = (*hidden_lights(scene, flat), *ignored_opacity(scene), *flat.said)
     if said:
         scene = replace(scene, warnings=(*scene.warnings, *said))
-    return OpenScene(scene, flat, traits, source, content=content, rig=rig)
+    return OpenScene(scene, flat, traits, source, content=content, whole=whole, arrangement=arrangement)

@@ -19,6 +19,7 @@ from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import radii_of_pixels
 from pmviewer.engine.stages.convergence import prepare_convergence
+from pmviewer.engine.stages.estimation import prepare_estimation
 from pmviewer.engine.stages.importance import prepare_importance
 from pmviewer.engine.stages.irradiance_cache import prepare_cache
 from pmviewer.engine.stages.pass_data import blank_eye, blank_pass
@@ -32,7 +33,8 @@ from pmviewer.photons.deposition.depositor import prepare_rules
 from pmviewer.photons.emission.scattered import scattered_record
 from pmviewer.photons.emission.strata import STRATA_DTYPE
 from pmviewer.photons.emission.tested import prepare_weighing
-from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE, N_COUNTS, PhotonBuffers, empty_ledger, trace_photons
+from pmviewer.photons.light_pass.ledger import N_COUNTS, empty_ledger
+from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE, PhotonBuffers, trace_photons
 from pmviewer.photons.projection.projected import NO_PROJECTION
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
@@ -117,7 +119,8 @@ def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]
     hits = ends, np.empty(0, np.int32), np.empty((0, 2), np.float32)
     steps = [Step("ray casting", cast_closest, (scene.flat.record[0], points, points, ends, ends, *hits))]
     light_pass, codes = np.zeros(1, LIGHT_PASS_DTYPE), np.zeros(1, np.uint32)
-    out = PhotonBuffers(photons, photons, codes, codes, np.zeros(N_COUNTS, np.int64), empty_ledger())
+    in_media = photons if plan.media else None
+    out = PhotonBuffers(photons, photons, codes, codes, np.zeros(N_COUNTS, np.int64), empty_ledger(), in_media)
     maps = projection_for(scene, settings)
     emissions = [("light pass", NO_PROJECTION if maps is None else maps.records)]
     if plan.emission != "off":
@@ -135,7 +138,12 @@ def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]
         steps.append(Step("caustic convergence", prepare_convergence))
     if settings.estimate.lookup == "nearest":
         steps.append(Step("kd-tree", build_kdtree, (photons, 1.0)))
-    return [*steps, Step("photon grid", build_grid, (photons, 1.0, 1.0))]
+    return [*steps, grid_step()]
+
+
+def grid_step() -> Step:
+    """What every light pass ends with."""
+    return Step("photon grid", build_grid, (np.zeros((1, 6), np.float32), 1.0, 1.0))
 
 
 def eye_steps(record: NDArray[np.void], traits: SceneTraits, settings: Settings, plan: Plan) -> list[Step]:
@@ -149,5 +157,7 @@ def eye_steps(record: NDArray[np.void], traits: SceneTraits, settings: Settings,
     given = blank_pass(record, settings, plan)
     if plan.cache:
         steps.append(Step("irradiance cache", prepare_cache, (given,)))
+    if plan.estimation:
+        steps.append(Step("gather estimation", prepare_estimation, (given,)))
     radii = first_radii(1, 0.0, 0.0) if radii_of_pixels(Facts(settings, plan, traits)) else None
     return [*steps, Step("camera pass", eye_pass, (given, outline, radii, film, counts, 0, 0))]

@@ -17,6 +17,7 @@ from pmviewer.engine.diagnose import Looked, inspected
 from pmviewer.engine.exposure import metered
 from pmviewer.engine.focus import focused
 from pmviewer.engine.frame import Frame
+from pmviewer.engine.immersion import immersed
 from pmviewer.engine.inspection import Inspection, Wanted
 from pmviewer.engine.inspector.watched import Watched
 from pmviewer.engine.make_frame import frame_of
@@ -25,6 +26,7 @@ from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import first_radius, radii_of_pixels
+from pmviewer.engine.stages.estimation import estimate_gathers
 from pmviewer.engine.stages.eye import gather_rays_of, outline_of, render_into
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.irradiance_cache import fill_cache, recipe
@@ -52,6 +54,11 @@ COARSE_PHOTONS = 40_000
 COARSE_PIXELS = 160 * 160
 
 
+def _settled(scene: OpenScene, camera: CameraPose) -> CameraPose:
+    """The camera with what only the scene can tell: where its lens is focused, and which medium it is in."""
+    return immersed(scene.flat, focused(scene.flat, camera))
+
+
 class Renderer:
     """One scene with one set of settings. `film` holds what was rendered, `passes` how many passes that is, `latest`
     the last of them, None before the first.
@@ -72,8 +79,8 @@ class Renderer:
         """plan: what runs, where that is not what settings and scene ask for. Raises SettingError when the camera is
         impossible or the image can't fit into memory."""
         self.scene, self.settings, self.pool, self.store, self.version = scene, settings, pool, store, version
-        self.render_camera = focused(scene.flat, resolve_camera(scene.scene, settings.camera))
-        self.camera = focused(scene.flat, resolve_view(scene.scene, settings, scene.flat.center, scene.flat.radius))
+        self.render_camera = _settled(scene, resolve_camera(scene.scene, settings.camera))
+        self.camera = _settled(scene, resolve_view(scene.scene, settings, scene.flat.center, scene.flat.radius))
         check_memory(self.camera.width, self.camera.height, settings.photons.N)
         self.plan: Plan = plan or plan_of(settings, scene.traits)
         self.facts = Facts(settings, self.plan, scene.traits)
@@ -184,7 +191,7 @@ class Renderer:
         shadows = tally.timed(pool, "shadow photons", lambda: self.shadows.run(index)) if plan.shadows else None
         scene = self._lit.flat.record
         given = pass_data(scene, eye, settings, plan, maps, shadows.record if shadows is not None else None)
-        cache = virtual = None
+        cache = virtual = estimates = None
         if plan.virtual:
             virtual = tally.timed(pool, "virtual lights", lambda: self.virtual.run(index))
             given = given._replace(virtual=virtual.record)
@@ -194,8 +201,15 @@ class Renderer:
             tally.add_cache(cache.n, cache.bytes)
             tally.add_counts(counts)
             given = given._replace(cache=cache.record)
+        if plan.estimation:
+            estimates, counts = tally.timed(
+                pool, "gather estimation", lambda: estimate_gathers(given, settings.gather, camera, pool)
+            )
+            tally.add_estimates(estimates.counts)
+            tally.add_counts(counts)
+            given = given._replace(cache=estimates.record)
         tally.timed(pool, "camera pass", lambda: self._eye_pass(given, film))
-        self.latest = RenderedPass(given, maps, shadows, cache, virtual)
+        self.latest = RenderedPass(given, maps, shadows, cache, virtual, estimates)
 
     def _light(self, film: Film, index: int, N: int) -> PassMaps:
         self.importance.run(0 if self.settings.photons.renew == "once" else index)

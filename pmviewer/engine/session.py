@@ -23,7 +23,7 @@ from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.inspector.report import Pinned
 from pmviewer.engine.loader import Loaded, Loader
 from pmviewer.engine.memory import give_back
-from pmviewer.engine.opened import OpenScene, nobody, open_scene, relit
+from pmviewer.engine.opened import OpenScene, arrangement_of, is_edited, nobody, open_scene
 from pmviewer.engine.pool import WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.published import Published
@@ -62,15 +62,15 @@ class Session:
         self._opened: OpenScene | None = None
         self._settings = settings or Settings()
         self._loader = Loader(
-            self._published, lambda: self._settings.light.rig, lambda: self._opened is not None, self._interrupt
+            self._published,
+            lambda: arrangement_of(self._settings),
+            lambda: self._opened is not None,
+            self._loaded_scene,
         )
         self._version = 0
-        self._restart = False
+        self._restart = self._paused = self._closed = self._first_picture = False
         self._pixel: tuple[int, int] | None = None
         self._pinned: Pinned | None = None
-        self._paused = False
-        self._closed = False
-        self._first_picture = False
         self._attempt = 0
         self._failed_version = -1
         self._warned: set[str] = set()
@@ -94,10 +94,10 @@ class Session:
         error message and changes nothing."""
         with self._changed:
             chosen = settings or self._settings
-            rig, ahead = chosen.light.rig, self._ahead
+            arrangement, ahead = arrangement_of(chosen), self._ahead
             on_type = nobody if ahead is None else partial(ahead.opening, settings=chosen)
             name = source.name if isinstance(source, Scene) else str(source)
-            self._loader.start(lambda: open_scene(source, parameters or {}, rig, on_type), name, settings)
+            self._loader.start(lambda: open_scene(source, parameters or {}, arrangement, on_type), name, settings)
 
     def cancel_loading(self) -> None:
         """Give up the scene that is being loaded; the old one stays."""
@@ -112,19 +112,27 @@ class Session:
             if not settings.display.compile_ahead:
                 self.stop_compiling_ahead()
             if "scene" in changed:
-                self._relight(settings)
+                self._rearrange()
             if changed - {"scene", "display", "stop"}:
                 self._outdate()
             else:
                 self._settle()
             return self._version
 
-    def _relight(self, settings: Settings) -> None:
-        """Open the open scene anew with other lights. A scene that is being loaded gets them anyway."""
-        opened = self._loader.loaded.opened if self._loader.loaded else self._opened
-        if opened is None or opened.content is None or self._loader.pending:
-            return
-        self._loader.start(lambda: relit(opened, settings.light.rig), opened.source, None)
+    def _rearrange(self) -> None:
+        """Arrange the open scene as the settings ask. A scene that is being loaded is arranged so anyway."""
+        waiting = self._loader.loaded
+        opened, geometry = (waiting.opened, waiting.geometry) if waiting else (self._opened, self.geometry)
+        if opened is not None and not opened.is_arranged(arrangement_of(self._settings)):
+            self._loader.rearrange(opened, geometry)
+
+    def _loaded_scene(self, rearranged: bool) -> None:
+        """The loader has a scene. A first picture of the scene before it was edited is shown, or dragging a light would
+        never show any."""
+        if rearranged and self._first_picture:
+            self._changed.notify_all()
+        else:
+            self._interrupt()
 
     def restart(self) -> None:
         """Forget the film and begin with pass 0."""
@@ -260,6 +268,11 @@ class Session:
         return self._opened
 
     @property
+    def kept_bytes(self) -> int:
+        """Of photons and maps that are kept for a return to settings of before."""
+        return self._store.bytes
+
+    @property
     def ahead(self) -> str:
         """What is being compiled ahead ("estimate.lookup = nearest (3 of 20)"), "" when nothing is."""
         return self._ahead.text if self._ahead is not None else ""
@@ -365,9 +378,10 @@ class Session:
 
     def _adopt(self, loaded: Loaded) -> None:
         """Make a loaded scene the open one."""
+        if not is_edited(self._opened, loaded.opened):
+            self._pixel = self._pinned = None
         self._store.clear()
         self._opened, self.geometry, self._renderer = loaded.opened, loaded.geometry, None
-        self._pixel = self._pinned = None
         if loaded.settings is not None:
             self._settings = loaded.settings
         self._version += 1
@@ -375,12 +389,15 @@ class Session:
 
     def _welcome(self, opened: OpenScene, before: OpenScene | None) -> None:
         """What the log says of a newly opened scene; of one with other lights than before only what is new."""
+        edited = is_edited(before, opened)
         relit = before is not None and opened.content is not None and opened.content is before.content
         for warning in opened.scene.warnings:
-            if not (relit and before is not None and warning in before.scene.warnings):
+            if not ((edited or relit) and before is not None and warning in before.scene.warnings):
                 self._published.say("warning", warning)
+        if edited:
+            return
         if relit:
-            self._published.say("info", f"light rig: {opened.rig}")
+            self._published.say("info", f"light rig: {opened.arrangement.rig}")
             return
         for reason, count in opened.scene.dropped.items():
             self._published.say("warning", f"{count} × {reason} left out")

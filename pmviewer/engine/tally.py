@@ -29,6 +29,7 @@ class Tally:
     cut: int = 0
     gathered: int = 0
     records: int = 0
+    estimates: dict[str, int] = field(default_factory=dict)
     seconds: float = 0.0
     cpu_seconds: float = 0.0
     stored: dict[str, int] = field(default_factory=lambda: {"caustic": 0, "global": 0})
@@ -57,9 +58,11 @@ class Tally:
         self.rays += photons.rays
         self.dropped["photons"] += photons.dropped
         self.stored_in_pass = {"caustic": len(photons.caustic), "global": len(photons.global_)}
+        if len(photons.volume):
+            self.stored_in_pass["volume"] = len(photons.volume)
         self.deposited = dict(photons.deposited)
         for name, count in self.stored_in_pass.items():
-            self.stored[name] += count
+            self.stored[name] = self.stored.get(name, 0) + count
 
     def set_maps(self, radii: Mapping[str, float], size: int, photons: int) -> None:
         """The maps of the latest pass: radii of look-ups by name, bytes, and photons in the photon maps."""
@@ -70,6 +73,12 @@ class Tally:
         """An irradiance cache of so many records and bytes."""
         self.records += records
         self.map_bytes += size
+
+    def add_estimates(self, counts: Mapping[str, int]) -> None:
+        """Estimates of gathers by what became of pixels (`pmviewer.engine.stages.estimation.Estimates.counts`)."""
+        for name, count in counts.items():
+            self.estimates[name] = self.estimates.get(name, 0) + count
+        self.records += counts["gathered"]
 
     def add_counts(self, counts: NDArray[np.int64]) -> None:
         """Counts of an eye-pass kernel (`pmviewer.render.record`)."""

@@ -64,6 +64,7 @@ PATH_STRIDE = 2
 """A path takes two dimensions a surface."""
 PATH_SCATTER = _dimension((PATH,), 2, "scattering and roulette", DEPTH, PATH_STRIDE)
 PATH_LIGHT = _dimension((PATH,), 3, "first light sample", DEPTH, PATH_STRIDE)
+PATH_FLIGHT = _dimension((PATH,), 3000, "flight through media to a surface or collision", DEPTH)
 GATHER = _dimension((EYE,), 2000, "gather ray by the BSDF, where all are")
 GATHER_BESIDE = _dimension((EYE,), 2001, "gather ray by the BSDF, beside guided ones")
 GATHER_GUIDED = _dimension((EYE,), 2002, "gather ray guided by photons")
@@ -73,6 +74,10 @@ CHAIN_LIGHT = _dimension((EYE,), 4000, "first light sample at followed lobes", D
 OUTLINE = _dimension((EYE,), 5000, "camera ray for emission alone, and its place on the lens")
 LENS = _dimension((EYE, PATH), 5001, "place on the lens")
 FURTHER_LIGHT = _dimension((EYE, PATH, SECOND_GATHER), 6000, "light sample after a surface's first", LIGHT_SAMPLE)
+VOLUME = _dimension((EYE,), 0x50000, "distance and lights of single scattering on a camera ray", DEPTH)
+VOLUME_PHASE = _dimension((EYE,), 0x60000, "direction and distance by the phase function on a camera ray", DEPTH)
+GATHER_VOLUME = _dimension((EYE,), 0x70000, "the same on a gather ray", DEPTH)
+GATHER_VOLUME_PHASE = _dimension((EYE,), 0x80000, "the same on a gather ray, by the phase function", DEPTH)
 VIRTUAL_SUBSET = _dimension((EYE,), 0x10000, "which virtual lights a pixel asks for")
 WALK = _dimension((EYE,), 0x20000, "gathering walk's way from the surface that it normalises")
 WALK_SCATTER = _dimension((EYE,), 0x20001, "gathering walk's scattering and roulette", BOUNCE)
@@ -92,6 +97,7 @@ PHOTON_SCATTER = _dimension((PHOTON, VIRTUAL_LIGHT), 1, "scattering and roulette
 EMITTER = _dimension((PHOTON, VIRTUAL_LIGHT), 0xE817, "choice of light")
 PROJECTION_ACCEPT = _dimension((PHOTON,), 0xE818, "cosine of the light in projection maps of the world's directions")
 STRATUM = _dimension((PHOTON,), 0xE819, "finer digits of the choice of a stratum")
+PHOTON_FLIGHT = _dimension((PHOTON,), 0x50000, "flight through media to a surface or collision", BOUNCE)
 STORE = _dimension((PHOTON,), 0x10000, "whether the photon is stored", BOUNCE)
 COPIES = _dimension((PHOTON,), 0x20000, "how often the photon is stored", BOUNCE)
 

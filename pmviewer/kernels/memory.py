@@ -103,6 +103,30 @@ load_i8 = _loader(types.int64, I64, np.int64)
 load_f8 = _loader(types.float64, F64, np.float64)
 
 
+def _storer(numba_type, llvm_type, dtype):
+    size = np.dtype(dtype).itemsize
+
+    def _store(address, index, value):
+        at_address(int(address) + size * int(index), 1, dtype)[0] = value
+
+    @with_twin(_store)
+    def store(typingctx, address, index, value):
+        signature = types.void(types.int64, types.int64, numba_type)
+
+        def codegen(context, builder, sig, args):
+            base = builder.inttoptr(args[0], llvm_type.as_pointer())
+            builder.store(args[2], builder.gep(base, [args[1]]))
+            return context.get_dummy_value()
+
+        return signature, codegen
+
+    return store
+
+
+store_f4 = _storer(types.float32, F32, np.float32)
+store_i4 = _storer(types.int32, I32, np.int32)
+
+
 @with_twin(lambda address: at_address(address, 1, np.int64)[0])
 def load_shared_i8(typingctx, address):
     """The int64 at a multiple of eight, whole even while another thread stores there (LLVM `monotonic`)."""

@@ -74,6 +74,14 @@ THIN_FIELDS: list[tuple[str, str]] = [
 ]
 """Of scenes where some rays pass panes of glass straight, see `pmviewer.kernels.bsdf.thin_glass`."""
 
+MEDIA_FIELDS: list[tuple[str, str]] = [
+    ("media", "i8"),  # float32 (n_media, MEDIUM_COLUMNS), see `pmviewer.kernels.media.medium`
+    ("prim_media", "i8"),  # int32 (n_prims, 2): the media inside and outside of each primitive, SAME where none ends
+    ("emits", "i8"),  # whether some of them emit light
+    ("light_media", "i8"),  # int32 (n_lights,): the medium that photons of a light start in
+]
+"""Of scenes with participating media."""
+
 
 def scene_dtype(
     bsdfs: bool = False,
@@ -84,6 +92,7 @@ def scene_dtype(
     opacity: bool = False,
     principled: bool = False,
     blends: bool = False,
+    media: bool = False,
 ) -> np.dtype:
     """The record of a scene with or without these features.
 
@@ -98,6 +107,7 @@ def scene_dtype(
         *(INSTANCE_FIELDS if instances else []),
         *(COLOUR_FIELDS if colours else []),
         *(OPACITY_FIELDS if opacity else []),
+        *(MEDIA_FIELDS if media else []),
     ]
     # In front, since numba warns where one record begins like another.
     return np.dtype([*extra, *_FIELDS], align=True)

@@ -19,7 +19,14 @@ from pmviewer.errors import OutputError, SceneError, SettingError
 from pmviewer.library.photons import Photons, check_map, photons_of
 from pmviewer.output.diagnostic_views import DIAGNOSTICS, HELD_WHILE_SHOWN
 from pmviewer.output.files import check_target
-from pmviewer.output.frame_export import LAYERS, RADIANCE_UNIT, shown_pixels, write_frame_exr, write_frame_png
+from pmviewer.output.frame_export import (
+    LAYERS,
+    RADIANCE_UNIT,
+    VOLUME_LAYERS,
+    shown_pixels,
+    write_frame_exr,
+    write_frame_png,
+)
 from pmviewer.output.metric import Metrics, metrics
 from pmviewer.output.session_file import write_session
 from pmviewer.output.tone import to_uint8
@@ -31,7 +38,7 @@ Look = Callable[[Frame, str, str | None], Inspection]
 """Makes a diagnostic view, of a map if one is named, for a frame. Raises SettingError."""
 
 SUFFIXES = (".exr", ".png", ".toml")
-VIEWS = (*LAYERS, *HELD_WHILE_SHOWN)
+VIEWS = (*LAYERS, *VOLUME_LAYERS, *HELD_WHILE_SHOWN)
 UNITS = {"albedo": "", "normal": "", "depth": "scene units"}
 """Of views that are no radiance."""
 
@@ -54,7 +61,7 @@ class RenderedFrame:
 
     @property
     def beauty(self) -> Image:
-        """The image (h, w, 3): the sum of the five terms, bit for bit."""
+        """The image (h, w, 3): the sum of the terms, bit for bit."""
         return self.view("beauty")
 
     @property
@@ -130,7 +137,7 @@ class RenderedFrame:
         """
         if name in HELD_WHILE_SHOWN:
             plane = self._held(name, map).image(name)
-        elif name in LAYERS:
+        elif name in (*LAYERS, *VOLUME_LAYERS):
             if map is not None:
                 raise SettingError(f"The view '{name}' is of no map: leave out map={map!r}.")
             plane = self.frame.image(name)

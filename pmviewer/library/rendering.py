@@ -16,7 +16,7 @@ from pmviewer.engine.ahead.beside import beside
 from pmviewer.engine.effects import facts_of, inactive_reason
 from pmviewer.engine.frame import Frame, PhotonCloud
 from pmviewer.engine.inspection import Inspection
-from pmviewer.engine.opened import open_scene, relit
+from pmviewer.engine.opened import arrangement_of, open_scene, rearranged
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
@@ -74,7 +74,7 @@ class Rendering:
             self._opened = open_scene(
                 scene,
                 self._parameters,
-                self._settings.light.rig,
+                arrangement_of(self._settings),
                 beside(self._settings, threads),
                 self._search_paths,
             )
@@ -106,11 +106,21 @@ class Rendering:
             settings = changed_by(self._settings, {**(values or {}), **more})
             changed = changed_stages(self._settings, settings)
             if "scene" in changed:
-                self._opened = relit(self._opened, settings.light.rig)
+                self._opened = rearranged(self._opened, arrangement_of(settings))
                 self._store.clear()
             if changed - {"display", "stop"}:
                 self._renderer = None
             self._settings = settings
+
+    def edit(self, edits: Mapping[str, Any]) -> None:
+        """Change lights, materials and objects, on top of what is edited already: `s.edit({"light.1.power": 2,
+        "material.wall.colour": (0.8, 0.2, 0.2)})`. None takes an edit back. Names are the file's or numbers from 1.
+
+        What was rendered is forgotten. Raises SettingError for what can't be an edit, SceneError for what the scene
+        does not have; nothing is changed then.
+        """
+        changes: dict[str, Any] = {**self._settings.edit.changes, **edits}
+        self.set({"edit.changes": {name: value for name, value in changes.items() if value is not None}})
 
     def get(self, name: str) -> Any:
         """The value of a setting, by the same names. Raises SettingError."""

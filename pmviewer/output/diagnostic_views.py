@@ -13,7 +13,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.output.falsecolour import COLOURS, DIVERGING, Scale, false_colour, scale_around_one, scale_of
+from pmviewer.output.colour_maps import CLASSES
+from pmviewer.output.false_look import Look, Own
+from pmviewer.output.falsecolour import Scale, false_colour
 
 Family = Literal[
     "look-up",
@@ -24,6 +26,9 @@ Family = Literal[
     "storing",
     "convergence",
     "virtual lights",
+    "estimation",
+    "error",
+    "difference",
 ]
 DENOISED = "denoised"
 """The one view of those that a frame holds only while it is shown that is a picture (`pmviewer.output.denoise`)."""
@@ -32,8 +37,8 @@ DIMMED = 0.4
 """Brightness of cells whose radiance photon is the nearest, but not near enough to be used."""
 GREY = (0.16, 0.16, 0.16)
 """Display-encoded colour of pixels in which there is nothing to tell."""
-CLASS_COLOURS = ((0.86, 0.27, 0.22), (0.35, 0.74, 0.36), (0.27, 0.48, 0.9))
-"""Display-encoded; the caustic convergence of Suykens and Willems, figure 6: red, green, blue."""
+CLASS_COLOURS = CLASSES["usual"]
+"""Of caustic convergence, unless the display settings choose others."""
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
@@ -56,11 +61,19 @@ class DiagnosticView:
     """Values are ratios, shown by how far they are below or above 1."""
     classes: tuple[str, ...] = ()
     """Values are numbers of classes with these names, in CLASS_COLOURS."""
+    signed: bool = False
+    """Values may be below zero, which is the middle of the colours; there is something to tell in every pixel."""
 
     @property
-    def colours(self) -> NDArray[np.float32]:
-        """The table (256, 3) of its colours."""
-        return DIVERGING if self.diverging else COLOURS
+    def own(self) -> Own:
+        """How its numbers become colours by themselves; counts start at none."""
+        from_none = self.unit in ("photons", "divisions")
+        return Own(self.unit, self.log, self.fixed, self.diverging, self.signed, from_none)
+
+    @property
+    def in_colours(self) -> bool:
+        """Whether its values are shown on a scale."""
+        return not (self.cells or self.classes)
 
 
 DIAGNOSTICS: Mapping[str, DiagnosticView] = {
@@ -154,8 +167,33 @@ DIAGNOSTICS: Mapping[str, DiagnosticView] = {
         "",
         "no weighted light",
     ),
+    "estimation mask": DiagnosticView(
+        "estimation",
+        "where the latest pass could estimate gathers: critical pixels gather as usual",
+        "",
+        "no diffuse surface seen first",
+        classes=("critical", "safe"),
+    ),
+    "gathered points": DiagnosticView(
+        "estimation",
+        "how the latest pass got the indirect light of a pixel",
+        "",
+        "no diffuse surface seen first",
+        classes=("gathered as usual", "interpolated", "full gather"),
+    ),
+    "subdivision level": DiagnosticView(
+        "estimation",
+        "how often the tile was divided in which the latest pass interpolated or gathered the pixel",
+        "divisions",
+        "gathered as usual",
+    ),
 }
 HELD_WHILE_SHOWN = (DENOISED, *DIAGNOSTICS)
+ERROR = DiagnosticView(
+    "error", "(I–R)²/(R²+0.01) of each pixel, mean of the channels", "", "", log=True, fixed=(1e-5, 1.0)
+)
+"""The view *error*, which needs a reference and nothing of the frame but its picture. Its scale is the same for every
+picture, so that two can be compared."""
 
 
 def scalar(values: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -165,18 +203,15 @@ def scalar(values: NDArray[np.floating]) -> NDArray[np.float32]:
     return (values @ np.array(LUMINANCE, np.float32)).astype(np.float32)
 
 
-def view_scale(view: str, plane: NDArray[np.floating]) -> Scale:
+def told(info: DiagnosticView, values: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Those of the values (h, w) in whose pixels there is something to tell, (n,); what is no number counts."""
+    return values.reshape(-1) if info.signed else values[~(values < 0)]
+
+
+def view_scale(view: str, plane: NDArray[np.floating], look: Look | None = None) -> Scale:
     """The scale on which a plane of that view is shown."""
     info = DIAGNOSTICS[view]
-    if info.fixed is not None:
-        return Scale(*info.fixed, unit=info.unit)
-    values = scalar(plane)
-    if info.diverging:
-        return scale_around_one(values, unit=info.unit)
-    scale = scale_of(values[values >= 0], info.log, info.unit)
-    if info.unit == "photons":  # counts start at none
-        return Scale(0.0, max(scale.upper, 1.0), unit=info.unit)
-    return scale
+    return (look or Look()).scale(info.own, told(info, scalar(plane)))
 
 
 def cell_colours(cells: NDArray[Any]) -> NDArray[np.float32]:
@@ -191,16 +226,22 @@ def cell_colours(cells: NDArray[Any]) -> NDArray[np.float32]:
     return (np.float32(0.25) + np.float32(0.75) * parts).astype(np.float32)
 
 
-def coloured(view: str, plane: NDArray[np.floating]) -> NDArray[np.float32]:
+def coloured(view: str, plane: NDArray[np.floating], look: Look | None = None) -> NDArray[np.float32]:
     """Display-encoded picture (h, w, 3) of a plane."""
+    return coloured_by(DIAGNOSTICS[view], plane, look or Look())
+
+
+def coloured_by(info: DiagnosticView, plane: NDArray[np.floating], look: Look) -> NDArray[np.float32]:
+    """The same of any kind of view in false colours."""
     values = scalar(plane)
-    if DIAGNOSTICS[view].classes:
-        pixels = np.array(CLASS_COLOURS, np.float32)[np.maximum(values, 0).astype(int)]
-    elif DIAGNOSTICS[view].cells:
+    if info.classes:
+        pixels = np.array(look.class_colours, np.float32)[np.maximum(values, 0).astype(int)]
+    elif info.cells:
         cells = np.floor(np.maximum(values, 0))
         pixels = cell_colours(cells)
         pixels[values > cells] *= np.float32(DIMMED)
     else:
-        pixels = false_colour(values, view_scale(view, plane), DIAGNOSTICS[view].colours)
-    pixels[values < 0] = GREY
+        pixels = false_colour(values, look.scale(info.own, told(info, values)), look.table(info.own))
+    if not info.signed:
+        pixels[values < 0] = GREY
     return pixels

@@ -9,56 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.output.tone import MAGENTA, srgb_encode
+from pmviewer.output.colour_maps import SEQUENTIAL, TWO_SIDED
+from pmviewer.output.tone import MAGENTA
 
-_OKLAB_TO_LMS = np.array(
-    [
-        [1.0, 0.3963377774, 0.2158037573],
-        [1.0, -0.1055613458, -0.0638541728],
-        [1.0, -0.0894841775, -1.2914855480],
-    ]
-)
-_LMS_TO_RGB = np.array(
-    [
-        [4.0767416621, -3.3077115913, 0.2309699292],
-        [-1.2684380046, 2.6097574011, -0.3413193965],
-        [-0.0041960863, -0.7034186147, 1.7076147010],
-    ]
-)
-
-
-def _oklab_to_rgb(lab: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Oklab (n, 3) to linear sRGB (B. Ottosson, "A perceptual color space for image processing", 2020)."""
-    return (lab @ _OKLAB_TO_LMS.T) ** 3 @ _LMS_TO_RGB.T
-
-
-def _table(size: int) -> NDArray[np.float32]:
-    """Lightness rises evenly while the hue turns from violet over blue and green to yellow. Chroma is lowest in the
-    middle, where the screen's gamut is narrowest, and never leaves the gamut."""
-    t = np.linspace(0.0, 1.0, size)
-    lightness = 0.22 + 0.72 * t
-    hue = np.radians(305.0 - 200.0 * t)
-    d = t - 0.45
-    chroma = 0.085 + np.where(d < 0, 0.1, 0.28) * d**2
-    rgb = _oklab_to_rgb(np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], 1))
-    return srgb_encode(rgb.astype(np.float32))
-
-
-def _diverging(size: int) -> NDArray[np.float32]:
-    """From blue over a light grey to orange: lightness falls evenly from the middle to both ends, which colour-blind
-    eyes tell apart as well."""
-    t = np.linspace(-1.0, 1.0, size)
-    off = np.abs(t)
-    lightness = 0.93 - 0.48 * off
-    hue = np.radians(np.where(t < 0, 255.0, 55.0))
-    chroma = 0.13 * np.sin(0.5 * np.pi * np.minimum(1.6 * off, 1.0))
-    rgb = _oklab_to_rgb(np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], 1))
-    return srgb_encode(np.clip(rgb, 0.0, 1.0).astype(np.float32))
-
-
-COLOURS: NDArray[np.float32] = _table(256)
-"""(256, 3), display-encoded, dark violet to light yellow. Its lightness alone tells the order, also in grey print."""
-DIVERGING: NDArray[np.float32] = _diverging(256)
+COLOURS: NDArray[np.float32] = SEQUENTIAL["violet-yellow"]
+"""(256, 3), display-encoded, dark violet to light yellow."""
+DIVERGING: NDArray[np.float32] = TWO_SIDED["blue-orange"]
 """(256, 3), display-encoded: below, at and above a middle that matters."""
 
 
@@ -105,25 +61,28 @@ ERROR_SCALE = Scale(1e-5, 1.0, log=True)
 """Of a pixel's relative squared error. The same for every picture, so that two can be compared."""
 
 
-def scale_of(values: NDArray[Any], log: bool = False, unit: str = "") -> Scale:
-    """A scale from the 1st to the 99th percentile of the finite (by logarithm: positive) values, widened when they
-    are all alike; 0–1 (0.1–1 by logarithm) when there are none."""
+def scale_of(values: NDArray[Any], log: bool = False, unit: str = "", percentile: float = 1.0) -> Scale:
+    """A scale from that percentile to the one as far from the other end of the finite (by logarithm: positive) values,
+    widened when they are all alike; 0–1 (0.1–1 by logarithm) when there are none."""
     values = np.asarray(values, np.float64)
     good = values[np.isfinite(values) & (values > 0 if log else True)]
     if not good.size:
         return Scale(0.1 if log else 0.0, 1.0, log, unit)
-    low, high = (float(v) for v in np.percentile(good, (1, 99)))
+    low, high = (float(v) for v in np.percentile(good, (percentile, 100 - percentile)))
     if high - low <= 1e-9 * max(abs(low), abs(high)):
         margin = abs(high) / 2 or 0.5
         low, high = low - margin, high + margin
     return Scale(low, high, log, unit)
 
 
-def scale_around_one(values: NDArray[Any], widest: float = 1000.0, unit: str = "") -> Scale:
-    """A logarithmic scale with 1 in its middle that holds 98 % of the positive values, 2 to `widest` either way."""
+def scale_around_one(values: NDArray[Any], widest: float = 1000.0, unit: str = "", percentile: float = 1.0) -> Scale:
+    """A logarithmic scale with 1 in its middle that holds the positive values but those beyond the percentile at either
+    end, 2 to `widest` either way."""
     values = np.asarray(values, np.float64)
     good = values[np.isfinite(values) & (values > 0)]
-    reach = max(2.0, *(np.exp(np.abs(np.log(np.percentile(good, (1, 99))))))) if good.size else 2.0
+    reach = (
+        max(2.0, *(np.exp(np.abs(np.log(np.percentile(good, (percentile, 100 - percentile))))))) if good.size else 2.0
+    )
     reach = min(float(reach), widest)
     return Scale(1.0 / reach, reach, log=True, unit=unit)
 

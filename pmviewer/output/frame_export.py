@@ -13,16 +13,20 @@ from pmviewer import __version__
 from pmviewer.errors import OutputError
 from pmviewer.output.diagnostic_views import DENOISED, DIAGNOSTICS, HELD_WHILE_SHOWN, coloured
 from pmviewer.output.exr import BEAUTY, PREFIX, Value, write_exr
+from pmviewer.output.false_look import look_of
 from pmviewer.output.png import write_png
 from pmviewer.output.shading import shaded, shades
 from pmviewer.output.side_by_side import side_by_side
 from pmviewer.output.tone import display_image, to_uint8
 from pmviewer.settings.access import Display, Settings, flat
+from pmviewer.settings.edits import as_text
 
 LAYERS = ("beauty", "emission", "direct", "specular", "caustic", "indirect", "albedo", "normal", "depth")
 """The beauty image, its terms in the order in which their sum gives it bit for bit, and the first hit's properties."""
 BEAUTY_VIEW = LAYERS[0]
-_EXR_NAMES = {"beauty": BEAUTY, "normal": "N"}
+VOLUME_LAYERS = ("volume", "volume indirect")
+"""Terms of scenes with media, added to the sum behind the others; files of other scenes don't have them."""
+EXR_NAMES = {"beauty": BEAUTY, "normal": "N", "volume indirect": "volume_indirect"}
 RADIANCE_UNIT = "W/(m^2 sr)"
 
 
@@ -126,6 +130,10 @@ class Exportable(Protocol):
         """In stops, as the display resolved it."""
 
     @property
+    def has_media(self) -> bool:
+        """Whether it has VOLUME_LAYERS."""
+
+    @property
     def diagnostics(self) -> Mapping[str, NDArray[np.float32]]:
         """Planes of `HELD_WHILE_SHOWN` that the frame holds, (h, w, c) by view."""
 
@@ -133,10 +141,16 @@ class Exportable(Protocol):
         """A layer of `LAYERS` or a plane of `diagnostics`, (h, w, c) float32; the image without a name."""
 
 
+def layers_of(frame: Exportable) -> tuple[str, ...]:
+    """The names of its layers: LAYERS, and where there are media VOLUME_LAYERS."""
+    return (*LAYERS, *VOLUME_LAYERS) if frame.has_media else LAYERS
+
+
 def frame_layers(frame: Exportable) -> dict[str, NDArray[np.float32]]:
-    """Every one of `LAYERS` by its name in an EXR file, (h, w, 3) float32, depth (h, w, 1); behind them the planes of
-    diagnostic views that the frame holds, negative where there is nothing to tell."""
-    layers = {_EXR_NAMES.get(name, name): frame.image(name) for name in LAYERS}
+    """Every one of `LAYERS` by its name in an EXR file, (h, w, 3) float32, depth (h, w, 1); behind them those of
+    VOLUME_LAYERS where there are media, and the planes of diagnostic views that the frame holds, negative where there
+    is nothing to tell."""
+    layers = {EXR_NAMES.get(name, name): frame.image(name) for name in layers_of(frame)}
     return layers | {layer_name(view): plane for view, plane in frame.diagnostics.items()}
 
 
@@ -220,7 +234,7 @@ def write_frame_png(
 def shown_pixels(frame: Exportable, view: str, display: Display) -> NDArray[np.float32]:
     """A view that the frame holds as it is shown: display-encoded, 0 … 1, (h, w, 3)."""
     if view in DIAGNOSTICS:
-        pixels = coloured(view, frame.image(view))
+        pixels = coloured(view, frame.image(view), look_of(display))
         return shaded(pixels, shades(frame.image("normal"), frame.camera), display.shading)
     return display_image(view, frame.image(view), exposure_of(frame, display), display.tone).pixels
 
@@ -258,6 +272,8 @@ def _plain(value: Any) -> Value:
 def _text(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
+    if isinstance(value, Mapping):
+        return as_text(value)
     if isinstance(value, tuple):
         return " ".join(repr(float(part)) for part in value)
     return str(value)

@@ -13,30 +13,42 @@ A session file looks like this; everything but `format` and `scene` may be missi
     [settings.photons]
     N = 100000
 
+    [[snapshots]]
+    number = 1
+    file = "caustic.snapshots/1.exr"
+
 `scene` is a bundled scene's name, or a file: absolute, or relative to the session file.
+Snapshots are EXR files (`pmviewer.output.snapshot`) in a folder beside the session file, which has its name.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
 from pmviewer import __version__
-from pmviewer.errors import PmviewerError, SceneError, SettingError
+from pmviewer.errors import OutputError, PmviewerError, SceneError, SettingError
 from pmviewer.output.files import read_file, write_file
+from pmviewer.progress import check
 from pmviewer.resources import data_folder
 from pmviewer.settings.access import SETTINGS, Settings, flat, with_values
 
+if TYPE_CHECKING:  # brings OpenEXR along, which the window doesn't wait for
+    from pmviewer.output.snapshot import Snapshot
+
 FORMAT = 1
 SUFFIX = ".toml"
-_KEYS = ("format", "program", "scene", "passes", "parameters", "settings")
+_KEYS = ("format", "program", "scene", "passes", "parameters", "settings", "snapshots")
+FOLDER = ".snapshots"
+"""Behind the session file's name, without its own ending: where its snapshots are."""
 _NEAR = 2
 """A scene up to so many folders above the session file is stored relative to it: the two probably move together."""
 
@@ -50,13 +62,23 @@ class SessionFile:
     scene: str
     passes: int
     parameters: Mapping[str, str] = field(default_factory=dict)
+    snapshots: tuple[tuple[int, Path], ...] = ()
+    """Number and file of each."""
 
 
 def write_session(
-    path: str | Path, settings: Settings, scene: str, passes: int, parameters: Mapping[str, str] | None = None
+    path: str | Path,
+    settings: Settings,
+    scene: str,
+    passes: int,
+    parameters: Mapping[str, str] | None = None,
+    snapshots: Sequence[Snapshot] = (),
 ) -> None:
-    """Write a session file; settings with their default value are left out. Raises OutputError."""
+    """Write a session file; settings with their default value are left out. Files of snapshots come first, and those of
+    the session file that is replaced go when nobody names them any more. Raises OutputError."""
     folder = Path(os.path.realpath(path)).parent
+    before = _snapshot_files(path)
+    files = _write_snapshots(Path(path), snapshots)
     tree: dict[str, Any] = {
         "format": FORMAT,
         "program": f"pmviewer {__version__}",
@@ -68,7 +90,43 @@ def write_session(
     changed = {name: value for name, value in flat(settings).items() if value != SETTINGS[name].default}
     if changed:
         tree["settings"] = _nested(changed)
+    if files:
+        tree["snapshots"] = [
+            {"number": snapshot.number, "file": file.relative_to(file.parents[1]).as_posix()}
+            for snapshot, file in zip(snapshots, files, strict=True)
+        ]
     write_file(path, tomli_w.dumps(tree).encode("utf-8"), (SUFFIX,))
+    for gone in before - set(files):
+        with contextlib.suppress(OSError):
+            gone.unlink()
+
+
+def _write_snapshots(path: Path, snapshots: Sequence[Snapshot]) -> list[Path]:
+    """The files of the snapshots, written into the session file's folder for them."""
+    folder = path.with_suffix(FOLDER)
+    if not snapshots:
+        return []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: the folder of the snapshots can't be made ({error.strerror}).") from None
+    from pmviewer.output.snapshot import write_snapshot
+
+    files = [folder / f"{snapshot.number}.exr" for snapshot in snapshots]
+    for snapshot, file in zip(snapshots, files, strict=True):
+        check()
+        write_snapshot(file, snapshot)
+    return files
+
+
+def _snapshot_files(path: str | Path) -> set[Path]:
+    """Files of snapshots that a session file has now, those in the folder with its name alone."""
+    try:
+        listed = read_session(path).snapshots
+    except (PmviewerError, OSError):
+        return set()
+    own = Path(path).with_suffix(FOLDER)
+    return {own / file.name for _, file in listed if file.parent.name == own.name}
 
 
 def read_session(path: str | Path) -> SessionFile:
@@ -131,7 +189,25 @@ def _session(tree: dict[str, Any], folder: Path) -> SessionFile:
         )
     settings = with_values(Settings(), dict(_leaves(values, "")))
     texts = {name: str(value) for name, value in parameters.items()}
-    return SessionFile(settings, _found_scene(scene, folder), passes, texts)
+    return SessionFile(
+        settings, _found_scene(scene, folder), passes, texts, _snapshots(tree.get("snapshots", []), folder)
+    )
+
+
+def _snapshots(rows: Any, folder: Path) -> tuple[tuple[int, Path], ...]:
+    """Number and file of each row; numbers are whole, positive and tell one from another."""
+    expected = 'expected rows as [[snapshots]] with number = 1 and file = "name.snapshots/1.exr"'
+    if not isinstance(rows, list):
+        raise SettingError(f"snapshots is not allowed as it is: {expected}.")
+    found: dict[int, Path] = {}
+    for row in rows:
+        number, file = (row.get("number"), row.get("file")) if isinstance(row, dict) else (None, None)
+        if not isinstance(number, int) or isinstance(number, bool) or not 0 < number < 10**6 or number in found:
+            raise SettingError(f"snapshots: {row!r} is not allowed: {expected}, each with a number of its own.")
+        if not isinstance(file, str) or not file.strip() or "\0" in file or len(row) != 2:
+            raise SettingError(f"snapshots: {row!r} is not allowed: {expected}.")
+        found[number] = folder / file
+    return tuple(found.items())
 
 
 def _nested(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,9 +10,14 @@ from PIL import Image, ImageDraw, ImageFont
 
 GAP, MARGIN = 8, 10
 TEXT = 14
-_PLAIN = str.maketrans({"×": "x", "–": "-", "≤": "<="})
+_PLAIN = str.maketrans({"×": "x", "–": "-", "≤": "<=", "→": "->", "…": "..."})
 """What the built-in font lacks."""
 GROUND, INK, DIM = (24, 24, 24), (235, 235, 235), (160, 160, 160)
+
+
+def drawable(text: str) -> str:
+    """The text in letters that the built-in font has."""
+    return text.translate(_PLAIN)
 
 
 def side_by_side(
@@ -24,8 +29,8 @@ def side_by_side(
 ) -> NDArray[np.uint8]:
     """A sheet (h, w, 3) with both pictures (h, w, 3), `captions` above them, a table of `rows` and sentences below."""
     font = ImageFont.load_default(TEXT)
-    rows = [tuple(text.translate(_PLAIN) for text in row) for row in rows]
-    notes = [note.translate(_PLAIN) for note in notes]
+    rows = [tuple(drawable(text) for text in row) for row in rows]
+    notes = [drawable(note) for note in notes]
     line = round(TEXT * 1.4)
     height, width = left.shape[:2]
     columns = [max(font.getlength(row[i]) for row in rows) for i in range(len(rows[0]))] if rows else []

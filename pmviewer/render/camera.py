@@ -61,6 +61,9 @@ class CameraPose:
     picture, which `pmviewer.engine.focus` finds."""
     filter: PixelFilter | None = None
     """Reconstruction filter of the file's film, None where it names none."""
+    medium: int | None = None
+    """Number of the medium around the eye, −1 for none, as `pmviewer.engine.immersion` finds it; None in scenes without
+    media."""
 
     @property
     def orthographic(self) -> bool:

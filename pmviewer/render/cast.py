@@ -8,7 +8,10 @@ import numpy as np
 
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import absent, has, part, specialised
+from pmviewer.kernels.media.medium import MOST_BOUNDARIES, has_media, is_boundary, medium_beyond
 from pmviewer.kernels.surface import leave, surface_at
+from pmviewer.kernels.vector import along, dot
 
 _f4 = np.float32
 _i8 = np.int64
@@ -16,18 +19,29 @@ _INF = _f4(np.inf)
 
 
 class Ray(NamedTuple):
-    """From o in the unit direction d; meets what lies between the distances near and far."""
+    """From o in the unit direction d; meets what lies between the distances near and far. `medium`: that it starts in
+    (`pmviewer.kernels.media.medium`), None in scenes without media; in others near is 0."""
 
     o: Any
     d: Any
     near: Any
     far: Any
+    medium: Any
+
+
+@specialised
+def ray_of_camera(eye, o, d, near, far):
+    """A camera ray, in the medium that the eye record says the camera is in, if it says so."""
+    if not has(eye, "medium"):
+        return lambda eye, o, d, near, far: Ray(o, d, near, far, None)
+    return lambda eye, o, d, near, far: Ray(along(o, d, near), d, _f4(0.0), far - near, _i8(eye.medium))
 
 
 class Hit(NamedTuple):
     """What a ray met: primitive (−1: nothing), the coordinates u and v on it, the distance t; there the point p, the
     geometric and the shading normal as the surface has them, and how far rays start off it. Where nothing is met, p is
-    the ray's origin and the normals are its direction."""
+    the ray's origin and the normals are its direction. `medium`: that the ray arrives in, and `crossed`: the boundaries
+    of media that it has crossed, which are no surfaces; both None in scenes without media."""
 
     prim: Any
     u: Any
@@ -37,27 +51,64 @@ class Hit(NamedTuple):
     ng: Any
     ns: Any
     gap: Any
+    medium: Any
+    crossed: Any
 
 
-@device
+@specialised
 def cast(scene, ray):
     """What the ray meets, a Hit."""
-    o, d = ray.o, ray.d
-    t, found, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], ray.near, ray.far)
-    prim = _i8(found)  # One type for every kind of scene.
-    if prim < 0:
-        return Hit(prim, u, v, t, o, d, d, _f4(0.0))
-    p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
-    return Hit(prim, u, v, t, p, ng, ns, gap)
+    if has_media(scene):
+        return lambda scene, ray: _cast_through(scene, ray)
+
+    def plain(scene, ray):
+        o, d = ray.o, ray.d
+        t, found, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], ray.near, ray.far)
+        prim = _i8(found)  # One type for every kind of scene.
+        if prim < 0:
+            return Hit(prim, u, v, t, o, d, d, _f4(0.0), None, None)
+        p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
+        return Hit(prim, u, v, t, p, ng, ns, gap, None, None)
+
+    return plain
 
 
 @device
-def ray_from(p, ng, gap, wi):
-    """The ray from a surface point with geometric normal ng, on either side, and that gap in direction wi."""
-    return Ray(leave(p, ng, gap, wi[0], wi[1], wi[2]), wi, _f4(0.0), _INF)
+def _cast_through(scene, ray):
+    """`cast` across the boundaries of media."""
+    o, d, far, medium = ray.o, ray.d, ray.far, ray.medium
+    travelled = _f4(0.0)
+    for crossed in range(MOST_BOUNDARIES):
+        t, found, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), far)
+        prim = _i8(found)
+        if prim < 0:
+            return Hit(prim, u, v, travelled + t, ray.o, d, d, _f4(0.0), medium, _i8(crossed))
+        p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
+        if not is_boundary(scene, prim):
+            return Hit(prim, u, v, travelled + t, p, ng, ns, gap, medium, _i8(crossed))
+        medium = medium_beyond(scene, prim, ng, d, medium)
+        o = leave(p, ng, gap, d[0], d[1], d[2])
+        travelled += t
+        far -= t
+    return Hit(_i8(-1), _f4(0.0), _f4(0.0), travelled, ray.o, d, d, _f4(0.0), medium, _i8(0))
+
+
+@device
+def ray_from(p, ng, gap, wi, medium):
+    """The ray from a surface point with geometric normal ng, on either side, and that gap in direction wi, which starts
+    in the medium."""
+    return Ray(leave(p, ng, gap, wi[0], wi[1], wi[2]), wi, _f4(0.0), _INF, medium)
+
+
+@specialised
+def medium_towards(si, wi):
+    """The medium on the side of a SurfaceInteraction that the direction wi points to; None in scenes without media."""
+    if absent(part(si, "media")):
+        return lambda si, wi: None
+    return lambda si, wi: si.media[0] if dot(wi, si.ng) >= _f4(0.0) else si.media[1]
 
 
 @device
 def leaving(si, wi):
     """The ray from a SurfaceInteraction in direction wi."""
-    return ray_from(si.p, si.ng, si.gap, wi)
+    return ray_from(si.p, si.ng, si.gap, wi, medium_towards(si, wi))

@@ -19,7 +19,9 @@ from pmviewer.kernels.bsdf.scattering import (
     same_side,
 )
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.dimensions import CHAIN
+from pmviewer.kernels.media.medium import has_media, medium_beyond
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face
 from pmviewer.kernels.vector import largest, mul, scale
@@ -41,7 +43,15 @@ def arrive(scene, glossy, d, hit, beta):
     wo = (-d[0], -d[1], -d[2])
     beta = attenuation(scene, material, hit.ng, d, hit.t, beta)
     b = bsdf_at(scene, hit.prim, material, hit.u, hit.v, hit.p, hit.ng, hit.ns, wo, glossy)
-    return SurfaceInteraction(hit.p, face(hit.ng, wo), hit.gap, b, wo), beta
+    return SurfaceInteraction(hit.p, face(hit.ng, wo), hit.gap, b, wo, _media(scene, d, hit)), beta
+
+
+@specialised
+def _media(scene, d, hit):
+    """`SurfaceInteraction.media` of what a ray of direction d met."""
+    if not has_media(scene):
+        return lambda scene, d, hit: None
+    return lambda scene, d, hit: (hit.medium, medium_beyond(scene, hit.prim, hit.ng, d, hit.medium))
 
 
 @device

@@ -29,6 +29,7 @@ from pmviewer.render.filter import place_in_filter
 from pmviewer.render.gather.cached import cached, surface_rays
 from pmviewer.render.gather.guide import AIM_WORDS, aim
 from pmviewer.render.given import Aim, GatherRays, Sampler, opened
+from pmviewer.render.media.volume import deposit_media
 from pmviewer.render.pixel import (
     CAUSTIC,
     DIRECT,
@@ -44,6 +45,7 @@ from pmviewer.render.pixel import (
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius
 from pmviewer.render.record import C_CUT, C_RAYS
 from pmviewer.render.reflect import reflected, unfound
+from pmviewer.render.straight import cast_on
 from pmviewer.render.virtual_lights.lit import note_object, virtual_light
 
 _f4 = np.float32
@@ -59,10 +61,10 @@ def _outline_ray(scene, eye, pixel, j):
     ux, uy, a, b = draw4(eye.sequence, pixel.seed, index, OUTLINE)
     x, y, weight = place_in_filter(eye, ux, uy)
     ray = lens_ray(eye, pixel.number, x, y, a, b)
-    hit = cast(scene, ray)
+    hit, tint = cast_on(scene, ray, False)
     light = met_light(scene, hit)
     if light >= 0:
-        return radiance_of(scene, light, hit, ray.d), weight
+        return mul(tint, radiance_of(scene, light, hit, ray.d)), weight
     return BLACK, weight
 
 
@@ -119,7 +121,7 @@ def _stored(given, si, beta, pixel, place, scratch, whole):
     numbers for the first light sample; scratch: lists of lights and of photons. Returns the choice of lights."""
     eye = given.eye
     u_pick, bu, bv, u_lobe = draw4(eye.sequence, pixel.seed, eye.index, BSDF)
-    known, gather = cached(given, si, pixel.counts)
+    known, gather = cached(given, si, pixel, whole)
     aimed = Aim(scratch[1], _i8(0), _i8(0))
     if gather > 0:
         aimed = aim(given, si, pixel.seed, scratch[1])
@@ -203,6 +205,7 @@ def eye_pass(given, outline, radii, film, counts, first, last):
         for depth in range(eye.max_depth + 1):
             hit = cast(scene, ray)
             counts[C_RAYS] += 1
+            beta = deposit_media(given, ray, hit, beta, pixel, depth)
             whole = depth == 0
             seen = EMISSION if whole else SPECULAR
             if hit.prim < 0:

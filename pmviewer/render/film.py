@@ -6,17 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.render.planes import CHANNELS, PLANES, TERMS
+from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS, PLANES, TERMS
 
 LEAST_WEIGHT = 0.5
 """Mean weight from which a pixel's samples are divided by it."""
-_WEIGHED = PLANES["emission"], slice(PLANES["emission"].stop, PLANES[TERMS[-1]].stop)
-"""Channels by the two columns of weights."""
+_WEIGHED = (
+    (PLANES["emission"], 0),
+    (slice(PLANES["emission"].stop, PLANES[TERMS[-1]].stop), 1),
+    (slice(CHANNELS, MEDIA_CHANNELS), 1),
+)
+"""Channels, and which of the two columns of weights is theirs."""
 
 
 @kernel
 def resolve(sums, passes, out, first, last):
-    """Means of pixels first … last−1: sums (n, ≥ CHANNELS) float64, out (n, CHANNELS) float32."""
+    """Means of pixels first … last−1: sums (n, ≥ channels) float64, out (n, channels) float32."""
     inverse = 1.0 / passes
     for pixel in range(first, last):
         for c in range(out.shape[1]):
@@ -24,24 +28,25 @@ def resolve(sums, passes, out, first, last):
 
 
 class Film:
-    """Sums of `passes` samples per pixel: `sums` (height·width, CHANNELS + further) float64, `further` being sums that
-    a method keeps beside the planes; `radii` of the pixels' look-ups in the latest pass
+    """Sums of `passes` samples per pixel: `sums` (height·width, channels + further) float64, `channels` being those of
+    `pmviewer.render.planes`, with media MEDIA_CHANNELS, and `further` sums that a method keeps beside the planes;
+    `radii` of the pixels' look-ups in the latest pass
     (`pmviewer.render.pixel_radius`), None where all have that of the pass; `weights` (height·width, 2) float64, sums
     of what samples count by a filter with negative parts (`pmviewer.render.filter`), in the term emission and in all
     others, None where each counts 1."""
 
-    def __init__(self, width: int, height: int, further: int = 0) -> None:
-        self.width, self.height = width, height
-        self.sums: NDArray[np.float64] = np.zeros((width * height, CHANNELS + further), np.float64)
+    def __init__(self, width: int, height: int, further: int = 0, channels: int = CHANNELS) -> None:
+        self.width, self.height, self.channels = width, height, channels
+        self.sums: NDArray[np.float64] = np.zeros((width * height, channels + further), np.float64)
         self.radii: NDArray[np.float32] | None = None
         self.weights: NDArray[np.float64] | None = None
         self.passes = 0
 
     def planes(self) -> NDArray[np.float32]:
-        """Means (height, width, CHANNELS) float32."""
-        out = np.empty((self.height * self.width, CHANNELS), np.float32)
+        """Means (height, width, channels) float32."""
+        out = np.empty((self.height * self.width, self.channels), np.float32)
         resolve(self.sums, float(max(self.passes, 1)), out, 0, len(out))
-        return self.weighed(out.reshape(self.height, self.width, CHANNELS))
+        return self.weighed(out.reshape(self.height, self.width, self.channels))
 
     def weighed(self, planes: NDArray[np.float32]) -> NDArray[np.float32]:
         """The planes with their terms divided by the mean weight of each pixel's samples in place of 1.
@@ -52,7 +57,8 @@ class Film:
         if self.weights is None:
             return planes
         means = self.weights.reshape(self.height, self.width, 2) / max(self.passes, 1)
-        for channels, weights in zip(_WEIGHED, np.moveaxis(means, 2, 0), strict=True):
+        for channels, column in _WEIGHED:
+            weights = means[..., column]
             known = np.abs(weights) >= LEAST_WEIGHT
             terms = np.where(known[..., None], planes[..., channels] / np.where(known, weights, 1.0)[..., None], 0.0)
             planes[..., channels] = terms if known.all() else np.where(known[..., None], terms, _around(terms, known))

@@ -5,7 +5,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from pmviewer.kernels.compile.jit import inlined
+from pmviewer.maps.variant import ABSENT
 from pmviewer.maps.virtual_lights import NO_VIRTUAL
+
+NO_VOLUME = ABSENT
+"""Stands for the photons in media where there are none."""
 
 
 class PassData(NamedTuple):
@@ -13,8 +17,9 @@ class PassData(NamedTuple):
 
     scene: SCENE_DTYPE; eye: EYE_DTYPE; caustic_map, global_map: of grids or kd-trees; choice_map: of the grid of
     photons that choose lights; radiance: of the radiance photons, or NO_RADIANCE_PHOTONS; cache: of the irradiance
-    cache, or NO_CACHE; shadows: of the shadow photons, or NO_SHADOWS; guides: of the photons that guide gather rays,
-    or NO_GUIDES; corner: CORNERS or NO_CORNERS; virtual: of the virtual lights, or NO_VIRTUAL.
+    cache, or of estimates (`pmviewer.render.gather.estimation.ESTIMATES`), or NO_CACHE; shadows: of the shadow photons,
+    or NO_SHADOWS; guides: of the photons that guide gather rays, or NO_GUIDES; corner: CORNERS or NO_CORNERS; virtual:
+    of the virtual lights, or NO_VIRTUAL; volume_map: of the grid of photons in media, or NO_VOLUME.
     """
 
     scene: Any
@@ -28,17 +33,20 @@ class PassData(NamedTuple):
     guides: Any
     corner: Any
     virtual: Any = NO_VIRTUAL
+    volume_map: Any = NO_VOLUME
 
 
 class SurfaceInteraction(NamedTuple):
     """A surface point seen from wo: p; ng, the geometric normal on the side of wo; gap, how far rays start off the
-    surface; bsdf, of `pmviewer.kernels.bsdf.scattering`; wo, unit."""
+    surface; bsdf, of `pmviewer.kernels.bsdf.scattering`; wo, unit; media, those on the side of wo and behind the
+    surface (`pmviewer.kernels.media.medium`), None in scenes without."""
 
     p: Any
     ng: Any
     gap: Any
     bsdf: Any
     wo: Any
+    media: Any
 
 
 class Sampler(NamedTuple):
@@ -85,4 +93,5 @@ def opened(given):
         given.guides[0],
         given.corner[0],
         given.virtual[0],
+        given.volume_map[0],
     )

@@ -20,7 +20,7 @@ from pmviewer.kernels.dimensions import LENS
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import add, along, dot, scale
 from pmviewer.kernels.warp import square_to_disk
-from pmviewer.render.cast import Ray
+from pmviewer.render.cast import ray_of_camera
 
 _f4 = np.float32
 
@@ -68,4 +68,4 @@ def through_lens(eye, raw, a, b):
     towards = along(towards, point, -eye.inverse_focus)
     d = scale(towards, _f4(1.0) / _f4(math.sqrt(dot(towards, towards))))
     per_depth = _f4(1.0) / dot(d, forward)
-    return Ray(o, d, eye.near * per_depth, eye.far * per_depth), towards
+    return ray_of_camera(eye, o, d, eye.near * per_depth, eye.far * per_depth), towards

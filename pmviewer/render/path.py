@@ -22,12 +22,15 @@ from pmviewer.render.chain import WHITE, arrive, scatter
 from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power
 from pmviewer.render.direct.direct import light_samples, met_light, power_heuristic, radiance_of
 from pmviewer.render.given import Sampler
+from pmviewer.render.media.path_flight import arrive_by_flight, scatter_in_medium
 from pmviewer.render.pixel import (
     CAUSTIC,
     DIRECT,
     EMISSION,
     INDIRECT,
     SPECULAR,
+    VOLUME,
+    VOLUME_INDIRECT,
     Pixel,
     deposit,
     properties,
@@ -40,14 +43,23 @@ ROULETTE_DEPTH = 8
 
 
 @device
-def term_of(eye, mirrored, stored, by_chain):
+def term_of(eye, mirrored, stored, by_chain, in_medium):
     """The term of light that arrives after the lobes that a path took: `stored` of those that photons are stored for,
-    with followed ones before (`mirrored`) and right after (`by_chain`) the first of them."""
+    collisions in media among them, with followed ones before (`mirrored`) and right after (`by_chain`) the first of
+    them, which was a collision or not (`in_medium`)."""
     if mirrored:
         return SPECULAR
+    if in_medium:
+        return VOLUME if stored == 1 and not by_chain else VOLUME_INDIRECT
     if by_chain and (stored == 1 or eye.indirect_caustics != 0):
         return CAUSTIC
     return DIRECT if stored == 1 else INDIRECT
+
+
+@device
+def path_survival(depth, beta):
+    """Probability with which a path goes on."""
+    return min(largest(beta), _f4(0.95)) if depth >= ROULETTE_DEPTH else _f4(1.0)
 
 
 @kernel
@@ -62,13 +74,42 @@ def path_pass(scenes, eyes, film, counts, first, last):
         stored = 0  # how often the path took lobes that photons are stored for
         mirrored = False  # whether it took a followed lobe before the first of these
         by_chain = False  # whether it took one right after the first of these
+        in_medium = False  # whether the first of these was a collision in a medium
         origin, pdf = ray.o, _f4(0.0)  # where the last direction was sampled, and its density, 0 if the lobe is a delta
         for depth in range(eye.max_depth + 1):
-            hit = cast(scene, ray)
-            counts[C_RAYS] += 1
+            arrival = arrive_by_flight(scene, eye, ray, beta, seed, depth)
+            hit = arrival.hit
+            counts[C_RAYS] += arrival.rays
             term = EMISSION
             if depth > 0:
-                term = term_of(eye, mirrored, stored, by_chain)
+                term = term_of(eye, mirrored, stored, by_chain, in_medium)
+            if largest(arrival.emitted) > _f4(0.0):
+                deposit(pixel, term, mul(beta, arrival.emitted))
+            beta = arrival.beta
+            if not largest(beta) > _f4(0.0):
+                break
+            if arrival.collides:
+                if depth == 0:
+                    seen = cast(scene, ray)
+                    if seen.prim >= 0:
+                        si, _ = arrive(scene, eye.glossy, ray.d, seen, beta)
+                        properties(eye, pixel, si)
+                if depth == eye.max_depth:
+                    counts[C_CUT] += 1
+                    break
+                stored += 1
+                in_medium = in_medium or stored == 1
+                u, v, u_lobe, u_end = draw4(eye.sequence, seed, eye.index, PATH_SCATTER + PATH_STRIDE * depth)
+                u_pick, lu, lv, _ = draw4(eye.sequence, seed, eye.index, PATH_LIGHT + PATH_STRIDE * depth)
+                after = scatter_in_medium(scene, eye, ray, arrival, choice, sampler, (u_lobe, u, v), (u_pick, lu, lv))
+                counts[C_RAYS] += after.rays
+                counts[C_SHADOW_RAYS] += after.rays
+                deposit(pixel, term_of(eye, mirrored, stored, by_chain, in_medium), after.L)
+                survival = path_survival(depth, after.beta)
+                if not u_end < survival:
+                    break
+                origin, ray, pdf, beta = after.ray.o, after.ray, after.pdf, scale(after.beta, _f4(1.0) / survival)
+                continue
             if hit.prim >= 0:
                 si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
             light = met_light(scene, hit)
@@ -104,14 +145,13 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 L, rays, _ = light_samples(scene, None, si, group, choice, eye.mis, sampler, (u_pick, lu, lv))
                 counts[C_RAYS] += rays
                 counts[C_SHADOW_RAYS] += rays
-                deposit(pixel, term_of(eye, mirrored, stored, by_chain), mul(beta, L))
+                deposit(pixel, term_of(eye, mirrored, stored, by_chain, in_medium), mul(beta, L))
             wi, beta, pdf, compression = scatter(scene, si, group, beta, u_lobe, u, v)
             beta = scale(beta, compression)
             if not largest(beta) > _f4(0.0):
                 break
-            if depth >= ROULETTE_DEPTH:
-                survival = min(largest(beta), _f4(0.95))
-                if not u_end < survival:
-                    break
-                beta = scale(beta, _f4(1.0) / survival)
+            survival = path_survival(depth, beta)
+            if not u_end < survival:
+                break
+            beta = scale(beta, _f4(1.0) / survival)
             origin, ray = si.p, leaving(si, wi)

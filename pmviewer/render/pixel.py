@@ -13,7 +13,7 @@ from pmviewer.kernels.dimensions import PIXEL, PIXEL_SALT
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.surface import face
 from pmviewer.kernels.vector import add, dot, is_good, normalize
-from pmviewer.render.cast import Ray
+from pmviewer.render.cast import ray_of_camera
 from pmviewer.render.filter import place_in_filter
 from pmviewer.render.lens import lens_numbers, through_lens
 from pmviewer.render.planes import PLANES
@@ -29,6 +29,8 @@ EMISSION, DIRECT, SPECULAR, CAUSTIC, INDIRECT, ALBEDO, NORMAL, DEPTH = (
     for name in ("emission", "direct", "specular", "caustic", "indirect", "albedo", "normal", "depth")
 )
 """First column of each plane of the film."""
+VOLUME, VOLUME_INDIRECT = PLANES["volume"].start, PLANES["volume indirect"].start
+"""Those of scenes with media."""
 
 
 class Pixel(NamedTuple):
@@ -69,14 +71,14 @@ def camera_ray(eye, pixel, u, v):
     o = (eye.x_eye, eye.y_eye, eye.z_eye)
     d = _raw_direction(eye, pixel, u, v)
     if eye.orthographic != 0:
-        return Ray(add(o, d), (eye.x_forward, eye.y_forward, eye.z_forward), eye.near, eye.far)
+        return ray_of_camera(eye, add(o, d), (eye.x_forward, eye.y_forward, eye.z_forward), eye.near, eye.far)
     d = normalize(d)
     far = eye.far / dot(d, (eye.x_forward, eye.y_forward, eye.z_forward))
     near = _f4(0.0)
     if eye.near > near:
         towards = dot(d, (eye.x_near, eye.y_near, eye.z_near))
         near = eye.near / towards if towards > near else _INF
-    return Ray(o, d, near, far)
+    return ray_of_camera(eye, o, d, near, far)
 
 
 @specialised

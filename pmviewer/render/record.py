@@ -62,11 +62,21 @@ _FIELDS: list[tuple] = [
 ]
 
 
-def eye_dtype(lens: bool = False, filtered: bool = False) -> np.dtype:
-    """The record of a camera with a lens or without, and a reconstruction filter other than the plain box or not:
-    kernels are compiled for the record's type, so that what is not there costs nothing."""
+MEDIA_FIELDS: list[tuple[str, str]] = [
+    ("medium", "i8"),  # that the camera is in, VACUUM for none
+    ("volume_light", "i4"),  # whether light that media scatter towards the camera is sampled
+    ("phase_rays", "i4"),  # and found by the phase function, too: there are lights that rays can meet
+    ("volume_radius", "f4"),  # of look-ups around rays
+]
+"""Of scenes with participating media."""
+
+
+def eye_dtype(lens: bool = False, filtered: bool = False, media: bool = False) -> np.dtype:
+    """The record of a camera with a lens or without, a reconstruction filter other than the plain box or not, and of a
+    scene with media or without: kernels are compiled for the record's type, so that what is not there costs nothing."""
     # In front, since numba warns where one record begins like another.
-    return np.dtype([*(LENS_FIELDS if lens else []), *(FILTER_FIELDS if filtered else []), *_FIELDS], align=True)
+    extra = [*(LENS_FIELDS if lens else []), *(FILTER_FIELDS if filtered else []), *(MEDIA_FIELDS if media else [])]
+    return np.dtype([*extra, *_FIELDS], align=True)
 
 
 EYE_DTYPE = eye_dtype()
@@ -84,7 +94,8 @@ themselves; paths from the camera that `max_depth` ended."""
 @dataclass(frozen=True)
 class Evaluation:
     """How a pass evaluates the terms of the picture: what it samples, and what it looks up in which maps. Each field is
-    one of EYE_DTYPE by its name; radii and `corner` are in scene units. The defaults sample and look up nothing."""
+    one of EYE_DTYPE by its name, the last three of scenes with media; radii and `corner` are in scene units. The
+    defaults sample and look up nothing."""
 
     direct: bool = False
     followed_direct: bool = False
@@ -107,6 +118,9 @@ class Evaluation:
     caustic_radius: float = 0.0
     global_radius: float = 0.0
     radiance_cutoff: float = 0.0
+    volume_light: bool = False
+    phase_rays: bool = False
+    volume_radius: float = 0.0
 
 
 NOTHING_EVALUATED = Evaluation()
@@ -118,8 +132,10 @@ def eye_record(
     """The record (1,) of an `eye_dtype` of pass `index`, complete: nobody writes to it afterwards. A lens must have
     been focused (`pmviewer.engine.focus`)."""
     chosen = filter_of(camera.filter, settings.render)
-    record = np.zeros(1, eye_dtype(camera.aperture > 0, chosen != BOX))
+    record = np.zeros(1, eye_dtype(camera.aperture > 0, chosen != BOX, camera.medium is not None))
     r = record[0]
+    if camera.medium is not None:
+        r["medium"] = camera.medium
     _set_camera(r, camera)
     if camera.aperture > 0:
         _set_lens(r, camera)
@@ -138,7 +154,8 @@ def eye_record(
     r["roulette"] = settings.gather.roulette
     r["radiance_similarity"] = settings.gather.similarity
     for field in fields(evaluation):
-        r[field.name] = getattr(evaluation, field.name)
+        if field.name in (record.dtype.names or ()):
+            r[field.name] = getattr(evaluation, field.name)
     return record
 
 

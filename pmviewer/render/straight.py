@@ -4,7 +4,7 @@ Camera rays, and what FOLLOWED lobes make of them, see every pane as it is. What
 light samples and the rays that find the same light by the BSDF, gather rays and those that find corners all go straight
 on, weakened and coloured by the panes on their way (`pmviewer.kernels.bsdf.thin_glass`). Light samples of FOLLOWED
 lobes do so on the way to lights that no ray can meet, whose light nothing else would find. Scenes whose records have no
-such panes compile none of it.
+such panes compile none of it. Scenes with media have no such panes, and the same rays are weakened by the media.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from pmviewer.kernels.bsdf.scattering import attenuation
 from pmviewer.kernels.bsdf.thin_glass import has_thin_glass, straight_transmittance, thin_rule
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
+from pmviewer.kernels.media.medium import has_media
 from pmviewer.kernels.scene import THIN_EXACT, THIN_IGNORED, material_of
 from pmviewer.kernels.surface import leave
 from pmviewer.kernels.vector import dot, largest, mul, sub
-from pmviewer.render.cast import Ray, cast, leaving
+from pmviewer.render.cast import Ray, cast, leaving, medium_towards
 from pmviewer.render.chain import BLACK, WHITE
+from pmviewer.render.media.through import BEFORE_LIGHT, light_through, way_through
 
-BEFORE_LIGHT = np.float32(1.0 - 2.0**-13)
-"""Shadow rays end a little before the light's own surface."""
 MOST_PANES = 256
 """A ray is stopped by the pane after so many."""
 
@@ -41,20 +41,28 @@ def visible(scene, p, ng, gap, wi, end):
 
 
 @specialised
-def transmission(scene, p, ng, gap, wi, end, straight):
-    """The share (red, green, blue) of light from `end`, in direction wi, that reaches the surface point p: all, none,
-    or what panes let through where it may go `straight`."""
-    if not has_thin_glass(scene):
-        return lambda scene, p, ng, gap, wi, end, straight: WHITE if visible(scene, p, ng, gap, wi, end) else BLACK
+def transmission(scene, si, wi, end, straight):
+    """The share (red, green, blue) of light from `end`, in direction wi, that reaches a SurfaceInteraction: all, none,
+    or what media, and where it may go `straight` panes, let through."""
+    if has_media(scene):
 
-    def through(scene, p, ng, gap, wi, end, straight):
+        def through_media(scene, si, wi, end, straight):
+            o = leave(si.p, si.ng, si.gap, wi[0], wi[1], wi[2])
+            return light_through(scene, o, end, medium_towards(si, wi))
+
+        return through_media
+    if not has_thin_glass(scene):
+        return lambda scene, si, wi, end, straight: WHITE if visible(scene, si.p, si.ng, si.gap, wi, end) else BLACK
+
+    def through(scene, si, wi, end, straight):
+        p, ng, gap = si.p, si.ng, si.gap
         if not straight:
             return WHITE if visible(scene, p, ng, gap, wi, end) else BLACK
         tint = WHITE
         for _ in range(MOST_PANES):
             o = leave(p, ng, gap, wi[0], wi[1], wi[2])
             d = sub(end, o)
-            hit = cast(scene, Ray(o, d, _f4(0.0), BEFORE_LIGHT))
+            hit = cast(scene, Ray(o, d, _f4(0.0), BEFORE_LIGHT, None))
             if hit.prim < 0:
                 return tint
             tint = _behind(scene, hit, wi, hit.t * _f4(math.sqrt(dot(d, d))), tint)
@@ -83,7 +91,14 @@ def _behind(scene, hit, d, length, tint):
 @specialised
 def cast_on(scene, ray, straight):
     """What the ray meets (`pmviewer.render.cast.Hit`), behind thin glass if it goes `straight`, and the tint (red,
-    green, blue) of the glass on its way. The hit's t counts from the last pane."""
+    green, blue) of media and glass on its way. The hit's t counts from the last pane."""
+    if has_media(scene):
+
+        def through_media(scene, ray, straight):
+            hit = cast(scene, ray)
+            return hit, way_through(scene, ray, hit)
+
+        return through_media
     if not has_thin_glass(scene):
         return lambda scene, ray, straight: (cast(scene, ray), WHITE)
 
@@ -98,7 +113,7 @@ def cast_on(scene, ray, straight):
                     break
                 tint = after
                 o = leave(hit.p, hit.ng, hit.gap, ray.d[0], ray.d[1], ray.d[2])
-                hit = cast(scene, Ray(o, ray.d, _f4(0.0), ray.far))
+                hit = cast(scene, Ray(o, ray.d, _f4(0.0), ray.far, None))
         return hit, tint
 
     return through

@@ -13,6 +13,7 @@ from pmviewer.scene.arrays.material_lobes import (
     is_rough_glass,
 )
 from pmviewer.scene.arrays.material_row import is_rich, used_materials
+from pmviewer.scene.arrays.media import has_media
 from pmviewer.scene.description import (
     Camera,
     DirectionalLight,
@@ -56,6 +57,14 @@ class SceneTraits:
     filters: tuple[tuple[str, PixelFilter], ...] = ()
     thin_glass: tuple[str, ...] = ()
     has_other_specular: bool = False
+    has_media: bool = False
+    """Participating media."""
+    has_scattering: bool = False
+    """Media that scatter light."""
+    straightest: float = 0.0
+    """The largest |g| of their phase functions."""
+    has_findable_lights: bool = True
+    """Lights that rays can meet."""
 
     @property
     def many_lights(self) -> bool:
@@ -109,6 +118,11 @@ def analyse(scene: Scene) -> SceneTraits:
         filters=tuple((name, camera.filter) for name, camera in _cameras(scene) if camera.filter is not None),
         thin_glass=tuple(sorted({m.thin_rule for m in panes})),
         has_other_specular=any(always_followed(m) and not any(m is pane for pane in panes) for m in used),
+        has_media=has_media(scene),
+        straightest=max((max(abs(m.phase.g), abs(m.phase.g_beside)) for m in scene.media), default=0.0),
+        has_findable_lights=any(isinstance(light, Environment) for light in scene.lights)
+        or any(s.radiance is not None and max(s.radiance) > 0 for s in scene.shapes),
+        has_scattering=has_media(scene) and any(max(m.albedo) > 0 and max(m.sigma_t) > 0 for m in scene.media),
         glossy_roughness=tuple(sorted({alpha for m in used for alpha in glossy_roughness(m)})),
     )
 

@@ -27,6 +27,7 @@ from pmviewer.scene.description import (
 )
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.emission import emitted_power
+from pmviewer.scene.meshes.mesh_bounds import know_bounds
 
 LARGEST_SIDE = 16384
 """Pixels; the camera's settings have the same bound."""
@@ -140,12 +141,22 @@ def clean_mesh(mesh: Mesh, dropped: Counter[str]) -> Mesh | None:
             count = int((verdict == number).sum())
             if count:
                 dropped[reason] += count
-        faces = faces[verdict == WHOLE]
+        faces = np.compress(verdict == WHOLE, faces, axis=0)
     if not len(faces):
         return None
-    place = np.empty(len(vertices), np.int32)
-    n_used = number_used(faces, place)
-    if n_used == len(vertices):
+    place, low, high = np.empty(len(vertices), np.int32), np.empty(3), np.empty(3)
+    n_used = number_used(vertices, faces, place, low, high)
+    cleaned = _without_unused(mesh, vertices, faces, None if n_used == len(vertices) else place)
+    know_bounds(cleaned, low, high)
+    return cleaned
+
+
+def _without_unused(
+    mesh: Mesh, vertices: NDArray[np.float64], faces: NDArray[np.int32], place: NDArray[np.int32] | None
+) -> Mesh:
+    """The mesh with these faces. `place` (V,) has the new number of each vertex, −1 for those that no face uses; None
+    where they use all."""
+    if place is None:
         normals = None if mesh.normals is None else _mended(Mesh(vertices, faces, mesh.normals))
         return Mesh(vertices, faces, normals, _finite(mesh.uv), _colours(mesh.colours))
     used = np.flatnonzero(place >= 0)

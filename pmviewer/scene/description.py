@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.bsdf.kinds import KINDS
+from pmviewer.scene.medium import Medium as Medium
 from pmviewer.scene.texture import LUMINANCE as LUMINANCE
 from pmviewer.scene.texture import Texture
 
@@ -133,6 +134,7 @@ class Material:
     base colour, `alpha` its roughness squared (with the aspect of anisotropy), `eta` the index that its specular
     reflection comes from; see `Principled` for the rest. A "blend" is `parts[0]` and `parts[1]` in the shares 1 −
     `weight` and `weight`, or the front and the back of the surface; all else of its own that counts is `opacity`.
+    "null" is no surface: where a medium begins or ends that nothing bounds.
     """
 
     name: str
@@ -200,13 +202,15 @@ class Material:
 @dataclass(frozen=True)
 class Shape:
     """Geometry with a material (index into `Scene.materials`) and, when it is a light, its emitted `radiance`, which
-    is the mean of `emission` if that is given."""
+    is the mean of `emission` if that is given. `media`: those inside and outside of it, where one begins or ends at the
+    surface (indices into `Scene.media`, −1 for none); None where it separates nothing."""
 
     name: str
     geometry: Geometry
     material: int
     radiance: RGB | None = None
     emission: Texture | None = None
+    media: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,6 +328,8 @@ class Camera:
     """Distance along the view of the plane that the lens shows sharp; None: the file does not say."""
     filter: PixelFilter | None = None
     """Of the film; None: the file does not say."""
+    medium: int = -1
+    """The medium that the file says the camera is in, −1 for none."""
 
 
 @dataclass(frozen=True)
@@ -359,6 +365,7 @@ class Scene:
     """The vertical axis, where the file's format has one."""
     exposure: float | None = 0.0
     """Exposure in EV that the scene is meant to be shown with; None: to be chosen from the picture."""
+    media: tuple[Medium, ...] = ()
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:

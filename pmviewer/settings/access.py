@@ -10,12 +10,14 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import ValidationError
 
 from pmviewer.errors import SettingError
+from pmviewer.settings import edits
 from pmviewer.settings.needs import Needs
 from pmviewer.settings.schema import (
     CacheOverlay,
     CameraSettings,
     Direct,
     Display,
+    Edit,
     Estimate,
     FateOverlay,
     FocusOverlay,
@@ -44,6 +46,7 @@ __all__ = [
     "CameraSettings",
     "Direct",
     "Display",
+    "Edit",
     "Estimate",
     "FateOverlay",
     "FocusOverlay",
@@ -70,6 +73,7 @@ __all__ = [
     "info_of",
     "needs_of",
     "parse_assignments",
+    "parse_edits",
     "range_text",
     "with_values",
 ]
@@ -110,8 +114,8 @@ def _kind_of(annotation: Any) -> tuple[type, tuple[str, ...], bool]:
         plain = next(arm for arm in get_args(annotation) if get_origin(arm) is not Literal)
         kind, choices, _ = _kind_of(plain)
         return kind, choices, True
-    if origin is tuple:
-        return tuple, (), False
+    if origin in (tuple, dict):
+        return origin, (), False
     return annotation, (), False
 
 
@@ -210,6 +214,8 @@ def _explain(error: ValidationError) -> str:
     if path not in SETTINGS:
         return f"There is no setting '{'.'.join(str(p) for p in first['loc'])}'."
     info = SETTINGS[path]
+    if info.scale == "edits":
+        return str(first["ctx"]["error"])
     return f"{path} = {first['input']!r} is not allowed: expected {range_text(info)}."
 
 
@@ -219,6 +225,8 @@ def range_text(info: SettingInfo) -> str:
         return "one of " + ", ".join(info.choices)
     if info.scale == "vector":
         text = "three numbers (x, y, z)"
+    elif info.scale == "edits":
+        text = "edits, as in light.1.power=2; material.wall.colour=0.8, 0.2, 0.2"
     elif info.scale == "name":
         text = "a name"
     elif info.kind is bool:
@@ -245,11 +253,21 @@ def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
         info = info_of(path)
         if info.scale == "vector" and raw != "auto":
             values[path] = tuple(part for part in raw.replace(",", " ").split())
+        elif info.scale == "edits":
+            values[path] = parse_edits(part for part in raw.split(";") if part.strip())
         elif info.kind is int and raw != "auto":
             values[path] = _whole_number(raw)
         else:
             values[path] = raw
     return values
+
+
+def parse_edits(texts: Iterable[str]) -> dict[str, tuple[float, ...]]:
+    """Edits of the scene (`pmviewer.settings.edits`) from texts like "light.lamp.power=2". Raises SettingError."""
+    try:
+        return edits.parse(texts)
+    except ValueError as error:
+        raise SettingError(str(error)) from None
 
 
 def _whole_number(raw: str) -> Any:

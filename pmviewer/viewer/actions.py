@@ -15,6 +15,7 @@ from pmviewer.render.camera import CameraPose
 from pmviewer.render.free_camera import as_perspective, plan_pose
 from pmviewer.settings.access import SETTINGS, get
 from pmviewer.viewer import layout
+from pmviewer.viewer.comparing_actions import comparing_actions
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.exports import Exports, default_path, fresh_path
 from pmviewer.viewer.overlays.registry import SWITCHED
@@ -45,6 +46,7 @@ class Commands:
         self._hidden: list[str] = []
         self._layout = layout.Layout()
         self.table: dict[str, Callable[[], None]] = {
+            **comparing_actions(state, dialogs),
             "open": self._open,
             "load_reference": self._load_reference,
             "save_session": lambda: self._save(".toml", self.exports.session),
@@ -64,6 +66,7 @@ class Commands:
             "exposure_up": lambda: self._expose(EXPOSURE_STEP),
             "exposure_down": lambda: self._expose(-EXPOSURE_STEP),
             "next_tone": self._next_tone,
+            "toggle_marks": lambda: self._toggle("display.marks"),
             "toggle_denoised": self._toggle_denoised,
             **{f"toggle_{o.name}": partial(self._toggle, f"overlays.{o.name}.show") for o in SWITCHED},
             "fit_picture": self._fit,

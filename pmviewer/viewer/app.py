@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,13 +30,16 @@ from pmviewer.viewer.panels.importance_panel import ImportancePanel
 from pmviewer.viewer.panels.inspector.panel import InspectorPanel, follow_pin
 from pmviewer.viewer.panels.log_panel import LogPanel, draw_toasts
 from pmviewer.viewer.panels.menus import Menus
+from pmviewer.viewer.panels.scene_panel import ScenePanel, follow_choice
 from pmviewer.viewer.panels.settings_panel import SettingsPanel
+from pmviewer.viewer.panels.snapshots.panel import SnapshotsPanel
 from pmviewer.viewer.panels.statistics_panel import StatisticsPanel
 from pmviewer.viewer.panels.status_bar import draw_status_bar
 from pmviewer.viewer.panels.toolbar import Toolbar
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.shortcuts import FLIP_KEY, is_held, run_shortcuts
 from pmviewer.viewer.shot import Shot
+from pmviewer.viewer.snapshots import SUFFIXES
 from pmviewer.viewer.state import InactiveReason, ViewerState
 from pmviewer.viewer.viewport.picture import Picture
 from pmviewer.viewer.viewport.viewport import Viewport
@@ -87,13 +90,16 @@ class ViewerApp:
 
     def _callbacks(self) -> layout.Callbacks:
         actions = self.commands.table
+        self._snapshots_panel = SnapshotsPanel(self.state, self.viewport, actions)
         panels = {
             "Settings": self.settings_panel.gui,
+            "Scene": ScenePanel(self.state).gui,
             "Overlays": OverlayPanel(self.viewport, self.settings_panel).gui,
             "Inspector": InspectorPanel(self.state).gui,
             "Statistics": StatisticsPanel(self.state).gui,
             "Importance": ImportancePanel(self.state).gui,
             "Error": ErrorPanel(self.state, actions).gui,
+            "Snapshots": self._snapshots_panel.gui,
             "Comparison": GainPanel(self.state, actions, self.settings_panel).gui,
             "Log": LogPanel(self.state).gui,
         }
@@ -116,7 +122,12 @@ class ViewerApp:
         immapp.run(self.params, self.add_ons)
 
     def drop(self, paths: list[str]) -> None:
-        """Files dropped onto the window: the first is opened, an EXR file as the reference."""
+        """Files dropped onto the window: a scene is opened, an EXR file as the reference; several pictures and PNG
+        files become snapshots."""
+        pictures = [Path(path) for path in paths if path.lower().endswith(SUFFIXES)]
+        if len(pictures) == len(paths) and (len(paths) > 1 or paths[0].lower().endswith(".png")):
+            self.state.snapshots.open(pictures)
+            return
         if len(paths) > 1:
             self.state.say("warning", f"{len(paths)} files were dropped; only {paths[0]} is opened.")
         if paths and paths[0].lower().endswith(".exr"):
@@ -166,6 +177,7 @@ class ViewerApp:
         self.state.poll()
         if not self.viewport.alone:
             follow_pin(self.state)
+            follow_choice(self.state)
         try:
             self.viewport.render()
         except PmviewerError as error:
@@ -225,6 +237,7 @@ class ViewerApp:
         if self.context is None:
             return
         self.viewport.release()
+        self._snapshots_panel.strip.release()
         free_collected(self.context)
         self.context.release()
         self.context = None
@@ -235,13 +248,15 @@ def run_viewer(
     settings: Settings | None,
     threads: int | None = None,
     parameters: Mapping[str, str] | None = None,
+    snapshots: Sequence[tuple[int, Path]] = (),
 ) -> int:
     """Open the window on a scene or session file (None: the Cornell box with a mirror and a glass sphere).
 
-    `parameters` are values for the scene file's `<default>` names, `threads` the session's (None: all cores).
+    `parameters` are values for the scene file's `<default>` names, `threads` the session's (None: all cores),
+    `snapshots` numbers and files of pictures in the strip.
     Returns 0 when the window was closed, or ends the process, if the engine is busy then: files that the user has asked
     for are written by that time. Raises WindowError when there is no display or no OpenGL.
     """
     from pmviewer.viewer.start import start_viewer
 
-    return start_viewer(ViewerApp, source, settings, threads, parameters, leave=True)
+    return start_viewer(ViewerApp, source, settings, threads, parameters, snapshots=snapshots, leave=True)

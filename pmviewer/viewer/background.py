@@ -39,6 +39,7 @@ FILES = Lane("files", kept=True, shown=True)
 READING = Lane("reading", shown=True)
 MEASURING = Lane("measuring")
 COMPARING = Lane("comparing")
+DIFFERENCES = Lane("differences")
 ENGINE = Lane("engine")
 
 

@@ -23,6 +23,7 @@ COMPARED_VIEWS = ("reference", "error")
 EARLIER_RUNS = 8
 NO_REFERENCE = "There is no reference: load one with File > Load reference, or drop an EXR file onto the window."
 _SAME_PICTURE = (
+    "compare.",
     "display.",
     "overlays.",
     "camera.",
@@ -36,10 +37,11 @@ _SAME_PICTURE = (
 
 @dataclass(frozen=True)
 class Point:
-    """The error after some passes; `seconds` of rendering, without pauses."""
+    """The error after some passes; `seconds` of rendering, without pauses, `cpu_seconds` summed over threads."""
 
     passes: int
     seconds: float
+    cpu_seconds: float
     metrics: Metrics
 
 
@@ -178,13 +180,13 @@ class Comparison:
         if self._background.running(MEASURING) or not (passes >= run.next_pass or last):
             return
         run.next_pass = next_mark(passes)
-        reference = self.reference
+        reference, seconds, cpu = self.reference, frame.statistics.seconds, frame.statistics.cpu_seconds
         assert reference is not None
 
         def work() -> str:
             from pmviewer.output.metric import metrics
 
-            run.points.append(Point(passes, frame.statistics.seconds, metrics(frame.image(), reference.image)))
+            run.points.append(Point(passes, seconds, cpu, metrics(frame.image(), reference.image)))
             return ""
 
         self._background.start(MEASURING, "measuring the error", work)
@@ -211,6 +213,8 @@ def _mismatch(reference: Reference, scene: Scene, frame: Frame) -> str | None:
     if (width, height) != reference.size:
         wanted = "×".join(str(side) for side in reference.size)
         return f"The reference has {wanted} pixels, the picture {width}×{height}: only the same size can be compared."
+    if frame.settings.edit.changes:
+        return "The scene is edited: the reference shows it as it is in its file."
     own = resolve_camera(scene, size_only(frame.settings.camera))
     if not frame.camera.sees_like(own):
         if frame.settings.free_camera.on:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pmviewer.settings.access import SETTINGS, Settings, flat, with_values
+from pmviewer.settings.edits import as_text
 from pmviewer.viewer.value_text import value_text
 
 MOST_STEPS = 1000
@@ -35,6 +36,8 @@ class Step:
         if len(self.after) == 1:
             ((path, value),) = self.after.items()
             info = SETTINGS[path]
+            if info.scale == "edits":
+                return _edit_name(self.before[path], value)
             return f"{info.group.lower()}, {info.title}: {value_text(info, value)}"
         return f"change {len(self.after)} settings"
 
@@ -100,3 +103,12 @@ class History:
 def _is_move(values: Mapping[str, Any]) -> bool:
     """Whether these are the settings of a camera that is moved."""
     return all(path.startswith(("camera.", "free_camera.")) and path.rpartition(".")[2] in _POSE for path in values)
+
+
+def _edit_name(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+    """What was edited of the scene."""
+    changed = {name: after.get(name) for name in (*before, *after) if before.get(name) != after.get(name)}
+    if len(changed) != 1:
+        return f"change {len(changed)} edits"
+    ((name, value),) = changed.items()
+    return f"{name}: as in the file" if value is None else as_text({name: value})

@@ -12,8 +12,19 @@ from pmviewer.viewer import theme
 from pmviewer.viewer.viewport.viewport import VIEWPORT
 
 Draw = Callable[[], None]
-PANELS = ("Settings", "Overlays", "Inspector", "Statistics", "Importance", "Error", "Comparison", "Log")
-_PLACE = {"Settings": "Left", "Overlays": "Right", "Inspector": "Right"}
+PANELS = (
+    "Settings",
+    "Scene",
+    "Overlays",
+    "Inspector",
+    "Statistics",
+    "Importance",
+    "Error",
+    "Snapshots",
+    "Comparison",
+    "Log",
+)
+_PLACE = {"Settings": "Left", "Scene": "Left", "Overlays": "Right", "Inspector": "Right"}
 """Where panels are docked; the others at the bottom."""
 WINDOW_SIZE = (1440, 900)
 SMALLEST_WINDOW = (800, 600)
@@ -137,7 +148,8 @@ class Shares:
         for number, node in nodes.items():
             if node is not root:
                 size = node.size.x * across, node.size.y * down
-                imgui.internal.dock_builder_set_node_size(number, size)
+                if min(size) > 0:  # a node whose panels are all hidden has none
+                    imgui.internal.dock_builder_set_node_size(number, size)
 
 
 class Layout:

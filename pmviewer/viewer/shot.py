@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pmviewer.errors import PmviewerError, SceneError, SettingError
 from pmviewer.output.png import write_png
+from pmviewer.viewer.background import DIFFERENCES
 
 if TYPE_CHECKING:
     from pmviewer.engine.frame import Frame
@@ -29,12 +30,15 @@ SETTLING = 4
 
 @dataclass
 class Shot:
-    """What to write; `pixel` is the one whose gather rays are shown, `pinned` the one in the inspector. `error` is why
-    there is no file, once the window has closed, `stored` what the last pass stored."""
+    """What to write; `pixel` is the one whose gather rays are shown, `pinned` the one in the inspector, `held`
+    names the object with handles, `panel` the panel in front. `error` is why there is no file, once the window has
+    closed, `stored` what the last pass stored."""
 
     path: Path
     pixel: tuple[int, int] | None = None
     pinned: tuple[int, int] | None = None
+    held: str = ""
+    panel: str = ""
     error: PmviewerError | None = None
     stored: str = ""
     done: bool = field(default=False, init=False)
@@ -65,6 +69,11 @@ class Shot:
             self._ask(state, viewport, frame)
         if status.state != "finished" or frame is None:
             return False
+        if state.snapshots.arriving or state.background.running(DIFFERENCES):
+            return False
+        problem = state.pair.problem(state.settings, frame)
+        if problem:
+            raise SettingError(f"compare.mode = {state.settings.compare.mode}: {problem}")
         view = state.settings.display.view
         refusal = state.refused_view(view)
         if refusal is not None:
@@ -87,6 +96,19 @@ class Shot:
             state.session.inspect(self.pixel)
         if self.pinned is not None:
             state.inspector.pin(self.pinned)
+        if self.held and state.editing.catalogue is not None:
+            state.editing.choose(state.editing.catalogue.find("object", self.held))
+        if self.panel:
+            self._to_the_front()
+
+    def _to_the_front(self) -> None:
+        """Bring the panel there. Raises SettingError where there is none of that name."""
+        windows = hello_imgui.get_runner_params().docking_params.dockable_windows
+        labels = {window.label.lower(): window for window in windows}
+        if self.panel.lower() not in labels:
+            panels = ", ".join(window.label for window in windows)
+            raise SettingError(f"--panel {self.panel}: there is no such panel, with --window there are {panels}.")
+        labels[self.panel.lower()].focus_window_at_next_frame = True
 
     def _end(self) -> None:
         self.done = True

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -84,6 +84,7 @@ def start_viewer(
     threads: int | None,
     parameters: Mapping[str, str] | None,
     *,
+    snapshots: Sequence[tuple[int, Path]] = (),
     leave: bool = False,
 ) -> int:
     """See `pmviewer.viewer.app.run_viewer`. With `leave` the process ends here when the window has closed while the
@@ -93,6 +94,8 @@ def start_viewer(
     app = make_app(link, inactive_reason=_inactive_reason)
     background = app.state.background
     app.state.open(source if source is not None else DEFAULT_SCENE, keep_camera=True, parameters=parameters)
+    if snapshots:
+        app.state.snapshots.open([path for _, path in snapshots], [number for number, _ in snapshots])
     app.params.callbacks.enqueue_post_init(lambda: link.connect(background))
     try:
         app.run()

@@ -15,11 +15,12 @@ from pmviewer.errors import PmviewerError, SettingError
 from pmviewer.output.diagnostic_views import HELD_WHILE_SHOWN
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.free_camera import resolve_view
-from pmviewer.render.planes import AOVS, TERMS
+from pmviewer.render.planes import AOVS, TERMS, VOLUME_TERMS
 from pmviewer.scene.description import Scene
 from pmviewer.settings.access import (
     CameraSettings,
     Display,
+    Edit,
     FreeCamera,
     SettingInfo,
     Settings,
@@ -27,19 +28,24 @@ from pmviewer.settings.access import (
     parse_assignments,
     with_values,
 )
+from pmviewer.settings.schema.compare import LAST, LIVE, REFERENCE
 from pmviewer.viewer.appearance import Appearance
 from pmviewer.viewer.background import Background
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.dialogs.recent import RecentFiles
+from pmviewer.viewer.editing import Editing
 from pmviewer.viewer.history import History
 from pmviewer.viewer.importance_gain import GainRun
 from pmviewer.viewer.inspector import Inspector
+from pmviewer.viewer.measured import Measured
+from pmviewer.viewer.pair import Pair, ShownPair
 from pmviewer.viewer.saved_views import FILE, SavedViews
 from pmviewer.viewer.session_link import SessionLike
+from pmviewer.viewer.snapshots import Snapshots
 from pmviewer.viewer.viewport.controls import camera_values
 
 InactiveReason = Callable[[str, Settings, Any], str | None]
-LAYERS = ("beauty", *TERMS, *AOVS)
+LAYERS = ("beauty", *TERMS, *VOLUME_TERMS, *AOVS)
 LOG_LINES = 2000
 COMPARING_LAYERS = "While two pictures are compared, the image, its terms and what the first surface is can be shown."
 TOAST_SECONDS = 12.0
@@ -77,8 +83,13 @@ class ViewerState:
         self.background = Background(self.say)
         self.comparison = Comparison(session, self.background, self.say)
         self.gain = GainRun(session, self.background, self.say)
+        self.snapshots = Snapshots(self.background, self.say)
+        self.pair = Pair(self.background, self.comparison, self.gain, self.snapshots)
+        self.measured = Measured(self.background, self.comparison, lambda: self.frame)
         self.inspector = Inspector(session, lambda: self.frame)
+        self._paired: tuple[tuple[Any, ...], ShownPair | None] | None = None
         self.history = History()
+        self.editing = Editing(session, self.change)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
         self._toasts_of = session.scene
@@ -182,7 +193,9 @@ class ViewerState:
         return display.model_copy(update={"exposure": frame.exposure if frame is not None else 0.0})
 
     def choices(self, info: SettingInfo) -> tuple[str, ...]:
-        """What can be chosen; the cameras are those of the scene's file."""
+        """What can be chosen; the cameras are those of the scene's file, pictures those that there are."""
+        if info.path in ("compare.a", "compare.b"):
+            return (LIVE, REFERENCE, LAST, *(str(one.number) for one in self.snapshots.all))
         if info.path != "camera.name":
             return info.choices
         names = [camera.name for camera in self.session.scene.cameras] if self.session.scene is not None else []
@@ -192,11 +205,11 @@ class ViewerState:
     def named_view(self) -> str:
         """The view that menus and toolbar name: the one asked for; while two pictures are compared, the one shown."""
         pair = self.shown_pair()
-        return self.settings.display.view if pair is None else pair[1].view
+        return self.settings.display.view if pair is None else pair.display.view
 
     def refused_view(self, view: str) -> str | None:
         """Why that view can't be shown now, or None."""
-        if self.gain.frames() is not None and view not in LAYERS:
+        if view not in LAYERS and self.shown_pair() is not None:
             return COMPARING_LAYERS
         if view in HELD_WHILE_SHOWN:
             return self.inactive_reason(f"display.view={view}", self.settings, self.session.traits)
@@ -247,14 +260,26 @@ class ViewerState:
             return
         self.change({"camera.focus": distance})
 
-    def shown_pair(self) -> tuple[tuple[Frame, Frame], Display] | None:
-        """The frames with and without importance while the viewport compares them, with a view that both have."""
-        frames = self.gain.frames()
-        if frames is None:
-            return None
-        display = self._exposed(self.settings.display, frames[0])
-        layer = display.view if display.view in LAYERS else "beauty"
-        return frames, display.model_copy(update={"view": layer})
+    def shown_pair(self) -> ShownPair | None:
+        """The pictures that the viewport compares now, by a view that is one of their layers; None when it compares
+        none."""
+        reference = self.comparison.reference
+        shown = self.gain.gain if self.gain.shown else None
+        now = (self.settings, self.frame, shown, self.snapshots.version, reference, self.pair.second)
+        if self._paired is None or any(a is not b for a, b in zip(self._paired[0], now, strict=True)):
+            display = self._exposed(self.settings.display, self.frame)
+            view = display.view if display.view in LAYERS else "beauty"
+            layer = display.model_copy(update={"view": view})
+            self._paired = now, self.pair.shown(self.settings, layer, self.frame)
+        return self._paired[1]
+
+    def take_snapshot(self) -> None:
+        """Keep the picture as it is, with all that made it."""
+        reference = self.comparison.reference
+        truth = str(reference.path) if reference is not None else ""
+        taken = self.snapshots.take(self.frame, self.comparison.current, truth)
+        if taken is not None:
+            self.say("info", f"snapshot {taken.name}")
 
     def compare_importance(self) -> None:
         """Start the comparison with and without importance, against the reference where that can be compared."""
@@ -265,8 +290,10 @@ class ViewerState:
         self.gain.start(truth)
 
     def scene_changed(self) -> bool:
-        """True once after another scene was opened; frames of the one before are not shown any more."""
-        scene = self.session.scene
+        """True once after another scene was opened; frames of the one before are not shown any more. A scene that is
+        lit or edited otherwise is no other scene."""
+        opened = self.session.opened_scene
+        scene = self.session.scene if opened is None else opened.content or opened.whole
         if scene is self._scene:
             return False
         before, self._scene = self._scene, scene
@@ -311,9 +338,12 @@ class ViewerState:
         settings = (
             self.settings
             if keep_camera
-            else self.settings.model_copy(update={"camera": CameraSettings(), "free_camera": FreeCamera()})
+            else self.settings.model_copy(
+                update={"camera": CameraSettings(), "free_camera": FreeCamera(), "edit": Edit()}
+            )
         )
         source: str | Path = path
+        snapshots: tuple[tuple[int, Path], ...] = ()
         if str(path).lower().endswith(".toml"):
             from pmviewer.output.session_file import read_session
 
@@ -323,10 +353,17 @@ class ViewerState:
                 self.say("error", str(error))
                 return
             source, settings, parameters = scene or saved.scene, saved.settings, saved.parameters
+            snapshots = saved.snapshots
             if is_gone(source):
                 self.say("error", f"{path}: its scene {source} is not there. Choose where it is now.")
                 self.lost = str(path), str(source)
                 return
+        if snapshots:
+            if self.snapshots.all:
+                self.say(
+                    "warning", f"{path}: its snapshots take the place of the {len(self.snapshots.all)} in the strip."
+                )
+            self.snapshots.open([file for _, file in snapshots], [number for number, _ in snapshots])
         self._opening = str(path), dict(parameters or {})
         self.session.open(source, settings, parameters)
 
@@ -358,4 +395,6 @@ class ViewerState:
         parameters = self._opening[1] if self._opening is not None else self.parameters
         self.comparison.poll(self.frame, with_own=not parameters)
         self.gain.poll(self.live_camera())
+        self.snapshots.poll()
+        self.pair.poll(self.shown_pair())
         self.toasts = [toast for toast in self.toasts if not toast.is_over()]

@@ -8,10 +8,12 @@ from functools import partial
 from make.boxes import glossy, lights, water
 from make.cabin import car_cabin
 from make.cardioid import cardioid
+from make.colonnade import colonnade
 from make.corners import corner_room, glossy_room
 from make.document import MadeScene
 from make.door import door_slit
 from make.egg import glass_egg
+from make.fog import fog_sphere
 from make.fractal import fractal_box
 from make.glasses import cognac, three_glasses
 from make.museum import museum
@@ -26,12 +28,14 @@ SCENES: dict[str, Callable[[], MadeScene]] = {
     "cardioid_010": partial(cardioid, 0.1),
     "cardioid_001": partial(cardioid, 0.01),
     "cognac": cognac,
+    "colonnade": colonnade,
     "corner_room": corner_room,
     "cornell_fractal": fractal_box,
     "cornell_glossy": glossy,
     "cornell_lights": lights,
     "cornell_water": water,
     "door_slit": door_slit,
+    "fog_sphere": fog_sphere,
     "glass_egg": glass_egg,
     "glossy_room": glossy_room,
     "lit_plane": lit_plane,

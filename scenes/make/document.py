@@ -17,7 +17,8 @@ Colour = tuple[float, float, float]
 @dataclass
 class MadeScene:
     """What a generator returns. `bsdfs` and `shapes` are XML elements; `meshes` maps file stems to geometry; `defaults`
-    are the scene's own parameters beside spp, integrator, max_depth, rr_depth and res."""
+    are the scene's own parameters beside spp, integrator, max_depth, rr_depth and res. `media` are XML elements, too,
+    and `around` is the id of the one that the camera stands in."""
 
     title: str
     description: str
@@ -31,6 +32,8 @@ class MadeScene:
     defaults: dict[str, str] = field(default_factory=dict)
     aspect: tuple[int, int] = (256, 256)
     max_depth: int = -1
+    media: tuple[str, ...] = ()
+    around: str = ""
 
 
 def numbers(*values: float) -> str:
@@ -64,6 +67,21 @@ def dielectric(identifier: str, inside: float, outside: float = 1.0, absorption:
     """A smooth boundary; its normals point to `outside`. `absorption` per metre, within."""
     extra = () if absorption is None else (rgb("absorption", *absorption),)
     return bsdf("dielectric", identifier, number("int_ior", inside), number("ext_ior", outside), *extra)
+
+
+def fog(identifier: str, sigma_t: float, albedo: Colour, g: float = 0.0) -> str:
+    """A homogeneous medium, its extinction per metre."""
+    phase = f'<phase type="hg">{number("g", g)}</phase>' if g else ""
+    values = number("sigma_t", sigma_t) + rgb("albedo", *albedo)
+    return f'<medium type="homogeneous" id="{identifier}">{values}{phase}</medium>'
+
+
+def boundary(low: Colour, high: Colour, inside: str) -> str:
+    """A box that nothing shows but the medium in it."""
+    size = ", ".join(numbers((b - a) / 2) for a, b in zip(low, high))
+    middle = ", ".join(numbers((b + a) / 2) for a, b in zip(low, high))
+    place = f'<transform name="to_world"><scale value="{size}"/><translate value="{middle}"/></transform>'
+    return f'<shape type="cube">{place}<bsdf type="null"/><ref name="interior" id="{inside}"/></shape>'
 
 
 BLACK = bsdf("diffuse", "black", rgb("reflectance", 0.0))
@@ -120,7 +138,12 @@ def _emitter(radiance: Colour | None) -> str:
 
 def _xml(scene: MadeScene) -> str:
     width, height = scene.aspect
-    defaults = {"spp": "64", "integrator": "path", "max_depth": str(scene.max_depth), "rr_depth": "8"}
+    defaults = {
+        "spp": "64",
+        "integrator": "volpath" if scene.media else "path",
+        "max_depth": str(scene.max_depth),
+        "rr_depth": "8",
+    }
     if width == height:
         defaults["res"] = str(width)
         size = ("$res", "$res")
@@ -134,6 +157,7 @@ def _xml(scene: MadeScene) -> str:
         *(f'  <default name="{name}" value="{value}"/>' for name, value in defaults.items()),
         '  <integrator type="$integrator"><integer name="max_depth" value="$max_depth"/>'
         '<integer name="rr_depth" value="$rr_depth"/></integrator>',
+        *(f"  {element}" for element in scene.media),
         '  <sensor type="perspective">',
         f'    {number("fov", scene.fov)}<string name="fov_axis" value="x"/>'
         '<float name="near_clip" value="0.001"/><float name="far_clip" value="1000"/>',
@@ -142,6 +166,7 @@ def _xml(scene: MadeScene) -> str:
         f'    <film type="hdrfilm"><integer name="width" value="{size[0]}"/><integer name="height" value="{size[1]}"/>'
         '<string name="pixel_format" value="rgb"/><string name="component_format" value="float32"/>'
         '<rfilter type="box"/></film>',
+        *([f'    <ref id="{scene.around}"/>'] if scene.around else []),
         "  </sensor>",
         *(f"  {element}" for element in (*scene.bsdfs, *scene.shapes)),
         "</scene>",

@@ -72,7 +72,8 @@ def by_mitsuba(path: Path, spp: int, variant: str) -> tuple[list[np.ndarray], di
     for half in range(2):
         seeds = range(half * rounds, (half + 1) * rounds)
         halves.append(sum(np.array(mi.render(scene, spp=CHUNK, seed=seed), np.float64) for seed in seeds) / rounds)
-    made = f"Mitsuba 3 ({mi.__version__}, {variant}), path, {2 * rounds * CHUNK} samples per pixel"
+    integrator = "volpath" if "Volumetric" in str(scene.integrator()) else "path"
+    made = f"Mitsuba 3 ({mi.__version__}, {variant}), {integrator}, {2 * rounds * CHUNK} samples per pixel"
     return halves, {"made": made, "seeds": f"0 to {2 * rounds - 1}", "samples": str(2 * rounds * CHUNK)}
 
 

@@ -22,6 +22,7 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.session import Session
 from pmviewer.errors import PmviewerError
+from pmviewer.kernels.accel.bvh import build, builder_kernels
 from pmviewer.kernels.compile import jit
 from pmviewer.settings.access import Settings, with_values
 from tests.support.scenes import diffuse_box, settings_of
@@ -85,6 +86,15 @@ def test_a_helper_compiles_the_eye_pass_from_types_alone(box):
     helper.ask(NextSteps(box.flat.record.dtype, box.traits, Settings()))
     helper.wait()
     assert helper._process.returncode == 0
+
+
+def test_a_waiting_helper_compiles_the_tree_builder_for_all_scenes():
+    kernels = [call.args[1] for call in builder_kernels()]
+    build(np.random.default_rng(2).uniform(-1, 1, (20, 3, 3)).astype(np.float32), np.zeros((0, 12), np.float32))
+    assert {kernel.py_func.__name__ for kernel in kernels} == {"collapse", "plan_range", "subtree", "triangle_boxes"}
+    for call in builder_kernels():
+        call()
+    assert [len(kernel.signatures) for kernel in kernels] == [1] * 4, "other types than those of a tree's own"
 
 
 def test_a_helper_tells_how_far_it_is(box):

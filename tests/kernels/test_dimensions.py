@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections import defaultdict
 from pathlib import Path
 
@@ -67,6 +68,7 @@ def test_seeds_made_from_a_renders_by_exclusive_or_differ():
     assert len(set(seeds)) == len(seeds)
 
 
+@functools.cache
 def sources() -> list[tuple[Path, ast.Module]]:
     files = [p for p in sorted(PACKAGE.rglob("*.py")) if p.name not in ("random.py", "dimensions.py")]
     return [(p, ast.parse(p.read_text(encoding="utf-8"))) for p in files]
@@ -105,6 +107,8 @@ def draws() -> list[tuple[str, ast.expr, dict[str, list[ast.expr]], set[str], se
             if isinstance(node, ast.ImportFrom) and node.module == TABLE
             for alias in node.names
         }
+        if not any(isinstance(node, ast.Call) and called(node) in DRAWS for node in ast.walk(tree)):
+            continue
         for function in (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.Lambda)):
             local = assigned(function) if isinstance(function, ast.FunctionDef) else {}
             for node in ast.walk(function):

@@ -39,38 +39,47 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.settings.access import Settings, with_values
 
-path, out, *pairs = sys.argv[1:]
-values = {"camera.width": 10, "camera.height": 10, "photons.N": 200, "estimate.radius": 0.1, "gather.rays": 2,
-          "render.max_depth": 3, "photons.max_bounces": 3, **dict(pair.split("=") for pair in pairs)}
-pool = WorkPool(1)
-renderer = Renderer(open_scene(path), with_values(Settings(), values), pool, StageStore(0))
-renderer.step()
-np.save(out, renderer.film.planes())
+path, out, *chosen = sys.argv[1:]
+pool, pictures = WorkPool(1), []
+for pairs in chosen:
+    values = {"camera.width": 10, "camera.height": 10, "photons.N": 200, "estimate.radius": 0.1, "gather.rays": 2,
+              "render.max_depth": 3, "photons.max_bounces": 3, **dict(pair.split("=") for pair in pairs.split())}
+    renderer = Renderer(open_scene(path), with_values(Settings(), values), pool, StageStore(0))
+    renderer.step()
+    pictures.append(renderer.film.planes())
+np.save(out, np.array(pictures))
 pool.close()
 """
 
 
-def picture(tmp_path, disabled: str, settings: tuple[str, ...]) -> np.ndarray:
+SETTINGS = (
+    "render.method=progressive",
+    "render.method=gather",
+    "render.method=path",
+    "render.method=progressive estimate.lookup=nearest estimate.k=5",
+)
+
+
+def pictures(tmp_path, disabled: str) -> np.ndarray:
+    """All settings' in one process, which takes longer to start than to make them."""
     scene, out = tmp_path / "scene.xml", tmp_path / f"{disabled}.npy"
     scene.write_text(SCENE)
     environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    command = [sys.executable, "-W", "ignore", "-c", PROGRAM, str(scene), str(out), *settings]
+    command = [sys.executable, "-W", "ignore", "-c", PROGRAM, str(scene), str(out), *SETTINGS]
     run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
     assert run.returncode == 0, run.stderr
     return np.load(out)
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [
-        ("render.method=progressive",),
-        ("render.method=gather",),
-        ("render.method=path",),
-        ("render.method=progressive", "estimate.lookup=nearest", "estimate.k=5"),
-    ],
-)
-def test_the_same_picture(tmp_path, settings):
-    compiled, interpreted = picture(tmp_path, "0", settings), picture(tmp_path, "1", settings)
+@pytest.fixture(scope="module")
+def both(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pictures")
+    return pictures(folder, "0"), pictures(folder, "1")
+
+
+@pytest.mark.parametrize("index", range(len(SETTINGS)), ids=SETTINGS)
+def test_the_same_picture(both, index):
+    compiled, interpreted = (all_[index] for all_ in both)
     assert interpreted.shape == compiled.shape
     assert np.isfinite(interpreted).all()
     assert compiled[..., :15].mean() > 0.01

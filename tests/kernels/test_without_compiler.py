@@ -14,6 +14,7 @@ import json, warnings
 from types import SimpleNamespace
 import numpy as np
 from pmviewer.kernels import random, vector, warp
+from pmviewer.kernels.accel import bvh
 from pmviewer.kernels.bsdf import specular
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
 
@@ -43,6 +44,11 @@ for i in range(40):
                     *warp.square_to_cone(a, b, f(0.25)), *warp.square_to_triangle(a, b)]
         rounded += [*n, *vector.from_basis(n, a, b, f(0.5)), vector.luminance(n), vector.dot(n, d), *vector.cross(n, d)]
         rounded += [*reflect(d, n), *fresnel_dielectric(a, f(1.5)), *fresnel_dielectric(a, f(0.6))]
+generator = np.random.default_rng(1)
+quadrics = np.zeros((12, 12), f)
+quadrics[:, 1:4], quadrics[:, 6:8], quadrics[:, 9] = generator.uniform(-1, 1, (12, 3)), (1, 0.1), 1
+tree = bvh.build(generator.uniform(-1, 1, (60, 3, 3)).astype(f), quadrics)
+exact += tree.nodes.view(np.int32).ravel().tolist() + tree.blocks.view(np.int32).ravel().tolist()
 print(json.dumps([exact, [float(x) for x in rounded]]))
 """
 

@@ -22,6 +22,9 @@ def values_of(info: SettingInfo) -> st.SearchStrategy:
         plain: st.SearchStrategy = st.sampled_from(info.choices)
     elif info.scale == "name":
         plain = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+    elif info.scale == "edits":
+        names = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=9)
+        plain = st.dictionaries(names.map("light.{}.power".format), st.tuples(st.floats(0.0, 1e9)), max_size=3)
     elif info.scale == "vector":
         plain = st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * 3)
     elif info.kind is bool:

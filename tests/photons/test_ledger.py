@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.energy import ENTRIES, Energy, EnergyLedger
+from pmviewer.photons.light_pass.ledger import E_DROPPED, E_EMITTED, E_STORED
 from pmviewer.photons.light_pass.light_pass import trace_pass
 from pmviewer.photons.light_pass.roulette import RULES
-from pmviewer.photons.light_pass.trace import E_DROPPED, E_EMITTED, E_STORED
 from pmviewer.photons.projection.projection import projection_of
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.arrays.flatten import flatten

@@ -13,9 +13,9 @@ from pmviewer.errors import SettingError
 from pmviewer.maps.record import BYTES_PER_PHOTON, unpack
 from pmviewer.photons.light_pass import batch as batch_module
 from pmviewer.photons.light_pass import light_pass as lightpass
+from pmviewer.photons.light_pass.ledger import E_ABSORBED, E_EMITTED, E_ESCAPED, E_STORED, E_TERMINATED
 from pmviewer.photons.light_pass.light_pass import trace_pass
 from pmviewer.photons.light_pass.plan import trajectories
-from pmviewer.photons.light_pass.trace import E_ABSORBED, E_EMITTED, E_ESCAPED, E_STORED, E_TERMINATED
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.settings.access import Photons

@@ -14,8 +14,8 @@ from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.random import INDEPENDENT
 from pmviewer.maps.record import CAUSTIC, INDIRECT_CAUSTIC, unpack
 from pmviewer.photons.light_pass import plan as passplan
+from pmviewer.photons.light_pass.ledger import E_ABSORBED, E_EMITTED, E_ESCAPED, E_TERMINATED
 from pmviewer.photons.light_pass.light_pass import trace_pass
-from pmviewer.photons.light_pass.trace import E_ABSORBED, E_EMITTED, E_ESCAPED, E_TERMINATED
 from pmviewer.photons.projection.bounds import MOST_SPHERES, enclosing, spheres_of
 from pmviewer.photons.projection.projected import concentric_from_polar
 from pmviewer.photons.projection.projection import projection_of

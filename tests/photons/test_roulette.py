@@ -10,9 +10,9 @@ import pytest
 from pmviewer.engine.pool import WorkPool
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.record import unpack
+from pmviewer.photons.light_pass.ledger import E_ABSORBED, E_EMITTED, E_ESCAPED, E_STORED, E_TERMINATED
 from pmviewer.photons.light_pass.light_pass import trace_pass
 from pmviewer.photons.light_pass.roulette import MOST_COPIES, RULES, copies, survival_probability
-from pmviewer.photons.light_pass.trace import E_ABSORBED, E_EMITTED, E_ESCAPED, E_STORED, E_TERMINATED
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.settings.access import Photons

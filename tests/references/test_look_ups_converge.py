@@ -14,6 +14,7 @@ from pmviewer.engine.store import StageStore
 from pmviewer.output.metric import loglog_slope, metrics
 from pmviewer.scene.description import Camera, Parallelogram, PointLight, Scene, Shape
 from pmviewer.settings.access import Settings, with_values
+from tests.references.test_convergence import halved
 from tests.support.scenes import diffuse
 
 ALBEDO = 0.5
@@ -104,9 +105,11 @@ def test_in_the_box_as_look_ups_of_their_size_do(pool):
     """The rest of the error is the dark rim along edges, whose width falls with the radius: nearest look-ups have it as
     look-ups of a fixed radius that holds as many photons."""
     target = reference("cornell_diffuse")
+    smaller = {"camera.width": target.shape[1] // 2, "camera.height": target.shape[0] // 2}
+    target = halved(target)
     relmse = {}
     for lookup, size in (("nearest", {"estimate.k": 20}), ("radius", {"estimate.radius": 0.053})):
-        values = {"render.method": "progressive", "photons.N": 20_000, "estimate.lookup": lookup} | size
+        values = {"render.method": "progressive", "photons.N": 20_000, "estimate.lookup": lookup} | size | smaller
         renderer = Renderer(open_scene("cornell_diffuse"), with_values(Settings(), values), pool, StageStore(0))
         found = errors(renderer, target, (16, 64))
         relmse[lookup] = [m.relmse_all for m in found]

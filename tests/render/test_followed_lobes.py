@@ -16,7 +16,7 @@ from pmviewer.settings.access import Settings, with_values
 
 HEAD = """<scene version="3.0.0"><sensor type="perspective"><float name="fov" value="{fov}"/><transform name="to_world">
 <lookat origin="{origin}" target="{target}" up="0,0,1"/></transform><film type="hdrfilm">
-<integer name="width" value="16"/><integer name="height" value="16"/><rfilter type="box"/></film></sensor>"""
+<integer name="width" value="48"/><integer name="height" value="48"/><rfilter type="box"/></film></sensor>"""
 POINT = """<emitter type="point"><point name="position" x="1" y="-1" z="3"/>
 <rgb name="intensity" value="10"/></emitter>"""
 BALL = """<shape type="sphere"><float name="radius" value="{radius}"/><point name="center" x="{x}" y="{y}" z="{z}"/>
@@ -43,7 +43,7 @@ def scene(tmp_path, *parts: str, origin="0,-4,2", target="0,0,0.3", fov=45.0) ->
 def means(source: str, method: str, passes: int, **values) -> np.ndarray:
     """(passes,) mean of the image in each pass."""
     opened = open_scene(source, {})
-    values = {"render.method": method, "photons.N": 40_000, **values}
+    values = {"render.method": method, "photons.N": 16_000, **values}
     pool = WorkPool(1)
     renderer = Renderer(opened, with_values(Settings(), values), pool, StageStore(0))
     totals = []
@@ -68,7 +68,7 @@ def test_metal_alone_is_lit(tmp_path, method, alpha):
     """Nothing is diffuse: rough metal stores photons from `photons.glossy` on, smoother metal is lit by samples."""
     floor = FLOOR.format(bsdf=METAL.format(alpha=alpha))
     source = scene(tmp_path, floor, MIRROR_BALL, ball_light(0.4))
-    assert agree(means(source, method, 48), means(source, "path", 400), 0.01)
+    assert agree(means(source, method, 40), means(source, "path", 48), 0.01)
 
 
 TILTED = """v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn 0.8 0 0.6\nf 1//1 2//1 3//1\nf 1//1 3//1 4//1\n"""
@@ -82,8 +82,8 @@ def test_a_tilted_shading_normal_lets_no_light_through_the_surface(tmp_path, met
     (tmp_path / "quad.obj").write_text(TILTED)
     quad = QUAD.format(bsdf=TWO_SIDED.format(bsdf=METAL.format(alpha=0.1)))
     source = scene(tmp_path, quad, SKY, origin="0,-4,4", target="0,0,0", fov=15)
-    ours = means(source, method, 200)
-    assert agree(ours, means(source, "path", 400))
+    ours = means(source, method, 24)
+    assert agree(ours, means(source, "path", 48))
     assert ours.mean() < 0.9
 
 
@@ -96,9 +96,9 @@ def test_an_unseen_object_changes_no_mirror(tmp_path, method):
         '<scale value="2"/>', '<scale value="3"/><rotate y="1" angle="90"/><translate x="2.5"/>'
     )
     camera = {"origin": "-1,-3,1.5", "target": "0,0,0", "fov": 20}
-    plain = means(scene(tmp_path, quad, wall, SKY, **camera), method, 150)
+    plain = means(scene(tmp_path, quad, wall, SKY, **camera), method, 17)
     hidden = BALL.format(radius=0.01, x=0, y=0, z=-9, what='<bsdf type="plastic"/>')
-    rich = means(scene(tmp_path, quad, wall, hidden, SKY, **camera), method, 150)
+    rich = means(scene(tmp_path, quad, wall, hidden, SKY, **camera), method, 17)
     assert plain.mean() == pytest.approx(rich.mean(), rel=2e-3)
 
 
@@ -110,7 +110,7 @@ def test_caustics_of_a_point_light_on_smooth_gloss(tmp_path, lookup):
     followed = means(source, "progressive", 40, **{"estimate.lookup": lookup})
     stored = means(source, "progressive", 40, **{"estimate.lookup": lookup, "photons.glossy": 0.05})
     assert agree(followed, stored, 0.01)
-    assert followed.mean() > 1.2 * means(source, "path", 40).mean()
+    assert followed.mean() > 1.2 * means(source, "path", 5).mean()
 
 
 @pytest.mark.parametrize("height", [1.2, -1.2], ids=["above", "below"])
@@ -120,9 +120,9 @@ def test_caustics_of_a_point_light_on_rough_glass(tmp_path, height):
     bsdf = '<bsdf type="roughdielectric"><float name="alpha" value="0.3"/></bsdf>'
     camera = {"origin": f"1.6,-1.2,{height}", "target": "0.9,-0.5,0", "fov": 25}
     with_ball = scene(tmp_path, FLOOR.format(bsdf=bsdf), MIRROR_BALL, ball_light(0.3), **camera)
-    truth = means(with_ball, "path", 6000)
+    truth = means(with_ball, "path", 660)
     with_point = scene(tmp_path, FLOOR.format(bsdf=bsdf), MIRROR_BALL, POINT, **camera)
-    assert agree(means(with_point, "progressive", 60), truth, 0.05)
+    assert agree(means(with_point, "progressive", 60, **{"photons.N": 40_000}), truth, 0.05)
 
 
 def test_the_path_tracer_says_what_it_can_not_find(tmp_path):

@@ -31,7 +31,7 @@ from tests.support.scenes import settings_of
 
 FILE = Path(__file__).with_name("mitsuba_materials") / "expected.json"
 SCENES = {row["name"]: row for row in json.loads(FILE.read_text("utf-8"))["scenes"]}
-SIZE = 24
+SIZE = 48
 LAMP = Parallelogram((-3.0, 3.0, -3.0), (6.0, 0.0, 0.0), (0.0, 0.0, 6.0))
 OF_PRINCIPLED = ("metallic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness", "clearcoat")
 
@@ -77,7 +77,7 @@ def scene_of(row):
 
 def channel_runs(row, method, passes):
     """(passes, 3) means of the picture's channels, pass by pass."""
-    values = {"render": {"method": method, "max_depth": 32}, "photons": {"N": 40_000}, "estimate": {"radius": 0.01}}
+    values = {"render": {"method": method, "max_depth": 32}, "photons": {"N": 16_000}, "estimate": {"radius": 0.01}}
     pool = WorkPool(2)
     renderer = Renderer(open_scene(scene_of(row)), settings_of(**values), pool, StageStore(0))
     totals = []
@@ -100,7 +100,7 @@ def check(name, method, passes):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_path_tracer_shows_mitsubas_picture(name):
-    check(name, "path", 256)
+    check(name, "path", 64)
 
 
 @pytest.mark.parametrize(
@@ -109,4 +109,4 @@ def test_path_tracer_shows_mitsubas_picture(name):
      ("diffuse and glass, area", "progressive"), ("nested, area", "progressive")],
 )  # fmt: skip
 def test_photon_methods_show_it_too(name, method):
-    check(name, method, 96)
+    check(name, method, 48)

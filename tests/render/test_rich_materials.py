@@ -33,6 +33,11 @@ SOLIDS = {
 }
 
 
+PICTURE, PHOTONS = 48, 16_000
+"""The mean of a picture is as exact by many pixels and few photons as by few pixels and many photons, at a fifth of the
+work: most of its noise comes from where pixels are sampled."""
+
+
 def box(floor, ball):
     """A closed box, glossy floor, a ball on it that makes a caustic there, a large light."""
     materials = (diffuse(albedo=(0.5,) * 3), replace(floor, two_sided=not floor.transparent), ball)
@@ -41,12 +46,12 @@ def box(floor, ball):
         Shape("ball", Sphere((0.2, -0.6, -0.2), 0.35), 2),
         panel(half=0.7),
     )
-    return Scene("box", None, shapes, materials, (), box_camera(), 24, 24)
+    return Scene("box", None, shapes, materials, (), box_camera(), PICTURE, PICTURE)
 
 
 def pass_means(scene, method, passes, **groups):
     """(passes,) mean of the image, pass by pass."""
-    values = {"render": {"method": method}, "photons": {"N": 60_000}, "estimate": {"radius": 0.02}} | groups
+    values = {"render": {"method": method}, "photons": {"N": PHOTONS}, "estimate": {"radius": 0.02}} | groups
     pool = WorkPool(2)
     renderer = Renderer(open_scene(scene), settings_of(**values), pool, StageStore(0))
     totals = []
@@ -80,8 +85,9 @@ def test_photons_agree_with_path_tracing_on_smooth_coarse_meshes(name):
     """In the whole picture, and on the diffuse ball itself, where photons without correction show the triangles."""
     scene = smooth_ball(SMOOTH[name])
     images = {}
-    for method, passes in (("path", 400), ("progressive", 32)):
-        values = {"render": {"method": method}, "photons": {"N": 60_000}, "estimate": {"radius": 0.03}}
+    for method, passes in (("path", 100), ("progressive", 32)):
+        N = 60_000 if name == "diffuse" else PHOTONS  # few photons meet the ball itself
+        values = {"render": {"method": method}, "photons": {"N": N}, "estimate": {"radius": 0.03}}
         images[method] = rendered(scene, settings_of(**values), passes, threads=2).frame(0)
     ours, path = images["progressive"].image().astype(float), images["path"].image().astype(float)
     print(f"{name}: mean {ours.mean():.5f}, path {path.mean():.5f}, ratio {ours.mean() / path.mean():.4f}")
@@ -90,7 +96,7 @@ def test_photons_agree_with_path_tracing_on_smooth_coarse_meshes(name):
         on_ball = images["path"].image("albedo")[..., 0] > 0.65
         a, b = images["progressive"].image("indirect")[on_ball], images["path"].image("indirect")[on_ball]
         print(f"indirect light on the ball: {a.mean():.5f}, path {b.mean():.5f}, {on_ball.sum()} pixels")
-        assert on_ball.sum() > 20
+        assert on_ball.sum() > 80
         assert a.mean() == pytest.approx(b.mean(), rel=0.03)
 
 
@@ -101,9 +107,9 @@ def test_progressive_and_gather_agree_with_path_tracing(name):
     else:
         scene = box(diffuse(), SOLIDS[name])
     assert "bsdfs" in open_scene(scene).flat.record.dtype.names
-    path = pass_means(scene, "path", 300)
-    for method in ("progressive", "gather"):
-        ours = pass_means(scene, method, 24)
+    path = pass_means(scene, "path", 40)
+    for method, passes in (("progressive", 14), ("gather", 8)):
+        ours = pass_means(scene, method, passes)
         error = np.hypot(ours.std() / np.sqrt(len(ours)), path.std() / np.sqrt(len(path)))
         print(f"{name}, {method}: {ours.mean():.5f}, path {path.mean():.5f} ± {error:.5f}")
         assert abs(ours.mean() - path.mean()) < 4 * error + 0.006 * path.mean()

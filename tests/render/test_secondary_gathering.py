@@ -40,7 +40,7 @@ def test_every_class_of_paths_is_counted_once(mis, indirect_caustics):
 
     Small look-ups hardly darken corners, so that the plain gather is right."""
     values = {
-        "photons": {"N": 60_000, "indirect_caustics": indirect_caustics},
+        "photons": {"N": 25_000, "indirect_caustics": indirect_caustics},
         "direct": {"mis": mis},
         "estimate": {"radius": 0.02, "alpha": 1.0, "caustic_radius": 1.0},
     }

@@ -185,9 +185,9 @@ def test_the_picture_is_the_same_for_any_number_of_threads():
 def test_behind_mirrors_and_glass_the_light_is_that_of_the_path_tracer():
     """Lights in caustics weigh nothing and are summed unweighted; the caustic map brings the light of caustics."""
     scene = cornell_box(size=12)
-    path = rendered(scene, settings_of(render={"method": "path"}), 1500).frame(0)
+    path = rendered(cornell_box(size=48), settings_of(render={"method": "path"}), 94).frame(0)
     for estimator in ("single step", "every vertex"):
-        frame = lit(scene, passes=60, number=200, estimator=estimator).frame(0)
+        frame = lit(scene, passes=30, number=200, estimator=estimator).frame(0)
         for term in ("specular", "indirect"):
             value, truth = (f.image(term) @ LUMINANCE for f in (frame, path))
             print(f"{estimator}, {term}: {value.mean() / truth.mean():.3f}")

@@ -104,10 +104,10 @@ def test_circles_are_said_only_of_circles(tmp_path: Path) -> None:
 
 
 def test_each_kind_of_unknown_thing_is_named_once_with_its_lines(tmp_path: Path) -> None:
-    medium = '<medium type="homogeneous"/>'
-    scene = load(tmp_path, medium, '<shape type="sphere"><float name="glow" value="1"/></shape>', medium)
+    aov = '<aov type="depth"/>'
+    scene = load(tmp_path, aov, '<shape type="sphere"><float name="glow" value="1"/></shape>', aov)
     assert scene.warnings == (
-        'lines 2, 4: <medium type="homogeneous"> is not supported and was ignored.',
+        'lines 2, 4: <aov type="depth"> is not supported and was ignored.',
         "line 3: 'glow' of <shape type=\"sphere\"> is not supported and was ignored.",
     )
 

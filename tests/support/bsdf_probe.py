@@ -174,7 +174,7 @@ class Grid:
     """Cells over one hemisphere, in z and φ, fine around a direction; each with a Gauss quadrature of its own."""
 
     CELLS = (24, 32)
-    NODES = 10
+    NODES = 7
 
     def __init__(self, centre, width, azimuth, lower=False, edge=0.0) -> None:
         """`width`, `azimuth`: angles of the finest cells in and across the plane of incidence; `edge`: cosine at which

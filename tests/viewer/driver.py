@@ -143,4 +143,4 @@ def wait_until(context, condition, seconds=480.0):
     while not condition():
         assert time.monotonic() < end, "it takes too long"
         context.yield_(1)
-        time.sleep(0.02)  # leave the processor to the engine
+        time.sleep(0.05)  # leave the processor to the engine: each frame is drawn by software

@@ -47,6 +47,8 @@ def random_value(info, rng: random.Random):
         return rng.random() < 0.5
     if info.choices:
         return rng.choice(info.choices)
+    if info.scale == "edits":
+        return {f"light.{rng.randint(1, 3)}.power": (rng.uniform(0, 3),) for _ in range(rng.randint(0, 2))}
     if info.scale == "vector":
         return tuple(rng.uniform(-3, 3) for _ in range(3))
     if info.scale == "name":

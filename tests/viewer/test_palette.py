@@ -84,14 +84,14 @@ def test_changed_settings_are_listed_and_reset_each(app, session):
         c.yield_(3)
         for path in ("gather.rays", "overlays.paths.count", "estimate.k"):
             assert c.item_info(item(path), NO_ERROR).id_ != 0
-        assert c.item_info(item("estimate.alpha"), NO_ERROR).id_ == 0
+        assert c.item_info(item("photons.glossy"), NO_ERROR).id_ == 0
         c.item_click("//Settings/**/\uf0e2##reset.overlays.paths.count")
         c.yield_(2)
         assert session.settings.overlays.paths.count == Settings().overlays.paths.count
         assert session.settings.gather.rays == 9
         c.key_press(chord(K.l, K.mod_ctrl))
         c.yield_(2)
-        assert c.item_info(item("estimate.alpha"), NO_ERROR).id_ != 0
+        assert c.item_info(item("photons.glossy"), NO_ERROR).id_ != 0
 
     drive(app, script)
 

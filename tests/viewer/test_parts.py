@@ -23,7 +23,7 @@ from pmviewer.viewer.panels.importance_panel import bias_row, deposition_rows, h
 from pmviewer.viewer.panels.statistics_panel import energy_rows
 from pmviewer.viewer.session_link import SessionLink
 from pmviewer.viewer.theme import drawable
-from pmviewer.viewer.viewport.hud import tick_text
+from pmviewer.viewer.viewport.legend import tick_text
 from tests.support.scenes import diffuse_box
 from tests.viewer.fake_session import FakeSession, photons_at, wall_photons
 

@@ -15,7 +15,9 @@ SMALL = ["camera.width=200", "camera.height=160", "photons.N=2000", "importance.
 
 def take(tmp_path, *settings, pixel=None, pin=None, window=False, captions=True):
     path = tmp_path / "shot.png"
-    take_shot(load_job("cornell_diffuse", [*SMALL, *settings], []), path, 1, None, window, (pixel, pin), captions, 1)
+    take_shot(
+        load_job("cornell_diffuse", [*SMALL, *settings], []), path, 1, None, window, (pixel, pin, ""), captions, 1
+    )
     return read_png(path)[0]
 
 

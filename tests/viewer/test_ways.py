@@ -85,7 +85,8 @@ def test_views_are_made_on_demand_in_the_legends_colours(app, tmp_path):
         assert "stored" in app.state.refused_view("storing probability")
 
     drive(app, script)
-    assert refused == ["storing probability", "virtual light error", "sum of weights", "normalisation"]
+    estimation = ["estimation mask", "gathered points", "subdivision level"]
+    assert refused == ["storing probability", "virtual light error", "sum of weights", "normalisation", *estimation]
     for frame, (view, pixels) in zip(frames[1:], seen.items(), strict=True):
         assert frame.planes is frames[0].planes
         expected = to_uint8(coloured(view, frame.image(view)))

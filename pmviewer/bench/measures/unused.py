@@ -63,6 +63,7 @@ NEEDS: Mapping[str, Needs] = {
     "cornell_fractal": Needs(outline=True, fields=("bsdfs", "instances")),
     "ring_caustic": Needs(caustics=True, outline=True),
     "cardioid_010": Needs(caustics=True, fields=("bsdfs",)),
+    "colonnade": Needs(fields=("bsdfs", "lights")),
     "corner_room": Needs(outline=True),
     "glossy_room": Needs(outline=True, fields=("bsdfs",)),
     "car_cabin": Needs(caustics=True, fields=("bsdfs",)),

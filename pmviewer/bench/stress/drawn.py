@@ -39,6 +39,7 @@ STRUCTURAL = {
     "gather.secondary",
     "gather.radiance_photons",
     "gather.cache",
+    "gather.estimation",
     "importance.map",
     "importance.deposition",
     "importance.convergence",
@@ -58,6 +59,7 @@ MOST = {
     "direct.shadow_N": 2000,
     "gather.rays": 4,
     "gather.cache_samples": 16,
+    "gather.estimation_samples": 16,
     "render.outline_rays": 8,
     "render.max_depth": 100,
     "virtual.number": 100,
@@ -67,6 +69,9 @@ MOST = {
     "virtual.window": 8.0,
 }
 """Upper ends where the schema's only cost time."""
+
+SIGNED = ("Mitchell-Netravali", "Catmull-Rom", "Lanczos")
+"""Filters that are negative somewhere: beside bright edges a picture of few samples may be so too."""
 
 PLAIN: dict[str, dict[str, Any]] = {
     "progressive": {},
@@ -86,6 +91,7 @@ STRUCTURES: dict[str, dict[str, Any]] = PLAIN | {
     "photon cones": {"render.method": "gather", "gather.directions": "photon cones", "gather.rays": 4},
     "secondary": {"render.method": "gather", "gather.secondary": 2.0},
     "irradiance cache": {"render.method": "gather", "gather.cache": "on"},
+    "gather estimation": {"render.method": "gather", "gather.estimation": "on"},
     "shadow photons": {"direct.shadow_photons": True},
     "virtual lights": {"render.method": "virtual lights"},
     "virtual lights, paths": {"render.method": "virtual lights", "virtual.estimator": "every vertex"},
@@ -120,6 +126,8 @@ def value_of(info: SettingInfo, u: float) -> Any:
         return u >= 0.5
     if info.choices:
         return info.choices[min(int(u * len(info.choices)), len(info.choices) - 1)]
+    if info.kind is dict:
+        return {} if u < 0.5 else {"light.1.power": (2 * u,)}
     assert info.lower is not None
     assert info.upper is not None
     low, high = info.lower, min(info.upper, MOST.get(info.path, math.inf))
@@ -198,7 +206,7 @@ def _problem(made: Renderer, views: bool) -> str:
     frame = made.frame(0)
     if not np.isfinite(frame.planes).all():
         return "a plane is not finite"
-    if (frame.beauty < 0).any():
+    if (frame.beauty < 0).any() and made.settings.render.filter not in SIGNED:
         return "a radiance is negative"
     energy = frame.statistics.energy
     if energy is not None:

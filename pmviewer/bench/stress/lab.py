@@ -114,6 +114,13 @@ class Lab:
     pool: WorkPool
     seeds: int = SEEDS
     said: list[str] = field(default_factory=list)
+    _known: dict[Any, Outcome] = field(default_factory=dict)
+
+    def once(self, key: Any, measure: Callable[[], Outcome]) -> Outcome:
+        """An outcome that several cases are compared with, measured for the first of them."""
+        if key not in self._known:
+            self._known[key] = measure()
+        return self._known[key]
 
     def open(self, scene: Scene | OpenScene) -> OpenScene:
         """The scene, with its warnings heard."""

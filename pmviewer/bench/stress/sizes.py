@@ -147,7 +147,14 @@ def _alpha(lab: Lab, alpha: float) -> Outcome:
     squares = np.cumprod([1.0] + [(i + alpha) / (i + 1) for i in range(1, 30)])
     expected = 0.25 * float(np.mean([kept(BOUND * 0.1 * np.sqrt(s)) for s in squares]))
     return lab.measure(
-        furnace(), expected, terms=("indirect",), passes=30, seeds=8, estimate__alpha=alpha, estimate__radius=0.1
+        furnace(),
+        expected,
+        terms=("indirect",),
+        passes=30,
+        seeds=8,
+        estimate__alpha=alpha,
+        estimate__radius=0.1,
+        photons__N=3000,
     )
 
 

@@ -27,7 +27,13 @@ FIRST = ("render", "estimate", "gather", "photons", "importance", "direct")
 """Groups of settings in the order in which they are most likely clicked; the others follow."""
 SIDE = 8
 """Pixels of the picture that a click is tried with, across and down."""
-FEW = {"photons.N": 200, "importance.N": 100, "gather.rays": 4, "gather.cache_samples": 8}
+FEW = {
+    "photons.N": 200,
+    "importance.N": 100,
+    "gather.rays": 4,
+    "gather.cache_samples": 8,
+    "gather.estimation_samples": 8,
+}
 """No more than these where it is tried."""
 
 

@@ -21,6 +21,8 @@ def reference_for(source: str | Path | None, scene: Scene, settings: Settings) -
     """
     if settings.free_camera.on:
         raise SettingError("References are seen by the render camera: switch free_camera.on off to compare with one.")
+    if source is None and settings.edit.changes:
+        raise SceneError("The scene's reference shows it as it is in its file: leave out the edits.")
     camera = resolve_camera(scene, settings.camera)
     path = reference_of(scene) if source is None else Path(source)
     if path is None:

@@ -17,7 +17,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.stages.eye import gather_rays_of
 from pmviewer.engine.wanted import looked_map
 from pmviewer.render.film import Film
-from pmviewer.render.planes import CHANNELS, TERMS
+from pmviewer.render.planes import PLANES, terms_of
 from pmviewer.scene.describe import area
 
 if TYPE_CHECKING:
@@ -38,7 +38,8 @@ def pixel_report(looked: Looked, pinned: Pinned, measures: Measures, pool: WorkP
     if not (0 <= pinned.x < film.width and 0 <= pinned.y < film.height):
         return None
     number = pinned.y * film.width + pinned.x
-    terms = _mean(film, number)[: 3 * len(TERMS)].reshape(-1, 3)
+    mean = _mean(film, number)
+    terms = np.array([mean[PLANES[name]] for name in terms_of(film.channels)])
     look_ups: tuple[LookUp, ...] = ()
     way, prims, samples = np.zeros((0, 3)), np.zeros(0, np.int64), None
     if not plan.path:
@@ -66,10 +67,10 @@ def pixel_report(looked: Looked, pinned: Pinned, measures: Measures, pool: WorkP
 
 
 def _mean(film: Film, number: int) -> Float:
-    """The planes of a pixel, (CHANNELS,)."""
+    """The planes of a pixel, (channels,)."""
     if type(film) is Film:
-        return film.sums[number, :CHANNELS] / max(film.passes, 1)
-    planes: NDArray[np.float32] = film.planes().reshape(-1, CHANNELS)
+        return film.sums[number, : film.channels] / max(film.passes, 1)
+    planes: NDArray[np.float32] = film.planes().reshape(-1, film.channels)
     return planes[number].astype(np.float64)
 
 

@@ -140,8 +140,8 @@ class Seen:
 class PixelReport:
     """What made a pixel in pass `index`.
 
-    `way` (v, 3) is its eye path: the camera's ray origin and the points that it met; `objects` are what is
-    there; `terms` (5, 3) its mean by term (`pmviewer.render.planes.TERMS`); `gathered` its gather rays
+    `way` (v, 3) is its eye path: the camera's ray origin and the points that it met; `objects` are what is there;
+    `terms` (5, 3), with media (7, 3), its mean by term (`pmviewer.render.planes.terms_of`); `gathered` its gather rays
     (`pmviewer.render.gather.gather_points`); `measures` what importance says there, by the name of the view, with the
     map it is of; `samples` (n_lights,) how many light samples each of the `lights` gets there, None where direct light
     is not sampled.

@@ -84,6 +84,7 @@ class MapBuilder:
             guides=guides,
             corner=corner,
             chooser=chooser,
+            volume=self._volume(light, traced) if plan.volume else None,
         )
 
     def _empty(self) -> tuple[Structure, PhotonGrid]:
@@ -155,6 +156,12 @@ class MapBuilder:
         if isinstance(global_.structure, PhotonKdTree):
             return median_radius(photons, global_.structure, global_.radius, self.settings.estimate, light)
         return global_.radius
+
+    def _volume(self, light: LightPlan, traced: TracedPass) -> LookUpMap:
+        """The pass's photons in media."""
+        photons, radius = traced.photons, light.radii["volume"]
+        make = partial(build_grid, photons.volume, radius, photons.volume_unit)
+        return LookUpMap(self._kept(light, ("volume", traced.key, radius), make, _bytes), radius)
 
     # beside them -----------------------------------------------------------------------------------------------------
 

@@ -49,7 +49,7 @@ def light_plan(
     largest radii in use by map, where they may be more than that of the pass."""
     estimate = settings.estimate
     radius = pass_radius(first_radius, index, estimate, importance.scene.flat.radius)
-    radii = {"caustic": radius * estimate.caustic_radius, "global": radius}
+    radii = {"caustic": radius * estimate.caustic_radius, "global": radius, "volume": radius * estimate.volume_radius}
     reach = {name: max(r, widest.get(name, 0.0)) for name, r in radii.items()}
     rules = Rules()
     if plan.deposition != "all":

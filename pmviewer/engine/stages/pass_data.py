@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.method import Plan, estimator_of
+from pmviewer.engine.stages.estimation import Estimates, blank_estimates
 from pmviewer.engine.stages.gather_guides import gather_records
 from pmviewer.engine.stages.pass_maps import LookUpMap, PassMaps, blank_grid, blank_maps
 from pmviewer.engine.stages.shadow_photons import ShadowMap
@@ -19,7 +20,7 @@ from pmviewer.maps.variant import looked_up_by
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.direct.choice import CHOICES
 from pmviewer.render.direct.shadow import NO_SHADOWS
-from pmviewer.render.given import PassData
+from pmviewer.render.given import NO_VOLUME, PassData
 from pmviewer.render.lookup import NO_RADIANCE_PHOTONS
 from pmviewer.render.record import Evaluation, eye_dtype, eye_record
 from pmviewer.settings.access import Settings
@@ -34,6 +35,7 @@ class RenderedPass:
     shadows: ShadowMap | None = None
     cache: IrradianceCache | None = None
     virtual: VirtualMap | None = None
+    estimates: Estimates | None = None
 
 
 def pass_record(camera: CameraPose, settings: Settings, plan: Plan, maps: PassMaps, index: int) -> NDArray[np.void]:
@@ -65,6 +67,9 @@ def _evaluation(settings: Settings, plan: Plan, maps: PassMaps) -> Evaluation:
         caustic_radius=maps.caustic.radius if maps.caustic is not None else 0.0,
         global_radius=maps.global_.radius if maps.global_ is not None else 0.0,
         radiance_cutoff=maps.radiance_reach,
+        volume_light=plan.volume,
+        phase_rays=plan.phase_rays,
+        volume_radius=maps.volume.radius if maps.volume is not None else 0.0,
     )
 
 
@@ -76,7 +81,7 @@ def pass_data(
     maps: PassMaps,
     shadows: NDArray[np.void] | None = None,
 ) -> PassData:
-    """The records that the kernels of a pass take, before its irradiance cache is filled."""
+    """The records that the kernels of a pass take, before there is an irradiance cache or estimates."""
     estimator = estimator_of(settings)
 
     def photon_map(made: LookUpMap | None) -> NDArray[np.void]:
@@ -94,12 +99,13 @@ def pass_data(
         shadows=shadows if shadows is not None else NO_SHADOWS,
         guides=guides,
         corner=corner,
+        volume_map=maps.volume.structure.record if maps.volume is not None else NO_VOLUME,
     )
 
 
 def blank_eye(settings: Settings, plan: Plan) -> NDArray[np.void]:
     """An eye record (1,) without contents. The free camera is a pinhole."""
-    return np.zeros(1, eye_dtype(plan.lens and not settings.free_camera.on, plan.filtered))
+    return np.zeros(1, eye_dtype(plan.lens and not settings.free_camera.on, plan.filtered, plan.media))
 
 
 def blank_pass(scene: NDArray[np.void], settings: Settings, plan: Plan) -> PassData:
@@ -109,4 +115,6 @@ def blank_pass(scene: NDArray[np.void], settings: Settings, plan: Plan) -> PassD
     given = pass_data(scene, blank_eye(settings, plan), settings, plan, blank_maps(settings, plan), shadows)
     if plan.virtual:
         given = given._replace(virtual=np.zeros(1, virtual_dtype(settings.virtual)))
+    if plan.estimation:
+        return given._replace(cache=blank_estimates())
     return given._replace(cache=np.zeros(1, CACHE_RECORD)) if plan.cache else given

@@ -34,12 +34,13 @@ class LookUpMap:
 class PassMaps:
     """The maps of pass `index` of N trajectories; nobody changes them. Their records are valid while this lives.
 
-    `caustic` and `global_` are None where nothing looks them up, and so are `chooser`, the grid of direct photons that
-    choose lights, `guides`, that of photons that guide gather rays, and `radiance`, the radiance photons, which are
-    used up to `radiance_reach`. `neighbours` nearest photons are looked up, which count in the `share` of their disc's
-    area; gather rays shorter than `corner` gather again. Lengths are in scene units. `rules` have decided about storing
-    the `photons`, and `known_before` is what guided emission knew before the pass. `empty` and `empty_grid` stand in
-    for maps that are not there: kernels take all maps, whether or not they look them up."""
+    `caustic` and `global_` are None where nothing looks them up, and so are `chooser`, the grid of direct photons
+    that choose lights, `volume`, the photons in media, `guides`, that of photons that guide gather rays, and
+    `radiance`, the radiance photons, which are used up to `radiance_reach`. `neighbours` nearest photons are looked
+    up, which count in the `share` of their disc's area; gather rays shorter than `corner` gather again. Lengths are
+    in scene units. `rules` have decided about storing the `photons`, and `known_before` is what guided emission knew
+    before the pass. `empty` and `empty_grid` stand in for maps that are not there: kernels take all maps, whether or
+    not they look them up."""
 
     index: int
     N: int
@@ -58,11 +59,12 @@ class PassMaps:
     guides: PhotonGrid | None = None
     corner: float = 0.0
     chooser: PhotonGrid | None = None
+    volume: LookUpMap | None = None
 
     @property
     def by_name(self) -> dict[str, LookUpMap]:
         """The photon maps that were built."""
-        maps = {"caustic": self.caustic, "global": self.global_}
+        maps = {"caustic": self.caustic, "global": self.global_, "volume": self.volume}
         return {name: made for name, made in maps.items() if made is not None}
 
     @property
@@ -123,4 +125,5 @@ def blank_maps(settings: Settings, plan: Plan) -> PassMaps:
         radiance=RadianceMap(grid) if plan.radiance else None,
         guides=grid if plan.guided_rays else None,
         chooser=grid if plan.choice != "power" else None,
+        volume=LookUpMap(grid, 0.0) if plan.volume else None,
     )

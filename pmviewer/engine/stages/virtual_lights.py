@@ -24,7 +24,7 @@ from pmviewer.maps.virtual_lights import (
 )
 from pmviewer.photons.virtual.lights import VirtualLights, virtual_lights
 from pmviewer.render.film import Film
-from pmviewer.render.planes import CHANNELS
+from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS
 from pmviewer.render.virtual_lights.film import WeightedFilm
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import Settings, Virtual
@@ -122,7 +122,9 @@ def lights_asked(record: NDArray[np.void]) -> int:
 
 def film_of(settings: Settings, plan: Plan, width: int, height: int) -> Film:
     """An empty film for the method."""
-    return WeightedFilm(width, height, settings.virtual) if plan.virtual else Film(width, height)
+    if plan.virtual:
+        return WeightedFilm(width, height, settings.virtual)
+    return Film(width, height, channels=MEDIA_CHANNELS if plan.media else CHANNELS)
 
 
 def bias_of(settings: Settings) -> tuple[str, ...]:

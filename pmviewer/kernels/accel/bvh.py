@@ -10,6 +10,7 @@ A child index c of a wide node is a node if c >= 0; otherwise ~c is a block, or,
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -17,14 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.accel.bvh_binary import build_binary
+from pmviewer.kernels.accel.bvh_pack import COLLAPSE_BYTES, collapse, triangle_boxes
+from pmviewer.kernels.accel.bvh_split import plan_range, subtree
 from pmviewer.kernels.accel.quadric import QUADRIC_FLOATS, quadric_bounds
 from pmviewer.kernels.accel.simd import BLOCK_ROWS, LANES, NODE_ROWS
-from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import aligned_empty
 from pmviewer.progress import parallel
-
-MIN_SINE = 1e-7
-"""A triangle whose edges span a smaller sine has no usable float32 normal: it is left out, like one without area."""
 
 _AT_ONCE = 1 << 17
 """Triangles that one thread looks at at a time."""
@@ -37,6 +36,9 @@ BVH_FIELDS = [
     ("n_triangles", "i8"),
 ]
 """The fields of a scene record that ray casting reads: three addresses and two counts."""
+
+TURNED = [4, 5, 6, 7, 0, 1, 2, 3]
+"""Elements of a box with its halves changed over."""
 
 F4 = NDArray[np.float32]
 
@@ -101,126 +103,71 @@ def build(triangles: F4, quadrics: F4, boxed: tuple[F4, F4] | None = None) -> Bv
     lower, upper = quadric_bounds(own_quadrics[: len(quadrics)])
     if boxed is not None:
         lower, upper = np.concatenate([lower, boxed[0]]), np.concatenate([upper, boxed[1]])
-    boxes = aligned_empty((len(triangles) + len(lower), 8), np.float32)
-    n_kept = _boxes_of(triangles, boxes)
+    boxes = aligned_empty((len(triangles) + len(lower), LANES), np.float32)
+    n_kept, around = _boxes_of(triangles, boxes)
     kept = np.flatnonzero(np.isfinite(lower).all(1) & np.isfinite(upper).all(1))
     boxes = boxes[: n_kept + len(kept)]
-    boxes[n_kept:, 0:3], boxes[n_kept:, 4:7] = lower[kept], -upper[kept]
-    boxes.view(np.int32)[n_kept:, 3] = kept
+    others = boxes[n_kept:]
+    others[:, 0:3], others[:, 4:7] = lower[kept], -upper[kept]
+    others[:, 3], others[:, 7] = 0.0, 0.0
+    around = np.concatenate([around, [[_joined(others), _joined(others - others[:, TURNED])]]]).min(axis=0)
+    others.view(np.int32)[:, 3] = kept
 
-    binary = build_binary(boxes, n_kept)
+    binary = build_binary(boxes, n_kept, around[0], around[1])
     nodes = aligned_empty((len(binary.nodes) // 2 + 1, NODE_ROWS, LANES), np.float32)
     # An unused lane refers to block 0, which therefore always exists.
     blocks = aligned_empty((max(binary.n_blocks, 1), BLOCK_ROWS, LANES), np.float32)
     blocks[0] = 0.0
-    n_nodes = _collapse(
-        triangles, boxes.view(np.int32), n_kept, binary.nodes, binary.nodes.view(np.int32), binary.plan,
-        nodes, nodes.view(np.int32), blocks, blocks.view(np.int32),
+    scratch = aligned_empty((COLLAPSE_BYTES,), np.uint8)
+    n_nodes = collapse(
+        triangles.ctypes.data, boxes.ctypes.data, n_kept, len(boxes), binary.nodes.ctypes.data, nodes.ctypes.data,
+        blocks.ctypes.data, len(blocks), scratch.ctypes.data,
     )  # fmt: skip
     own_nodes = aligned_empty((n_nodes, NODE_ROWS, LANES), np.float32)
     own_nodes[:] = nodes[:n_nodes]
     return Bvh(own_nodes, blocks, own_quadrics, len(triangles))
 
 
-def _boxes_of(triangles: F4, boxes: F4) -> int:
-    """Fill `boxes` with those of the usable triangles in their order; returns their number."""
-    ids = boxes.view(np.int32)
+def _joined(rows: F4) -> F4:
+    """The box around boxes (n, 8)."""
+    return np.asarray(rows.min(axis=0, initial=np.inf), np.float32)
+
+
+def _boxes_of(triangles: F4, boxes: F4) -> tuple[int, F4]:
+    """Fill `boxes` with those of the usable triangles in their order; returns their number and, (k, 2, 8), boxes around
+    parts of them with those around their centres."""
     starts = range(0, len(triangles), _AT_ONCE)
-    tasks = [partial(_triangle_boxes, triangles, boxes, ids, i, min(i + _AT_ONCE, len(triangles))) for i in starts]
+    around = aligned_empty((len(starts) + 1, 2, LANES), np.float32)
+    around[-1] = np.inf
+    from_, to, over = triangles.ctypes.data, boxes.ctypes.data, around.ctypes.data
+    found = parallel(
+        [
+            partial(triangle_boxes, from_, to, over + around.strides[0] * k, i, min(i + _AT_ONCE, len(triangles)))
+            for k, i in enumerate(starts)
+        ]
+    )
     count = 0
-    for start, found in zip(starts, parallel(tasks)):
+    for start, more in zip(starts, found):
         if count < start:
-            boxes[count : count + found] = boxes[start : start + found].copy()
-        count += found
-    return count
+            boxes[count : count + more] = boxes[start : start + more].copy()
+        count += more
+    return count, around
 
 
-@kernel
-def _triangle_boxes(triangles, boxes, box_ids, begin, end):
-    """Fill rows of `boxes` (n, 8) from `begin` on, as `bvh_binary` has them, for the usable ones of the triangles
-    [begin, end); returns their number."""
-    count = begin
-    for i in range(begin, end):
-        total = np.float64(0.0)
-        for k in range(3):
-            a, b, c = triangles[i, 0, k], triangles[i, 1, k], triangles[i, 2, k]
-            boxes[count, k] = min(a, min(b, c))
-            boxes[count, 4 + k] = -max(a, max(b, c))
-            total += abs(np.float64(a)) + abs(np.float64(b)) + abs(np.float64(c))
-        x1 = np.float64(triangles[i, 1, 0]) - np.float64(triangles[i, 0, 0])
-        y1 = np.float64(triangles[i, 1, 1]) - np.float64(triangles[i, 0, 1])
-        z1 = np.float64(triangles[i, 1, 2]) - np.float64(triangles[i, 0, 2])
-        x2 = np.float64(triangles[i, 2, 0]) - np.float64(triangles[i, 0, 0])
-        y2 = np.float64(triangles[i, 2, 1]) - np.float64(triangles[i, 0, 1])
-        z2 = np.float64(triangles[i, 2, 2]) - np.float64(triangles[i, 0, 2])
-        nx, ny, nz = y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2
-        longest = (x1 * x1 + y1 * y1 + z1 * z1) * (x2 * x2 + y2 * y2 + z2 * z2)
-        usable = nx * nx + ny * ny + nz * nz > MIN_SINE * MIN_SINE * longest
-        if usable and total < np.inf:
-            box_ids[count, 3] = i
-            box_ids[count, 7] = 0
-            count += 1
-    return count - begin
+def builder_kernels() -> list[Callable[[], object]]:
+    """Calls for nothing, each of which compiles a kernel that `build` needs, last to first: for a process that compiles
+    while another one does so in the order of `build`."""
+    rows = aligned_empty((2048, LANES), np.float32)
+    rows[:] = 0.0
+    at, apart = rows.ctypes.data, rows[1024:].ctypes.data
+    return [
+        partial(_with_memory, rows, collapse, at, at, 0, 0, at, at, at, 1, apart),
+        partial(_with_memory, rows, plan_range, at, at, 0, 0),
+        partial(_with_memory, rows, subtree, at, 0, at, at, 0, apart, 0),
+        partial(_with_memory, rows, triangle_boxes, at, at, apart, 0, 0),
+    ]
 
 
-@device
-def _fill_block(triangles, box_ints, begin, count, block, block_ints):
-    for lane in range(LANES):
-        i = box_ints[begin + lane, 3] if lane < count else -1
-        for k in range(3):
-            if i >= 0:
-                corner = triangles[i, 0, k]
-                block[k, lane] = corner
-                block[3 + k, lane] = triangles[i, 1, k] - corner
-                block[6 + k, lane] = triangles[i, 2, k] - corner
-            else:
-                block[k, lane] = block[3 + k, lane] = block[6 + k, lane] = np.float32(0)
-        block_ints[9, lane] = i
-
-
-@kernel
-def _collapse(triangles, box_ints, n_triangles, binary, binary_ints, plan, nodes, node_ints, blocks, block_ints):
-    """Turn the binary tree into wide nodes and blocks; returns the number of wide nodes."""
-    n_blocks_total = len(blocks)
-    n_nodes, n_blocks = 1, 0
-    stack = np.empty((1024, 2), np.int64)
-    stack[0, 0], stack[0, 1] = 0, 0
-    size = 1
-    pending = np.empty((LANES, 2), np.int64)
-    while size > 0:
-        size -= 1
-        source, target = stack[size, 0], stack[size, 1]
-        lane = 0
-        pending[0, 0], pending[0, 1] = source, 1
-        waiting = 1 if len(box_ints) > 0 else 0
-        while waiting > 0:
-            waiting -= 1
-            c, k = pending[waiting, 0], pending[waiting, 1]
-            begin, held = np.int64(binary_ints[c, 3]), np.int64(binary_ints[c, 7])
-            share = np.int64(plan[c, k - 1])
-            if held == 0 and (c == source or (k > 1 and share > 0)):
-                k = LANES if c == source else k
-                pending[waiting, 0], pending[waiting, 1] = begin + 1, k - share
-                pending[waiting + 1, 0], pending[waiting + 1, 1] = begin, share
-                waiting += 2
-                continue
-            for i in range(3):
-                nodes[target, 2 * i, lane], nodes[target, 2 * i + 1, lane] = binary[c, i], -binary[c, 4 + i]
-            if held == 0:
-                node_ints[target, 6, lane] = n_nodes
-                stack[size, 0], stack[size, 1] = c, n_nodes
-                size += 1
-                n_nodes += 1
-            elif begin < n_triangles:
-                _fill_block(triangles, box_ints, begin, held, blocks[n_blocks], block_ints[n_blocks])
-                node_ints[target, 6, lane] = ~n_blocks
-                n_blocks += 1
-            else:
-                node_ints[target, 6, lane] = ~(n_blocks_total + box_ints[begin, 3])
-            lane += 1
-        node_ints[target, 7] = 0
-        for i in range(lane, LANES):
-            for k in range(3):
-                nodes[target, 2 * k, i], nodes[target, 2 * k + 1, i] = np.float32(np.inf), np.float32(-np.inf)
-            node_ints[target, 6, i] = ~0
-    return n_nodes
+def _with_memory(rows: F4, function: Callable[..., object], *addresses: int) -> object:
+    """Call it while `rows` live."""
+    return function(*addresses)

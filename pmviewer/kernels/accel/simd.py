@@ -38,7 +38,8 @@ def _constant(value: float) -> ir.Constant:
     return ir.Constant(V8, [value] * LANES)
 
 
-def _splat(builder, scalar):
+def splat(builder, scalar):
+    """Eight times the same float32, in LLVM's builder."""
     vector = builder.insert_element(ir.Constant(V8, ir.Undefined), scalar, ir.Constant(I32, 0))
     return builder.shuffle_vector(vector, ir.Constant(V8, ir.Undefined), ir.Constant(V8I, [0] * LANES))
 
@@ -90,11 +91,11 @@ def hit_boxes(typingctx, node, nears, origin, inverse, tmin, tmax, out):
 
     def codegen(context, builder, sig, args):
         node, nears, origin, inverse, tmin, tmax, out = args
-        enter, leave = _splat(builder, tmin), _splat(builder, tmax)
+        enter, leave = splat(builder, tmin), splat(builder, tmax)
         for near, o, i in zip(*(cgutils.unpack_tuple(builder, values, 3) for values in (nears, origin, inverse))):
             first = _load(builder, builder.add(node, near))
             last = _load(builder, builder.add(node, builder.xor(near, ir.Constant(I64, ROW_BYTES))))
-            o, i = _splat(builder, o), _splat(builder, i)
+            o, i = splat(builder, o), splat(builder, i)
             t0 = builder.fmul(builder.fsub(first, o), i)
             t1 = builder.fmul(builder.fsub(last, o), i)
             enter = builder.select(builder.fcmp_ordered(">", t0, enter), t0, enter)
@@ -152,7 +153,7 @@ def hit_triangles(typingctx, block, ox, oy, oz, dx, dy, dz, tmin, tmax, out):
 
         rows = [_load(builder, builder.add(block, ir.Constant(I64, ROW_BYTES * k))) for k in range(9)]
         v0, e1, e2 = rows[0:3], rows[3:6], rows[6:9]
-        origin, direction = ([_splat(builder, x) for x in args[k : k + 3]] for k in (1, 4))
+        origin, direction = ([splat(builder, x) for x in args[k : k + 3]] for k in (1, 4))
         p = cross(direction, e2)
         inverse = builder.fdiv(_constant(1.0), dot(e1, p))
         s = [sub(o, v) for o, v in zip(origin, v0)]
@@ -163,8 +164,8 @@ def hit_triangles(typingctx, block, ox, oy, oz, dx, dy, dz, tmin, tmax, out):
         low = _constant(-EDGE_TOLERANCE)
         lanes = builder.and_(builder.fcmp_ordered(">=", u, low), builder.fcmp_ordered(">=", v, low))
         lanes = builder.and_(lanes, builder.fcmp_ordered("<=", add(u, v), _constant(1.0 + EDGE_TOLERANCE)))
-        lanes = builder.and_(lanes, builder.fcmp_ordered(">", t, _splat(builder, tmin)))
-        lanes = builder.and_(lanes, builder.fcmp_ordered("<", t, _splat(builder, tmax)))
+        lanes = builder.and_(lanes, builder.fcmp_ordered(">", t, splat(builder, tmin)))
+        lanes = builder.and_(lanes, builder.fcmp_ordered("<", t, splat(builder, tmax)))
         for row, value in enumerate((t, u, v)):
             _store(builder, value, out, row)
         return _mask(builder, lanes)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 DIFFUSE, CONDUCTOR, DIELECTRIC = 0, 1, 2
 ROUGH_CONDUCTOR, ROUGH_DIELECTRIC, THIN_DIELECTRIC, PLASTIC, ROUGH_PLASTIC, SCHLICK, WARD = range(3, 10)
-PRINCIPLED, BLEND = 10, 11
+PRINCIPLED, BLEND, NULL = 10, 11, 12
 
 
 class Kind(NamedTuple):
@@ -35,6 +35,8 @@ KINDS = {
     "ward": Kind(WARD, "specular", based=True),
     "principled": Kind(PRINCIPLED),
     "blend": Kind(BLEND),
+    "null": Kind(NULL),
 }
-"""By `Material.kind`. What principled materials and blends have depends on their numbers."""
+"""By `Material.kind`. What principled materials and blends have depends on their numbers; null is the boundary of
+a medium that nothing else shows (`pmviewer.kernels.media.medium`)."""
 GLOSSY = tuple(kind.number for kind in KINDS.values() if kind.glossy)

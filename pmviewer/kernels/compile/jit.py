@@ -24,7 +24,7 @@ from numba import njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
 
-from pmviewer.kernels.compile import collector, library
+from pmviewer.kernels.compile import collector, library, quicker
 from pmviewer.kernels.compile.cache_folder import claim
 from pmviewer.kernels.compile.sources import PACKAGE, stamp
 from pmviewer.kernels.compile.turns import Turns
@@ -77,6 +77,7 @@ _turns = Turns(CACHE_FOLDER)
 if not numba.config.DISABLE_JIT:
     library.install()
     collector.install()
+    quicker.install()
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": FASTMATH}
 

@@ -57,31 +57,26 @@ def judge(vertices, faces, begin, end, largest, flattest, verdict):
 
 
 @kernel
-def number_used(faces, number):
-    """number (V,) int32 becomes 0, 1, 2 … for the vertices that faces use, in their own order, −1 for the others;
-    returns how many are used."""
-    number[:] = -1
+def number_used(vertices, faces, number, low, high):
+    """number (V,) int32 becomes 0, 1, 2 … for the vertices (V, 3) that faces use, in their own order, −1 for others;
+    low and high (3,) the corners of the box around them. Returns how many are used."""
+    for i in range(len(number)):
+        number[i] = -1
     for f in range(len(faces)):
         for k in range(3):
             number[faces[f, k]] = 0
+    x0, y0, z0, x1, y1, z1 = np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf
     used = np.int32(0)
     for i in range(len(number)):
         if number[i] == 0:
             number[i] = used
             used += 1
+            x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+            x0, y0, z0 = min(x0, x), min(y0, y), min(z0, z)
+            x1, y1, z1 = max(x1, x), max(y1, y), max(z1, z)
+    low[0], low[1], low[2] = x0, y0, z0
+    high[0], high[1], high[2] = x1, y1, z1
     return used
-
-
-@kernel
-def bounds_of(vertices, faces, low, high):
-    """Lowest and highest corner (3,) of the box around the vertices that the faces use."""
-    low[:], high[:] = np.inf, -np.inf
-    for f in range(len(faces)):
-        for k in range(3):
-            i = faces[f, k]
-            for axis in range(3):
-                low[axis] = min(low[axis], vertices[i, axis])
-                high[axis] = max(high[axis], vertices[i, axis])
 
 
 @kernel

@@ -100,7 +100,7 @@ class PhotonGrid:
 
 
 @device
-def _hash(cx, cy, cz, mask):
+def cell_bucket(cx, cy, cz, mask):
     """Bucket of a cell; four cells with the same cx >> 2 get four successive buckets."""
     h = _u4(_u4(_u4(cx >> 2) * _u4(73856093)) ^ _u4(_u4(cy) * _u4(19349663)) ^ _u4(_u4(cz) * _u4(83492791)))
     h = _u4(_u4(h ^ _u4(h >> _u4(16))) * _u4(0x7FEB352D))
@@ -120,7 +120,7 @@ def _row(grid, cx0, cx1, cy, cz, ranges, count):
             count += 1
         return count
     for cx in range(cx0, cx1 + 1):
-        bucket = _hash(cx, cy, cz, grid.hash_mask)
+        bucket = cell_bucket(cx, cy, cz, grid.hash_mask)
         first, end = load_i4(grid.starts, bucket), load_i4(grid.starts, bucket + 1)
         if first == end:
             continue
@@ -244,7 +244,7 @@ def _sort(photons, words, records, shift, keys, order, bucket_ends, cell_ends, b
         if grid.hash_mask == 0:
             key = (cz * grid.ny + cy) * grid.nx + cx
         else:
-            key = _hash(cx, cy, cz, grid.hash_mask)
+            key = cell_bucket(cx, cy, cz, grid.hash_mask)
         keys[0, i] = key
         bucket_ends[key >> shift] += 1
     total = 0

@@ -19,7 +19,7 @@ from pmviewer.maps.power import write_power
 from pmviewer.maps.record import in_classes
 from pmviewer.photons.emission.strata import Strata, table_of
 from pmviewer.photons.light_pass import batch as light_pass
-from pmviewer.photons.light_pass.trace import C_DROPPED, C_RAYS, N_COUNTS, empty_ledger
+from pmviewer.photons.light_pass.ledger import C_DROPPED, C_RAYS, N_COUNTS, empty_ledger
 from pmviewer.tasks import Runner
 
 Float = NDArray[np.float32]

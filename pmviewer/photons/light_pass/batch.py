@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SettingError
+from pmviewer.photons.light_pass.ledger import C_CAUSTIC, C_GLOBAL, C_VOLUME, N_COUNTS, empty_ledger
 from pmviewer.photons.light_pass.paths import PhotonPaths
 from pmviewer.photons.light_pass.roulette import EQUAL, MOST_COPIES
-from pmviewer.photons.light_pass.trace import (
-    C_CAUSTIC,
-    C_GLOBAL,
-    N_COUNTS,
-    PhotonBuffers,
-    empty_ledger,
-    trace_photons,
-)
+from pmviewer.photons.light_pass.trace import PhotonBuffers, trace_photons
 from pmviewer.resources import available_memory
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.tasks import Runner
@@ -34,6 +28,7 @@ BYTES_PER_STORED = 60
 """A photon as it arrived, joined to the others, and in its map."""
 
 
+NO_PHOTONS: Float = np.empty((0, 6), np.float32)
 NO_NORMALS, GLOBAL_NORMALS, NORMALS = range(3)
 """Whose surface normals are wanted: nobody's, global photons', all photons'."""
 
@@ -49,6 +44,8 @@ class Batch:
     ledgers: NDArray[np.float64]
     global_normals: Codes
     caustic_normals: Codes
+    volume: Float = field(default_factory=lambda: NO_PHOTONS)
+    """Photons (n, 6) in media."""
 
 
 Task = Callable[[], Batch]
@@ -73,7 +70,7 @@ def trace_batch(
     if pass_["roulette"] == EQUAL:
         most *= MOST_COPIES
     counts, ledgers = np.zeros(N_COUNTS, np.int64), empty_ledger()
-    parts: list[tuple[Float, Float, Codes, Codes]] = []
+    parts: list[tuple[Float, Float, Codes, Codes, Float]] = []
     while i0 < i1:
         rows = 5 * (i1 - i0) + 2 * most
         out = PhotonBuffers(
@@ -83,6 +80,7 @@ def trace_batch(
             np.empty(len(caustic_out) if with_normals == NORMALS else 0, np.uint32),
             np.zeros(N_COUNTS, np.int64),
             ledgers,
+            volume_out := np.empty((rows, 6), np.float32) if scene.has_media else None,
         )
         i0 = trace_photons(scene.record, record, emission, i0, i1, out, where)
         n_caustic, n_global = out.counts[C_CAUSTIC], out.counts[C_GLOBAL]
@@ -92,13 +90,13 @@ def trace_batch(
                 out.global_out[:n_global].copy(),
                 out.global_normals[:n_global].copy(),
                 out.caustic_normals[:n_caustic].copy(),
+                NO_PHOTONS if volume_out is None else volume_out[: out.counts[C_VOLUME]].copy(),
             )
         )
         counts += out.counts
-    caustic, global_, global_normals, caustic_normals = zip(*parts) if parts else ((), (), (), ())
-    return Batch(
-        joined(caustic), joined(global_), counts, ledgers, joined_codes(global_normals), joined_codes(caustic_normals)
-    )
+    caustic, global_, global_normals, caustic_normals, volume = zip(*parts) if parts else ((), (), (), (), ())
+    normals = joined_codes(global_normals), joined_codes(caustic_normals)
+    return Batch(joined(caustic), joined(global_), counts, ledgers, *normals, joined(volume))
 
 
 def bounded(tasks: list[Task], most: int, run: Runner) -> list[Batch]:

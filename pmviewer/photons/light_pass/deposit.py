@@ -15,9 +15,9 @@ from pmviewer.photons.deposition.depositor import Depositor, Judged
 from pmviewer.photons.deposition.fates import Fates
 from pmviewer.photons.deposition.rules import Deposition, rounds
 from pmviewer.photons.light_pass.batch import BATCH, Codes, Float, Numbered, joined
+from pmviewer.photons.light_pass.ledger import C_DROPPED, C_RAYS, N_COUNTS, empty_ledger
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.photons.light_pass.plan import PassPlan
-from pmviewer.photons.light_pass.trace import C_DROPPED, C_RAYS, N_COUNTS, empty_ledger
 from pmviewer.tasks import Runner
 
 SAMPLED = 64 * BATCH

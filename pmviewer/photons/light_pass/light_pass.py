@@ -30,10 +30,10 @@ from pmviewer.photons.light_pass.batch import (
     trace_batch,
 )
 from pmviewer.photons.light_pass.deposit import deposit
+from pmviewer.photons.light_pass.ledger import C_DROPPED, C_RAYS, N_COUNTS, empty_ledger
 from pmviewer.photons.light_pass.paths import PhotonPaths
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.photons.light_pass.plan import PassPlan, pass_record, plan_pass
-from pmviewer.photons.light_pass.trace import C_DROPPED, C_RAYS, N_COUNTS, empty_ledger
 from pmviewer.photons.projection.projection import Projection
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import Photons
@@ -112,6 +112,8 @@ def _joined(plan: PassPlan, results: list[Batch], last: int) -> PhotonMaps:
         ledgers=ledgers,
         energy=plan.energy(ledgers),
         normals=joined_codes(r.global_normals for r in results),
+        volume=joined(r.volume for r in results),
+        volume_unit=plan.global_unit * plan.store_probability,
     )
 
 

@@ -43,6 +43,10 @@ class PhotonMaps:
     deposited: Mapping[str, Deposited] = field(default_factory=dict)
     guided: Guided | None = None
     """The emission, where it is guided; the ledgers then leave out its test photons."""
+    volume: Float = field(default_factory=lambda: np.empty((0, 6), np.float32))
+    """Photons (n, 6) that collided in media after they were scattered, with the power that they were scattered with, in
+    units of `volume_unit`."""
+    volume_unit: float = 0.0
 
     @property
     def ledger(self) -> NDArray[np.float64]:
@@ -52,5 +56,5 @@ class PhotonMaps:
     @property
     def bytes(self) -> int:
         """Of all photons and normals, for the stage store; grids and trees count for themselves."""
-        arrays = self.caustic, self.global_, self.normals, self.caustic_normals, self.sample
+        arrays = self.caustic, self.global_, self.normals, self.caustic_normals, self.sample, self.volume
         return sum(array.nbytes for array in arrays)

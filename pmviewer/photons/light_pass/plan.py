@@ -9,15 +9,9 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
 from pmviewer.photons.emission.guided import Guided
+from pmviewer.photons.light_pass.ledger import E_ABSORBED, E_DROPPED, E_EMITTED, E_ESCAPED, E_TERMINATED
 from pmviewer.photons.light_pass.roulette import MOST_COPIES, RULES
-from pmviewer.photons.light_pass.trace import (
-    E_ABSORBED,
-    E_DROPPED,
-    E_EMITTED,
-    E_ESCAPED,
-    E_TERMINATED,
-    LIGHT_PASS_DTYPE,
-)
+from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE
 from pmviewer.photons.projection.projected import NO_PROJECTION
 from pmviewer.photons.projection.projection import Projection
 from pmviewer.scene.arrays.flatten import FlatScene
@@ -55,6 +49,11 @@ class PassPlan:
     def global_photons(self) -> int:
         """Trajectories that the power of global photons is shared by."""
         return self.filling if self.guided is None else self.guided.N
+
+    @property
+    def store_probability(self) -> float:
+        """With which a global photon is stored."""
+        return float(self.record[0]["store_probability"])
 
     def caustic_unit(self, n: int) -> float:
         """That of the caustic map when the first n trajectories are traced, of those that make caustics."""

@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pmviewer.kernels.accel.opacity import over_opacity
-from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.bsdf.scattering import (
     FOLLOWED,
     NOTHING,
@@ -34,12 +33,25 @@ from pmviewer.kernels.compile.jit import inlined, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import COPIES, EMISSION, EMITTER, FURTHER_PHOTONS_SALT, PHOTON_SCATTER, STORE
 from pmviewer.kernels.lights.light import is_delta_light
+from pmviewer.kernels.media.medium import light_medium
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import STRAIGHT, adjoint_cosines, face, leave, surface_at
 from pmviewer.kernels.vector import dot, is_good, luminance, mul, scale
 from pmviewer.maps.photon_words import encode_direction, write_photon
 from pmviewer.maps.record import BOUNCES, CAUSTIC, HAD_DIFFUSE, INDIRECT_CAUSTIC, LAST_SPECULAR, UNFOUND
+from pmviewer.photons.light_pass.flight import Photon, Trajectory, is_full, medium_after, to_surface
+from pmviewer.photons.light_pass.ledger import (
+    C_CAUSTIC,
+    C_DROPPED,
+    C_GLOBAL,
+    E_ABSORBED,
+    E_DROPPED,
+    E_EMITTED,
+    E_ESCAPED,
+    E_STORED,
+    E_TERMINATED,
+)
 from pmviewer.photons.light_pass.paths import begin_path, extend_path
 from pmviewer.photons.light_pass.roulette import BY_LUMINANCE, EQUAL, MOST_COPIES, copies, survival_probability
 from pmviewer.photons.projection.projected import emission
@@ -48,7 +60,6 @@ _f4 = np.float32
 _f8 = np.float64
 _u4 = np.uint32
 _i8 = np.int64
-_INF = _f4(np.inf)
 
 LIGHT_PASS_DTYPE = np.dtype(
     [
@@ -70,26 +81,13 @@ LIGHT_PASS_DTYPE = np.dtype(
     align=True,
 )
 
-N_COUNTS = 4
-C_GLOBAL, C_CAUSTIC, C_RAYS, C_DROPPED = range(N_COUNTS)
-N_LEDGER = 6
-E_EMITTED, E_STORED, E_ABSORBED, E_ESCAPED, E_TERMINATED, E_DROPPED = range(N_LEDGER)
-"""Energy ledger: luminance of power in units of the map's. What roulette gives a survivor or takes from a victim counts
-as absorbed, so that the ledger always balances and each entry is right in the mean. E_STORED is what arrived where
-photons are stored, as often as it arrived; the others after E_EMITTED are how a trajectory ends. A photon whose power
-becomes infinite or NaN is dropped with the power that it had before."""
-
-
-def empty_ledger():
-    """Ledgers (2, N_LEDGER) of the trajectories that fill the global map and of the others, float64."""
-    return np.zeros((2, N_LEDGER))
-
 
 class PhotonBuffers(NamedTuple):
     """What photons leave behind. global_out, caustic_out: float32 (capacity, 6), see `pmviewer.maps.record`;
     global_normals, caustic_normals: uint32 (capacity,), receive codes of the surface normals on the side that each
     photon came from, or (0,) when nobody needs them; counts: int64 (N_COUNTS,) and ledgers: float64 (2, N_LEDGER) are
-    added to, `counts[C_GLOBAL]` and `counts[C_CAUSTIC]` being the rows filled so far."""
+    added to, `counts[C_GLOBAL]`, `counts[C_CAUSTIC]` and `counts[C_VOLUME]` being the rows filled so far; volume_out:
+    float32 (capacity, 6), photons in media, or None in scenes without."""
 
     global_out: Any
     caustic_out: Any
@@ -97,6 +95,7 @@ class PhotonBuffers(NamedTuple):
     caustic_normals: Any
     counts: Any
     ledgers: Any
+    volume_out: Any
 
 
 class Arrival(NamedTuple):
@@ -112,39 +111,40 @@ class Arrival(NamedTuple):
 
 @kernel
 def trace_photons(scenes, passes, projections, i0, i1, out, paths):
-    """Trace photons i0 … i1−1 of a pass.
+    """Trace photons i0 … i1−1 of a pass. Returns the next to trace: less than i1 when a buffer may not hold its path.
 
     scenes: SCENE_DTYPE (1,); passes: LIGHT_PASS_DTYPE (1,); projections: PROJECTION_DTYPE (2,), STRATA_DTYPE (2,),
     SCATTERED_DTYPE (2,) or NO_PROJECTION, of the trajectories that fill the global map and of the others; out:
     `PhotonBuffers`; paths: None, or where to write whole paths (`pmviewer.photons.light_pass.paths`).
-
-    Returns the index of the next photon to trace: less than i1 when a buffer may not hold another photon's path.
     """
     # Taken apart outside of the loop: counting references to arrays for each photon would take a quarter of the time.
-    global_out, caustic_out, global_normals, caustic_normals, counts, ledgers = out
+    global_out, caustic_out, global_normals, caustic_normals, counts, ledgers, volume_out = out
     scene, pass_ = scenes[0], passes[0]
     most = pass_.max_bounces if pass_.roulette != EQUAL else MOST_COPIES * pass_.max_bounces
     for i in range(i0, i1):
-        if counts[C_GLOBAL] + most > len(global_out) or counts[C_CAUSTIC] + most > len(caustic_out):
+        full = counts[C_GLOBAL] + most > len(global_out) or counts[C_CAUSTIC] + most > len(caustic_out)
+        if full or is_full(volume_out, counts, most):
             return i
         to_global = i < pass_.global_trajectories
         kind = 0 if to_global else 1
         seed, index = _stream(pass_, i)
         p, d, beta, light, starts, factor = _emitted(scene, pass_, projections[kind], i, seed, index)
         ledgers[kind, E_EMITTED] += _f8(factor)  # its luminance is 1
-        if not is_good(beta):
-            counts[C_DROPPED] += 1
-            ledgers[kind, E_DROPPED] += _f8(factor)
-            continue
-        if not starts:
-            ledgers[kind, E_ESCAPED] += _f8(factor)
+        good = is_good(beta)
+        if not (good and starts):
+            counts[C_DROPPED] += 0 if good else 1
+            ledgers[kind, E_ESCAPED if good else E_DROPPED] += _f8(factor)
             continue
         begin_path(paths, i, p, d, scale(beta, factor), light)
-        o, flags, bounces = p, _u4(0), 0
+        of = Trajectory(i, seed, index, light, factor, to_global)
+        photon = Photon(p, d, light_medium(scene, light), beta, _u4(0), 0)
         deltas = pass_.unfound != 0 and is_delta_light(scene, light)  # and nothing but deltas since the light
         while True:
-            t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), _INF)
-            counts[C_RAYS] += 1
+            alive, flown, prim, u, v, t = to_surface(scene, pass_, photon, of, volume_out, counts, ledgers, paths)
+            if not alive:
+                break
+            deltas = deltas and flown.bounces == photon.bounces  # no collision on the way
+            o, d, medium, beta, flags, bounces = flown
             word = _u4(flags | _u4(min(bounces, BOUNCES)))
             if prim < 0:
                 extend_path(paths, i, prim, o, d, scale(beta, factor), word, light)
@@ -153,7 +153,7 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
             if is_ignored(scene, prim, material):
-                o = leave(p, ng, gap, d[0], d[1], d[2])
+                photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces)
                 continue
             beta = _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledgers, kind)
             extend_path(paths, i, prim, p, d, scale(beta, factor), word, light)
@@ -164,15 +164,14 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
             if b.groups | kept == NOTHING or not before > _f4(0.0):
                 ledgers[kind, E_ABSORBED] += _f8(before * factor)
                 break
-            ng = face(ng, wi)
+            outward, ng = ng, face(ng, wi)
             u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, PHOTON_SCATTER + bounces)
             unfound = deltas and flags != 0 and kept & FOLLOWED != 0
             if kept & STORED != 0 or unfound:
-                word = _u4(word | _u4(UNFOUND)) if unfound else word
                 times, stored = _copies(pass_, beta, seed, index, bounces)
                 # As many photons as the opacity says meet the surface; looked up, it is taken to be there.
                 stored = over_opacity(scene, prim, u, v, p, scale(stored, factor))
-                arrival = Arrival(p, wi, ng, word, light)
+                arrival = Arrival(p, wi, ng, _u4(word | _u4(UNFOUND)) if unfound else word, light)
                 if _is_caustic(pass_, word):
                     in_caustic = _in_caustic(pass_, word, stored)
                     _store(caustic_out, caustic_normals, counts, C_CAUSTIC, arrival, in_caustic, times)
@@ -208,7 +207,8 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
             if bounces >= pass_.max_bounces:
                 ledgers[kind, E_TERMINATED] += _f8(luminance(beta) * factor)
                 break
-            o = leave(p, ng, gap, d[0], d[1], d[2])
+            medium = medium_after(scene, prim, outward, wi, d, medium)
+            photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces)
     return i1
 
 

@@ -51,7 +51,7 @@ def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, numbers):
     choice of light and place; the sampler draws further ones. `shadows` is for `known_visibility`. Returns L, the
     shadow rays cast and those that shadow photons saved.
     """
-    p, ng, gap, b, wo = si.p, si.ng, si.gap, si.bsdf, si.wo
+    p, ng, b, wo = si.p, si.ng, si.bsdf, si.wo
     total = BLACK
     rays, saved = 0, 0
     u_pick, u, v = numbers
@@ -72,7 +72,7 @@ def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, numbers):
                 saved += 1
             tint = WHITE if known == LIT else BLACK
             if known == UNKNOWN:
-                tint = transmission(scene, p, ng, gap, wi, end, group != FOLLOWED or not findable)
+                tint = transmission(scene, si, wi, end, group != FOLLOWED or not findable)
             if largest(tint) > _f4(0.0):
                 weight = cos / (m * pdf)
                 if findable and n_bsdf > 0:

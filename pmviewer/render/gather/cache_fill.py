@@ -92,7 +92,7 @@ def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
             if dot(wi, ng) <= _f4(0.0):
                 continue
             counts[C_RAYS] += 1
-            ray = ray_from(p, ng, gap, wi)
+            ray = ray_from(p, ng, gap, wi, None)  # never in scenes with media
             hit, tint = cast_on(given.scene, ray, True)
             if hit.prim >= 0:
                 cells[here, 3] = way(given.scene, ray.o, wi, hit)

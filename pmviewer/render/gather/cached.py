@@ -1,7 +1,8 @@
-"""The final gather where there is an irradiance cache: interpolated where records say enough, else cast (R6).
+"""The final gather where there is an irradiance cache: interpolated where records say enough, else cast (R6); and
+where gathers are estimated: the pixel's estimate where there is one, else cast (R7).
 
-Only irradiance of Lambertian lobes is cached, and only indirect light; direct light is sampled everywhere. Kernels are
-compiled for the cache or, given NO_CACHE, for the gather alone.
+Only irradiance of Lambertian lobes is known, and only indirect light; direct light is sampled everywhere. Kernels are
+compiled for the cache, for estimates or, given NO_CACHE, for the gather alone.
 """
 
 from __future__ import annotations
@@ -10,11 +11,12 @@ import numpy as np
 
 from pmviewer.kernels.bsdf.plain import INV_PI
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_sample, is_lambertian, shading_normal
-from pmviewer.kernels.compile.specialise import absent, part, specialised
+from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.vector import dot, largest, mul, scale
 from pmviewer.maps.irradiance_cache import interpolate
 from pmviewer.render.chain import BLACK
 from pmviewer.render.direct.direct import found_light
+from pmviewer.render.gather.estimation import estimated
 from pmviewer.render.gather.gather import gather_rays
 from pmviewer.render.record import C_CACHED, C_GATHERED, C_RAYS
 from pmviewer.render.straight import cast_straight
@@ -23,18 +25,31 @@ _f4 = np.float32
 
 
 @specialised
-def cached(given, si, counts):
-    """(irradiance, gather rays that are still to be cast) at a surface: all rays where there is no cache."""
+def cached(given, si, pixel, whole):
+    """(irradiance, gather rays that are still to be cast) at a surface that a Pixel sees: all rays where nothing is
+    known. `whole`: at the camera ray's own surface."""
     if absent(part(given, "cache")):
-        return lambda given, si, counts: (BLACK, given.eye.gather_rays)
+        return lambda given, si, pixel, whole: (BLACK, given.eye.gather_rays)
+    if has(part(given, "cache"), "estimates"):
 
-    def from_records(given, si, counts):
+        def from_estimates(given, si, pixel, whole):
+            if whole and is_lambertian(si.bsdf):
+                E, known = estimated(given.cache, pixel.number)
+                if known:
+                    pixel.counts[C_CACHED] += 1
+                    return E, np.int32(0)
+            pixel.counts[C_GATHERED] += 1
+            return BLACK, given.eye.gather_rays
+
+        return from_estimates
+
+    def from_records(given, si, pixel, whole):
         if is_lambertian(si.bsdf):
             E, weight = interpolate(given.cache, si.p, shading_normal(si.bsdf))
             if weight > _f4(0.0):
-                counts[C_CACHED] += 1
+                pixel.counts[C_CACHED] += 1
                 return E, np.int32(0)
-        counts[C_GATHERED] += 1
+        pixel.counts[C_GATHERED] += 1
         return BLACK, given.eye.gather_rays
 
     return from_records

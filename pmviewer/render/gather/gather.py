@@ -12,11 +12,12 @@ from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, chain_nu
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.dimensions import GATHER_CHAIN, GATHER_FORK
 from pmviewer.kernels.vector import add, dot, largest, mul, scale
-from pmviewer.render.cast import cast
+from pmviewer.render.cast import cast, leaving
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow
 from pmviewer.render.direct.direct import found_light
 from pmviewer.render.gather.corner import gather_again, is_corner
 from pmviewer.render.gather.guide import gather_direction
+from pmviewer.render.media.volume import gathered_from_media
 from pmviewer.render.record import C_RAYS
 from pmviewer.render.reflect import gathered
 from pmviewer.render.straight import cast_straight
@@ -80,6 +81,9 @@ def gather_light(given, hit, d, seed, index, counts):
             break
         counts[C_RAYS] += 1
         hit = cast(scene, ray)
+        L, T = gathered_from_media(given, ray, hit, seed, index, depth + 1, counts)
+        total = add(total, mul(beta, L))
+        beta = mul(beta, T)
     return total
 
 
@@ -113,6 +117,9 @@ def gather_rays(given, si, beta, rays, counts):
             weight = scale(weight, _f4(1.0) / survival)
         counts[C_RAYS] += 1
         hit, tint = cast_straight(scene, si, wi)
+        if eye.gather_rays > 0:
+            from_media, _ = gathered_from_media(given, leaving(si, wi), hit, rays.seed, sample, 0, counts)
+            indirect = add(indirect, scale(mul(weight, from_media), share))
         weight = mul(weight, tint)
         if eye.direct != 0 and eye.mis != 0 and pdf > _f4(0.0):
             L = found_light(scene, si.p, wi, pdf, n_bsdf, rays.choice, eye.biased, hit)

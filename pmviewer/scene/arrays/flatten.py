@@ -6,7 +6,7 @@ Primitives are numbered triangles first, then quadrics (spheres, cylinders, disk
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,8 @@ from pmviewer.scene.arrays.flatten_textures import (
 from pmviewer.scene.arrays.instances import build_instanced, instance_bounds
 from pmviewer.scene.arrays.light_table import LightTable
 from pmviewer.scene.arrays.material_row import MaterialTable, is_rich, material_table, used_materials
-from pmviewer.scene.arrays.stored_geometry import StoredGeometry, stored_geometry
+from pmviewer.scene.arrays.media import has_media, light_media, media_of_prims, medium_rows
+from pmviewer.scene.arrays.stored_geometry import StoredGeometry, same_surfaces, stored_geometry
 from pmviewer.scene.arrays.textured_emission import Emission, textured_lights
 from pmviewer.scene.description import LUMINANCE, Cylinder, Mesh, Parallelogram, Scene, Shape
 from pmviewer.scene.meshes.mesh_bounds import mesh_bounds
@@ -56,6 +57,7 @@ class FlatScene:
     n_triangles: int
     n_quadrics: int
     owner: Scene = field(repr=False)
+    stored: StoredGeometry = field(repr=False)
     n_instances: int = 0
     n_elements: int = 0
     """Triangles and quadrics that rays can meet, those of instances counted as often as they are shown."""
@@ -63,6 +65,13 @@ class FlatScene:
     """Of the instanced groups."""
     shape_of_prim: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, np.int32), repr=False)
     """The shape of each stored primitive."""
+    said: tuple[str, ...] = ()
+    """Sentences about what can't be shown right."""
+
+    @property
+    def has_media(self) -> bool:
+        """Whether there are participating media."""
+        return "media" in (self.record.dtype.names or ())
 
     @property
     def delta_lights(self) -> bool:
@@ -79,7 +88,7 @@ def bounding_sphere(scene: Scene) -> tuple[NDArray[np.float64], float]:
     """Centre and radius of the sphere around the bounding box of all shapes and instances."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for shape in scene.shapes:
-        for corner in _bounds(shape):
+        for corner in shape_bounds(shape):
             low, high = np.minimum(low, corner), np.maximum(high, corner)
     if scene.instances:
         more_low, more_high = instance_bounds(scene.instances)
@@ -88,7 +97,8 @@ def bounding_sphere(scene: Scene) -> tuple[NDArray[np.float64], float]:
     return center, max(float(np.linalg.norm(high - low)) / 2, 1e-30)
 
 
-def _bounds(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def shape_bounds(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest corner (3,) of a box around the shape."""
     g = shape.geometry
     if isinstance(g, Mesh):
         return mesh_bounds(g)
@@ -102,13 +112,19 @@ def _bounds(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.array(g.center) - g.radius, np.array(g.center) + g.radius
 
 
-def flatten(scene: Scene, on_type: Callable[[np.dtype], None] = lambda of_record: None) -> FlatScene:
+def flatten(
+    scene: Scene,
+    on_type: Callable[[np.dtype], None] = lambda of_record: None,
+    like: FlatScene | None = None,
+) -> FlatScene:
     """Build arrays, acceleration structure and light table. `on_type` hears of what type the record will be, before the
-    tree is built.
+    tree is built. The tree of `like` serves for the same surfaces.
 
     Raises SceneError when the scene has no surface or no light that emits.
     """
-    stored, materials = stored_geometry(scene), material_table(scene)
+    known = like if like is not None and same_surfaces(like.owner, scene) else None
+    stored = stored_geometry(scene) if known is None else replace(known.stored, shapes=scene.shapes)
+    materials = material_table(scene)
     prim_material = np.array([s.material for s in stored.shapes], np.int32)[stored.shape_of_prim]
     center, radius = bounding_sphere(scene)
     lit, emissions = textured_lights(with_covered_emission(scene))
@@ -119,8 +135,12 @@ def flatten(scene: Scene, on_type: Callable[[np.dtype], None] = lambda of_record
     record = np.zeros(1, K.scene_dtype(**features))
     r = record[0]
     on_type(record.dtype)
-    stage(f"building the tree over {len(stored.vertices):,} triangles")
-    if stored.groups:
+    if known is None:
+        stage(f"building the tree over {len(stored.vertices):,} triangles")
+    if known is not None:
+        bvh, shown = known.bvh, None
+        bvh.store(r)
+    elif stored.groups:
         bvh, shown = build_instanced(scene, stored.groups, stored.vertices, stored.quadrics, stored.shape_of_prim, r)
     else:
         bvh, shown = build(stored.vertices, stored.quadrics), None
@@ -136,6 +156,7 @@ def flatten(scene: Scene, on_type: Callable[[np.dtype], None] = lambda of_record
         "light_triangle_cdf": lights.triangle_cdf,
         **lights.sky_arrays(),
         **_shading_arrays(scene, features, stored, materials, lights, emissions),
+        **(_media_arrays(scene, stored) if features["media"] else {}),
     }
     for name, array in arrays.items():
         arrays[name] = np.ascontiguousarray(array)
@@ -147,6 +168,11 @@ def flatten(scene: Scene, on_type: Callable[[np.dtype], None] = lambda of_record
     if lights.sky is not None:
         r["sky_height"], r["sky_width"] = lights.sky.pixels.shape[:2]
     r["center_x"], r["center_y"], r["center_z"], r["radius"] = *center, radius
+    said: list[str] = []
+    if features["media"]:
+        r["emits"] = any(max(medium.emission) > 0 for medium in scene.media)
+        arrays["light_media"], said = light_media(record, lights.names, scene.camera.medium)
+        r["light_media"] = arrays["light_media"].ctypes.data
     n_elements = shown.n_elements if shown else len(stored.vertices) + len(stored.quadrics)
     return FlatScene(
         record=record,
@@ -162,10 +188,12 @@ def flatten(scene: Scene, on_type: Callable[[np.dtype], None] = lambda of_record
         n_triangles=len(stored.vertices),
         n_quadrics=len(stored.quadrics),
         owner=scene,
+        stored=stored,
         n_instances=len(scene.instances),
         n_elements=n_elements,
         trees=shown.trees if shown else (),
         shape_of_prim=stored.shape_of_prim,
+        said=tuple(said),
     )
 
 
@@ -191,6 +219,14 @@ def _features(scene: Scene, materials: MaterialTable, lights: LightTable, emits_
         "opacity": any(m.passable for m in used),
         "principled": "principled" in materials.kinds,
         "blends": "blend" in materials.kinds,
+        "media": has_media(scene),
+    }
+
+
+def _media_arrays(scene: Scene, stored: StoredGeometry) -> dict[str, NDArray]:
+    return {
+        "media": medium_rows(scene.media),
+        "prim_media": media_of_prims(stored.shapes, stored.shape_of_prim),
     }
 
 

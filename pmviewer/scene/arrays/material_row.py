@@ -65,7 +65,7 @@ def is_plain(m: Material) -> bool:
         return m.metal is None
     if m.kind == "dielectric":
         return not any(m.absorption)
-    return m.kind == "diffuse"
+    return m.kind in ("diffuse", "null")
 
 
 def used_materials(scene: Scene) -> list[Material]:

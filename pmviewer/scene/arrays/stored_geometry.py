@@ -35,6 +35,13 @@ class StoredGeometry:
         return _corner_normals([m for _, m in self.meshes], len(self.vertices))
 
 
+def same_surfaces(one: Scene, other: Scene) -> bool:
+    """Are the surfaces of both the very same, whatever they are made of? Instances count as others."""
+    if one.instances or other.instances or len(one.shapes) != len(other.shapes):
+        return False
+    return all(a.geometry is b.geometry for a, b in zip(one.shapes, other.shapes))
+
+
 def stored_geometry(scene: Scene) -> StoredGeometry:
     """Raises SceneError when the scene has no surface."""
     groups = [normalised(group, scene) for group in scene.groups] if scene.instances else []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,15 +45,40 @@ class DrawGeometry:
     radius: float
     note: str = ""
     """Says how instances were simplified, if they were."""
+    objects: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    """Numbers of what is drawn, shapes before instances, in the order of its corners."""
+    starts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
+    """The first corner of each, and the end."""
+
+    def vertices_of(self, number: int) -> NDArray[np.float32]:
+        """The corners (n, 3) of the shape or instance of that number; none if it is not drawn."""
+        found = np.flatnonzero(self.objects == number)
+        return self.vertices[self.starts[found[0]] : self.starts[found[0] + 1]] if len(found) else self.vertices[:0]
+
+    def object_at(self, corner: int) -> int:
+        """The number of the shape or instance that the corner belongs to, −1 if nobody knows."""
+        at = int(np.searchsorted(self.starts, corner, side="right")) - 1
+        return int(self.objects[at]) if 0 <= at < len(self.objects) else -1
+
+
+def recoloured(scene: Scene, like: DrawGeometry) -> DrawGeometry:
+    """The geometry of a scene with the same surfaces of other materials or lights (`same_surfaces`)."""
+    counts = np.diff(like.starts)
+    albedos = [_albedo(scene, shape, int(count)) for shape, count in zip(scene.shapes, counts, strict=True)]
+    return replace(like, albedo=np.ascontiguousarray(np.concatenate(albedos), np.float32))
 
 
 def tessellate(scene: Scene) -> DrawGeometry:
     """All shapes and instances of the scene as triangles."""
-    parts = [_drawn(scene, shape) for shape in scene.shapes]
+    # The boundary of a medium is nothing to be seen, unless there is nothing else.
+    solid = [i for i, shape in enumerate(scene.shapes) if scene.materials[shape.material].kind != "null"]
+    objects = solid or list(range(len(scene.shapes)))
+    parts = [_drawn(scene, scene.shapes[i]) for i in objects]
     note = ""
     if scene.instances:
-        copies, note = _copies(scene)
+        copies, numbers, note = _copies(scene)
         parts += copies
+        objects += [len(scene.shapes) + number for number in numbers]
     vertices, normals, albedos = zip(*parts)
     center, radius = bounding_sphere(scene)
     return DrawGeometry(
@@ -63,12 +88,19 @@ def tessellate(scene: Scene) -> DrawGeometry:
         center=center,
         radius=radius,
         note=note,
+        objects=np.array(objects, np.int64),
+        starts=np.concatenate([[0], np.cumsum([len(corners) for corners in vertices])]).astype(np.int64),
     )
 
 
 def _drawn(scene: Scene, shape: Shape) -> Drawn:
     """Corners, normals and albedo of a shape, (3n, 3) each."""
     corners, corner_normals = triangles_of(shape.geometry)
+    return corners.reshape(-1, 3), corner_normals.reshape(-1, 3), _albedo(scene, shape, corners.shape[0] * 3)
+
+
+def _albedo(scene: Scene, shape: Shape, corners: int) -> Float:
+    """Of so many corners of the shape, (corners, 3)."""
     material = scene.materials[shape.material]
     colour = np.array(mean_colour(material, _colour))
     tint: Float = np.ones(3)
@@ -76,8 +108,7 @@ def _drawn(scene: Scene, shape: Shape) -> Drawn:
         tint = shape.geometry.colours[shape.geometry.faces].reshape(-1, 3)
     if shape.radiance is not None and max(shape.radiance) > 0:
         colour, tint = np.array(shape.radiance) / max(shape.radiance), np.ones(3)
-    albedo = np.broadcast_to(colour * tint, (corners.shape[0] * 3, 3))
-    return corners.reshape(-1, 3), corner_normals.reshape(-1, 3), albedo
+    return np.broadcast_to(colour * tint, (corners, 3))
 
 
 def _colour(material: Material) -> RGB:
@@ -87,8 +118,9 @@ def _colour(material: Material) -> RGB:
     return (r, g, b)
 
 
-def _copies(scene: Scene) -> tuple[list[Drawn], str]:
-    """The triangles of all instances, and what to say when they had to be simplified to fit the budget."""
+def _copies(scene: Scene) -> tuple[list[Drawn], list[int], str]:
+    """The triangles of the instances that are drawn, their numbers, and what to say when they had to be simplified to
+    fit the budget."""
     whole: dict[Group, Drawn] = {}
     for group in scene.groups:
         parts = [_drawn(scene, shape) for shape in group.shapes]
@@ -101,7 +133,8 @@ def _copies(scene: Scene) -> tuple[list[Drawn], str]:
         drawn = {group: _clustered(part, cells) for group, part in whole.items()}
         count = sum(len(drawn[instance.group][0]) for instance in scene.instances) // 3
         cells //= 2
-    shown = scene.instances[:: max(1, -(-count // INSTANCE_BUDGET))]
+    step = max(1, -(-count // INSTANCE_BUDGET))
+    shown, numbers = scene.instances[::step], list(range(0, len(scene.instances), step))
     found: list[Drawn] = []
     for instance in shown:
         corners, normals, albedo = drawn[instance.group]
@@ -110,9 +143,9 @@ def _copies(scene: Scene) -> tuple[list[Drawn], str]:
             (corners @ m[:3, :3].T + m[:3, 3], unit(normals @ cofactor(m).T) * (-1.0 if mirrors(m) else 1.0), albedo)
         )
     if count == asked:
-        return found, ""
+        return found, numbers, ""
     total = sum(len(corners) for corners, _, _ in found) // 3
-    return found, f"the geometry view draws {total:,} of {asked:,} instanced triangles"
+    return found, numbers, f"the geometry view draws {total:,} of {asked:,} instanced triangles"
 
 
 def _clustered(part: Drawn, cells: int) -> Drawn:

@@ -7,7 +7,7 @@ import weakref
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.meshes.mesh import bounds_of
+from pmviewer.kernels.meshes.mesh import number_used
 from pmviewer.scene.description import Mesh
 
 _known: dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
@@ -18,8 +18,14 @@ def mesh_bounds(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Lowest and highest corner of the box around the vertices that the mesh's faces use."""
     if id(mesh) not in _known:
         box = np.empty(3), np.empty(3)
-        bounds_of(np.ascontiguousarray(mesh.vertices, np.float64), np.ascontiguousarray(mesh.faces, np.int32), *box)
-        _known[id(mesh)] = box
-        weakref.finalize(mesh, _known.pop, id(mesh), None)
+        vertices, faces = np.ascontiguousarray(mesh.vertices, np.float64), np.ascontiguousarray(mesh.faces, np.int32)
+        number_used(vertices, faces, np.empty(len(vertices), np.int32), *box)
+        know_bounds(mesh, *box)
     low, high = _known[id(mesh)]
     return low.copy(), high.copy()
+
+
+def know_bounds(mesh: Mesh, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
+    """What `mesh_bounds` will say of a mesh that nobody changes any more."""
+    _known[id(mesh)] = low, high
+    weakref.finalize(mesh, _known.pop, id(mesh), None)

@@ -13,10 +13,17 @@ from pmviewer.settings.schema.base import Auto, Group, Scale, Stage, Vec3, setti
 from pmviewer.settings.schema.camera import CameraSettings
 from pmviewer.settings.schema.compare import Compare
 from pmviewer.settings.schema.direct import Direct
-from pmviewer.settings.schema.display import (
+from pmviewer.settings.schema.display import Display
+from pmviewer.settings.schema.edit import Edit
+from pmviewer.settings.schema.estimate import Estimate
+from pmviewer.settings.schema.free_camera import FreeCamera
+from pmviewer.settings.schema.gather import Gather
+from pmviewer.settings.schema.importance import Importance
+from pmviewer.settings.schema.light import Light
+from pmviewer.settings.schema.light_pass import Photons
+from pmviewer.settings.schema.overlays import (
     CacheOverlay,
     Colour,
-    Display,
     FateOverlay,
     FocusOverlay,
     GatherOverlay,
@@ -28,12 +35,6 @@ from pmviewer.settings.schema.display import (
     ProjectionOverlay,
     ShadowOverlay,
 )
-from pmviewer.settings.schema.estimate import Estimate
-from pmviewer.settings.schema.free_camera import FreeCamera
-from pmviewer.settings.schema.gather import Gather
-from pmviewer.settings.schema.importance import Importance
-from pmviewer.settings.schema.light import Light
-from pmviewer.settings.schema.light_pass import Photons
 from pmviewer.settings.schema.render import Render
 from pmviewer.settings.schema.virtual import Virtual
 
@@ -45,6 +46,7 @@ __all__ = [
     "Compare",
     "Direct",
     "Display",
+    "Edit",
     "Estimate",
     "FateOverlay",
     "FocusOverlay",
@@ -76,6 +78,7 @@ class Settings(Group):
     """All settings of a session."""
 
     light: Light = Field(default_factory=Light)
+    edit: Edit = Field(default_factory=Edit)
     photons: Photons = Field(default_factory=Photons)
     importance: Importance = Field(default_factory=Importance)
     estimate: Estimate = Field(default_factory=Estimate)

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validat
 
 from pmviewer.settings.needs import Need, Needs
 
-Scale = Literal["linear", "log", "integer", "choice", "name", "switch", "vector"]
+Scale = Literal["linear", "log", "integer", "choice", "name", "switch", "vector", "edits"]
 Stage = Literal["scene", "photons", "maps", "image", "display", "stop"]
 Auto = Literal["auto"]
 Vec3 = tuple[float, float, float]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from pmviewer.settings.needs import Need, Needs
+from pmviewer.settings.needs import CLEAR, Need, Needs
 from pmviewer.settings.schema.base import Auto, Group, setting
 
 LIGHT_SAMPLES = Need(
@@ -111,7 +111,10 @@ class Direct(Group):
         stage="maps",
         scale="switch",
         title="shadow photons",
-        needs=(SPARES_SHADOW_RAYS,),
+        needs=(
+            CLEAR,
+            SPARES_SHADOW_RAYS,
+        ),
     )
     shadow_N: int = setting(
         50_000,

@@ -5,10 +5,9 @@ from __future__ import annotations
 from importlib.util import find_spec
 from typing import Any, Literal
 
-from pydantic import ConfigDict
-
-from pmviewer.settings.needs import BOTH_MAPS, IMPORTANCE, LENS, SHADOW_PHOTONS, Need, Needs, never
-from pmviewer.settings.schema.base import Auto, Group, setting, subgroup
+from pmviewer.settings.needs import BOTH_MAPS, IMPORTANCE, MEDIA, SHADOW_PHOTONS, Need, Needs
+from pmviewer.settings.schema.base import Auto, Group, setting
+from pmviewer.settings.schema.gather import ESTIMATION
 from pmviewer.settings.schema.virtual import VIRTUAL_LIGHTS, WEIGHTED
 
 LOOKED_UP = Need(
@@ -47,8 +46,12 @@ VIEW_NEEDS: dict[str, Needs] = {
     "virtual light error": (VIRTUAL_LIGHTS,),
     "sum of weights": (VIRTUAL_LIGHTS, WEIGHTED),
     "normalisation": (VIRTUAL_LIGHTS, WEIGHTED),
+    "estimation mask": (ESTIMATION,),
+    "gathered points": (ESTIMATION,),
+    "subdivision level": (ESTIMATION,),
 }
 """Of the views that a frame holds only while they are shown."""
+MEDIA_VIEWS = ("volume", "volume indirect")
 MAP_VIEWS = (
     "look-up radius",
     "photon count",
@@ -68,30 +71,40 @@ FALSE_COLOURS = Need(
     lambda f: f.settings.display.view == "error" or f.settings.display.view in VIEW_NEEDS.keys() - {"denoised"},
     "Only with views in false colours.",
 )
-TRACED = Need(lambda f: f.plan.photons, "This method traces no photons.")
-CAUSTIC_PHOTONS = Need(
-    lambda f: f.plan.caustic_classes,
-    "No caustic photons: the scene has no mirror or glass, or the method does not use them.",
+TWO_SIDED_VIEWS, CLASS_VIEWS, CELL_VIEWS = ("density ratio",), ("caustic convergence",), ("radiance cells",)
+_TWO_SIDED_DIFFERENCES = ("signed", "relative")
+
+
+def _difference(settings: Any) -> str:
+    """The kind of difference between two pictures that is shown, "" for none."""
+    return settings.compare.difference if settings.compare.mode == "difference" else ""
+
+
+def _scaled(settings: Any) -> bool:
+    view = settings.display.view
+    quantity = view == "error" or view in VIEW_NEEDS.keys() - {"denoised", *CLASS_VIEWS, *CELL_VIEWS}
+    return bool(_difference(settings)) or quantity
+
+
+def _two_sided(settings: Any) -> bool:
+    kind = _difference(settings)
+    return kind in _TWO_SIDED_DIFFERENCES if kind else settings.display.view in TWO_SIDED_VIEWS
+
+
+SCALED_COLOURS = Need(lambda f: _scaled(f.settings), "Only with views and differences of a quantity, in false colours.")
+SEQUENTIAL_COLOURS = Need(
+    lambda f: (_scaled(f.settings) and not _two_sided(f.settings)) or f.settings.overlays.importons.show,
+    "Only with views and differences in false colours that have no middle.",
 )
-RADIANCE_SHOWN = Need(lambda f: f.plan.radiance, "Only the method 'gather' has radiance photons, where they are on.")
-CACHE_SHOWN = Need(lambda f: f.plan.cache, "Only the method 'gather' has an irradiance cache, where it is on.")
-IMPORTANCE_OF_EACH_MAP = Need(
-    lambda f: f.plan.caustic_classes and f.plan.global_classes and f.plan.gather,
-    "One importance serves both maps: they are shown at the same places.",
+TWO_SIDED_COLOURS = Need(
+    lambda f: _two_sided(f.settings), "Only with the view 'density ratio' and differences with a sign."
 )
-JUDGED = Need(lambda f: f.plan.judges, "Every photon is stored (importance.deposition).")
-GATHER_RAYS = Need(lambda f: f.plan.gather, "Only the method 'gather' casts gather rays.")
-PLAIN_EMISSION = Need(
-    lambda f: f.plan.emission == "off", "Guided emission takes no projection maps (importance.emission)."
+CLASS_COLOURS = Need(
+    lambda f: f.settings.display.view in CLASS_VIEWS or f.settings.overlays.fates.show,
+    "Only with the view 'caustic convergence' and the overlay of photons by fate.",
 )
-PROJECTED = Need(
-    lambda f: f.settings.photons.projection != "off",
-    "Photons leave the lights in all directions (photons.projection).",
-)
-CAUSTIC_TRAJECTORIES = Need(
-    lambda f: f.settings.photons.q != 1.0 and f.settings.photons.q_rule != "photons",
-    "All trajectories fill the global map, and leave for any surface (photons.q).",
-)
+BY_PERCENTILES = Need(lambda f: f.settings.display.range == "percentiles", "Only by percentiles (display.range).")
+BY_HAND = Need(lambda f: f.settings.display.range == "by hand", "Only by hand (display.range).")
 
 
 class Display(Group):
@@ -108,6 +121,8 @@ class Display(Group):
         "normal",
         "depth",
         "geometry",
+        "volume",
+        "volume indirect",
         "reference",
         "error",
         "denoised",
@@ -125,6 +140,9 @@ class Display(Group):
         "virtual light error",
         "sum of weights",
         "normalisation",
+        "estimation mask",
+        "gathered points",
+        "subdivision level",
     ] = setting(
         "beauty",
         "What the viewport shows: the image, one of its terms, a property of the first hit, the shaded geometry, the "
@@ -132,7 +150,7 @@ class Display(Group):
         "colours with a legend, how the latest pass made the picture.",
         stage="display",
         scale="choice",
-        choice_needs=VIEW_NEEDS,
+        choice_needs={**VIEW_NEEDS, **dict.fromkeys(MEDIA_VIEWS, (MEDIA,))},
     )
     map: Literal["global", "caustic"] = setting(
         "global",
@@ -185,271 +203,84 @@ class Display(Group):
         scale="switch",
         title="compile ahead",
     )
-
-
-Colour = Literal["power", "bounce", "light"]
-
-
-class PointOverlay(Group):
-    """A photon map drawn as points"""
-
-    show: bool = setting(False, "Draw the photons of this map.", stage="display", scale="switch")
-    size: float = setting(2.0, "Point size.", stage="display", scale="linear", unit="px", ge=1, le=12)
-    colour: Colour = setting(
-        "power",
-        "Colour by power, by number of bounces or by light.",
+    colours: Literal["violet-yellow", "fire", "blue-yellow", "grey"] = setting(
+        "violet-yellow",
+        "Colours of quantities from small to large. In all of them lightness alone tells the order, for colour-blind "
+        "eyes too.",
         stage="display",
         scale="choice",
+        section="false colours and marks",
+        needs=(SEQUENTIAL_COLOURS,),
     )
-    depth: bool = setting(True, "Hide points behind surfaces.", stage="display", scale="switch", title="depth test")
-    limit: int = setting(
-        100_000,
-        "At most this many points are drawn, evenly thinned.",
-        stage="display",
-        scale="log",
-        unit="points",
-        ge=1_000,
-        le=5_000_000,
-    )
-
-
-def coloured_by_irradiance(what: str) -> Any:
-    """The colour of points that are light of many photons."""
-    return setting(
-        "irradiance",
-        "Colour by irradiance.",
+    two_sided: Literal["blue-orange", "purple-green"] = setting(
+        "blue-orange",
+        "Colours of what lies below and above a middle: ratios around 1, differences around 0.",
         stage="display",
         scale="choice",
-        needs=(never(f"{what} are coloured by irradiance: light of many photons, lights and bounces."),),
+        title="two-sided colours",
+        needs=(TWO_SIDED_COLOURS,),
     )
-
-
-class RadianceOverlay(PointOverlay):
-    """Radiance photons drawn as points"""
-
-    colour: Literal["irradiance"] = coloured_by_irradiance("Radiance photons")  # type: ignore[assignment]
-
-
-class CacheOverlay(PointOverlay):
-    """Records of the irradiance cache drawn as points"""
-
-    colour: Literal["irradiance"] = coloured_by_irradiance("Records")  # type: ignore[assignment]
-    circles: bool = setting(
-        False,
-        "Circles as wide as records reach, for at most 2,000 of them, evenly thinned.",
-        stage="display",
-        scale="switch",
-        title="reach",
-    )
-
-
-class ShadowOverlay(PointOverlay):
-    """Shadow photons drawn as points"""
-
-    colour: Literal["lit or shadow", "light"] = setting(  # type: ignore[assignment]
-        "lit or shadow",
-        "Colour by what the photon tells, or by light.",
+    classes: Literal["usual", "colour-blind safe"] = setting(
+        "usual",
+        "Colours of caustic convergence and of photons by fate: red, green and blue as in the sources, or such as "
+        "colour-blind eyes tell apart.",
         stage="display",
         scale="choice",
+        title="colours of classes",
+        needs=(CLASS_COLOURS,),
     )
-    lit: bool = setting(
-        True, "Draw those that the light reaches, too.", stage="display", scale="switch", title="lit ones"
-    )
-
-
-class ImportonOverlay(PointOverlay):
-    """Importons drawn as points"""
-
-    colour: Literal["importance", "screen", "footprint", "average", "map"] = setting(  # type: ignore[assignment]
-        "importance",
-        "Colour by the importance of the place, as it is used or by either estimate or their average, or by the map "
-        "that it is for: caustic or global.",
+    range: Literal["auto", "percentiles", "by hand"] = setting(
+        "auto",
+        "From where to where the colours go. auto: the view's own ends, or those between which 98 % of the values lie.",
         stage="display",
         scale="choice",
+        title="range of colours",
+        needs=(SCALED_COLOURS,),
     )
-    map: Literal["both", "caustic", "global"] = setting(
-        "both",
-        "Importons of which importance map are drawn.",
+    percentile: float = setting(
+        1.0,
+        "Share of the pixels that lies beyond each end of the colours.",
         stage="display",
-        scale="choice",
-        needs=(IMPORTANCE_OF_EACH_MAP,),
-    )
-
-
-class FateOverlay(PointOverlay):
-    """What becomes of photons, drawn as points"""
-
-    show: bool = setting(
-        False,
-        "Draw where photons of the latest pass arrived and what the deposition rule made of them.",
-        stage="display",
-        scale="switch",
-    )
-    colour: Literal["fate", "bounce"] = setting(  # type: ignore[assignment]
-        "fate",
-        "Colour by what became of the photon, or by number of bounces.",
-        stage="display",
-        scale="choice",
-    )
-    map: Literal["both", "caustic", "global"] = setting(
-        "both",
-        "Photons of which map are drawn.",
-        stage="display",
-        scale="choice",
-        needs=(BOTH_MAPS,),
-    )
-    only: Literal["all", "stored", "not stored"] = setting(
-        "all", "Draw all photons, or some.", stage="display", scale="choice"
-    )
-    count: int = setting(
-        100_000,
-        "Trajectories of the pass whose photons are judged again, the first ones: density control finds an empty map "
-        "with them.",
-        stage="display",
-        scale="log",
-        unit="trajectories",
-        ge=100,
-        le=5_000_000,
-    )
-
-
-class LightOverlay(PointOverlay):
-    """Lights as points, by their importance"""
-
-    show: bool = setting(
-        False, "Mark the lights by how much of the picture each one lights.", stage="display", scale="switch"
-    )
-    size: float = setting(12.0, "Point size.", stage="display", scale="linear", unit="px", ge=1, le=40)
-    colour: Literal["picture", "emission"] = setting(  # type: ignore[assignment]
-        "picture",
-        "Colour by the share of the picture's light that comes from the light, or by how many times as many photons "
-        "leave it as by its power (guided emission).",
-        stage="display",
-        scale="choice",
-    )
-    depth: bool = setting(False, "Hide points behind surfaces.", stage="display", scale="switch", title="depth test")
-    labels: int = setting(
-        5,
-        "Lights that are labelled with their share, the most important ones.",
-        stage="display",
-        scale="integer",
+        scale="linear",
+        unit="%",
         ge=0,
-        le=50,
+        le=25,
+        needs=(SCALED_COLOURS, BY_PERCENTILES),
     )
-
-
-class PathOverlay(Group):
-    """Photon paths drawn as lines"""
-
-    show: bool = setting(
-        False, "Draw the paths of the first photons of the latest pass.", stage="display", scale="switch"
+    low: float = setting(
+        0.0,
+        "Value of the first colour, in the view's unit. By logarithm, 0 and less is a millionth of the last one's.",
+        stage="display",
+        scale="linear",
+        title="first colour at",
+        ge=-1e15,
+        le=1e15,
+        needs=(SCALED_COLOURS, BY_HAND),
     )
-    size: float = setting(1.5, "Line width.", stage="display", scale="linear", title="width", unit="px", ge=1, le=8)
-    colour: Colour = setting(
-        "bounce",
-        "Colour by power, by number of bounces so far or by light.",
+    high: float = setting(
+        1.0,
+        "Value of the last colour, in the view's unit.",
+        stage="display",
+        scale="linear",
+        title="last colour at",
+        ge=-1e15,
+        le=1e15,
+        needs=(SCALED_COLOURS, BY_HAND),
+    )
+    spacing: Literal["auto", "linear", "log"] = setting(
+        "auto",
+        "Colours follow the values evenly or by their logarithm; auto is as the view's values are spread. What may be "
+        "negative is always shown evenly.",
         stage="display",
         scale="choice",
+        title="spacing of colours",
+        needs=(SCALED_COLOURS,),
     )
-    depth: bool = setting(False, "Hide lines behind surfaces.", stage="display", scale="switch", title="depth test")
-    count: int = setting(
-        50, "Photons whose paths are drawn.", stage="display", scale="log", unit="paths", ge=1, le=5_000
-    )
-    first: int = setting(
-        1,
-        "Leave out what comes before this flight of a photon: 1 is the one from the light.",
-        stage="display",
-        scale="integer",
-        title="first flight",
-        ge=1,
-        le=16,
-    )
-    length: int = setting(
-        8, "Flights of a photon that are drawn.", stage="display", scale="integer", title="flights", ge=1, le=63
-    )
-
-
-class GatherOverlay(Group):
-    """Gather rays of one pixel"""
-
-    show: bool = setting(
+    marks: bool = setting(
         False,
-        "Draw the gather rays of a pixel in the latest pass: hold I to take the pixel under the mouse.",
+        "Mark and count pixels that hide something: not finite (magenta), negative (cyan), and clipped ones (stripes), "
+        "brighter than the screen or beyond the colours' ends. In the window alone.",
         stage="display",
         scale="switch",
+        title="mark odd pixels",
     )
-    size: float = setting(1.5, "Line width.", stage="display", scale="linear", title="width", unit="px", ge=1, le=8)
-    colour: Literal["contribution", "source"] = setting(
-        "contribution",
-        "Colour by the radiance that a ray adds to the pixel, or by what chose its direction: the BSDF or photons.",
-        stage="display",
-        scale="choice",
-    )
-    depth: bool = setting(False, "Hide rays behind surfaces.", stage="display", scale="switch", title="depth test")
-
-
-class ProjectionOverlay(Group):
-    """Projection maps of the lights"""
-
-    show: bool = setting(
-        False,
-        "Draw where and in which directions photons leave the lights: the cells of their projection maps that are on.",
-        stage="display",
-        scale="switch",
-    )
-    map: Literal["surfaces", "caustic"] = setting(
-        "surfaces",
-        "Cells in which photons can meet any surface, or what makes caustics.",
-        stage="display",
-        scale="choice",
-        needs=(CAUSTIC_TRAJECTORIES,),
-    )
-    size: float = setting(
-        0.15,
-        "Radius of the shells of directions around lights. Cells of places are drawn where they are.",
-        stage="display",
-        scale="log",
-        unit="× scene",
-        ge=0.01,
-        le=2.0,
-    )
-    opacity: float = setting(0.4, "Opacity of the cells.", stage="display", scale="linear", ge=0.05, le=1.0)
-    depth: bool = setting(True, "Hide cells behind surfaces.", stage="display", scale="switch", title="depth test")
-
-
-class FocusOverlay(Group):
-    """Focal plane of the lens"""
-
-    show: bool = setting(
-        False,
-        "Draw the plane that the lens shows sharp: what lies behind it is tinted. Ctrl+click in the picture moves it.",
-        stage="display",
-        scale="switch",
-    )
-    opacity: float = setting(0.35, "Opacity of the plane.", stage="display", scale="linear", ge=0.05, le=1.0)
-    depth: bool = setting(True, "Hide it behind surfaces.", stage="display", scale="switch", title="depth test")
-
-
-class Overlays(Group):
-    """Overlays"""
-
-    caustic: PointOverlay = subgroup(PointOverlay, "caustic photons", TRACED, CAUSTIC_PHOTONS)
-    global_: PointOverlay = subgroup(PointOverlay, "global photons", TRACED, alias="global")
-    radiance: RadianceOverlay = subgroup(RadianceOverlay, "radiance photons", TRACED, RADIANCE_SHOWN)
-    cache: CacheOverlay = subgroup(CacheOverlay, "irradiance cache", TRACED, CACHE_SHOWN)
-    shadow: ShadowOverlay = subgroup(ShadowOverlay, "shadow photons", SHADOW_PHOTONS)
-    virtual: PointOverlay = subgroup(PointOverlay, "virtual lights", VIRTUAL_LIGHTS)
-    importons: ImportonOverlay = subgroup(ImportonOverlay, "importons", TRACED, IMPORTANCE)
-    fates: FateOverlay = subgroup(FateOverlay, "photons by fate", TRACED, JUDGED)
-    lights: LightOverlay = subgroup(LightOverlay, "light importance", TRACED, IMPORTANCE)
-    paths: PathOverlay = subgroup(PathOverlay, "photon paths", TRACED)
-    gather: GatherOverlay = subgroup(GatherOverlay, "gather rays", TRACED, GATHER_RAYS)
-    projection: ProjectionOverlay = subgroup(ProjectionOverlay, "projection maps", TRACED, PLAIN_EMISSION, PROJECTED)
-    focal: FocusOverlay = subgroup(FocusOverlay, "focal plane", LENS)
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
-
-    def styles(self) -> dict[str, Group]:
-        """How each overlay is drawn, by its name in the settings' paths."""
-        fields = type(self).model_fields
-        return {field.alias or name: getattr(self, name) for name, field in fields.items()}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from pmviewer.settings.needs import CAUSTIC_MAP, PHOTONS, Need, Needs
+from pmviewer.settings.needs import CAUSTIC_MAP, PHOTONS, VOLUME, Need, Needs
 from pmviewer.settings.schema.base import Auto, Group, setting
 
 NEAREST = Need(lambda f: f.settings.estimate.lookup == "nearest", "Only with look-up 'nearest'.")
@@ -74,6 +74,16 @@ class Estimate(Group):
             FIXED_RADIUS,
             CAUSTIC_MAP,
         ),
+    )
+    volume_radius: float = setting(
+        1.0,
+        "Radius of look-ups in media relative to that of the global map: photons so near a ray light it.",
+        stage="maps",
+        scale="log",
+        unit="×",
+        ge=0.01,
+        le=100.0,
+        needs=(VOLUME,),
     )
     radius_rule: Literal["pass", "pixel"] = setting(
         "pass",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from pmviewer.settings.needs import Need, Needs
+from pmviewer.settings.needs import CLEAR, Need, Needs
 from pmviewer.settings.schema.base import Auto, Group, setting
 
 GATHER = Need(
@@ -15,6 +15,14 @@ SEVERAL_RAYS = Need(lambda f: f.settings.gather.rays >= 2, "A single gather ray 
 GUIDES = Need(lambda f: f.plan.guided_rays, "No photons guide the rays: see gather.directions.")
 RADIANCE_PHOTONS = Need(lambda f: f.plan.radiance, "Only with radiance photons.")
 IRRADIANCE_CACHE = Need(lambda f: f.plan.cache, "Only with the irradiance cache.")
+
+NO_CACHE = Need(
+    lambda f: not f.plan.cache, "The irradiance cache interpolates between gathers of its own instead (gather.cache)."
+)
+DIFFUSE = Need(
+    lambda f: f.traits.has_diffuse, "No diffuse surface in this scene: glossy and smooth ones gather as usual."
+)
+ESTIMATION = Need(lambda f: f.plan.estimation, "Only with estimated gathers (gather.estimation).")
 
 
 class Gather(Group):
@@ -83,6 +91,7 @@ class Gather(Group):
         ge=0.0,
         le=20.0,
         title="secondary below",
+        needs=(CLEAR,),
     )
     radiance_photons: Literal["off", "all", "1/4", "1/8"] = setting(
         "off",
@@ -122,6 +131,7 @@ class Gather(Group):
         section="Irradiance cache",
         stage="image",
         scale="choice",
+        needs=(CLEAR,),
     )
     cache_error: float = setting(
         0.45,
@@ -166,4 +176,92 @@ class Gather(Group):
         ge=1.0,
         le=1000.0,
         needs=(IRRADIANCE_CACHE,),
+    )
+    estimation: Literal["off", "on"] = setting(
+        "off",
+        "Final gather estimation: where the picture shows flat, open, diffuse surfaces, few pixels gather, each pass "
+        "others, and those between them are interpolated (course guide §6.3.2). All other pixels gather as without.",
+        section="Final gather estimation",
+        stage="image",
+        scale="choice",
+        needs=(CLEAR, NO_CACHE, DIFFUSE),
+    )
+    estimation_error: float = setting(
+        0.3,
+        "Error that interpolation within a tile may make in the first pass: half a diagonal over the least harmonic "
+        "mean distance of what its corners see, and half the turn of the normal. It shrinks with the sixth root of "
+        "the pass.",
+        stage="image",
+        scale="log",
+        title="estimation error",
+        ge=0.005,
+        le=2.0,
+        needs=(ESTIMATION,),
+    )
+    estimation_contrast: float = setting(
+        1.5,
+        "Tiles whose corners differ in irradiance by more than this share of its mean are divided, whatever their "
+        "distances say. Three standard errors of a gather are taken off first, so that noise divides few.",
+        stage="image",
+        scale="log",
+        title="estimation contrast",
+        ge=0.05,
+        le=4.0,
+        needs=(ESTIMATION,),
+    )
+    estimation_samples: int = setting(
+        64,
+        "Rays of a full gather, stratified over the hemisphere.",
+        stage="image",
+        scale="log",
+        unit="rays",
+        title="estimation samples",
+        ge=8,
+        le=4096,
+        needs=(ESTIMATION,),
+    )
+    estimation_spacing: int = setting(
+        16,
+        "Distance of full gathers on the undivided grid in the first pass; it shrinks with the sixth root of the pass.",
+        stage="image",
+        scale="integer",
+        unit="px",
+        title="estimation spacing",
+        ge=2,
+        le=128,
+        needs=(ESTIMATION,),
+    )
+    estimation_smallest: int = setting(
+        2,
+        "Width of the smallest tile. Where even that is too wide, a share of these tiles that falls from pass to pass "
+        "is interpolated all the same, and the rest gathers as usual.",
+        stage="image",
+        scale="integer",
+        unit="px",
+        title="smallest tile",
+        ge=2,
+        le=64,
+        needs=(ESTIMATION,),
+    )
+    estimation_normals: float = setting(
+        10.0,
+        "Pixels whose normal differs by more than this from that of one beside them are critical and gather as usual.",
+        stage="image",
+        scale="linear",
+        unit="°",
+        title="critical turn",
+        ge=0.1,
+        le=90.0,
+        needs=(ESTIMATION,),
+    )
+    estimation_step: float = setting(
+        0.5,
+        "Pixels are critical, too, where one beside them lies farther than this off the plane of the surface.",
+        stage="image",
+        scale="log",
+        unit="px",
+        title="critical step",
+        ge=0.01,
+        le=100.0,
+        needs=(ESTIMATION,),
     )

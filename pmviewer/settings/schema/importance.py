@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from pmviewer.settings.needs import CAUSTIC_MAP, GLOBAL_MAP, IMPORTANCE, PHOTONS, Need, Needs
+from pmviewer.settings.needs import CAUSTIC_MAP, CLEAR, GLOBAL_MAP, IMPORTANCE, PHOTONS, Need, Needs
 from pmviewer.settings.schema.base import Auto, Group, setting
 
 Deposit = Literal["all", "Keller-Wald", "density control", "constant density"]
@@ -36,7 +36,7 @@ CHRISTENSEN_DISCARD = Need(
 class Importance(Group):
     """Importance"""
 
-    needs: ClassVar[Needs] = (PHOTONS,)
+    needs: ClassVar[Needs] = (PHOTONS, CLEAR)
 
     map: Literal["off", "screen", "footprint", "average"] = setting(
         "off",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pmviewer.settings.needs import FOLLOWED, GLOBAL_MAP, PHOTONS, Need
+from pmviewer.settings.needs import CLEAR, FOLLOWED, GLOBAL_MAP, PHOTONS, Need
 from pmviewer.settings.schema.base import Group, setting
 
 GLOSSY = Need(lambda f: f.traits.glossy_roughness, "No glossy surface in this scene.")
@@ -96,7 +96,7 @@ class Photons(Group):
         stage="photons",
         scale="choice",
         title="projection maps",
-        needs=(PHOTONS, PLAIN_EMISSION),
+        needs=(CLEAR, PHOTONS, PLAIN_EMISSION),
     )
     roulette: Literal["luminance", "channel maximum", "equal"] = setting(
         "luminance",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pmviewer.settings.needs import FOLLOWED, Need
+from pmviewer.settings.needs import CLEAR, FOLLOWED, Need
 from pmviewer.settings.schema.base import Auto, Group, setting
 
 FOLLOWED_OR_PATHS = Need(lambda f: f.plan.path or FOLLOWED.holds(f), "No mirror or glass in this scene.")
@@ -57,7 +57,10 @@ class Render(Group):
         stage="photons",
         scale="choice",
         title="thin glass",
-        needs=(THIN_GLASS,),
+        needs=(
+            CLEAR,
+            THIN_GLASS,
+        ),
     )
     outline_rays: int = setting(
         16,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pmviewer.viewer.background import FILES
 from pmviewer.viewer.comparison import COMPARED_VIEWS
 from pmviewer.viewer.overlays.layers import any_shown
+from pmviewer.viewer.pair import WIPE
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport.viewport import Viewport
 
@@ -47,18 +48,18 @@ class Exports:
         points = overlays and (any_shown(settings) or self._state.inspector.pinned is not None)
         display = self._state.shown_display
         pair, gain = self._state.shown_pair(), self._state.gain.gain
-        if pair is not None and gain is not None:
+        if pair is not None and gain is not None and self._state.gain.shown and pair.mode == WIPE:
 
             def sheet() -> str:
                 from pmviewer.output.frame_export import gain_sheet
                 from pmviewer.output.png import write_png
 
-                write_png(path, gain_sheet(gain, pair[1]))
+                write_png(path, gain_sheet(gain, pair.display))
                 return f"wrote {path.absolute()}"
 
             self._state.background.start(FILES, "writing PNG", sheet)
             return
-        if frame is not None and not points and display.view not in ("geometry", *COMPARED_VIEWS):
+        if frame is not None and pair is None and not points and display.view not in ("geometry", *COMPARED_VIEWS):
             # The same code as `pmviewer render` uses, so that both write the same picture.
 
             def work() -> str:
@@ -106,7 +107,7 @@ class Exports:
         self._state.background.start(FILES, "writing EXR", work)
 
     def session(self, path: Path) -> None:
-        """Settings and scene, so that the file reopens to the same picture."""
+        """Settings and scene, so that the file reopens to the same picture, and the snapshots beside it."""
         state = self._state
         if state.session.scene is None:
             state.say("error", "There is no session to save yet: open a scene first.")
@@ -114,11 +115,12 @@ class Exports:
         settings, scene = state.settings, state.session.scene_path
         parameters = dict(state.parameters)
         passes = state.frame.statistics.passes if state.frame is not None else 0
+        snapshots = tuple(state.snapshots.all)
 
         def work() -> str:
             from pmviewer.output.session_file import write_session
 
-            write_session(path, settings, scene, passes, parameters)
+            write_session(path, settings, scene, passes, parameters, snapshots)
             return f"wrote {path.absolute()}"
 
         state.background.start(FILES, "saving the session", work)

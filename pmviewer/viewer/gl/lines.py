@@ -10,7 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.viewer.gl.palette import Colouring, palettes
+from pmviewer.viewer.gl.palette import Colouring, look_uniforms, palettes
 from pmviewer.viewer.gl.program import Drawing, Shaders, set_uniforms
 from pmviewer.viewer.gl.records import ATTRIBUTES, EMPTY, LAYOUT, CloudSummary, log_range, summary_of
 
@@ -64,6 +64,7 @@ class LineCloud:
         width, height = drawing.viewport
         set_uniforms(
             self._program,
+            **look_uniforms(drawing.look),
             view=drawing.view,
             projection=drawing.projection,
             viewport=(float(width), float(height)),

@@ -1,39 +1,34 @@
-"""Two pictures as textures, for a viewport that is split between them."""
+"""Two pictures as textures, for a viewport that compares them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
+
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
-from pmviewer.engine.frame import Frame
+from pmviewer.viewer.gl.textures import HeldTexture
+
+Keyed = tuple[Hashable, Callable[[], NDArray[np.float32]]]
 
 
 class PairPlanes:
     """Every method needs the window's OpenGL context."""
 
     def __init__(self, context: moderngl.Context) -> None:
-        self._context = context
-        self._shown: tuple[Frame, Frame, str] | None = None
-        self.planes: tuple[moderngl.Texture, ...] = ()
+        self._held = HeldTexture(context), HeldTexture(context)
 
-    def upload(self, frames: tuple[Frame, Frame] | None, view: str) -> bool:
-        """Take that view of both frames, or none. True when anything changed."""
-        wanted = None if frames is None else (*frames, view)
-        before = self._shown
-        if wanted is None and before is None:
-            return False
-        if wanted and before and wanted[0] is before[0] and wanted[1] is before[1] and view == before[2]:
-            return False
-        for plane in self.planes:
-            plane.release()
-        self._shown, self.planes = wanted, ()
-        if frames is not None:
-            images = [np.ascontiguousarray(frame.image(view), np.float32) for frame in frames]
-            self.planes = tuple(self._texture(image) for image in images)
-        return True
+    @property
+    def planes(self) -> tuple[moderngl.Texture, ...]:
+        """Both textures, or none."""
+        held = tuple(one.texture for one in self._held if one.texture is not None)
+        return held if len(held) == 2 else ()
 
-    def _texture(self, image: np.ndarray) -> moderngl.Texture:
-        height, width, channels = image.shape
-        texture = self._context.texture((width, height), channels, image.tobytes(), dtype="f4", alignment=4)
-        texture.repeat_x = texture.repeat_y = False
-        return texture
+    def upload(self, pair: tuple[Keyed, Keyed] | None) -> bool:
+        """Take two images, each with what tells it from others, or none. True when anything changed."""
+        if pair is None:
+            changed = [held.take(None, lambda: np.empty(0)) for held in self._held]
+        else:
+            changed = [held.take(key, image) for held, (key, image) in zip(self._held, pair, strict=True)]
+        return any(changed)

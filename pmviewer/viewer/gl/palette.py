@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.output.falsecolour import COLOURS, DIVERGING
+from pmviewer.output.colour_maps import FATES, SEQUENTIAL, TWO_SIDED
+from pmviewer.output.false_look import Look
 
 RGB = tuple[float, float, float]
 
@@ -40,13 +42,9 @@ LIT_COLOUR: RGB = (1.0, 0.80, 0.25)
 SHADOW_COLOUR: RGB = (0.35, 0.30, 0.95)
 """Of shadow photons where the light arrives and where it does not."""
 
-FATE_PALETTE: tuple[RGB, ...] = (
-    (0.45, 0.85, 0.40),
-    (0.90, 0.35, 0.30),
-    (0.35, 0.60, 0.98),
-    (0.98, 0.85, 0.25),
-)
-"""Of photons that are stored, rejected, redistributed and discarded (`pmviewer.photons.deposition.deposited.FATES`)."""
+FATE_PALETTE: tuple[RGB, ...] = FATES["usual"]
+"""Unless the display settings choose others: of photons that are stored, rejected, redistributed and discarded
+(`pmviewer.photons.deposition.deposited.FATES`)."""
 
 
 class By(IntEnum):
@@ -78,10 +76,9 @@ class Colouring:
     scale: Literal["percentiles", "around one", "share"] = "percentiles"
     text: str = ""
 
-    @property
-    def table(self) -> NDArray[np.floating]:
+    def table(self, look: Look) -> NDArray[np.floating]:
         """(n, 3) false colours from small to large."""
-        return DIVERGING if self.scale == "around one" else COLOURS
+        return TWO_SIDED[look.two_sided] if self.scale == "around one" else SEQUENTIAL[look.colours]
 
 
 POWER = Colouring(By.POWER)
@@ -96,10 +93,18 @@ def palettes() -> dict[str, Any]:
         "light_palette": LIGHT_PALETTE,
         "lit_colour": LIT_COLOUR,
         "shadow_colour": SHADOW_COLOUR,
-        "fate_palette": FATE_PALETTE,
-        "false_colours": np.concatenate([COLOURS[::17], DIVERGING[::17]]),
     }
     return {name: np.array(value, np.float32) for name, value in colours.items()}
+
+
+@cache
+def look_uniforms(look: Look) -> dict[str, NDArray[np.float32]]:
+    """Those that the display settings choose."""
+    tables = SEQUENTIAL[look.colours][::17], TWO_SIDED[look.two_sided][::17]
+    return {
+        "fate_palette": np.array(look.fate_colours, np.float32),
+        "false_colours": np.concatenate(tables).astype(np.float32),
+    }
 
 
 def light_colour(number: int) -> RGB:

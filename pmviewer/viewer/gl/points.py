@@ -12,7 +12,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.viewer.gl.palette import POWER, By, Colouring, palettes
+from pmviewer.viewer.gl.palette import POWER, By, Colouring, look_uniforms, palettes
 from pmviewer.viewer.gl.program import Drawing, Shaders, set_uniforms
 from pmviewer.viewer.gl.records import ATTRIBUTES, EMPTY, LAYOUT, RECORD_BYTES, CloudSummary, log_range, summary_of
 
@@ -92,6 +92,7 @@ class PointCloud:
             self._ranges[colouring] = log_range(self._sample, colouring)
         set_uniforms(
             self._program,
+            **look_uniforms(drawing.look),
             view=drawing.view,
             projection=drawing.projection,
             size=width,

@@ -12,21 +12,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import WindowError
+from pmviewer.output.false_look import Look
 from pmviewer.render.camera import Matrix
 from pmviewer.resources import data_folder
+
+DEFAULT_LOOK = Look()
 
 
 @dataclass(frozen=True)
 class Drawing:
     """Where things are drawn over the picture: into the bound framebuffer, whose depth buffer holds the surfaces if
     any of them hides behind surfaces. `viewport` is the picture's width and height in pixels, `pixel_ratio` scales
-    widths (HiDPI), `limit` is the most points of a cloud, None as many as the user wants."""
+    widths (HiDPI), `limit` is the most points of a cloud, None as many as the user wants, `look` the false
+    colours."""
 
     view: Matrix
     projection: Matrix
     viewport: tuple[int, int]
     pixel_ratio: float = 1.0
     limit: int | None = None
+    look: Look = DEFAULT_LOOK
 
 
 class Shaders:

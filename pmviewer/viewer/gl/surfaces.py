@@ -18,6 +18,7 @@ class Surfaces:
         self._shaders = shaders
         self._geometry: Any = None
         self._buffer: moderngl.Buffer | None = None
+        self._albedo: moderngl.Buffer | None = None
         self._array: moderngl.VertexArray | None = None
         self.center, self.radius = np.zeros(3), 1.0
         """Of the bounding sphere."""
@@ -31,17 +32,25 @@ class Surfaces:
         """Take a `DrawGeometry` (or None). True when it is another one than before."""
         if geometry is self._geometry:
             return False
+        if geometry is not None and self._albedo is not None and geometry.vertices is self._geometry.vertices:
+            self._geometry = geometry
+            self._albedo.write(np.ascontiguousarray(geometry.albedo, np.float32))
+            return True
         self.release()
         self._geometry = geometry
         if geometry is None or not len(geometry.vertices):
             return True
-        program = self._shaders.get("geometry")
-        data = np.hstack([geometry.vertices, geometry.normals, geometry.albedo]).astype(np.float32)
-        self._buffer = self._shaders.context.buffer(np.ascontiguousarray(data))
-        names = [(n, n in program) for n in ("position", "normal", "albedo")]
-        layout = " ".join("3f4" if used else "12x1" for _, used in names)
-        attributes = [n for n, used in names if used]
-        self._array = self._shaders.context.vertex_array(program, [(self._buffer, layout, *attributes)])
+        program, context = self._shaders.get("geometry"), self._shaders.context
+        places = np.hstack([geometry.vertices, geometry.normals]).astype(np.float32)
+        self._buffer = context.buffer(np.ascontiguousarray(places))
+        self._albedo = context.buffer(np.ascontiguousarray(geometry.albedo, np.float32))
+        content = []
+        for buffer, wanted in ((self._buffer, ("position", "normal")), (self._albedo, ("albedo",))):
+            names = [(n, n in program) for n in wanted]
+            if any(used for _, used in names):
+                layout = " ".join("3f4" if used else "12x1" for _, used in names)
+                content.append((buffer, layout, *(n for n, used in names if used)))
+        self._array = context.vertex_array(program, content)
         self.center, self.radius = np.asarray(geometry.center, float), float(geometry.radius)
         return True
 
@@ -49,9 +58,10 @@ class Surfaces:
         """Free what lies on the GPU."""
         if self._array is not None:
             self._array.release()
-        if self._buffer is not None:
-            self._buffer.release()
-        self._geometry = self._array = self._buffer = None
+        for buffer in (self._buffer, self._albedo):
+            if buffer is not None:
+                buffer.release()
+        self._geometry = self._array = self._buffer = self._albedo = None
 
     def draw(self, view: Matrix, projection: Matrix, brightness: float = 1.0) -> None:
         """Draw into the bound framebuffer, pushed back a little in depth so that surfaces don't fight with the points

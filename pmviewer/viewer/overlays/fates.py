@@ -9,10 +9,11 @@ import numpy as np
 from imgui_bundle import imgui
 from numpy.typing import NDArray
 
+from pmviewer.output.false_look import Look, look_of
 from pmviewer.photons.deposition.deposited import FATES
 from pmviewer.settings.access import FateOverlay
 from pmviewer.viewer.format import grouped
-from pmviewer.viewer.gl.palette import BOUNCES, FATE_PALETTE, By, Colouring
+from pmviewer.viewer.gl.palette import BOUNCES, By, Colouring
 from pmviewer.viewer.gl.records import CloudSummary, tags
 from pmviewer.viewer.overlays.legend import colour_legend, swatches
 from pmviewer.viewer.overlays.overlay import Needs, Source, Switch
@@ -54,9 +55,9 @@ class Fates(Points):
     def count(self, source: Source) -> int | None:
         return self.cloud.summary().total if self.is_shown(source.settings) else None
 
-    def colours_legend(self, colouring: Colouring, cloud: CloudSummary) -> None:
+    def colours_legend(self, colouring: Colouring, cloud: CloudSummary, look: Look) -> None:
         if colouring.by != By.FATE:  # the counts are the legend of fates
-            colour_legend(colouring, cloud, self.unit)
+            colour_legend(colouring, cloud, self.unit, look)
 
     def more_legend(self, source: Source) -> None:
         """How many photons met which fate, in the maps that are drawn."""
@@ -66,6 +67,7 @@ class Fates(Points):
         style: FateOverlay = self.style(source.settings)
         counts = fate_counts(photons, style.map)
         total = max(sum(counts), 1)
-        for name, count, colour in zip(FATES, counts, FATE_PALETTE, strict=True):
+        palette = look_of(source.settings.display).fate_colours
+        for name, count, colour in zip(FATES, counts, palette, strict=True):
             if count:
                 swatches("", [(f"{name}: {grouped(count)}, {count / total:.1%}", colour)])

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from imgui_bundle import imgui
 
+from pmviewer.output.false_look import Look
 from pmviewer.settings.access import ImportonOverlay
 from pmviewer.viewer.gl.palette import LIGHT_PALETTE, LIGHTS, MEAN_OF_GREEN_AND_BLUE, By, Colouring
 from pmviewer.viewer.gl.points import EVERY_TAG
@@ -36,9 +37,9 @@ class Importons(MapPoints):
     def tags(cls, style: ImportonOverlay) -> int:
         return EVERY_TAG if style.map == "both" else 1 << (style.map == "global")
 
-    def colours_legend(self, colouring: Colouring, cloud: CloudSummary) -> None:
+    def colours_legend(self, colouring: Colouring, cloud: CloudSummary, look: Look) -> None:
         if colouring.by == By.LIGHT:
             maps = [("caustic map", LIGHT_PALETTE[0]), ("global map", LIGHT_PALETTE[1])]
             swatches("Importance for the ", maps)
         else:
-            super().colours_legend(colouring, cloud)
+            super().colours_legend(colouring, cloud, look)

@@ -6,6 +6,7 @@ import numpy as np
 from imgui_bundle import imgui
 from numpy.typing import NDArray
 
+from pmviewer.output.false_look import Look
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import grouped, si
 from pmviewer.viewer.gl.palette import (
@@ -18,6 +19,7 @@ from pmviewer.viewer.gl.palette import (
     Colouring,
     light_colour,
 )
+from pmviewer.viewer.gl.program import DEFAULT_LOOK
 from pmviewer.viewer.gl.records import CloudSummary
 
 MOST_SWATCHES = 12
@@ -41,7 +43,7 @@ def drawn_of(cloud: CloudSummary) -> None:
         imgui.text_disabled(f"{grouped(cloud.drawn)} of {grouped(cloud.total)} drawn")
 
 
-def colour_legend(colouring: Colouring, cloud: CloudSummary, unit: str) -> None:
+def colour_legend(colouring: Colouring, cloud: CloudSummary, unit: str, look: Look = DEFAULT_LOOK) -> None:
     """What the colours of points or lines tell; `unit` is that of their power."""
     if colouring.by == By.POWER:
         low, high = si(cloud.power_low, unit), si(cloud.power_high, unit)
@@ -49,7 +51,9 @@ def colour_legend(colouring: Colouring, cloud: CloudSummary, unit: str) -> None:
         wrapped(f"Hue of the {'power' if unit == 'W' else 'irradiance'}; {amount}")
     elif colouring.by == By.QUANTITY:
         wrapped(colouring.text)
-        colour_bar(colouring.table, *(_end_text(colouring, end, unit) for end in (cloud.power_low, cloud.power_high)))
+        colour_bar(
+            colouring.table(look), *(_end_text(colouring, end, unit) for end in (cloud.power_low, cloud.power_high))
+        )
     elif colouring.by == By.BOUNCES:
         last = len(BOUNCE_PALETTE) - 1
         labels = [*(str(i) for i in range(last)), f"{last}+"]

@@ -1,4 +1,4 @@
-"""Photons of the caustic and the global map as points."""
+"""Photons of the caustic, the global and the volume map as points."""
 
 from __future__ import annotations
 
@@ -20,3 +20,11 @@ class GlobalPhotons(MapPoints):
 
     name = "global"
     switch = Switch(imgui.Key.g, "G", "Global photons on or off")
+
+
+class VolumePhotons(MapPoints):
+    """Photons that media scattered in the latest pass, after they were scattered before."""
+
+    name = "volume"
+    switch = Switch(imgui.Key.k, "K", "Volume photons on or off")
+    things = "Photons in media in the latest pass"

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.output.false_look import Look, look_of
 from pmviewer.settings.access import PointOverlay, Settings
 from pmviewer.viewer.gl.palette import BOUNCES, LIGHTS, POWER, Colouring
 from pmviewer.viewer.gl.points import EVERY_TAG, PointCloud
@@ -63,15 +64,15 @@ class Points(Overlay):
         colouring = self.colourings[style.colour]
         cloud = self.cloud.summary(style.limit, colouring)
         if cloud.total:
-            self.colours_legend(colouring, cloud)
+            self.colours_legend(colouring, cloud, look_of(source.settings.display))
         else:
             nothing_to_draw()
         self.more_legend(source)
         drawn_of(cloud)
 
-    def colours_legend(self, colouring: Colouring, cloud: CloudSummary) -> None:
+    def colours_legend(self, colouring: Colouring, cloud: CloudSummary, look: Look) -> None:
         """What the colours mean."""
-        colour_legend(colouring, cloud, self.unit)
+        colour_legend(colouring, cloud, self.unit, look)
 
     def more_legend(self, source: Source) -> None:
         """What else the legend says, under the colours."""

@@ -11,7 +11,7 @@ from pmviewer.viewer.overlays.inspected import Inspected
 from pmviewer.viewer.overlays.irradiance_cache import IrradianceCache
 from pmviewer.viewer.overlays.light_importance import Lights
 from pmviewer.viewer.overlays.overlay import Overlay
-from pmviewer.viewer.overlays.photon_maps import CausticPhotons, GlobalPhotons
+from pmviewer.viewer.overlays.photon_maps import CausticPhotons, GlobalPhotons, VolumePhotons
 from pmviewer.viewer.overlays.photon_paths import Paths
 from pmviewer.viewer.overlays.projection_maps import ProjectionMaps
 from pmviewer.viewer.overlays.radiance_photons import RadiancePhotons
@@ -21,6 +21,7 @@ from pmviewer.viewer.overlays.virtual_lights import VirtualLights
 OVERLAYS: tuple[type[Overlay], ...] = (
     CausticPhotons,
     GlobalPhotons,
+    VolumePhotons,
     RadiancePhotons,
     IrradianceCache,
     ShadowPhotons,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from imgui_bundle import icons_fontawesome_6 as fa
@@ -16,8 +18,22 @@ from pmviewer.viewer.format import grouped
 from pmviewer.viewer.panels.statistics_panel import Rows, table
 from pmviewer.viewer.panels.widgets import icon_button
 from pmviewer.viewer.shortcuts import keys_of
+from pmviewer.viewer.snapshots import curve_of
 from pmviewer.viewer.state import ViewerState
 
+if TYPE_CHECKING:  # brings OpenEXR along, which the window doesn't wait for
+    from pmviewer.output.snapshot import CurvePoint
+
+CURRENT, EARLIER, KEPT = "current", "earlier", "snapshot"
+AXES = {"seconds": "rendering time (s)", "CPU": "CPU time (s)", "passes": "passes"}
+"""What curves are plotted against."""
+_SNAPSHOTS: tuple[theme.Colour, ...] = (
+    (0.35, 0.71, 0.91, 1.0),
+    (0.10, 0.70, 0.50, 1.0),
+    (0.84, 0.55, 0.72, 1.0),
+    (0.94, 0.89, 0.36, 1.0),
+)
+"""After Okabe and Ito; they repeat."""
 _EARLIER: tuple[theme.Colour, ...] = (
     (0.62, 0.62, 0.62, 0.8),
     (0.48, 0.60, 0.70, 0.8),
@@ -46,27 +62,32 @@ def log_limits(values: Sequence[float]) -> tuple[float, float]:
 
 
 class ErrorPanel:
-    """The tab "Error". `by_passes`: the curves are plotted against passes, not time."""
+    """The tab "Error". `axis`: what the curves are plotted against."""
 
     def __init__(self, state: ViewerState, actions: Mapping[str, Callable[[], None]]) -> None:
         self._state = state
         self._actions = actions
-        self.by_passes = False
+        self.axis = "seconds"
 
     def gui(self) -> None:
         """Draw the tab; called once a frame while it is in front."""
         comparison = self._state.comparison
         runs = [*comparison.earlier, *([comparison.current] if comparison.current else [])]
-        runs = [run for run in runs if run.points]
+        curves = [_curve_of(run, run is comparison.current) for run in runs if run.points]
+        if comparison.reference is not None:
+            truth = str(comparison.reference.path)
+            kept = self._state.snapshots.all
+            known = [one for one in kept if one.curve and one.truth == truth]
+            curves += [Curve(f"{one.name}##snapshot{one.number}", one.curve, KEPT) for one in known]
         if imgui.begin_child("##figures", (17 * imgui.get_font_size(), 0)):
             self._source()
-            if runs:
+            if curves:
                 self._axis_choice()
             self._figures()
         imgui.end_child()
         imgui.same_line()
-        if runs:
-            self._plot(runs)
+        if curves:
+            self._plot(curves)
         else:
             imgui.text_disabled("The curve of the error begins with the first pass that can be compared.")
 
@@ -104,21 +125,21 @@ class ErrorPanel:
     def _axis_choice(self) -> None:
         """What the curves run over, and a button that forgets those of other settings."""
         comparison = self._state.comparison
-        for text, by_passes in (("seconds", False), ("passes", True)):
-            if imgui.radio_button(text, self.by_passes == by_passes):
-                self.by_passes = by_passes
-            imgui.same_line()
+        for number, text in enumerate(AXES):
+            if number:
+                imgui.same_line()
+            if imgui.radio_button(text, self.axis == text):
+                self.axis = text
         imgui.begin_disabled(not comparison.earlier)
         if imgui.button("Clear"):
             comparison.clear_earlier()
         imgui.end_disabled()
         imgui.set_item_tooltip("Forget the curves of earlier settings")
 
-    def _plot(self, runs: list[Run]) -> None:
-        comparison = self._state.comparison
-        curves = [(run, *self._curve(run)) for run in runs]
-        x_limits = log_limits([float(x) for _, xs, _ in curves for x in xs])
-        y_limits = log_limits([float(y) for _, _, ys in curves for y in ys])
+    def _plot(self, curves: list[Curve]) -> None:
+        drawn = [(curve, *curve.values(self.axis)) for curve in curves]
+        x_limits = log_limits([float(x) for _, xs, _ in drawn for x in xs])
+        y_limits = log_limits([float(y) for _, _, ys in drawn for y in ys])
         implot.push_style_var(implot.StyleVar_.plot_padding, (4, 4))
         implot.push_style_var(implot.StyleVar_.label_padding, (4, 2))
         implot.push_style_color(implot.Col_.frame_bg, theme.grey(0, 0))
@@ -126,29 +147,42 @@ class ErrorPanel:
         implot.push_style_color(implot.Col_.axis_grid, theme.grey(theme.look.lighter, 0.12))
         flags = implot.Flags_.no_inputs | implot.Flags_.no_menus | implot.Flags_.no_mouse_text
         if implot.begin_plot("##curves", imgui.get_content_region_avail(), flags):
-            _axis(implot.ImAxis_.x1, "passes" if self.by_passes else "rendering time (s)", x_limits)
+            _axis(implot.ImAxis_.x1, AXES[self.axis], x_limits)
             _axis(implot.ImAxis_.y1, "relMSE", y_limits)
             implot.setup_legend(implot.Location_.east, implot.LegendFlags_.outside)
-            for number, (run, xs, ys) in enumerate(curves):
-                current = run is comparison.current
-                colour = imgui.ImVec4(*(theme.ACCENT if current else _EARLIER[number % len(_EARLIER)]))
+            for number, (curve, xs, ys) in enumerate(drawn):
+                current = curve.kind == CURRENT
+                palette = _SNAPSHOTS if curve.kind == KEPT else _EARLIER
+                colour = imgui.ImVec4(*(theme.ACCENT if current else palette[number % len(palette)]))
                 spec = implot.Spec(line_color=colour, line_weight=2.0 if current else 1.5)
                 spec.marker, spec.marker_size = implot.Marker_.circle, 3.0 if current else 2.0
                 spec.marker_fill_color = spec.marker_line_color = colour
-                implot.plot_line(f"{theme.drawable(run.label)}##{run.version}", xs, ys, spec)
+                implot.plot_line(theme.drawable(curve.label), xs, ys, spec)
             implot.end_plot()
         implot.pop_style_color(3)
         implot.pop_style_var(2)
 
-    def _curve(self, run: Run) -> tuple[np.ndarray, np.ndarray]:
-        """Passes or seconds, and relMSE: positive, since both axes are logarithmic."""
-        points = list(run.points)
-        xs = np.array([p.passes if self.by_passes else p.seconds for p in points], np.float64)
-        ys = np.array([p.metrics.relmse_all for p in points], np.float64)
-        good = np.isfinite(ys)
-        if not good.any():
+
+@dataclass(frozen=True)
+class Curve:
+    """A line of the plot: of the current run, of an earlier one, or of a snapshot."""
+
+    label: str
+    points: Sequence[CurvePoint]
+    kind: str
+
+    def values(self, axis: str) -> tuple[np.ndarray, np.ndarray]:
+        """What it is plotted against, and relMSE: positive, since both axes are logarithmic."""
+        read = {"passes": lambda p: p.passes, "seconds": lambda p: p.seconds, "CPU": lambda p: p.cpu_seconds}[axis]
+        points = [p for p in self.points if math.isfinite(p.relmse)]
+        if not points:
             return np.ones(1), np.ones(1)
-        return np.maximum(xs[good], 1e-6), np.maximum(ys[good], 1e-12)
+        xs, ys = (np.array(values, np.float64) for values in zip(*((read(p), p.relmse) for p in points)))
+        return np.maximum(xs, 1e-6), np.maximum(ys, 1e-12)
+
+
+def _curve_of(run: Run, current: bool) -> Curve:
+    return Curve(f"{run.label}##{run.version}", curve_of(run), CURRENT if current else EARLIER)
 
 
 def _axis(axis: int, title: str, limits: tuple[float, float]) -> None:

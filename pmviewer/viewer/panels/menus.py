@@ -43,6 +43,9 @@ class Menus:
         if imgui.begin_menu("Render"):
             self._render()
             imgui.end_menu()
+        if imgui.begin_menu("Compare"):
+            self._compare()
+            imgui.end_menu()
         if imgui.begin_menu("Overlays"):
             for overlay in SWITCHED:
                 title = SETTINGS[f"overlays.{overlay.name}.show"].group.capitalize()
@@ -156,6 +159,31 @@ class Menus:
                 if imgui.menu_item(f"{name}##forget", "", False)[0]:
                     forget_view(self._state, name)
             imgui.end_menu()
+
+    def _compare(self) -> None:
+        state = self._state
+        self._item("Take a snapshot", "take_snapshot")
+        self._item("Open a picture as a snapshot …", "open_snapshot")
+        imgui.separator()
+        for mode in SETTINGS["compare.mode"].choices:
+            if imgui.menu_item(mode.capitalize(), "", mode == state.settings.compare.mode)[0]:
+                state.change({"compare.mode": mode})
+        self._item("Next of these", "next_comparison")
+        imgui.separator()
+        if imgui.begin_menu("Difference"):
+            for kind in SETTINGS["compare.difference"].choices:
+                why = state.inactive_reason(f"compare.difference={kind}", state.settings, state.session.traits)
+                usable = why is None or state.settings.compare.mode != "difference"
+                if imgui.menu_item(kind, "", kind == state.settings.compare.difference, usable)[0]:
+                    state.change({"compare.mode": "difference", "compare.difference": kind})
+                if why is not None and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+                    imgui.set_tooltip(theme.drawable(why))
+            imgui.end_menu()
+        self._item("Flip to the other picture", "flip_pictures")
+        self._item("Swap A and B", "swap_pictures")
+        imgui.separator()
+        self._item("With and without importance", "compare_importance", state.gain.running)
+        self._item("Mark odd pixels", "toggle_marks", state.settings.display.marks)
 
     def _render(self) -> None:
         self._item("Resume" if self._state.session.paused else "Pause", "toggle_pause")

@@ -25,6 +25,8 @@ from pmviewer.viewer.value_text import value_text
 _ASK = "Reset every setting"
 PINNED = ("photons.N", "photons.q", "estimate.radius")
 _ELSEWHERE = ("overlays.",)
+STACKED = 14.0
+"""Width in font sizes below which a name stands above its value."""
 _OPEN = ("Light pass", "Density estimate", "Method")
 
 
@@ -155,18 +157,20 @@ class SettingsPanel:
 
     @staticmethod
     def begin_rows(name: str, name_em: float = 8.8, room: float = 0) -> bool:
-        """Open the table that `row` fills; end it with `imgui.end_table()` when True."""
-        width = imgui.get_content_region_avail().x - room
-        if not imgui.begin_table(f"##{name}", 3, imgui.TableFlags_.none, (width, 0)):
+        """Open the table that `row` fills; end it with `imgui.end_table()` when True. In a narrow panel names have a
+        line of their own, above their values."""
+        width, em = imgui.get_content_region_avail().x - room, imgui.get_font_size()
+        stacked = width < STACKED * em
+        if not imgui.begin_table(f"##{name}", 2 if stacked else 3, imgui.TableFlags_.none, (width, 0)):
             return False
-        em = imgui.get_font_size()
-        imgui.table_setup_column("name", imgui.TableColumnFlags_.width_fixed, min(name_em * em, 0.42 * width))
+        if not stacked:
+            imgui.table_setup_column("name", imgui.TableColumnFlags_.width_fixed, min(name_em * em, 0.42 * width))
         imgui.table_setup_column("value", imgui.TableColumnFlags_.width_stretch)
         imgui.table_setup_column("reset", imgui.TableColumnFlags_.width_fixed, 1.75 * em)
         return True
 
     def row(self, info: SettingInfo) -> None:
-        """Label, widget and reset of one setting, inside a table of three columns."""
+        """Label, widget and reset of one setting, inside the table of `begin_rows`."""
         state, value = self.state, self._value(info.path)
         reason = self._facts()[1][info.path]
         resolved = state.resolved(info.path) if value == "auto" else value
@@ -181,7 +185,10 @@ class SettingsPanel:
         imgui.pop_style_color()
         described = self._is_hovered()
         self._context_menu("label", info, value, resolved)
-        imgui.table_next_column()
+        if imgui.table_get_column_count() > 2:
+            imgui.table_next_column()
+        elif info.scale == "switch":
+            imgui.same_line()
         new = self.widgets.edit(info, value, resolved)
         described = described or (self._is_hovered() and not imgui.is_item_active())
         self._context_menu("value", info, value, resolved)

@@ -53,7 +53,7 @@ def energy_rows(energy: Energy) -> Rows:
 
 
 def time_rows(s: Statistics) -> Rows:
-    """Times, rays, and what the irradiance cache and shadow photons spared."""
+    """Times, rays, and what the irradiance cache, estimated gathers and shadow photons spared."""
     rows = [
         ("Passes", grouped(s.passes)),
         ("Rendering time", duration(s.seconds)),
@@ -67,6 +67,14 @@ def time_rows(s: Statistics) -> Rows:
             ("Records of the irradiance cache", grouped(s.cache_records)),
             ("Gathers per pixel and pass", f"{s.gathers_per_pixel:.3f}"),
             ("Interpolated", f"{s.interpolated:.1%}"),
+        ]
+    if s.estimates:
+        safe, pixels = max(s.estimates["safe"], 1), sum(s.estimates[name] for name in ("safe", "critical", "other"))
+        rows += [
+            ("Safe pixels", f"{safe / max(pixels, 1):.1%}"),
+            ("of them fully gathered", f"{s.estimates['gathered'] / safe:.1%}"),
+            ("interpolated", f"{s.estimates['interpolated'] / safe:.1%}"),
+            ("gathered as usual", f"{s.estimates['left'] / safe:.1%}"),
         ]
     if s.saved_rays:
         share = s.saved_rays / (s.saved_rays + s.shadow_rays)

@@ -64,6 +64,10 @@ class SettingWidgets:
         if info.scale == "switch":
             changed, new = imgui.checkbox(f"##{info.path}", value)
             return new if changed else None
+        if info.scale == "edits":
+            imgui.align_text_to_frame_padding()
+            imgui.text_disabled(theme.drawable(value_text(info, value)))
+            return None
         if info.scale in ("choice", "name"):
             return self._choice(info, value, resolved)
         if info.scale == "vector":

@@ -119,10 +119,7 @@ class Navigation:
 
     def _magnify(self, notches: float) -> None:
         """Zoom into the pixels, keeping the point under the mouse where it is."""
-        mouse = imgui.get_mouse_pos()
-        x, y = mouse.x - self._viewport.origin[0], mouse.y - self._viewport.origin[1]
-        left, top, width, height = self._viewport.rectangle()
-        u, v = (x - left) / width, (y - top) / height
+        u, v = self._viewport.mouse_in_picture()
         zoom = min(max(self._viewport.fit.zoom * 1.25**notches, 1.0), MOST_ZOOM)
         grown = zoom / self._viewport.fit.zoom
         center = u + (self._viewport.fit.center[0] - u) / grown, v + (self._viewport.fit.center[1] - v) / grown

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import moderngl
 
+from pmviewer.output.false_look import look_of
 from pmviewer.render.camera import CameraPose
 from pmviewer.settings.access import Display, Settings
 from pmviewer.viewer.gl.framebuffers import Framebuffers
@@ -12,6 +13,7 @@ from pmviewer.viewer.gl.planes import Planes
 from pmviewer.viewer.gl.program import Drawing, Shaders
 from pmviewer.viewer.gl.surfaces import Surfaces
 from pmviewer.viewer.overlays.layers import Layers
+from pmviewer.viewer.pair import BESIDE, DIFFERENCE, FLIP, WIPE, ShownPair
 from pmviewer.viewer.viewport.target import Target, clip_planes
 
 SURROUND = (0.105, 0.105, 0.105)
@@ -56,13 +58,13 @@ class Picture:
         overlays: Settings | None,
         *,
         navigating: bool = False,
-        split: float | None = None,
+        pair: ShownPair | None = None,
     ) -> moderngl.Texture:
         """Draw into the framebuffer of that name and return its colour texture (rows bottom to top).
 
         `camera` is the frame's; None draws the surround alone. `overlays` are the settings that tell which overlays
-        are drawn and how, None leaves them out. With `split` the uploaded pair is drawn instead of the frame: its first
-        picture up to that share of the width.
+        are drawn and how, None leaves them out. With a `pair`, whose pictures are uploaded, it is drawn instead of the
+        frame.
         """
         framebuffer = self.framebuffers.get(name, target.size)
         framebuffer.scissor = (0, 0, *framebuffer.size)
@@ -72,28 +74,45 @@ class Picture:
         colour = framebuffer.color_attachments[0]
         assert isinstance(colour, moderngl.Texture)
         clip = target.clip
-        if camera is None or clip is None:
+        if clip is None or (camera is None and pair is None):
             return colour
         framebuffer.viewport = target.viewport
         framebuffer.scissor = clip
-        if split is not None and self.planes.pair.planes:
-            self._draw_pair(framebuffer, target, clip, display, split)
+        if pair is not None and self.planes.pair.planes:
+            self._draw_pair(framebuffer, target, display, pair)
+            return colour
+        if camera is None:
             return colour
         self._draw_one(framebuffer, target, camera, display, overlays, navigating)
         self.context.disable(moderngl.DEPTH_TEST)
         return colour
 
-    def _draw_pair(
-        self,
-        framebuffer: moderngl.Framebuffer,
-        target: Target,
-        clip: tuple[int, int, int, int],
-        display: Display,
-        split: float,
-    ) -> None:
+    def _draw_pair(self, framebuffer: moderngl.Framebuffer, target: Target, display: Display, pair: ShownPair) -> None:
+        """The pictures of the pair as their mode says, or their difference once it is there."""
+        first, second = self.planes.pair.planes
+        width = target.picture[2]
+        if pair.mode == BESIDE:
+            for number, plane in enumerate((first, second)):
+                pane, offset = target.pane(number)
+                if pane.clip is not None:
+                    framebuffer.viewport = (pane.viewport[0] + offset, *pane.viewport[1:])
+                    framebuffer.scissor = (pane.clip[0] + offset, *pane.clip[1:])
+                    framebuffer.use()
+                    self.planes.draw(display, width, plane)
+            return
+        framebuffer.use()
+        if pair.mode == WIPE:
+            self._draw_wipe(framebuffer, target, display, pair.split)
+        elif pair.mode == DIFFERENCE and self.planes.shown is not None:
+            self.planes.draw(display, width, plain=True)
+        else:
+            self.planes.draw(display, width, second if pair.mode == FLIP and pair.second else first)
+
+    def _draw_wipe(self, framebuffer: moderngl.Framebuffer, target: Target, display: Display, split: float) -> None:
         """The two pictures of the pair on both sides of the split."""
+        assert target.clip is not None
         left, _, width, _ = target.picture
-        x, y, w, h = clip
+        x, y, w, h = target.clip
         middle = min(max(round(left + split * width), x), x + w)
         for plane, start, end in zip(self.planes.pair.planes, (x, middle), (middle, x + w), strict=True):
             if end > start:
@@ -124,5 +143,5 @@ class Picture:
         if not as_geometry and self.layers.need_depth(overlays):
             self.surfaces.draw_depth(framebuffer, view, projection)
         limit = NAVIGATION_LIMIT if navigating and self.software else None
-        width, height = target.picture[2:]
-        self.layers.draw(framebuffer, Drawing(view, projection, (width, height), target.pixel_ratio, limit), overlays)
+        look, size = look_of(display), target.picture[2:]
+        self.layers.draw(framebuffer, Drawing(view, projection, size, target.pixel_ratio, limit, look), overlays)

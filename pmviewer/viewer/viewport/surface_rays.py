@@ -30,13 +30,15 @@ class SurfaceRays:
 
     def __init__(self, geometry: Any) -> None:
         corners = np.asarray(geometry.vertices, np.float32).reshape(-1, 3, 3)
+        self._order = np.zeros(0, np.int64)
         if len(corners):
             middle = corners.mean(axis=1)
             low = middle.min(axis=0)
             span = max(float((middle.max(axis=0) - low).max()), 1e-30)
             cell = np.minimum((middle - low) * ((1 << _BITS) / span), (1 << _BITS) - 1).astype(np.uint64)
             code = _spread(cell[:, 0]) | (_spread(cell[:, 1]) << np.uint64(1)) | (_spread(cell[:, 2]) << np.uint64(2))
-            corners = corners[np.argsort(code, kind="stable")]
+            self._order = np.argsort(code, kind="stable")
+            corners = corners[self._order]
         starts = np.arange(0, len(corners), CLUSTER)
         low, high = corners.min(axis=1), corners.max(axis=1)
         self._low = np.minimum.reduceat(low, starts).astype(float) if len(corners) else np.zeros((0, 3))
@@ -46,6 +48,13 @@ class SurfaceRays:
     def nearest(self, origin: Vector, direction: Vector, start: float = 0.0) -> tuple[float, Vector] | None:
         """Distance and unit normal, towards the origin, of the first surface that the ray meets from the distance
         `start` on; None where it meets none. `direction` (3,) is a unit vector."""
+        hit = self.nearest_triangle(origin, direction, start)
+        return hit[:2] if hit is not None else None
+
+    def nearest_triangle(
+        self, origin: Vector, direction: Vector, start: float = 0.0
+    ) -> tuple[float, Vector, int] | None:
+        """As `nearest`, and the number of the triangle in the `DrawGeometry`."""
         with np.errstate(divide="ignore", invalid="ignore"):
             inverse = 1.0 / direction
             sides = np.stack([(self._low - origin) * inverse, (self._high - origin) * inverse])
@@ -56,12 +65,13 @@ class SurfaceRays:
         if not len(met):
             return None
         numbers = (met[:, None] * CLUSTER + np.arange(CLUSTER)).ravel()
-        corners = self._corners[numbers[numbers < len(self._corners)]].astype(float)
-        return _first(corners, origin, direction, start)
+        numbers = numbers[numbers < len(self._corners)]
+        hit = _first(self._corners[numbers].astype(float), origin, direction, start)
+        return None if hit is None else (*hit[:2], int(self._order[numbers[hit[2]]]))
 
 
-def _first(corners: Vector, origin: Vector, direction: Vector, start: float) -> tuple[float, Vector] | None:
-    """The first of the triangles (n, 3, 3) that the ray meets (Möller and Trumbore 1997)."""
+def _first(corners: Vector, origin: Vector, direction: Vector, start: float) -> tuple[float, Vector, int] | None:
+    """The first of the triangles (n, 3, 3) that the ray meets (Möller and Trumbore 1997), and which it is."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     p = np.cross(direction, second)
     determinant = np.einsum("ij,ij->i", first, p)
@@ -78,4 +88,4 @@ def _first(corners: Vector, origin: Vector, direction: Vector, start: float) -> 
     number = int(np.argmin(np.where(inside, t, np.inf)))
     normal = np.cross(first[number], second[number])
     normal /= max(float(np.linalg.norm(normal)), 1e-300)
-    return float(t[number]), normal if normal @ direction < 0 else -normal
+    return float(t[number]), normal if normal @ direction < 0 else -normal, number

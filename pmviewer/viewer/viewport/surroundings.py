@@ -45,6 +45,9 @@ class Surroundings:
         """Of a `DrawGeometry`, or None. Of one with many triangles nothing is known for some moments."""
         if geometry is self._geometry:
             return
+        if geometry is not None and self._geometry is not None and geometry.vertices is self._geometry.vertices:
+            self._geometry = geometry  # in other colours
+            return
         self._geometry, self._closed, self._unlit, self._rays = geometry, None, (-1, ""), None
         self._radius = float(geometry.radius) if geometry is not None else 1.0
         if geometry is None:
@@ -52,7 +55,7 @@ class Surroundings:
 
         def work() -> str:
             rays = SurfaceRays(geometry)
-            if self._geometry is geometry:
+            if self._geometry is not None and self._geometry.vertices is geometry.vertices:
                 self._rays = rays
             return ""
 
@@ -63,12 +66,16 @@ class Surroundings:
 
     def under(self, pose: CameraPose, pixel: tuple[float, float]) -> Vector | None:
         """The surface point (3,) that the camera sees at that place of the image, in pixels; None without one."""
-        if self._rays is None:
-            return None
-        origins, directions = pose.rays(np.array([pixel[0]]), np.array([pixel[1]]))
-        origin, direction = origins[0], directions[0]
-        hit = self._rays.nearest(origin, direction, _start(pose, direction))
+        origin, direction = _ray(pose, pixel)
+        hit = self._rays.nearest(origin, direction, _start(pose, direction)) if self._rays is not None else None
         return origin + direction * hit[0] if hit is not None else None
+
+    def object_under(self, pose: CameraPose, pixel: tuple[float, float]) -> int:
+        """The number of the object there, shapes before instances; −1 where there is none."""
+        origin, direction = _ray(pose, pixel)
+        rays, geometry = self._rays, self._geometry
+        hit = rays.nearest_triangle(origin, direction, _start(pose, direction)) if rays is not None else None
+        return geometry.object_at(3 * hit[2]) if hit is not None else -1
 
     def depth_ahead(self, pose: CameraPose) -> float:
         """A typical distance of what the camera sees: the middle one of nine places; the scene's radius where it sees
@@ -145,6 +152,12 @@ class Surroundings:
                 text = UNLIT if np.any((depth > 0) & np.isfinite(depth)) else NOTHING
             self._unlit = frame.serial, text
         return self._unlit[1]
+
+
+def _ray(pose: CameraPose, pixel: tuple[float, float]) -> tuple[Vector, Vector]:
+    """Origin and direction (3,) of the camera's ray through that place of the image."""
+    origins, directions = pose.rays(np.array([pixel[0]]), np.array([pixel[1]]))
+    return origins[0], directions[0]
 
 
 def _start(pose: CameraPose, direction: Vector) -> float:

@@ -40,6 +40,12 @@ class Target:
         left, top, width, height = self.picture
         return left, self.size[1] - top - height, width, height
 
+    def pane(self, number: int) -> tuple[Target, int]:
+        """One of two halves beside each other, each with the picture at the same place, and how far to the right it
+        begins."""
+        half = self.size[0] // 2
+        return Target((half, self.size[1]), self.picture, self.pixel_ratio), number * half
+
     @property
     def clip(self) -> tuple[int, int, int, int] | None:
         """The part of the picture inside the framebuffer, as OpenGL's scissor wants it; None when nothing is."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import moderngl
@@ -13,11 +14,20 @@ from imgui_bundle import imgui
 
 from pmviewer.engine.frame import Frame
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
+from pmviewer.output.difference_views import DIFFERENCES
+from pmviewer.output.false_look import look_of
 from pmviewer.render.camera import CameraPose, resolve_camera, size_only
+from pmviewer.scene.description import Scene
 from pmviewer.settings.access import Display
+from pmviewer.viewer.gl.pair import Keyed
+from pmviewer.viewer.gl.textures import Same
 from pmviewer.viewer.overlays.overlay import Source
+from pmviewer.viewer.pair import BESIDE, FLIP, WIPE, ShownPair
+from pmviewer.viewer.panels.widgets import SettingWidgets
 from pmviewer.viewer.shortcuts import INSPECT_KEY, is_held
+from pmviewer.viewer.sides import Side
 from pmviewer.viewer.state import ViewerState
+from pmviewer.viewer.viewport.gizmo import Gizmo
 from pmviewer.viewer.viewport.hud import draw_hud
 from pmviewer.viewer.viewport.navigation import DRAG_THRESHOLD, Clicks, Navigation
 from pmviewer.viewer.viewport.picking import picked
@@ -52,10 +62,13 @@ class Viewport:
         self._texture: moderngl.Texture | None = None
         self._drawn_key: Any = None
         self.surroundings = Surroundings()
+        self.widgets = SettingWidgets(state.refused_view, state.choices)
+        """Of the settings beside the legend."""
+        self.gizmo = Gizmo(self)
         self._navigation = Navigation(self)
         self._clicks = Clicks()
         self._splitting = False
-        self._advice: tuple[Any, str] | None = None
+        self._advice: tuple[Any, Scene, str] | None = None
         self.draw_toasts: Callable[[], None] = lambda: None
 
     # drawing ----------------------------------------------------------------------------------------------------
@@ -76,19 +89,29 @@ class Viewport:
 
     def shown_camera(self) -> CameraPose | None:
         """The frame's camera, so that points lie on the picture; the newest one when only geometry is shown."""
-        pair = self.state.gain.frames()
-        if pair is not None:
-            return pair[0].camera
+        gain = self.state.gain.frames()
+        if gain is not None:
+            return gain[0].camera
         frame = self.state.frame
         if frame is None or self.state.shown_display.view == "geometry":
             return self.state.live_camera() if self.state.session.geometry is not None else None
         return frame.camera
 
     def rectangle(self) -> tuple[float, float, float, float]:
-        """The picture's left, top, width and height in the panel, in points."""
+        """The picture's left, top, width and height in the panel, in points; of two pictures the first
+        one's."""
         camera = self.shown_camera()
         aspect = camera.width / camera.height if camera else 1.0
-        return self.fit.rectangle(self.size, aspect)
+        pair = self.state.shown_pair()
+        if pair is not None:
+            aspect = pair.a.size[0] / pair.a.size[1]
+        return self.fit.rectangle((self.size[0] / self.panes, self.size[1]), aspect)
+
+    @property
+    def panes(self) -> int:
+        """Two while pictures are shown beside each other, else one."""
+        pair = self.state.shown_pair()
+        return 2 if pair is not None and pair.mode == BESIDE else 1
 
     def target(self) -> Target:
         """The panel in pixels."""
@@ -110,33 +133,40 @@ class Viewport:
         changed = picture.surfaces.upload(self.state.session.geometry)
         self.surroundings.take(self.state.session.geometry, self.state.background)
         display, reference = self.state.shown_display, self.state.comparison.reference
-        changed |= picture.planes.reference.upload(reference.image if reference is not None else None)
-        if frame is not None:
-            changed |= picture.planes.upload(frame, display.view)
-        changed |= picture.layers.upload(self.source())
-        pair, split = self.state.shown_pair(), None
+        truth = reference.image if reference is not None else None
+        same = None if truth is None else Same(truth)
+        changed |= picture.planes.reference.take(same, lambda: np.asarray(truth))
+        pair = self.state.shown_pair()
+        changed |= picture.planes.pair.upload(_keyed(pair))
+        difference = self.state.pair.current(pair) if pair is not None else None
         if pair is not None:
-            display, split = pair[1], settings.compare.split
-        changed |= picture.planes.pair.upload(pair[0] if pair is not None else None, display.view)
+            display = pair.display
+        if difference is not None:
+            info, look = DIFFERENCES[difference.kind], look_of(display)
+            changed |= picture.planes.upload_difference(difference.key, difference.values, info, look)
+        elif frame is not None:
+            changed |= picture.planes.upload(frame, display, truth)
+        changed |= picture.layers.upload(self.source())
         camera, target = self.shown_camera(), self.target()
         navigating = self.state.navigating and picture.software
-        key = (camera, target, display, settings.overlays, settings.free_camera, navigating, split)
+        compared = (pair.mode, pair.split, pair.second, *pair.keys) if pair is not None else None
+        key = (camera, target, display, settings.overlays, settings.free_camera, navigating, compared)
         if changed or key != self._drawn_key:
-            self._texture = picture.draw(
-                "window", target, camera, display, settings, navigating=navigating, split=split
-            )
+            self._texture = picture.draw("window", target, camera, display, settings, navigating=navigating, pair=pair)
             self._drawn_key = key
             self.redraws += 1
 
     def capture(self, *, overlays: bool) -> np.ndarray | None:
-        """(height, width, 3) uint8: the picture at its own resolution, with or without the points."""
+        """(height, width, 3) uint8: the picture at its own resolution, with or without the points; of compared
+        pictures what the viewport shows of them."""
         picture, camera = self.picture, self.shown_camera()
         if picture is None or camera is None:
             return None
-        settings = self.state.settings
-        size = camera.width, camera.height
-        target = Target(size, (0, 0, *size))
-        picture.draw("capture", target, camera, self.state.shown_display, settings if overlays else None)
+        settings, pair = self.state.settings, self.state.shown_pair()
+        size = (camera.width, camera.height) if pair is None else pair.a.size
+        target = Target((size[0] * self.panes, size[1]), (0, 0, *size))
+        display = self.state.shown_display if pair is None else pair.display
+        picture.draw("capture", target, camera, display, settings if overlays else None, pair=pair)
         return picture.framebuffers.read("capture")
 
     # interface --------------------------------------------------------------------------------------------------
@@ -165,32 +195,44 @@ class Viewport:
         self._ratio = imgui.get_io().display_framebuffer_scale.x or 1.0
         if self._texture is not None:
             imgui.image(imgui.ImTextureRef(self._texture.glo), self.size, (0, 1), (1, 0))
+        if not self.alone and self._texture is not None:
+            imgui.set_cursor_screen_pos(corner)
+            self.gizmo.gui(self.shown_camera())
         imgui.set_cursor_screen_pos(corner)
         buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_middle
+        if self.gizmo.wants_mouse:
+            imgui.dummy(self.size)  # a button would keep the mouse from the handles
+            draw_hud(self, not self.alone)
+            self.draw_toasts()
+            return
+        imgui.set_next_item_allow_overlap()  # for the button at the legend
         imgui.invisible_button("##picture", self.size, buttons | imgui.ButtonFlags_.mouse_button_right)
         hovered, active = imgui.is_item_hovered(), imgui.is_item_active()
         if hovered:
             imgui.set_item_key_owner(imgui.Key.mouse_wheel_y)
         if hovered and self.state.settings.overlays.gather.show and is_held(INSPECT_KEY):
             self._inspect()
-        if hovered and _clicked_with_ctrl():
+        if hovered and _clicked_with(imgui.get_io().key_ctrl):
             self._focus()
+        if hovered and _clicked_with(imgui.get_io().key_shift and not self.state.flying):
+            self._choose_object()
         pose = self.state.live_camera() if hovered or active or self.state.flying else None
         if self._drags_split(hovered, active):
             pose = None
         if pose is not None:
             self._navigation.handle(pose, hovered, active)
-        if self._clicks.clicked(active) and not (self.state.flying or self.split_x() is not None):
+        if self._clicks.clicked(active) and not (self.state.flying or self.state.shown_pair() is not None):
             self._pin()
         draw_hud(self, hovered and not self.alone)
         self.draw_toasts()
 
     def split_x(self) -> float | None:
         """Where the line between the compared pictures is, in points from the panel's left edge; None without."""
-        if self.state.gain.frames() is None:
+        pair = self.state.shown_pair()
+        if pair is None or pair.mode != WIPE:
             return None
         left, _, width, _ = self.rectangle()
-        return left + self.state.settings.compare.split * width
+        return left + pair.split * width
 
     def _drags_split(self, hovered: bool, active: bool) -> bool:
         """Move the line between the compared pictures with the mouse. True while the mouse does that."""
@@ -211,11 +253,25 @@ class Viewport:
         return self._splitting
 
     def frame_at(self, pixel: tuple[int, int]) -> Frame | None:
-        """The frame that is shown at a pixel of the image."""
-        pair = self.state.gain.frames()
+        """The frame that is shown at a pixel of the image, None where it is of a snapshot."""
+        side = self.side_at(pixel)
+        return side.frame if side is not None else self.state.frame
+
+    def side_at(self, pixel: tuple[int, int]) -> Side | None:
+        """Which of the compared pictures is shown at a pixel of the image: of a difference the first one. None when
+        nothing is compared."""
+        pair = self.state.shown_pair()
         if pair is None:
-            return self.state.frame
-        return pair[0 if pixel[0] + 0.5 < self.state.settings.compare.split * pair[0].camera.width else 1]
+            return None
+        if pair.mode == WIPE:
+            return pair.sides[pixel[0] + 0.5 >= pair.split * pair.a.size[0]]
+        if pair.mode == BESIDE:
+            return pair.sides[self.pane_under_mouse()]
+        return pair.sides[pair.mode == FLIP and pair.second]
+
+    def pane_under_mouse(self) -> int:
+        """0, or 1 where the mouse is over the second of two pictures beside each other."""
+        return int(self.panes == 2 and imgui.get_mouse_pos().x - self.origin[0] >= self.size[0] / 2)
 
     def _inspect(self) -> None:
         """Ask for the gather rays of the pixel under the mouse."""
@@ -244,6 +300,7 @@ class Viewport:
         """The mouse's place in the picture, 0 to 1 from its left and top."""
         mouse = imgui.get_mouse_pos()
         left, top, width, height = self.rectangle()
+        left += self.pane_under_mouse() * self.size[0] / 2
         return (mouse.x - self.origin[0] - left) / width, (mouse.y - self.origin[1] - top) / height
 
     def _focus(self) -> None:
@@ -251,6 +308,18 @@ class Viewport:
         place, camera = self._place_under_mouse(), self.shown_camera()
         if place is not None and camera is not None:
             self.state.focus_at(camera, place[0] * camera.width, place[1] * camera.height)
+
+    def _choose_object(self) -> None:
+        """Take hold of the object under the mouse, or let go what is there."""
+        place, camera, editing = self._place_under_mouse(), self.shown_camera(), self.state.editing
+        if place is None or camera is None:
+            return
+        number = self.surroundings.object_under(camera, (place[0] * camera.width, place[1] * camera.height))
+        held = editing.chosen is not None and editing.object_number(editing.chosen) == number
+        if number < 0 or held:
+            editing.choose(None)
+        else:
+            editing.choose_object(number)
 
     def advice(self) -> str:
         """One sentence where a surface stops the camera or it shows nothing of use; else an empty one."""
@@ -262,11 +331,12 @@ class Viewport:
             return STOPPED
         if state.navigating:
             return ""
-        key = (pose, state.frame.serial if state.frame is not None else 0, scene)
-        if self._advice is None or self._advice[0] != key:
+        key = (pose, state.frame.serial if state.frame is not None else 0)
+        known = self._advice
+        if known is None or known[0] != key or known[1] is not scene:
             own = resolve_camera(scene, size_only(state.settings.camera.model_copy(update={"name": "auto"})))
-            self._advice = key, self.surroundings.advice(pose, own, state.frame)
-        return self._advice[1]
+            self._advice = known = key, scene, self.surroundings.advice(pose, own, state.frame)
+        return known[2]
 
     def place_under_mouse(self, pose: CameraPose) -> tuple[float, float] | None:
         """Where in the camera's image the mouse is, in pixels; None beside the picture."""
@@ -275,9 +345,12 @@ class Viewport:
 
     def pixel_under_mouse(self) -> tuple[int, int] | None:
         """Pixel (x, y) of the image, or None when the mouse is elsewhere."""
-        frame, place = self.state.frame, self._place_under_mouse()
-        if frame is None or place is None:
+        frame, place, pair = self.state.frame, self._place_under_mouse(), self.state.shown_pair()
+        if place is None or (frame is None and pair is None):
             return None
+        if pair is not None:
+            return int(place[0] * pair.a.size[0]), int(place[1] * pair.a.size[1])
+        assert frame is not None
         return int(place[0] * frame.camera.width), int(place[1] * frame.camera.height)
 
     def _place_under_mouse(self) -> tuple[float, float] | None:
@@ -286,11 +359,20 @@ class Viewport:
         return (u, v) if 0 <= u < 1 and 0 <= v < 1 else None
 
 
-def _clicked_with_ctrl() -> bool:
-    """Whether the left button was released where it was pressed, with Ctrl held."""
+def _clicked_with(modifier: bool) -> bool:
+    """Whether the left button was released where it was pressed, with a key held."""
     io = imgui.get_io()
     still = io.mouse_drag_max_distance_sqr[imgui.MouseButton_.left] < DRAG_THRESHOLD**2
-    return io.key_ctrl and imgui.is_mouse_released(imgui.MouseButton_.left) and still
+    return modifier and imgui.is_mouse_released(imgui.MouseButton_.left) and still
+
+
+def _keyed(pair: ShownPair | None) -> tuple[Keyed, Keyed] | None:
+    """The pair's layers with what tells them from others."""
+    if pair is None:
+        return None
+    view = pair.display.view
+    first, second = ((key, partial(side.image, view)) for side, key in zip(pair.sides, pair.keys, strict=True))
+    return first, second
 
 
 def is_data_view(display: Display) -> bool:

@@ -32,6 +32,7 @@ class Materials:
         self._index: dict[int, int] = {}
         self._built: dict[int, Material] = {}
         self._defaults: dict[RGB, int] = {}
+        self._null: int | None = None
 
     def default(self, emits: bool) -> int:
         """What a shape without a BSDF gets: grey, or black if it is a light."""
@@ -49,6 +50,15 @@ class Materials:
             self._index[key] = len(self.list)
             self.list.append(material)
         return self._index[key]
+
+    def boundary(self, material: int) -> int:
+        """The material of a shape where a medium begins or ends: where rays never stop, one that tells them so."""
+        if not older.is_clear(self.list[material]):
+            return material
+        if self._null is None:
+            self._null = len(self.list)
+            self.list.append(Material("boundary of a medium", "null", BLACK))
+        return self._null
 
     def _build(self, element: Element, name: str, depth: int) -> Material:
         """The element's material, once however many others it is a part of."""

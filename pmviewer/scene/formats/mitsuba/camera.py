@@ -15,6 +15,7 @@ from pmviewer.scene.clean import check_camera
 from pmviewer.scene.description import Camera, NamedCamera, Vec3
 from pmviewer.scene.formats.mitsuba.document import Document, Properties
 from pmviewer.scene.formats.mitsuba.film import DEFAULT_SIZE, Film, read_film
+from pmviewer.scene.formats.mitsuba.medium import Media
 from pmviewer.scene.formats.mitsuba.transform import Matrix, mirrors
 from pmviewer.scene.formats.mitsuba.values import parse_float, parse_numbers
 from pmviewer.scene.formats.mitsuba.xml import Element
@@ -42,16 +43,18 @@ class _Unusable(Exception):
     """A sensor that no camera can stand in for."""
 
 
-def read_cameras(sensors: Sequence[Element], document: Document, box: Box) -> tuple[list[NamedCamera], tuple[int, int]]:
+def read_cameras(
+    sensors: Sequence[Element], document: Document, box: Box, media: Media
+) -> tuple[list[NamedCamera], tuple[int, int]]:
     """Every usable <sensor> in the order of the file, and the size of the picture if there is none. `box` has the
-    corners of the scene; `batch` stands for the sensors in it."""
+    corners of the scene, `media` its media; `batch` stands for the sensors in it."""
     found: list[NamedCamera] = []
     size = DEFAULT_SIZE
     for element in _flat(sensors, document):
         p = Properties(element, document)
         film = read_film(p)
         try:
-            found.append(_camera(p, film, (box[0] + box[1]) / 2))
+            found.append(_camera(p, film, (box[0] + box[1]) / 2, media.around(p)))
         except _Unusable as reason:
             document.warn(f"{reason}: it is left out.", element)
             size = (film.width, film.height) if size == DEFAULT_SIZE else size
@@ -74,7 +77,7 @@ def _flat(sensors: Sequence[Element], document: Document) -> list[Element]:
     return flat
 
 
-def _camera(p: Properties, film: Film, center: NDArray[np.float64]) -> NamedCamera:
+def _camera(p: Properties, film: Film, center: NDArray[np.float64], medium: int) -> NamedCamera:
     element, document = p.element, p.document
     if p.type in _UNPOINTED:
         raise _Unusable(f"{element} looks nowhere in particular")
@@ -91,8 +94,8 @@ def _camera(p: Properties, film: Film, center: NDArray[np.float64]) -> NamedCame
     camera = _orthographic(p, camera, film, m) if p.type in ("orthographic", "telecentric") else _lens(p, camera, film)
     near, far = _clip(p)
     aperture, focus = _thin_lens(p, far)
-    p.warn_unused("film")
-    camera = replace(camera, near=near, far=far, aperture=aperture, focus=focus, filter=film.filter)
+    p.warn_unused("film", "medium")
+    camera = replace(camera, near=near, far=far, aperture=aperture, focus=focus, filter=film.filter, medium=medium)
     try:
         check_camera(camera, document.diagnostics.path, element.line)
     except SceneError as error:

@@ -48,7 +48,7 @@ def add_lights(p: Properties, lights: list[Light]) -> None:
         document.ignore(element)
         return
     found = _READERS[p.type](p, name)
-    p.warn_unused("texture")
+    p.warn_unused("texture", "medium")
     for light in found:
         if not isinstance(light, Environment):
             lights.append(light)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,4 +138,4 @@ class Groups:
 
 def _dark(shape: Shape) -> Shape:
     """The shape as no light."""
-    return Shape(shape.name, shape.geometry, shape.material)
+    return replace(shape, radiance=None, emission=None)

@@ -52,7 +52,7 @@ def load_mitsuba(path: Path, parameters: Mapping[str, str], search_paths: Sequen
         hint = diagnostics.left_out() or f"Add a <shape> of type {', '.join(SUPPORTED)}."
         raise diagnostics.error("The scene has no surface.", hint=hint)
     low, high = box = joint_bounds(shapes, instances)
-    cameras, size = read_cameras(scene.sensors, document, box)
+    cameras, size = read_cameras(scene.sensors, document, box, scene.media)
     seen = cameras[0] if cameras else NamedCamera("framed", framed((), box=box), *size)
     touched = on_a_surface(seen.camera.origin, shapes, float(np.linalg.norm(high - low)))
     if touched is not None:
@@ -70,4 +70,5 @@ def load_mitsuba(path: Path, parameters: Mapping[str, str], search_paths: Sequen
         dropped=dict(diagnostics.dropped),
         instances=instances,
         cameras=tuple(cameras),
+        media=tuple(scene.media.list),
     )

@@ -110,6 +110,10 @@ class Properties:
         """Nested objects of these kinds, references resolved."""
         return [target for _, target in self._objects if target.tag in tags]
 
+    def named_objects(self, tag: str) -> list[tuple[str, Element]]:
+        """Nested objects of a kind with the names that they are given here, "" for none."""
+        return [(at.attributes.get("name", ""), target) for at, target in self._objects if target.tag == tag]
+
     def known(self, *names: str) -> None:
         """Names that may stand in the file but change nothing here."""
         self._asked.update(names)

@@ -10,6 +10,7 @@ from pmviewer.scene.formats.mitsuba.bsdf import Materials
 from pmviewer.scene.formats.mitsuba.document import SILENT_TAGS, Document, MissingFile, Properties
 from pmviewer.scene.formats.mitsuba.emitter import add_lights
 from pmviewer.scene.formats.mitsuba.group import GROUP, INSTANCE, Groups
+from pmviewer.scene.formats.mitsuba.medium import Media
 from pmviewer.scene.formats.mitsuba.mesh_file import BrokenMesh
 from pmviewer.scene.formats.mitsuba.older import is_clear
 from pmviewer.scene.formats.mitsuba.shape import SUPPORTED, geometry
@@ -17,7 +18,7 @@ from pmviewer.scene.formats.mitsuba.xml import Element
 from pmviewer.scene.texture import Texture
 
 # Definitions that other objects refer to change nothing where they stand.
-_SILENT = SILENT_TAGS | {"bsdf", "texture", "spectrum", "alias"}
+_SILENT = SILENT_TAGS | {"bsdf", "texture", "spectrum", "alias", "medium", "phase", "volume"}
 _MERGE = "merge"
 MOST_MERGED = 1 << 17
 BROKEN = "Meshes that can't be used, whose shapes are left out: {names}."
@@ -29,6 +30,7 @@ class Reader:
     def __init__(self, document: Document) -> None:
         self.document = document
         self.materials = Materials(document)
+        self.media = Media(document)
         self.shapes: list[Shape] = []
         self.groups = Groups(document, self._shape)
         self.lights: list[Light] = []
@@ -106,6 +108,9 @@ class Reader:
             surface = geometry(p)
             radiance, emission = self._light_of(p)
             material = self._material(p, radiance)
+            media = self.media.beside(p, self.materials.list[material])
+            if media is not None:
+                material = self.materials.boundary(material)
         except SceneError as error:
             self._failed(element, error, "The shape is left out.")
             return None
@@ -113,8 +118,8 @@ class Reader:
         stem = Path(file.attributes.get("value", "").replace("\\", "/")).stem if file is not None else p.type
         name = element.attributes.get("id") or f"{stem} (line {element.line})"
         p.known("silhouette_sampling_weight", "face_normals")
-        p.warn_unused("bsdf", "emitter")
-        return Shape(name, surface, material, radiance, emission)
+        p.warn_unused("bsdf", "emitter", "medium")
+        return Shape(name, surface, material, radiance, emission, media)
 
     def _material(self, p: Properties, radiance: RGB | None) -> int:
         bsdfs = p.objects("bsdf")

@@ -6,7 +6,7 @@ import numpy as np
 from imgui_bundle import imgui, implot
 
 from pmviewer.engine.inspector.report import History, PixelReport, luminance
-from pmviewer.render.planes import TERMS
+from pmviewer.render.planes import TERMS, VOLUME_TERMS
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import grouped
 from pmviewer.viewer.overlays.legend import wrapped
@@ -18,6 +18,8 @@ TERM_COLOURS: tuple[theme.Colour, ...] = (
     (0.45, 0.68, 0.88, 1.0),
     (0.85, 0.45, 0.62, 1.0),
     (0.42, 0.72, 0.52, 1.0),
+    (0.62, 0.55, 0.86, 1.0),
+    (0.70, 0.70, 0.70, 1.0),
 )
 """Of the terms in their order, distinct with colour-blind eyes too."""
 
@@ -26,7 +28,8 @@ def shares(report: PixelReport) -> list[tuple[str, float, float]]:
     """Name, luminance, and share of the whole of each term."""
     values = luminance(report.terms)
     total = float(values.sum())
-    return [(name, float(v), float(v) / total if total > 0 else 0.0) for name, v in zip(TERMS, values, strict=True)]
+    names = (*TERMS, *VOLUME_TERMS)[: len(values)]
+    return [(name, float(v), float(v) / total if total > 0 else 0.0) for name, v in zip(names, values, strict=True)]
 
 
 def draw_terms(report: PixelReport) -> None:
@@ -35,7 +38,7 @@ def draw_terms(report: PixelReport) -> None:
         imgui.table_setup_column("name", imgui.TableColumnFlags_.width_fixed)
         imgui.table_setup_column("bar", imgui.TableColumnFlags_.width_stretch)
         imgui.table_setup_column("value", imgui.TableColumnFlags_.width_fixed)
-        for (name, value, share), colour in zip(shares(report), TERM_COLOURS, strict=True):
+        for (name, value, share), colour in zip(shares(report), TERM_COLOURS):
             imgui.table_next_row()
             imgui.table_next_column()
             imgui.text_unformatted(name)

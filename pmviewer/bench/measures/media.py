@@ -1,0 +1,182 @@
+"""Participating media: formulas, agreement with Mitsuba 3's `volpath`, and error against time (T9, E7).
+
+Formulas: absorption (Beer and Lambert), light that a slab scatters once, and a white medium under a white sky, which
+vanishes. Mitsuba renders the same files; they are compared block by block as in `pmviewer.bench.measures.mitsuba`. On
+the scene fog_sphere every method's error against the scene's reference is measured over its CPU time, Mitsuba's too.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from pmviewer.bench import peer
+from pmviewer.bench.measures.error import Curve, measure, measure_peer
+from pmviewer.bench.measures.mitsuba import SIGNIFICANCE, Case, compare
+from pmviewer.bench.report import BenchResult, Cell, Target
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
+from pmviewer.scene.description import (
+    Camera,
+    ConstantEnvironment,
+    DirectionalLight,
+    Light,
+    Material,
+    Medium,
+    Parallelogram,
+    Scene,
+    Shape,
+    Sphere,
+)
+from pmviewer.settings.access import Settings, with_values
+
+NULL = Material("boundary", "null", (0.0, 0.0, 0.0))
+CAMERA = Camera((0, 0, 3), (0, 0, 0), (0, 1, 0), 2.0)
+WIDE = 200.0
+"""Half the width of slabs: what is seen of them knows no edge."""
+BEER, SLAB, FURNACE = 0.1, 1.0, 0.5
+"""Percent."""
+SCENE, ERROR, SHARE = "fog_sphere", 7e-2, 0.5
+"""relMSE to reach, well above the noise of the reference (1.5e-2), and our time over Mitsuba's at most."""
+METHODS = ("progressive", "gather", "path")
+BUDGET, QUICK_BUDGET, PEER_BUDGET = 60.0, 12.0, 2.5
+COLUMNS = ("what", "method", "passes or runs", "CPU s", "measured or ratio", "expected", "error %, relMSE or p")
+
+
+def slab(medium: Medium, light: Light) -> Scene:
+    """The medium between z = −1 and 0, seen from above."""
+    bottom = Parallelogram((-WIDE, -WIDE, -1), (0, 2 * WIDE, 0), (2 * WIDE, 0, 0))
+    top = Parallelogram((-WIDE, -WIDE, 0), (2 * WIDE, 0, 0), (0, 2 * WIDE, 0))
+    shapes = tuple(Shape(name, geometry, 0, media=(0, -1)) for name, geometry in (("bottom", bottom), ("top", top)))
+    return Scene("slab", None, shapes, (NULL,), (light,), CAMERA, 32, 32, media=(medium,))
+
+
+def formulas() -> Iterator[tuple[str, Scene, str, float, float]]:
+    """Name, scene, view, its mean by the formula, and the percent by which it may differ."""
+    sky = ConstantEnvironment("sky", (1.0, 1.0, 1.0))
+    for sigma in (0.3, 3.0):
+        ink = Medium("ink", (sigma,) * 3, (0.0,) * 3)
+        yield f"absorption, depth {sigma:g}", slab(ink, sky), "beauty", math.exp(-sigma), BEER
+    for mu0, tau in ((1.0, 0.2), (0.6, 1.0), (0.3, 5.0)):
+        sun = DirectionalLight("sun", (math.sqrt(1 - mu0 * mu0), 0.0, -mu0), (math.pi,) * 3)
+        expected = 0.8 / 4 * mu0 / (1 + mu0) * (1 - math.exp(-tau * (1 + 1 / mu0)))
+        name = f"single scattering of a slab, depth {tau:g}, sun at {mu0:g}"
+        yield name, slab(Medium("slab", (tau,) * 3, (0.8,) * 3), sun), "volume", expected, SLAB
+    ball = Shape("ball", Sphere((0.0, 0.0, 0.0), 1.0), 0, media=(0, -1))
+    milk, camera = Medium("milk", (1.0,) * 3, (1.0,) * 3), Camera((0, 0, 4), (0, 0, 0), (0, 1, 0), 20.0)
+    scene = Scene("furnace", None, (ball,), (NULL,), (sky,), camera, 32, 32, media=(milk,))
+    yield "white medium under a white sky", scene, "beauty", 1.0, FURNACE
+
+
+def scene_file(inside: str) -> str:
+    """A floor under a lamp, and on it a sphere with what is `inside`."""
+    return f"""<scene version="3.0.0">
+  <integrator type="volpath"><integer name="max_depth" value="64"/><integer name="rr_depth" value="8"/></integrator>
+  <medium type="homogeneous" id="fog"><rgb name="sigma_t" value="0.2 0.25 0.3"/><float name="albedo" value="0.9"/>
+    <phase type="hg"><float name="g" value="0.3"/></phase></medium>
+  <medium type="homogeneous" id="marble"><rgb name="sigma_t" value="0.6 0.7 0.9"/><float name="scale" value="8"/>
+    <rgb name="albedo" value="0.98 0.95 0.9"/></medium>
+  <sensor type="perspective"><float name="fov" value="36"/>
+    <transform name="to_world"><lookat origin="0, 1, 4.4" target="0, 0.5, 0" up="0, 1, 0"/></transform>
+    <sampler type="independent"/>
+    <film type="hdrfilm"><integer name="width" value="64"/><integer name="height" value="64"/>
+      <rfilter type="box"/></film>
+    {'<ref id="fog"/>' if "fog" in inside else ""}</sensor>
+  <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="-90"/><scale value="3"/></transform>
+    <bsdf type="twosided"><bsdf type="diffuse"/></bsdf></shape>
+  <shape type="rectangle"><transform name="to_world"><scale value="1.2"/><rotate x="1" angle="90"/>
+    <translate y="3" z="0.5"/></transform><bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>
+    <emitter type="area"><rgb name="radiance" value="7 6.5 6"/></emitter></shape>
+  {inside}
+</scene>
+"""
+
+
+FILES = {
+    "smoke in a cube": '<shape type="cube"><transform name="to_world"><scale value="0.6"/><translate y="0.7"/>'
+    '</transform><bsdf type="null"/><ref name="interior" id="marble"/></shape>',
+    "fog around a glass sphere": '<shape type="cube"><transform name="to_world"><scale value="6"/></transform>'
+    '<bsdf type="null"/><ref name="interior" id="fog"/></shape><shape type="sphere"><point name="center" '
+    'value="0 0.7 0"/><float name="radius" value="0.6"/><bsdf type="dielectric"/><ref name="exterior" id="fog"/>'
+    "</shape>",
+    "marble": '<shape type="sphere"><point name="center" value="0 0.7 0"/><float name="radius" value="0.6"/>'
+    '<bsdf type="dielectric"><float name="int_ior" value="1.3"/></bsdf><ref name="interior" id="marble"/></shape>',
+}
+
+
+def by_formula(quick: bool, pool: WorkPool) -> Iterator[tuple[list[Cell], Target]]:
+    """A row and a target for each formula and method."""
+    for name, scene, view, expected, most in formulas():
+        for method in ("path", "progressive"):
+            passes = (64 if quick else 256) if method == "path" else (16 if quick else 64)
+            values: dict[str, object] = {"render.method": method, "render.max_depth": 1000, "photons.N": 300_000}
+            values["estimate.radius"] = 0.05 if view == "beauty" else 2e-4
+            renderer = Renderer(open_scene(scene), with_values(Settings(), values), pool, StageStore(0))
+            for _ in range(passes):
+                renderer.step()
+            found = float(renderer.frame(0).image(view).mean())
+            error = 100 * abs(found / expected - 1)
+            spent = renderer.tally.cpu_seconds
+            note = f"{name}, {method}: {found:.5f} of {expected:.5f}"
+            yield [name, method, passes, spent, found, expected, error], Target("T9", error, most, "%", False, note)
+
+
+def against_mitsuba(quick: bool, pool: WorkPool) -> Iterator[tuple[list[Cell], Target]]:
+    """A row and a target for each file and method."""
+    runs = 8 if quick else 16
+    with tempfile.TemporaryDirectory() as folder:
+        for i, (name, inside) in enumerate(FILES.items()):
+            file = Path(folder) / f"{i}.xml"
+            file.write_text(scene_file(inside), "utf-8")
+            methods = ("path", "progressive") if quick else ("path", "progressive", "gather")
+            for method, passes, tolerance, same, _ in compare(
+                Case(name, {}, 128, 16, 32, 0.03, file), methods, runs, pool
+            ):
+                within = f" within {tolerance:.0%} of a block" if tolerance else ""
+                note = f"p of {name}, {method}, and Mitsuba 3 being equal{within}; mean ratio {same.ratio:.4f}"
+                row: list[Cell] = [name, method, f"{runs} × {passes}", "", f"{same.ratio:.4f}", 1, same.p_value]
+                yield row, Target("T9", same.p_value, SIGNIFICANCE, "", True, note)
+
+
+def over_time(quick: bool) -> tuple[list[list[Cell]], Target]:
+    """Error against CPU time on the scene with a volume caustic, and our best time over Mitsuba's."""
+    budget = QUICK_BUDGET if quick else BUDGET
+    curves = [measure(open_scene(SCENE), method, budget) for method in METHODS]
+    theirs = measure_peer(SCENE, PEER_BUDGET * budget)
+    rows: list[list[Cell]] = []
+    for curve in (*curves, theirs):
+        name = "Mitsuba 3 volpath" if curve is theirs else curve.method
+        for n, cpu, error, ratio in zip(curve.passes, curve.cpu, curve.error, curve.ratio, strict=True):
+            rows.append([f"{SCENE} over time", name, n, cpu, f"{ratio:.4f}", 1, error])
+    best: Curve = min(curves, key=lambda curve: curve.time_to(ERROR))
+    spent, note = (
+        theirs.time_to(ERROR),
+        f"of Mitsuba 3's time to relMSE {ERROR:g} on {SCENE}, by {best.method} (1e-2 is below its reference's noise)",
+    )
+    if not math.isfinite(spent):
+        spent, note = theirs.cpu[-1], f"{note}; Mitsuba did not reach it within {theirs.cpu[-1]:.3g} CPU s"
+    ratio = best.time_to(ERROR) / spent
+    return rows, Target("P22", ratio if np.isfinite(ratio) else math.inf, SHARE, "", False, note)
+
+
+def run(quick: bool = False) -> BenchResult:
+    """Measure all three parts. Raises PmviewerError without Mitsuba."""
+    variant = peer.variant()
+    rows: list[list[Cell]] = []
+    targets: list[Target] = []
+    pool = WorkPool()
+    try:
+        for row, target in (*by_formula(quick, pool), *against_mitsuba(quick, pool)):
+            rows.append(row)
+            targets.append(target)
+    finally:
+        pool.close()
+    more, speed = over_time(quick)
+    notes = [f"Mitsuba 3, {variant}, volpath", "the beam estimate alone looks the volume map up"]
+    return BenchResult("Participating media (T9, E7)", COLUMNS, rows + more, [*targets, speed], notes)

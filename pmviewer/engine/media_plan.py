@@ -1,0 +1,48 @@
+"""What runs in scenes with participating media, and what does not yet know of them."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from pmviewer.settings.access import Settings, with_values
+
+
+class Lacking(NamedTuple):
+    """A setting that does nothing in scenes with media: what it is set to instead, and the sentence about it."""
+
+    name: str
+    instead: Any
+    sentence: str
+
+
+LACKING = (
+    Lacking("importance.map", "off", "Importance does not know of media: photons are stored and emitted without it."),
+    Lacking("importance.deposition", "all", "Deposition rules do not know of media: all photons are stored."),
+    Lacking("importance.emission", "off", "Guided emission does not know of media: photons leave the lights by power."),
+    Lacking("gather.cache", "off", "The irradiance cache does not know of media: every surface point gathers itself."),
+    Lacking("gather.estimation", "off", "Estimated gathers do not know of media: every pixel gathers itself."),
+    Lacking("gather.secondary", 0.0, "Secondary gathering does not know of media: gather rays look the map up."),
+    Lacking("direct.shadow_photons", False, "Shadow photons do not know of media: all shadow rays are cast."),
+)
+VIRTUAL = "Virtual lights do not know of media: the method progressive shows the scene."
+THIN = "Light passes thin glass as through all glass: simplified panes do not know of media."
+MAP_ALONE = "A map alone shows no light that media scatter: choose progressive, gather or path."
+BLURRED_FROM = 0.99
+BLURRED = "Photons keep their directions to 0.06°: light that media scatter nearly straight on is blurred by that."
+
+
+def in_media(settings: Settings) -> tuple[Settings, tuple[str, ...]]:
+    """The settings that a scene with media goes by, and sentences about those that are others than were asked for."""
+    changes: dict[str, Any] = {}
+    said: list[str] = []
+    for lacking in LACKING:
+        group, name = lacking.name.split(".")
+        if getattr(getattr(settings, group), name) != lacking.instead:
+            changes[lacking.name] = lacking.instead
+            said.append(lacking.sentence)
+    if settings.render.method == "virtual lights":
+        changes["render.method"] = "progressive"
+        said.append(VIRTUAL)
+    if settings.render.method in ("global map", "caustic map"):
+        said.append(MAP_ALONE)
+    return (with_values(settings, changes) if changes else settings), tuple(said)

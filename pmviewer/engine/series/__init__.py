@@ -1,0 +1,1 @@
+"""Series of pictures: settings between keys, one picture for each."""

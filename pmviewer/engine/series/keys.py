@@ -1,0 +1,70 @@
+"""Keys of a film made comparable: what is automatic in one and a number in another, and what only one edits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.errors import SettingError
+from pmviewer.render.camera import CameraPose, resolve_camera
+from pmviewer.scene.description import Scene
+from pmviewer.scene.editing.own import own_numbers
+from pmviewer.settings.access import Settings, get, with_values
+
+_CAMERA = ("origin", "target", "up", "fov", "view_width", "shift_x", "shift_y", "aperture", "focus")
+
+
+def completed_keys(scene: Scene, whole: Scene, keys: Sequence[Settings]) -> list[Settings]:
+    """The keys with numbers wherever they differ, of the open `scene` and the one before it was edited. Raises
+    SettingError for an edit of what the scene does not have, and for a number that nobody knows."""
+    names = list(dict.fromkeys(name for key in keys for name in key.edit.changes))
+    own = {name: own_numbers(whole, name) for name in names if not all(name in key.edit.changes for key in keys)}
+    differing = [
+        name for name in _CAMERA if any(get(k, f"camera.{name}") != get(keys[0], f"camera.{name}") for k in keys)
+    ]
+    found = []
+    for key in keys:
+        pose = resolve_camera(scene, key.camera)
+        values: dict[str, Any] = {}
+        for name in differing:
+            if get(key, f"camera.{name}") == "auto":
+                values[f"camera.{name}"] = _of_pose(pose, name)
+        if own:
+            values["edit.changes"] = {**own, **key.edit.changes}
+        found.append(with_values(key, values))
+    return found
+
+
+def orbits(scene: Scene, settings: Settings, pictures: int, degrees: float) -> list[Settings]:
+    """The camera on its way around its target, about its up axis, by so many degrees in so many pictures; a whole turn
+    ends one step before it begins again."""
+    pose = resolve_camera(scene, settings.camera)
+    target, offset = np.asarray(pose.target, float), np.subtract(pose.origin, pose.target)
+    up = np.asarray(pose.up, float) / np.linalg.norm(pose.up)
+    closed = abs(degrees) % 360 == 0
+    steps = np.linspace(0.0, np.radians(degrees), pictures, endpoint=not closed)
+    origins = [target + _turned(offset, up, angle) for angle in steps]
+    return [
+        with_values(
+            settings, {"camera.origin": tuple(map(float, o)), "camera.target": pose.target, "camera.up": pose.up}
+        )
+        for o in origins
+    ]
+
+
+def _turned(v: NDArray[np.float64], axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+    """About a unit axis (Rodrigues)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(v * c + np.cross(axis, v) * s + axis * float(axis @ v) * (1 - c))
+
+
+def _of_pose(pose: CameraPose, name: str) -> Any:
+    if name in ("shift_x", "shift_y"):
+        return pose.shift["xy".index(name[-1])]
+    value = getattr(pose, name)
+    if value is None:
+        raise SettingError(f"camera.{name} is a number in one key and auto in another: give it a number in both.")
+    return value

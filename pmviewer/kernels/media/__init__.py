@@ -1,0 +1,1 @@
+"""Participating media in kernels: their numbers, boundaries, phase functions and free flights."""

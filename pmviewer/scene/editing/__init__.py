@@ -1,0 +1,1 @@
+"""Changes to a scene as it was opened: lights, materials and objects, by name."""
