@@ -226,6 +226,7 @@ class ViewerApp:
         """End what runs beside the window; what the user has asked for is finished first, without the window."""
         self._running = False
         self.state.appearance.keep()
+        self.state.remember_opening()
         self.state.session.on_update = self.state.gain.on_update = None
         self._release()
         if self.state.background.running(FILES):

@@ -309,6 +309,12 @@ class ViewerState:
             self._stale_serial = frame.serial
         return True
 
+    def remember_opening(self) -> None:
+        """Before the window goes: what was opened since its last picture, or is being loaded, is a recent file too."""
+        self.scene_changed()
+        if self._opening is not None and self.session.loading:
+            self.recent.add(self._opening[0])
+
     def move_camera(self, pose: CameraPose) -> None:
         """Set the pose of the camera that is looked through, the free one while it is on."""
         self.last_camera_move = time.monotonic()

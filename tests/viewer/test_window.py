@@ -382,6 +382,19 @@ def test_a_dropped_scene_opens_with_its_own_camera_and_is_remembered(app, sessio
     assert app.state.recent.entries == [str(path)]
 
 
+@pytest.mark.parametrize("still", ["opened", "loading", "refused"])
+def test_what_was_opened_just_before_the_window_closes_is_remembered_unless_it_was_refused(app, session, still):
+    def script(c):
+        if still == "opened":
+            app.state.open("box2")
+        else:
+            app.state._opening = "box2", {}  # a session that has not got there, or has refused it
+            session.loading = "reading box2" if still == "loading" else ""
+
+    drive(app, script)
+    assert app.state.recent.entries == ([] if still == "refused" else ["box2"])
+
+
 def test_a_broken_session_file_is_one_error(app, session, tmp_path):
     path = tmp_path / "broken-session.toml"
     path.write_text("format = ")
