@@ -18,6 +18,9 @@ def bench(
         int | None, typer.Option(min=1, help="Of agree, files and hostile: how many scenes or files.")
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Of agree, files and hostile: which ones.")] = None,
+    first: Annotated[
+        int | None, typer.Option(min=0, help="Of agree: the number to begin with, to go on with a run of before.")
+    ] = None,
     keep: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Of agree and hostile: where scenes go that fail.")
     ] = None,
@@ -33,5 +36,6 @@ def bench(
         for key, (description, _) in BENCHES.items():
             typer.echo(f"{key:10s} {description}")
         return
-    options = {"folder": folder, "scenes": scenes, "seed": seed, "keep": keep, "json": json, "sheet": sheet}
+    options = {"folder": folder, "scenes": scenes, "seed": seed, "first": first, "keep": keep, "json": json}
+    options |= {"sheet": sheet}
     run_bench(name, quick, csv, markdown, options)

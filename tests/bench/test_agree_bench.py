@@ -213,10 +213,10 @@ def test_a_scene_that_kills_its_process_is_named_and_the_others_are_done(tmp_pat
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *(p for p in sys.path if p)]))
     from agree_work_for_tests import work
 
-    found = dict(try_scenes(10, 5, work, processes=2))
-    assert sorted(found) == [0, 1, 2, 3, 4]
+    found = dict(try_scenes(10, 4, work, processes=2, first=1))
+    assert sorted(found) == [1, 2, 3, 4]
     assert found[2].refused == "the process died"
-    assert [found[i].lit for i in (0, 1, 3, 4)] == [10, 11, 13, 14]
+    assert [found[i].lit for i in (1, 3, 4)] == [11, 13, 14]
 
 
 def test_missing_mitsuba_and_senseless_numbers_are_one_clear_error(monkeypatch):

@@ -41,8 +41,11 @@ class Disagreement:
     file: str = ""
 
 
-def run(quick: bool = False, scenes: int | None = None, seed: int = SEED, keep: Path | None = None) -> BenchResult:
-    """Try the scenes 0 … `scenes` − 1 of `seed` and save what disagrees into `keep`, a temporary folder if not given.
+def run(
+    quick: bool = False, scenes: int | None = None, seed: int = SEED, first: int = 0, keep: Path | None = None
+) -> BenchResult:
+    """Try the scenes `first` … `first` + `scenes` − 1 of `seed` and save what disagrees into `keep`, a temporary folder
+    if not given.
 
     Raises PmviewerError without Mitsuba.
     """
@@ -55,7 +58,7 @@ def run(quick: bool = False, scenes: int | None = None, seed: int = SEED, keep: 
     folder = keep or Path(tempfile.mkdtemp(prefix=f"agree-{seed}-"))
     folder.mkdir(parents=True, exist_ok=True)
     verdicts: dict[int, Verdict] = {}
-    for index, verdict in try_scenes(seed, count):
+    for index, verdict in try_scenes(seed, count, first=first):
         verdicts[index] = verdict
         _tell(seed, index, verdict, len(verdicts), count, time.perf_counter() - started)
     found = judged(seed, verdicts, folder)
@@ -127,7 +130,7 @@ def report(
     )
     target = Target(
         "agreement", len(open_), 0, "scenes", False,
-        f"scenes of seed {seed} that disagree, of {len(verdicts)}; {len(found) - len(open_)} more by known deviations; "
+        f"scenes of seed {seed} that disagree, of {len(verdicts)} from {min(verdicts)} on; {len(found) - len(open_)} more by known deviations; "
         f"at radius {STAGES[0].radius:g}–{STAGES[-1].radius:g} of the scene, N = {STAGES[0].photons:,}–"
         f"{STAGES[-1].photons:,}, max_depth {MAX_DEPTH}",
     )  # fmt: skip

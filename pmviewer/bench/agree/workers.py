@@ -33,10 +33,14 @@ def try_scene(seed: int, index: int) -> Verdict:
 
 
 def try_scenes(
-    seed: int, count: int, work: Callable[[int, int], Verdict] = try_scene, processes: int | None = None
+    seed: int,
+    count: int,
+    work: Callable[[int, int], Verdict] = try_scene,
+    processes: int | None = None,
+    first: int = 0,
 ) -> Iterator[tuple[int, Verdict]]:
-    """(index, verdict) of scenes 0 … count − 1 of `seed`, in the order in which they end."""
-    waiting = list(range(count))
+    """(index, verdict) of `count` scenes of `seed` from `first` on, in the order in which they end."""
+    waiting = list(range(first, first + count))
     processes = processes or available_threads()
     while waiting:
         suspects = yield from _side_by_side(seed, waiting, work, processes)
