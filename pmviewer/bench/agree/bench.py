@@ -130,7 +130,8 @@ def report(
     )
     target = Target(
         "agreement", len(open_), 0, "scenes", False,
-        f"scenes of seed {seed} that disagree, of {len(verdicts)} from {min(verdicts)} on; {len(found) - len(open_)} more by known deviations; "
+        f"scenes of seed {seed} that disagree, of {len(verdicts)} from {min(verdicts)} on; "
+        f"{len(found) - len(open_)} more by known deviations; "
         f"at radius {STAGES[0].radius:g}–{STAGES[-1].radius:g} of the scene, N = {STAGES[0].photons:,}–"
         f"{STAGES[-1].photons:,}, max_depth {MAX_DEPTH}",
     )  # fmt: skip
