@@ -31,11 +31,13 @@ work: most of its noise comes from where pixels are sampled."""
 
 
 def box(floor, ball=None, light=None, size=PICTURE):
-    """A closed box with a floor and a ball of these materials; a large light, or a point."""
+    """A closed box with a floor and a ball of these materials; a large light, or a point. Behind a wall, in the dark,
+    lies a crumb of everything: the scenes are all of one kind, so that kernels are compiled once for all of them."""
     shapes = [*box_walls(1.0, (0, 0, 1, 0, 0, 0)), Shape("ball", Sphere((0.2, -0.6, -0.2), 0.35), 2)]
+    shapes.append(Shape("crumb", Sphere((1.02, 0.0, 0.0), 0.01), 3))
     if light is None:
         shapes.append(panel(half=0.7))
-    materials = (diffuse(albedo=(0.5,) * 3), floor, floor if ball is None else ball)
+    materials = (diffuse(albedo=(0.5,) * 3), floor, floor if ball is None else ball, CRUMB)
     return Scene("box", None, tuple(shapes), materials, () if light is None else (light,), box_camera(), size, size)
 
 
@@ -67,6 +69,9 @@ def agree(a, b, name, tolerance=0.006):
     assert abs(total[0].mean() - total[1].mean()) < 4 * error + tolerance * total[1].mean()
 
 
+LAYERED = Material("p", "principled", (0.8, 0.4, 0.2), alpha=(0.25, 0.25), principled=Principled(metallic=0.6))
+FIELD = Checkerboard((0.9,) * 3, (0.1,) * 3)
+CRUMB = blend(0.5, blend(0.5, LAYERED, replace(MIRROR, name="bright")), GLASS, textures={"weight": FIELD})
 TWO_COLOURS = blend(0.3, diffuse("a", (0.9, 0.1, 0.4)), diffuse("b", (0.2, 0.8, 0.4)))
 MIXED = diffuse("mixed", (0.7 * 0.9 + 0.3 * 0.2, 0.7 * 0.1 + 0.3 * 0.8, 0.4))
 WAYS = {
@@ -119,16 +124,14 @@ def test_light_that_no_path_finds_is_kept_for_every_part():
 
 def test_textures_of_weight_and_metal():
     """A textured share is a textured colour; a texture of one value is that value."""
-    field = Checkerboard((0.9,) * 3, (0.1,) * 3)
     dark, bright = diffuse("dark", (0.1,) * 3), diffuse("bright", (0.7,) * 3)
     colours = Checkerboard((0.1 + 0.9 * 0.6,) * 3, (0.1 + 0.1 * 0.6,) * 3)
-    mixed = box(blend(0.5, dark, bright, textures={"weight": field}), diffuse())
+    mixed = box(blend(0.5, dark, bright, textures={"weight": FIELD}), diffuse())
     plain = box(replace(diffuse("floor", (0.4,) * 3), textures={"reflectance": colours}), diffuse())
     agree(pass_means(mixed, 40, settings("path")), pass_means(plain, 40, settings("path")), "path")
-    layered = Material("p", "principled", (0.8, 0.4, 0.2), alpha=(0.25, 0.25), principled=Principled(metallic=0.6))
     one = Bitmap(np.full((1, 1, 1), 0.6, np.float32))
     numbers, texture = (
-        rendered(box(replace(layered, textures=t)), settings("path"), 2).frame(0).image()
+        rendered(box(replace(LAYERED, textures=t)), settings("path"), 2).frame(0).image()
         for t in ({"reflectance": Bitmap(np.full((1, 1, 3), (0.8, 0.4, 0.2), np.float32))}, {"metallic": one})
     )
     assert texture == pytest.approx(numbers, rel=1e-3, abs=1e-5)
