@@ -277,15 +277,20 @@ def window(scene: str, folder: Path) -> Iterator[ViewerApp]:
     """A window on the engine with that scene, small, which leaves the user's configuration alone."""
     from pmviewer.engine.effects import inactive_reason
     from pmviewer.engine.session import Session
+    from pmviewer.kernels.compile import elsewhere
     from pmviewer.viewer.app import ViewerApp
     from pmviewer.viewer.dialogs.recent import RecentFiles
 
+    elsewhere.install()  # as the window has it
     session = Session(settings=with_values(Settings(), START))
     recent = RecentFiles(folder / "recent.txt")
     app = ViewerApp(session, recent=recent, remember=False, inactive_reason=inactive_reason)
     app.state.open(scene, keep_camera=True)
-    yield app
-    session.close()
+    try:
+        yield app
+    finally:
+        session.close()
+        elsewhere.uninstall()
 
 
 def let_loose(scene: str, seed: int, actions: int, folder: Path) -> Report:
