@@ -19,6 +19,7 @@ from pmviewer.viewer.comparing_actions import comparing_actions
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.exports import Exports, default_path, fresh_path
 from pmviewer.viewer.overlays.registry import SWITCHED
+from pmviewer.viewer.panels.film_panel import FILM
 from pmviewer.viewer.panels.palette import Palette
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.view_actions import save_view
@@ -47,6 +48,9 @@ class Commands:
         self._layout = layout.Layout()
         self.table: dict[str, Callable[[], None]] = {
             **comparing_actions(state, dialogs),
+            "add_key": self._add_key,
+            "play_film": self._play_film,
+            "export_film": self._export_film,
             "open": self._open,
             "load_reference": self._load_reference,
             "save_session": lambda: self._save(".toml", self.exports.session),
@@ -167,6 +171,31 @@ class Commands:
         window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(COMPARISON)
         window.is_visible = window.focus_window_at_next_frame = True
         self.state.compare_importance()
+
+    # film -------------------------------------------------------------------------------------------------------
+
+    def _show_film(self) -> None:
+        window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(FILM)
+        window.is_visible = window.focus_window_at_next_frame = True
+
+    def _add_key(self) -> None:
+        self.state.film.add()
+        self._show_film()
+
+    def _play_film(self) -> None:
+        film = self.state.film
+        if film.playing:
+            film.stop()
+        else:
+            film.play()
+
+    def _export_film(self) -> None:
+        film = self.state.film
+        why = film.refusal()
+        if why is not None:
+            self.state.say("warning", f"No film: {why}")
+            return
+        self.dialogs.save("Export the film", default_path(self.state, film.export_as.format, "film"), film.export)
 
     # camera -----------------------------------------------------------------------------------------------------
 

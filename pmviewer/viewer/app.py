@@ -24,6 +24,7 @@ from pmviewer.viewer.gl.framebuffers import Framebuffers
 from pmviewer.viewer.gl.freeing import free_collected
 from pmviewer.viewer.overlays.panel import OverlayPanel
 from pmviewer.viewer.panels.error_panel import ErrorPanel
+from pmviewer.viewer.panels.film_panel import FILM, FilmPanel
 from pmviewer.viewer.panels.gain_panel import GainPanel
 from pmviewer.viewer.panels.help_overlay import draw_help
 from pmviewer.viewer.panels.importance_panel import ImportancePanel
@@ -101,6 +102,7 @@ class ViewerApp:
             "Error": ErrorPanel(self.state, actions).gui,
             "Snapshots": self._snapshots_panel.gui,
             "Comparison": GainPanel(self.state, actions, self.settings_panel).gui,
+            FILM: FilmPanel(self.state, actions).gui,
             "Log": LogPanel(self.state).gui,
         }
         return layout.Callbacks(
@@ -165,7 +167,7 @@ class ViewerApp:
         self.state.appearance.load()
         self._running = True
         self.state.session.on_update = self.wake
-        self.state.gain.on_update = self.wake
+        self.state.gain.on_update = self.state.film.on_update = self.wake
         self.state.background.on_done = self.wake
 
     def _pre_new_frame(self) -> None:
@@ -184,7 +186,7 @@ class ViewerApp:
             self.state.say("error", str(error))
         self.context.screen.use()  # or the interface would be drawn into the picture
         self._show_title()
-        if self.state.flying or self.state.navigating:
+        if self.state.flying or self.state.navigating or self.state.film.playing:
             self.wake()
 
     def _show_title(self) -> None:
@@ -227,7 +229,7 @@ class ViewerApp:
         self._running = False
         self.state.appearance.keep()
         self.state.remember_opening()
-        self.state.session.on_update = self.state.gain.on_update = None
+        self.state.session.on_update = self.state.gain.on_update = self.state.film.on_update = None
         self._release()
         if self.state.background.running(FILES):
             glfw.hide_window(glfw_window_hello_imgui())

@@ -36,6 +36,7 @@ class Lane:
 
 
 FILES = Lane("files", kept=True, shown=True)
+FILMS = Lane("films", shown=True)
 READING = Lane("reading", shown=True)
 MEASURING = Lane("measuring")
 COMPARING = Lane("comparing")

@@ -23,7 +23,7 @@ import numpy as np
 from imgui_bundle import ImVec2, hello_imgui, imgui
 from imgui_bundle.immapp import testing
 
-from pmviewer.engine.memory import give_back
+from pmviewer.engine.memory import few_arenas, give_back
 from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, get, with_values
 from pmviewer.settings.edits import PROPERTIES
 from pmviewer.settings.presets import PRESETS
@@ -282,6 +282,7 @@ def window(scene: str, folder: Path) -> Iterator[ViewerApp]:
     from pmviewer.viewer.dialogs.recent import RecentFiles
 
     elsewhere.install()  # as the window has it
+    few_arenas()
     session = Session(settings=with_values(Settings(), START))
     recent = RecentFiles(folder / "recent.txt")
     app = ViewerApp(session, recent=recent, remember=False, inactive_reason=inactive_reason)

@@ -81,6 +81,8 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Camera", "Home or A", "Frame the whole scene", "frame_all", K.home, alternative=K.a),
     Binding("Camera", "Backspace", "The scene file's camera; the free one's overview", "reset_camera", K.backspace),
     Binding("Camera", "Ctrl+B", "Save the view (View > Saved views)", "save_view", K.b, ctrl=True),
+    Binding("Film", "Ctrl+K", "Add a key to the film", "add_key", K.k, ctrl=True),
+    Binding("Film", "Ctrl+Shift+K", "Play the film, or stop", "play_film", K.k, ctrl=True, shift=True),
     Binding("Free camera", "O", "The render camera's importance from elsewhere", "toggle_free", K.o),
     Binding("Free camera", "Shift+Home", "From above", "free_from_above", K.home, shift=True),
     Binding("Free camera", "Shift+Backspace", "To the render camera", "free_to_render", K.backspace, shift=True),

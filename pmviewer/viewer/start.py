@@ -65,8 +65,10 @@ def _make_session(threads: int | None, settings: Settings | None) -> Callable[[]
         compiler = elsewhere.install()
         if helper is not None:  # a first start: there will be much to compile
             compiler.begin()
+        from pmviewer.engine.memory import few_arenas
         from pmviewer.engine.session import Session
 
+        few_arenas()
         return Session(threads, settings, compiles_ahead=True, helper=helper)
 
     return make

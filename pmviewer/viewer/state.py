@@ -28,12 +28,14 @@ from pmviewer.settings.access import (
     parse_assignments,
     with_values,
 )
+from pmviewer.settings.film import FilmKey
 from pmviewer.settings.schema.compare import LAST, LIVE, REFERENCE
 from pmviewer.viewer.appearance import Appearance
 from pmviewer.viewer.background import Background
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.dialogs.recent import RecentFiles
 from pmviewer.viewer.editing import Editing
+from pmviewer.viewer.film import FilmEditor
 from pmviewer.viewer.history import History
 from pmviewer.viewer.importance_gain import GainRun
 from pmviewer.viewer.inspector import Inspector
@@ -90,6 +92,7 @@ class ViewerState:
         self._paired: tuple[tuple[Any, ...], ShownPair | None] | None = None
         self.history = History()
         self.editing = Editing(session, self.change)
+        self.film = FilmEditor(session, self.history, self.change, self.background, self.say)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
         self._toasts_of = session.scene
@@ -108,6 +111,8 @@ class ViewerState:
         self.parameters: dict[str, str] = {}
         """Values for the open scene file's `<default>` names."""
         self._opening: tuple[str, dict[str, str]] | None = None
+        self._film: tuple[FilmKey, ...] = ()
+        """Keys of the film of what is being opened."""
         self.lost: tuple[str, str] | None = None
         """A session file that was to be opened and the scene that it misses, until somebody asks where that is."""
 
@@ -301,6 +306,7 @@ class ViewerState:
             path, self.parameters = self._opening
             self.recent.add(path)
             self.history.clear()
+            self.film.take(self._film)
             if before is not None and self.session.paused:
                 self.session.resume()  # it was the scene before that was to stand still
             self._opening = None
@@ -350,6 +356,7 @@ class ViewerState:
         )
         source: str | Path = path
         snapshots: tuple[tuple[int, Path], ...] = ()
+        film: tuple[FilmKey, ...] = ()
         if str(path).lower().endswith(".toml"):
             from pmviewer.output.session_file import read_session
 
@@ -359,7 +366,7 @@ class ViewerState:
                 self.say("error", str(error))
                 return
             source, settings, parameters = scene or saved.scene, saved.settings, saved.parameters
-            snapshots = saved.snapshots
+            snapshots, film = saved.snapshots, saved.film
             if is_gone(source):
                 self.say("error", f"{path}: its scene {source} is not there. Choose where it is now.")
                 self.lost = str(path), str(source)
@@ -370,7 +377,7 @@ class ViewerState:
                     "warning", f"{path}: its snapshots take the place of the {len(self.snapshots.all)} in the strip."
                 )
             self.snapshots.open([file for _, file in snapshots], [number for number, _ in snapshots])
-        self._opening = str(path), dict(parameters or {})
+        self._opening, self._film = (str(path), dict(parameters or {})), film
         self.session.open(source, settings, parameters)
 
     def say(self, level: Level, text: str) -> None:
@@ -402,5 +409,6 @@ class ViewerState:
         self.comparison.poll(self.frame, with_own=not parameters)
         self.gain.poll(self.live_camera())
         self.snapshots.poll()
+        self.film.poll()
         self.pair.poll(self.shown_pair())
         self.toasts = [toast for toast in self.toasts if not toast.is_over()]

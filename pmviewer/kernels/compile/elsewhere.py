@@ -140,7 +140,7 @@ def _serve() -> None:
     """Compile what standard input asks for, and answer each with a byte."""
     asked: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=_hear, args=(asked,), daemon=True).start()
-    import pmviewer.kernels.compile.jit  # noqa: F401 - with what takes time, before anybody asks
+    importlib.import_module(f"{PACKAGE.name}.kernels.compile.jit")  # what takes time, before anybody asks
 
     while True:
         try:

@@ -79,6 +79,7 @@ class Menus:
         self._item("Export PNG with overlays …", "export_png_overlays")
         self._item("Export EXR, 32-bit float …", "export_exr")
         self._item("Export EXR, 16-bit half …", "export_exr_half")
+        self._item("Export the film …", "export_film", enabled=len(self._state.film.keys) > 1)
         self._item("Screenshot of the picture", "screenshot_picture")
         self._item("Screenshot of the window", "screenshot")
         imgui.separator()
