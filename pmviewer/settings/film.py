@@ -15,7 +15,7 @@ from pmviewer.settings.between import between
 LONGEST = 3600.0
 """Seconds of a film."""
 EXPOSURE = "display.exposure"
-_LEFT_OUT = ("overlays.", "compare.", "display.", "free_camera.", "camera.width", "camera.height")
+_LEFT_OUT = ("region.", "overlays.", "compare.", "display.", "free_camera.", "camera.width", "camera.height")
 
 
 def in_films(path: str) -> bool:

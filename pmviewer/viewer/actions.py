@@ -18,6 +18,7 @@ from pmviewer.viewer import layout
 from pmviewer.viewer.comparing_actions import comparing_actions
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.exports import Exports, default_path, fresh_path
+from pmviewer.viewer.dialogs.still_dialog import StillDialog
 from pmviewer.viewer.overlays.registry import SWITCHED
 from pmviewer.viewer.panels.film_panel import FILM
 from pmviewer.viewer.panels.palette import Palette
@@ -44,6 +45,7 @@ class Commands:
         self.window_shot: Path | None = None
         """Where the next frame of the whole window goes."""
         self.palette = Palette(state)
+        self.still_dialog = StillDialog(state, dialogs)
         self._hidden: list[str] = []
         self._layout = layout.Layout()
         self.table: dict[str, Callable[[], None]] = {
@@ -56,6 +58,7 @@ class Commands:
             "save_session": lambda: self._save(".toml", self.exports.session),
             "export_exr": lambda: self._save(".exr", self.exports.exr),
             "export_exr_half": lambda: self._save(".exr", lambda path: self.exports.exr(path, half=True)),
+            "export_still": self.still_dialog.open,
             "export_png": lambda: self._save(".png", lambda path: self.exports.png(path, overlays=False)),
             "export_png_overlays": lambda: self._save(".png", lambda path: self.exports.png(path, overlays=True)),
             "screenshot": self._screenshot,
@@ -73,6 +76,8 @@ class Commands:
             "toggle_marks": lambda: self._toggle("display.marks"),
             "toggle_denoised": self._toggle_denoised,
             **{f"toggle_{o.name}": partial(self._toggle, f"overlays.{o.name}.show") for o in SWITCHED},
+            "choose_region": self.viewport.region.toggle,
+            "toggle_region": lambda: self._toggle("region.on"),
             "fit_picture": self._fit,
             "compare_importance": self._compare_importance,
             "toggle_fly": self._toggle_fly,
@@ -277,6 +282,8 @@ class Commands:
         self.state.help_open = not self.state.help_open
 
     def _escape(self) -> None:
-        if not (self.state.flying or self.state.help_open):
+        if self.viewport.region.choosing:
+            self.viewport.region.toggle()
+        elif not (self.state.flying or self.state.help_open):
             self.state.inspector.unpin()
         self.state.flying = self.state.help_open = self.palette.is_open = False

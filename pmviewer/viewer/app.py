@@ -197,13 +197,14 @@ class ViewerApp:
             self._title = title
 
     def _over_everything(self) -> None:
-        if not (self.dialogs.is_open or self.commands.palette.is_open):
+        if not (self.dialogs.is_open or self.commands.palette.is_open or self.commands.still_dialog.is_open):
             run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying, self.state.history)
         self.state.flipped = not self.dialogs.is_open and is_held(FLIP_KEY)
         self.commands.locate_scene()
         self.dialogs.poll()
         draw_help(self.state)
         self.commands.palette.gui(self.commands.table)
+        self.commands.still_dialog.gui()
 
     def _before_swap(self) -> None:
         path, self.commands.window_shot = self.commands.window_shot, None

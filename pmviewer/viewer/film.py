@@ -226,7 +226,7 @@ class FilmEditor:
         from pmviewer.engine.pool import WorkPool
 
         how, opened = replace(self.export_as), self._session.opened_scene
-        fixed = {"render.passes": how.passes, "compare.mode": "off", "free_camera.on": False}
+        fixed = {"render.passes": how.passes, "compare.mode": "off", "free_camera.on": False, "region.on": False}
         try:
             pictures = way.pictures(how.fps, with_values(self._session.settings, fixed))
         except SettingError as error:
@@ -275,5 +275,7 @@ class FilmEditor:
 
     def _tell(self, text: str, share: float) -> None:
         self.progress = text, share
+        if self._work is not None:
+            self._work.share = share
         if self.on_update:
             self.on_update()

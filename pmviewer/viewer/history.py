@@ -40,6 +40,8 @@ class Step:
         names = {path.rpartition(".")[2] for path in self.after}
         if groups <= {"camera", "free_camera"} and names <= _POSE and len(names) > 1:
             return "move the free camera" if groups == {"free_camera"} else "move the camera"
+        if groups == {"region"}:
+            return "refine a region" if self.after.get("region.on", True) else "refine the whole picture"
         if len(self.after) == 1:
             ((path, value),) = self.after.items()
             info = SETTINGS[path]

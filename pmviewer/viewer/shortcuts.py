@@ -50,6 +50,8 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Edit", "Ctrl+L", "List the changed settings, or all again", "list_changed", K.l, ctrl=True),
     Binding("Render", "Space", "Pause or resume", "toggle_pause", K.space),
     Binding("Render", "R", "Restart", "restart", K.r),
+    Binding("Render", "B", "Refine a region alone: drag it; a click: the whole picture", "choose_region", K.b),
+    Binding("Render", "Shift+B", "The region on or off", "toggle_region", K.b, shift=True),
     Binding("Render", "N", "Compare with and without importance", "compare_importance", K.n),
     Binding("Compare", "S", "Keep the picture as a snapshot", "take_snapshot", K.s),
     Binding("Compare", "X", "Compare A and B: wipe, flip, side by side, difference, off", "next_comparison", K.x),

@@ -44,6 +44,7 @@ from pmviewer.viewer.pair import Pair, ShownPair
 from pmviewer.viewer.saved_views import FILE, SavedViews
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.snapshots import Snapshots
+from pmviewer.viewer.still import StillExport
 from pmviewer.viewer.viewport.controls import camera_values
 
 InactiveReason = Callable[[str, Settings, Any], str | None]
@@ -92,6 +93,7 @@ class ViewerState:
         self._paired: tuple[tuple[Any, ...], ShownPair | None] | None = None
         self.history = History()
         self.editing = Editing(session, self.change)
+        self.still = StillExport(session, self.background)
         self.film = FilmEditor(session, self.history, self.change, self.background, self.say)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []

@@ -77,6 +77,7 @@ class Menus:
         imgui.separator()
         self._item("Export PNG …", "export_png")
         self._item("Export PNG with overlays …", "export_png_overlays")
+        self._item("Export at another size …", "export_still")
         self._item("Export EXR, 32-bit float …", "export_exr")
         self._item("Export EXR, 16-bit half …", "export_exr_half")
         self._item("Export the film …", "export_film", enabled=len(self._state.film.keys) > 1)
@@ -189,6 +190,8 @@ class Menus:
     def _render(self) -> None:
         self._item("Resume" if self._state.session.paused else "Pause", "toggle_pause")
         self._item("Restart", "restart")
+        self._item("Refine a region: drag it", "choose_region")
+        self._item("Region", "toggle_region", self._state.settings.region.on)
         ahead = self._state.settings.display.compile_ahead
         if imgui.menu_item("Compile ahead", "", ahead)[0]:
             self._state.change({"display.compile_ahead": not ahead})
