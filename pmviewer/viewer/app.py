@@ -42,6 +42,7 @@ from pmviewer.viewer.shortcuts import FLIP_KEY, is_held, run_shortcuts
 from pmviewer.viewer.shot import Shot
 from pmviewer.viewer.snapshots import SUFFIXES
 from pmviewer.viewer.state import InactiveReason, ViewerState
+from pmviewer.viewer.tour import Rectangle, Tour
 from pmviewer.viewer.viewport.picture import Picture
 from pmviewer.viewer.viewport.viewport import Viewport
 
@@ -79,6 +80,8 @@ class ViewerApp:
         self.viewport = Viewport(self.state)
         self.dialogs = FileDialogs()
         self.commands = Commands(self.state, self.viewport, self.dialogs)
+        self.tour = Tour(self._places, remember=remember and shot is None)
+        self.commands.table["begin_tour"] = self.tour.begin
         self.settings_panel = SettingsPanel(self.state)
         self.context: moderngl.Context | None = None
         self._title = ""
@@ -91,6 +94,7 @@ class ViewerApp:
 
     def _callbacks(self) -> layout.Callbacks:
         actions = self.commands.table
+        self._toolbar = Toolbar(self.state, actions)
         self._snapshots_panel = SnapshotsPanel(self.state, self.viewport, actions)
         panels = {
             "Settings": self.settings_panel.gui,
@@ -109,7 +113,7 @@ class ViewerApp:
             panels=panels,
             viewport=self.viewport.gui,
             menus=Menus(self.state, actions, layout.PANELS).gui,
-            toolbar=Toolbar(self.state, actions).gui,
+            toolbar=self._toolbar.gui,
             status=lambda: draw_status_bar(self.state),
             over_everything=self._over_everything,
             post_init=self._post_init,
@@ -136,6 +140,11 @@ class ViewerApp:
             self.commands.load_reference(Path(paths[0]))
         elif paths:
             self.state.open(paths[0])
+
+    def _places(self) -> dict[str, Rectangle]:
+        """What the tour points at, where it is drawn."""
+        known = {"pinned": self.settings_panel.pinned, "toolbar": self._toolbar.choices}
+        return {name: place for name, place in known.items() if place is not None}
 
     def wake(self) -> None:
         """Draw soon. From any thread."""
@@ -165,6 +174,7 @@ class ViewerApp:
         if not self.viewport.alone:
             glfw.set_window_size_limits(glfw_window_hello_imgui(), width, height, glfw.DONT_CARE, glfw.DONT_CARE)
         self.state.appearance.load()
+        self.tour.begin_if_new()
         self._running = True
         self.state.session.on_update = self.wake
         self.state.gain.on_update = self.state.film.on_update = self.wake
@@ -205,6 +215,7 @@ class ViewerApp:
         draw_help(self.state)
         self.commands.palette.gui(self.commands.table)
         self.commands.still_dialog.gui()
+        self.tour.gui()
 
     def _before_swap(self) -> None:
         path, self.commands.window_shot = self.commands.window_shot, None

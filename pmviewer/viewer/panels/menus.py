@@ -52,6 +52,7 @@ class Menus:
                 self._item(title, f"toggle_{overlay.name}", overlay.is_shown(self._state.settings))
             imgui.end_menu()
         if imgui.begin_menu("Help"):
+            self._item("The tour", "begin_tour")
             self._item("Keys and mouse", "toggle_help", self._state.help_open)
             imgui.end_menu()
 

@@ -22,6 +22,7 @@ _WIDTH = 36.0
 _UNBOUND = {
     "open_snapshot": "Open an EXR or PNG file as a snapshot",
     "export_still": "Export at another size, with the legend",
+    "begin_tour": "The tour: five steps through the window",
     "export_film": "Export the film",
     "export_exr_half": "Export the layers as EXR, 16-bit half",
     "export_png_overlays": "Export the picture with overlays as PNG",
