@@ -74,6 +74,8 @@ class Tour:
         self._places = places
         self._remember = remember
         self._fresh = False
+        self.shown_at: Rectangle | None = None
+        """What is highlighted now."""
 
     def begin_if_new(self) -> None:
         """Once the window is there: whoever has not seen it sees it."""
@@ -109,7 +111,7 @@ class Tour:
         found = self._places().get(step.target) or _of_window(step.target)
         if found is not None:
             found = tuple(min(max(v, whole[i % 2]), whole[i % 2 + 2]) for i, v in enumerate(found))  # type: ignore[assignment]
-            _highlight(found, whole)
+        self.shown_at = found
         em = imgui.get_font_size()
         wide = min(_WIDTH * em, 0.8 * area.size.x)
         imgui.set_next_window_pos(beside(found, whole, (wide + 1.5 * em, _HEIGHT * em), em))
@@ -125,6 +127,9 @@ class Tour:
         imgui.pop_style_var(2)
         imgui.pop_style_color()
         if shown:
+            if found is not None:
+                corner, size = imgui.get_window_pos(), imgui.get_window_size()
+                _highlight(found, whole, (corner.x, corner.y, corner.x + size.x, corner.y + size.y))
             self._card(step, wide)
         imgui.end()
 
@@ -171,22 +176,25 @@ def beside(target: Rectangle | None, whole: Rectangle, size: tuple[float, float]
 
 def _of_window(name: str) -> Rectangle | None:
     window = imgui.internal.find_window_by_name(name)
-    if window is None or not window.active:
+    if window is None or not window.was_active:
         return None
     return window.pos.x, window.pos.y, window.pos.x + window.size.x, window.pos.y + window.size.y
 
 
-def _highlight(target: Rectangle, whole: Rectangle) -> None:
-    """All else is darker."""
+def without(rectangle: Rectangle, hole: Rectangle) -> list[Rectangle]:
+    """What is left of a rectangle: above, below, left and right of the hole."""
+    left, top, right, bottom = rectangle
+    x0, x1 = (min(max(x, left), right) for x in (hole[0], hole[2]))
+    y0, y1 = (min(max(y, top), bottom) for y in (hole[1], hole[3]))
+    parts = [(left, top, right, y0), (left, y1, right, bottom), (left, y0, x0, y1), (x1, y0, right, y1)]
+    return [part for part in parts if part[0] < part[2] and part[1] < part[3]]
+
+
+def _highlight(target: Rectangle, whole: Rectangle, card: Rectangle) -> None:
+    """All but the target and the card is darker."""
     draw = imgui.get_foreground_draw_list()
     dark = imgui.get_color_u32(imgui.ImVec4(0, 0, 0, _DARKER))
-    left, top, right, bottom = whole
+    for part in (rest for around in without(whole, target) for rest in without(around, card)):
+        draw.add_rect_filled(part[:2], part[2:], dark)
     x0, y0, x1, y1 = target
-    for corner, other in (
-        ((left, top), (right, y0)),
-        ((left, y1), (right, bottom)),
-        ((left, y0), (x0, y1)),
-        ((x1, y0), (right, y1)),
-    ):
-        draw.add_rect_filled(corner, other, dark)
     draw.add_rect((x0, y0), (x1, y1), imgui.get_color_u32(imgui.ImVec4(*theme.ACCENT)), 3.0, 2.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pmviewer.viewer.tour import STEPS, beside
+from pmviewer.viewer.tour import STEPS, beside, without
 from tests.viewer.driver import drive, make_app
 from tests.viewer.fake_session import FakeSession
 
@@ -24,6 +24,7 @@ def test_all_steps_point_at_something_and_the_card_is_in_the_window(tmp_path, mo
         for number in range(len(STEPS)):
             c.yield_(6)
             assert tour.number == number
+            assert tour.shown_at is not None, f"{STEPS[number].title}: what it points at is there"
             card = c.window_info("//Tour").window
             assert 0 <= card.pos.x <= size[0] - card.size.x, STEPS[number].title
             assert 0 <= card.pos.y <= size[1] - card.size.y, STEPS[number].title
@@ -47,3 +48,16 @@ def test_a_card_stands_beside_its_target():
         if target is not None:
             apart = x >= target[2] or x + 250 <= target[0] or y >= target[3] or y + 150 <= target[1]
             assert apart, target
+
+
+def test_all_but_two_rectangles_is_dark():
+    whole, target, card = (0, 0, 20, 12), (2, 1, 9, 12), (7, 3, 15, 8)
+    dark = [part for around in without(whole, target) for part in without(around, card)]
+
+    def within(x, y, r):
+        return r[0] <= x < r[2] and r[1] <= y < r[3]
+
+    for x in range(20):
+        for y in range(12):
+            count = sum(within(x, y, part) for part in dark)
+            assert count == (not within(x, y, target) and not within(x, y, card)), (x, y)
