@@ -83,7 +83,10 @@ class KernelLibrary(JITCodeLibrary):
             library.enable_object_caching()
             library._set_compiled_object(machine_code)
             library._finalize_final_module()
-            codegen._engine._load_defined_symbols(llvm.parse_bitcode(bitcode))
+            # Constants and types of a module stay in its context when it is gone, so that this one has its own.
+            module = llvm.parse_bitcode(bitcode, llvm.create_context())
+            codegen._engine._load_defined_symbols(module)
+            module.close()
             library._packed = zlib.compress(bitcode, 1)
             library._native = library._disable_inspection = True
         return library
