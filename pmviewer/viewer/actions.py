@@ -54,6 +54,7 @@ class Commands:
             "play_film": self._play_film,
             "export_film": self._export_film,
             "open": self._open,
+            "open_photons": self._open_photons,
             "load_reference": self._load_reference,
             "save_session": lambda: self._save(".toml", self.exports.session),
             "export_exr": lambda: self._save(".exr", self.exports.exr),
@@ -125,6 +126,9 @@ class Commands:
     def load_reference(self, path: Path) -> None:
         """Compare with that EXR file from now on."""
         self.state.comparison.load(path, self.state.live_camera())
+
+    def _open_photons(self) -> None:
+        self.dialogs.open("Photons of a PLY file", "PLY files", ["*.ply"], self.state.loaded.open)
 
     def _save(self, suffix: str, write: Callable[[Path], None]) -> None:
         view = "" if suffix == ".toml" else self.state.settings.display.view if suffix == ".png" else "layers"

@@ -39,6 +39,7 @@ from pmviewer.viewer.film import FilmEditor
 from pmviewer.viewer.history import History
 from pmviewer.viewer.importance_gain import GainRun
 from pmviewer.viewer.inspector import Inspector
+from pmviewer.viewer.loaded_photons import LoadedPhotons
 from pmviewer.viewer.measured import Measured
 from pmviewer.viewer.pair import Pair, ShownPair
 from pmviewer.viewer.saved_views import FILE, SavedViews
@@ -93,6 +94,7 @@ class ViewerState:
         self._paired: tuple[tuple[Any, ...], ShownPair | None] | None = None
         self.history = History()
         self.editing = Editing(session, self.change)
+        self.loaded = LoadedPhotons(self.background, lambda: self.change({"overlays.file.show": True}))
         self.still = StillExport(session, self.background)
         self.film = FilmEditor(session, self.history, self.change, self.background, self.say)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
@@ -412,5 +414,6 @@ class ViewerState:
         self.gain.poll(self.live_camera())
         self.snapshots.poll()
         self.film.poll()
+        self.loaded.poll()
         self.pair.poll(self.shown_pair())
         self.toasts = [toast for toast in self.toasts if not toast.is_over()]

@@ -63,6 +63,7 @@ class Menus:
     def _file(self) -> None:
         self._item("Open …", "open")
         self._item("Load reference …", "load_reference")
+        self._item("Photons of a PLY file …", "open_photons")
         if imgui.begin_menu("Bundled scenes"):
             self._bundled.gui()
             imgui.end_menu()

@@ -87,7 +87,9 @@ class Viewport:
         geometry = state.session.geometry
         radius = float(geometry.radius) if geometry is not None else 1.0
         camera = state.render_camera if geometry is not None else lambda: None
-        return Source(state.settings, state.frame, radius, camera, self.inspected, state.inspector)
+        return Source(
+            state.settings, state.frame, radius, camera, self.inspected, state.inspector, state.loaded.photons
+        )
 
     def shown_camera(self) -> CameraPose | None:
         """The frame's camera, so that points lie on the picture; the newest one when only geometry is shown."""
