@@ -102,6 +102,7 @@ class ViewerState:
         self._toasts_of = session.scene
         self._said: deque[Message] = deque()
         """What any thread said since the last frame."""
+        self._calls: deque[Callable[[], None]] = deque()
         self.flying = False
         self.panels_hidden = False
         self.help_open = False
@@ -388,6 +389,10 @@ class ViewerState:
         """A line for the log, from any thread."""
         self._said.append(Message(level, text))
 
+    def call(self, what: Callable[[], None]) -> None:
+        """Have the window's thread do that with its next frame. From any thread."""
+        self._calls.append(what)
+
     def _take(self, message: Message) -> None:
         self.log.append(message)
         if message.level == "error":
@@ -402,6 +407,8 @@ class ViewerState:
 
     def poll(self) -> None:
         """Once per window frame: collect the messages. Errors of a scene that is gone float no longer."""
+        while self._calls:
+            self._calls.popleft()()
         if self.session.scene is not self._toasts_of:
             self._toasts_of = self.session.scene
             self.toasts.clear()
