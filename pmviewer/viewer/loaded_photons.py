@@ -72,6 +72,7 @@ def read_photons(path: Path) -> FilePhotons:
 
     places = vectors(_PLACE, 0.0)
     good = np.isfinite(places).all(axis=1)
-    parts = [vectors(_DIRECTION, 0.0), vectors(_POWER, 1.0), *map(numbers, ("bounces", "path_class", "light"))]
-    records, unit = pack(places[good], *(part[good] for part in parts))
+    wi, Phi = vectors(_DIRECTION, 0.0)[good], vectors(_POWER, 1.0)[good]
+    bounces, path_class, light = (numbers(name)[good] for name in ("bounces", "path_class", "light"))
+    records, unit = pack(places[good], wi, Phi, bounces, path_class, light)
     return FilePhotons(records, unit, path)

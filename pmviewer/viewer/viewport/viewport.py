@@ -188,9 +188,11 @@ class Viewport:
         imgui.push_style_var(imgui.StyleVar_.window_padding, (0, 0))
         shown, _ = imgui.begin(VIEWPORT, None, flags | imgui.WindowFlags_.no_collapse)
         imgui.pop_style_var()
-        if shown:
-            self._contents()
-        imgui.end()
+        try:
+            if shown:
+                self._contents()
+        finally:  # or imgui ends the program over the open window, and what was wrong stays untold
+            imgui.end()
 
     def _contents(self) -> None:
         available, corner = imgui.get_content_region_avail(), imgui.get_cursor_screen_pos()
