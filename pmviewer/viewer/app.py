@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 # imgui_bundle comes first: it makes glfw use the library that it brings along.
-from imgui_bundle import hello_imgui, immapp  # isort: skip
+from imgui_bundle import hello_imgui, imgui, immapp  # isort: skip
 import glfw
 import moderngl
 import numpy as np
@@ -144,7 +144,8 @@ class ViewerApp:
     def _places(self) -> dict[str, Rectangle]:
         """What the tour points at, where it is drawn."""
         known = {"pinned": self.settings_panel.pinned, "toolbar": self._toolbar.choices}
-        return {name: place for name, place in known.items() if place is not None}
+        gap = 0.25 * imgui.get_font_size()
+        return {name: (p[0] - gap, p[1] - gap, p[2] + gap, p[3] + gap) for name, p in known.items() if p is not None}
 
     def wake(self) -> None:
         """Draw soon. From any thread."""

@@ -189,6 +189,7 @@ class RandomUser:
         state.flying = state.help_open = False
         if state.panels_hidden:
             self.app.commands.table["toggle_panels"]()
+        state.film.stop()
         state.inspector.unpin()
         state.editing.choose(None)
         while state.history.done:

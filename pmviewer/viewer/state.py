@@ -148,11 +148,13 @@ class ViewerState:
             self.session.set(settings)
 
     def undo(self) -> None:
-        """Take the last step of the user's back."""
+        """Take the last step of the user's back; playing a film is one."""
+        self.film.stop()
         self._step(self.history.undo(self.settings))
 
     def redo(self) -> None:
         """Take it again."""
+        self.film.stop()
         self._step(self.history.redo(self.settings))
 
     def _step(self, settings: Settings | None) -> None:

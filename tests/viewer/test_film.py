@@ -56,7 +56,14 @@ def test_a_film_is_made_gone_through_undone_and_written(tmp_path):
             wait_until(c, lambda: 0.1 < film.at < 0.4)
             assert 40 < state.settings.camera.fov < 60
             film.stop()
+            fov = state.settings.camera.fov
             assert len(state.history.done) == before + 1, "playing is one step"
+            film.play()
+            wait_until(c, lambda: film.at > 0.1 and state.settings.camera.fov != fov)
+            state.undo()
+            assert not film.playing
+            assert len(state.history.done) == before + 1, "undoing while it plays undoes the playing"
+            assert state.settings.camera.fov == fov
             state.change({"display.view": "beauty"})
             film.export_as.fps, film.export_as.passes = 4.0, 1
             film.export(tmp_path / "film.webp")
