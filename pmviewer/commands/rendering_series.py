@@ -17,7 +17,7 @@ from pmviewer.engine.series.render import series
 from pmviewer.errors import OutputError, SettingError
 from pmviewer.output.contact_sheet import contact_sheet
 from pmviewer.output.film import FORMATS as FILMS
-from pmviewer.output.film import Film
+from pmviewer.output.film import Film, numbered
 from pmviewer.output.frame_export import shown_pixels, write_frame_exr, write_frame_png
 from pmviewer.output.png import write_png
 from pmviewer.output.tone import to_uint8
@@ -80,11 +80,6 @@ def render_series(plan: Plan, outputs: Outputs, threads: int | None) -> None:
         print(f"wrote {outputs.sheet}: {count} pictures")
     for path in outputs.pictures:
         print(f"wrote {numbered(path, 1, count)} to {numbered(path, count, count).name}")
-
-
-def numbered(path: Path, number: int, count: int) -> Path:
-    """The picture's file: its number, from 1, behind the name."""
-    return path.with_stem(f"{path.stem}_{number:0{max(4, len(str(count)))}d}")
 
 
 def _pixels(frame: Frame) -> np.ndarray:

@@ -33,6 +33,8 @@ def caveats(
             "Gather rays go straight through thin glass: light that it reflects after a diffuse bounce is missing. "
             "Turn photons.indirect_caustics on, or choose the method progressive."
         )
+    if settings.region.on and not plan.virtual and passes > 1:
+        said.append("Outside of the region (region.on) the picture has one pass.")
     said += [_dropped(place, count) for place, count in tally.dropped.items() if count]
     cut = tally.cut / max(pixels * passes, 1)
     if cut > CUT_PATHS:

@@ -22,6 +22,9 @@ BYTES_PER_TRIANGLE = 300
 
 BYTES_PER_INSTANCE = 1200
 
+_M_ARENA_MAX = -8
+"""Of malloc.h."""
+
 
 def give_back() -> None:
     """Return to the system what has been freed. The C library of Linux keeps it otherwise: arrays of a batch are below
@@ -31,6 +34,16 @@ def give_back() -> None:
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # musl has none
     if trim is not None:
         trim(0)
+
+
+def few_arenas() -> None:
+    """Have all threads share two of the C library's heaps, where Linux's would make eight a processor: each keeps what
+    is scattered over it, and a program that lives long has threads come and go. Kernels allocate next to nothing."""
+    if not sys.platform.startswith("linux"):
+        return
+    options = getattr(ctypes.CDLL(None), "mallopt", None)  # musl has none
+    if options is not None:
+        options(_M_ARENA_MAX, 2)
 
 
 def check_scene_memory(scene: Scene) -> None:

@@ -85,6 +85,8 @@ class Renderer:
         self.plan: Plan = plan or plan_of(settings, scene.traits)
         self.facts = Facts(settings, self.plan, scene.traits)
         self.film = film_of(settings, self.plan, self.camera.width, self.camera.height)
+        if settings.region.on and not self.plan.virtual:
+            self.film.region = settings.region.pixels(self.camera.width, self.camera.height)
         self.first_radius = (
             first_radius(scene.flat, self.render_camera, settings.estimate, self.plan.gather)
             if self.plan.photons

@@ -26,6 +26,7 @@ from pmviewer.engine.wanted import looked_map, wanted_of
 from pmviewer.errors import PictureWarning, PmviewerError, SceneError, SettingError
 from pmviewer.library.frame import RenderedFrame
 from pmviewer.library.interrupt import interrupts_between_passes
+from pmviewer.library.live import Live, Scripted
 from pmviewer.library.names import changed_by, path_of
 from pmviewer.library.photons import Photons, check_map, photons_of
 from pmviewer.output.session_file import read_session
@@ -221,11 +222,14 @@ class Rendering:
             scene = self._opened.scene
             return photons_of(map, cloud, self._settings, scene.name, passes, tuple(scene.warnings))
 
-    def show(self) -> None:
+    def show(self, script: Callable[[Live], None] | None = None) -> dict[str, Any]:
         """Open the window on the same scene with the same settings, and return when it is closed.
 
-        It is a window of its own: it renders for itself, and what is changed in it is not changed here. Raises
-        WindowError without a display or OpenGL, SceneError for a scene that was made in Python, which it can't open.
+        It is a window of its own: it renders for itself. What is changed in it is not changed here but returned, by
+        full name: `s.set(s.show())` takes it over. `script` is called on a thread of its own with the open window
+        (`pmviewer.library.live.Live`), which it can change and read while the user does; its error ends the script
+        alone and is raised when the window is closed. Raises WindowError without a display or OpenGL, SceneError for a
+        scene that was made in Python, which the window can't open.
         """
         with self._alone():
             if self._opened.content is None:
@@ -235,7 +239,15 @@ class Rendering:
             from pmviewer.viewer.start import start_viewer
 
             search_also(self._search_paths)
-            start_viewer(ViewerApp, self._opened.source, self._settings, self._pool.threads, self._parameters)
+            scripted, before = Scripted(script), flat(self._settings)
+
+            def make(*arguments: Any, **options: Any) -> ViewerApp:
+                return scripted.begin(ViewerApp(*arguments, **options))
+
+            source, threads = self._opened.source, self._pool.threads
+            start_viewer(make, source, self._settings, threads, self._parameters)
+            after = flat(scripted.end())
+            return {path: value for path, value in after.items() if value != before[path]}
 
     # its end ----------------------------------------------------------------------------------------------------
 

@@ -22,6 +22,11 @@ QUALITY = 8
 """Of 10: hardly to be told from the pictures."""
 
 
+def numbered(path: Path, number: int, count: int) -> Path:
+    """The file of one picture of `count`: its number, from 1, behind the name."""
+    return path.with_stem(f"{path.stem}_{number:0{max(4, len(str(count)))}d}")
+
+
 class Film:
     """Takes the pictures (h, w, 3) of a film one after the other; `close` writes the file, whole or not at all."""
 
@@ -63,6 +68,15 @@ class Film:
             write_file(self.path, data, FORMATS)
         elif self._pictures:
             write_file(self.path, self._animated(), FORMATS)
+
+    def drop(self) -> None:
+        """Give it up: nothing is written."""
+        self._pictures = []
+        if self._encoder is not None:
+            self._encoder.close()
+            self._encoder = None
+        if self._folder is not None:
+            self._folder.cleanup()
 
     def _begin(self, size: tuple[int, int]) -> Generator[None, Any, None]:
         import imageio_ffmpeg

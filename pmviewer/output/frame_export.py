@@ -227,8 +227,13 @@ def write_frame_png(
     if view not in LAYERS and view not in HELD_WHILE_SHOWN:
         raise OutputError(f"{path}: the view '{view}' is drawn by the window alone. Choose one of {', '.join(LAYERS)}.")
     pixels = shown_pixels(frame, view, display)
+    write_png(path, pixels, frame_texts(frame))
+
+
+def frame_texts(frame: Exportable) -> dict[str, str]:
+    """The metadata as PNG files have it."""
     texts = {PREFIX + name: _text(value) for name, value in frame_metadata(frame).items()}
-    write_png(path, pixels, {"Software": f"pmviewer {__version__}", "Title": frame.scene_name, **texts})
+    return {"Software": f"pmviewer {__version__}", "Title": frame.scene_name, **texts}
 
 
 def shown_pixels(frame: Exportable, view: str, display: Display) -> NDArray[np.float32]:

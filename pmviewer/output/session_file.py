@@ -17,6 +17,10 @@ A session file looks like this; everything but `format` and `scene` may be missi
     number = 1
     file = "caustic.snapshots/1.exr"
 
+    [[film]]
+    at = 1.5
+    settings = { "camera.origin" = [0.0, 1.0, 3.0] }
+
 `scene` is a bundled scene's name, or a file: absolute, or relative to the session file.
 Snapshots are EXR files (`pmviewer.output.snapshot`) in a folder beside the session file, which has its name.
 """
@@ -40,13 +44,14 @@ from pmviewer.output.files import read_file, write_file
 from pmviewer.progress import check
 from pmviewer.resources import data_folder
 from pmviewer.settings.access import SETTINGS, Settings, flat, with_values
+from pmviewer.settings.film import FilmKey, as_tree, from_tree
 
 if TYPE_CHECKING:  # brings OpenEXR along, which the window doesn't wait for
     from pmviewer.output.snapshot import Snapshot
 
 FORMAT = 1
 SUFFIX = ".toml"
-_KEYS = ("format", "program", "scene", "passes", "parameters", "settings", "snapshots")
+_KEYS = ("format", "program", "scene", "passes", "parameters", "settings", "snapshots", "film")
 FOLDER = ".snapshots"
 """Behind the session file's name, without its own ending: where its snapshots are."""
 _NEAR = 2
@@ -64,6 +69,8 @@ class SessionFile:
     parameters: Mapping[str, str] = field(default_factory=dict)
     snapshots: tuple[tuple[int, Path], ...] = ()
     """Number and file of each."""
+    film: tuple[FilmKey, ...] = ()
+    """Keys of the film, by time."""
 
 
 def write_session(
@@ -73,6 +80,7 @@ def write_session(
     passes: int,
     parameters: Mapping[str, str] | None = None,
     snapshots: Sequence[Snapshot] = (),
+    film: Sequence[FilmKey] = (),
 ) -> None:
     """Write a session file; settings with their default value are left out. Files of snapshots come first, and those of
     the session file that is replaced go when nobody names them any more. Raises OutputError."""
@@ -95,6 +103,8 @@ def write_session(
             {"number": snapshot.number, "file": file.relative_to(file.parents[1]).as_posix()}
             for snapshot, file in zip(snapshots, files, strict=True)
         ]
+    if film:
+        tree["film"] = as_tree(film)
     write_file(path, tomli_w.dumps(tree).encode("utf-8"), (SUFFIX,))
     for gone in before - set(files):
         with contextlib.suppress(OSError):
@@ -189,9 +199,8 @@ def _session(tree: dict[str, Any], folder: Path) -> SessionFile:
         )
     settings = with_values(Settings(), dict(_leaves(values, "")))
     texts = {name: str(value) for name, value in parameters.items()}
-    return SessionFile(
-        settings, _found_scene(scene, folder), passes, texts, _snapshots(tree.get("snapshots", []), folder)
-    )
+    snapshots, film = _snapshots(tree.get("snapshots", []), folder), from_tree(tree.get("film", []))
+    return SessionFile(settings, _found_scene(scene, folder), passes, texts, snapshots, film)
 
 
 def _snapshots(rows: Any, folder: Path) -> tuple[tuple[int, Path], ...]:

@@ -41,12 +41,39 @@ class Film:
         self.radii: NDArray[np.float32] | None = None
         self.weights: NDArray[np.float64] | None = None
         self.passes = 0
+        self.region: tuple[int, int, int, int] | None = None
+        """Columns x0 … x1−1 and rows y0 … y1−1 of (x0, y0, x1, y1), which alone are rendered from the second pass on;
+        None for all."""
+
+    def spans(self) -> list[tuple[int, int]]:
+        """First and last + 1 of the pixels, row by row, that the next pass renders."""
+        if self.region is None or self.passes == 0:
+            return [(0, len(self.sums))]
+        x0, y0, x1, y1 = self.region
+        return [(y * self.width + x0, y * self.width + x1) for y in range(y0, y1)]
+
+    def samples(self, pixel: int) -> int:
+        """How many passes a pixel has."""
+        if self.region is None or self.passes == 0:
+            return self.passes
+        (x0, y0, x1, y1), (y, x) = self.region, divmod(pixel, self.width)
+        return self.passes if x0 <= x < x1 and y0 <= y < y1 else 1
+
+    def _as_sampled(self, means: NDArray[np.floating]) -> None:
+        """Means (h, w, n) over `passes`, made those over each pixel's own."""
+        if self.region is not None and self.passes > 1:
+            x0, y0, x1, y1 = self.region
+            inside = means[y0:y1, x0:x1].copy()
+            means *= self.passes
+            means[y0:y1, x0:x1] = inside
 
     def planes(self) -> NDArray[np.float32]:
         """Means (height, width, channels) float32."""
         out = np.empty((self.height * self.width, self.channels), np.float32)
         resolve(self.sums, float(max(self.passes, 1)), out, 0, len(out))
-        return self.weighed(out.reshape(self.height, self.width, self.channels))
+        planes = out.reshape(self.height, self.width, self.channels)
+        self._as_sampled(planes)
+        return self.weighed(planes)
 
     def weighed(self, planes: NDArray[np.float32]) -> NDArray[np.float32]:
         """The planes with their terms divided by the mean weight of each pixel's samples in place of 1.
@@ -57,6 +84,7 @@ class Film:
         if self.weights is None:
             return planes
         means = self.weights.reshape(self.height, self.width, 2) / max(self.passes, 1)
+        self._as_sampled(means)
         for channels, column in _WEIGHED:
             weights = means[..., column]
             known = np.abs(weights) >= LEAST_WEIGHT

@@ -18,7 +18,9 @@ from pmviewer.viewer import layout
 from pmviewer.viewer.comparing_actions import comparing_actions
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.exports import Exports, default_path, fresh_path
+from pmviewer.viewer.dialogs.still_dialog import StillDialog
 from pmviewer.viewer.overlays.registry import SWITCHED
+from pmviewer.viewer.panels.film_panel import FILM
 from pmviewer.viewer.panels.palette import Palette
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.view_actions import save_view
@@ -43,15 +45,21 @@ class Commands:
         self.window_shot: Path | None = None
         """Where the next frame of the whole window goes."""
         self.palette = Palette(state)
+        self.still_dialog = StillDialog(state, dialogs)
         self._hidden: list[str] = []
         self._layout = layout.Layout()
         self.table: dict[str, Callable[[], None]] = {
             **comparing_actions(state, dialogs),
+            "add_key": self._add_key,
+            "play_film": self._play_film,
+            "export_film": self._export_film,
             "open": self._open,
+            "open_photons": self._open_photons,
             "load_reference": self._load_reference,
             "save_session": lambda: self._save(".toml", self.exports.session),
             "export_exr": lambda: self._save(".exr", self.exports.exr),
             "export_exr_half": lambda: self._save(".exr", lambda path: self.exports.exr(path, half=True)),
+            "export_still": self.still_dialog.open,
             "export_png": lambda: self._save(".png", lambda path: self.exports.png(path, overlays=False)),
             "export_png_overlays": lambda: self._save(".png", lambda path: self.exports.png(path, overlays=True)),
             "screenshot": self._screenshot,
@@ -69,6 +77,8 @@ class Commands:
             "toggle_marks": lambda: self._toggle("display.marks"),
             "toggle_denoised": self._toggle_denoised,
             **{f"toggle_{o.name}": partial(self._toggle, f"overlays.{o.name}.show") for o in SWITCHED},
+            "choose_region": self.viewport.region.toggle,
+            "toggle_region": lambda: self._toggle("region.on"),
             "fit_picture": self._fit,
             "compare_importance": self._compare_importance,
             "toggle_fly": self._toggle_fly,
@@ -116,6 +126,9 @@ class Commands:
     def load_reference(self, path: Path) -> None:
         """Compare with that EXR file from now on."""
         self.state.comparison.load(path, self.state.live_camera())
+
+    def _open_photons(self) -> None:
+        self.dialogs.open("Photons of a PLY file", "PLY files", ["*.ply"], self.state.loaded.open)
 
     def _save(self, suffix: str, write: Callable[[Path], None]) -> None:
         view = "" if suffix == ".toml" else self.state.settings.display.view if suffix == ".png" else "layers"
@@ -167,6 +180,31 @@ class Commands:
         window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(COMPARISON)
         window.is_visible = window.focus_window_at_next_frame = True
         self.state.compare_importance()
+
+    # film -------------------------------------------------------------------------------------------------------
+
+    def _show_film(self) -> None:
+        window = hello_imgui.get_runner_params().docking_params.dockable_window_of_name(FILM)
+        window.is_visible = window.focus_window_at_next_frame = True
+
+    def _add_key(self) -> None:
+        self.state.film.add()
+        self._show_film()
+
+    def _play_film(self) -> None:
+        film = self.state.film
+        if film.playing:
+            film.stop()
+        else:
+            film.play()
+
+    def _export_film(self) -> None:
+        film = self.state.film
+        why = film.refusal()
+        if why is not None:
+            self.state.say("warning", f"No film: {why}")
+            return
+        self.dialogs.save("Export the film", default_path(self.state, film.export_as.format, "film"), film.export)
 
     # camera -----------------------------------------------------------------------------------------------------
 
@@ -248,6 +286,8 @@ class Commands:
         self.state.help_open = not self.state.help_open
 
     def _escape(self) -> None:
-        if not (self.state.flying or self.state.help_open):
+        if self.viewport.region.choosing:
+            self.viewport.region.toggle()
+        elif not (self.state.flying or self.state.help_open):
             self.state.inspector.unpin()
         self.state.flying = self.state.help_open = self.palette.is_open = False

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 # imgui_bundle comes first: it makes glfw use the library that it brings along.
-from imgui_bundle import hello_imgui, immapp  # isort: skip
+from imgui_bundle import hello_imgui, imgui, immapp  # isort: skip
 import glfw
 import moderngl
 import numpy as np
@@ -24,6 +24,7 @@ from pmviewer.viewer.gl.framebuffers import Framebuffers
 from pmviewer.viewer.gl.freeing import free_collected
 from pmviewer.viewer.overlays.panel import OverlayPanel
 from pmviewer.viewer.panels.error_panel import ErrorPanel
+from pmviewer.viewer.panels.film_panel import FILM, FilmPanel
 from pmviewer.viewer.panels.gain_panel import GainPanel
 from pmviewer.viewer.panels.help_overlay import draw_help
 from pmviewer.viewer.panels.importance_panel import ImportancePanel
@@ -41,6 +42,7 @@ from pmviewer.viewer.shortcuts import FLIP_KEY, is_held, run_shortcuts
 from pmviewer.viewer.shot import Shot
 from pmviewer.viewer.snapshots import SUFFIXES
 from pmviewer.viewer.state import InactiveReason, ViewerState
+from pmviewer.viewer.tour import Rectangle, Tour
 from pmviewer.viewer.viewport.picture import Picture
 from pmviewer.viewer.viewport.viewport import Viewport
 
@@ -78,6 +80,8 @@ class ViewerApp:
         self.viewport = Viewport(self.state)
         self.dialogs = FileDialogs()
         self.commands = Commands(self.state, self.viewport, self.dialogs)
+        self.tour = Tour(self._places, remember=remember and shot is None)
+        self.commands.table["begin_tour"] = self.tour.begin
         self.settings_panel = SettingsPanel(self.state)
         self.context: moderngl.Context | None = None
         self._title = ""
@@ -90,6 +94,7 @@ class ViewerApp:
 
     def _callbacks(self) -> layout.Callbacks:
         actions = self.commands.table
+        self._toolbar = Toolbar(self.state, actions)
         self._snapshots_panel = SnapshotsPanel(self.state, self.viewport, actions)
         panels = {
             "Settings": self.settings_panel.gui,
@@ -101,13 +106,14 @@ class ViewerApp:
             "Error": ErrorPanel(self.state, actions).gui,
             "Snapshots": self._snapshots_panel.gui,
             "Comparison": GainPanel(self.state, actions, self.settings_panel).gui,
+            FILM: FilmPanel(self.state, actions).gui,
             "Log": LogPanel(self.state).gui,
         }
         return layout.Callbacks(
             panels=panels,
             viewport=self.viewport.gui,
             menus=Menus(self.state, actions, layout.PANELS).gui,
-            toolbar=Toolbar(self.state, actions).gui,
+            toolbar=self._toolbar.gui,
             status=lambda: draw_status_bar(self.state),
             over_everything=self._over_everything,
             post_init=self._post_init,
@@ -134,6 +140,12 @@ class ViewerApp:
             self.commands.load_reference(Path(paths[0]))
         elif paths:
             self.state.open(paths[0])
+
+    def _places(self) -> dict[str, Rectangle]:
+        """What the tour points at, where it is drawn."""
+        known = {"pinned": self.settings_panel.pinned, "toolbar": self._toolbar.choices}
+        gap = 0.25 * imgui.get_font_size()
+        return {name: (p[0] - gap, p[1] - gap, p[2] + gap, p[3] + gap) for name, p in known.items() if p is not None}
 
     def wake(self) -> None:
         """Draw soon. From any thread."""
@@ -163,9 +175,10 @@ class ViewerApp:
         if not self.viewport.alone:
             glfw.set_window_size_limits(glfw_window_hello_imgui(), width, height, glfw.DONT_CARE, glfw.DONT_CARE)
         self.state.appearance.load()
+        self.tour.begin_if_new()
         self._running = True
         self.state.session.on_update = self.wake
-        self.state.gain.on_update = self.wake
+        self.state.gain.on_update = self.state.film.on_update = self.wake
         self.state.background.on_done = self.wake
 
     def _pre_new_frame(self) -> None:
@@ -184,7 +197,7 @@ class ViewerApp:
             self.state.say("error", str(error))
         self.context.screen.use()  # or the interface would be drawn into the picture
         self._show_title()
-        if self.state.flying or self.state.navigating:
+        if self.state.flying or self.state.navigating or self.state.film.playing:
             self.wake()
 
     def _show_title(self) -> None:
@@ -195,13 +208,15 @@ class ViewerApp:
             self._title = title
 
     def _over_everything(self) -> None:
-        if not (self.dialogs.is_open or self.commands.palette.is_open):
+        if not (self.dialogs.is_open or self.commands.palette.is_open or self.commands.still_dialog.is_open):
             run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying, self.state.history)
         self.state.flipped = not self.dialogs.is_open and is_held(FLIP_KEY)
         self.commands.locate_scene()
         self.dialogs.poll()
         draw_help(self.state)
         self.commands.palette.gui(self.commands.table)
+        self.commands.still_dialog.gui()
+        self.tour.gui()
 
     def _before_swap(self) -> None:
         path, self.commands.window_shot = self.commands.window_shot, None
@@ -227,7 +242,7 @@ class ViewerApp:
         self._running = False
         self.state.appearance.keep()
         self.state.remember_opening()
-        self.state.session.on_update = self.state.gain.on_update = None
+        self.state.session.on_update = self.state.gain.on_update = self.state.film.on_update = None
         self._release()
         if self.state.background.running(FILES):
             glfw.hide_window(glfw_window_hello_imgui())

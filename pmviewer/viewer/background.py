@@ -36,6 +36,7 @@ class Lane:
 
 
 FILES = Lane("files", kept=True, shown=True)
+FILMS = Lane("films", shown=True)
 READING = Lane("reading", shown=True)
 MEASURING = Lane("measuring")
 COMPARING = Lane("comparing")
@@ -54,6 +55,8 @@ class Work:
     stop: Callable[[], None] | None = None
     started: float = field(default_factory=time.monotonic)
     cancelled: bool = field(default=False, init=False)
+    share: float | None = field(default=None, init=False)
+    """How far it is, where it tells."""
     done: threading.Event = field(default_factory=threading.Event, init=False)
 
     @property
@@ -88,7 +91,11 @@ class Background:
     def start(self, lane: Lane, title: str, do: Callable[[], str], *, stop: Callable[[], None] | None = None) -> Work:
         """Have `do` done on the lane's thread. The text it returns, unless empty, goes to the log, and so does the one
         sentence of its error. In a window that is closing nothing begins any more but what is kept."""
-        work = Work(title, lane, do, stop)
+        return self.take(Work(title, lane, do, stop))
+
+    def take(self, work: Work) -> Work:
+        """The same for work that is made already."""
+        lane = work.lane
         with self._lock:
             if self._closed and not lane.kept:
                 work.cancelled = True

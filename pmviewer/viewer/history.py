@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from pmviewer.settings.access import SETTINGS, Settings, flat, with_values
 from pmviewer.settings.edits import as_text
+from pmviewer.settings.film import FilmKey
 from pmviewer.viewer.value_text import value_text
 
+Keys = tuple[FilmKey, ...]
 MOST_STEPS = 1000
 PAUSE = 0.6
 """Seconds after which the wheel, or a key that is held, begins another step."""
@@ -25,14 +27,21 @@ class Step:
     after: dict[str, Any]
     gesture: int
     at: float
+    film: tuple[Keys, Keys] | None = None
+    """Keys of the film before and after, of a step that changed these."""
+    label: str = ""
 
     @property
     def name(self) -> str:
         """What the step did, in a few words."""
+        if self.label:
+            return self.label
         groups = {path.rpartition(".")[0] for path in self.after}
         names = {path.rpartition(".")[2] for path in self.after}
         if groups <= {"camera", "free_camera"} and names <= _POSE and len(names) > 1:
             return "move the free camera" if groups == {"free_camera"} else "move the camera"
+        if groups == {"region"}:
+            return "refine a region" if self.after.get("region.on", True) else "refine the whole picture"
         if len(self.after) == 1:
             ((path, value),) = self.after.items()
             info = SETTINGS[path]
@@ -54,6 +63,8 @@ class History:
         """Grows with each press of a button or a key: changes within one are one step."""
         self.held = False
         """Whether a mouse button is down."""
+        self.on_film: Callable[[Keys], None] = lambda keys: None
+        """Hears what keys the film has when a step with such is undone or done again."""
 
     def changed(self, before: Settings, after: Settings) -> None:
         """Take note of a change that the user has made."""
@@ -71,8 +82,20 @@ class History:
             return
         self.done = [*self.done, step][-MOST_STEPS:]
 
+    def film_changed(self, before: Keys, after: Keys, label: str) -> None:
+        """Take note of a change of the film's keys."""
+        self.undone.clear()
+        last = self.done[-1] if self.done else None
+        if last is not None and last.film is not None and last.gesture == self.gesture and last.label == label:
+            last.film = last.film[0], after
+            return
+        step = Step({}, {}, self.gesture, time.monotonic(), (before, after), label)
+        self.done = [*self.done, step][-MOST_STEPS:]
+
     def _goes_on(self, last: Step, step: Step) -> bool:
         """Whether the step is part of the last one: of the same drag, or turn of the wheel."""
+        if last.film is not None:
+            return False
         alike = last.after.keys() == step.after.keys() or (_is_move(last.after) and _is_move(step.after))
         return alike and last.gesture == step.gesture and (self.held or step.at - last.at < PAUSE)
 
@@ -83,6 +106,8 @@ class History:
         step = self.done.pop()
         self.undone.append(step)
         self.gesture += 1
+        if step.film is not None:
+            self.on_film(step.film[0])
         return with_values(settings, step.before)
 
     def redo(self, settings: Settings) -> Settings | None:
@@ -92,6 +117,8 @@ class History:
         step = self.undone.pop()
         self.done.append(step)
         self.gesture += 1
+        if step.film is not None:
+            self.on_film(step.film[1])
         return with_values(settings, step.after)
 
     def clear(self) -> None:

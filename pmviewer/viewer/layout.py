@@ -22,6 +22,7 @@ PANELS = (
     "Error",
     "Snapshots",
     "Comparison",
+    "Film",
     "Log",
 )
 _PLACE = {"Settings": "Left", "Scene": "Left", "Overlays": "Right", "Inspector": "Right"}

@@ -23,7 +23,7 @@ import numpy as np
 from imgui_bundle import ImVec2, hello_imgui, imgui
 from imgui_bundle.immapp import testing
 
-from pmviewer.engine.memory import give_back
+from pmviewer.engine.memory import few_arenas, give_back
 from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, get, with_values
 from pmviewer.settings.edits import PROPERTIES
 from pmviewer.settings.presets import PRESETS
@@ -189,6 +189,7 @@ class RandomUser:
         state.flying = state.help_open = False
         if state.panels_hidden:
             self.app.commands.table["toggle_panels"]()
+        state.film.stop()
         state.inspector.unpin()
         state.editing.choose(None)
         while state.history.done:
@@ -277,15 +278,21 @@ def window(scene: str, folder: Path) -> Iterator[ViewerApp]:
     """A window on the engine with that scene, small, which leaves the user's configuration alone."""
     from pmviewer.engine.effects import inactive_reason
     from pmviewer.engine.session import Session
+    from pmviewer.kernels.compile import elsewhere
     from pmviewer.viewer.app import ViewerApp
     from pmviewer.viewer.dialogs.recent import RecentFiles
 
+    elsewhere.install()  # as the window has it
+    few_arenas()
     session = Session(settings=with_values(Settings(), START))
     recent = RecentFiles(folder / "recent.txt")
     app = ViewerApp(session, recent=recent, remember=False, inactive_reason=inactive_reason)
     app.state.open(scene, keep_camera=True)
-    yield app
-    session.close()
+    try:
+        yield app
+    finally:
+        session.close()
+        elsewhere.uninstall()
 
 
 def let_loose(scene: str, seed: int, actions: int, folder: Path) -> Report:

@@ -59,10 +59,16 @@ def check_screen() -> None:
 def _make_session(threads: int | None, settings: Settings | None) -> Callable[[], SessionLike]:
     def make() -> SessionLike:
         from pmviewer.engine.ahead.early import early_helper
+        from pmviewer.kernels.compile import elsewhere
 
         helper = early_helper(threads)  # imports while this process does
+        compiler = elsewhere.install()
+        if helper is not None:  # a first start: there will be much to compile
+            compiler.begin()
+        from pmviewer.engine.memory import few_arenas
         from pmviewer.engine.session import Session
 
+        few_arenas()
         return Session(threads, settings, compiles_ahead=True, helper=helper)
 
     return make

@@ -28,20 +28,24 @@ from pmviewer.settings.access import (
     parse_assignments,
     with_values,
 )
+from pmviewer.settings.film import FilmKey
 from pmviewer.settings.schema.compare import LAST, LIVE, REFERENCE
 from pmviewer.viewer.appearance import Appearance
 from pmviewer.viewer.background import Background
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.dialogs.recent import RecentFiles
 from pmviewer.viewer.editing import Editing
+from pmviewer.viewer.film import FilmEditor
 from pmviewer.viewer.history import History
 from pmviewer.viewer.importance_gain import GainRun
 from pmviewer.viewer.inspector import Inspector
+from pmviewer.viewer.loaded_photons import LoadedPhotons
 from pmviewer.viewer.measured import Measured
 from pmviewer.viewer.pair import Pair, ShownPair
 from pmviewer.viewer.saved_views import FILE, SavedViews
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.snapshots import Snapshots
+from pmviewer.viewer.still import StillExport
 from pmviewer.viewer.viewport.controls import camera_values
 
 InactiveReason = Callable[[str, Settings, Any], str | None]
@@ -90,11 +94,15 @@ class ViewerState:
         self._paired: tuple[tuple[Any, ...], ShownPair | None] | None = None
         self.history = History()
         self.editing = Editing(session, self.change)
+        self.loaded = LoadedPhotons(self.background, lambda: self.change({"overlays.file.show": True}))
+        self.still = StillExport(session, self.background)
+        self.film = FilmEditor(session, self.history, self.change, self.background, self.say)
         self.log: deque[Message] = deque(maxlen=LOG_LINES)
         self.toasts: list[Toast] = []
         self._toasts_of = session.scene
         self._said: deque[Message] = deque()
         """What any thread said since the last frame."""
+        self._calls: deque[Callable[[], None]] = deque()
         self.flying = False
         self.panels_hidden = False
         self.help_open = False
@@ -108,6 +116,8 @@ class ViewerState:
         self.parameters: dict[str, str] = {}
         """Values for the open scene file's `<default>` names."""
         self._opening: tuple[str, dict[str, str]] | None = None
+        self._film: tuple[FilmKey, ...] = ()
+        """Keys of the film of what is being opened."""
         self.lost: tuple[str, str] | None = None
         """A session file that was to be opened and the scene that it misses, until somebody asks where that is."""
 
@@ -138,11 +148,13 @@ class ViewerState:
             self.session.set(settings)
 
     def undo(self) -> None:
-        """Take the last step of the user's back."""
+        """Take the last step of the user's back; playing a film is one."""
+        self.film.stop()
         self._step(self.history.undo(self.settings))
 
     def redo(self) -> None:
         """Take it again."""
+        self.film.stop()
         self._step(self.history.redo(self.settings))
 
     def _step(self, settings: Settings | None) -> None:
@@ -301,6 +313,7 @@ class ViewerState:
             path, self.parameters = self._opening
             self.recent.add(path)
             self.history.clear()
+            self.film.take(self._film)
             if before is not None and self.session.paused:
                 self.session.resume()  # it was the scene before that was to stand still
             self._opening = None
@@ -350,6 +363,7 @@ class ViewerState:
         )
         source: str | Path = path
         snapshots: tuple[tuple[int, Path], ...] = ()
+        film: tuple[FilmKey, ...] = ()
         if str(path).lower().endswith(".toml"):
             from pmviewer.output.session_file import read_session
 
@@ -359,7 +373,7 @@ class ViewerState:
                 self.say("error", str(error))
                 return
             source, settings, parameters = scene or saved.scene, saved.settings, saved.parameters
-            snapshots = saved.snapshots
+            snapshots, film = saved.snapshots, saved.film
             if is_gone(source):
                 self.say("error", f"{path}: its scene {source} is not there. Choose where it is now.")
                 self.lost = str(path), str(source)
@@ -370,12 +384,16 @@ class ViewerState:
                     "warning", f"{path}: its snapshots take the place of the {len(self.snapshots.all)} in the strip."
                 )
             self.snapshots.open([file for _, file in snapshots], [number for number, _ in snapshots])
-        self._opening = str(path), dict(parameters or {})
+        self._opening, self._film = (str(path), dict(parameters or {})), film
         self.session.open(source, settings, parameters)
 
     def say(self, level: Level, text: str) -> None:
         """A line for the log, from any thread."""
         self._said.append(Message(level, text))
+
+    def call(self, what: Callable[[], None]) -> None:
+        """Have the window's thread do that with its next frame. From any thread."""
+        self._calls.append(what)
 
     def _take(self, message: Message) -> None:
         self.log.append(message)
@@ -391,6 +409,8 @@ class ViewerState:
 
     def poll(self) -> None:
         """Once per window frame: collect the messages. Errors of a scene that is gone float no longer."""
+        while self._calls:
+            self._calls.popleft()()
         if self.session.scene is not self._toasts_of:
             self._toasts_of = self.session.scene
             self.toasts.clear()
@@ -402,5 +422,7 @@ class ViewerState:
         self.comparison.poll(self.frame, with_own=not parameters)
         self.gain.poll(self.live_camera())
         self.snapshots.poll()
+        self.film.poll()
+        self.loaded.poll()
         self.pair.poll(self.shown_pair())
         self.toasts = [toast for toast in self.toasts if not toast.is_over()]

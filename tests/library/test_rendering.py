@@ -268,17 +268,22 @@ def test_frames_are_written_with_all_layers(box, tmp_path):
 def test_the_window_opens_on_the_same_scene_and_settings(monkeypatch):
     given = {}
 
-    def start(app, source, settings, threads, parameters):
-        given.update(app=app, source=source, N=settings.photons.N, threads=threads, parameters=dict(parameters))
+    def start(make, source, settings, threads, parameters):
+        make("session")
+        changed = with_values(settings, {"photons.N": 9})  # by the user, in the window
+        window.state.settings = changed
+        given.update(source=source, N=settings.photons.N, threads=threads, parameters=dict(parameters))
         return 0
 
     with pmviewer.open("cornell_diffuse", parameters={"res": 32}, threads=2) as s:
         s.set(N=7)
         # the viewer's modules need its libraries, which this test does not
-        monkeypatch.setitem(sys.modules, "pmviewer.viewer.app", SimpleNamespace(ViewerApp="app"))
+        window = SimpleNamespace(state=SimpleNamespace(settings=None))
+        monkeypatch.setitem(sys.modules, "pmviewer.viewer.app", SimpleNamespace(ViewerApp=lambda session: window))
         monkeypatch.setitem(sys.modules, "pmviewer.viewer.start", SimpleNamespace(start_viewer=start))
-        s.show()
-        assert given == {"app": "app", "source": "cornell_diffuse", "N": 7, "threads": 2, "parameters": {"res": "32"}}
+        assert s.show() == {"photons.N": 9}
+        assert s.get("N") == 7, "what was changed in the window is returned, and not changed here"
+        assert given == {"source": "cornell_diffuse", "N": 7, "threads": 2, "parameters": {"res": "32"}}
 
         def no_display(*arguments):
             raise WindowError("No window can be opened.")

@@ -69,7 +69,7 @@ def pixel_report(looked: Looked, pinned: Pinned, measures: Measures, pool: WorkP
 def _mean(film: Film, number: int) -> Float:
     """The planes of a pixel, (channels,)."""
     if type(film) is Film:
-        return film.sums[number, : film.channels] / max(film.passes, 1)
+        return film.sums[number, : film.channels] / max(film.samples(number), 1)
     planes: NDArray[np.float32] = film.planes().reshape(-1, film.channels)
     return planes[number].astype(np.float64)
 

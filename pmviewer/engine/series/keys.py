@@ -12,7 +12,8 @@ from pmviewer.errors import SettingError
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.scene.description import Scene
 from pmviewer.scene.editing.own import own_numbers
-from pmviewer.settings.access import Settings, get, with_values
+from pmviewer.settings.access import SETTINGS, Settings, get, with_values
+from pmviewer.settings.film import FilmKey, FilmWay, comparable
 
 _CAMERA = ("origin", "target", "up", "fov", "view_width", "shift_x", "shift_y", "aperture", "focus")
 
@@ -36,6 +37,19 @@ def completed_keys(scene: Scene, whole: Scene, keys: Sequence[Settings]) -> list
             values["edit.changes"] = {**own, **key.edit.changes}
         found.append(with_values(key, values))
     return found
+
+
+def film_way(scene: Scene, whole: Scene, keys: Sequence[FilmKey]) -> FilmWay:
+    """The way through the keys, of which there is one at least; `scene` and `whole` as in `completed_keys`. Raises
+    SettingError, for what can't be gone through between the keys too."""
+    by_time = sorted(keys, key=lambda key: key.at)
+    settings = comparable(by_time)
+    differing = tuple(path for path in SETTINGS if any(get(one, path) != get(settings[0], path) for one in settings))
+    of_keys = completed_keys(scene, whole, settings)
+    way = FilmWay(tuple(key.at for key in by_time), tuple(of_keys), differing)
+    for first, second in zip(way.times, way.times[1:], strict=False):
+        way.at(0.5 * (first + second), settings[0])
+    return way
 
 
 def orbits(scene: Scene, settings: Settings, pictures: int, degrees: float) -> list[Settings]:

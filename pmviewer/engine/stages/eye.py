@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -37,23 +37,41 @@ def render_into(
     signed = has_signs(given.eye)
     if signed and film.weights is None:
         film.weights = np.zeros((pixels, 2))
-    tile = tile_size(pixels, given.eye[0], pool.threads, lights_asked(given.virtual))
+    spans = film.spans()
+    tile = tile_size(
+        sum(last - first for first, last in spans), given.eye[0], pool.threads, lights_asked(given.virtual)
+    )
 
-    def task(first: int) -> Callable[[], NDArray[np.int64]]:
+    def task(parts: Sequence[tuple[int, int]]) -> Callable[[], NDArray[np.int64]]:
         def run() -> NDArray[np.int64]:
             counts = np.zeros(N_COUNTS, np.int64)
-            last = min(first + tile, pixels)
-            if plan.path:
-                path_pass(given.scene, given.eye, film.sums, counts, first, last)
-            else:
-                eye_pass(given, outline, film.radii, film.sums, counts, first, last)
-            if signed:
-                add_weights(given.eye, outline, film.weights, first, last)
+            for first, last in parts:
+                if plan.path:
+                    path_pass(given.scene, given.eye, film.sums, counts, first, last)
+                else:
+                    eye_pass(given, outline, film.radii, film.sums, counts, first, last)
+                if signed:
+                    add_weights(given.eye, outline, film.weights, first, last)
             return counts
 
         return run
 
-    return sum(pool.run([task(first) for first in range(0, pixels, tile)]), np.zeros(N_COUNTS, np.int64))
+    return sum(pool.run([task(parts) for parts in _tiled(spans, tile)]), np.zeros(N_COUNTS, np.int64))
+
+
+def _tiled(spans: Sequence[tuple[int, int]], tile: int) -> list[list[tuple[int, int]]]:
+    """Spans of pixels in tasks of some `tile` pixels: long ones divided, short ones together."""
+    tasks: list[list[tuple[int, int]]] = []
+    room = 0
+    for first, last in spans:
+        for begin in range(first, last, tile):
+            end = min(begin + tile, last)
+            if room < end - begin:
+                tasks.append([])
+                room = tile
+            tasks[-1].append((begin, end))
+            room -= end - begin
+    return tasks
 
 
 def tile_size(pixels: int, eye: np.void, threads: int, virtual_lights: int = 0) -> int:

@@ -24,7 +24,7 @@ from numba import njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
 
-from pmviewer.kernels.compile import collector, library, quicker
+from pmviewer.kernels.compile import collector, elsewhere, library, quicker
 from pmviewer.kernels.compile.cache_folder import claim
 from pmviewer.kernels.compile.sources import PACKAGE, stamp
 from pmviewer.kernels.compile.turns import Turns
@@ -188,9 +188,10 @@ class _KernelCache(FunctionCache):
 
 
 class _KernelDispatcher(CPUDispatcher):
-    """Compiles what no other process is compiling."""
+    """Compiles what no other process is compiling, or has it compiled (`elsewhere`)."""
 
     _cache: _KernelCache
+    _is_entry = True
 
     def is_kept(self, *arguments: Any) -> bool:
         """Whether code for such arguments is compiled already, by any process."""
@@ -199,6 +200,8 @@ class _KernelDispatcher(CPUDispatcher):
 
     def compile(self, sig: Any) -> Any:
         before = self._cache.turns
+        if before == 0 and self._is_entry and not (sig in self.overloads or self._cache.has(sig, self.targetctx)):
+            elsewhere.compiled(self, sig)
         try:
             return super().compile(sig)
         finally:
@@ -214,6 +217,8 @@ def _cached(dispatcher: Any, kind: type[_KernelDispatcher]) -> Any:
 
 class _DeviceDispatcher(_KernelDispatcher):
     """Without a wrapper numba would jump to address 0."""
+
+    _is_entry = False
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         raise TypeError(f"{self.py_func.__name__} is a device function: call it from a kernel.")

@@ -9,6 +9,7 @@ equal bit for bit), in two thirds of the time.
 
 from __future__ import annotations
 
+import zlib
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -25,6 +26,7 @@ class KernelLibrary(JITCodeLibrary):
     names one of its own functions."""
 
     _native = False
+    _packed: bytes | None = None
 
     def finalize(self) -> None:
         """Link in what it calls. After this nothing can be added."""
@@ -76,9 +78,26 @@ class KernelLibrary(JITCodeLibrary):
             library._final_module = library._shared_module = llvm.parse_bitcode(data)
             library._finalized = library._disable_inspection = True
         else:
-            library = super()._unserialize(codegen, state)
-            library._native = True
+            machine_code, bitcode = data
+            library = codegen.create_library(name)
+            library.enable_object_caching()
+            library._set_compiled_object(machine_code)
+            library._finalize_final_module()
+            # Constants and types of a module stay in its context when it is gone, so that this one has its own.
+            module = llvm.parse_bitcode(bitcode, llvm.create_context())
+            codegen._engine._load_defined_symbols(module)
+            module.close()
+            library._packed = zlib.compress(bitcode, 1)
+            library._native = library._disable_inspection = True
         return library
+
+    def _get_module_for_linking(self) -> Any:
+        """What others link in. For code that came from disk it is parsed when somebody asks: that is rare, and a parsed
+        module takes several times the memory of the machine code."""
+        if self._packed is not None:
+            self._shared_module = llvm.parse_bitcode(zlib.decompress(self._packed))
+            self._packed = None
+        return super()._get_module_for_linking()
 
 
 class _KernelCodegen(JITCPUCodegen):

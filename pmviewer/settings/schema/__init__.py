@@ -35,6 +35,7 @@ from pmviewer.settings.schema.overlays import (
     ProjectionOverlay,
     ShadowOverlay,
 )
+from pmviewer.settings.schema.region import Region
 from pmviewer.settings.schema.render import Render
 from pmviewer.settings.schema.virtual import Virtual
 
@@ -63,6 +64,7 @@ __all__ = [
     "Photons",
     "PointOverlay",
     "ProjectionOverlay",
+    "Region",
     "Render",
     "Scale",
     "Settings",
@@ -86,6 +88,7 @@ class Settings(Group):
     gather: Gather = Field(default_factory=Gather)
     virtual: Virtual = Field(default_factory=Virtual)
     render: Render = Field(default_factory=Render)
+    region: Region = Field(default_factory=Region)
     camera: CameraSettings = Field(default_factory=CameraSettings)
     free_camera: FreeCamera = Field(default_factory=FreeCamera)
     compare: Compare = Field(default_factory=Compare)

@@ -294,6 +294,7 @@ class Overlays(Group):
     paths: PathOverlay = subgroup(PathOverlay, "photon paths", TRACED)
     gather: GatherOverlay = subgroup(GatherOverlay, "gather rays", TRACED, GATHER_RAYS)
     projection: ProjectionOverlay = subgroup(ProjectionOverlay, "projection maps", TRACED, PLAIN_EMISSION, PROJECTED)
+    file: PointOverlay = subgroup(PointOverlay, "photons of a file")
     focal: FocusOverlay = subgroup(FocusOverlay, "focal plane", LENS)
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)

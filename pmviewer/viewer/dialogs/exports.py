@@ -115,12 +115,12 @@ class Exports:
         settings, scene = state.settings, state.session.scene_path
         parameters = dict(state.parameters)
         passes = state.frame.statistics.passes if state.frame is not None else 0
-        snapshots = tuple(state.snapshots.all)
+        snapshots, film = tuple(state.snapshots.all), state.film.keys
 
         def work() -> str:
             from pmviewer.output.session_file import write_session
 
-            write_session(path, settings, scene, passes, parameters, snapshots)
+            write_session(path, settings, scene, passes, parameters, snapshots, film)
             return f"wrote {path.absolute()}"
 
         state.background.start(FILES, "saving the session", work)

@@ -19,6 +19,7 @@ from pmviewer.viewer.gl.program import Drawing, Shaders
 
 if TYPE_CHECKING:
     from pmviewer.viewer.inspector import Inspector
+    from pmviewer.viewer.loaded_photons import FilePhotons
     from pmviewer.viewer.viewport.viewport import Viewport
 
 Needs = tuple[Any, ...]
@@ -36,6 +37,8 @@ class Source:
     render_camera: Callable[[], CameraPose | None] = lambda: None
     pixel: tuple[int, int] | None = None
     inspector: Inspector | None = None
+    loaded: FilePhotons | None = None
+    """Of a file that was opened."""
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pmviewer.viewer.overlays.fates import Fates
+from pmviewer.viewer.overlays.file_photons import FilePhotons
 from pmviewer.viewer.overlays.focal_plane import FocalPlane
 from pmviewer.viewer.overlays.frustum import Frustum
 from pmviewer.viewer.overlays.gather_rays import GatherRays
@@ -32,6 +33,7 @@ OVERLAYS: tuple[type[Overlay], ...] = (
     Paths,
     GatherRays,
     ProjectionMaps,
+    FilePhotons,
     FocalPlane,
     Frustum,
     Inspected,

@@ -10,7 +10,7 @@ from pmviewer.viewer import theme
 from pmviewer.viewer.shortcuts import BINDINGS, Binding
 from pmviewer.viewer.state import ViewerState
 
-_LEFT = ("File", "Edit", "Render", "Free camera", "Window", "Settings")
+_LEFT = ("File", "Edit", "Render", "Film", "Free camera", "Window", "Settings")
 _KEYS, _TEXT = 12.0, 18.0
 _WIDTH = _KEYS + _TEXT + 1.5
 """Widths in multiples of the font size."""

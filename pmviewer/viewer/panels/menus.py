@@ -52,6 +52,7 @@ class Menus:
                 self._item(title, f"toggle_{overlay.name}", overlay.is_shown(self._state.settings))
             imgui.end_menu()
         if imgui.begin_menu("Help"):
+            self._item("The tour", "begin_tour")
             self._item("Keys and mouse", "toggle_help", self._state.help_open)
             imgui.end_menu()
 
@@ -62,6 +63,7 @@ class Menus:
     def _file(self) -> None:
         self._item("Open …", "open")
         self._item("Load reference …", "load_reference")
+        self._item("Photons of a PLY file …", "open_photons")
         if imgui.begin_menu("Bundled scenes"):
             self._bundled.gui()
             imgui.end_menu()
@@ -77,8 +79,10 @@ class Menus:
         imgui.separator()
         self._item("Export PNG …", "export_png")
         self._item("Export PNG with overlays …", "export_png_overlays")
+        self._item("Export at another size …", "export_still")
         self._item("Export EXR, 32-bit float …", "export_exr")
         self._item("Export EXR, 16-bit half …", "export_exr_half")
+        self._item("Export the film …", "export_film", enabled=len(self._state.film.keys) > 1)
         self._item("Screenshot of the picture", "screenshot_picture")
         self._item("Screenshot of the window", "screenshot")
         imgui.separator()
@@ -188,6 +192,8 @@ class Menus:
     def _render(self) -> None:
         self._item("Resume" if self._state.session.paused else "Pause", "toggle_pause")
         self._item("Restart", "restart")
+        self._item("Refine a region: drag it", "choose_region")
+        self._item("Region", "toggle_region", self._state.settings.region.on)
         ahead = self._state.settings.display.compile_ahead
         if imgui.menu_item("Compile ahead", "", ahead)[0]:
             self._state.change({"display.compile_ahead": not ahead})

@@ -21,6 +21,10 @@ _WIDTH = 36.0
 """In multiples of the font size."""
 _UNBOUND = {
     "open_snapshot": "Open an EXR or PNG file as a snapshot",
+    "export_still": "Export at another size, with the legend",
+    "begin_tour": "The tour: five steps through the window",
+    "open_photons": "Photons of a PLY file over the picture",
+    "export_film": "Export the film",
     "export_exr_half": "Export the layers as EXR, 16-bit half",
     "export_png_overlays": "Export the picture with overlays as PNG",
 }

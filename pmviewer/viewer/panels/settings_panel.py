@@ -38,6 +38,8 @@ class SettingsPanel:
         self.widgets = SettingWidgets(state.refused_view, state.choices)
         self.find = ""
         """Only settings that contain this are listed."""
+        self.pinned: tuple[float, float, float, float] | None = None
+        """Where on the screen the rows above the groups are: left, top, right, bottom."""
         self._known: tuple[Settings, Any, dict[str, Any], dict[str, str | None]] | None = None
         listed = [i for i in SETTINGS.values() if i.path not in PINNED and not i.path.startswith(_ELSEWHERE)]
         self._groups = [(heading, list(infos)) for heading, infos in groupby(listed, key=lambda info: info.group)]
@@ -49,6 +51,8 @@ class SettingsPanel:
             for path in PINNED:
                 self.row(SETTINGS[path])
             imgui.end_table()
+            low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+            self.pinned = low.x, low.y, high.x, high.y
         imgui.spacing()
         self._filter_row()
         flags = imgui.WindowFlags_.always_vertical_scrollbar

@@ -106,4 +106,9 @@ def draw_status_bar(state: ViewerState) -> None:
         imgui.text_disabled("·")
         imgui.same_line()
         waited = f" {duration(work.seconds)}" if work.seconds > 0.5 else ""
-        imgui.text_colored(imgui.ImVec4(*theme.ACCENT), f"{work.title} …{waited}")
+        far = "" if work.share is None else f" {work.share:.0%}"
+        imgui.text_colored(imgui.ImVec4(*theme.ACCENT), f"{work.title} …{far}{waited}")
+        if work.stop is not None and work.share is not None:
+            imgui.same_line()
+            if imgui.small_button(f"Cancel##{work.title}"):
+                work.cancel()

@@ -22,6 +22,8 @@ WIDE, MORE = 78.0, 11.0
 """Width of the window in em from which the light's rig has room, and how much a choice of cameras takes."""
 
 
+_CHOICES = 5
+"""Items up to the choice of the view."""
 _MORE = "More of the toolbar"
 _PAUSE = ("Pause", "Resume")
 _FREE = "Free camera: see the render camera's importance from elsewhere"
@@ -45,13 +47,17 @@ class Toolbar:
         self._state = state
         self._actions = actions
         self._widgets = SettingWidgets(state.refused_view, state.choices)
+        self.choices: tuple[float, float, float, float] | None = None
+        """Where on the screen method and view are chosen: left, top, right, bottom."""
 
     def gui(self) -> None:
         """What fits, from the left; the rest behind a button at the end."""
         items, room = self._items(), imgui.get_content_region_avail().x
         fits = _how_many(items, room, _button_width())
+        corner, wide = imgui.get_cursor_screen_pos(), sum(item.width for item in items[:_CHOICES])
         for item in items[:fits]:
             item.draw()
+        self.choices = corner.x, corner.y, corner.x + wide, corner.y + imgui.get_frame_height()
         rest = [item for item in items[fits:] if item.in_menu is not None]
         if rest:
             self._overflow(rest)

@@ -70,6 +70,9 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         source = viewport.source()
         for overlay in viewport.picture.layers.shown(state.settings):
             overlay.annotate(viewport, source)
+    hint = viewport.region.draw()
+    if hint:
+        caption(viewport, hint, (width / 2, height - line - 2 * margin), anchor=0.5, colour=theme.DARK.accent)
     advice = "" if viewport.alone else viewport.advice()
     if advice:
         caption(viewport, advice, (width / 2, 0.5 * height), anchor=0.5, colour=theme.DARK.warning)

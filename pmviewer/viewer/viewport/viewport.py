@@ -32,6 +32,7 @@ from pmviewer.viewer.viewport.hud import draw_hud
 from pmviewer.viewer.viewport.navigation import DRAG_THRESHOLD, Clicks, Navigation
 from pmviewer.viewer.viewport.picking import picked
 from pmviewer.viewer.viewport.picture import Picture
+from pmviewer.viewer.viewport.region import RegionDrag
 from pmviewer.viewer.viewport.surroundings import STOPPED, Surroundings
 from pmviewer.viewer.viewport.target import Fit, Target
 
@@ -68,6 +69,7 @@ class Viewport:
         self._navigation = Navigation(self)
         self._clicks = Clicks()
         self._splitting = False
+        self.region = RegionDrag(self)
         self._advice: tuple[Any, Scene, str] | None = None
         self.draw_toasts: Callable[[], None] = lambda: None
 
@@ -85,7 +87,9 @@ class Viewport:
         geometry = state.session.geometry
         radius = float(geometry.radius) if geometry is not None else 1.0
         camera = state.render_camera if geometry is not None else lambda: None
-        return Source(state.settings, state.frame, radius, camera, self.inspected, state.inspector)
+        return Source(
+            state.settings, state.frame, radius, camera, self.inspected, state.inspector, state.loaded.photons
+        )
 
     def shown_camera(self) -> CameraPose | None:
         """The frame's camera, so that points lie on the picture; the newest one when only geometry is shown."""
@@ -184,9 +188,11 @@ class Viewport:
         imgui.push_style_var(imgui.StyleVar_.window_padding, (0, 0))
         shown, _ = imgui.begin(VIEWPORT, None, flags | imgui.WindowFlags_.no_collapse)
         imgui.pop_style_var()
-        if shown:
-            self._contents()
-        imgui.end()
+        try:
+            if shown:
+                self._contents()
+        finally:  # or imgui ends the program over the open window, and what was wrong stays untold
+            imgui.end()
 
     def _contents(self) -> None:
         available, corner = imgui.get_content_region_avail(), imgui.get_cursor_screen_pos()
@@ -217,11 +223,12 @@ class Viewport:
         if hovered and _clicked_with(imgui.get_io().key_shift and not self.state.flying):
             self._choose_object()
         pose = self.state.live_camera() if hovered or active or self.state.flying else None
-        if self._drags_split(hovered, active):
+        drawing = self.region.handle(active)
+        if drawing or self._drags_split(hovered, active):
             pose = None
         if pose is not None:
             self._navigation.handle(pose, hovered, active)
-        if self._clicks.clicked(active) and not (self.state.flying or self.state.shown_pair() is not None):
+        if self._clicks.clicked(active) and not (drawing or self.state.flying or self.state.shown_pair() is not None):
             self._pin()
         draw_hud(self, hovered and not self.alone)
         self.draw_toasts()
