@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.energy import Energy
 from pmviewer.engine.inspection import Inspection
+from pmviewer.engine.remaining import Remaining
 from pmviewer.output.diagnostic_views import HELD_WHILE_SHOWN
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.planes import MEDIA_CHANNELS, beauty_of, view_of
@@ -73,6 +74,8 @@ class Statistics:
     """What became of the photons that arrived in the latest pass, by map; empty where all are stored."""
     clamped: float = 0.0
     """Share of the light from virtual lights that clamping took, 0 without."""
+    remaining: Remaining | None = None
+    """Estimate of the picture's error; None before the second pass and where passes don't tell it."""
     importons: int = 0
     """Importons traced for the importance maps of the latest pass, 0 without; `stored_in_pass` tells how many are
     stored."""

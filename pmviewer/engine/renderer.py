@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.automatic import automatic_values
 from pmviewer.engine.diagnose import Looked, inspected
 from pmviewer.engine.exposure import metered
@@ -85,6 +86,7 @@ class Renderer:
         self.plan: Plan = plan or plan_of(settings, scene.traits)
         self.facts = Facts(settings, self.plan, scene.traits)
         self.film = film_of(settings, self.plan, self.camera.width, self.camera.height)
+        self.error = ErrorEstimate(self.camera.width, self.camera.height, settings, self.plan)
         self.first_radius = (
             first_radius(scene.flat, self.render_camera, settings.estimate, self.plan.gather)
             if self.plan.photons
@@ -116,7 +118,12 @@ class Renderer:
     def stops_by(self, settings: Settings) -> bool:
         """Whether a stop rule of these settings holds, which may differ from the renderer's own in nothing else."""
         render = settings.render
-        return self.passes >= render.passes or 0 < render.time_limit <= self.tally.seconds
+        if self.passes >= render.passes or 0 < render.time_limit <= self.tally.seconds:
+            return True
+        if render.error <= 0:
+            return False
+        remaining = self.error.latest
+        return remaining is not None and remaining.relmse <= render.error
 
     def step(self) -> None:
         """Render the next pass into the film.
@@ -126,6 +133,7 @@ class Renderer:
         start = time.perf_counter()
         self._pass(self.film, self.camera, self.passes, self.settings.photons.N)
         self.film.passes += 1
+        self.tally.timed(self.pool, "error estimate", lambda: self.pool.run([lambda: self.error.add(self.film)]))
         self.tally.seconds += time.perf_counter() - start
 
     def photons_alone(self, passes: int) -> PhotonMaps | None:
@@ -178,7 +186,11 @@ class Renderer:
         looked = self._looked(film)
         inspection = inspected(wanted or wanted_of(self.facts), looked, self.pool)
         made = replace(frame_of(looked, self.tally, inspection), serial=serial, version=self.version, coarse=coarse)
-        return replace(made, automatic=automatic_values(looked, self.settled_radius))
+        return replace(
+            made,
+            automatic=automatic_values(looked, self.settled_radius),
+            statistics=replace(made.statistics, remaining=None if coarse else self.error.latest),
+        )
 
     def _looked(self, film: Film) -> Looked:
         stages = self.light, self.importance, self.latest

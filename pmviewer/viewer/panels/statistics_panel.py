@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 
 from pmviewer.engine.energy import ENTRIES, Energy
 from pmviewer.engine.frame import Statistics
+from pmviewer.engine.remaining import Remaining
 from pmviewer.viewer import theme
 from pmviewer.viewer.comparison import Point
 from pmviewer.viewer.format import data_size, duration, grouped, si
@@ -97,6 +98,15 @@ def convergence_rows(s: Statistics) -> Rows:
     ]
 
 
+def remaining_rows(found: Remaining) -> Rows:
+    """The estimate of the picture's error, with the interval that holds in nine pictures of ten."""
+    return [
+        ("relMSE, about", f"{found.relmse:.2e}"),
+        ("in nine of ten", f"{found.low:.1e} – {found.high:.1e}"),
+        ("of it bias", "not measured" if found.bias is None else f"{found.bias:.1e}"),
+    ]
+
+
 def reference_rows(point: Point) -> Rows:
     """The errors of the pass that was last measured against the reference."""
     return [
@@ -141,6 +151,8 @@ class StatisticsPanel:
             name: f"{duration(t)}  {t / total:4.0%}" if total else duration(t) for name, t in s.stage_seconds.items()
         }
         table("CPU time by stage", sorted(share.items(), key=lambda row: -s.stage_seconds[row[0]]))
+        if s.remaining is not None:
+            table("Estimated error", remaining_rows(s.remaining))
         if error is not None:
             table("Against the reference", reference_rows(error))
         for name, why in s.skipped:
