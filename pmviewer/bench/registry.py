@@ -17,6 +17,7 @@ BENCHES: dict[str, tuple[str, str]] = {
     "lookup": ("Photon look-ups against scipy's cKDTree (P7)", "pmviewer.bench.measures.lookup:run"),
     "photons": ("Photons per second and bytes per photon (P8, P13)", "pmviewer.bench.measures.photons:run"),
     "error": ("Error against CPU time on the bundled scenes (P1–P5)", "pmviewer.bench.measures.error:run"),
+    "auto": ("Automatic mode: against Mitsuba, and errors asked for (P17, P21)", "pmviewer.bench.measures.auto:run"),
     "mitsuba": ("Agreement with Mitsuba 3 on the same files, block by block", "pmviewer.bench.measures.mitsuba:run"),
     "agree": ("Random scenes: every method against Mitsuba 3 and the others", "pmviewer.bench.agree.bench:run"),
     "files": ("Real files of a folder: which open, and against Mitsuba 3", "pmviewer.bench.files.bench:run"),

@@ -69,15 +69,14 @@ def render_job(
     view = _view(settings, opened)
     if denoise and (reason := inactive_reason(f"display.view={DENOISED}", settings, opened.traits)) is not None:
         raise SettingError(f"--denoise: {reason}")
-    pool = WorkPool(threads)
+    pool, bias = WorkPool(threads), None
     try:
-        bias = None
         if wants_choice(stop, job.settings):
             settings, bias = with_choice(opened, settings, pool)
         frame = _rendered(opened, settings, pool, target, denoise, bias)
     finally:
         pool.close()
-    if said := remaining_report(frame.statistics):
+    if (stats or settings.render.error > 0 or bias is not None) and (said := remaining_report(frame.statistics)):
         print(said)
     if said := pass_report(frame.statistics):
         print(said)

@@ -46,6 +46,7 @@ from pmviewer.render.film import Film
 from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.gather.gather_points import POINT_COLUMNS
 from pmviewer.render.given import PassData
+from pmviewer.render.moments import Moments
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, RADIUS, first_radii, shrink
 from pmviewer.settings.access import Settings
 from pmviewer.settings.needs import Facts
@@ -86,6 +87,8 @@ class Renderer:
         self.plan: Plan = plan or plan_of(settings, scene.traits)
         self.facts = Facts(settings, self.plan, scene.traits)
         self.film = film_of(settings, self.plan, self.camera.width, self.camera.height)
+        if self.plan.moments:
+            self.film.moments = Moments(len(self.film.sums))
         self.error = ErrorEstimate(self.camera.width, self.camera.height, settings, self.plan)
         self.first_radius = (
             first_radius(scene.flat, self.render_camera, settings.estimate, self.plan.gather)
@@ -133,7 +136,9 @@ class Renderer:
         start = time.perf_counter()
         self._pass(self.film, self.camera, self.passes, self.settings.photons.N)
         self.film.passes += 1
-        self.tally.timed(self.pool, "error estimate", lambda: self.pool.run([lambda: self.error.add(self.film)]))
+        if self.film.moments is not None:
+            self.film.moments.close_pass()
+        self.error.add(self.film)
         self.tally.seconds += time.perf_counter() - start
 
     def photons_alone(self, passes: int) -> PhotonMaps | None:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
+from pmviewer.render.moments import Moments
 from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS, PLANES, TERMS
 
 LEAST_WEIGHT = 0.5
@@ -33,13 +34,14 @@ class Film:
     `radii` of the pixels' look-ups in the latest pass
     (`pmviewer.render.pixel_radius`), None where all have that of the pass; `weights` (height·width, 2) float64, sums
     of what samples count by a filter with negative parts (`pmviewer.render.filter`), in the term emission and in all
-    others, None where each counts 1."""
+    others, None where each counts 1; `moments`, what passes tell of the noise, None where nobody keeps them."""
 
     def __init__(self, width: int, height: int, further: int = 0, channels: int = CHANNELS) -> None:
         self.width, self.height, self.channels = width, height, channels
         self.sums: NDArray[np.float64] = np.zeros((width * height, channels + further), np.float64)
         self.radii: NDArray[np.float32] | None = None
         self.weights: NDArray[np.float64] | None = None
+        self.moments: Moments | None = None
         self.passes = 0
 
     def planes(self) -> NDArray[np.float32]:

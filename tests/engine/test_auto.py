@@ -20,6 +20,7 @@ from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.output.metric import EPSILON
 from pmviewer.render.film import Film
+from pmviewer.render.moments import Moments
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import SETTINGS, Settings, flat, with_values
 
@@ -91,18 +92,31 @@ def test_a_trial_picks_settings_that_alone_give_the_same_picture(cornell):
     assert found[0].name in found[0].sentences[0]
 
 
+def noted(width: int, height: int) -> Film:
+    film = Film(width, height)
+    film.moments = Moments(width * height)
+    return film
+
+
+def add(film: Film) -> None:
+    """What was added to the sums is a pass."""
+    film.moments.add(film.sums, film.channels, 0, len(film.sums))
+    film.moments.close_pass()
+    film.passes += 1
+
+
 @pytest.mark.parametrize("passes", [2, 8, 24, 100])
 def test_independent_passes_have_the_error_that_they_are_estimated_to_have(cornell, passes):
     """Against made-up noise of known variance on a known picture."""
     rng = np.random.default_rng(passes)
     w = h = 64
     truth = np.full((h * w, 3), 0.7)
-    film = Film(w, h)
+    film = noted(w, h)
     error = ErrorEstimate(w, h, Settings(), plan_of(Settings(), cornell.traits))
     for _ in range(passes):
         film.sums[:, 0:3] += 0.25 * truth
         film.sums[:, 12:15] += 0.75 * truth + rng.normal(0, 0.3, truth.shape)
-        film.passes += 1
+        add(film)
         error.add(film)
     expected = 0.09 / passes / (0.49 + EPSILON)
     assert error.latest is not None
@@ -112,13 +126,13 @@ def test_independent_passes_have_the_error_that_they_are_estimated_to_have(corne
 
 def test_one_bright_pixel_does_not_hide_in_its_own_brightness(cornell):
     """A pixel that is a hundred times too bright once is wrong by far more than its own size says."""
-    film = Film(32, 32)
+    film = noted(32, 32)
     error = ErrorEstimate(32, 32, Settings(), plan_of(Settings(), cornell.traits))
     for i in range(2):
         film.sums[:, 0:3] += 1.0
         if i:
             film.sums[300, 0:3] += 100.0
-        film.passes += 1
+        add(film)
         error.add(film)
     alone = 50.0**2 / 51.0**2 / 1024
     assert error.latest is not None

@@ -27,7 +27,6 @@ from pmviewer.engine.method import Plan
 from pmviewer.engine.remaining import Remaining
 from pmviewer.output.metric import EPSILON
 from pmviewer.render.film import Film
-from pmviewer.render.planes import PLANES, terms_of
 from pmviewer.settings.access import Settings
 
 POWERS = (1.5, 1.0)
@@ -63,7 +62,7 @@ class ErrorEstimate:
 
     def __init__(self, width: int, height: int, settings: Settings, plan: Plan) -> None:
         self._size = width, height
-        self.tells = not plan.virtual and settings.photons.renew == "each pass"
+        self.tells = plan.moments and settings.photons.renew == "each pass"
         self.bias: Callable[[int], float] | None = None
         shrinks = plan.shown_directly | plan.caustic_mask | plan.volume and settings.estimate.alpha < 1.0
         self._powers = (*POWERS, SHRINKING) if shrinks else POWERS
@@ -75,12 +74,10 @@ class ErrorEstimate:
     def add(self, film: Film) -> None:
         """After each pass of the film. Others than those of the module's list are only counted."""
         n = self._passes = film.passes
-        if not self.tells or not _is_level(n):
+        if not self.tells or film.moments is None or not _is_level(n):
             return
         w, h = self._size
-        total = np.zeros((h, w, 3))
-        for term in terms_of(film.channels):
-            total += film.sums[:, PLANES[term]].reshape(h, w, 3)
+        total = film.moments.image.reshape(h, w, 3).copy()
         half = self._sums.pop(n // 2, None) if n % 2 == 0 else None
         if half is not None:
             self._levels.append(_level(half, total, n // 2))

@@ -10,8 +10,8 @@ from pmviewer.settings.schema.base import Auto, Group, setting
 FOLLOWED_OR_PATHS = Need(lambda f: f.plan.path or FOLLOWED.holds(f), "No mirror or glass in this scene.")
 NO_PATHS = Need(lambda f: not f.plan.path, "The path tracer treats all pixels alike.")
 TELLS_ERROR = Need(
-    lambda f: not f.plan.virtual and f.settings.photons.renew == "each pass",
-    "Passes don't tell their error: they share one photon map, or virtual lights.",
+    lambda f: f.plan.moments and f.settings.photons.renew == "each pass",
+    "Passes don't tell their error: they share one photon map, or divide sums.",
 )
 TWO_WAYS = Need(
     lambda f: f.settings.render.method in ("progressive", "gather", "virtual lights"),
