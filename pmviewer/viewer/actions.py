@@ -71,6 +71,7 @@ class Commands:
             **{f"toggle_{o.name}": partial(self._toggle, f"overlays.{o.name}.show") for o in SWITCHED},
             "fit_picture": self._fit,
             "compare_importance": self._compare_importance,
+            "choose_automatically": state.automatic.start,
             "toggle_fly": self._toggle_fly,
             "frame_all": self._frame_all,
             "reset_camera": self._reset_camera,
