@@ -61,6 +61,12 @@ BENCHES: dict[str, tuple[str, str]] = {
     "stress": ("Extremes of every kind: finite, unbiased or said so, bounded", "pmviewer.bench.stress.suite:run"),
     "load": ("Opening large PLY, OBJ and STL files against Mitsuba and Embree", "pmviewer.bench.measures.load:run"),
     "projection": ("Caustic photons by projection maps (T7)", "pmviewer.bench.measures.projection:run"),
+    "threads": (
+        "Two threads against one, serial share by stage (P19)",
+        "pmviewer.bench.measures.threads:run",
+    ),
+    "all": ("Every bench, each in its own process, within 40 minutes", "pmviewer.bench.measures.everything:run"),
+    "report": ("The page of what bench all has found", "pmviewer.bench.measures.everything:report"),
 }
 """Name: what it measures, and where its function is."""
 
