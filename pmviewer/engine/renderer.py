@@ -106,6 +106,7 @@ class Renderer:
         self.shadows = ShadowStage(scene, settings, pool, store, self.tally)
         self.virtual = VirtualStage(scene, settings, pool, store, self.tally)
         self.latest: RenderedPass | None = None
+        self._outline: NDArray[np.uint8] | None = None
         self._watched = Watched()
 
     @property
@@ -236,7 +237,9 @@ class Renderer:
     def _eye_pass(self, given: PassData, film: Film) -> None:
         outline = np.zeros(0, np.uint8)
         if not self.plan.path:
-            outline = outline_of(self.scene, self.camera, film, self.settings, self.store)
+            if self._outline is None:  # the store may keep nothing
+                self._outline = outline_of(self.scene, self.camera, film, self.settings, self.store)
+            outline = self._outline
         self.tally.add_counts(render_into(film, given, outline, self.plan, self.pool))
 
     def _radii_of_pixels(self, film: Film, index: int) -> dict[str, float]:

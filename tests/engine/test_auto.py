@@ -46,12 +46,12 @@ def test_a_user_s_own_settings_of_the_method_are_told():
 
 def test_what_the_model_promises_is_what_sums_over_passes_say():
     """Against sums written out by Knaus and Zwicker's recurrence."""
-    m = Measured(PROGRESSIVE, Costs(0.1, 1e-6, 0.0), eye=0.02, photons=300.0, bias2=1e-4, radius=0.01)
+    m = Measured(PROGRESSIVE, Costs(0.1, 1e-6, 0.0), eye=0.02, photons=300.0, bias2=1e-4, radius=0.01, blurs=True)
     area, areas = 1.0, []
     for i in range(1, 21):
         areas.append(area)
         area *= (i + 2 / 3) / (i + 1)
-    noise = 0.02 / 20 + 300.0 / 50_000 / 4 * sum(1 / a for a in areas) / 400
+    noise = 0.02 / 20**1.25 + 300.0 / 50_000 / 4 * sum(1 / a for a in areas) / 400
     bias = 1e-4 * 2**3 * (sum(a**0.75 for a in areas) / 20) ** 2
     assert error_after(m, 50_000, 2.0, 20) == pytest.approx(noise + bias, rel=1e-6)
     assert seconds_to(m, 50_000, 2.0, noise + bias) == pytest.approx(20 * 0.15, rel=1e-3)

@@ -17,8 +17,8 @@ GUIDED_FROM = 100.0
 
 @dataclass(frozen=True)
 class Candidate:
-    """`values` by full name, beside the defaults of what automatic mode sets. `shrinks` tells whether look-ups at what
-    pixels see blur, ever less from pass to pass."""
+    """`values` by full name, beside the defaults of what automatic mode sets. `shrinks` tells whether the radius
+    decides about nearly all of its light, so that other radii are worth a thought."""
 
     name: str
     values: Mapping[str, Any]

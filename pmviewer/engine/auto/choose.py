@@ -20,7 +20,7 @@ SHARE = 0.1
 """Of the time asked for, what a trial may take."""
 USUAL = 10.0
 """CPU seconds that are planned for where nobody gives any."""
-BETTER = 0.9
+BETTER = 0.87
 """What another way must promise of the default's error to be taken: less is within the trial's own noise."""
 NEARLY = 1.07
 """What of the least error counts as the same."""

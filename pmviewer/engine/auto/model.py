@@ -1,7 +1,8 @@
 """What the trial's figures promise for a given time: error over N, radius and passes.
 
-The variance of the mean of n passes is eye/n plus the photons' part; where look-ups shrink, the variance of pass i goes
-with r²₁/r²ᵢ, and its bias with r²ᵢ/r²₁ (Knaus and Zwicker 2011, §3).
+The variance of the mean of n passes is that of the camera rays, whose numbers complement one another from pass to pass,
+eye/n^1.25, plus the photons' part, which falls as 1/n. Where look-ups shrink, the photons' variance in pass i goes with
+r²₁/r²ᵢ, as for Knaus & Zwicker 2011, and bias with a power of rᵢ/r₁.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from pmviewer.engine.auto.trial import ORDER, Measured
 from pmviewer.maps.radius import progressive_radius
 
 PHOTONS = (12_500, 25_000, 50_000, 100_000, 150_000, 200_000, 300_000, 600_000, 1_200_000, 2_400_000)
-WIDTHS = (0.5, 2**-0.5, 1.0, 2**0.5, 2.0)
+COMPLEMENT = 1.25
+"""Power that the camera rays' part falls with: measured over the bundled scenes."""
+WIDTHS = (2**-0.5, 1.0, 2**0.5)
 """Radii that are tried, relative to the automatic one."""
 FEWEST = 4
 """Passes: a picture of fewer says nothing of its own error."""
@@ -60,8 +63,9 @@ def error_after(m: Measured, N: int, width: float, passes: float) -> float:
     noisier, photons = 1.0, m.photons / N
     if m.candidate.shrinks:
         photons /= width**2
+    if m.blurs:
         noisier = _mean(_sums()[0], passes, 1 / 3)
-    return (m.eye + photons * noisier) / passes + bias_after(m, width, passes)
+    return m.eye / passes**COMPLEMENT + photons * noisier / passes + bias_after(m, width, passes)
 
 
 def bias_after(m: Measured, width: float, passes: float) -> float:

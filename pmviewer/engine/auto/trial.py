@@ -37,8 +37,11 @@ F8 = NDArray[np.float64]
 
 FEWER = 4
 """Photons of the larger trial pass over those of the smaller one."""
-OUTLIERS = 0.002
+OUTLIERS = 0.0005
 """Share of the noisiest pixels that say nothing in two passes."""
+RARE = 2.0
+"""What the photons' variance of a few small pictures is multiplied by: photons that are rare and bright are missing in
+nearly all of them, and make half of the error of a long picture (measured on cornell_glossy, office, museum)."""
 BLOCK = 4
 """What interpolation does is compared in blocks of so many pixels squared: its bias is smooth, noise is not. Pictures
 with two radii have the same photons and camera rays, and little noise in their difference."""
@@ -78,6 +81,8 @@ class Measured:
     radius: float
     interpolated: bool = False
     """Whether the bias is that of interpolation."""
+    blurs: bool = False
+    """Whether pixels look photons up within a radius that shrinks: the global map, or caustics beside a gather."""
 
 
 @dataclass
@@ -148,7 +153,7 @@ def trial(
         if candidate is CACHE and gathers is not None:
             interpolated = _bias2(found[0].images, gathers[1][0].images, mean, BLOCK)
         measured = _measured(candidate, found, radius, mean, scale, max(bias2, interpolated))
-        result.measured.append(replace(measured, interpolated=interpolated > bias2))
+        result.measured.append(replace(measured, interpolated=interpolated > bias2, blurs=name in wide))
     result.seconds, result.cpu_seconds = time.perf_counter() - started, pool.cpu_seconds - before
     return result
 
@@ -180,6 +185,7 @@ def _measured(candidate: Candidate, runs: list[_Run], radius: float, mean: F8, s
         photons = max(variances[1] - variances[0], 0.0) / (1 / few.N - 1 / many.N)
         photons = min(photons, variances[0] * many.N)
         eye = variances[0] - photons / many.N
+        photons *= RARE
     return Measured(candidate, _costs(runs, scale), eye, photons, bias2, radius)
 
 
