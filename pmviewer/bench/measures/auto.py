@@ -33,7 +33,7 @@ RUN_SCENES = ("cornell_diffuse", "cornell_caustic", "cornell_glossy", "colonnade
 RUNS, QUICK_RUNS = 25, 6
 """With different seeds on each of these scenes."""
 SIDE = 64
-ASKED = (1e-2, 4e-3)
+ASKED = (3e-3, 1e-3)
 TRUTH_PASSES = 600
 NEAR = 0.3
 """How far from the error that was asked for the one reached may be."""

@@ -22,7 +22,7 @@ USUAL = 10.0
 """CPU seconds that are planned for where nobody gives any."""
 BETTER = 0.87
 """What another way must promise of the default's error to be taken: less is within the trial's own noise."""
-NEARLY = 1.07
+NEARLY = 1.2
 """What of the least error counts as the same."""
 PER_PHOTON, PER_PIXEL = 1.5e-6, 6e-6
 """CPU seconds of a trial by trajectory and by pixel and candidate: what its size is planned by, clock or no clock."""
