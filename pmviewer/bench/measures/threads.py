@@ -24,7 +24,7 @@ from pmviewer.engine.store import StageStore
 from pmviewer.progress import available_threads
 from pmviewer.settings.access import Settings, with_values
 
-CASES = (
+CASES: tuple[tuple[str, dict[str, Any]], ...] = (
     ("cornell_caustic", {}),
     ("rooms_10x10", {}),
     ("cornell_caustic", {"render.method": "gather"}),
@@ -62,7 +62,7 @@ class WatchedPool(WorkPool):
         self._name, self._since = BETWEEN, time.thread_time()
         super().__init__(threads)
 
-    @property  # type: ignore[override]
+    @property
     def stage(self) -> str:
         """The one that runs."""
         return self._name

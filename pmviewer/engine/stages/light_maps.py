@@ -174,8 +174,8 @@ class MapBuilder:
         key = "radiance photons", traced.key, estimate, gather.radiance_photons, gather.cutoff, global_.radius
         make = partial(radiance_photons_of, traced.photons, global_, self.settings, light)
         if not light.kept:
-            return self.pool.run([make])[0]  # type: ignore[no-any-return]
-        return self._kept(light, key, make, lambda made: made[0].bytes)  # type: ignore[no-any-return]
+            return self.pool.run([make])[0]
+        return self._kept(light, key, make, lambda made: made[0].bytes)
 
     def _guides(self, light: LightPlan, traced: TracedPass, radius: float | None) -> PhotonGrid | None:
         """The pass's photons that guide gather rays, None where none do."""
