@@ -139,7 +139,7 @@ class Renderer:
         self.film.passes += 1
         if self.film.moments is not None:
             self.film.moments.close_pass()
-        self.error.add(self.film)
+        self.error.add(self.film, self.pool.run)
         self.tally.seconds += time.perf_counter() - start
 
     def photons_alone(self, passes: int) -> PhotonMaps | None:

@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ from pmviewer.engine.remaining import Remaining
 from pmviewer.output.metric import EPSILON
 from pmviewer.render.film import Film
 from pmviewer.settings.access import Settings
+from pmviewer.tasks import Runner, in_turn
 
 POWERS = (1.5, 1.0)
 SHRINKING = 2.0 / 3.0
@@ -71,8 +73,8 @@ class ErrorEstimate:
         self._levels: list[_Level] = []
         self._passes = 0
 
-    def add(self, film: Film) -> None:
-        """After each pass of the film. Others than those of the module's list are only counted."""
+    def add(self, film: Film, run: Runner = in_turn) -> None:
+        """After each pass of the film. Others than those of the module's list are only counted. `run` does tasks."""
         n = self._passes = film.passes
         if not self.tells or film.moments is None or not _is_level(n):
             return
@@ -80,7 +82,7 @@ class ErrorEstimate:
         total = film.moments.image.reshape(h, w, 3).copy()
         half = self._sums.pop(n // 2, None) if n % 2 == 0 else None
         if half is not None:
-            self._levels.append(_level(half, total, n // 2))
+            self._levels.append(_level(half, total, n // 2, run))
         self._sums[n] = total
 
     @property
@@ -107,12 +109,16 @@ def _is_level(n: int) -> bool:
     return n & (n - 1) == 0 or (n % 3 == 0 and (n // 3) & (n // 3 - 1) == 0)
 
 
-def _level(first: F8, total: F8, m: int) -> _Level:
+def _level(first: F8, total: F8, m: int, run: Runner) -> _Level:
     """D of m passes, whose sum is `first`, against the m passes after them; `total` is the sum of both."""
-    square = (2 * first - total) ** 2 / (2 * m * m)
-    mean = total / (2 * m)
-    around = np.min([uniform_filter(mean, (size, size, 0)) for size in AROUND], axis=0)
-    plane = (square / (around**2 + EPSILON)).mean(axis=2)
+
+    def of_channel(c: int) -> F8:
+        mean = total[..., c] / (2 * m)
+        around = np.minimum(*(uniform_filter(mean, size) for size in AROUND))
+        square: F8 = (2 * first[..., c] - total[..., c]) ** 2 / (2 * m * m)
+        return square / (around**2 + EPSILON)
+
+    plane = np.mean(run([partial(of_channel, c) for c in range(3)]), axis=0)
     blocks = _block_means(plane)
     D = float(plane.mean())
     return _Level(m, D, float(blocks.std()) / math.sqrt(blocks.size) / D if D > 0 else 0.0)
