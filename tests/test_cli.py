@@ -120,6 +120,8 @@ def test_search_path_finds_what_a_scene_names(tmp_path, capsys, monkeypatch):
         (["render", "cornell_diffuse", "-o", "x.exr", "--set", "photons.M=3"], "photons.M"),
         (["render", "cornell_diffuse", "-o", "x.exr", "--set", "photons.N=none"], "whole number"),
         (["render", "cornell_diffuse", "-o", "x.exr", "--passes", "2", "--time", "2"], "exclude"),
+        (["render", "cornell_diffuse", "-o", "x.exr", "--passes", "2", "--error", "0.1"], "exclude"),
+        (["render", "cornell_diffuse", "-o", "x.exr", "--auto", "--set", "photons.N=9"], "chooses photons.N itself"),
         (["render", "cornell_diffuse", "-o", "x.exr", "-D", "res"], "name=value"),
         (["render", "cornell_diffuse", "-o", "x.exr", "--size", "16x16", "--reference", "auto"], "256×256"),
         (["render", "cornell_diffuse", "-o", "x.exr", "--reference", "no.exr"], "no.exr"),

@@ -17,6 +17,7 @@ BENCHES: dict[str, tuple[str, str]] = {
     "lookup": ("Photon look-ups against scipy's cKDTree (P7)", "pmviewer.bench.measures.lookup:run"),
     "photons": ("Photons per second and bytes per photon (P8, P13)", "pmviewer.bench.measures.photons:run"),
     "error": ("Error against CPU time on the bundled scenes (P1–P5)", "pmviewer.bench.measures.error:run"),
+    "auto": ("Automatic mode: against Mitsuba, and errors asked for (P17, P21)", "pmviewer.bench.measures.auto:run"),
     "mitsuba": ("Agreement with Mitsuba 3 on the same files, block by block", "pmviewer.bench.measures.mitsuba:run"),
     "agree": ("Random scenes: every method against Mitsuba 3 and the others", "pmviewer.bench.agree.bench:run"),
     "files": ("Real files of a folder: which open, and against Mitsuba 3", "pmviewer.bench.files.bench:run"),
@@ -60,6 +61,12 @@ BENCHES: dict[str, tuple[str, str]] = {
     "stress": ("Extremes of every kind: finite, unbiased or said so, bounded", "pmviewer.bench.stress.suite:run"),
     "load": ("Opening large PLY, OBJ and STL files against Mitsuba and Embree", "pmviewer.bench.measures.load:run"),
     "projection": ("Caustic photons by projection maps (T7)", "pmviewer.bench.measures.projection:run"),
+    "threads": (
+        "Two threads against one, serial share by stage (P19)",
+        "pmviewer.bench.measures.threads:run",
+    ),
+    "all": ("Every bench, each in its own process, within 40 minutes", "pmviewer.bench.measures.everything:run"),
+    "report": ("The page of what bench all has found", "pmviewer.bench.measures.everything:report"),
 }
 """Name: what it measures, and where its function is."""
 

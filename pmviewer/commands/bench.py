@@ -10,7 +10,7 @@ import typer
 
 def bench(
     name: Annotated[str, typer.Argument(help="A bench's name, or list.")] = "list",
-    folder: Annotated[Path | None, typer.Argument(help="Of files: the folder with scene files.")] = None,
+    folder: Annotated[Path | None, typer.Argument(help="Of files: of scene files; of report: of results.")] = None,
     quick: Annotated[bool, typer.Option(help="Fewer rounds and smaller inputs.")] = False,
     csv: Annotated[Path | None, typer.Option(help="Also write the table as CSV.")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Also write the table as Markdown.")] = None,
@@ -22,7 +22,8 @@ def bench(
         int | None, typer.Option(min=0, help="Of agree: the number to begin with, to go on with a run of before.")
     ] = None,
     keep: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Of agree and hostile: where scenes go that fail.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Of agree and hostile: where failing scenes go; of all: results."),
     ] = None,
     json: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Of files: keep results here, and go on with those kept.")

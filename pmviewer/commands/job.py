@@ -61,13 +61,31 @@ def _definition(text: str) -> tuple[str, str]:
     return name, value
 
 
+@dataclass(frozen=True)
+class Stop:
+    """When a rendering stops: after passes, after seconds, at an estimated error (relMSE); and whether automatic mode
+    chooses how it renders, None for where that suits."""
+
+    passes: int | None = None
+    seconds: float | None = None
+    error: float | None = None
+    auto: bool | None = None
+
+
 def overrides(
-    passes: int | None, seconds: float | None, size: str | None, seed: int | None, session_passes: int | None
+    passes: int | None,
+    seconds: float | None,
+    size: str | None,
+    seed: int | None,
+    session_passes: int | None,
+    error: float | None = None,
 ) -> dict[str, object]:
     """Settings by the command line's other options. Raises SettingError."""
     values: dict[str, object] = {}
-    if seconds is not None:
-        values["render.time_limit"] = seconds
+    if error is not None:
+        values["render.error"] = error
+    if seconds is not None or error is not None:
+        values["render.time_limit"] = seconds or 0.0
         values["render.passes"] = 1_000_000
     else:
         values["render.passes"] = passes or session_passes or DEFAULT_PASSES

@@ -7,10 +7,11 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from pmviewer.commands.job import Job, check_output, overrides
+from pmviewer.commands.choosing import wants_choice, with_choice
+from pmviewer.commands.job import DEFAULT_PASSES, Job, Stop, check_output, overrides
 from pmviewer.commands.patience import patiently, print_warnings
 from pmviewer.commands.progress_bar import progress_bar
-from pmviewer.commands.statistics import pass_report, statistics_report
+from pmviewer.commands.statistics import pass_report, remaining_report, statistics_report
 from pmviewer.engine.ahead.beside import beside
 from pmviewer.engine.comparison.reference import reference_for
 from pmviewer.engine.effects import inactive_reason
@@ -26,18 +27,20 @@ from pmviewer.output.compare import ERROR_COLUMNS, Reference, error_row
 from pmviewer.output.diagnostic_views import DENOISED, HELD_WHILE_SHOWN
 from pmviewer.output.frame_export import LAYERS, VOLUME_LAYERS, write_frame_exr, write_frame_png
 from pmviewer.output.metric import metrics
+from pmviewer.output.session_file import write_session
 from pmviewer.progress import watched
 from pmviewer.settings.access import Settings, with_values
 
-FORMATS = (".exr", ".png")
+FORMATS = (".exr", ".png", ".toml")
+STOPS = {"render.time_limit": 0.0, "render.error": 0.0, "render.passes": DEFAULT_PASSES}
+"""In a session file the number of passes alone says when to stop: it gives the same picture again."""
 
 
 def render_job(
     job: Job,
     outputs: list[Path],
     *,
-    passes: int | None = None,
-    seconds: float | None = None,
+    stop: Stop | None = None,
     size: str | None = None,
     threads: int | None = None,
     seed: int | None = None,
@@ -55,7 +58,8 @@ def render_job(
     """
     for path in outputs:
         check_output(path, FORMATS)
-    settings = with_values(job.settings, overrides(passes, seconds, size, seed, job.passes))
+    stop = stop or Stop()
+    settings = with_values(job.settings, overrides(stop.passes, stop.seconds, size, seed, job.passes, stop.error))
     with patiently() as tell, watched(tell, threads=threads):
         opened = open_scene(job.scene, job.parameters, arrangement_of(settings), beside(settings, threads))
     print_warnings(opened.scene.warnings, opened.scene.dropped)
@@ -65,7 +69,15 @@ def render_job(
     view = _view(settings, opened)
     if denoise and (reason := inactive_reason(f"display.view={DENOISED}", settings, opened.traits)) is not None:
         raise SettingError(f"--denoise: {reason}")
-    frame = _rendered(opened, settings, threads, target, denoise)
+    pool, bias = WorkPool(threads), None
+    try:
+        if wants_choice(stop, job.settings):
+            settings, bias = with_choice(opened, settings, pool)
+        frame = _rendered(opened, settings, pool, target, denoise, bias)
+    finally:
+        pool.close()
+    if (stats or settings.render.error > 0 or bias is not None) and (said := remaining_report(frame.statistics)):
+        print(said)
     if said := pass_report(frame.statistics):
         print(said)
     if stats:
@@ -74,6 +86,9 @@ def render_job(
     for path in outputs:
         if path.suffix.lower() == ".exr":
             write_frame_exr(path, frame, half=half)
+        elif path.suffix.lower() == ".toml":
+            stored = with_values(frame.settings, STOPS)
+            write_session(path, stored, job.scene, frame.statistics.passes, job.parameters)
         else:
             write_frame_png(path, frame, view=view)
         print(f"wrote {path}")
@@ -81,23 +96,24 @@ def render_job(
 
 
 def _rendered(
-    opened: OpenScene, settings: Settings, threads: int | None, target: Reference | None, denoise: bool
+    opened: OpenScene,
+    settings: Settings,
+    pool: WorkPool,
+    target: Reference | None,
+    denoise: bool,
+    bias: Callable[[int], float] | None,
 ) -> Frame:
-    pool = WorkPool(threads)
-    try:
-        renderer = Renderer(opened, settings, pool, StageStore(0))
-        if opened.scene.exposure is None and settings.display.exposure == "auto":
-            renderer.coarse_frame(0)  # as in the window it decides the exposure
-        _run(renderer, pool, None if target is None else partial(_print_error, target))
-        wanted = wanted_of(renderer.facts)
-        return renderer.frame(1, replace(wanted, denoised=True) if denoise else wanted)
-    finally:
-        pool.close()
+    renderer = Renderer(opened, settings, pool, StageStore(0))
+    renderer.error.bias = bias
+    if opened.scene.exposure is None and settings.display.exposure == "auto":
+        renderer.coarse_frame(0)  # as in the window it decides the exposure
+    _run(renderer, pool, None if target is None else partial(_print_error, target))
+    wanted = wanted_of(renderer.facts)
+    return renderer.frame(1, replace(wanted, denoised=True) if denoise else wanted)
 
 
 def _run(renderer: Renderer, pool: WorkPool, measure: Callable[[Renderer], None] | None) -> None:
     """Render until a stop rule holds; `measure` is called after passes 1, 2, 4, … and the last one."""
-    render = renderer.settings.render
     with progress_bar(remaining=True) as bar:
         prepare(renderer.scene, renderer.settings, pool, bar.update)
         bar.restart("rendering")
@@ -105,10 +121,18 @@ def _run(renderer: Renderer, pool: WorkPool, measure: Callable[[Renderer], None]
             renderer.step()
             if measure is not None and (renderer.passes & (renderer.passes - 1) == 0 or renderer.finished):
                 measure(renderer)
-            share = renderer.passes / render.passes
-            if render.time_limit > 0:
-                share = renderer.tally.seconds / render.time_limit
-            bar.update(f"pass {renderer.passes}", min(share, 1.0))
+            bar.update(*_progress(renderer))
+
+
+def _progress(renderer: Renderer) -> tuple[str, float]:
+    """What is said of a pass that is through, and the share of all that is done by the rule that will stop it."""
+    render, remaining = renderer.settings.render, renderer.error.latest
+    share, said = renderer.passes / render.passes, f"pass {renderer.passes}"
+    if render.time_limit > 0:
+        share = max(share, renderer.tally.seconds / render.time_limit)
+    if render.error > 0 and remaining is not None:
+        share, said = max(share, render.error / remaining.relmse), f"{said}, relMSE {remaining.relmse:.1e}"
+    return said, min(share, 1.0)
 
 
 def _view(settings: Settings, opened: OpenScene) -> str:

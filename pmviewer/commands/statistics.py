@@ -39,6 +39,15 @@ def pass_report(s: Statistics) -> str:
     return "\n".join(lines)
 
 
+def remaining_report(s: Statistics) -> str:
+    """The estimate of the picture's error, "" without one."""
+    if s.remaining is None:
+        return ""
+    found = s.remaining
+    bias = "bias not measured" if found.bias is None else f"bias {found.bias:.1e} of it"
+    return f"relMSE about {found.relmse:.2g}, in nine of ten pictures {found.low:.2g} to {found.high:.2g}; {bias}"
+
+
 def _estimation(s: Statistics) -> str:
     """What became of the pixels with estimated gathers."""
     pixels, safe = sum(s.estimates[name] for name in ("safe", "critical", "other")), max(s.estimates["safe"], 1)

@@ -128,6 +128,8 @@ def diagnostic_planes(wanted: Wanted, looked: Looked, pool: WorkPool) -> dict[st
     if wanted.family == "estimation":
         estimates = looked.rendered.estimates
         return estimates.views() if estimates is not None else {}
+    if wanted.family == "noise":
+        return noise_plane(looked.film)
     channels = {**FAMILY_CHANNELS, "importance": IMPORTANCE_CHANNELS, "density": 1, "storing": 1}
     planes = _drawn(looked, channels[wanted.family], lambda out: _kernel(wanted, looked, out), pool)
 
@@ -155,6 +157,14 @@ def diagnostic_planes(wanted: Wanted, looked: Looked, pool: WorkPool) -> dict[st
             made["density ratio"] = ratio(made["achieved density"], required)
         return made
     return {"radiance photons": plane(0, 1, 2), "radiance cells": plane(3)}
+
+
+def noise_plane(film: Film) -> dict[str, NDArray[np.float32]]:
+    """Relative standard errors in percent; −1 before two passes and in coarse pictures."""
+    errors = np.full(film.width * film.height, -1.0)
+    if film.moments is not None:
+        errors = np.nan_to_num(100 * film.moments.relative_errors(), nan=-1.0)
+    return {"noise": errors.astype(np.float32).reshape(film.height, film.width, 1)}
 
 
 def _denoised(looked: Looked, pool: WorkPool) -> dict[str, NDArray[np.float32]]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.energy import Energy
 from pmviewer.engine.inspection import Inspection
+from pmviewer.engine.remaining import Remaining
 from pmviewer.output.diagnostic_views import HELD_WHILE_SHOWN
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.planes import MEDIA_CHANNELS, beauty_of, view_of
@@ -56,6 +57,9 @@ class Statistics:
     estimates: Mapping[str, int] = field(default_factory=dict)
     """Pixels of all passes by what the estimation of gathers made of them: safe, critical, other; of the safe ones
     gathered (sparse: on the undivided grid), interpolated, left. Empty without."""
+    noise: float | None = None
+    """What noise is expected to leave of the picture's relMSE, from how the passes differ
+    (`pmviewer.render.moments`); bias is none of it. None before two passes and where passes can't tell."""
     saved_rays: int = 0
     """Shadow rays that were not cast, because shadow photons knew."""
     seconds: float = 0.0
@@ -73,6 +77,8 @@ class Statistics:
     """What became of the photons that arrived in the latest pass, by map; empty where all are stored."""
     clamped: float = 0.0
     """Share of the light from virtual lights that clamping took, 0 without."""
+    remaining: Remaining | None = None
+    """Estimate of the picture's error; None before the second pass and where passes don't tell it."""
     importons: int = 0
     """Importons traced for the importance maps of the latest pass, 0 without; `stored_in_pass` tells how many are
     stored."""

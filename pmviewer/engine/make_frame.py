@@ -94,6 +94,7 @@ def _statistics(looked: Looked, tally: Tally, clouds: dict[str, PhotonCloud]) ->
         energy=energy,
         skipped=plan.skipped,
         estimates=dict(tally.estimates),
+        noise=film.moments.relmse() if film.moments is not None else None,
         clamped=film.lost if isinstance(film, WeightedFilm) else 0.0,
         importons=importance.traced if importance is not None else 0,
         warnings=_warnings(looked, tally, energy),

@@ -7,12 +7,14 @@ import ctypes
 import sys
 
 from pmviewer.errors import SceneError, SettingError
+from pmviewer.render.moments import BYTES_PER_PIXEL as OF_MOMENTS
 from pmviewer.render.planes import CHANNELS
 from pmviewer.resources import available_memory
 from pmviewer.scene.description import Scene
 
-BYTES_PER_PIXEL = CHANNELS * (8 + 3 * 4)
-"""The film's float64 sums and three float32 frames: the one shown, the one being made, the one being exported."""
+BYTES_PER_PIXEL = CHANNELS * (8 + 3 * 4) + OF_MOMENTS
+"""The film's float64 sums, what it keeps of its noise, and three float32 frames: the one shown, the one being made, the
+one being exported."""
 
 BYTES_PER_TRAJECTORY = 250
 """Some three photons stored, twice while batches are joined, and their map."""

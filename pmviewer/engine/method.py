@@ -8,8 +8,9 @@ from typing import Literal, NamedTuple
 from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, THIN, in_media
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
-from pmviewer.render.filter import BOX, filter_of
+from pmviewer.render.filter import BOX, filter_of, is_signed
 from pmviewer.scene.analysis import SceneTraits
+from pmviewer.scene.description import PixelFilter
 from pmviewer.settings.access import Settings, with_values
 from pmviewer.settings.schema.importance import WITHOUT_IMPORTANCE, Deposit
 
@@ -43,7 +44,8 @@ class Plan:
     is whether virtual lights bring the indirect light; `media` whether the scene has participating media, and `volume`
     whether photons are stored in them and light that they scatter is looked up, `phase_rays` whether rays by phase
     functions can meet a light; `lens` whether the render camera has one, `filtered` whether the
-    film has another reconstruction filter than the plain box; `thin_glass` are the rules by which light passes panes of
+    film has another reconstruction filter than the plain box, `moments` whether the film keeps what passes tell of its
+    noise; `thin_glass` are the rules by which light passes panes of
     glass, () where all of it is exact; `warnings`
     are sentences for the log about what was asked for and can't be."""
 
@@ -68,6 +70,7 @@ class Plan:
     convergence: int = 0
     lens: bool = False
     filtered: bool = False
+    moments: bool = True
     media: bool = False
     volume: bool = False
     phase_rays: bool = False
@@ -152,6 +155,7 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         plan,
         lens=_has_lens(settings, traits),
         filtered=_filtered(settings, traits),
+        moments=not (_divided(settings, plan) or is_signed(_filter(settings, traits))),
         thin_glass=thin_rules(settings, traits),
         warnings=(*plan.warnings, *_of_thin(settings, traits)),
     )
@@ -187,7 +191,16 @@ def _has_lens(settings: Settings, traits: SceneTraits) -> bool:
 
 
 def _filtered(settings: Settings, traits: SceneTraits) -> bool:
-    return filter_of(dict(traits.filters).get(settings.camera.name), settings.render) != BOX
+    return _filter(settings, traits) != BOX
+
+
+def _filter(settings: Settings, traits: SceneTraits) -> PixelFilter:
+    return filter_of(dict(traits.filters).get(settings.camera.name), settings.render)
+
+
+def _divided(settings: Settings, plan: Plan) -> bool:
+    """Whether the film divides sums, which no pass alone does."""
+    return plan.virtual and settings.virtual.estimator not in ("unweighted", "clamped")
 
 
 def thin_rules(settings: Settings, traits: SceneTraits) -> tuple[str, ...]:

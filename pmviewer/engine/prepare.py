@@ -39,6 +39,7 @@ from pmviewer.photons.projection.projected import NO_PROJECTION
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
 from pmviewer.render.filter import add_weights
+from pmviewer.render.moments import prepare_moments
 from pmviewer.render.path import path_pass
 from pmviewer.render.pixel_radius import first_radii
 from pmviewer.render.record import N_COUNTS as N_EYE_COUNTS
@@ -104,6 +105,8 @@ def steps_of(scene: OpenScene, settings: Settings) -> list[Step]:
     """What passes of this scene with these settings run, in the order in which they run it."""
     plan = plan_of(settings, scene.traits)
     steps = [Step("film", lambda: Film(1, 1).planes())]
+    if plan.moments:
+        steps.append(Step("moments", prepare_moments))
     if plan.importance:
         steps.append(Step("importance", prepare_importance, (with_thin_glass(scene, settings, plan), settings)))
     if plan.photons:

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.automatic import automatic_values
 from pmviewer.engine.diagnose import Looked, inspected
 from pmviewer.engine.exposure import metered
@@ -45,6 +46,7 @@ from pmviewer.render.film import Film
 from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.gather.gather_points import POINT_COLUMNS
 from pmviewer.render.given import PassData
+from pmviewer.render.moments import Moments
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, RADIUS, first_radii, shrink
 from pmviewer.settings.access import Settings
 from pmviewer.settings.needs import Facts
@@ -87,6 +89,9 @@ class Renderer:
         self.film = film_of(settings, self.plan, self.camera.width, self.camera.height)
         if settings.region.on and not self.plan.virtual:
             self.film.region = settings.region.pixels(self.camera.width, self.camera.height)
+        if self.plan.moments:
+            self.film.moments = Moments(len(self.film.sums), self.film.refined)
+        self.error = ErrorEstimate(self.camera.width, self.camera.height, settings, self.plan)
         self.first_radius = (
             first_radius(scene.flat, self.render_camera, settings.estimate, self.plan.gather)
             if self.plan.photons
@@ -103,6 +108,7 @@ class Renderer:
         self.shadows = ShadowStage(scene, settings, pool, store, self.tally)
         self.virtual = VirtualStage(scene, settings, pool, store, self.tally)
         self.latest: RenderedPass | None = None
+        self._outline: NDArray[np.uint8] | None = None
         self._watched = Watched()
 
     @property
@@ -118,7 +124,12 @@ class Renderer:
     def stops_by(self, settings: Settings) -> bool:
         """Whether a stop rule of these settings holds, which may differ from the renderer's own in nothing else."""
         render = settings.render
-        return self.passes >= render.passes or 0 < render.time_limit <= self.tally.seconds
+        if self.passes >= render.passes or 0 < render.time_limit <= self.tally.seconds:
+            return True
+        if render.error <= 0:
+            return False
+        remaining = self.error.latest
+        return remaining is not None and remaining.relmse <= render.error
 
     def step(self) -> None:
         """Render the next pass into the film.
@@ -128,6 +139,9 @@ class Renderer:
         start = time.perf_counter()
         self._pass(self.film, self.camera, self.passes, self.settings.photons.N)
         self.film.passes += 1
+        if self.film.moments is not None:
+            self.film.moments.close_pass()
+        self.error.add(self.film, self.pool.run)
         self.tally.seconds += time.perf_counter() - start
 
     def photons_alone(self, passes: int) -> PhotonMaps | None:
@@ -180,7 +194,11 @@ class Renderer:
         looked = self._looked(film)
         inspection = inspected(wanted or wanted_of(self.facts), looked, self.pool)
         made = replace(frame_of(looked, self.tally, inspection), serial=serial, version=self.version, coarse=coarse)
-        return replace(made, automatic=automatic_values(looked, self.settled_radius))
+        return replace(
+            made,
+            automatic=automatic_values(looked, self.settled_radius),
+            statistics=replace(made.statistics, remaining=None if coarse else self.error.latest),
+        )
 
     def _looked(self, film: Film) -> Looked:
         stages = self.light, self.importance, self.latest
@@ -221,7 +239,9 @@ class Renderer:
     def _eye_pass(self, given: PassData, film: Film) -> None:
         outline = np.zeros(0, np.uint8)
         if not self.plan.path:
-            outline = outline_of(self.scene, self.camera, film, self.settings, self.store)
+            if self._outline is None:  # the store may keep nothing
+                self._outline = outline_of(self.scene, self.camera, film, self.settings, self.store)
+            outline = self._outline
         self.tally.add_counts(render_into(film, given, outline, self.plan, self.pool))
 
     def _radii_of_pixels(self, film: Film, index: int) -> dict[str, float]:

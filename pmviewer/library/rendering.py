@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from pmviewer.engine.ahead.beside import beside
+from pmviewer.engine.auto.choose import Choice, Goal, choose
 from pmviewer.engine.effects import facts_of, inactive_reason
 from pmviewer.engine.frame import Frame, PhotonCloud
 from pmviewer.engine.inspection import Inspection
@@ -148,6 +149,25 @@ class Rendering:
     def passes(self) -> int:
         """Rendered with the settings as they are."""
         return self._renderer.passes if self._renderer is not None else 0
+
+    def choose(
+        self, seconds: float | None = None, error: float | None = None, progress: Progress | None = None
+    ) -> tuple[str, ...]:
+        """Let a short trial choose method, N, radius and the like for so many seconds of rendering, or for a relMSE,
+        and set them: `print(*s.choose(seconds=10), sep="\\n")`. Gives the sentences that say what and why.
+
+        What was set of these before is replaced; the picture's error is not a stop rule by that: set `render.error`.
+        Raises SettingError.
+        """
+        for name, value in (("seconds", seconds), ("error", error)):
+            if value is not None:
+                _check_number(f"choose({name}", value, Real)
+        goal = Goal((seconds or 0.0) * self._pool.threads, error or 0.0)
+        tell = progress or (lambda text, share: None)
+        with self._alone():
+            choice: Choice = self._within_memory(lambda: choose(self._opened, self._settings, goal, self._pool, tell))
+        self.set(choice.values)
+        return choice.sentences
 
     def render(
         self, passes: int | None = None, seconds: float | None = None, progress: Progress | None = None

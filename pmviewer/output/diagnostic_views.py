@@ -27,6 +27,7 @@ Family = Literal[
     "convergence",
     "virtual lights",
     "estimation",
+    "noise",
     "error",
     "difference",
 ]
@@ -186,6 +187,13 @@ DIAGNOSTICS: Mapping[str, DiagnosticView] = {
         "how often the tile was divided in which the latest pass interpolated or gathered the pixel",
         "divisions",
         "gathered as usual",
+    ),
+    "noise": DiagnosticView(
+        "noise",
+        "standard error of the pixel relative to the pixel, from how the passes differ",
+        "%",
+        "fewer than two passes",
+        log=True,
     ),
 }
 HELD_WHILE_SHOWN = (DENOISED, *DIAGNOSTICS)

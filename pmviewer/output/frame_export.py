@@ -62,8 +62,28 @@ class Counts(Protocol):
         """Of all passes, summed over threads."""
 
     @property
+    def remaining(self) -> Remaining | None:
+        """Estimate of the picture's error, None without."""
+
+    @property
     def dropped(self) -> Mapping[str, int]:
         """Samples that were not finite or negative, by where they arose."""
+
+
+class Remaining(Protocol):
+    """What an exporter reads of `pmviewer.engine.remaining.Remaining`."""
+
+    @property
+    def relmse(self) -> float:
+        """Estimate."""
+
+    @property
+    def low(self) -> float:
+        """Lower end of the interval that covers nine pictures of ten."""
+
+    @property
+    def high(self) -> float:
+        """Upper end."""
 
 
 class Pose(Protocol):
@@ -193,6 +213,8 @@ def frame_metadata(frame: Exportable) -> dict[str, Value]:
     about |= {f"radius.{name}": float(radius) for name, radius in counts.radius.items()}
     about |= {f"dropped.{place}": count for place, count in counts.dropped.items()}
     about |= {f"units.{layer_name(view)}": DIAGNOSTICS[view].unit for view in frame.diagnostics if view in DIAGNOSTICS}
+    if (found := counts.remaining) is not None:
+        about |= {"relmse.estimate": found.relmse, "relmse.low": found.low, "relmse.high": found.high}
     if DENOISED in frame.diagnostics:
         about["denoiser"] = "Open Image Denoise; a guess, no estimate"
     return about | {path: _plain(value) for path, value in flat(frame.settings).items()}

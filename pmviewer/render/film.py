@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
+from pmviewer.render.moments import Moments
 from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS, PLANES, TERMS
 
 LEAST_WEIGHT = 0.5
@@ -33,13 +34,14 @@ class Film:
     `radii` of the pixels' look-ups in the latest pass
     (`pmviewer.render.pixel_radius`), None where all have that of the pass; `weights` (height·width, 2) float64, sums
     of what samples count by a filter with negative parts (`pmviewer.render.filter`), in the term emission and in all
-    others, None where each counts 1."""
+    others, None where each counts 1; `moments`, what passes tell of the noise, None where nobody keeps them."""
 
     def __init__(self, width: int, height: int, further: int = 0, channels: int = CHANNELS) -> None:
         self.width, self.height, self.channels = width, height, channels
         self.sums: NDArray[np.float64] = np.zeros((width * height, channels + further), np.float64)
         self.radii: NDArray[np.float32] | None = None
         self.weights: NDArray[np.float64] | None = None
+        self.moments: Moments | None = None
         self.passes = 0
         self.region: tuple[int, int, int, int] | None = None
         """Columns x0 … x1−1 and rows y0 … y1−1 of (x0, y0, x1, y1), which alone are rendered from the second pass on;
@@ -51,6 +53,16 @@ class Film:
             return [(0, len(self.sums))]
         x0, y0, x1, y1 = self.region
         return [(y * self.width + x0, y * self.width + x1) for y in range(y0, y1)]
+
+    @property
+    def refined(self) -> NDArray[np.bool_] | None:
+        """(pixels,) those of the region; None without one."""
+        if self.region is None:
+            return None
+        x0, y0, x1, y1 = self.region
+        inside = np.zeros((len(self.sums) // self.width, self.width), bool)
+        inside[y0:y1, x0:x1] = True
+        return inside.ravel()
 
     def samples(self, pixel: int) -> int:
         """How many passes a pixel has."""

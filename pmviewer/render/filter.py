@@ -89,6 +89,11 @@ def has_signs(eye: NDArray[np.void]) -> bool:
     return "filter_weight" in (eye.dtype.names or ()) and bool((eye[0]["filter_weight"] < 0).any())
 
 
+def is_signed(chosen: PixelFilter) -> bool:
+    """Whether samples may count negatively by it."""
+    return bool((_table(chosen)[1] < 0).any())
+
+
 def evaluate(chosen: PixelFilter, x: Float) -> Float:
     """f(x), not normalised, at places (n,) in pixels from the pixel's middle."""
     x, r = np.abs(np.asarray(x, float)), chosen.radius

@@ -81,6 +81,7 @@ class Commands:
             "toggle_region": lambda: self._toggle("region.on"),
             "fit_picture": self._fit,
             "compare_importance": self._compare_importance,
+            "choose_automatically": state.automatic.start,
             "toggle_fly": self._toggle_fly,
             "frame_all": self._frame_all,
             "reset_camera": self._reset_camera,

@@ -44,8 +44,16 @@ MOST: Mapping[str, float] = {
     "virtual.walks": 8, "compare.passes": 4,
 }  # fmt: skip
 """Upper ends where higher ones take only time, and memory that is asked for."""
-LEFT_ALONE = ("quit", "save_session", "export_exr", "export_png", "screenshot", "screenshot_picture")
-"""Actions that end the program or write files without end."""
+LEFT_ALONE = (
+    "quit",
+    "save_session",
+    "export_exr",
+    "export_png",
+    "screenshot",
+    "screenshot_picture",
+    "choose_automatically",
+)
+"""Actions that end the program, write files without end, or compile ways of rendering that nobody looks at."""
 _WEIGHTS = {
     "setting": 30, "key": 20, "orbit": 12, "click": 12, "wheel": 6, "edit": 6, "undo": 8, "preset": 2, "shift click": 4,
 }  # fmt: skip

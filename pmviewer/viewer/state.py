@@ -31,6 +31,7 @@ from pmviewer.settings.access import (
 from pmviewer.settings.film import FilmKey
 from pmviewer.settings.schema.compare import LAST, LIVE, REFERENCE
 from pmviewer.viewer.appearance import Appearance
+from pmviewer.viewer.automatic import AutomaticRun
 from pmviewer.viewer.background import Background
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.dialogs.recent import RecentFiles
@@ -87,6 +88,7 @@ class ViewerState:
         self.background = Background(self.say)
         self.comparison = Comparison(session, self.background, self.say)
         self.gain = GainRun(session, self.background, self.say)
+        self.automatic = AutomaticRun(session, self.background, self.say, self._change_by_itself)
         self.snapshots = Snapshots(self.background, self.say)
         self.pair = Pair(self.background, self.comparison, self.gain, self.snapshots)
         self.measured = Measured(self.background, self.comparison, lambda: self.frame)
@@ -146,6 +148,12 @@ class ViewerState:
         if settings != self.settings:
             self.history.changed(self.settings, settings)
             self.session.set(settings)
+
+    def _change_by_itself(self, values: dict[str, Any]) -> None:
+        """Change settings as a step of its own to undo, when the mouse does something else."""
+        self.history.gesture += 1
+        self.change(values)
+        self.history.gesture += 1
 
     def undo(self) -> None:
         """Take the last step of the user's back; playing a film is one."""
@@ -421,6 +429,7 @@ class ViewerState:
         parameters = self._opening[1] if self._opening is not None else self.parameters
         self.comparison.poll(self.frame, with_own=not parameters)
         self.gain.poll(self.live_camera())
+        self.automatic.poll()
         self.snapshots.poll()
         self.film.poll()
         self.loaded.poll()

@@ -294,3 +294,12 @@ def test_the_window_opens_on_the_same_scene_and_settings(monkeypatch):
         assert s.get("N") == 7
     with pmviewer.open(cornell_box(size=8)) as s, pytest.raises(SceneError, match="made in Python"):
         s.show()
+
+
+def test_choosing_sets_what_it_says_and_refuses_what_is_no_time():
+    with pmviewer.open(diffuse_box(), {"camera.width": 16, "camera.height": 16}) as s:
+        said = s.choose(seconds=0.01)
+        assert s.get("gather.cache") == "on"
+        assert "too few for a trial" in said[0]
+        with pytest.raises(SettingError, match="above 0"):
+            s.choose(error=-1)

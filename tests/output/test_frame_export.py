@@ -38,6 +38,7 @@ def frame() -> Frame:
             seconds=1.5,
             cpu_seconds=2.75,
             dropped={"film": 0},
+            remaining=None,
         ),
         scene_name="cornell_caustic",
     )

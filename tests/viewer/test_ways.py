@@ -77,7 +77,7 @@ def test_views_are_made_on_demand_in_the_legends_colours(app, tmp_path):
             frames.append(app.state.frame)
             seen[view] = on_window_thread(c, lambda: app.viewport.capture(overlays=False))
         app.commands.exports.exr(tmp_path / "a.exr")
-        app.state.change({"render.method": "path"})
+        app.state.change({"display.view": "radiance cells", "render.method": "path"})
         wait_until(c, lambda: finished(app) and app.state.frame.settings.render.method == "path")
         c.yield_(2)
         assert app.state.shown_display.view == "beauty"

@@ -52,6 +52,8 @@ def render_into(
                     eye_pass(given, outline, film.radii, film.sums, counts, first, last)
                 if signed:
                     add_weights(given.eye, outline, film.weights, first, last)
+                if film.moments is not None:
+                    film.moments.add(film.sums, film.channels, first, last)
             return counts
 
         return run

@@ -53,16 +53,21 @@ class MapBuilder:
         """All maps of the pass; `before` are those of the pass before, whose radii of guides and light choice are kept:
         they blur nothing."""
         plan, photons = self.plan, traced.photons
-        caustic, global_ = self._photon_maps(light, traced)
+        makes: list[Callable[[], Any]] = [
+            lambda: self._guides(light, traced, before.guides.radius if before and before.guides else None),
+            lambda: self._chooser(light, traced, before.chooser.radius if before and before.chooser else None),
+            lambda: self._volume(light, traced) if plan.volume else None,
+        ]
+        if light.kept:  # the stage store belongs to one thread
+            caustic, global_ = self._photon_maps(light, traced)
+            guides, chooser, volume = (make() for make in makes)
+        else:
+            both = [partial(self._photon_map, light, photons, name) for name in ("caustic", "global")]
+            caustic, global_, guides, chooser, volume = self.pool.run([*both, *makes])
         radiance, reach = None, 0.0
         if plan.radiance:
             assert global_ is not None
             radiance, reach = self._radiance(light, traced, global_)
-        guides = chooser = None
-        if plan.guided_rays:
-            guides = self._guides(light, traced, before.guides.radius if before and before.guides else None)
-        if plan.choice != "power":
-            chooser = self._chooser(light, traced, before.chooser.radius if before and before.chooser else None)
         corner = 0.0
         if plan.corners:
             assert global_ is not None
@@ -84,7 +89,7 @@ class MapBuilder:
             guides=guides,
             corner=corner,
             chooser=chooser,
-            volume=self._volume(light, traced) if plan.volume else None,
+            volume=volume,
         )
 
     def _empty(self) -> tuple[Structure, PhotonGrid]:
@@ -95,20 +100,18 @@ class MapBuilder:
         return grid, grid
 
     def _kept(self, light: LightPlan, key: tuple[Any, ...], make: Callable[[], Any], size: Callable[[Any], int]) -> Any:
-        """What `make` returns, on a thread of the pool."""
+        """What `make` returns. That of passes that are kept is made on a thread of the pool; of others whoever asks is
+        on one."""
         if light.kept:
             return self.pool.run([lambda: self.store.get(key, make, size)])[0]
-        return self.pool.run([make])[0]
+        return make()
 
     # caustic and global map ------------------------------------------------------------------------------------------
 
     def _photon_maps(self, light: LightPlan, traced: TracedPass) -> tuple[LookUpMap | None, LookUpMap | None]:
-        makes = [partial(self._photon_map, light, traced.photons, name) for name in ("caustic", "global")]
-        if not light.kept:
-            caustic, global_ = self.pool.run(makes)
-            return caustic, global_
         found = []
-        for name, make in zip(("caustic", "global"), makes, strict=True):  # the stage store belongs to one thread
+        for name in ("caustic", "global"):
+            make = partial(self._photon_map, light, traced.photons, name)
             key = "map", traced.key, name, self._classes(name), self._look_up_key(light, name)
             found.append(self._kept(light, key, make, lambda made: made.structure.bytes if made else 0))
         return found[0], found[1]
@@ -170,10 +173,14 @@ class MapBuilder:
         gather, estimate = self.settings.gather, self.settings.estimate
         key = "radiance photons", traced.key, estimate, gather.radiance_photons, gather.cutoff, global_.radius
         make = partial(radiance_photons_of, traced.photons, global_, self.settings, light)
+        if not light.kept:
+            return self.pool.run([make])[0]
         return self._kept(light, key, make, lambda made: made[0].bytes)
 
-    def _guides(self, light: LightPlan, traced: TracedPass, radius: float | None) -> PhotonGrid:
-        """The pass's photons that guide gather rays."""
+    def _guides(self, light: LightPlan, traced: TracedPass, radius: float | None) -> PhotonGrid | None:
+        """The pass's photons that guide gather rays, None where none do."""
+        if not self.plan.guided_rays:
+            return None
         asked, photons = self.settings.gather.guide_radius, traced.photons
 
         def build() -> PhotonGrid:
@@ -182,8 +189,10 @@ class MapBuilder:
 
         return self._kept(light, ("guides", traced.key, self.plan.guide_mask, asked, radius), build, _bytes)
 
-    def _chooser(self, light: LightPlan, traced: TracedPass, radius: float | None) -> PhotonGrid:
-        """The pass's direct photons that choose lights. A small radius would miss lights."""
+    def _chooser(self, light: LightPlan, traced: TracedPass, radius: float | None) -> PhotonGrid | None:
+        """The pass's direct photons that choose lights, None where they don't. A small radius would miss lights."""
+        if self.plan.choice == "power":
+            return None
         asked, photons, scene_radius = self.settings.direct.choice_radius, traced.photons, self.scene.flat.radius
 
         def build() -> PhotonGrid:

@@ -30,6 +30,10 @@ RADIANCE_PHOTONS = Need(
     lambda f: f.plan.radiance, "Only with the method 'gather' and radiance photons (gather.radiance_photons)."
 )
 DENOISER = Need(lambda f: find_spec("pyoidn") is not None, "Needs Open Image Denoise: pip install 'pmviewer[denoise]'.")
+MOMENTS = Need(
+    lambda f: f.plan.moments,
+    "Not with weighted virtual lights, nor with filters that have negative parts: their pictures divide sums.",
+)
 VIEW_NEEDS: dict[str, Needs] = {
     "denoised": (DENOISER,),
     "look-up radius": (LOOKED_UP,),
@@ -49,6 +53,7 @@ VIEW_NEEDS: dict[str, Needs] = {
     "estimation mask": (ESTIMATION,),
     "gathered points": (ESTIMATION,),
     "subdivision level": (ESTIMATION,),
+    "noise": (MOMENTS,),
 }
 """Of the views that a frame holds only while they are shown."""
 MEDIA_VIEWS = ("volume", "volume indirect")
@@ -143,6 +148,7 @@ class Display(Group):
         "estimation mask",
         "gathered points",
         "subdivision level",
+        "noise",
     ] = setting(
         "beauty",
         "What the viewport shows: the image, one of its terms, a property of the first hit, the shaded geometry, the "

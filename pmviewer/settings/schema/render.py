@@ -9,6 +9,10 @@ from pmviewer.settings.schema.base import Auto, Group, setting
 
 FOLLOWED_OR_PATHS = Need(lambda f: f.plan.path or FOLLOWED.holds(f), "No mirror or glass in this scene.")
 NO_PATHS = Need(lambda f: not f.plan.path, "The path tracer treats all pixels alike.")
+TELLS_ERROR = Need(
+    lambda f: f.plan.moments and f.settings.photons.renew == "each pass",
+    "Passes don't tell their error: they share one photon map, or divide sums.",
+)
 TWO_WAYS = Need(
     lambda f: f.settings.render.method in ("progressive", "gather", "virtual lights"),
     "Only with the methods 'progressive', 'gather' and 'virtual lights'.",
@@ -97,6 +101,17 @@ class Render(Group):
     )
     time_limit: float = setting(
         0.0, "Refinement stops after this time; 0 is no limit.", stage="stop", scale="linear", unit="s", ge=0, le=1e6
+    )
+    error: float = setting(
+        0.0,
+        "Refinement stops when the picture's relMSE is estimated to be below this; 0 is no limit. The estimate is the "
+        "statistics' one: from how passes differ, and how they change with the radius.",
+        stage="stop",
+        scale="linear",
+        title="error limit",
+        ge=0,
+        le=10.0,
+        needs=(TELLS_ERROR,),
     )
     direct: Literal["by method", "accurate", "approximate"] = setting(
         "by method",

@@ -12,6 +12,10 @@ from pmviewer.viewer import theme
 from pmviewer.viewer.panels.widgets import tooltip_text
 from pmviewer.viewer.state import ViewerState
 
+AUTOMATIC = (
+    "A trial of a few passes on a small picture finds the method, N and radius that suit the scene, for the time limit "
+    "or the error limit of the stop rules, or for ten seconds. It says why in the log."
+)
 LISTED = 20
 """Steps that the history shows, either way."""
 
@@ -43,6 +47,10 @@ class EditMenu:
     def _presets(self) -> None:
         """Ways of rendering; the one in force is ticked. Camera, display, seed and stop rules stay."""
         settings = self._state.settings
+        self._item("Automatic", "choose_automatically", self._state.automatic.running)
+        if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
+            tooltip_text([(AUTOMATIC, theme.TEXT)])
+        imgui.separator()
         for preset in PRESETS:
             assignments = preset.assignments()
             in_force = all(get(settings, path) == value for path, value in assignments.items())

@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 
 from pmviewer.engine.energy import ENTRIES, Energy
 from pmviewer.engine.frame import Statistics
+from pmviewer.engine.remaining import Remaining
 from pmviewer.viewer import theme
 from pmviewer.viewer.comparison import Point
 from pmviewer.viewer.format import data_size, duration, grouped, si
@@ -79,6 +80,8 @@ def time_rows(s: Statistics) -> Rows:
     if s.saved_rays:
         share = s.saved_rays / (s.saved_rays + s.shadow_rays)
         rows.append(("Shadow rays saved by shadow photons", f"{100 * share:.0f} %"))
+    if s.noise is not None and s.remaining is None:
+        rows.append(("Expected relMSE by noise", f"{s.noise:.3e}"))
     if s.passes and s.seconds:
         rows.append(("Time of a pass", duration(s.seconds / s.passes)))
     return rows
@@ -94,6 +97,15 @@ def convergence_rows(s: Statistics) -> Rows:
         ("Caustic map converged", f"{1 - found.more:.1%}" if found.photons else "no caustic photons"),
         ("Caustic map dense enough", f"{found.dense:.1%}"),
         ("Caustic trajectories spared", grouped(found.spared)),
+    ]
+
+
+def remaining_rows(found: Remaining) -> Rows:
+    """The estimate of the picture's error, with the interval that holds in nine pictures of ten."""
+    return [
+        ("relMSE, about", f"{found.relmse:.2e}"),
+        ("in nine of ten", f"{found.low:.1e} – {found.high:.1e}"),
+        ("of it bias", "not measured" if found.bias is None else f"{found.bias:.1e}"),
     ]
 
 
@@ -141,6 +153,8 @@ class StatisticsPanel:
             name: f"{duration(t)}  {t / total:4.0%}" if total else duration(t) for name, t in s.stage_seconds.items()
         }
         table("CPU time by stage", sorted(share.items(), key=lambda row: -s.stage_seconds[row[0]]))
+        if s.remaining is not None:
+            table("Estimated error", remaining_rows(s.remaining))
         if error is not None:
             table("Against the reference", reference_rows(error))
         for name, why in s.skipped:

@@ -28,6 +28,8 @@ def status_parts(state: ViewerState) -> list[str]:
     if s.rays:
         parts.append(f"{si(s.rays_per_second, 'rays/s')}")
     parts.append(duration(s.seconds))
+    if s.remaining is not None:
+        parts.append(f"relMSE ≈ {s.remaining.relmse:.1e}")
     point = state.comparison.latest(frame)
     if point is not None:
         parts.append(f"relMSE {point.metrics.relmse_all:.2e}")

@@ -27,6 +27,7 @@ _CHOICES = 5
 _MORE = "More of the toolbar"
 _PAUSE = ("Pause", "Resume")
 _FREE = "Free camera: see the render camera's importance from elsewhere"
+_AUTOMATIC = "Automatic: a short trial chooses the method and its numbers"
 _COMPARE = "Compare with and without importance"
 
 
@@ -80,6 +81,7 @@ class Toolbar:
             self._button(fa.ICON_FA_PLAY if paused else fa.ICON_FA_PAUSE, "toggle_pause", _PAUSE[paused], on=paused),
             self._button(fa.ICON_FA_ARROW_ROTATE_RIGHT, "restart", "Restart"),
             _gap(),
+            self._button(fa.ICON_FA_GAUGE_HIGH, "choose_automatically", _AUTOMATIC, on=state.automatic.running),
             self._setting("render.method", "method", 7),
             self._setting("display.view", "view", 9),
         ]

@@ -1,0 +1,170 @@
+"""Threads: two against one by the clock, and the serial share of a pass by stage (P19).
+
+The clock says little on a machine that does other things. The shares come from CPU times: each task's own, and the main
+thread's between them. From these follows how long a pass would take on any number of threads that nothing else uses:
+every call of the pool ends with its last task, and the main thread waits for it. The serial share s is Amdahl's, of
+T(n)/T(1) = s + (1 − s)/n; it holds what only one thread can do as well as the waiting for the last task of a stage.
+"""
+
+from __future__ import annotations
+
+import heapq
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from pmviewer.bench.report import BenchResult, Target
+from pmviewer.engine.opened import OpenScene, open_scene
+from pmviewer.engine.pool import Task, WorkPool
+from pmviewer.engine.prepare import prepare
+from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
+from pmviewer.progress import available_threads
+from pmviewer.settings.access import Settings, with_values
+
+CASES: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("cornell_caustic", {}),
+    ("rooms_10x10", {}),
+    ("cornell_caustic", {"render.method": "gather"}),
+    ("cornell_diffuse", {"render.method": "gather", "gather.cache": "on"}),
+)
+SIZE = {"camera.width": 512, "camera.height": 512}
+PASSES, QUICK_PASSES, SKIPPED = 12, 6, 4
+"""Passes, of which the first are not counted: they fill the stage store and the caches."""
+THREADS = (2, 8, 32)
+BETWEEN = "between stages"
+
+
+@dataclass
+class _Stage:
+    """CPU seconds of the main thread and of the tasks of each call of the pool."""
+
+    main: float = 0.0
+    calls: list[list[float]] = field(default_factory=list)
+
+    @property
+    def alone(self) -> float:
+        """On one thread."""
+        return self.main + sum(map(sum, self.calls))
+
+    def on(self, threads: int) -> float:
+        """On so many."""
+        return self.main + sum(makespan(tasks, threads) for tasks in self.calls)
+
+
+class WatchedPool(WorkPool):
+    """Remembers by stage what its tasks and the thread that calls it cost."""
+
+    def __init__(self, threads: int | None = None) -> None:
+        self.stages: dict[str, _Stage] = {}
+        self._name, self._since = BETWEEN, time.thread_time()
+        super().__init__(threads)
+
+    @property
+    def stage(self) -> str:
+        """The one that runs."""
+        return self._name
+
+    @stage.setter
+    def stage(self, name: str) -> None:
+        self.note()
+        self._name = name or BETWEEN
+
+    def note(self) -> None:
+        """What the calling thread has done since the last note belongs to the stage."""
+        now = time.thread_time()
+        self.stages.setdefault(self._name, _Stage()).main += now - self._since
+        self._since = now
+
+    def run(self, tasks: Sequence[Task]) -> list[Any]:
+        """As the pool's own."""
+        spent = [0.0] * len(tasks)
+
+        def timed(number: int, task: Task) -> Any:
+            start = time.thread_time()
+            try:
+                return task()
+            finally:
+                spent[number] = time.thread_time() - start
+
+        results = super().run([partial(timed, number, task) for number, task in enumerate(tasks)])
+        self.note()
+        self.stages.setdefault(self._name, _Stage()).calls.append(spent)
+        return results
+
+
+def makespan(tasks: Sequence[float], threads: int) -> float:
+    """Seconds until the last task is through, when each thread takes the next one as soon as it is free."""
+    free = [0.0] * min(threads, max(len(tasks), 1))
+    for task in tasks:
+        heapq.heapreplace(free, free[0] + task)
+    return max(free)
+
+
+def serial_share(alone: float, together: float, threads: int) -> float:
+    """Amdahl's s of times on one thread and on several."""
+    return (threads * together / alone - 1) / (threads - 1) if alone > 0 else 0.0
+
+
+def _clocked(opened: OpenScene, settings: Settings, threads: int, passes: int) -> float:
+    """Seconds of the quickest pass, by the clock."""
+    pool = WorkPool(threads)
+    try:
+        renderer, best = Renderer(opened, settings, pool, StageStore(0)), float("inf")
+        for index in range(passes):
+            start = time.perf_counter()
+            renderer.step()
+            if index >= SKIPPED:
+                best = min(best, time.perf_counter() - start)
+    finally:
+        pool.close()
+    return best
+
+
+def _watched(opened: OpenScene, settings: Settings, passes: int) -> tuple[dict[str, _Stage], int]:
+    """What the counted passes cost by stage, and how many they are."""
+    pool = WatchedPool(1)
+    try:
+        prepare(opened, settings, pool, lambda text, share: None)
+        renderer = Renderer(opened, settings, pool, StageStore(0))
+        for index in range(passes):
+            if index == SKIPPED:
+                pool.note()
+                pool.stages.clear()
+            renderer.step()
+            pool.stage = ""
+    finally:
+        pool.close()
+    return pool.stages, passes - SKIPPED
+
+
+def run(quick: bool = False) -> BenchResult:
+    """A row for each stage of each case, then the pass as a whole."""
+    passes = QUICK_PASSES if quick else PASSES
+    rows: list[list[str | float | int]] = []
+    targets: list[Target] = []
+    for scene, values in CASES[: 2 if quick else None]:
+        opened, settings = open_scene(scene), with_values(Settings(), {**SIZE, **values})
+        stages, counted = _watched(opened, settings, passes)
+        one, two = (_clocked(opened, settings, threads, passes) for threads in (1, 2))
+        name = f"{scene}, {settings.render.method}{', cache' if settings.gather.cache == 'on' else ''}"
+        alone = sum(stage.alone for stage in stages.values())
+        for title, stage in sorted(stages.items(), key=lambda item: -item[1].alone):
+            lost = [(n * stage.on(n) - stage.alone) / (n - 1) / alone for n in THREADS]
+            rows.append([name, title, 1e3 * stage.alone / counted, *(f"{share:.1%}" for share in lost), ""])
+        times = {n: sum(stage.on(n) for stage in stages.values()) for n in THREADS}
+        shares = {n: serial_share(alone, times[n], n) for n in THREADS}
+        speed = f"{one / two:.2f}×"
+        rows.append([name, "pass", 1e3 * alone / counted, *(f"{shares[n]:.1%}" for n in THREADS), speed])
+        targets.append(Target("P19", alone / times[2], 1.9, "×", True, f"{name}: two threads, by CPU times"))
+        targets.append(Target("P19", 100 * shares[8], 2.0, "%", False, f"{name}: serial share on eight threads"))
+        if available_threads() > 1:
+            targets.append(Target("P19", one / two, 1.9, "×", True, f"{name}: two threads, by the clock"))
+    columns = ["case", "stage", "CPU ms a pass", *(f"serial on {n}" for n in THREADS), "clock, 2 threads"]
+    notes = [
+        "512×512; a stage's serial share is of the whole pass; clocks need a machine that does nothing else",
+        "serial on n: what a pass on n threads that nothing else uses takes longer than 1/n, by each task's CPU time",
+    ]
+    return BenchResult("Threads", columns, rows, targets, notes)

@@ -1,0 +1,180 @@
+"""Automatic mode: the way of rendering for a time or an error, and why it was chosen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, Candidate, assignments, candidates
+from pmviewer.engine.auto.model import FEWEST, WIDTHS, Option, bias_after, options, seconds_to
+from pmviewer.engine.auto.trial import Tell, Trial, trial
+from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.render.camera import resolve_camera
+from pmviewer.settings.access import SETTINGS, Settings, with_values
+
+SHARE = 0.1
+"""Of the time asked for, what a trial may take."""
+USUAL = 10.0
+"""CPU seconds that are planned for where nobody gives any."""
+BETTER = 0.87
+"""What another way must promise of the default's error to be taken: less is within the trial's own noise."""
+NEARLY = 1.2
+"""What of the least error counts as the same."""
+PER_PHOTON, PER_PIXEL = 1.5e-6, 6e-6
+"""CPU seconds of a trial by trajectory and by pixel and candidate: what its size is planned by, clock or no clock."""
+LEAST, LARGEST, FEWEST_PHOTONS = 48, 160, 20_000
+"""Sides of the trial's picture in pixels, and N."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """CPU seconds of rendering, or a relMSE; with neither a picture as good as `USUAL` seconds allow."""
+
+    seconds: float = 0.0
+    error: float = 0.0
+
+
+@dataclass(frozen=True)
+class Choice:
+    """`values` are all settings that it sets, by full name; `changed` those that differ from the defaults. `expected`
+    is the relMSE after `seconds` CPU seconds that the trial promises, NaN without one; `sentences` say why; `bias`
+    gives the squared relative bias after so many passes, None without a trial."""
+
+    name: str
+    values: Mapping[str, Any]
+    expected: float
+    seconds: float
+    sentences: tuple[str, ...]
+    trial: Trial = field(default_factory=Trial)
+    bias: Callable[[int], float] | None = None
+
+    @property
+    def changed(self) -> dict[str, Any]:
+        """Those that differ from the defaults."""
+        return {path: value for path, value in self.values.items() if value != SETTINGS[path].default}
+
+
+def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, tell: Tell) -> Choice:
+    """What suits the scene, the camera and its picture best. `settings` give camera, size and seed; what automatic mode
+    sets itself does not count. Raises Cancelled when the pool is cancelled."""
+    base = with_values(settings, assignments({}))
+    seconds = goal.seconds or USUAL
+    found, left_out = candidates(opened.traits, base.photons.glossy, seconds)
+    said = [f"not tried: {what}, {why}" for what, why in left_out]
+    camera = resolve_camera(opened.scene, base.camera)
+    planned = _size(SHARE * seconds, len(found), camera.width, camera.height)
+    if planned is None or len(found) == 1:
+        name = _by_traits(opened, base)
+        why = "nothing else suits the scene" if len(found) == 1 else f"{seconds:.3g} CPU s are too few for a trial"
+        return Choice(name.name, assignments(name.values), math.nan, 0.0, (f"{name.name}: {why}", *said))
+    (width, height), N = planned
+    tried = trial(opened, with_values(base, {"photons.N": N}), found, pool, (width, height), tell)
+    picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, seconds - tried.cpu_seconds)
+    return Choice(
+        picked.name,
+        assignments(_values(picked, base)),
+        picked.error,
+        picked.seconds,
+        (_sentence(picked, goal), *_table(tried, picked), *said),
+        tried,
+        partial(bias_after, picked.measured, picked.width),
+    )
+
+
+def _by_traits(opened: OpenScene, base: Settings) -> Candidate:
+    """Without a trial: in scenes without mirrors and glass the irradiance cache, else the default."""
+    traits = opened.traits
+    plain = not traits.follows(base.photons.glossy) and traits.has_diffuse and not traits.has_media
+    return CACHE if plain and not traits.glossy_roughness else PROGRESSIVE
+
+
+def _size(budget: float, count: int, width: int, height: int) -> tuple[tuple[int, int], int] | None:
+    """Size of the trial's picture, and N, for that many CPU seconds and candidates; None where they are too few."""
+    default = int(SETTINGS["photons.N"].default)
+    N = min(default, int(0.35 * budget / PER_PHOTON / 2))
+    if N < FEWEST_PHOTONS:
+        return None
+    pixels = 0.65 * budget / (PER_PIXEL * count * 4)
+    if pixels < LEAST**2:
+        return None
+    shrink = math.sqrt(min(pixels, LARGEST**2) / (width * height))
+    if shrink >= 1:
+        return (width, height), N
+    return (max(round(width * shrink), 1), max(round(height * shrink), 1)), N
+
+
+def _by_time(tried: Trial, seconds: float) -> Option:
+    """The least error after that time; the default unless another is clearly better."""
+    every = [option for m in tried.measured for option in options(m, WIDTHS, seconds)]
+    enough = [option for option in every if option.passes >= FEWEST]
+    if not enough:
+        return max(every, key=lambda option: option.passes)
+    best = _calmest(enough, lambda option: option.error)
+    usual = [o for o in enough if _is_default(o)]
+    return usual[0] if usual and best.error > BETTER * usual[0].error else best
+
+
+def _by_error(tried: Trial, error: float) -> Option:
+    """The least time to that error; where none reaches it, what comes nearest in a long time."""
+    found: list[Option] = []
+    for m in tried.measured:
+        for option in options(m, WIDTHS, 1.0):
+            seconds = seconds_to(m, option.N, option.width, error)
+            passes = seconds / m.costs.of(option.N, option.width**2) if math.isfinite(seconds) else math.inf
+            found.append(Option(m, option.N, option.width, passes, error, seconds))
+    reached = [o for o in found if math.isfinite(o.seconds)]
+    if not reached:
+        return _by_time(tried, 1000.0)
+    best = _calmest(reached, lambda option: option.seconds)
+    usual = [o for o in reached if _is_default(o)]
+    return usual[0] if usual and best.seconds > BETTER * usual[0].seconds else best
+
+
+def _calmest(found: list[Option], of: Callable[[Option], float]) -> Option:
+    """Of the candidate with the least value the numbers nearest to the defaults that are hardly worse: those of two
+    trials are then the same more often."""
+    best = min(found, key=of)
+    near = [o for o in found if o.measured is best.measured and of(o) <= NEARLY * of(best)]
+    N = float(SETTINGS["photons.N"].default)
+    return min(near, key=lambda o: abs(math.log(o.N / N)) + 2 * abs(math.log(o.width)))
+
+
+def _is_default(option: Option) -> bool:
+    default = option.measured.candidate is PROGRESSIVE and option.width == 1.0
+    return default and option.N in (SETTINGS["photons.N"].default,)
+
+
+def _values(picked: Option, base: Settings) -> dict[str, Any]:
+    """The settings that the option stands for."""
+    values = dict(picked.measured.candidate.values)
+    with_photons = with_values(base, assignments(values))
+    if with_photons.render.method != "path" and SETTINGS["photons.N"].default != picked.N:
+        values["photons.N"] = picked.N
+    if picked.width != 1.0:
+        values["estimate.radius"] = float(f"{picked.measured.radius * picked.width:.4g}")
+    return values
+
+
+def _sentence(picked: Option, goal: Goal) -> str:
+    width = "" if picked.width == 1.0 else f", radius {picked.width:.2g} times the automatic one"
+    photons = f", N = {picked.N:,}" if picked.measured.photons > 0 else ""
+    if goal.error and math.isfinite(picked.seconds):
+        promise = f"relMSE {goal.error:.2g} expected after {picked.seconds:.3g} CPU s"
+    else:
+        promise = f"relMSE {picked.error:.2g} expected after {picked.seconds:.3g} CPU s"
+    return f"{picked.name}{photons}{width}: {promise}"
+
+
+def _table(tried: Trial, picked: Option) -> list[str]:
+    """Each candidate at its best, for the log."""
+    lines = []
+    for m in tried.measured:
+        if math.isfinite(picked.seconds):
+            best = min(options(m, WIDTHS, picked.seconds), key=lambda o: o.error)
+            lines.append(f"tried {m.candidate.name}: relMSE {best.error:.2g} with N = {best.N:,} in that time")
+    lines.append(f"trial: {tried.pixels:,} pixels, {tried.cpu_seconds:.2g} CPU s")
+    return lines

@@ -1,0 +1,156 @@
+"""How wrong the picture still is, from the picture alone: relMSE with an interval.
+
+Passes complement one another: their samples are parts of one sequence, so that the mean of n of them is nearer to the
+truth than n independent ones would be, and the scatter of passes says too much. What can be seen is D(m), half the
+squared difference of the means of m passes and of the m after them. From the variance V of the mean,
+V(2m) = V(m) − D(m)/2, and since V goes to 0, V(n) = (D(n) + D(2n) + D(4n) + …)/2. What falls as D(m) = c·m⁻ᵖ has
+therefore V(n) = D(n/2)/(2·(2ᵖ − 1)): the usual D/2 for independent passes, p = 1, less for others. One power fitted to
+all D promises too much where they bend, a sum of parts that fall with p = 1.5 (samples that complement one another),
+1 (independent ones) and, where look-ups shrink, 2/3 (photons) too little: the estimate is the geometric mean of both.
+
+D is taken at n = 2, 4, 6, 8, 12, 16, 24 …, so that all other passes cost nothing. Halves don't tell the bias that both
+have: it is added where a trial has measured it (`pmviewer.engine.auto.trial`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
+from scipy.optimize import nnls
+
+from pmviewer.engine.method import Plan
+from pmviewer.engine.remaining import Remaining
+from pmviewer.output.metric import EPSILON
+from pmviewer.render.film import Film
+from pmviewer.settings.access import Settings
+from pmviewer.tasks import Runner, in_turn
+
+POWERS = (1.5, 1.0)
+SHRINKING = 2.0 / 3.0
+"""Powers with which parts of D fall; the last where look-ups shrink by the usual alpha."""
+USUAL, USUAL_ERROR = 1.25, 0.3
+"""p of most pictures, and its standard deviation."""
+ROUGHNESS = 0.2
+"""Relative error of D beside the noise: sequences are better at some numbers of passes than at others."""
+UNSURE = 0.35
+"""Relative error of an estimate by one value of D beside that; it falls with the root of their number."""
+AROUND = (3, 7)
+"""Pixels along the sides of the boxes whose means stand for the truth that errors are relative to."""
+BLOCKS = 8
+"""Blocks along each side of the picture whose differences tell how well D is known."""
+WIDTH = 1.645
+"""Standard errors of an interval that is to cover 90 %."""
+F8 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Level:
+    """D of so many passes against the next, and its relative standard error."""
+
+    passes: int
+    D: float
+    error: float
+
+
+class ErrorEstimate:
+    """Follows one film from pass to pass. `tells` is False where all passes share what is wrong with them; `bias`, if
+    anybody sets it, gives the squared relative bias after so many passes."""
+
+    def __init__(self, width: int, height: int, settings: Settings, plan: Plan) -> None:
+        self._size = width, height
+        self.tells = plan.moments and settings.photons.renew == "each pass"
+        self.bias: Callable[[int], float] | None = None
+        shrinks = plan.shown_directly | plan.caustic_mask | plan.volume and settings.estimate.alpha < 1.0
+        self._powers = (*POWERS, SHRINKING) if shrinks else POWERS
+        self._sums: dict[int, F8] = {}
+        """Sums of the image over the first passes, by their number; those that will be compared yet."""
+        self._levels: list[_Level] = []
+        self._passes = 0
+
+    def add(self, film: Film, run: Runner = in_turn) -> None:
+        """After each pass of the film. Others than those of the module's list are only counted. `run` does tasks."""
+        n = self._passes = film.passes
+        if not self.tells or film.moments is None or not _is_level(n):
+            return
+        w, h = self._size
+        x0, y0, x1, y1 = film.region or (0, 0, w, h)
+        total = film.moments.image.reshape(h, w, 3)[y0:y1, x0:x1].copy()
+        half = self._sums.pop(n // 2, None) if n % 2 == 0 else None
+        if half is not None:
+            self._levels.append(_level(half, total, n // 2, run))
+        self._sums[n] = total
+
+    @property
+    def latest(self) -> Remaining | None:
+        """Of the film as it is; None before the second pass."""
+        if not self._levels:
+            return None
+        last = self._levels[-1]
+        n, p = self._passes, _power(self._levels)
+        one = last.D * (2 * last.passes / n) ** p / (2 * (2**p - 1))
+        several = sum(c * n**-p for p, c in _parts(self._levels, self._powers)) or one
+        value = math.sqrt(one * several)
+        spread = math.sqrt(last.error**2 + ROUGHNESS**2 + UNSURE**2 / len(self._levels))
+        if not math.isfinite(value) or value <= 0:
+            return None
+        bias = self.bias(self._passes) if self.bias is not None else None
+        added = bias or 0.0
+        factor = math.exp(WIDTH * spread)
+        return Remaining(value + added, bias, value / factor + 0.5 * added, value * factor + 2 * added)
+
+
+def _is_level(n: int) -> bool:
+    """Powers of two, and those times 3/2."""
+    return n & (n - 1) == 0 or (n % 3 == 0 and (n // 3) & (n // 3 - 1) == 0)
+
+
+def _level(first: F8, total: F8, m: int, run: Runner) -> _Level:
+    """D of m passes, whose sum is `first`, against the m passes after them; `total` is the sum of both."""
+
+    def of_channel(c: int) -> F8:
+        mean = total[..., c] / (2 * m)
+        around = np.minimum(*(uniform_filter(mean, size) for size in AROUND))
+        square: F8 = (2 * first[..., c] - total[..., c]) ** 2 / (2 * m * m)
+        return square / (around**2 + EPSILON)
+
+    plane = np.mean(run([partial(of_channel, c) for c in range(3)]), axis=0)
+    blocks = _block_means(plane)
+    D = float(plane.mean())
+    return _Level(m, D, float(blocks.std()) / math.sqrt(blocks.size) / D if D > 0 else 0.0)
+
+
+def _parts(levels: list[_Level], powers: tuple[float, ...]) -> list[tuple[float, float]]:
+    """Powers and factors of the parts of V, from D at all levels."""
+    m = np.array([level.passes for level in levels], float)
+    D = np.array([max(level.D, 1e-300) for level in levels])
+    weight = 1 / (D * np.sqrt([ROUGHNESS**2 + level.error**2 for level in levels]))
+    found, _ = nnls(weight[:, None] * m[:, None] ** -np.array(powers), weight * D)
+    return [(p, _of_mean(float(c), p)) for p, c in zip(powers, found, strict=True)]
+
+
+def _power(levels: list[_Level]) -> float:
+    """p of D ∝ m⁻ᵖ, by a fit that starts from the usual one."""
+    x = np.log([level.passes for level in levels])
+    y = np.log([max(level.D, 1e-300) for level in levels])
+    weight = 1 / np.array([ROUGHNESS**2 + level.error**2 for level in levels])
+    x, y = x - np.average(x, weights=weight), y - np.average(y, weights=weight)
+    known = 1 / USUAL_ERROR**2
+    p = (known * USUAL - float((weight * x * y).sum())) / (known + float((weight * x * x).sum()))
+    return min(max(p, SHRINKING), POWERS[0])
+
+
+def _of_mean(c: float, p: float) -> float:
+    """The factor v of V(n) = v·n⁻ᵖ that belongs to D(m) = c·m⁻ᵖ."""
+    return c * 2**p / (2 * (2**p - 1))
+
+
+def _block_means(plane: F8) -> F8:
+    h, w = plane.shape
+    rows = [band.mean(axis=0) for band in np.array_split(plane, min(BLOCKS, h), axis=0)]
+    return np.array([[part.mean() for part in np.array_split(row, min(BLOCKS, w))] for row in rows])
