@@ -44,7 +44,7 @@ _INF = _f4(np.inf)
 
 class Photon(NamedTuple):
     """A photon on its way: from o in direction d, the medium there (None in scenes without), its power, flags and
-    number of scatterings."""
+    number of scatterings, and its wave (`pmviewer.kernels.bsdf.dispersion`, None in scenes without dispersion)."""
 
     o: Any
     d: Any
@@ -52,6 +52,7 @@ class Photon(NamedTuple):
     beta: Any
     flags: Any
     bounces: Any
+    wave: Any
 
 
 class Trajectory(NamedTuple):
@@ -102,7 +103,7 @@ def to_surface(scene, pass_, photon, of, volume_out, counts, ledgers, paths):
 
 
 def _through_media(scene, pass_, photon, of, volume_out, counts, ledgers, paths):
-    o, d, medium, beta, flags, bounces = photon
+    o, d, medium, beta, flags, bounces, wave = photon
     kind = 0 if of.to_global else 1
     while True:
         u_channel, u_depth, _, _ = draw4(pass_.sequence, of.seed, of.index, PHOTON_FLIGHT + bounces)
@@ -110,7 +111,7 @@ def _through_media(scene, pass_, photon, of, volume_out, counts, ledgers, paths)
         counts[C_RAYS] += flight.rays
         after, before = mul(beta, flight.weight), luminance(beta)
         o, medium, prim = flight.o, flight.medium, flight.prim
-        here = Photon(o, d, medium, after, flags, bounces)
+        here = Photon(o, d, medium, after, flags, bounces, wave)
         met = Met(True, here, np.int32(prim), flight.u, flight.v, flight.t)
         gone = Met(False, here, np.int32(prim), flight.u, flight.v, flight.t)
         if not is_good(after):

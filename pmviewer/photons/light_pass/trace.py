@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pmviewer.kernels.accel.opacity import over_opacity
+from pmviewer.kernels.bsdf.dispersion import beyond, colour_of_split, has_dispersion, met_by, new_wave
 from pmviewer.kernels.bsdf.scattering import (
     FOLLOWED,
     NOTHING,
@@ -31,7 +32,7 @@ from pmviewer.kernels.bsdf.scattering import (
 from pmviewer.kernels.bsdf.thin_glass import is_ignored, keeps_class
 from pmviewer.kernels.compile.jit import inlined, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
-from pmviewer.kernels.dimensions import COPIES, EMISSION, EMITTER, FURTHER_PHOTONS_SALT, PHOTON_SCATTER, STORE
+from pmviewer.kernels.dimensions import COPIES, EMISSION, EMITTER, FURTHER_PHOTONS_SALT, PHOTON_SCATTER, STORE, WAVE
 from pmviewer.kernels.lights.light import is_delta_light
 from pmviewer.kernels.media.medium import light_medium
 from pmviewer.kernels.random import draw1, draw4, hash3
@@ -137,14 +138,15 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
             continue
         begin_path(paths, i, p, d, scale(beta, factor), light)
         of = Trajectory(i, seed, index, light, factor, to_global)
-        photon = Photon(p, d, light_medium(scene, light), beta, _u4(0), 0)
+        wave = new_wave(scene, pass_.sequence, seed, index, WAVE)
+        photon = Photon(p, d, light_medium(scene, light), beta, _u4(0), 0, wave)
         deltas = pass_.unfound != 0 and is_delta_light(scene, light)  # and nothing but deltas since the light
         while True:
             alive, flown, prim, u, v, t = to_surface(scene, pass_, photon, of, volume_out, counts, ledgers, paths)
             if not alive:
                 break
             deltas = deltas and flown.bounces == photon.bounces  # no collision on the way
-            o, d, medium, beta, flags, bounces = flown
+            o, d, medium, beta, flags, bounces, wave = flown
             word = _u4(flags | _u4(min(bounces, BOUNCES)))
             if prim < 0:
                 extend_path(paths, i, prim, o, d, scale(beta, factor), word, light)
@@ -153,12 +155,13 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
             if is_ignored(scene, prim, material):
-                photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces)
+                photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces, wave)
                 continue
             beta = _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledgers, kind)
             extend_path(paths, i, prim, p, d, scale(beta, factor), word, light)
             wi = (-d[0], -d[1], -d[2])
-            b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
+            b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy, wave)
+            wave, beta = _met(scene, b, wave, beta, factor, ledgers, kind)
             kept = keeps(scene, material, b, ng, wi, pass_.glossy)
             before = luminance(beta)
             if b.groups | kept == NOTHING or not before > _f4(0.0):
@@ -203,12 +206,13 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
             beta = scale(after, _f4(1.0) / survival)
             if pass_.roulette != BY_LUMINANCE or not survival < _f4(1.0):  # else it stays
                 ledgers[kind, E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * factor)
+            wave, beta = _split(scene, b, wave, d, beta, factor, ledgers, kind)
             bounces += 1
             if bounces >= pass_.max_bounces:
                 ledgers[kind, E_TERMINATED] += _f8(luminance(beta) * factor)
                 break
             medium = medium_after(scene, prim, outward, wi, d, medium)
-            photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces)
+            photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces, wave)
     return i1
 
 
@@ -245,6 +249,35 @@ def _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledgers, kind):
             return _f4(0.0), _f4(0.0), _f4(0.0)
         ledgers[kind, E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * factor)
         return beta
+
+    return booked
+
+
+@specialised
+def _met(scene, b, wave, beta, factor, ledgers, kind):
+    """A photon's wave and power where it meets a surface of BSDF b; what its colour gives or takes is booked, which is
+    nothing in the mean."""
+    if not has_dispersion(scene):
+        return lambda scene, b, wave, beta, factor, ledgers, kind: (wave, beta)
+
+    def booked(scene, b, wave, beta, factor, ledgers, kind):
+        wave, coloured = met_by(scene, b, wave, beta)
+        ledgers[kind, E_ABSORBED] += _f8(luminance(beta) * factor) - _f8(luminance(coloured) * factor)
+        return wave, coloured
+
+    return booked
+
+
+@specialised
+def _split(scene, b, wave, d, beta, factor, ledgers, kind):
+    """The same where it leaves the surface in direction d. After roulette, which would undo the colour."""
+    if not has_dispersion(scene):
+        return lambda scene, b, wave, d, beta, factor, ledgers, kind: (wave, beta)
+
+    def booked(scene, b, wave, d, beta, factor, ledgers, kind):
+        coloured = colour_of_split(scene, b, wave, d, beta)
+        ledgers[kind, E_ABSORBED] += _f8(luminance(beta) * factor) - _f8(luminance(coloured) * factor)
+        return beyond(b, wave, d), coloured
 
     return booked
 
