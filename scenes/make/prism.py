@@ -12,12 +12,12 @@ from make.mesh import Mesh, prism
 GLASS = "SF11"
 MIDDLE_INDEX = 1.795
 """About that of green light: the beam goes through symmetrically for it."""
-SIDE, HEIGHT = 0.9, 0.62
+SIDE, HEIGHT = 0.5, 0.4
 BEND = 2 * math.asin(MIDDLE_INDEX / 2) - math.pi / 3
 """The beam's deviation in radians; it comes along +x and is bent towards −z."""
-SCREEN = 2.1
+SCREEN = 2.0
 """Distance from the prism's middle, along the bent beam."""
-SLIT = 0.024
+SLIT = 0.014
 
 
 def _body() -> tuple[Mesh, float]:
@@ -38,14 +38,14 @@ def _body() -> tuple[Mesh, float]:
 def prism_and_screen() -> MadeScene:
     """The spot's cone is narrow and grazes the table; a slit close to the prism makes a sheet of it."""
     body, z = _body()
-    spot_at, aim = (-3.0, 0.34, z), (0.0, 0.17, z)
+    spot_at, aim = (-1.8, 0.22, z), (0.0, 0.11, z)
     direction = np.array([math.cos(BEND), 0.0, -math.sin(BEND)])
     across = (1.1 * math.sin(BEND), 0.0, 1.1 * math.cos(BEND))
     middle = SCREEN * direction
-    half = 0.3
+    half = 0.2
     spot = (
         f'<emitter type="spot"><transform name="to_world"><lookat origin="{numbers(*spot_at)}" '
-        f'target="{numbers(*aim)}" up="0 1 0"/></transform>{rgb("intensity", 900, 900, 900)}'
+        f'target="{numbers(*aim)}" up="0 1 0"/></transform>{rgb("intensity", 300, 300, 300)}'
         f"{number('cutoff_angle', 5)}{number('beam_width', 4.9)}</emitter>"
     )
     return MadeScene(
@@ -54,9 +54,9 @@ def prism_and_screen() -> MadeScene:
         "spectrum onto a screen.",
         "Dispersion: photons with a wavelength each. Mitsuba's RGB variants don't know it: the reference is "
         "pmviewer's own, with look-ups a tenth as wide as the automatic ones.",
-        (-0.25, 1.75, 2.6),
-        (0.25, 0.12, -0.75),
-        46,
+        (-0.25, 1.9, 1.25),
+        (0.14, 0.16, -0.72),
+        48,
         [
             diffuse("table", 0.5, 0.49, 0.47),
             diffuse("screen", 0.8, 0.8, 0.8),
@@ -68,10 +68,10 @@ def prism_and_screen() -> MadeScene:
             panel((0, 0, 0), (3.4, 0, 0), (0, 0, -3.4), "table"),
             panel((middle[0], 0.45, middle[2]), across, (0, 0.45, 0), "screen"),
             mesh("prism", "glass", flat=True),
-            panel((-0.95, half, z - half - SLIT / 2), (0, 0, half), (0, half, 0), "dark"),
-            panel((-0.95, half, z + half + SLIT / 2), (0, 0, half), (0, half, 0), "dark"),
+            panel((-0.6, half, z - half - SLIT / 2), (0, 0, half), (0, half, 0), "dark"),
+            panel((-0.6, half, z + half + SLIT / 2), (0, 0, half), (0, half, 0), "dark"),
             spot,
-            lamp((0.8, 3.2, 1.5), (0.2, 0.0, -0.5), (0.5, 0.5), (1.6, 1.6, 1.7)),
+            lamp((0.8, 3.2, 1.5), (0.2, 0.0, -0.5), (0.5, 0.5), (8, 8, 8.4)),
         ],
         meshes={"prism": body},
         aspect=(256, 192),
