@@ -87,7 +87,6 @@ DISPERSION_FIELDS: list[tuple[str, str]] = [
     ("spectrum", "i8"),  # float32 (SPECTRUM_NODES, SPECTRUM_COLUMNS): wavelength in nm, and its colour
 ]
 """Of scenes with dispersive glass, see `pmviewer.kernels.bsdf.dispersion`."""
-SPECTRUM_NODES, SPECTRUM_COLUMNS = 257, 4
 
 
 def scene_dtype(

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.scene import SPECTRUM_NODES
+from pmviewer.kernels.bsdf.kinds import BANDS, SPECTRUM_NODES
 from pmviewer.scene.cie import colours_in_daylight
 from pmviewer.scene.dispersion import LONGEST, SHORTEST, Dispersion
 
@@ -53,3 +53,19 @@ def channel_indices(dispersion: Dispersion, eta: float) -> tuple[float, float, f
     """Mean relative index of each channel's light."""
     r, g, b = over_spectrum(spectrum()[:, 1:] * indices(dispersion, eta)[:, None]).tolist()
     return r, g, b
+
+
+def of_bands(bands: NDArray[np.integer]) -> Float:
+    """Wavelengths in nm at the middle of bands (BANDS), NaN for band 0."""
+    u = (np.asarray(bands, np.float64) - 0.5) / BANDS
+    nm = np.interp(u, np.linspace(0, 1, SPECTRUM_NODES), spectrum()[:, 0])
+    return np.where(np.asarray(bands) > 0, nm, np.nan)
+
+
+def shown_colours() -> Float:
+    """Colours (BANDS, 3) of the bands for a screen, each as bright as it can be, gamma-encoded."""
+    u = (np.arange(BANDS) + 0.5) / BANDS
+    nodes = np.linspace(0, 1, SPECTRUM_NODES)
+    table = np.stack([np.interp(u, nodes, spectrum()[:, k]) for k in (1, 2, 3)], axis=1)
+    shown: Float = (table / table.max(axis=1, keepdims=True)) ** (1 / 2.2)
+    return shown

@@ -20,22 +20,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.kinds import BANDS, SPECTRUM_COLUMNS, SPECTRUM_NODES
 from pmviewer.kernels.bsdf.specular import fresnel_dielectric
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, specialised
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.random import draw1
-from pmviewer.kernels.scene import (
-    M_GLASS,
-    MATERIAL_COLUMNS,
-    SPECTRUM_COLUMNS,
-    SPECTRUM_NODES,
-)
+from pmviewer.kernels.scene import M_GLASS, MATERIAL_COLUMNS
 from pmviewer.kernels.vector import dot, mul, scale
 
 _f4 = np.float32
 _i4 = np.int32
 _i8 = np.int64
+_u4 = np.uint32
 
 
 class Wave(NamedTuple):
@@ -114,6 +111,12 @@ def colour_at(scene, u):
     """Linear sRGB at the place u of the spectrum; its mean over u is (1, 1, 1)."""
     i, f = _place(u)
     return _column(scene, i, f, 1), _column(scene, i, f, 2), _column(scene, i, f, 3)
+
+
+@device
+def band_of(wave):
+    """Of a path's wave (BANDS): 1 to BANDS, 0 for a path that is not split."""
+    return _u4(min(_i4(wave.u * _f4(BANDS)), _i4(BANDS - 1)) + 1) if wave.split != 0 else _u4(0)
 
 
 @specialised

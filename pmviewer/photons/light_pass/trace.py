@@ -39,8 +39,9 @@ from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import STRAIGHT, adjoint_cosines, face, leave, surface_at
 from pmviewer.kernels.vector import dot, is_good, luminance, mul, scale
-from pmviewer.maps.photon_words import encode_direction, write_photon
+from pmviewer.maps.photon_words import encode_direction
 from pmviewer.maps.record import BOUNCES, CAUSTIC, HAD_DIFFUSE, INDIRECT_CAUSTIC, LAST_SPECULAR, UNFOUND
+from pmviewer.photons.light_pass.banded import write_of_wave
 from pmviewer.photons.light_pass.flight import Photon, Trajectory, is_full, medium_after, to_surface
 from pmviewer.photons.light_pass.ledger import (
     C_CAUSTIC,
@@ -101,13 +102,14 @@ class PhotonBuffers(NamedTuple):
 
 class Arrival(NamedTuple):
     """A photon where it meets a surface that keeps it: point p, unit wi to where it came from, ng on that side, flags
-    and light as in `pmviewer.maps.record`."""
+    and light as in `pmviewer.maps.record`, and its wave."""
 
     p: Any
     wi: Any
     ng: Any
     flags: Any
     light: Any
+    wave: Any
 
 
 @kernel
@@ -136,9 +138,9 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
             counts[C_DROPPED] += 0 if good else 1
             ledgers[kind, E_ESCAPED if good else E_DROPPED] += _f8(factor)
             continue
-        begin_path(paths, i, p, d, scale(beta, factor), light)
-        of = Trajectory(i, seed, index, light, factor, to_global)
         wave = new_wave(scene, pass_.sequence, seed, index, WAVE)
+        begin_path(paths, i, p, d, scale(beta, factor), light, wave)
+        of = Trajectory(i, seed, index, light, factor, to_global)
         photon = Photon(p, d, light_medium(scene, light), beta, _u4(0), 0, wave)
         deltas = pass_.unfound != 0 and is_delta_light(scene, light)  # and nothing but deltas since the light
         while True:
@@ -149,7 +151,7 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
             o, d, medium, beta, flags, bounces, wave = flown
             word = _u4(flags | _u4(min(bounces, BOUNCES)))
             if prim < 0:
-                extend_path(paths, i, prim, o, d, scale(beta, factor), word, light)
+                extend_path(paths, i, prim, o, d, scale(beta, factor), word, light, wave)
                 ledgers[kind, E_ESCAPED] += _f8(luminance(beta) * factor)
                 break
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
@@ -158,7 +160,7 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces, wave)
                 continue
             beta = _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledgers, kind)
-            extend_path(paths, i, prim, p, d, scale(beta, factor), word, light)
+            extend_path(paths, i, prim, p, d, scale(beta, factor), word, light, wave)
             wi = (-d[0], -d[1], -d[2])
             b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy, wave)
             wave, beta = _met(scene, b, wave, beta, factor, ledgers, kind)
@@ -174,7 +176,7 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 times, stored = _copies(pass_, beta, seed, index, bounces)
                 # As many photons as the opacity says meet the surface; looked up, it is taken to be there.
                 stored = over_opacity(scene, prim, u, v, p, scale(stored, factor))
-                arrival = Arrival(p, wi, ng, _u4(word | _u4(UNFOUND)) if unfound else word, light)
+                arrival = Arrival(p, wi, ng, _u4(word | _u4(UNFOUND)) if unfound else word, light, wave)
                 if _is_caustic(pass_, word):
                     in_caustic = _in_caustic(pass_, word, stored)
                     _store(caustic_out, caustic_normals, counts, C_CAUSTIC, arrival, in_caustic, times)
@@ -321,7 +323,7 @@ def _store(rows, normals, counts, which, arrival, power, times):
     counts[which] rows are filled."""
     ng = arrival.ng
     for _ in range(times):
-        write_photon(rows, counts[which], arrival.p, arrival.wi, power, arrival.flags, arrival.light)
+        write_of_wave(rows, counts[which], arrival.p, arrival.wi, power, arrival.flags, arrival.light, arrival.wave)
         if len(normals) > 0:
             normals[counts[which]] = encode_direction(ng[0], ng[1], ng[2])
         counts[which] += 1

@@ -37,9 +37,7 @@ def of_its_own(hit, sequence, seed, index):
 
     def another(hit, sequence, seed, index):
         wave = renewed(hit.wave, sequence, seed, index, GATHER_WAVE)
-        return Hit(
-            hit.prim, hit.u, hit.v, hit.t, hit.p, hit.ng, hit.ns, hit.gap, hit.medium, hit.crossed, wave
-        )
+        return Hit(hit.prim, hit.u, hit.v, hit.t, hit.p, hit.ng, hit.ns, hit.gap, hit.medium, hit.crossed, wave)
 
     return another
 

@@ -115,6 +115,8 @@ def scatter_in_medium(scene, eye, ray, arrival, choice, sampler, numbers, places
         beta = mul(arrival.beta, scattering_albedo(scene, medium))
         L, rays = phase_light(scene, p, ray.d, medium, lobes, choice, eye.mis, sampler, places)
         wi = sample_phase(lobes, ray.d, numbers[0], numbers[1], numbers[2])
-        return Scattered(mul(beta, L), Ray(p, wi, _f4(0.0), _INF, medium, ray.wave), phase(lobes, ray.d, wi), beta, rays)
+        return Scattered(
+            mul(beta, L), Ray(p, wi, _f4(0.0), _INF, medium, ray.wave), phase(lobes, ray.d, wi), beta, rays
+        )
 
     return scattered

@@ -75,6 +75,11 @@ class FlatScene:
         return "media" in (self.record.dtype.names or ())
 
     @property
+    def disperses(self) -> bool:
+        """Whether there is glass that splits light into colours."""
+        return "glasses" in (self.record.dtype.names or ())
+
+    @property
     def delta_lights(self) -> bool:
         """Whether there are lights that no ray can meet."""
         return bool(np.isin(self.lights[:, K.L_KIND], (K.POINT, K.SPOT, K.DIRECTIONAL)).any())

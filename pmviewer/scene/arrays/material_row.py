@@ -19,6 +19,7 @@ from pmviewer.kernels.bsdf.kinds import (
     ROUGH_DIELECTRIC,
     ROUGH_PLASTIC,
     SCHLICK,
+    SPECTRUM_NODES,
     THIN_DIELECTRIC,
 )
 from pmviewer.kernels.bsdf.microfacet import SMOOTHEST
@@ -96,7 +97,7 @@ def material_table(scene: Scene) -> MaterialTable:
     for row, m in zip(rows, materials):
         if m.kind == "blend":
             fill_blend(row, m, number_of)
-    glasses = [np.zeros(K.SPECTRUM_NODES, np.float32)]
+    glasses = [np.zeros(SPECTRUM_NODES, np.float32)]
     for row, m in zip(rows, materials):
         if m.disperses and id(m) in counts:
             _fill_dispersion(row, m, glasses)
