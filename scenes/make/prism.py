@@ -55,8 +55,8 @@ def prism_and_screen() -> MadeScene:
         "Dispersion: photons with a wavelength each. Mitsuba's RGB variants don't know it: the reference is "
         "pmviewer's own, with look-ups a tenth as wide as the automatic ones.",
         (-0.25, 1.9, 1.25),
-        (0.14, 0.16, -0.72),
-        48,
+        (0.08, 0.1, -0.64),
+        52,
         [
             diffuse("table", 0.5, 0.49, 0.47),
             diffuse("screen", 0.8, 0.8, 0.8),

@@ -23,6 +23,6 @@ def lit_sphere(glass, size=24, kind="dielectric", eta=None, albedo=0.6):
     shapes = (
         Shape("floor", Parallelogram((-2, 0, -2), (0, 0, 4), (4, 0, 0)), 0),
         Shape("ball", Sphere((0, 0.5, 0), 0.45), 1),
-        Shape("lamp", Parallelogram((0.7, 2.4, -0.3), (0.6, 0, 0), (0, 0, 0.6)), 2, (20.0,) * 3),
+        Shape("lamp", Parallelogram((0.2, 2.4, -0.7), (1.4, 0, 0), (0, 0, 1.4)), 2, (6.0,) * 3),
     )
     return Scene("lit sphere", None, shapes, materials, (), camera, size, size)
