@@ -6,42 +6,19 @@ import numpy as np
 import pytest
 
 import pmviewer
+from pmviewer.bench.measures.dispersion import prism_scene
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.photon_words import write_banded
 from pmviewer.maps.record import bands, unpack
 from pmviewer.photons.light_pass.light_pass import trace_pass
 from pmviewer.photons.light_pass.roulette import RULES
 from pmviewer.scene.arrays.flatten import flatten
-from pmviewer.scene.description import Camera, Material, Mesh, Parallelogram, Scene, Shape, SpotLight
 from pmviewer.scene.dispersion import GLASSES
 from pmviewer.settings.access import Photons
 from tests.support.dispersive import SCHOTT, lit_sphere
 
 INCIDENCE = 60.0
-"""Of the light on the prism's first face; its second one faces +x, its edge is along y, its angle 60°."""
-
-
-def prism(glass):
-    """Light along +x from afar, and a screen for what goes straight through both faces."""
-    ring = 0.5 * np.array([[0.5, np.sqrt(3) / 2], [-1.0, 0.0], [0.5, -np.sqrt(3) / 2]])  # (x, z)
-    vertices = np.concatenate([np.insert(ring, 1, y, axis=1) for y in (-0.5, 0.5)])
-    sides = [f for i in range(3) for j in [(i + 1) % 3] for f in ((i, j, 3 + j), (i, 3 + j, 3 + i))]
-    faces = np.array([*sides, (0, 2, 1), (3, 4, 5)])
-    middle = vertices[faces].mean(axis=1)
-    out = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
-    faces = np.where(((out * middle).sum(axis=1) > 0)[:, None], faces, faces[:, ::-1])
-    angle = np.radians(58)
-    to_screen, across = np.array([np.cos(angle), 0, np.sin(angle)]), np.array([-np.sin(angle), 0, np.cos(angle)])
-    corner = 3 * to_screen - 1.4 * across - [0, 0.6, 0]
-    screen = Parallelogram(tuple(corner), tuple(2.8 * across), (0.0, 1.2, 0.0))
-    materials = (
-        Material("screen", "diffuse", (0.5,) * 3, two_sided=True),
-        Material("glass", "dielectric", (1.0,) * 3, eta=glass.n_d, dispersion=glass),
-    )
-    shapes = (Shape("screen", screen, 0), Shape("prism", Mesh(vertices, faces.astype(np.int32)), 1))
-    light = SpotLight("sun", (-100.0, 0.0, -0.12), (1.0, 0.0, 0.0), (1e5,) * 3, 0.06, 0.06)
-    camera = Camera((0, 5, 0), (0, 0, 0), (1, 0, 0), 40.0)
-    return Scene("prism", None, shapes, materials, (light,), camera, 16, 16)
+"""Of the light on the prism's first face, in degrees; its angle is 60°."""
 
 
 def snell(name, nm):
@@ -56,7 +33,7 @@ def snell(name, nm):
 @pytest.mark.parametrize("name", ["F2", "SF11"])
 def test_each_wavelength_leaves_a_prism_at_snells_angle(name):
     """Within 1 % of its deviation, which is the angle on the second face here; so do the edges of the spectrum."""
-    with pmviewer.open(prism(GLASSES[name.lower()])) as s:
+    with pmviewer.open(prism_scene(GLASSES[name.lower()])) as s:
         s.set({"photons.N": 30_000})
         photons = s.photons("caustic")
     through = (photons.bounces == 2) & (photons.positions[:, 0] > 0.5)

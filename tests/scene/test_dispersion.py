@@ -1,9 +1,10 @@
-"""Dispersion as scenes say it: glasses, equations, Abbe's number; the spectrum that wavelengths are drawn from (T10)."""
+"""Dispersion as scenes say it: glasses, equations, Abbe's number; the spectrum that wavelengths come from (T10)."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -72,7 +73,7 @@ def test_wavelengths_are_drawn_by_their_share_of_white():
     left out, each channel scaled to 1: from the reader of spectra that Mitsuba's files go through."""
     edges = np.arange(380, 731, 10.0)
     parts = []
-    for low, high in zip(edges[:-1], edges[1:]):
+    for low, high in pairwise(edges):
         fine = np.linspace(low, high, 41)
         parts.append(
             np.mean(
@@ -141,7 +142,11 @@ def test_files_name_glass_or_give_its_numbers(tmp_path):
         ('<string name="glass" value="jelly"/>', False, "'jelly' is none of BK7, F2"),
         ('<string name="sellmeier_b" value="1 2"/>', False, "as many numbers"),
         ('<float name="cauchy_b" value="0.01"/>', False, "without 'cauchy_a'"),
-        ('<float name="cauchy_a" value="1.5"/><float name="cauchy_b" value="-0.01"/>', True, "bends red more than blue"),
+        (
+            '<float name="cauchy_a" value="1.5"/><float name="cauchy_b" value="-0.01"/>',
+            True,
+            "bends red more than blue",
+        ),
         ('<float name="cauchy_a" value="1.5"/><float name="cauchy_b" value="-0.2"/>', True, "between 380 and 6"),
         ('<float name="cauchy_a" value="0.5"/><float name="cauchy_b" value="0.001"/>', True, "between 380 and 730 nm"),
         ('<float name="cauchy_a" value="1.5"/><float name="cauchy_b" value="9"/>', True, "it is cut to that"),
