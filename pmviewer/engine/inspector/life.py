@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from pmviewer.engine.inspector.report import PhotonAt, PhotonLife
@@ -33,5 +35,5 @@ def life_of(tracer: Tracer, maps: PassMaps, photon: PhotonAt) -> PhotonLife:
     names = tracer.flat.light_names
     name = names[light] if light < len(names) else str(light + 1)
     stored_at = int(at[0]) if len(at) else -1
-    waves = tuple(of_bands(bands(vertices)).tolist()) if tracer.flat.disperses else ()
+    waves = (math.nan, *of_bands(bands(vertices[1:])).tolist()) if tracer.flat.disperses else ()
     return PhotonLife(photon, vertices, paths.power_unit, trajectory, stored_at, name, wavelengths=waves)

@@ -65,19 +65,19 @@ def _put(paths, i, p, wi, beta, flags, light, wave):
 
 
 @specialised
-def begin_path(paths, i, p, d, beta, light, wave):
+def begin_path(paths, i, p, d, beta, light):
     """Photon i of the pass leaves its light at p in direction d. `paths`: None, or `PhotonPaths.arguments`."""
     if absent(paths):
 
-        def nothing(paths, i, p, d, beta, light, wave):
+        def nothing(paths, i, p, d, beta, light):
             pass
 
         return nothing
 
-    def begin(paths, i, p, d, beta, light, wave):
+    def begin(paths, i, p, d, beta, light):
         if i < len(paths[1]):
             paths[1][i] = 0
-            _put(paths, i, p, d, beta, _u4(0), light, wave)
+            _put(paths, i, p, d, beta, _u4(0), light, None)
 
     return begin
 

@@ -138,10 +138,9 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
             counts[C_DROPPED] += 0 if good else 1
             ledgers[kind, E_ESCAPED if good else E_DROPPED] += _f8(factor)
             continue
-        wave = new_wave(scene, pass_.sequence, seed, index, WAVE)
-        begin_path(paths, i, p, d, scale(beta, factor), light, wave)
+        begin_path(paths, i, p, d, scale(beta, factor), light)
         of = Trajectory(i, seed, index, light, factor, to_global)
-        photon = Photon(p, d, light_medium(scene, light), beta, _u4(0), 0, wave)
+        photon = Photon(p, d, light_medium(scene, light), beta, _u4(0), 0, _wave(scene, pass_, seed, index))
         deltas = pass_.unfound != 0 and is_delta_light(scene, light)  # and nothing but deltas since the light
         while True:
             alive, flown, prim, u, v, t = to_surface(scene, pass_, photon, of, volume_out, counts, ledgers, paths)
@@ -192,10 +191,7 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 ledgers[kind, E_TERMINATED] += _f8(before * factor)
                 break
             d, weight = _scattered(scene, b, group, wi, ng, u_lobe, (u0, u1))
-            if group != FOLLOWED:
-                flags = _u4(HAD_DIFFUSE)
-            elif not keeps_class(scene, prim, material, ng, d):
-                flags = _u4(flags | _u4(LAST_SPECULAR))
+            flags = _flags_after(scene, group, prim, material, ng, d, flags)
             after = scale(mul(beta, weight), share)
             if not is_good(after):
                 counts[C_DROPPED] += 1
@@ -234,6 +230,12 @@ def _stream(pass_, i):
     if place >> 32 != 0:  # a Sobol set has 2³² points; the next photons use other sets
         seed = hash3(seed, _u4(place >> 32), _u4(FURTHER_PHOTONS_SALT))
     return seed, _u4(place)
+
+
+@inlined
+def _wave(scene, pass_, seed, index):
+    """The wave of a photon that leaves its light, None in scenes without dispersion."""
+    return new_wave(scene, pass_.sequence, seed, index, WAVE)
 
 
 @specialised
@@ -327,6 +329,16 @@ def _store(rows, normals, counts, which, arrival, power, times):
         if len(normals) > 0:
             normals[counts[which]] = encode_direction(ng[0], ng[1], ng[2])
         counts[which] += 1
+
+
+@inlined
+def _flags_after(scene, group, prim, material, ng, d, flags):
+    """A photon's flags after a group of lobes of that material sent it in direction d, from the side of ng."""
+    if group != FOLLOWED:
+        return _u4(HAD_DIFFUSE)
+    if keeps_class(scene, prim, material, ng, d):
+        return flags
+    return _u4(flags | _u4(LAST_SPECULAR))
 
 
 @inlined
