@@ -25,7 +25,7 @@ EXPECTED = """
 shape: rectangle disk sphere cylinder cube obj ply instance
 shape: blob~mesh tetra~mesh sheet~mesh quad~mesh tilted~vertex~normals mesh~without~normals flipped~normals face~normals
 transform: mirrored uneven sheared groups~in~groups axis~not~of~unit~length
-bsdf: diffuse conductor roughconductor dielectric roughdielectric thindielectric plastic roughplastic
+bsdf: dispersion diffuse conductor roughconductor dielectric roughdielectric thindielectric plastic roughplastic
 bsdf: twosided bumpmap normalmap anisotropic ggx beckmann
 texture: bitmap checkerboard nearest bilinear repeat mirror clamp roughness
 light: point spot directional constant envmap several textured~area touches~or~crosses
