@@ -20,7 +20,7 @@ FRAUNHOFER_F, FRAUNHOFER_D, FRAUNHOFER_C = 486.1327, 587.5618, 656.2725
 SHORTEST, LONGEST = 380.0, 730.0
 """In nm, of what is seen: what lies outside adds less than a thousandth to any channel of white."""
 LEAST_ABBE = 1.0
-"""No glass has less than some 9."""
+"""Optical glass has some 20 at least, rutile 10."""
 LEAST_INDEX, LARGEST_INDEX = 1.0, 10.0
 
 
