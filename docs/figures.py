@@ -19,6 +19,7 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 TEXTS = (
     "compare.md",
+    "dispersion.md",
     "editing.md",
     "estimation.md",
     "importance.md",

@@ -1,5 +1,6 @@
 // The colour of a photon as it is stored (pmviewer/maps/record.py).
-uniform int colour_by;      // 0 power, 1 bounces, 2 light, 3 lit or in shadow, 4 a channel in false colours, 5 fate
+uniform int colour_by;      // 0 power, 1 bounces, 2 light, 3 lit or in shadow, 4 a channel in false colours, 5 fate,
+                            // 6 wavelength
 uniform int channel;        // of 4: red, green, blue, or (3) the mean of green and blue
 uniform int colour_row;     // of 4: small to large, or (1) around a middle
 uniform vec3 false_colours[32]; // sixteen of either table
@@ -7,6 +8,7 @@ uniform vec3 fate_palette[4];
 uniform vec2 power_range;   // logarithms (base 2) of the brightest channel, dim and bright end
 uniform vec3 bounce_palette[8];
 uniform vec3 light_palette[8];
+uniform vec3 wave_palette[64]; // of photons without a wavelength, and of the bands of the spectrum
 uniform vec3 lit_colour;
 uniform vec3 shadow_colour;
 
@@ -26,6 +28,11 @@ vec3 photon_hue(uint flags, uvec2 power_and_light) {
     if (colour_by == 1) return bounce_palette[min(int(flags & 63u), 7)];
     if (colour_by == 2) return light_palette[int((power_and_light.y >> 16u) % 8u)];
     if (colour_by == 5) return fate_palette[int((power_and_light.y >> 16u) & 3u)];
+    if (colour_by == 6) {
+        uint red_green = power_and_light.x;
+        uint band = (red_green & 3u) | ((red_green >> 16u & 3u) << 2u) | ((power_and_light.y & 3u) << 4u);
+        return wave_palette[int(band)];
+    }
     if (colour_by == 3) return (flags & HAD_DIFFUSE) != 0u ? shadow_colour : lit_colour;
     vec3 power = vec3(decode(power_and_light.x & 0xFFFFu), decode(power_and_light.x >> 16u),
                       decode(power_and_light.y & 0xFFFFu));

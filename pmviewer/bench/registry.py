@@ -47,6 +47,10 @@ BENCHES: dict[str, tuple[str, str]] = {
     "denoise": ("Denoised pictures: error against time (P16)", "pmviewer.bench.measures.denoise:run"),
     "media": ("Media: formulas, against Mitsuba, error over time (T9, E7)", "pmviewer.bench.measures.media:run"),
     "lens": ("Lens and filters: circle of confusion, and against Mitsuba (R13)", "pmviewer.bench.measures.lens:run"),
+    "dispersion": (
+        "Dispersion: prism angles, white, paths and photons (T10)",
+        "pmviewer.bench.measures.dispersion:run",
+    ),
     "virtual": ("Virtual lights: estimators against the plain sum (R10)", "pmviewer.bench.measures.virtual:run"),
     "thin-glass": (
         "Thin glass ignored or tinted against exact caustics (R9)",

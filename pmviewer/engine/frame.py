@@ -105,6 +105,8 @@ class PhotonCloud:
     power_unit: float
     reach: NDArray[np.float32] | None = None
     """Of records: (n,) distances up to which they are used, in scene units."""
+    banded: bool = False
+    """Do photons tell their wavelengths (`pmviewer.maps.record.bands`)?"""
 
 
 @dataclass(frozen=True)

@@ -46,10 +46,11 @@ def _clouds(looked: Looked) -> dict[str, PhotonCloud]:
         return clouds
     maps, shadows, cache = looked.latest.maps, looked.latest.shadows, looked.latest.cache
     if maps.photons is not None:
-        clouds["global"] = PhotonCloud(maps.photons.global_, maps.photons.global_unit)
-        clouds["caustic"] = PhotonCloud(maps.photons.caustic, maps.photons.caustic_unit)
+        banded = looked.plan.banded
+        clouds["global"] = PhotonCloud(maps.photons.global_, maps.photons.global_unit, banded=banded)
+        clouds["caustic"] = PhotonCloud(maps.photons.caustic, maps.photons.caustic_unit, banded=banded)
         if looked.plan.volume:
-            clouds["volume"] = PhotonCloud(maps.photons.volume, maps.photons.volume_unit)
+            clouds["volume"] = PhotonCloud(maps.photons.volume, maps.photons.volume_unit, banded=banded)
     if maps.radiance is not None:
         clouds["radiance"] = PhotonCloud(maps.radiance.known(), maps.radiance.grid.power_unit)
     if shadows is not None:

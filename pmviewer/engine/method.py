@@ -43,11 +43,10 @@ class Plan:
     importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0 without; `virtual`
     is whether virtual lights bring the indirect light; `media` whether the scene has participating media, and `volume`
     whether photons are stored in them and light that they scatter is looked up, `phase_rays` whether rays by phase
-    functions can meet a light; `lens` whether the render camera has one, `filtered` whether the
-    film has another reconstruction filter than the plain box, `moments` whether the film keeps what passes tell of its
-    noise; `thin_glass` are the rules by which light passes panes of
-    glass, () where all of it is exact; `warnings`
-    are sentences for the log about what was asked for and can't be."""
+    functions can meet a light; `dispersion` whether glass splits light into colours; `lens` whether the render camera
+    has one, `filtered` whether the film has another reconstruction filter than the plain box, `moments` whether the
+    film keeps what passes tell of its noise; `thin_glass` are the rules by which light passes panes of glass, () where
+    all of it is exact; `warnings` are sentences for the log about what was asked for and can't be."""
 
     path: bool = False
     direct: bool = False
@@ -74,6 +73,7 @@ class Plan:
     media: bool = False
     volume: bool = False
     phase_rays: bool = False
+    dispersion: bool = False
     caustic_mask: int = 0
     global_mask: int = 0
     direct_mask: int = 0
@@ -102,6 +102,11 @@ class Plan:
     def judges(self) -> bool:
         """Whether a rule decides which photons are stored."""
         return self.deposition != "all" or self.emission not in ("off", "Peter-Pietrek")
+
+    @property
+    def banded(self) -> bool:
+        """Whether stored photons tell their wavelengths: rules that write powers anew lose them."""
+        return self.dispersion and not self.chooses_photons
 
     @property
     def chooses_photons(self) -> bool:
@@ -157,7 +162,8 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         filtered=_filtered(settings, traits),
         moments=not (_divided(settings, plan) or is_signed(_filter(settings, traits))),
         thin_glass=thin_rules(settings, traits),
-        warnings=(*plan.warnings, *_of_thin(settings, traits)),
+        dispersion=traits.has_dispersion,
+        warnings=(*plan.warnings, *_of_thin(settings, traits), *_of_dispersion(plan, traits)),
     )
     if not plan.photons:
         return plan
@@ -183,6 +189,16 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     if how.map == "off":
         return replace(plan, skipped=(*plan.skipped, ("importance", "importance.map is off")))
     return replace(plan, importance=True)
+
+
+SPLIT_TWICE = (
+    "Light that glass splits into colours and that is then seen through such glass mixes red, green and blue there, "
+    "not wavelengths: the method 'path' keeps them."
+)
+
+
+def _of_dispersion(plan: Plan, traits: SceneTraits) -> tuple[str, ...]:
+    return (SPLIT_TWICE,) if traits.has_dispersion and not plan.path else ()
 
 
 def _has_lens(settings: Settings, traits: SceneTraits) -> bool:

@@ -121,13 +121,13 @@ def _ray_of_pinhole(eye, x, y):
     zero = (_f4(0.0), _f4(0.0), _f4(0.0))
     if eye.orthographic != 0:
         P, D = start(right, down, zero, zero)
-        return Ray(add(o, raw), (eye.x_forward, eye.y_forward, eye.z_forward), eye.near, eye.far, None), P, D
+        return Ray(add(o, raw), (eye.x_forward, eye.y_forward, eye.z_forward), eye.near, eye.far, None, None), P, D
     inv = _f4(1.0) / _f4(math.sqrt(dot(raw, raw)))
     d = scale(raw, inv)
     dx, dy = scale(along(right, d, -dot(right, d)), inv), scale(along(down, d, -dot(down, d)), inv)
     per_depth = _f4(1.0) / dot(d, (eye.x_forward, eye.y_forward, eye.z_forward))
     P, D = start(zero, zero, dx, dy)
-    return Ray(o, d, eye.near * per_depth, eye.far * per_depth, None), P, D
+    return Ray(o, d, eye.near * per_depth, eye.far * per_depth, None, None), P, D
 
 
 @device

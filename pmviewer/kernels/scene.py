@@ -82,6 +82,12 @@ MEDIA_FIELDS: list[tuple[str, str]] = [
 ]
 """Of scenes with participating media."""
 
+DISPERSION_FIELDS: list[tuple[str, str]] = [
+    ("glasses", "i8"),  # float32 (n_glasses + 1, SPECTRUM_NODES): relative indices over the spectrum, row 0 unused
+    ("spectrum", "i8"),  # float32 (SPECTRUM_NODES, SPECTRUM_COLUMNS): wavelength in nm, and its colour
+]
+"""Of scenes with dispersive glass, see `pmviewer.kernels.bsdf.dispersion`."""
+
 
 def scene_dtype(
     bsdfs: bool = False,
@@ -93,6 +99,7 @@ def scene_dtype(
     principled: bool = False,
     blends: bool = False,
     media: bool = False,
+    dispersion: bool = False,
 ) -> np.dtype:
     """The record of a scene with or without these features.
 
@@ -108,6 +115,7 @@ def scene_dtype(
         *(COLOUR_FIELDS if colours else []),
         *(OPACITY_FIELDS if opacity else []),
         *(MEDIA_FIELDS if media else []),
+        *(DISPERSION_FIELDS if dispersion else []),
     ]
     # In front, since numba warns where one record begins like another.
     return np.dtype([*extra, *_FIELDS], align=True)
@@ -149,6 +157,9 @@ M_THIN = _columns[42]
 THIN_EXACT, THIN_IGNORED, THIN_TINTED, THIN_REFLECTING, THIN_BY_SETTING = range(5)
 """What M_THIN may be, see `pmviewer.kernels.bsdf.thin_glass`."""
 M_METALLIC_MAP, M_WEIGHT_MAP = _columns[40:42]
+M_GLASS = _columns[43]
+"""Row of `glasses`, 0 where the index is the same for all wavelengths. Then M_ETA_RGB are the channels' mean indices.
+"""
 BSDF_TABLE_SIZE = 64
 
 PARALLELOGRAM, DISK, SPHERE, CYLINDER, MESH, POINT, ENVIRONMENT, SPOT, DIRECTIONAL, IMAGE = range(10)

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from pmviewer import __version__
 from pmviewer.engine.frame import PhotonCloud
 from pmviewer.errors import SettingError
-from pmviewer.maps.record import unpack
+from pmviewer.maps.record import bands, unpack
 from pmviewer.output.ply import write_ply
+from pmviewer.scene.spectrum import of_bands
 from pmviewer.settings.access import SETTINGS, Settings, flat
 
 MAPS = ("global", "caustic")
@@ -43,6 +44,9 @@ class Photons:
     """(n,) numbers of `PATH_CLASSES`."""
     lights: NDArray[np.uint16]
     """(n,) numbers of the lights that they come from, in the order of the scene's light table."""
+    wavelengths: NDArray[np.float32] | None
+    """(n,) nm, to a sixtieth of the spectrum; NaN for a photon that no glass has split yet. None where photons have
+    none: no glass disperses light, or importance chooses what is stored."""
     settings: Settings
     scene_name: str = ""
     pass_number: int = 1
@@ -66,6 +70,8 @@ class Photons:
         for names, array in (*parts, (("power_r", "power_g", "power_b"), self.powers)):
             columns += [(name, array[:, i]) for i, name in enumerate(names)]
         columns += [("bounces", self.bounces), ("path_class", self.path_classes), ("light", self.lights)]
+        if self.wavelengths is not None:
+            columns.append(("wavelength", self.wavelengths))
         write_ply(path, columns, self._comments())
 
     def _comments(self) -> Sequence[str]:
@@ -85,6 +91,7 @@ class Photons:
             "bounces: scatterings before this surface, 31 for 31 or more",
             f"path_class: {classes}",
             "light: number of the light in the scene",
+            *(["wavelength: nm, nan for light that no glass has split"] if self.wavelengths is not None else []),
             *(f"note {note}" for note in self.notes),
             *(f"setting {name} = {values[name]}" for name in told),
         ]
@@ -103,6 +110,7 @@ def photons_of(
         bounces=fields["bounces"].astype(np.uint8),
         path_classes=fields["path_class"].astype(np.uint8),
         lights=fields["light"].astype(np.uint16),
+        wavelengths=of_bands(bands(cloud.photons)).astype(np.float32) if cloud.banded else None,
         settings=settings,
         scene_name=scene_name,
         pass_number=pass_number,

@@ -231,14 +231,15 @@ class Rendering:
             reason = inactive_reason(f"overlays.{map}.show", self._settings, self._opened.traits)
             if reason is not None:
                 raise SettingError(f"photons('{map}'): {reason}")
-            made = self._within_memory(
-                lambda: Renderer(self._opened, self._settings, self._pool, self._store).photons_alone(passes)
-            )
-            cloud = (
-                PhotonCloud(made.caustic, made.caustic_unit)
-                if map == "caustic"
-                else PhotonCloud(made.global_, made.global_unit)
-            )
+
+            def traced() -> tuple[bool, Any]:
+                renderer = Renderer(self._opened, self._settings, self._pool, self._store)
+                return renderer.plan.banded, renderer.photons_alone(passes)
+
+            banded, made = self._within_memory(traced)
+            of_caustics = map == "caustic"
+            rows, unit = (made.caustic, made.caustic_unit) if of_caustics else (made.global_, made.global_unit)
+            cloud = PhotonCloud(rows, unit, banded=banded)
             scene = self._opened.scene
             return photons_of(map, cloud, self._settings, scene.name, passes, tuple(scene.warnings))
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device, inlined
+from pmviewer.kernels.dimensions import BAND_SALT
 from pmviewer.kernels.memory import bits_of_float, float_of_bits
+from pmviewer.kernels.random import hash3
 from pmviewer.maps.record import EXPONENT_BASE
 
 _EXPONENT_BASE = np.uint32(EXPONENT_BASE)
@@ -65,6 +67,30 @@ def write_photon(rows, row, p, wi, power, flags, light):
     rows[row, 0], rows[row, 1], rows[row, 2] = p
     r, g, b = encode_power(power[0]), encode_power(power[1]), encode_power(power[2])
     rows[row, 3] = float_of_bits(_u4(encode_direction(wi[0], wi[1], wi[2]) | _u4(flags)))
+    rows[row, 4] = float_of_bits(_u4(r | _u4(g << _u4(16))))
+    rows[row, 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
+
+
+@device
+def encode_marked(x, mark, noise):
+    """`encode_power` with the two lowest bits of the code replaced by `mark`; `noise` is a random number below 2¹⁵,
+    which makes the power right in the mean."""
+    bits = _u4(bits_of_float(_f4(x)))
+    if bits < _u4(_EXPONENT_BASE + _u4(0x10000)):
+        return _u4(mark)
+    steps = _u4(_u4(bits - _EXPONENT_BASE) - _u4(_u4(mark) << _u4(13)) + _u4(noise)) >> _u4(15)
+    return _u4(_u4(min(steps, _u4(0x3FFF)) << _u4(2)) | _u4(mark))
+
+
+@device
+def write_banded(rows, row, p, wi, power, flags, light, band):
+    """`write_photon` of a photon of that band of wavelengths (`pmviewer.maps.record`)."""
+    write_photon(rows, row, p, wi, power, flags, light)
+    noise = hash3(_u4(bits_of_float(p[0])), _u4(bits_of_float(p[1])), _u4(bits_of_float(p[2])))
+    more = hash3(noise, _u4(BAND_SALT), _u4(band))
+    r = encode_marked(power[0], _u4(band) & _u4(3), _u4(noise & _u4(0x7FFF)))
+    g = encode_marked(power[1], _u4(_u4(band) >> _u4(2)) & _u4(3), _u4(_u4(noise >> _u4(16)) & _u4(0x7FFF)))
+    b = encode_marked(power[2], _u4(_u4(band) >> _u4(4)) & _u4(3), _u4(more & _u4(0x7FFF)))
     rows[row, 4] = float_of_bits(_u4(r | _u4(g << _u4(16))))
     rows[row, 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
 

@@ -21,6 +21,11 @@ class: direct `LD` (neither bit), caustic `LS+D` (bit 7 alone), indirect (bit 6 
 the photon came over mirrors and clear glass alone from a light that no ray can meet to a lobe that is followed, so that
 no path from the eye finds this light. Bits 0–4: the number of scatterings so far (31 means 31 or more).
 
+In scenes with dispersive glass the two lowest bits of each channel's power tell the photon's band of wavelengths, which
+costs no power in the mean: the rest is rounded at random. Band 0 is that of photons that have all wavelengths still, 1
+to BANDS those of the spectrum (`pmviewer.kernels.bsdf.kinds`). Rules that write powers anew lose it
+(`pmviewer.maps.power`).
+
 Rows rather than a structured type: three columns are coordinates as arrays of points are, one copy moves a photon, and
 kernels address a word by its column. Grids and kd-trees keep the same words in an order of their own.
 """
@@ -62,6 +67,13 @@ def in_classes(photons: np.ndarray, mask: int) -> np.ndarray | None:
     classes = (photons.view(np.uint32)[:, 3] >> 6) & 3
     wanted = np.array([mask >> c & 1 for c in range(4)], bool)[classes]
     return None if wanted.all() else wanted
+
+
+def bands(photons: np.ndarray) -> np.ndarray:
+    """Bands (n,) of wavelengths of photons (n, 6) of scenes with dispersive glass, 0 for all wavelengths."""
+    words = np.ascontiguousarray(photons).view(np.uint32)
+    red_green, blue = words[:, 4], words[:, 5]
+    return ((red_green & 3) | ((red_green >> 16 & 3) << 2) | ((blue & 3) << 4)).astype(np.int32)
 
 
 def unpack(photons, power_unit: float) -> dict[str, np.ndarray]:

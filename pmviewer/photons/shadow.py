@@ -74,7 +74,7 @@ def trace_shadows(scenes, seed, glossy, i0, i1, out, counts):
                 break
             q, ng, ns, gap = surface_at(scene, prim, u, v, p[0], p[1], p[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
-            bsdf = bsdf_at(scene, prim, material, u, v, q, ng, ns, wi, glossy)
+            bsdf = bsdf_at(scene, prim, material, u, v, q, ng, ns, wi, glossy, None)
             if keeps(scene, material, bsdf, ng, wi, glossy) != NOTHING:
                 write_photon(out, counts[0], q, wi, beta, flags, light)
                 counts[0] += 1

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pmviewer.kernels.accel.raycast import closest_hit
+from pmviewer.kernels.bsdf.dispersion import beyond
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.media.medium import MOST_BOUNDARIES, has_media, is_boundary, medium_beyond
@@ -20,28 +21,38 @@ _INF = _f4(np.inf)
 
 class Ray(NamedTuple):
     """From o in the unit direction d; meets what lies between the distances near and far. `medium`: that it starts in
-    (`pmviewer.kernels.media.medium`), None in scenes without media; in others near is 0."""
+    (`pmviewer.kernels.media.medium`), None in scenes without media; in others near is 0. `wave`: the path's wavelength
+    (`pmviewer.kernels.bsdf.dispersion`), None where glass bends all alike."""
 
     o: Any
     d: Any
     near: Any
     far: Any
     medium: Any
+    wave: Any
 
 
 @specialised
 def ray_of_camera(eye, o, d, near, far):
     """A camera ray, in the medium that the eye record says the camera is in, if it says so."""
     if not has(eye, "medium"):
-        return lambda eye, o, d, near, far: Ray(o, d, near, far, None)
-    return lambda eye, o, d, near, far: Ray(along(o, d, near), d, _f4(0.0), far - near, _i8(eye.medium))
+        return lambda eye, o, d, near, far: Ray(o, d, near, far, None, None)
+    return lambda eye, o, d, near, far: Ray(along(o, d, near), d, _f4(0.0), far - near, _i8(eye.medium), None)
+
+
+@specialised
+def of_wave(ray, wave):
+    """The ray with another wave."""
+    if absent(wave):
+        return lambda ray, wave: ray
+    return lambda ray, wave: Ray(ray.o, ray.d, ray.near, ray.far, ray.medium, wave)
 
 
 class Hit(NamedTuple):
     """What a ray met: primitive (−1: nothing), the coordinates u and v on it, the distance t; there the point p, the
     geometric and the shading normal as the surface has them, and how far rays start off it. Where nothing is met, p is
     the ray's origin and the normals are its direction. `medium`: that the ray arrives in, and `crossed`: the boundaries
-    of media that it has crossed, which are no surfaces; both None in scenes without media."""
+    of media that it has crossed, which are no surfaces; both None in scenes without media. `wave`: the ray's."""
 
     prim: Any
     u: Any
@@ -53,6 +64,7 @@ class Hit(NamedTuple):
     gap: Any
     medium: Any
     crossed: Any
+    wave: Any
 
 
 @specialised
@@ -66,9 +78,9 @@ def cast(scene, ray):
         t, found, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], ray.near, ray.far)
         prim = _i8(found)  # One type for every kind of scene.
         if prim < 0:
-            return Hit(prim, u, v, t, o, d, d, _f4(0.0), None, None)
+            return Hit(prim, u, v, t, o, d, d, _f4(0.0), None, None, ray.wave)
         p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
-        return Hit(prim, u, v, t, p, ng, ns, gap, None, None)
+        return Hit(prim, u, v, t, p, ng, ns, gap, None, None, ray.wave)
 
     return plain
 
@@ -82,22 +94,22 @@ def _cast_through(scene, ray):
         t, found, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), far)
         prim = _i8(found)
         if prim < 0:
-            return Hit(prim, u, v, travelled + t, ray.o, d, d, _f4(0.0), medium, _i8(crossed))
+            return Hit(prim, u, v, travelled + t, ray.o, d, d, _f4(0.0), medium, _i8(crossed), ray.wave)
         p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
         if not is_boundary(scene, prim):
-            return Hit(prim, u, v, travelled + t, p, ng, ns, gap, medium, _i8(crossed))
+            return Hit(prim, u, v, travelled + t, p, ng, ns, gap, medium, _i8(crossed), ray.wave)
         medium = medium_beyond(scene, prim, ng, d, medium)
         o = leave(p, ng, gap, d[0], d[1], d[2])
         travelled += t
         far -= t
-    return Hit(_i8(-1), _f4(0.0), _f4(0.0), travelled, ray.o, d, d, _f4(0.0), medium, _i8(0))
+    return Hit(_i8(-1), _f4(0.0), _f4(0.0), travelled, ray.o, d, d, _f4(0.0), medium, _i8(0), ray.wave)
 
 
 @device
-def ray_from(p, ng, gap, wi, medium):
+def ray_from(p, ng, gap, wi, medium, wave):
     """The ray from a surface point with geometric normal ng, on either side, and that gap in direction wi, which starts
-    in the medium."""
-    return Ray(leave(p, ng, gap, wi[0], wi[1], wi[2]), wi, _f4(0.0), _INF, medium)
+    in the medium and has the wave."""
+    return Ray(leave(p, ng, gap, wi[0], wi[1], wi[2]), wi, _f4(0.0), _INF, medium, wave)
 
 
 @specialised
@@ -111,4 +123,4 @@ def medium_towards(si, wi):
 @device
 def leaving(si, wi):
     """The ray from a SurfaceInteraction in direction wi."""
-    return ray_from(si.p, si.ng, si.gap, wi, medium_towards(si, wi))
+    return ray_from(si.p, si.ng, si.gap, wi, medium_towards(si, wi), beyond(si.bsdf, si.wave, wi))

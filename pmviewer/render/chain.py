@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.dispersion import colour_of_split, met_by
 from pmviewer.kernels.bsdf.scattering import (
     FOLLOWED,
     STORED,
@@ -42,8 +43,9 @@ def arrive(scene, glossy, d, hit, beta):
     material = material_of(scene, hit.prim)
     wo = (-d[0], -d[1], -d[2])
     beta = attenuation(scene, material, hit.ng, d, hit.t, beta)
-    b = bsdf_at(scene, hit.prim, material, hit.u, hit.v, hit.p, hit.ng, hit.ns, wo, glossy)
-    return SurfaceInteraction(hit.p, face(hit.ng, wo), hit.gap, b, wo, _media(scene, d, hit)), beta
+    b = bsdf_at(scene, hit.prim, material, hit.u, hit.v, hit.p, hit.ng, hit.ns, wo, glossy, hit.wave)
+    wave, beta = met_by(scene, b, hit.wave, beta)
+    return SurfaceInteraction(hit.p, face(hit.ng, wo), hit.gap, b, wo, _media(scene, d, hit), wave), beta
 
 
 @specialised
@@ -61,7 +63,7 @@ def scatter(scene, si, group, beta, u_lobe, u, v):
     wi, weight, pdf, compression = bsdf_sample(scene, si.bsdf, group, si.wo, u_lobe, u, v)
     if same_side(si.bsdf, group, si.ng, si.wo, wi) == 0:
         return wi, BLACK, pdf, compression
-    return wi, mul(beta, weight), pdf, compression
+    return wi, colour_of_split(scene, si.bsdf, si.wave, wi, mul(beta, weight)), pdf, compression
 
 
 @device

@@ -193,7 +193,7 @@ def eye_pass(given, outline, radii, film, counts, first, last):
     scene, eye = given.scene, given.eye
     lights, found = stack_i4(LIST_WORDS), stack_i4(AIM_WORDS)
     for number in range(first, last):
-        seed, ray, place, weight = sampled_ray(eye, number)
+        seed, ray, place, weight = sampled_ray(scene, eye, number)
         pixel = Pixel(number, seed, film, radii, counts, weight)
         outlined = len(outline) > 0 and outline[number] != 0
         if outlined:

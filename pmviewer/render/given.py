@@ -39,7 +39,8 @@ class PassData(NamedTuple):
 class SurfaceInteraction(NamedTuple):
     """A surface point seen from wo: p; ng, the geometric normal on the side of wo; gap, how far rays start off the
     surface; bsdf, of `pmviewer.kernels.bsdf.scattering`; wo, unit; media, those on the side of wo and behind the
-    surface (`pmviewer.kernels.media.medium`), None in scenes without."""
+    surface (`pmviewer.kernels.media.medium`), None in scenes without; wave, that of the path that arrived
+    (`pmviewer.kernels.bsdf.dispersion`), None in scenes without dispersion."""
 
     p: Any
     ng: Any
@@ -47,6 +48,7 @@ class SurfaceInteraction(NamedTuple):
     bsdf: Any
     wo: Any
     media: Any
+    wave: Any
 
 
 class Sampler(NamedTuple):

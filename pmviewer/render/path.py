@@ -68,7 +68,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
     scene, eye = scenes[0], eyes[0]
     choice = choose_by_power(stack_i4(LIST_WORDS), eye.light_samples)
     for number in range(first, last):
-        seed, ray, _, weight = sampled_ray(eye, number)
+        seed, ray, _, weight = sampled_ray(scene, eye, number)
         pixel, sampler = Pixel(number, seed, film, None, counts, weight), Sampler(eye.sequence, seed, eye.index)
         beta = WHITE
         stored = 0  # how often the path took lobes that photons are stored for

@@ -6,14 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.dispersion import new_wave
 from pmviewer.kernels.bsdf.scattering import shading_normal
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
-from pmviewer.kernels.dimensions import PIXEL, PIXEL_SALT
+from pmviewer.kernels.dimensions import PIXEL, PIXEL_SALT, WAVE
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.surface import face
 from pmviewer.kernels.vector import add, dot, is_good, normalize
-from pmviewer.render.cast import ray_of_camera
+from pmviewer.render.cast import of_wave, ray_of_camera
 from pmviewer.render.filter import place_in_filter
 from pmviewer.render.lens import lens_numbers, through_lens
 from pmviewer.render.planes import PLANES
@@ -95,14 +96,15 @@ def lens_ray(eye, pixel, u, v, a, b):
 
 
 @device
-def sampled_ray(eye, pixel):
+def sampled_ray(scene, eye, pixel):
     """The pixel's seed, its camera ray in the pass of the eye record, two numbers for its first light sample, and what
     the sample counts (`Pixel.weight`)."""
     seed = pixel_seed(eye, pixel)
     ux, uy, u_light, v_light = draw4(eye.sequence, seed, eye.index, PIXEL)
     x, y, weight = place_in_filter(eye, ux, uy)
     a, b = lens_numbers(eye, seed)
-    return seed, lens_ray(eye, pixel, x, y, a, b), (u_light, v_light), weight
+    ray = of_wave(lens_ray(eye, pixel, x, y, a, b), new_wave(scene, eye.sequence, seed, eye.index, WAVE))
+    return seed, ray, (u_light, v_light), weight
 
 
 @specialised

@@ -62,7 +62,7 @@ def transmission(scene, si, wi, end, straight):
         for _ in range(MOST_PANES):
             o = leave(p, ng, gap, wi[0], wi[1], wi[2])
             d = sub(end, o)
-            hit = cast(scene, Ray(o, d, _f4(0.0), BEFORE_LIGHT, None))
+            hit = cast(scene, Ray(o, d, _f4(0.0), BEFORE_LIGHT, None, None))
             if hit.prim < 0:
                 return tint
             tint = _behind(scene, hit, wi, hit.t * _f4(math.sqrt(dot(d, d))), tint)
@@ -113,7 +113,7 @@ def cast_on(scene, ray, straight):
                     break
                 tint = after
                 o = leave(hit.p, hit.ng, hit.gap, ray.d[0], ray.d[1], ray.d[2])
-                hit = cast(scene, Ray(o, ray.d, _f4(0.0), ray.far, None))
+                hit = cast(scene, Ray(o, ray.d, _f4(0.0), ray.far, None, ray.wave))
         return hit, tint
 
     return through

@@ -63,6 +63,8 @@ class SceneTraits:
     """Media that scatter light."""
     straightest: float = 0.0
     """The largest |g| of their phase functions."""
+    has_dispersion: bool = False
+    """Glass that splits light into colours."""
     has_findable_lights: bool = True
     """Lights that rays can meet."""
 
@@ -123,6 +125,7 @@ def analyse(scene: Scene) -> SceneTraits:
         has_findable_lights=any(isinstance(light, Environment) for light in scene.lights)
         or any(s.radiance is not None and max(s.radiance) > 0 for s in scene.shapes),
         has_scattering=has_media(scene) and any(max(m.albedo) > 0 and max(m.sigma_t) > 0 for m in scene.media),
+        has_dispersion=any(m.disperses for m in used),
         glossy_roughness=tuple(sorted({alpha for m in used for alpha in glossy_roughness(m)})),
     )
 

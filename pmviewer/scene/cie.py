@@ -74,6 +74,14 @@ _MATCHING /= _MATCHING[1].mean()
 _DAYLIGHT /= (_MATCHING[1] * _DAYLIGHT).mean()
 
 
+def colours_in_daylight(nm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Linear sRGB (n, 3), possibly negative, of daylight (D65) of single wavelengths; white if all are added up."""
+    matching, daylight = (
+        np.stack([np.interp(nm, _WAVELENGTHS, row) for row in rows]) for rows in (_MATCHING, [_DAYLIGHT])
+    )
+    return (_XYZ_TO_SRGB @ (matching * daylight)).T
+
+
 def integrated(spectrum: Callable[[NDArray[np.float64]], NDArray[np.float64]], lit: bool) -> RGB:
     """Linear sRGB, possibly negative, of a spectrum over wavelengths in nm. `lit`: it is what a surface makes of
     daylight (D65), not light itself; a surface of reflectance 1 is then white."""

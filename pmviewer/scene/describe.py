@@ -135,7 +135,19 @@ def _materials(scene: Scene) -> str:
     if passed:
         names = ", ".join(passed[:_LISTED]) + (" …" if len(passed) > _LISTED else "")
         texts.append(f"{len(passed)} of them let light pass in part ({names})")
+    split = [_glass_text(m) for m in used if m.disperses]
+    if split:
+        names = ", ".join(split[:_LISTED]) + (" …" if len(split) > _LISTED else "")
+        texts.append(f"{len(split)} of them split light into colours ({names})")
     return ", ".join(texts)
+
+
+def _glass_text(material: Material) -> str:
+    """A dispersive glass with its numbers."""
+    glass = material.dispersion
+    assert glass is not None
+    name = f"{material.name}: {glass.name}" if glass.name else material.name
+    return f"{name}, n_d {glass.n_d:.4g}, Abbe number {glass.abbe:.3g}"
 
 
 def _lights(scene: Scene, radius: float) -> list[tuple[str, str]]:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.bsdf.kinds import KINDS
+from pmviewer.scene.dispersion import Dispersion
 from pmviewer.scene.medium import Medium as Medium
 from pmviewer.scene.texture import LUMINANCE as LUMINANCE
 from pmviewer.scene.texture import Texture
@@ -166,6 +167,8 @@ class Material:
     """Of a blend: is `parts[0]` what the front shows and `parts[1]` what the back does, whatever the weight?"""
     thin_glass: ThinGlass = ""
     """Of a dielectric or thin dielectric: what becomes of light and rays there (`thin_rule`)."""
+    dispersion: Dispersion | None = None
+    """Of a dielectric or rough dielectric: how its index depends on the wavelength; `eta` is that at 587.6 nm."""
     mirrored_maps: bool = False
     """Seen from behind, do mapped normals turn round only across the surface, as if its picture were mirrored
     (Mitsuba's `twosided` around a map), or as a whole, as those of a thin sheet with bumps do?"""
@@ -192,6 +195,11 @@ class Material:
         if self.kind not in ("dielectric", "thin dielectric"):
             return "exact"
         return self.thin_glass or ("by setting" if self.kind == "thin dielectric" else "exact")
+
+    @property
+    def disperses(self) -> bool:
+        """Does it bend wavelengths differently?"""
+        return self.dispersion is not None and self.kind in ("dielectric", "rough dielectric")
 
     @property
     def transparent(self) -> bool:

@@ -41,6 +41,7 @@ PROPERTIES: dict[str, dict[str, Property]] = {
         "colour": Property("linear RGB of what it reflects; a texture is tinted to have it in the mean", 3, 0.0, 1.0),
         "roughness": Property("roughness of its gloss, alpha", 1, 0.0, 1.0),
         "index": Property("index of refraction, inside over outside", 1, 0.2, 5.0),
+        "dispersion": Property("20 over Abbe's number, 0 for an index that is the same for all light", 1, 0.0, 20.0),
     },
     "object": {
         "move": _MOVE,

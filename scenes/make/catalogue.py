@@ -19,6 +19,7 @@ from make.glasses import cognac, three_glasses
 from make.museum import museum
 from make.office import office
 from make.plane import lit_plane
+from make.prism import prism_and_screen
 from make.room import skylight_room
 
 SCENES: dict[str, Callable[[], MadeScene]] = {
@@ -41,6 +42,7 @@ SCENES: dict[str, Callable[[], MadeScene]] = {
     "lit_plane": lit_plane,
     "museum": museum,
     "office": office,
+    "prism": prism_and_screen,
     "skylight_room": skylight_room,
     "three_glasses": three_glasses,
 }

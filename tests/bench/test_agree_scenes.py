@@ -25,7 +25,7 @@ EXPECTED = """
 shape: rectangle disk sphere cylinder cube obj ply instance
 shape: blob~mesh tetra~mesh sheet~mesh quad~mesh tilted~vertex~normals mesh~without~normals flipped~normals face~normals
 transform: mirrored uneven sheared groups~in~groups axis~not~of~unit~length
-bsdf: diffuse conductor roughconductor dielectric roughdielectric thindielectric plastic roughplastic
+bsdf: dispersion diffuse conductor roughconductor dielectric roughdielectric thindielectric plastic roughplastic
 bsdf: twosided bumpmap normalmap anisotropic ggx beckmann
 texture: bitmap checkerboard nearest bilinear repeat mirror clamp roughness
 light: point spot directional constant envmap several textured~area touches~or~crosses
@@ -73,7 +73,7 @@ def test_every_scene_is_read_without_a_warning_and_few_variants_of_kernels_are_n
         scene = load_scene(path)
         assert [w for w in scene.warnings if not any(h in w for h in HARMLESS)] == [], (i, scene_of(2, i)["profile"])
         kinds.add(flatten(scene).record.dtype)
-    assert len(kinds) <= 5
+    assert len(kinds) <= 6
 
 
 def test_text_reads_back():

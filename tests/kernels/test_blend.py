@@ -44,7 +44,7 @@ def _kept(scenes, material, wo, glossy, out):
     n, zero = (np.float32(0), np.float32(0), np.float32(1)), np.float32(0.25)
     for k in range(len(wo)):
         o = (wo[k, 0], wo[k, 1], wo[k, 2])
-        b = bsdf_at(scenes[0], np.int64(0), material, zero, zero, n, n, n, o, glossy)
+        b = bsdf_at(scenes[0], np.int64(0), material, zero, zero, n, n, n, o, glossy, None)
         out[k, 0], out[k, 1] = keeps(scenes[0], material, b, n, o, glossy), b.groups
 
 

@@ -75,6 +75,8 @@ def _materials(scene: Node) -> Iterator[str]:
             yield "bsdf: anisotropic"
     for bsdf in bsdfs_of(scene):
         yield f"bsdf: {bsdf['type']}"
+        if "glass" in bsdf or "abbe" in bsdf:
+            yield "bsdf: dispersion"
         if "distribution" in bsdf:
             yield f"bsdf: {bsdf['distribution']}"
 

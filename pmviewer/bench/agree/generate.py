@@ -59,6 +59,8 @@ PROFILES = (
     Profile("rooms", materials.RICH, room=1.0, more_lights=True, ground=("diffuse", "diffuse", "roughplastic")),
     Profile("plain lights", materials.PLAIN, rich=False, room=0.5, ground=("diffuse",)),
 )
+DISPERSING, DISPERSION_SEED = "nested glass", 0xD15
+"""The profile in whose scenes every second time the glass splits light, which Mitsuba's RGB variants don't know."""
 SCALES = (1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3)
 HALF = 2.0
 """Half the edge of the ground, and of a room."""
@@ -84,6 +86,8 @@ def scene_of(seed: int, index: int) -> Node:
             scene = deviation.without(scene) or scene
     if needs_particles(scene) and draw.chance(0.8):
         _near_lights_alone(scene)
+    if profile.name == DISPERSING and index // len(PROFILES) % 2 == 1:
+        _disperse(Draw(seed + DISPERSION_SEED, index), scene)
     if needs_particles(scene):
         for shape in scene["shapes"]:
             if "mesh" in shape and "emitter" in shape:
@@ -104,6 +108,24 @@ def _choose(draw: Draw, profile: Profile, closed: bool) -> Profile:
         ground = tuple(k for k in profile.ground if not materials.is_delta({"type": k}))
         return replace(profile, bsdfs=rough or profile.bsdfs, ground=ground)
     return profile
+
+
+def _disperse(draw: Draw, scene: Node) -> None:
+    """Give most of the glass of the scene dispersion, some of it at least."""
+    glass = [bsdf for bsdf in bsdfs_of(scene) if bsdf["type"] in ("dielectric", "roughdielectric")]
+    for i, bsdf in enumerate(glass):
+        if i > 0 and draw.chance(0.3):
+            continue
+        bsdf.pop("int_ior", None)
+        if draw.chance(0.5):
+            bsdf["glass"] = draw.pick(("BK7", "F2", "SF11", "diamond", "water"))
+        else:
+            bsdf |= {"int_ior": draw.number(1.2, 2), "abbe": draw.log(10, 80)}
+
+
+def disperses(scene: Node) -> bool:
+    """Whether glass of the scene splits light."""
+    return any("glass" in bsdf or "abbe" in bsdf for bsdf in bsdfs_of(scene))
 
 
 def _checkered(shape: Node) -> bool:

@@ -5,6 +5,8 @@
   or coats, no path tracer finds the caustics. There they are compared with Mitsuba's particle tracer instead, in the
   pixels that see nothing of the kind; with each other where no such pixel is left, where lights at infinity shine,
   which Mitsuba's particles show wrong, or where these bring less than its own paths.
+* Of scenes whose glass disperses, which Mitsuba's RGB variants don't know, the photon methods with our `path` alone, in
+  the terms of the first surface: what is seen through glass mixes channels by photons, wavelengths by paths.
 * With thin glass, `gather` with panes that light passes straight (`render.thin_glass`), as the photon methods.
 * The photon methods with our `path`, term by term: with such caustics only what the camera sees without them.
 
@@ -25,7 +27,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.bench.agree.generate import has_distant_lights, needs_particles
+from pmviewer.bench.agree.generate import disperses, has_distant_lights, needs_particles
 from pmviewer.bench.agree.materials import is_mapped
 from pmviewer.bench.agree.mitsuba_client import Mitsuba, MitsubaError
 from pmviewer.bench.agree.ours import METHODS, PHOTON_METHODS, THIN_GLASS, Effort, our_runs, picture, term
@@ -59,6 +61,7 @@ HARMLESS = ("axis of <rotate> is not of unit length", "lean from their faces")
 """The warnings that are wanted: both programs stretch by such an axis, and what leaning normals do is known."""
 TERMS = {"emission": ("emission",), "direct": ("direct",), "specular": ("specular",),
          "caustic + indirect": ("caustic", "indirect")}  # fmt: skip
+OF_FIRST_SURFACE = ("emission", "direct", "caustic + indirect")
 SAFE_TERMS = ("emission", "direct")
 """Those that hold no caustics."""
 
@@ -180,10 +183,11 @@ def questions(runs: Runs) -> Iterator[Question]:
     def one_scattering(stage: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return summaries(picture(runs.ours("path", stage, 1))), summaries(runs.theirs("path", stage, 2))
 
-    yield Question("path", "Mitsuba path", "picture", lambda s: (whole("path", s), paths(s)))
-    yield Question("path", "Mitsuba path", "one scattering", one_scattering)
-    particles = needs_particles(runs.scene)
-    for method in (*PHOTON_METHODS, *(THIN_GLASS if has_panes(runs.scene) else ())):
+    particles, alone = needs_particles(runs.scene), disperses(runs.scene)
+    if not alone:
+        yield Question("path", "Mitsuba path", "picture", lambda s: (whole("path", s), paths(s)))
+        yield Question("path", "Mitsuba path", "one scattering", one_scattering)
+    for method in (*PHOTON_METHODS, *(THIN_GLASS if has_panes(runs.scene) and not alone else ())):
 
         def by_particles(stage: int, method: str = method) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
             seen = runs.seen_plainly
@@ -195,7 +199,9 @@ def questions(runs: Runs) -> Iterator[Question]:
         def by_other(stage: int, method: str = method) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
             return whole(method, stage), whole("progressive", stage)
 
-        if not particles:
+        if alone:
+            pass
+        elif not particles:
             yield Question(method, "Mitsuba path", "picture", by_paths)
         elif not has_distant_lights(runs.scene) and runs.seen_plainly.mean() >= LEAST_SEEN and particles_hold(runs):
             yield Question(method, "Mitsuba particles", "plain pixels", by_particles)
@@ -203,7 +209,7 @@ def questions(runs: Runs) -> Iterator[Question]:
             yield Question(method, "progressive", "picture", by_other)
         if method in THIN_GLASS:
             continue
-        for name in SAFE_TERMS if particles else TERMS:
+        for name in SAFE_TERMS if particles else OF_FIRST_SURFACE if alone else TERMS:
 
             def by_term(
                 stage: int, method: str = method, name: str = name
@@ -222,7 +228,8 @@ def tried(
         for warning in runs.opened.scene.warnings:
             if not any(harmless in warning for harmless in HARMLESS):
                 return Verdict(refused=f"pmviewer warns: {warning}")
-        shown = runs.theirs("path", 0).mean(axis=0)
+        alone = disperses(scene)
+        shown = (picture(runs.ours("path", 0)) if alone else runs.theirs("path", 0)).mean(axis=0)
         if shown.mean() < LEAST_LIGHT:
             return Verdict()
         comparisons = [question.asked(stages) for question in questions(runs)]

@@ -47,6 +47,15 @@ NONSENSE: dict[str, str] = {
     "albedo -1": SENSOR + SKY + _grey('<rgb name="reflectance" value="-1"/>'),
     "ior 0": SENSOR + SKY + _bsdf("dielectric", '<float name="int_ior" value="0"/>'),
     "ior -1.5": SENSOR + SKY + _bsdf("dielectric", '<float name="int_ior" value="-1.5"/>'),
+    "Abbe number 0": SENSOR + SKY + _bsdf("dielectric", '<float name="abbe" value="0"/>'),
+    "Abbe number NaN": SENSOR + SKY + _bsdf("dielectric", '<float name="abbe" value="nan"/>'),
+    "glass that nobody makes": SENSOR + SKY + _bsdf("dielectric", '<string name="glass" value="jelly"/>'),
+    "Cauchy's B far below 0": SENSOR
+    + SKY
+    + _bsdf("dielectric", '<float name="cauchy_a" value="1.5"/><float name="cauchy_b" value="-0.2"/>'),
+    "Sellmeier's poles in the visible": SENSOR
+    + SKY
+    + _bsdf("dielectric", '<string name="sellmeier_b" value="1 1"/><string name="sellmeier_c" value="0.2 0.3"/>'),
     "roughness -1": SENSOR + SKY + _bsdf("roughconductor", '<float name="alpha" value="-1"/>'),
     "roughness 1e9": SENSOR + SKY + _bsdf("roughconductor", '<float name="alpha" value="1e9"/>'),
     "ball of radius 0": SENSOR + SKY + '<shape type="sphere"><float name="radius" value="0"/></shape>',

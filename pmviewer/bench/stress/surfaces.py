@@ -35,6 +35,7 @@ from pmviewer.scene.description import (
     Sphere,
     SpotLight,
 )
+from pmviewer.scene.dispersion import by_abbe
 
 FURNACE = "furnace: radiance 1"
 OF_A_ROOM: dict[str, Any] = {"estimate__radius": 0.02, "camera__width": 32, "camera__height": 32}
@@ -54,6 +55,10 @@ def materials() -> list[Case]:
         for method in METHODS:
             run = partial(_glass, eta=eta, render__method=method, passes=4 if method == "path" else 1)
             cases.append(Case("ior", f"{eta:g}, {method}", FURNACE, run))
+    for abbe in (1.0, 25.0, 1e6):
+        for method in METHODS:
+            run = partial(_split, abbe=abbe, render__method=method, passes=4 if method == "path" else 1)
+            cases.append(Case("Abbe number", f"{abbe:g}, {method}", FURNACE, run))
     for kind in ("rough conductor", "rough dielectric", "rough plastic"):
         for alpha in (0.0, 1e-4, 1.0):
             for method in ("gather", "progressive"):
@@ -101,6 +106,12 @@ def _black(lab: Lab, **values: Any) -> Outcome:
 
 def _glass(lab: Lab, eta: float, **values: Any) -> Outcome:
     scene = furnace(extra=(ball(1),), materials=(replace(GLASS, eta=eta),))
+    return lab.measure(scene, 1.0, photons__N=20_000, estimate__radius=0.03, **values)
+
+
+def _split(lab: Lab, abbe: float, **values: Any) -> Outcome:
+    """A ball that splits light takes none of it."""
+    scene = furnace(extra=(ball(1),), materials=(replace(GLASS, dispersion=by_abbe(1.5, abbe)),))
     return lab.measure(scene, 1.0, photons__N=20_000, estimate__radius=0.03, **values)
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from pmviewer.engine.inspector.report import PhotonAt, PhotonLife
 from pmviewer.engine.stages.pass_maps import PassMaps
 from pmviewer.engine.stages.tracer import Tracer
+from pmviewer.maps.record import bands
 from pmviewer.photons.light_pass.search import path_of, trajectory_at
+from pmviewer.scene.spectrum import of_bands
 
 GONE = "The pass that stored this photon is over, and with guided emission it can't be traced again: choose one anew."
 NOT_TRACED = "This photon is one of the test photons of guided emission, whose paths aren't traced again."
@@ -30,4 +34,6 @@ def life_of(tracer: Tracer, maps: PassMaps, photon: PhotonAt) -> PhotonLife:
     light = int(vertices[:1].view(np.uint32)[0, 5] >> 16) if len(vertices) else 0
     names = tracer.flat.light_names
     name = names[light] if light < len(names) else str(light + 1)
-    return PhotonLife(photon, vertices, paths.power_unit, trajectory, int(at[0]) if len(at) else -1, name)
+    stored_at = int(at[0]) if len(at) else -1
+    waves = (math.nan, *of_bands(bands(vertices[1:])).tolist()) if tracer.flat.disperses else ()
+    return PhotonLife(photon, vertices, paths.power_unit, trajectory, stored_at, name, wavelengths=waves)

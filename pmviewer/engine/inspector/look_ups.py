@@ -16,7 +16,7 @@ from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.pass_maps import LookUpMap
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED
 from pmviewer.maps.estimate.filters import FILTERS
-from pmviewer.maps.record import UNFOUND, unpack
+from pmviewer.maps.record import UNFOUND, bands, unpack
 from pmviewer.maps.search.kdtree import PhotonKdTree
 from pmviewer.render.diagnostics.pixel_replay import (
     AS_CAUSTICS,
@@ -29,6 +29,7 @@ from pmviewer.render.diagnostics.pixel_replay import (
     empty_rows,
     replay_pixel,
 )
+from pmviewer.scene.spectrum import of_bands
 from pmviewer.settings.access import Settings
 
 MOST_LOOK_UPS, MOST_POINTS = 64, 64
@@ -71,12 +72,12 @@ class Replay:
         return made, way[: counts[1]].astype(np.float64), prims[1 : counts[1]].copy(), shares
 
 
-def look_ups_of(replay: Replay, rendered: RenderedPass, settings: Settings) -> tuple[LookUp, ...]:
-    """Everything that the pixel looked up, in the order of the eye pass."""
-    return tuple(_look_up(row, replay, rendered, settings) for row in replay.rows)
+def look_ups_of(replay: Replay, rendered: RenderedPass, settings: Settings, banded: bool) -> tuple[LookUp, ...]:
+    """Everything that the pixel looked up, in the order of the eye pass. `banded`: photons tell their wavelengths."""
+    return tuple(_look_up(row, replay, rendered, settings, banded) for row in replay.rows)
 
 
-def _look_up(row: np.void, replay: Replay, rendered: RenderedPass, settings: Settings) -> LookUp:
+def _look_up(row: np.void, replay: Replay, rendered: RenderedPass, settings: Settings, banded: bool) -> LookUp:
     eye, maps, purpose = rendered.given.eye[0], rendered.maps, int(row["purpose"])
     name = "caustic" if purpose in (OF_CAUSTICS, NOT_FOUND) else "global"
     made, photons = maps.by_name.get(name), maps.photons
@@ -88,7 +89,9 @@ def _look_up(row: np.void, replay: Replay, rendered: RenderedPass, settings: Set
     both = bool(row["both_sides"])
     disc = Disc(row["p"], row["n"], float(eye["flatness"]), int(row["class_mask"]), both, flags)
     near, chosen = _chosen(stored, disc, made, float(row["radius"]), eye)
-    unpacked = unpack(np.ascontiguousarray(stored[near.rows]), unit)
+    records = np.ascontiguousarray(stored[near.rows])
+    unpacked = unpack(records, unit)
+    unpacked["wavelength"] = of_bands(bands(records) if banded else np.zeros(len(records), np.int64))
     share = replay.shares(int(row["depth"]), int(group), unpacked["wi"]).astype(np.float64)
     beta = row["beta"].astype(np.float64)
     brings = beta * share * unpacked["Phi"]
@@ -154,4 +157,5 @@ def _found(
         bounces=unpacked["bounces"][at].astype(np.int64),
         path_class=unpacked["path_class"][at].astype(np.int64),
         light=unpacked["light"][at].astype(np.int64),
+        wavelength=unpacked["wavelength"][at],
     )

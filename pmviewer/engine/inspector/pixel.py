@@ -45,7 +45,7 @@ def pixel_report(looked: Looked, pinned: Pinned, measures: Measures, pool: WorkP
     if not plan.path:
         replay = pool.run([lambda: Replay(rendered, film.radii, number, len(looked.scene.flat.light_names))])[0]
         way, prims, samples = replay.way, replay.prims, replay.samples
-        look_ups = pool.run([lambda: look_ups_of(replay, rendered, looked.settings)])[0]
+        look_ups = pool.run([lambda: look_ups_of(replay, rendered, looked.settings, plan.banded)])[0]
     map_ = looked_map(looked.settings, plan)
     return PixelReport(
         of=pinned,

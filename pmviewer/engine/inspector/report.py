@@ -52,6 +52,8 @@ class Found:
     bounces: NDArray[np.int64]
     path_class: NDArray[np.int64]
     light: NDArray[np.int64]
+    wavelength: Float
+    """(m,) nm, NaN of photons that no glass has split."""
 
     @property
     def n(self) -> int:
@@ -124,6 +126,8 @@ class PhotonLife:
     stored_at: int = -1
     light: str = ""
     note: str = ""
+    wavelengths: tuple[float, ...] = ()
+    """In nm, of the photon on its way to each vertex, NaN as long as no glass has split it; () in scenes without."""
 
 
 @dataclass(frozen=True)

@@ -39,4 +39,8 @@ KINDS = {
 }
 """By `Material.kind`. What principled materials and blends have depends on their numbers; null is the boundary of
 a medium that nothing else shows (`pmviewer.kernels.media.medium`)."""
+SPECTRUM_NODES, SPECTRUM_COLUMNS = 257, 4
+"""Of the table of wavelengths and colours (`pmviewer.kernels.bsdf.dispersion`)."""
+BANDS = 63
+"""Bands of wavelengths that stored photons tell (`pmviewer.maps.record`)."""
 GLOSSY = tuple(kind.number for kind in KINDS.values() if kind.glossy)

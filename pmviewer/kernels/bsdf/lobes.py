@@ -39,7 +39,7 @@ from pmviewer.kernels.bsdf.material import beer_lambert, interior_attenuation, m
 from pmviewer.kernels.bsdf.plastic import coat_transmittance, coated_diffuse, under_coat
 from pmviewer.kernels.bsdf.rough_dielectric import rough_dielectric_f_pdf, sample_rough_dielectric
 from pmviewer.kernels.bsdf.schlick import schlick_shadowing
-from pmviewer.kernels.bsdf.smooth import sample_smooth
+from pmviewer.kernels.bsdf.smooth import smooth_lobe
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.textures.normal_map import reflecting_normal
 from pmviewer.kernels.vector import add, basis, cross, dot, largest, mul, scale
@@ -343,7 +343,7 @@ def bsdf_sample(b, group, wo, u_lobe, u, v):
     if b.groups & group == 0:
         return wo, _BLACK, _f4(0.0), _f4(1.0)
     if group == FOLLOWED and b.delta:
-        i, weight, compression = sample_smooth(p, o, u_lobe)
+        i, weight, compression = smooth_lobe(p, o, u_lobe)
         return world(b, i), weight, _f4(0.0), compression
     if p.kind == ROUGH_DIELECTRIC:
         i, useful = sample_rough_dielectric(p, o, u_lobe, u, v)

@@ -7,8 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.dispersion import Glass, glass_of_material, index_at
 from pmviewer.kernels.bsdf.kinds import DIELECTRIC, ROUGH_DIELECTRIC
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import absent, specialised
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.scene import (
     BSDF_TABLE_SIZE,
@@ -34,6 +36,7 @@ from pmviewer.kernels.scene import (
 from pmviewer.kernels.vector import dot
 
 _f4 = np.float32
+_i4 = np.int32
 
 
 class MaterialParams(NamedTuple):
@@ -42,7 +45,7 @@ class MaterialParams(NamedTuple):
     kind int32; two_sided bool; reflectance, specular, transmittance, eta_rgb, k_rgb (red, green, blue); eta inside over
     outside; ax, ay GGX or Beckmann roughness (Schlick's α is its square); distribution int32; nonlinear bool; inner the
     diffuse reflectance of a coat from below; table the address of the material's row in `bsdf_tables`; mapped bool: a
-    normal or bump map tilts its normals.
+    normal or bump map tilts its normals; glass what dispersive glass is made of (`Glass`), None in scenes without.
     """
 
     kind: Any
@@ -60,6 +63,7 @@ class MaterialParams(NamedTuple):
     inner: Any
     table: Any
     mapped: Any
+    glass: Any
 
 
 @device
@@ -67,13 +71,14 @@ def material_params(scene, material):
     """The parameters of a material, before textures."""
     base = material * MATERIAL_COLUMNS
     row = scene.materials
+    eta = load_f4(row, base + M_ETA)
     return MaterialParams(
         np.int32(load_f4(row, base + M_KIND)),
         load_f4(row, base + M_TWO_SIDED) != _f4(0.0),
         load3(row, base + M_REFLECTANCE),
         load3(row, base + M_SPECULAR),
         load3(row, base + M_TRANSMITTANCE),
-        load_f4(row, base + M_ETA),
+        eta,
         load3(row, base + M_ETA_RGB),
         load3(row, base + M_K_RGB),
         load_f4(row, base + M_ALPHA_X),
@@ -83,7 +88,44 @@ def material_params(scene, material):
         load_f4(row, base + M_INNER),
         scene.bsdf_tables + np.int64(load_f4(row, base + M_TABLE)) * np.int64(4 * BSDF_TABLE_SIZE),
         load_f4(row, base + M_MAPPED) != _f4(0.0),
+        glass_of_material(scene, material, eta),
     )
+
+
+@specialised
+def at_wave(scene, p, ns, wo, wave):
+    """A material's parameters p for a path's wave (`pmviewer.kernels.bsdf.dispersion`), seen from wo at a shading
+    normal ns."""
+    if absent(wave):
+        return lambda scene, p, ns, wo, wave: p
+
+    def bent(scene, p, ns, wo, wave):
+        row, middle = p.glass.row, p.glass.eta
+        eta, lazy = p.eta, _i4(0)
+        if row > 0:
+            eta = index_at(scene, row, wave.u)
+            if wave.split == 0 and p.kind == DIELECTRIC and middle > _f4(1.0) and dot(ns, wo) > _f4(0.0):
+                lazy = _i4(1)
+        return MaterialParams(
+            p.kind,
+            p.two_sided,
+            p.reflectance,
+            p.specular,
+            p.transmittance,
+            eta,
+            p.eta_rgb,
+            p.k_rgb,
+            p.ax,
+            p.ay,
+            p.distribution,
+            p.nonlinear,
+            p.inner,
+            p.table,
+            p.mapped,
+            Glass(row, middle, lazy),
+        )
+
+    return bent
 
 
 @device

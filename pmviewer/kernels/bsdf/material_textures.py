@@ -107,4 +107,5 @@ def texture_params(scene, material, prim, b1, b2, p):
         plain.inner,
         plain.table,
         plain.mapped,
+        plain.glass,
     )

@@ -126,6 +126,7 @@ def _rough_dielectric(p, q):
         p.inner,
         p.table,
         p.mapped,
+        p.glass,
     )
 
 

@@ -23,6 +23,7 @@ from pmviewer.kernels.bsdf import lobes
 from pmviewer.kernels.bsdf import principled as principled_bsdf
 from pmviewer.kernels.bsdf.blend import blend_keeps, chosen_part, inside_attenuation
 from pmviewer.kernels.bsdf.kinds import BLEND
+from pmviewer.kernels.bsdf.material import at_wave
 from pmviewer.kernels.bsdf.material_textures import texture_params
 from pmviewer.kernels.bsdf.plain import (
     FOLLOWED,
@@ -78,8 +79,9 @@ def _rich(b: Any) -> ModuleType:
 
 
 @specialised
-def bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
-    """The BSDF at the point p of primitive `prim`, at its coordinates (u, v), with normals ng and ns, seen from wo.
+def bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy, wave):
+    """The BSDF at the point p of primitive `prim`, at its coordinates (u, v), with normals ng and ns, seen from wo by a
+    path of that wave (`pmviewer.kernels.bsdf.dispersion`; None for the middle index).
 
     Of a blend it is that of the part that counts at this hit (`pmviewer.kernels.bsdf.blend`). Its fields `groups`
     (NOTHING, or bits STORED and FOLLOWED) and `albedo` are for anyone to read. A black surface, or the back of a
@@ -87,37 +89,39 @@ def bsdf_at(scene, prim, material, u, v, p, ng, ns, wo, glossy):
     """
     if has(scene, "blends"):
 
-        def blended(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+        def blended(scene, prim, material, u, v, p, ng, ns, wo, glossy, wave):
             part = chosen_part(scene, material, prim, u, v, p, ng, wo)
-            return unblended(scene, prim, part, u, v, p, ng, ns, wo, glossy)
+            return unblended(scene, prim, part, u, v, p, ng, ns, wo, glossy, wave)
 
         return blended
-    return _unblended(scene, prim, material, u, v, p, ng, ns, wo, glossy)
+    return _unblended(scene, prim, material, u, v, p, ng, ns, wo, glossy, wave)
 
 
-def _unblended(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+def _unblended(scene, prim, material, u, v, p, ng, ns, wo, glossy, wave):
     """`bsdf_at` of a material that is no blend."""
     if has(scene, "principled"):
         return _with_principled(scene)
 
     if has(scene, "bsdfs") and has(scene, "textures"):
 
-        def textured(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+        def textured(scene, prim, material, u, v, p, ng, ns, wo, glossy, wave):
             numbers = texture_params(scene, material, prim, u, v, p)
             ns, tangent = shading_frame(scene, material, prim, u, v, p, ng, ns, wo)
+            numbers = at_wave(scene, numbers, ns, wo, wave)
             return lobes.bsdf_at(scene, material, numbers, ng, ns, tangent, wo, glossy)
 
         return textured
 
     if has(scene, "bsdfs"):
 
-        def rich(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+        def rich(scene, prim, material, u, v, p, ng, ns, wo, glossy, wave):
             tangent = (_f4(0.0), _f4(0.0), _f4(0.0))
-            return lobes.bsdf_at(scene, material, lobes.material_params(scene, material), ng, ns, tangent, wo, glossy)
+            numbers = at_wave(scene, lobes.material_params(scene, material), ns, wo, wave)
+            return lobes.bsdf_at(scene, material, numbers, ng, ns, tangent, wo, glossy)
 
         return rich
 
-    def plain(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+    def plain(scene, prim, material, u, v, p, ng, ns, wo, glossy, wave):
         return plain_bsdf(scene, material, ng, ns, wo)
 
     return plain
@@ -130,17 +134,18 @@ def _with_principled(scene):
     """`unblended` for scenes with principled materials, by the type of the scene's record."""
     if has(scene, "textures"):
 
-        def textured(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+        def textured(scene, prim, material, u, v, p, ng, ns, wo, glossy, wave):
             numbers = texture_params(scene, material, prim, u, v, p)
             metallic = metallic_at(scene, material, prim, u, v, p)
             ns, tangent = shading_frame(scene, material, prim, u, v, p, ng, ns, wo)
+            numbers = at_wave(scene, numbers, ns, wo, wave)
             return principled_bsdf.bsdf_at(scene, material, numbers, metallic, ng, ns, tangent, wo, glossy)
 
         return textured
 
-    def untextured(scene, prim, material, u, v, p, ng, ns, wo, glossy):
+    def untextured(scene, prim, material, u, v, p, ng, ns, wo, glossy, wave):
         tangent = (_f4(0.0), _f4(0.0), _f4(0.0))
-        numbers = lobes.material_params(scene, material)
+        numbers = at_wave(scene, lobes.material_params(scene, material), ns, wo, wave)
         metallic = metallic_at(scene, material, prim, u, v, p)
         return principled_bsdf.bsdf_at(scene, material, numbers, metallic, ng, ns, tangent, wo, glossy)
 

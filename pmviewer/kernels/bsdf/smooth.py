@@ -6,10 +6,12 @@ import math
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.dispersion import refracted_lazily
 from pmviewer.kernels.bsdf.fresnel import fresnel_conductor
 from pmviewer.kernels.bsdf.kinds import CONDUCTOR, PLASTIC, THIN_DIELECTRIC
 from pmviewer.kernels.bsdf.specular import fresnel_dielectric
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.kernels.vector import mul, scale
 
 _f4 = np.float32
@@ -20,6 +22,14 @@ def thin_reflectance(cos, eta):
     """Reflectance of a thin pane with all reflections between its two faces: 2R/(1 + R)."""
     fresnel, _ = fresnel_dielectric(cos, eta)
     return _f4(2.0) * fresnel / (_f4(1.0) + fresnel)
+
+
+@specialised
+def smooth_lobe(p, o, u):
+    """`sample_smooth`, of dispersive glass by the path's wavelength (`pmviewer.kernels.bsdf.dispersion`)."""
+    if absent(part(p, "glass")):
+        return lambda p, o, u: sample_smooth(p, o, u)
+    return lambda p, o, u: refracted_lazily(p, o, u) if p.glass.lazy != 0 else sample_smooth(p, o, u)
 
 
 @device

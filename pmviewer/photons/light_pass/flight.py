@@ -21,8 +21,8 @@ from pmviewer.kernels.media.medium import has_media, medium_beyond, phase_number
 from pmviewer.kernels.media.phase import sample_phase
 from pmviewer.kernels.random import draw1, draw4
 from pmviewer.kernels.vector import dot, is_good, luminance, mul, scale
-from pmviewer.maps.photon_words import write_photon
 from pmviewer.maps.record import BOUNCES, HAD_DIFFUSE
+from pmviewer.photons.light_pass.banded import write_of_wave
 from pmviewer.photons.light_pass.ledger import (
     C_DROPPED,
     C_RAYS,
@@ -44,7 +44,7 @@ _INF = _f4(np.inf)
 
 class Photon(NamedTuple):
     """A photon on its way: from o in direction d, the medium there (None in scenes without), its power, flags and
-    number of scatterings."""
+    number of scatterings, and its wave (`pmviewer.kernels.bsdf.dispersion`, None in scenes without dispersion)."""
 
     o: Any
     d: Any
@@ -52,6 +52,7 @@ class Photon(NamedTuple):
     beta: Any
     flags: Any
     bounces: Any
+    wave: Any
 
 
 class Trajectory(NamedTuple):
@@ -102,7 +103,7 @@ def to_surface(scene, pass_, photon, of, volume_out, counts, ledgers, paths):
 
 
 def _through_media(scene, pass_, photon, of, volume_out, counts, ledgers, paths):
-    o, d, medium, beta, flags, bounces = photon
+    o, d, medium, beta, flags, bounces, wave = photon
     kind = 0 if of.to_global else 1
     while True:
         u_channel, u_depth, _, _ = draw4(pass_.sequence, of.seed, of.index, PHOTON_FLIGHT + bounces)
@@ -110,7 +111,7 @@ def _through_media(scene, pass_, photon, of, volume_out, counts, ledgers, paths)
         counts[C_RAYS] += flight.rays
         after, before = mul(beta, flight.weight), luminance(beta)
         o, medium, prim = flight.o, flight.medium, flight.prim
-        here = Photon(o, d, medium, after, flags, bounces)
+        here = Photon(o, d, medium, after, flags, bounces, wave)
         met = Met(True, here, np.int32(prim), flight.u, flight.v, flight.t)
         gone = Met(False, here, np.int32(prim), flight.u, flight.v, flight.t)
         if not is_good(after):
@@ -122,10 +123,10 @@ def _through_media(scene, pass_, photon, of, volume_out, counts, ledgers, paths)
         if not flight.collides:
             return met
         word = _u4(flags | _u4(min(bounces, BOUNCES)))
-        extend_path(paths, of.i, 0, flight.p, d, scale(after, of.factor), word, of.light)
+        extend_path(paths, of.i, 0, flight.p, d, scale(after, of.factor), word, of.light, wave)
         before, scattered = luminance(after), mul(after, scattering_albedo(scene, medium))
         if of.to_global and bounces > 0 and luminance(scattered) > _f4(0.0):
-            _store(pass_, of, volume_out, counts, (flight.p, d, scattered, word), bounces)
+            _store(pass_, of, volume_out, counts, (flight.p, d, scattered, word, wave), bounces)
             ledgers[kind, E_STORED] += _f8(before * of.factor)
         if not before > _f4(0.0):
             return gone
@@ -150,15 +151,16 @@ def _through_media(scene, pass_, photon, of, volume_out, counts, ledgers, paths)
 
 @device
 def _store(pass_, of, volume_out, counts, collision, bounces):
-    """Keep a photon that collides: its place, direction of travel, scattered power, and flags."""
-    p, d, scattered, word = collision
+    """Keep a photon that collides: its place, direction of travel, scattered power, flags and wave."""
+    p, d, scattered, word, wave = collision
     times = 1
     if pass_.roulette == EQUAL:
         times, part = copies(scattered, draw1(pass_.sequence, of.seed, of.index, COPIES + bounces))
         scattered = scale(scattered, part)
     for _ in range(times):
         row = counts[C_VOLUME]
-        write_photon(volume_out, row, p, (-d[0], -d[1], -d[2]), scale(scattered, of.factor), word, of.light)
+        wi, power = (-d[0], -d[1], -d[2]), scale(scattered, of.factor)
+        write_of_wave(volume_out, row, p, wi, power, word, of.light, wave)
         counts[C_VOLUME] += 1
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, specialised
-from pmviewer.maps.photon_words import write_photon
+from pmviewer.photons.light_pass.banded import write_of_wave
 
 MOST_VERTICES = 64
 """Longer paths are cut: roulette ends nearly all of them long before."""
@@ -55,12 +55,12 @@ def empty_paths(n: int, scene_radius: float) -> PhotonPaths:
 
 
 @device
-def _put(paths, i, p, wi, beta, flags, light):
+def _put(paths, i, p, wi, beta, flags, light, wave):
     vertices, counts, _ = paths
     row = counts[i]
     if row >= MOST_VERTICES:
         return
-    write_photon(vertices[i], row, p, wi, beta, flags, light)
+    write_of_wave(vertices[i], row, p, wi, beta, flags, light, wave)
     counts[i] = row + 1
 
 
@@ -77,26 +77,26 @@ def begin_path(paths, i, p, d, beta, light):
     def begin(paths, i, p, d, beta, light):
         if i < len(paths[1]):
             paths[1][i] = 0
-            _put(paths, i, p, d, beta, _u4(0), light)
+            _put(paths, i, p, d, beta, _u4(0), light, None)
 
     return begin
 
 
 @specialised
-def extend_path(paths, i, prim, p, d, beta, flags, light):
-    """It flew in direction d to the surface point p, or, where prim < 0, from p out of the scene."""
+def extend_path(paths, i, prim, p, d, beta, flags, light, wave):
+    """With that wave it flew in direction d to the surface point p, or, where prim < 0, from p out of the scene."""
     if absent(paths):
 
-        def nothing(paths, i, prim, p, d, beta, flags, light):
+        def nothing(paths, i, prim, p, d, beta, flags, light, wave):
             pass
 
         return nothing
 
-    def extend(paths, i, prim, p, d, beta, flags, light):
+    def extend(paths, i, prim, p, d, beta, flags, light, wave):
         if i < len(paths[1]):
             if prim < 0:
                 reach = paths[2]
                 p = (p[0] + reach * d[0], p[1] + reach * d[1], p[2] + reach * d[2])
-            _put(paths, i, p, (-d[0], -d[1], -d[2]), beta, flags, light)
+            _put(paths, i, p, (-d[0], -d[1], -d[2]), beta, flags, light, wave)
 
     return extend

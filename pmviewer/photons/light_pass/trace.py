@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pmviewer.kernels.accel.opacity import over_opacity
+from pmviewer.kernels.bsdf.dispersion import beyond, colour_of_split, has_dispersion, met_by, new_wave
 from pmviewer.kernels.bsdf.scattering import (
     FOLLOWED,
     NOTHING,
@@ -31,15 +32,16 @@ from pmviewer.kernels.bsdf.scattering import (
 from pmviewer.kernels.bsdf.thin_glass import is_ignored, keeps_class
 from pmviewer.kernels.compile.jit import inlined, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
-from pmviewer.kernels.dimensions import COPIES, EMISSION, EMITTER, FURTHER_PHOTONS_SALT, PHOTON_SCATTER, STORE
+from pmviewer.kernels.dimensions import COPIES, EMISSION, EMITTER, FURTHER_PHOTONS_SALT, PHOTON_SCATTER, STORE, WAVE
 from pmviewer.kernels.lights.light import is_delta_light
 from pmviewer.kernels.media.medium import light_medium
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import STRAIGHT, adjoint_cosines, face, leave, surface_at
 from pmviewer.kernels.vector import dot, is_good, luminance, mul, scale
-from pmviewer.maps.photon_words import encode_direction, write_photon
+from pmviewer.maps.photon_words import encode_direction
 from pmviewer.maps.record import BOUNCES, CAUSTIC, HAD_DIFFUSE, INDIRECT_CAUSTIC, LAST_SPECULAR, UNFOUND
+from pmviewer.photons.light_pass.banded import write_of_wave
 from pmviewer.photons.light_pass.flight import Photon, Trajectory, is_full, medium_after, to_surface
 from pmviewer.photons.light_pass.ledger import (
     C_CAUSTIC,
@@ -100,13 +102,14 @@ class PhotonBuffers(NamedTuple):
 
 class Arrival(NamedTuple):
     """A photon where it meets a surface that keeps it: point p, unit wi to where it came from, ng on that side, flags
-    and light as in `pmviewer.maps.record`."""
+    and light as in `pmviewer.maps.record`, and its wave."""
 
     p: Any
     wi: Any
     ng: Any
     flags: Any
     light: Any
+    wave: Any
 
 
 @kernel
@@ -137,28 +140,29 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
             continue
         begin_path(paths, i, p, d, scale(beta, factor), light)
         of = Trajectory(i, seed, index, light, factor, to_global)
-        photon = Photon(p, d, light_medium(scene, light), beta, _u4(0), 0)
+        photon = Photon(p, d, light_medium(scene, light), beta, _u4(0), 0, _wave(scene, pass_, seed, index))
         deltas = pass_.unfound != 0 and is_delta_light(scene, light)  # and nothing but deltas since the light
         while True:
             alive, flown, prim, u, v, t = to_surface(scene, pass_, photon, of, volume_out, counts, ledgers, paths)
             if not alive:
                 break
             deltas = deltas and flown.bounces == photon.bounces  # no collision on the way
-            o, d, medium, beta, flags, bounces = flown
+            o, d, medium, beta, flags, bounces, wave = flown
             word = _u4(flags | _u4(min(bounces, BOUNCES)))
             if prim < 0:
-                extend_path(paths, i, prim, o, d, scale(beta, factor), word, light)
+                extend_path(paths, i, prim, o, d, scale(beta, factor), word, light, wave)
                 ledgers[kind, E_ESCAPED] += _f8(luminance(beta) * factor)
                 break
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
             if is_ignored(scene, prim, material):
-                photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces)
+                photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces, wave)
                 continue
             beta = _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledgers, kind)
-            extend_path(paths, i, prim, p, d, scale(beta, factor), word, light)
+            extend_path(paths, i, prim, p, d, scale(beta, factor), word, light, wave)
             wi = (-d[0], -d[1], -d[2])
-            b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
+            b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy, wave)
+            wave, beta = _met(scene, b, wave, beta, factor, ledgers, kind)
             kept = keeps(scene, material, b, ng, wi, pass_.glossy)
             before = luminance(beta)
             if b.groups | kept == NOTHING or not before > _f4(0.0):
@@ -171,7 +175,7 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 times, stored = _copies(pass_, beta, seed, index, bounces)
                 # As many photons as the opacity says meet the surface; looked up, it is taken to be there.
                 stored = over_opacity(scene, prim, u, v, p, scale(stored, factor))
-                arrival = Arrival(p, wi, ng, _u4(word | _u4(UNFOUND)) if unfound else word, light)
+                arrival = Arrival(p, wi, ng, _u4(word | _u4(UNFOUND)) if unfound else word, light, wave)
                 if _is_caustic(pass_, word):
                     in_caustic = _in_caustic(pass_, word, stored)
                     _store(caustic_out, caustic_normals, counts, C_CAUSTIC, arrival, in_caustic, times)
@@ -187,10 +191,7 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 ledgers[kind, E_TERMINATED] += _f8(before * factor)
                 break
             d, weight = _scattered(scene, b, group, wi, ng, u_lobe, (u0, u1))
-            if group != FOLLOWED:
-                flags = _u4(HAD_DIFFUSE)
-            elif not keeps_class(scene, prim, material, ng, d):
-                flags = _u4(flags | _u4(LAST_SPECULAR))
+            flags = _flags_after(scene, group, prim, material, ng, d, flags)
             after = scale(mul(beta, weight), share)
             if not is_good(after):
                 counts[C_DROPPED] += 1
@@ -203,12 +204,13 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
             beta = scale(after, _f4(1.0) / survival)
             if pass_.roulette != BY_LUMINANCE or not survival < _f4(1.0):  # else it stays
                 ledgers[kind, E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * factor)
+            wave, beta = _split(scene, b, wave, d, beta, factor, ledgers, kind)
             bounces += 1
             if bounces >= pass_.max_bounces:
                 ledgers[kind, E_TERMINATED] += _f8(luminance(beta) * factor)
                 break
             medium = medium_after(scene, prim, outward, wi, d, medium)
-            photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces)
+            photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces, wave)
     return i1
 
 
@@ -230,6 +232,12 @@ def _stream(pass_, i):
     return seed, _u4(place)
 
 
+@inlined
+def _wave(scene, pass_, seed, index):
+    """The wave of a photon that leaves its light, None in scenes without dispersion."""
+    return new_wave(scene, pass_.sequence, seed, index, WAVE)
+
+
 @specialised
 def _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledgers, kind):
     """beta after the way to a surface (`attenuation`), what was lost on it booked; black when it is no number."""
@@ -245,6 +253,35 @@ def _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledgers, kind):
             return _f4(0.0), _f4(0.0), _f4(0.0)
         ledgers[kind, E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * factor)
         return beta
+
+    return booked
+
+
+@specialised
+def _met(scene, b, wave, beta, factor, ledgers, kind):
+    """A photon's wave and power where it meets a surface of BSDF b; what its colour gives or takes is booked, which is
+    nothing in the mean."""
+    if not has_dispersion(scene):
+        return lambda scene, b, wave, beta, factor, ledgers, kind: (wave, beta)
+
+    def booked(scene, b, wave, beta, factor, ledgers, kind):
+        wave, coloured = met_by(scene, b, wave, beta)
+        ledgers[kind, E_ABSORBED] += _f8(luminance(beta) * factor) - _f8(luminance(coloured) * factor)
+        return wave, coloured
+
+    return booked
+
+
+@specialised
+def _split(scene, b, wave, d, beta, factor, ledgers, kind):
+    """The same where it leaves the surface in direction d. After roulette, which would undo the colour."""
+    if not has_dispersion(scene):
+        return lambda scene, b, wave, d, beta, factor, ledgers, kind: (wave, beta)
+
+    def booked(scene, b, wave, d, beta, factor, ledgers, kind):
+        coloured = colour_of_split(scene, b, wave, d, beta)
+        ledgers[kind, E_ABSORBED] += _f8(luminance(beta) * factor) - _f8(luminance(coloured) * factor)
+        return beyond(b, wave, d), coloured
 
     return booked
 
@@ -288,10 +325,20 @@ def _store(rows, normals, counts, which, arrival, power, times):
     counts[which] rows are filled."""
     ng = arrival.ng
     for _ in range(times):
-        write_photon(rows, counts[which], arrival.p, arrival.wi, power, arrival.flags, arrival.light)
+        write_of_wave(rows, counts[which], arrival.p, arrival.wi, power, arrival.flags, arrival.light, arrival.wave)
         if len(normals) > 0:
             normals[counts[which]] = encode_direction(ng[0], ng[1], ng[2])
         counts[which] += 1
+
+
+@inlined
+def _flags_after(scene, group, prim, material, ng, d, flags):
+    """A photon's flags after a group of lobes of that material sent it in direction d, from the side of ng."""
+    if group != FOLLOWED:
+        return _u4(HAD_DIFFUSE)
+    if keeps_class(scene, prim, material, ng, d):
+        return flags
+    return _u4(flags | _u4(LAST_SPECULAR))
 
 
 @inlined

@@ -22,6 +22,7 @@ from pmviewer.kernels.accel.occlusion import occluded
 from pmviewer.kernels.accel.opacity import over_opacity
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.bsdf.albedo import stored_albedo
+from pmviewer.kernels.bsdf.dispersion import beyond, colour_of_split, met_by, new_wave
 from pmviewer.kernels.bsdf.plain import INV_PI
 from pmviewer.kernels.bsdf.scattering import (
     FOLLOWED,
@@ -44,6 +45,7 @@ from pmviewer.kernels.dimensions import (
     PHOTON_SCATTER,
     SEEN_EMITTER,
     SEEN_LIGHT,
+    WAVE,
 )
 from pmviewer.kernels.lights.light import emit_from, pick_light
 from pmviewer.kernels.lights.start import seen_from, spread_over
@@ -174,6 +176,7 @@ def trace_virtual_lights(scenes, passes, i0, i1, photons_out, lights_out, counts
         if not is_good(beta):
             counts[C_DROPPED] += 1
             continue
+        wave = new_wave(scene, pass_.sequence, seed, index, WAVE)
         o, q, flags, first = z0, _f4(0.0), _u4(0), True
         for bounces in range(pass_.max_bounces):
             t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), _INF)
@@ -184,7 +187,8 @@ def trace_virtual_lights(scenes, passes, i0, i1, photons_out, lights_out, counts
             material = material_of(scene, prim)
             beta = attenuation(scene, material, ng, d, t, beta)
             wi = (-d[0], -d[1], -d[2])
-            b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy)
+            b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy, wave)
+            wave, beta = met_by(scene, b, wave, beta)
             before = luminance(beta)
             if b.groups == NOTHING or not (is_good(beta) and before > _f4(0.0)):
                 break
@@ -223,7 +227,8 @@ def trace_virtual_lights(scenes, passes, i0, i1, photons_out, lights_out, counts
             survival = min(luminance(after) / before, _f4(1.0))
             if not s2 < survival:
                 break
-            beta = scale(after, _f4(1.0) / survival)
+            beta = colour_of_split(scene, b, wave, d, scale(after, _f4(1.0) / survival))
+            wave = beyond(b, wave, d)
             if group == FOLLOWED:
                 q, first, flags = _f4(0.0), False, _u4(flags | _u4(LAST_SPECULAR))
             elif paths:

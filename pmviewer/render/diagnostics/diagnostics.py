@@ -62,7 +62,7 @@ def stored_hit(scene, eye, pixel):
         if not largest(beta) > _f4(0.0):
             break
         hit = cast(scene, ray)
-    missed = Hit(_i8(-1), hit.u, hit.v, hit.t, hit.p, hit.ng, hit.ns, hit.gap, hit.medium, hit.crossed)
+    missed = Hit(_i8(-1), hit.u, hit.v, hit.t, hit.p, hit.ng, hit.ns, hit.gap, hit.medium, hit.crossed, hit.wave)
     return missed, hit.ng, ray.d
 
 

@@ -121,7 +121,7 @@ def replay_pixel(given, radii, pixel, asked, wi, shares, rows, way, prims, expec
     """
     given = opened(given)
     scene, eye = given.scene, given.eye
-    seed, ray, _, _ = sampled_ray(eye, pixel)
+    seed, ray, _, _ = sampled_ray(scene, eye, pixel)
     beta = WHITE
     row, points = _i8(0), _i8(1)
     for k in range(3):

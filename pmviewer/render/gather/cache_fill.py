@@ -11,9 +11,10 @@ import math
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.dispersion import new_wave
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian, shading_normal
 from pmviewer.kernels.compile.jit import device, kernel
-from pmviewer.kernels.dimensions import CACHE_SALT, HEMISPHERE
+from pmviewer.kernels.dimensions import CACHE_SALT, GATHER_WAVE, HEMISPHERE
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import dot, largest, luminance, mul
 from pmviewer.maps.hemisphere import cell_direction, irradiance_and_gradients
@@ -54,7 +55,7 @@ def uncovered_hit(given, pixel, counts):
     size of a pixel there.
     """
     scene, eye, cache = given.scene, given.eye, given.cache
-    seed, ray, _, _ = sampled_ray(eye, pixel)
+    seed, ray, _, _ = sampled_ray(scene, eye, pixel)
     beta = WHITE
     travelled = _f4(0.0)
     for depth in range(eye.max_depth + 1):
@@ -92,7 +93,8 @@ def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
             if dot(wi, ng) <= _f4(0.0):
                 continue
             counts[C_RAYS] += 1
-            ray = ray_from(p, ng, gap, wi, None)  # never in scenes with media
+            wave = new_wave(given.scene, eye.sequence, seed, _u4(here), GATHER_WAVE)
+            ray = ray_from(p, ng, gap, wi, None, wave)  # never in scenes with media
             hit, tint = cast_on(given.scene, ray, True)
             if hit.prim >= 0:
                 cells[here, 3] = way(given.scene, ray.o, wi, hit)

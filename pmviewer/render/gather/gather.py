@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.dispersion import renewed
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, chain_numbers, followed_share
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.dimensions import GATHER_CHAIN, GATHER_FORK
+from pmviewer.kernels.compile.specialise import absent, part, specialised
+from pmviewer.kernels.dimensions import GATHER_CHAIN, GATHER_FORK, GATHER_WAVE
 from pmviewer.kernels.vector import add, dot, largest, mul, scale
-from pmviewer.render.cast import cast, leaving
+from pmviewer.render.cast import Hit, cast, leaving
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow
 from pmviewer.render.direct.direct import found_light
 from pmviewer.render.gather.corner import gather_again, is_corner
@@ -27,6 +29,19 @@ LEAST_SURVIVAL = np.float32(0.05)
 """Roulette lets this share of the weakest rays live, so that none of them counts more than twenty times."""
 
 
+@specialised
+def of_its_own(hit, sequence, seed, index):
+    """The Hit of a gather ray that has a wavelength of its own, unless the path before it has one."""
+    if absent(part(hit, "wave")):
+        return lambda hit, sequence, seed, index: hit
+
+    def another(hit, sequence, seed, index):
+        wave = renewed(hit.wave, sequence, seed, index, GATHER_WAVE)
+        return Hit(hit.prim, hit.u, hit.v, hit.t, hit.p, hit.ng, hit.ns, hit.gap, hit.medium, hit.crossed, wave)
+
+    return another
+
+
 @device
 def gather_light(given, hit, d, seed, index, counts):
     """Radiance that a gather ray of direction d brings back from what it met, a Hit: that of the global map at the
@@ -35,6 +50,7 @@ def gather_light(given, hit, d, seed, index, counts):
     Lobes that are followed (mirrors, glass) add nothing unless the map holds what they reflect (`gather_specular`).
     """
     scene, eye = given.scene, given.eye
+    hit = of_its_own(hit, eye.sequence, seed, index)
     beta = WHITE
     total = BLACK
     length = _f4(0.0)

@@ -57,7 +57,7 @@ def gather_points(given, pixel, counts, rows):
     """
     given = opened(given)
     scene, eye = given.scene, given.eye
-    seed, ray, _, _ = sampled_ray(eye, pixel)
+    seed, ray, _, _ = sampled_ray(scene, eye, pixel)
     beta = WHITE
     row = _i8(0)
     for depth in range(eye.max_depth + 1):

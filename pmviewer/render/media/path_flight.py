@@ -90,11 +90,11 @@ def arrive_by_flight(scene, eye, ray, beta, seed, depth):
             rays += 1
         beta = mul(beta, flight.weight)
         no, prim = _f4(0.0), flight.prim
-        hit = Hit(prim, flight.u, flight.v, flight.length, o, d, d, no, flight.medium, _i8(0))
+        hit = Hit(prim, flight.u, flight.v, flight.length, o, d, d, no, flight.medium, _i8(0), ray.wave)
         if prim >= 0:
             b = flight.o
             p, ng, ns, gap = surface_at(scene, prim, flight.u, flight.v, b[0], b[1], b[2], d[0], d[1], d[2], flight.t)
-            hit = Hit(prim, flight.u, flight.v, flight.length, p, ng, ns, gap, flight.medium, _i8(0))
+            hit = Hit(prim, flight.u, flight.v, flight.length, p, ng, ns, gap, flight.medium, _i8(0), ray.wave)
         return Arrival(hit, flight.collides, flight.p, emitted, beta, rays)
 
     return through_media
@@ -115,6 +115,8 @@ def scatter_in_medium(scene, eye, ray, arrival, choice, sampler, numbers, places
         beta = mul(arrival.beta, scattering_albedo(scene, medium))
         L, rays = phase_light(scene, p, ray.d, medium, lobes, choice, eye.mis, sampler, places)
         wi = sample_phase(lobes, ray.d, numbers[0], numbers[1], numbers[2])
-        return Scattered(mul(beta, L), Ray(p, wi, _f4(0.0), _INF, medium), phase(lobes, ray.d, wi), beta, rays)
+        return Scattered(
+            mul(beta, L), Ray(p, wi, _f4(0.0), _INF, medium, ray.wave), phase(lobes, ray.d, wi), beta, rays
+        )
 
     return scattered

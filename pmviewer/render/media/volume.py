@@ -120,7 +120,7 @@ def _by_phase(scene, stretch, choice, numbers):
         return _BLACK
     p = along(o, d, t)
     wi = sample_phase(lobes, d, numbers[1], numbers[2], numbers[3])
-    ray = Ray(p, wi, _f4(0.0), _INF, medium)
+    ray = Ray(p, wi, _f4(0.0), _INF, medium, None)
     hit = cast(scene, ray)
     L = found_light(scene, p, wi, phase(lobes, d, wi), _f4(1.0), choice, 0, hit)
     if not largest(L) > _f4(0.0):

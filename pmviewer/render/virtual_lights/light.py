@@ -61,7 +61,7 @@ def bsdf_of(scene, virtual, row, glossy):
     u, v = load_f4(virtual.lights, row + V_U), load_f4(virtual.lights, row + V_V)
     y, wi = load3(virtual.lights, row + V_P), load3(virtual.lights, row + V_WI)
     ng, ns = load3(virtual.lights, row + V_N), load3(virtual.lights, row + V_NS)
-    return bsdf_at(scene, prim, material_of(scene, prim), u, v, y, ng, ns, wi, glossy), wi
+    return bsdf_at(scene, prim, material_of(scene, prim), u, v, y, ng, ns, wi, glossy, None), wi
 
 
 @specialised

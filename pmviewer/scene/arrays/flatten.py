@@ -30,6 +30,7 @@ from pmviewer.scene.arrays.stored_geometry import StoredGeometry, same_surfaces,
 from pmviewer.scene.arrays.textured_emission import Emission, textured_lights
 from pmviewer.scene.description import LUMINANCE, Cylinder, Mesh, Parallelogram, Scene, Shape
 from pmviewer.scene.meshes.mesh_bounds import mesh_bounds
+from pmviewer.scene.spectrum import spectrum
 
 Float = NDArray[np.float32]
 
@@ -72,6 +73,11 @@ class FlatScene:
     def has_media(self) -> bool:
         """Whether there are participating media."""
         return "media" in (self.record.dtype.names or ())
+
+    @property
+    def disperses(self) -> bool:
+        """Whether there is glass that splits light into colours."""
+        return "glasses" in (self.record.dtype.names or ())
 
     @property
     def delta_lights(self) -> bool:
@@ -220,6 +226,7 @@ def _features(scene: Scene, materials: MaterialTable, lights: LightTable, emits_
         "principled": "principled" in materials.kinds,
         "blends": "blend" in materials.kinds,
         "media": has_media(scene),
+        "dispersion": any(m.disperses for m in used),
     }
 
 
@@ -247,6 +254,8 @@ def _shading_arrays(
     meshes = [stored.shapes[i].geometry for i, _ in stored.meshes]
     if features["colours"]:
         arrays["colours"] = corner_colours(meshes)
+    if features["dispersion"]:
+        arrays |= {"glasses": materials.glasses, "spectrum": spectrum().astype(np.float32)}
     textures = TextureTable()
     if features["bsdfs"]:
         arrays["bsdf_tables"] = materials.tables

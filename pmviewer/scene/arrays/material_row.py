@@ -19,6 +19,7 @@ from pmviewer.kernels.bsdf.kinds import (
     ROUGH_DIELECTRIC,
     ROUGH_PLASTIC,
     SCHLICK,
+    SPECTRUM_NODES,
     THIN_DIELECTRIC,
 )
 from pmviewer.kernels.bsdf.microfacet import SMOOTHEST
@@ -26,6 +27,7 @@ from pmviewer.kernels.bsdf.tables import fill_coat, fill_schlick
 from pmviewer.scene.arrays.blends import fill_blend, with_parts
 from pmviewer.scene.arrays.material_lobes import coat_alpha, principled_of
 from pmviewer.scene.description import Material, Scene
+from pmviewer.scene.spectrum import channel_indices, indices
 
 Float = NDArray[np.float32]
 THIN_RULES = {
@@ -48,10 +50,12 @@ _LEAST_BEND = 1e-3
 @dataclass(frozen=True)
 class MaterialTable:
     """rows: float32 (materials, MATERIAL_COLUMNS), of the scene's `materials` and then of the parts of blends; tables:
-    float32 (tables, BSDF_TABLE_SIZE), at least one; kinds: those that are used."""
+    float32 (tables, BSDF_TABLE_SIZE), at least one; glasses: float32 (glasses + 1, SPECTRUM_NODES), indices of those
+    that disperse; kinds: those that are used."""
 
     rows: Float
     tables: Float
+    glasses: Float
     materials: tuple[Material, ...]
     kinds: frozenset[str]
 
@@ -64,7 +68,7 @@ def is_plain(m: Material) -> bool:
     if m.kind == "conductor":
         return m.metal is None
     if m.kind == "dielectric":
-        return not any(m.absorption)
+        return not any(m.absorption) and not m.disperses
     return m.kind in ("diffuse", "null")
 
 
@@ -93,10 +97,15 @@ def material_table(scene: Scene) -> MaterialTable:
     for row, m in zip(rows, materials):
         if m.kind == "blend":
             fill_blend(row, m, number_of)
+    glasses = [np.zeros(SPECTRUM_NODES, np.float32)]
+    for row, m in zip(rows, materials):
+        if m.disperses and id(m) in counts:
+            _fill_dispersion(row, m, glasses)
     tables = tables or [np.zeros(K.BSDF_TABLE_SIZE, np.float32)]
     return MaterialTable(
         np.array(rows, np.float32).reshape(-1, K.MATERIAL_COLUMNS),
         np.array(tables, np.float32),
+        np.array(glasses, np.float32),
         tuple(materials),
         frozenset(m.kind for m in used),
     )
@@ -135,6 +144,13 @@ def _row(m: Material, tables: list[Float] | None) -> list[float]:
         row[K.M_TABLE] = len(tables)
         tables.append(_schlick(alpha_x * alpha_y))
     return row
+
+
+def _fill_dispersion(row: list[float], m: Material, glasses: list[Float]) -> None:
+    assert m.dispersion is not None
+    row[K.M_ETA_RGB : K.M_ETA_RGB + 3] = channel_indices(m.dispersion, m.eta)
+    row[K.M_GLASS] = len(glasses)
+    glasses.append(indices(m.dispersion, m.eta).astype(np.float32))
 
 
 def opacity_numbers(m: Material) -> tuple[float, float, float]:

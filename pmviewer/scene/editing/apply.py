@@ -14,7 +14,7 @@ from pmviewer.scene.arrays.flatten import shape_bounds
 from pmviewer.scene.arrays.instances import instance_bounds
 from pmviewer.scene.description import ImageEnvironment, Light, Material, Scene, Shape
 from pmviewer.scene.editing.catalogue import Target, catalogue_of, refusal
-from pmviewer.scene.editing.recolour import recoloured, roughened, with_emission, with_radiance
+from pmviewer.scene.editing.recolour import dispersed, recoloured, roughened, with_emission, with_radiance
 from pmviewer.scene.editing.transform import Similarity, similarity, transformed
 from pmviewer.settings.edits import Edits, parts
 
@@ -105,4 +105,6 @@ def _material(material: Material, values: Values) -> Material:
         material = roughened(material, values["roughness"])
     if "index" in values:
         material = replace(material, eta=values["index"])
+    if "dispersion" in values:
+        material = dispersed(material, values["dispersion"])
     return material

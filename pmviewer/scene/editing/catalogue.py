@@ -111,4 +111,6 @@ def _of_material(material: Material, prop: str) -> str | None:
         return "It has no gloss."
     if prop == "index" and material.kind not in _BENT:
         return "It has no index of refraction."
+    if prop == "dispersion" and material.kind not in ("dielectric", "rough dielectric"):
+        return "It is no glass that light is refracted in."
     return None

@@ -11,7 +11,7 @@ from pmviewer.scene.description import (
     SpotLight,
 )
 from pmviewer.scene.editing.catalogue import Target, catalogue_of
-from pmviewer.scene.editing.recolour import GREY, colour_of
+from pmviewer.scene.editing.recolour import GREY, colour_of, strength_of
 from pmviewer.settings.edits import PROPERTIES, parts
 
 
@@ -33,6 +33,8 @@ def own_of(scene: Scene, target: Target, prop: str) -> tuple[float, ...]:
         return colour_of(material)
     if prop == "index":
         return (material.eta,)
+    if prop == "dispersion":
+        return (strength_of(material),)
     smooth = material.kind in ("conductor", "dielectric", "plastic")
     return (0.0 if smooth else sum(material.alpha) / 2,)
 

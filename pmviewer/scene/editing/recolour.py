@@ -17,6 +17,7 @@ from pmviewer.scene.description import (
     Shape,
     SpotLight,
 )
+from pmviewer.scene.dispersion import by_abbe
 from pmviewer.scene.texture import Checkerboard, Texture, limited, scaled
 
 GREY: RGB = (1.0, 1.0, 1.0)
@@ -84,6 +85,18 @@ def roughened(material: Material, alpha: float) -> Material:
     if kind in ("conductor", "dielectric", "plastic"):
         kind = kind if alpha == 0 else f"rough {kind}"
     return replace(material, kind=kind, alpha=(alpha, alpha))
+
+
+def dispersed(material: Material, strength: float) -> Material:
+    """The glass with another Abbe number, 20 over the strength; 0 bends all light alike."""
+    if strength <= 0 or material.eta <= 1:
+        return replace(material, dispersion=None)
+    return replace(material, dispersion=by_abbe(material.eta, 20 / strength))
+
+
+def strength_of(material: Material) -> float:
+    """What `dispersed` changes."""
+    return 0.0 if material.dispersion is None else max(0.0, 20 / material.dispersion.abbe)
 
 
 def _textures(material: Material, slot: str, texture: Texture | None, colour: RGB) -> dict[str, Texture]:

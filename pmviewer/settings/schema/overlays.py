@@ -61,6 +61,17 @@ class PointOverlay(Group):
     )
 
 
+class PhotonOverlay(PointOverlay):
+    """The photons of a map drawn as points"""
+
+    colour: Literal["power", "bounce", "light", "wavelength"] = setting(  # type: ignore[assignment]
+        "power",
+        "Colour by power, by number of bounces, by light, or by wavelength where glass splits light into colours.",
+        stage="display",
+        scale="choice",
+    )
+
+
 def coloured_by_irradiance(what: str) -> Any:
     """The colour of points that are light of many photons."""
     return setting(
@@ -281,11 +292,11 @@ class FocusOverlay(Group):
 class Overlays(Group):
     """Overlays"""
 
-    caustic: PointOverlay = subgroup(PointOverlay, "caustic photons", TRACED, CAUSTIC_PHOTONS)
-    global_: PointOverlay = subgroup(PointOverlay, "global photons", TRACED, alias="global")
+    caustic: PhotonOverlay = subgroup(PhotonOverlay, "caustic photons", TRACED, CAUSTIC_PHOTONS)
+    global_: PhotonOverlay = subgroup(PhotonOverlay, "global photons", TRACED, alias="global")
     radiance: RadianceOverlay = subgroup(RadianceOverlay, "radiance photons", TRACED, RADIANCE_SHOWN)
     cache: CacheOverlay = subgroup(CacheOverlay, "irradiance cache", TRACED, CACHE_SHOWN)
-    volume: PointOverlay = subgroup(PointOverlay, "volume photons", VOLUME)
+    volume: PhotonOverlay = subgroup(PhotonOverlay, "volume photons", VOLUME)
     shadow: ShadowOverlay = subgroup(ShadowOverlay, "shadow photons", SHADOW_PHOTONS)
     virtual: PointOverlay = subgroup(PointOverlay, "virtual lights", VIRTUAL_LIGHTS)
     importons: ImportonOverlay = subgroup(ImportonOverlay, "importons", TRACED, IMPORTANCE)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pmviewer.output.colour_maps import FATES, SEQUENTIAL, TWO_SIDED
 from pmviewer.output.false_look import Look
+from pmviewer.scene.spectrum import shown_colours
 
 RGB = tuple[float, float, float]
 
@@ -42,6 +43,9 @@ LIT_COLOUR: RGB = (1.0, 0.80, 0.25)
 SHADOW_COLOUR: RGB = (0.35, 0.30, 0.95)
 """Of shadow photons where the light arrives and where it does not."""
 
+ALL_WAVELENGTHS: RGB = (0.62, 0.62, 0.62)
+"""Of photons that no glass has split yet."""
+
 FATE_PALETTE: tuple[RGB, ...] = FATES["usual"]
 """Unless the display settings choose others: of photons that are stored, rejected, redistributed and discarded
 (`pmviewer.photons.deposition.deposited.FATES`)."""
@@ -56,6 +60,7 @@ class By(IntEnum):
     LIT = 3
     QUANTITY = 4
     FATE = 5
+    WAVELENGTH = 6
 
 
 MEAN_OF_GREEN_AND_BLUE = 3
@@ -84,6 +89,7 @@ class Colouring:
 POWER = Colouring(By.POWER)
 BOUNCES = Colouring(By.BOUNCES)
 LIGHTS = Colouring(By.LIGHT)
+WAVELENGTHS = Colouring(By.WAVELENGTH)
 
 
 def palettes() -> dict[str, Any]:
@@ -93,6 +99,7 @@ def palettes() -> dict[str, Any]:
         "light_palette": LIGHT_PALETTE,
         "lit_colour": LIT_COLOUR,
         "shadow_colour": SHADOW_COLOUR,
+        "wave_palette": np.concatenate([[ALL_WAVELENGTHS], shown_colours()]),
     }
     return {name: np.array(value, np.float32) for name, value in colours.items()}
 

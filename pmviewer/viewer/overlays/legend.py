@@ -7,6 +7,8 @@ from imgui_bundle import imgui
 from numpy.typing import NDArray
 
 from pmviewer.output.false_look import Look
+from pmviewer.scene.dispersion import LONGEST, SHORTEST
+from pmviewer.scene.spectrum import shown_colours
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import grouped, si
 from pmviewer.viewer.gl.palette import (
@@ -60,6 +62,9 @@ def colour_legend(colouring: Colouring, cloud: CloudSummary, unit: str, look: Lo
         swatches("Scatterings before; 0 is straight from the light", list(zip(labels, BOUNCE_PALETTE, strict=True)))
     elif colouring.by == By.LIT:
         swatches("Where the light ", [("arrives", LIT_COLOUR), ("does not", SHADOW_COLOUR)])
+    elif colouring.by == By.WAVELENGTH:
+        wrapped("Wavelength; grey: all of them still, as no glass has split the light")
+        colour_bar(np.repeat(shown_colours(), 15, axis=0), f"{SHORTEST:.0f} nm", f"{LONGEST:.0f} nm")
     elif colouring.by == By.LIGHT:
         swatches("", [(f"light {i + 1}", light_colour(i)) for i in cloud.lights[:MOST_SWATCHES]])
         if len(cloud.lights) > MOST_SWATCHES:

@@ -40,6 +40,10 @@ class Points(Overlay):
         """Whether shadow photons that the light reaches are left out."""
         return False
 
+    def colouring(self, style: Any) -> Colouring:
+        """How the points become colours."""
+        return self.colourings[style.colour]
+
     def take(self, records: NDArray[np.float32], power_unit: float = 1.0, *_: Any) -> None:
         self.cloud.upload(records, power_unit)
 
@@ -51,7 +55,7 @@ class Points(Overlay):
         limit = style.limit if drawing.limit is None else min(style.limit, drawing.limit)
         self.cloud.draw(
             drawing,
-            self.colourings[style.colour],
+            self.colouring(style),
             size=style.size,
             depth=style.depth,
             limit=limit,
@@ -61,7 +65,7 @@ class Points(Overlay):
 
     def legend(self, source: Source) -> None:
         style: PointOverlay = self.style(source.settings)
-        colouring = self.colourings[style.colour]
+        colouring = self.colouring(style)
         cloud = self.cloud.summary(style.limit, colouring)
         if cloud.total:
             self.colours_legend(colouring, cloud, look_of(source.settings.display))

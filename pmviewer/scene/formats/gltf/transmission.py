@@ -1,4 +1,4 @@
-"""KHR_materials_transmission: glass, solid or thin, alone or in part."""
+"""KHR_materials_transmission: glass, solid or thin, alone or in part; KHR_materials_dispersion of solid glass."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from pmviewer.scene.description import BLACK, RGB, Material
 from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.dispersion import LEAST_ABBE, Dispersion, by_abbe
 from pmviewer.scene.formats.gltf.fields import Fields
 from pmviewer.scene.formats.gltf.surface import Surface, even
 from pmviewer.scene.formats.gltf.texture import GltfTextures
@@ -45,12 +46,18 @@ def _glass(name: str, material: Fields, surface: Surface, diagnostics: Diagnosti
         if rough:
             diagnostics.warn("Thin sheets of rough glass are shown smooth: what is behind them is too sharp.")
         return replace(glass, kind="thin dielectric")
-    glass = replace(glass, absorption=absorption(volume))
+    glass = replace(glass, absorption=absorption(volume), dispersion=_dispersion(material, ior))
     if rough:
         if surface.alpha_map is not None:
             textures["alpha"] = surface.alpha_map
         glass = replace(glass, kind="rough dielectric", alpha=(surface.alpha, surface.alpha))
     return glass
+
+
+def _dispersion(material: Fields, ior: float) -> Dispersion | None:
+    """KHR_materials_dispersion: 20 over Abbe's number, the index being that at 587.6 nm."""
+    strength = material.extension("KHR_materials_dispersion").number("dispersion", 0.0, 0.0, 20 / LEAST_ABBE)
+    return by_abbe(ior, 20 / strength) if strength > 0 and ior > 1 else None
 
 
 def absorption(volume: Fields) -> RGB:

@@ -10,6 +10,7 @@ from pmviewer.scene.description import BLACK, RGB, THIN_GLASS, Material, ThinGla
 from pmviewer.scene.formats.mitsuba import older
 from pmviewer.scene.formats.mitsuba.compound import blend, mask, mixture, two_sided
 from pmviewer.scene.formats.mitsuba.document import Document, Properties
+from pmviewer.scene.formats.mitsuba.glass import dispersing
 from pmviewer.scene.formats.mitsuba.interface import alpha, alphas, bounded, distribution, relative_ior
 from pmviewer.scene.formats.mitsuba.maps import mapped, with_textures
 from pmviewer.scene.formats.mitsuba.principled import principled, principled_thin
@@ -163,6 +164,7 @@ def _dielectric(p: Properties, name: str) -> Material:
     if not thin:
         # Not Mitsuba's: σ of Beer–Lambert's law inside, per scene unit.
         material = replace(material, absorption=p.bounded_colour("absorption", 0.0, None))
+        material = dispersing(p, material)
     if p.type == "roughdielectric":
         return replace(material, kind="rough dielectric", alpha=alphas(p), distribution=distribution(p))
     return replace(material, thin_glass=_thin_glass(p))

@@ -71,6 +71,13 @@ def relative_ior(p: Properties, inside: str) -> float:
     return _ior(p, "int_ior", inside) / _ior(p, "ext_ior", "air")
 
 
+def outside_ior(p: Properties) -> float:
+    """Index of what surrounds a dielectric: `ext_ior`, 1 where `eta` is given in its place."""
+    if p.tag_of("eta") in ("float", "integer"):
+        return 1.0
+    return _ior(p, "ext_ior", "air")
+
+
 def _ior(p: Properties, name: str, default: str) -> float:
     if p.tag_of(name) in ("float", "integer"):
         return bounded(p, name, p.number(name, 1.0), _LEAST_IOR, _LARGEST_IOR)

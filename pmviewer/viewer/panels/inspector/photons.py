@@ -138,21 +138,28 @@ class PhotonTable:
             inspector.choose(None if chosen else photon)
         if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
             name = report.lights[int(light)] if int(light) < len(report.lights) else ""
-            imgui.set_tooltip(theme.drawable(f"{CLASSES[found.path_class[row]]}, from {name}. Click: its path"))
+            kind = CLASSES[found.path_class[row]] + wavelength_text(float(found.wavelength[row]))
+            imgui.set_tooltip(theme.drawable(f"{kind}, from {name}. Click: its path"))
         power, distance = power / self._units[1][0], distance / self._units[2][0]
         for text in (f"{power:.3g}", f"{distance:.2f}", f"{weight:.2f}", f"{bounces:.0f}", f"{light + 1:.0f}"):
             imgui.table_next_column()
             imgui.text_unformatted(text)
 
 
+def wavelength_text(nm: float) -> str:
+    """What is said of a photon's wavelength, nothing where it has none."""
+    return f", {nm:.0f} nm" if nm == nm else ""
+
+
 def life_rows(life: PhotonLife) -> list[tuple[str, str]]:
     """Where the photon was and with which power on the way there, as a share of that with which it left its light."""
     power = brightest_channel(life.vertices)
     start = max(float(power[0]), 1e-30)
+    wavelength = life.wavelengths if len(life.wavelengths) else [float("nan")] * len(life.vertices)
     rows = [(f"leaves {life.light}", si(float(power[0]) * life.power_unit, "W"))]
     for number in range(1, len(life.vertices)):
         here = "  ‹ stored here" if number == life.stored_at else ""
-        rows.append((f"surface {number}{here}", f"{power[number] / start:.3g} ×"))
+        rows.append((f"surface {number}{here}", f"{power[number] / start:.3g} ×{wavelength_text(wavelength[number])}"))
     return rows
 
 
