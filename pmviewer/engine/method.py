@@ -45,7 +45,7 @@ class Plan:
     whether photons are stored in them and light that they scatter is looked up, `phase_rays` whether rays by phase
     functions can meet a light; `lens` whether the render camera has one, `filtered` whether the
     film has another reconstruction filter than the plain box, `moments` whether the film keeps what passes tell of its
-    noise; `thin_glass` are the rules by which light passes panes of
+    noise, `split` whether camera paths go both ways at glass; `thin_glass` are the rules by which light passes panes of
     glass, () where all of it is exact; `warnings`
     are sentences for the log about what was asked for and can't be."""
 
@@ -71,6 +71,7 @@ class Plan:
     lens: bool = False
     filtered: bool = False
     moments: bool = True
+    split: bool = False
     media: bool = False
     volume: bool = False
     phase_rays: bool = False
@@ -155,6 +156,7 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         plan,
         lens=_has_lens(settings, traits),
         filtered=_filtered(settings, traits),
+        split=settings.render.splits > 0 and traits.has_smooth_glass and not (plan.path or plan.virtual),
         moments=not (_divided(settings, plan) or is_signed(_filter(settings, traits))),
         thin_glass=thin_rules(settings, traits),
         warnings=(*plan.warnings, *_of_thin(settings, traits)),
