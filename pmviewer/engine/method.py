@@ -45,8 +45,9 @@ class Plan:
     whether photons are stored in them and light that they scatter is looked up, `phase_rays` whether rays by phase
     functions can meet a light; `dispersion` whether glass splits light into colours; `lens` whether the render camera
     has one, `filtered` whether the film has another reconstruction filter than the plain box, `moments` whether the
-    film keeps what passes tell of its noise; `thin_glass` are the rules by which light passes panes of glass, () where
-    all of it is exact; `warnings` are sentences for the log about what was asked for and can't be."""
+    film keeps what passes tell of its noise, `split` whether camera paths go both ways at glass; `thin_glass` are the
+    rules by which light passes panes of glass, () where all of it is exact; `warnings` are sentences for the log about
+    what was asked for and can't be."""
 
     path: bool = False
     direct: bool = False
@@ -70,6 +71,7 @@ class Plan:
     lens: bool = False
     filtered: bool = False
     moments: bool = True
+    split: bool = False
     media: bool = False
     volume: bool = False
     phase_rays: bool = False
@@ -160,6 +162,7 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         plan,
         lens=_has_lens(settings, traits),
         filtered=_filtered(settings, traits),
+        split=_splits(settings, traits, plan),
         moments=not (_divided(settings, plan) or is_signed(_filter(settings, traits))),
         thin_glass=thin_rules(settings, traits),
         dispersion=traits.has_dispersion,
@@ -204,6 +207,12 @@ def _of_dispersion(plan: Plan, traits: SceneTraits) -> tuple[str, ...]:
 def _has_lens(settings: Settings, traits: SceneTraits) -> bool:
     camera = settings.camera
     return camera.name in traits.lenses if camera.aperture == "auto" else camera.aperture > 0
+
+
+def _splits(settings: Settings, traits: SceneTraits, plan: Plan) -> bool:
+    """Whether camera paths go both ways at glass."""
+    glass = traits.has_smooth_glass and not traits.has_dispersion
+    return settings.render.splits > 0 and glass and not (plan.path or plan.virtual)
 
 
 def _filtered(settings: Settings, traits: SceneTraits) -> bool:

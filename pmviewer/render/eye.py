@@ -1,6 +1,7 @@
 """The eye pass: one sample per pixel of Jensen's four-way split (R1), from the maps of this pass.
 
-From the camera, mirrors, glass and smooth glossy lobes are followed. Wherever a surface has lobes that photons are
+From the camera, mirrors, glass and smooth glossy lobes are followed, at the first glass both ways
+(`pmviewer.render.split`). Wherever a surface has lobes that photons are
 stored for, direct light is sampled, caustics come from the caustic map, and indirect light from the global map: shown
 directly (`progressive`) or by a final gather (`gather`, see `pmviewer.render.gather.gather`). A surface with lobes of
 both kinds does both, so that a chain may light up at every surface it meets.
@@ -22,7 +23,7 @@ from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import add, largest, mul, scale
 from pmviewer.maps.record import CAUSTIC as CAUSTIC_CLASS
 from pmviewer.render.cast import cast
-from pmviewer.render.chain import BLACK, WHITE, arrive, follow_camera_path
+from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.direct.choice import LIST_WORDS, choose, choose_by_power
 from pmviewer.render.direct.direct import direct_light, found_light, met_light, radiance_of
 from pmviewer.render.filter import place_in_filter
@@ -45,6 +46,7 @@ from pmviewer.render.pixel import (
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius
 from pmviewer.render.record import C_CUT, C_RAYS
 from pmviewer.render.reflect import reflected, unfound
+from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import cast_on
 from pmviewer.render.virtual_lights.lit import note_object, virtual_light
 
@@ -199,40 +201,46 @@ def eye_pass(given, outline, radii, film, counts, first, last):
         if outlined:
             outline_emission(scene, eye, pixel)
             counts[C_RAYS] += eye.outline_rays
-        beta = WHITE
-        left, pdf = ray.o, _f4(0.0)  # where, and with which density, a lobe was left that is not a delta
+        way, ways = first_way(ray)
         choice = choose_by_power(lights, eye.light_samples)
-        for depth in range(eye.max_depth + 1):
-            hit = cast(scene, ray)
-            counts[C_RAYS] += 1
-            beta = deposit_media(given, ray, hit, beta, pixel, depth)
-            whole = depth == 0
-            seen = EMISSION if whole else SPECULAR
-            if hit.prim < 0:
+        while True:
+            ray, beta, first_depth, splits, u_way = way
+            left, pdf = ray.o, _f4(0.0)  # where, and with which density, a lobe was left that is not a delta
+            for depth in range(first_depth, eye.max_depth + 1):
+                hit = cast(scene, ray)
+                counts[C_RAYS] += 1
+                beta = deposit_media(given, ray, hit, beta, pixel, depth)
+                whole = depth == 0
+                seen = EMISSION if whole else SPECULAR
+                if hit.prim < 0:
+                    if met_light(scene, hit) >= 0 and not (whole and outlined):
+                        deposit(pixel, seen, mul(beta, _emission(given, left, pdf, choice, hit, ray.d)))
+                    break
+                si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
+                if whole:
+                    properties(eye, pixel, si)
+                    note_object(given, hit.prim, pixel)
                 if met_light(scene, hit) >= 0 and not (whole and outlined):
                     deposit(pixel, seen, mul(beta, _emission(given, left, pdf, choice, hit, ray.d)))
+                groups = si.bsdf.groups
+                beta, u_way = thinned(eye, beta, u_way), CERTAIN
+                if groups == NOTHING or not largest(beta) > _f4(0.0):
+                    break
+                if groups & STORED != 0:
+                    choice = _stored(given, si, beta, pixel, place, (lights, found), whole)
+                if groups & FOLLOWED == 0:
+                    break
+                if depth == eye.max_depth:
+                    counts[C_CUT] += 1
+                    break
+                if not is_delta(si.bsdf):
+                    choice = _followed(given, si, beta, pixel, depth, choice, lights)
+                ray, beta, pdf, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
+                if eye.followed_direct == 0:
+                    pdf = _f4(0.0)
+                if not largest(beta) > _f4(0.0):
+                    break
+                left = si.p
+            if ways.n == 0:
                 break
-            si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
-            if whole:
-                properties(eye, pixel, si)
-                note_object(given, hit.prim, pixel)
-            if met_light(scene, hit) >= 0 and not (whole and outlined):
-                deposit(pixel, seen, mul(beta, _emission(given, left, pdf, choice, hit, ray.d)))
-            groups = si.bsdf.groups
-            if groups == NOTHING:
-                break
-            if groups & STORED != 0:
-                choice = _stored(given, si, beta, pixel, place, (lights, found), whole)
-            if groups & FOLLOWED == 0:
-                break
-            if depth == eye.max_depth:
-                counts[C_CUT] += 1
-                break
-            if not is_delta(si.bsdf):
-                choice = _followed(given, si, beta, pixel, depth, choice, lights)
-            ray, beta, pdf = follow_camera_path(given, si, beta, seed, depth)
-            if eye.followed_direct == 0:
-                pdf = _f4(0.0)
-            if not largest(beta) > _f4(0.0):
-                break
-            left = si.p
+            way, ways = next_way(ways)

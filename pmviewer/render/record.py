@@ -12,6 +12,7 @@ from pmviewer.maps.estimate.filters import FILTERS
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.filter import BOX, FILTER_FIELDS, filter_of, set_filter
 from pmviewer.render.lens import LENS_FIELDS
+from pmviewer.render.split import SPLIT_FIELDS
 from pmviewer.settings.access import Settings
 
 _FIELDS: list[tuple] = [
@@ -71,11 +72,13 @@ MEDIA_FIELDS: list[tuple[str, str]] = [
 """Of scenes with participating media."""
 
 
-def eye_dtype(lens: bool = False, filtered: bool = False, media: bool = False) -> np.dtype:
-    """The record of a camera with a lens or without, a reconstruction filter other than the plain box or not, and of a
-    scene with media or without: kernels are compiled for the record's type, so that what is not there costs nothing."""
+def eye_dtype(lens: bool = False, filtered: bool = False, media: bool = False, split: bool = False) -> np.dtype:
+    """The record of a camera with a lens or without, a reconstruction filter other than the plain box or not, of a
+    scene with media or without, and of paths that split at glass or choose: kernels are compiled for the record's type,
+    so that what is not there costs nothing."""
     # In front, since numba warns where one record begins like another.
     extra = [*(LENS_FIELDS if lens else []), *(FILTER_FIELDS if filtered else []), *(MEDIA_FIELDS if media else [])]
+    extra += SPLIT_FIELDS if split else []
     return np.dtype([*extra, *_FIELDS], align=True)
 
 
@@ -94,8 +97,8 @@ themselves; paths from the camera that `max_depth` ended."""
 @dataclass(frozen=True)
 class Evaluation:
     """How a pass evaluates the terms of the picture: what it samples, and what it looks up in which maps. Each field is
-    one of EYE_DTYPE by its name, the last three of scenes with media; radii and `corner` are in scene units. The
-    defaults sample and look up nothing."""
+    one of EYE_DTYPE by its name, the last four of scenes with media and of paths that split; radii and `corner` are in
+    scene units. The defaults sample and look up nothing."""
 
     direct: bool = False
     followed_direct: bool = False
@@ -121,6 +124,7 @@ class Evaluation:
     volume_light: bool = False
     phase_rays: bool = False
     volume_radius: float = 0.0
+    splits: int = 0
 
 
 NOTHING_EVALUATED = Evaluation()
@@ -132,7 +136,9 @@ def eye_record(
     """The record (1,) of an `eye_dtype` of pass `index`, complete: nobody writes to it afterwards. A lens must have
     been focused (`pmviewer.engine.focus`)."""
     chosen = filter_of(camera.filter, settings.render)
-    record = np.zeros(1, eye_dtype(camera.aperture > 0, chosen != BOX, camera.medium is not None))
+    record = np.zeros(
+        1, eye_dtype(camera.aperture > 0, chosen != BOX, camera.medium is not None, evaluation.splits > 0)
+    )
     r = record[0]
     if camera.medium is not None:
         r["medium"] = camera.medium

@@ -67,6 +67,8 @@ class SceneTraits:
     """Glass that splits light into colours."""
     has_findable_lights: bool = True
     """Lights that rays can meet."""
+    has_smooth_glass: bool = False
+    """Surfaces that reflect and refract as deltas."""
 
     @property
     def many_lights(self) -> bool:
@@ -114,6 +116,7 @@ def analyse(scene: Scene) -> SceneTraits:
         rich=is_rich(scene),
         has_delta=any(is_delta(m) for m in used),
         has_rough_glass=any(is_rough_glass(m) for m in used),
+        has_smooth_glass=any(m.transparent and is_delta(m) for m in used),
         has_delta_lights=any(isinstance(light, PointLight | SpotLight | DirectionalLight) for light in scene.lights),
         orthographic=scene.camera.projection == "orthographic",
         lenses=frozenset(name for name, camera in _cameras(scene) if camera.aperture > 0),

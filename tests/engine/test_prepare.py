@@ -16,7 +16,7 @@ from pmviewer.engine.prepare import prepare, steps_of, types_of
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.stages.pass_data import blank_eye, blank_pass
 from pmviewer.engine.store import StageStore
-from pmviewer.render.record import eye_record
+from pmviewer.render.record import Evaluation, eye_record
 from pmviewer.settings.access import Settings, with_values
 from tests.support.scenes import cornell_box
 
@@ -84,7 +84,8 @@ def test_blank_records_have_the_types_of_a_pass(variant, box, pool):
 def test_blank_eyes_have_the_types_of_lens_and_filter(values, box, pool):
     settings = with_values(Settings(), values)
     renderer = Renderer(box, settings, pool, StageStore(0))
-    assert blank_eye(settings, renderer.plan).dtype == eye_record(renderer.camera, settings, 0).dtype
+    splitting = Evaluation(splits=2)
+    assert blank_eye(settings, renderer.plan).dtype == eye_record(renderer.camera, settings, 0, splitting).dtype
 
 
 def signatures() -> set[tuple[str, Any]]:

@@ -47,7 +47,7 @@ def box() -> Scene:
 def rendered(**gather):
     pool = WorkPool(1)
     settings = settings_of(
-        render={"method": "gather", "outline_rays": 0}, photons={"N": 2000}, gather={"rays": 2, **gather}
+        render={"method": "gather", "outline_rays": 0, "splits": 0}, photons={"N": 2000}, gather={"rays": 2, **gather}
     )
     renderer = Renderer(open_scene(box()), settings, pool, StageStore(0))
     renderer.step()

@@ -55,14 +55,14 @@ class Replay:
         self.samples: NDArray[np.float32] | None = None
         self.rows, self.way, self.prims = self._run(-1, 0, np.zeros((0, 3), np.float32))[:3]
 
-    def shares(self, depth: int, group: int, wi: NDArray[np.float32]) -> NDArray[np.float32]:
+    def shares(self, surface: int, group: int, wi: NDArray[np.float32]) -> NDArray[np.float32]:
         """(m, 3), 1/sr: what the lobes of that group reflect at that surface of light from wi (m, 3)."""
-        return self._run(depth, group, wi)[3]
+        return self._run(surface, group, wi)[3]
 
     def _run(
-        self, depth: int, group: int, wi: NDArray[np.float32]
+        self, surface: int, group: int, wi: NDArray[np.float32]
     ) -> tuple[np.ndarray, Float, NDArray[np.int64], NDArray[np.float32]]:
-        asked, counts = np.array([depth, group], np.int64), np.zeros(3, np.int64)
+        asked, counts = np.array([surface, group], np.int64), np.zeros(3, np.int64)
         rows, shares = empty_rows(MOST_LOOK_UPS), np.zeros((len(wi), 3), np.float32)
         way, prims = np.zeros((MOST_POINTS, 3), np.float32), np.full(MOST_POINTS, -1, np.int64)
         wi = np.ascontiguousarray(wi, np.float32)
@@ -92,7 +92,7 @@ def _look_up(row: np.void, replay: Replay, rendered: RenderedPass, settings: Set
     records = np.ascontiguousarray(stored[near.rows])
     unpacked = unpack(records, unit)
     unpacked["wavelength"] = of_bands(bands(records) if banded else np.zeros(len(records), np.int64))
-    share = replay.shares(int(row["depth"]), int(group), unpacked["wi"]).astype(np.float64)
+    share = replay.shares(int(row["surface"]), int(group), unpacked["wi"]).astype(np.float64)
     beta = row["beta"].astype(np.float64)
     brings = beta * share * unpacked["Phi"]
     kernel, cone_k = FILTERS[int(eye["filter"])], float(eye["cone_k"])

@@ -69,6 +69,7 @@ def _evaluation(settings: Settings, plan: Plan, maps: PassMaps) -> Evaluation:
         radiance_cutoff=maps.radiance_reach,
         volume_light=plan.volume,
         phase_rays=plan.phase_rays,
+        splits=settings.render.splits if plan.split else 0,
         volume_radius=maps.volume.radius if maps.volume is not None else 0.0,
     )
 
@@ -105,7 +106,7 @@ def pass_data(
 
 def blank_eye(settings: Settings, plan: Plan) -> NDArray[np.void]:
     """An eye record (1,) without contents. The free camera is a pinhole."""
-    return np.zeros(1, eye_dtype(plan.lens and not settings.free_camera.on, plan.filtered, plan.media))
+    return np.zeros(1, eye_dtype(plan.lens and not settings.free_camera.on, plan.filtered, plan.media, plan.split))
 
 
 def blank_pass(scene: NDArray[np.void], settings: Settings, plan: Plan) -> PassData:

@@ -39,7 +39,7 @@ from pmviewer.kernels.bsdf.material import beer_lambert, interior_attenuation, m
 from pmviewer.kernels.bsdf.plastic import coat_transmittance, coated_diffuse, under_coat
 from pmviewer.kernels.bsdf.rough_dielectric import rough_dielectric_f_pdf, sample_rough_dielectric
 from pmviewer.kernels.bsdf.schlick import schlick_shadowing
-from pmviewer.kernels.bsdf.smooth import smooth_lobe
+from pmviewer.kernels.bsdf.smooth import smooth_lobe, smooth_reflectance
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.textures.normal_map import reflecting_normal
 from pmviewer.kernels.vector import add, basis, cross, dot, largest, mul, scale
@@ -330,6 +330,14 @@ def bsdf_compression(b, wo, wi):
     if side * dot(b.n, wi) >= _f4(0.0):
         return _f4(1.0)
     return _f4(1.0) / (p.eta * p.eta) if side > _f4(0.0) else p.eta * p.eta
+
+
+@device
+def bsdf_mirrored_share(b, wo):
+    """Probability with which FOLLOWED lobes reflect where they are smooth glass; 1 of all else."""
+    if b.groups & FOLLOWED == 0 or not b.delta:
+        return _f4(1.0)
+    return smooth_reflectance(b.p, local(b, wo))
 
 
 @device

@@ -277,6 +277,14 @@ def _sampled(b, group, o, u_lobe, u, v):
 
 
 @device
+def bsdf_mirrored_share(b, wo):
+    """See `lobes.bsdf_mirrored_share`; 1 of a principled one."""
+    if _is_principled(b):
+        return _ONE
+    return lobes.bsdf_mirrored_share(b.one, wo)
+
+
+@device
 def bsdf_sample(b, group, wo, u_lobe, u, v):
     """(wi, f·|cos|/pdf, pdf, compression), the pdf being that of all lobes of the group; weight 0 means absorbed."""
     if not _is_principled(b):

@@ -36,6 +36,7 @@ from pmviewer.kernels.bsdf.plain import (
     plain_sample,
 )
 from pmviewer.kernels.bsdf.principled_lobes import metallic_at
+from pmviewer.kernels.bsdf.specular import glass_reflectance
 from pmviewer.kernels.compile.specialise import has, is_a, specialised
 from pmviewer.kernels.random import draw1, draw4
 from pmviewer.kernels.scene import material_kind
@@ -58,6 +59,7 @@ __all__ = [
     "is_lambertian",
     "is_plain",
     "keeps",
+    "mirrored_share",
     "pick_group",
     "same_side",
     "shading_normal",
@@ -276,6 +278,15 @@ def is_lambertian(b):
         f = _rich(b).bsdf_is_lambertian
         return lambda b: f(b)
     return lambda b: True
+
+
+@specialised
+def mirrored_share(scene, b, wo):
+    """Probability with which FOLLOWED lobes reflect where they are smooth glass; 1 of all else."""
+    if is_plain(b):
+        return lambda scene, b, wo: glass_reflectance(scene, b.material, b.n, wo)
+    f = _rich(b).bsdf_mirrored_share
+    return lambda scene, b, wo: f(b, wo)
 
 
 @specialised

@@ -33,6 +33,19 @@ def smooth_lobe(p, o, u):
 
 
 @device
+def smooth_reflectance(p, o):
+    """Probability with which `sample_smooth` reflects at glass; 1 of what never transmits."""
+    cos = min(abs(o[2]), _f4(1.0))
+    if p.kind == CONDUCTOR or p.kind == PLASTIC:
+        return _f4(1.0)
+    if p.kind == THIN_DIELECTRIC:
+        return thin_reflectance(cos, p.eta)
+    eta = p.eta if o[2] > _f4(0.0) else _f4(1.0) / p.eta
+    fresnel, _ = fresnel_dielectric(cos, eta)
+    return fresnel
+
+
+@device
 def sample_smooth(p, o, u):
     """(direction, weight, compression) of the smooth lobes; `u` chooses between reflection and transmission."""
     cos = min(abs(o[2]), _f4(1.0))

@@ -37,6 +37,18 @@ def fresnel_dielectric(cos_i, eta):
 
 
 @device
+def glass_reflectance(scene, material, n, wo):
+    """Share of the light that smooth glass with outward normal n reflects back to the side of wo; 1 of a mirror."""
+    if material_kind(scene, material) == CONDUCTOR:
+        return _f4(1.0)
+    cos, eta = dot(wo, n), material_eta(scene, material)
+    if cos < _f4(0.0):
+        cos, eta = -cos, _f4(1.0) / eta
+    fresnel, _ = fresnel_dielectric(min(cos, _f4(1.0)), eta)
+    return fresnel
+
+
+@device
 def scatter_specular(scene, material, n, d, u):
     """One specular scattering of the travelling direction d at a surface with outward normal n.
 

@@ -13,12 +13,13 @@ from pmviewer.maps.estimate.glossy import reflected_share
 from pmviewer.maps.record import CAUSTIC
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.render.cast import cast
-from pmviewer.render.chain import WHITE, arrive, follow_camera_path
+from pmviewer.render.chain import arrive
 from pmviewer.render.direct.choice import LIST_WORDS, choose, expected_samples
 from pmviewer.render.given import opened
 from pmviewer.render.pixel import sampled_ray
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, own_radius
 from pmviewer.render.reflect import reflected, unfound
+from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
 
 OF_CAUSTICS, AS_INDIRECT, AS_DIRECT, AS_CAUSTICS, NOT_FOUND, GATHERED = range(6)
 """What a look-up is for: the caustic map; the global map as indirect light, as direct light, as caustics; the caustic
@@ -35,11 +36,13 @@ ROW = np.dtype(
         ("class_mask", "i4"),
         ("depth", "i4"),
         ("both_sides", "i4"),
+        ("surface", "i4"),
     ]
 )
 """A look-up: place, normal on the viewer's side, direction to the viewer, what the pixel takes of light from there, the
 radiance that the look-up found, its radius (scene units; with the k nearest the largest one), purpose, path classes,
-number of the surface on the way, and whether photons from behind count too."""
+number of the surface on its way, whether photons from behind count too, and the surface's number among all that are
+met, ways that waited where paths split behind the others."""
 _COLUMNS = ROW.itemsize // 4
 
 _f4 = np.float32
@@ -50,27 +53,28 @@ _CAUSTICS = np.int32(1 << CAUSTIC)
 
 @device
 def _put(rows, row, si, beta, L, radius, what):
-    """A look-up into rows, float32 (n, columns of ROW); `what`: purpose, class mask, depth, both_sides. Returns the
-    next free row."""
+    """A look-up into rows, float32 (n, columns of ROW); `what`: purpose, class mask, depth, both_sides, surface.
+    Returns the next free row."""
     if row >= len(rows):
         return row
     for k in range(3):
         rows[row, k], rows[row, 3 + k], rows[row, 6 + k] = si.p[k], si.ng[k], si.wo[k]
         rows[row, 9 + k], rows[row, 12 + k] = beta[k], L[k]
     rows[row, 15] = radius
-    for k in range(4):
+    for k in range(5):
         rows[row, 16 + k] = _f4(what[k])
     return row + 1
 
 
 @device
-def _stored(given, radii, pixel, si, beta, depth, rows, row):
-    """The look-ups by the STORED lobes of a surface."""
+def _stored(given, radii, pixel, si, beta, numbers, rows, row):
+    """The look-ups by the STORED lobes of a surface with those numbers on its way and among all."""
     eye = given.eye
+    depth, surface = numbers
     if eye.caustic_mask != 0:
         r = own_radius(radii, OF_CAUSTIC, pixel, eye.caustic_radius)
         L = reflected(given.caustic_map, eye, r, si, eye.caustic_mask)
-        row = _put(rows, row, si, beta, L, r, (_i8(OF_CAUSTICS), _i8(eye.caustic_mask), _i8(depth), _i8(0)))
+        row = _put(rows, row, si, beta, L, r, (_i8(OF_CAUSTICS), _i8(eye.caustic_mask), depth, _i8(0), surface))
     for k in range(4):
         mask, r = eye.global_mask, own_radius(radii, OF_GLOBAL, pixel, eye.global_radius)
         if k == 1:
@@ -84,7 +88,7 @@ def _stored(given, radii, pixel, si, beta, depth, rows, row):
         if mask != 0:
             L = reflected(given.global_map, eye, r, si, mask)
             purpose = _i8(AS_INDIRECT + k) if k < 3 else _i8(GATHERED)
-            row = _put(rows, row, si, beta, L, r, (purpose, _i8(mask), _i8(depth), _i8(0)))
+            row = _put(rows, row, si, beta, L, r, (purpose, _i8(mask), depth, _i8(0), surface))
     return row
 
 
@@ -108,54 +112,64 @@ def _expected(given, si, expected):
 
 
 @kernel
-def replay_pixel(given, radii, pixel, asked, wi, shares, rows, way, prims, expected, counts):
+def replay_pixel(given, radii, pixel, asked, wi, shares, rows, vertices, prims, expected, counts):
     """Replay a pixel in the pass of the eye record.
 
-    given: as for `pmviewer.render.eye.eye_pass`; radii: as there; pixel: int64; asked: int64 (2,), the depth of a
+    given: as for `pmviewer.render.eye.eye_pass`; radii: as there; pixel: int64; asked: int64 (2,), the number of a
     surface (−1: of none) and the group of its lobes whose `reflected_share` of light from the directions wi, float32
     (m, 3), goes into shares (m, 3); rows: float32 (n, columns of ROW) of what is looked up, in the order of the eye
-    pass; way: float32 (v, 3), the ray's origin and the points that the path meets; prims: int64 (v,), the primitives
-    there; expected: float32 (n_lights,), light samples that the first surface that stores photons spends on each light,
-    left alone where there is none; counts: int64 (3,), how many rows and points there are, and at the surface number
-    counts[2] − 1 the lights were chosen, 0 for nowhere.
+    pass; vertices: float32 (v, 3), the ray's origin and the points that the path meets, of its ways where it splits the
+    one that never waits; prims: int64 (v,), the primitives there; expected: float32 (n_lights,), light samples that the
+    first surface of that way that stores photons spends on each light, left alone where there is none; counts: int64
+    (3,), how many rows and points there are, and at the surface number counts[2] − 1 the lights were chosen, 0 for
+    nowhere.
     """
     given = opened(given)
     scene, eye = given.scene, given.eye
     seed, ray, _, _ = sampled_ray(scene, eye, pixel)
-    beta = WHITE
+    way, ways = first_way(ray)
+    main, surface = True, _i8(-1)
     row, points = _i8(0), _i8(1)
     for k in range(3):
-        way[0, k] = ray.o[k]
-    for depth in range(eye.max_depth + 1):
-        hit = cast(scene, ray)
-        if hit.prim < 0:
+        vertices[0, k] = ray.o[k]
+    while True:
+        ray, beta, first, splits, u = way
+        for depth in range(first, eye.max_depth + 1):
+            hit = cast(scene, ray)
+            if hit.prim < 0:
+                break
+            if main and points < len(vertices):
+                prims[points] = hit.prim
+                for k in range(3):
+                    vertices[points, k] = hit.p[k]
+                points += 1
+            si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
+            groups = si.bsdf.groups
+            beta, u = thinned(eye, beta, u), CERTAIN
+            if groups == NOTHING or not largest(beta) > _f4(0.0):
+                break
+            surface += 1
+            if surface == asked[0]:
+                _shares(si, asked[1], wi, shares)
+            if groups & STORED != 0:
+                if main and eye.direct != 0 and counts[2] == 0:
+                    _expected(given, si, expected)
+                    counts[2] = depth + 1
+                row = _stored(given, radii, pixel, si, beta, (_i8(depth), surface), rows, row)
+            if groups & FOLLOWED == 0 or depth == eye.max_depth:
+                break
+            if eye.unfound != 0 and not is_delta(si.bsdf):
+                r = own_radius(radii, OF_CAUSTIC, pixel, eye.caustic_radius)
+                L = unfound(given.caustic_map, eye, r, si)
+                both = _i8(1) if transmits(si.bsdf) else _i8(0)
+                row = _put(rows, row, si, beta, L, r, (_i8(NOT_FOUND), _i8(_CAUSTICS), _i8(depth), both, surface))
+            ray, beta, _, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
+            if not largest(beta) > _f4(0.0):
+                break
+        if ways.n == 0:
             break
-        if points < len(way):
-            prims[points] = hit.prim
-            for k in range(3):
-                way[points, k] = hit.p[k]
-            points += 1
-        si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
-        groups = si.bsdf.groups
-        if groups == NOTHING:
-            break
-        if depth == asked[0]:
-            _shares(si, asked[1], wi, shares)
-        if groups & STORED != 0:
-            if eye.direct != 0 and counts[2] == 0:
-                _expected(given, si, expected)
-                counts[2] = depth + 1
-            row = _stored(given, radii, pixel, si, beta, depth, rows, row)
-        if groups & FOLLOWED == 0 or depth == eye.max_depth:
-            break
-        if eye.unfound != 0 and not is_delta(si.bsdf):
-            r = own_radius(radii, OF_CAUSTIC, pixel, eye.caustic_radius)
-            L = unfound(given.caustic_map, eye, r, si)
-            both = _i8(1) if transmits(si.bsdf) else _i8(0)
-            row = _put(rows, row, si, beta, L, r, (_i8(NOT_FOUND), _i8(_CAUSTICS), _i8(depth), both))
-        ray, beta, _ = follow_camera_path(given, si, beta, seed, depth)
-        if not largest(beta) > _f4(0.0):
-            break
+        way, ways = next_way(ways)
+        main = False
     counts[0], counts[1] = row, points
 
 
@@ -169,6 +183,6 @@ def as_look_ups(rows: np.ndarray) -> np.ndarray:
     made = np.zeros(len(rows), ROW)
     for k, name in enumerate(("p", "n", "wo", "beta", "L")):
         made[name] = rows[:, 3 * k : 3 * k + 3]
-    for k, name in enumerate(("radius", "purpose", "class_mask", "depth", "both_sides")):
+    for k, name in enumerate(("radius", "purpose", "class_mask", "depth", "both_sides", "surface")):
         made[name] = rows[:, 15 + k]
     return made

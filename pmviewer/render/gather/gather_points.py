@@ -9,11 +9,12 @@ from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.vector import dot, largest, mul, scale
 from pmviewer.render.cast import cast
-from pmviewer.render.chain import BLACK, WHITE, arrive, follow_camera_path
+from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.gather.gather import gather_light, gather_survival
 from pmviewer.render.gather.guide import AIM_WORDS, aim, gather_direction
 from pmviewer.render.given import GatherRays, opened
 from pmviewer.render.pixel import sampled_ray
+from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import cast_straight
 
 _f4 = np.float32
@@ -58,18 +59,25 @@ def gather_points(given, pixel, counts, rows):
     given = opened(given)
     scene, eye = given.scene, given.eye
     seed, ray, _, _ = sampled_ray(scene, eye, pixel)
-    beta = WHITE
+    way, ways = first_way(ray)
     row = _i8(0)
-    for depth in range(eye.max_depth + 1):
-        hit = cast(scene, ray)
-        if hit.prim < 0:
-            break
-        si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
-        if si.bsdf.groups & STORED != 0:
-            row = _replay(given, si, beta, seed, rows, row, counts)
-        if si.bsdf.groups & FOLLOWED == 0:
-            break
-        ray, beta, _ = follow_camera_path(given, si, beta, seed, depth)
-        if not largest(beta) > _f4(0.0):
-            break
-    return row
+    while True:
+        ray, beta, first, splits, u = way
+        for depth in range(first, eye.max_depth + 1):
+            hit = cast(scene, ray)
+            if hit.prim < 0:
+                break
+            si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
+            beta, u = thinned(eye, beta, u), CERTAIN
+            if not largest(beta) > _f4(0.0):
+                break
+            if si.bsdf.groups & STORED != 0:
+                row = _replay(given, si, beta, seed, rows, row, counts)
+            if si.bsdf.groups & FOLLOWED == 0:
+                break
+            ray, beta, _, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
+            if not largest(beta) > _f4(0.0):
+                break
+        if ways.n == 0:
+            return row
+        way, ways = next_way(ways)

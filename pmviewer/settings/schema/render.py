@@ -27,6 +27,11 @@ THIN_GLASS = Need(
         else "No thin glass in this scene that goes by this setting (a thindielectric does)."
     ),
 )
+SMOOTH_GLASS = Need(lambda f: f.traits.has_smooth_glass, "No smooth glass in this scene.")
+ONE_INDEX = Need(lambda f: not f.plan.dispersion, "Where glass splits light into colours, paths go one way at it.")
+SPLIT = Need(
+    lambda f: not (f.plan.path or f.plan.virtual), "The path tracer and virtual lights go one way at every surface."
+)
 
 
 class Render(Group):
@@ -49,6 +54,22 @@ class Render(Group):
         ge=1,
         le=1000,
         needs=(FOLLOWED_OR_PATHS,),
+    )
+    splits: int = setting(
+        2,
+        "Surfaces of smooth glass on a path from the camera at which it goes both ways, by reflection and by "
+        "refraction, the weaker thinned out beyond what it meets first; at all others it goes one of them by chance. "
+        "What is seen in glass is less noisy for it: lamps that a glass ball reflects most of all.",
+        stage="image",
+        scale="integer",
+        unit="surfaces",
+        ge=0,
+        le=2,
+        needs=(
+            SMOOTH_GLASS,
+            ONE_INDEX,
+            SPLIT,
+        ),
     )
     thin_glass: Literal["exact", "ignored", "tinted", "tinted and reflecting"] = setting(
         "exact",

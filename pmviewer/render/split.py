@@ -1,0 +1,125 @@
+"""Both ways at glass: camera paths that split where smooth glass reflects and refracts, in place of choosing one at
+random.
+
+At the first `splits` such surfaces of a path both ways are followed, weighted by the share R of the light that is
+reflected and by 1 − R. The stronger goes on, the other waits until the path has ended. What a weak way brings hardly
+counts unless it is a light, and the first surface on it tells: emission there counts as it is, and beyond that the way
+is thinned out by roulette with the probability w/THINNING, w being its throughput. So the reflection of a lamp on a
+glass ball, which a choice would hit with 4 % of the samples at 25 times its weight, is seen by all, for little more
+than a ray.
+
+Eye records without the field `splits` split nothing, and compile none of it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pmviewer.kernels.bsdf.scattering import chain_numbers, mirrored_share
+from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.dimensions import CHAIN
+from pmviewer.kernels.vector import largest, scale
+from pmviewer.render.chain import BLACK, WHITE, follow, follow_camera_path
+
+_f4 = np.float32
+_i8 = np.int64
+MOST_SPLITS = 2
+THINNING = 0.2
+"""Throughput from which a way is never thinned out."""
+SPLIT_FIELDS: list[tuple[str, str]] = [("splits", "i4")]
+"""Of eye records: smooth glass surfaces of a path at which it splits."""
+CERTAIN = _f4(-1.0)
+_ZERO, _HALF, _ONE, _BELOW_ONE = _f4(0.0), _f4(0.5), _f4(1.0), _f4(1.0 - 2.0**-24)
+_THINNING = _f4(THINNING)
+
+
+class Way(NamedTuple):
+    """A part of a camera path: its first ray, the throughput beta up to its end, the depth of the surface there, the
+    splits before it, and the number that roulette has for it, or CERTAIN where there is none."""
+
+    ray: Any
+    beta: Any
+    depth: Any
+    splits: Any
+    u: Any
+
+
+class Ways(NamedTuple):
+    """Those that wait: n of them, the last at place n − 1."""
+
+    n: Any
+    a: Any
+    b: Any
+
+
+@device
+def first_way(ray):
+    """The camera ray, and nothing that waits."""
+    way = Way(ray, WHITE, _i8(0), _i8(0), CERTAIN)
+    return way, Ways(_i8(0), way, way)
+
+
+@device
+def _waiting(ways, way):
+    """The ways with one more. A path has never more than its splits."""
+    if ways.n == 0:
+        return Ways(_i8(1), way, ways.b)
+    return Ways(_i8(2), ways.a, way)
+
+
+@device
+def next_way(ways):
+    """The last that waits, and the others; there must be one."""
+    way = ways.a
+    if ways.n == 2:
+        way = ways.b
+    return way, Ways(_i8(ways.n - 1), ways.a, ways.b)
+
+
+@specialised
+def split_camera_path(given, si, beta, seed, depth, splits, ways):
+    """`follow_camera_path`, or both ways: the ray, beta, the density, the splits so far and the ways that wait."""
+    if not has(part(given, "eye"), "splits"):
+
+        def one(given, si, beta, seed, depth, splits, ways):
+            ray, beta, pdf = follow_camera_path(given, si, beta, seed, depth)
+            return ray, beta, pdf, splits, ways
+
+        return one
+
+    def both(given, si, beta, seed, depth, splits, ways):
+        eye, share = given.eye, _ONE
+        if splits < eye.splits:
+            share = mirrored_share(given.scene, si.bsdf, si.wo)
+        if not (share > _ZERO and share < _ONE):
+            ray, beta, pdf = follow_camera_path(given, si, beta, seed, depth)
+            return ray, beta, pdf, splits, ways
+        mirrored, reflected, _ = follow(given.scene, si, beta, _ZERO, _ZERO, _ZERO)
+        bent, refracted, _ = follow(given.scene, si, beta, _BELOW_ONE, _BELOW_ONE, _ZERO)
+        reflected, refracted = scale(reflected, share), scale(refracted, _ONE - share)
+        _, u, _, _ = chain_numbers(given.scene, eye.sequence, seed, eye.index, CHAIN + depth)
+        if share > _HALF:
+            ways = _waiting(ways, Way(bent, refracted, _i8(depth + 1), splits + 1, u))
+            return mirrored, reflected, _ZERO, splits + 1, ways
+        ways = _waiting(ways, Way(mirrored, reflected, _i8(depth + 1), splits + 1, u))
+        return bent, refracted, _ZERO, splits + 1, ways
+
+    return both
+
+
+@specialised
+def thinned(eye, beta, u):
+    """beta beyond the first surface of a way with that number for roulette; black where the way ends."""
+    if not has(eye, "splits"):
+        return lambda eye, beta, u: beta
+
+    def by_roulette(eye, beta, u):
+        survival = largest(beta) / _THINNING
+        if u < _ZERO or survival >= _ONE:
+            return beta
+        return scale(beta, _ONE / survival) if u < survival else BLACK
+
+    return by_roulette
