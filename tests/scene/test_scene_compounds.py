@@ -137,7 +137,6 @@ def test_coats(tmp_path: Path) -> None:
     [
         ('<bsdf type="phong"/>', "ward", (0.5,) * 3),
         (f'<bsdf type="roughdiffuse">{BLUE.format("diffuseReflectance")}</bsdf>', "diffuse", (0.1, 0.2, 0.3)),
-        (f'<bsdf type="difftrans">{BLUE.format("transmittance")}</bsdf>', "diffuse", (0.1, 0.2, 0.3)),
         (f'<bsdf type="hk">{LAYER}</bsdf>', "diffuse", (0.75, 0.5, 0)),
         ('<bsdf type="pplastic"/>', "rough plastic", (0.5,) * 3),
         ('<bsdf type="irawan"/>', "diffuse", (0.5,) * 3),
@@ -150,6 +149,14 @@ def test_nearest_materials_are_named_once(tmp_path: Path, bsdf: str, kind: str, 
     assert (found.kind, found.reflectance) == (kind, pytest.approx(colour))
     assert len(warnings) == 1
     assert "is not supported" in warnings[0]
+
+
+def test_paper_lets_light_through(tmp_path: Path) -> None:
+    found, warnings = material(tmp_path, f'<bsdf type="difftrans">{bitmap(tmp_path, "transmittance")}</bsdf>')
+    assert (found.kind, max(found.reflectance), warnings) == ("diffuse transmitter", 0, ())
+    assert found.textures.keys() == {"transmittance"}
+    older, _ = material(tmp_path, f'<bsdf type="difftrans">{BLUE.format("diffuseTransmittance")}</bsdf>')
+    assert older.transmittance == pytest.approx((0.1, 0.2, 0.3))
 
 
 def test_plugins_of_others_are_read_as_what_they_are_called_after(tmp_path: Path) -> None:
