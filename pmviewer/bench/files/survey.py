@@ -32,6 +32,8 @@ NOT_READ = {"film", "integrator", "sampler", "rfilter", "subsurface"}
 """Elements whose file names are outputs, or caches that renderers make themselves."""
 NAMED_ENDINGS = {".obj", ".ply", ".stl", ".serialized", ".xml", ".png", ".jpg", ".jpeg", ".exr", ".hdr", ".tga", ".bmp",
                  ".rgbe", ".pfm", ".spd", ".vol", ".hair", ".gif", ".bsdf", ".eta"}  # fmt: skip
+_TRIANGLES = (4, 5, 6)
+"""Modes of glTF's primitives: triangles, strips and fans."""
 MOST_INCLUDES = 200
 MOST_TEXT = 64 << 20
 LFS = b"version https://git-lfs"
@@ -169,8 +171,9 @@ def _gltf_document(document: dict[str, Any], path: Path, found: Survey) -> None:
         uri = entry.get("uri")
         if uri is not None and not uri.startswith("data:"):
             _name(found, unquote(uri), [path.parent])
-    if not document.get("meshes"):
-        raise _Odd("foreign", "has no meshes")
+    modes = [part.get("mode", 4) for mesh in document.get("meshes", []) for part in mesh.get("primitives", [])]
+    if not any(mode in _TRIANGLES for mode in modes):
+        raise _Odd("foreign", "has no triangles")
 
 
 def _obj(path: Path, found: Survey) -> None:
