@@ -171,8 +171,10 @@ def _gltf_document(document: dict[str, Any], path: Path, found: Survey) -> None:
         uri = entry.get("uri")
         if uri is not None and not uri.startswith("data:"):
             _name(found, unquote(uri), [path.parent])
-    modes = [part.get("mode", 4) for mesh in document.get("meshes", []) for part in mesh.get("primitives", [])]
-    if not any(mode in _TRIANGLES for mode in modes):
+    if not document.get("meshes"):
+        raise _Odd("foreign", "has no meshes")
+    modes = [part.get("mode", 4) for mesh in document["meshes"] for part in mesh.get("primitives", [])]
+    if modes and not any(mode in _TRIANGLES for mode in modes):
         raise _Odd("foreign", "has no triangles")
 
 
