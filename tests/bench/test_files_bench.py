@@ -89,6 +89,7 @@ def test_a_pointer_in_the_place_of_a_file_is_not_the_file(tmp_path):
         ("a.gltf", '{"asset": {"version": "2.0"}, "meshes": [{}]}', "complete"),
         ("a.gltf", '{"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"mode": 0}]}]}', "foreign"),
         ("a.gltf", '{"asset": {"version": "2.0"}, "meshes": [{}], "buffers": [{"uri": "no%20.bin"}]}', "incomplete"),
+        ("a.gltf", '{"asset": {"version": "2.0"}, "meshes": [{}], "buffers": [{"byteLength": 4}]}', "incomplete"),
         ("a.gltf", "{", "broken"),
         ("a.glb", b"glTF", "broken"),
         ("a.obj", OBJ, "complete"),

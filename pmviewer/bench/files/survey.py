@@ -171,6 +171,10 @@ def _gltf_document(document: dict[str, Any], path: Path, found: Survey) -> None:
         uri = entry.get("uri")
         if uri is not None and not uri.startswith("data:"):
             _name(found, unquote(uri), [path.parent])
+    for number, entry in enumerate(document.get("buffers", [])):
+        first_of_glb = number == 0 and path.suffix.lower() == ".glb"
+        if not (first_of_glb or "uri" in entry or entry.get("extensions")):
+            found.missing.append(f"the bytes of buffer {number}")
     if not document.get("meshes"):
         raise _Odd("foreign", "has no meshes")
     modes = [part.get("mode", 4) for mesh in document["meshes"] for part in mesh.get("primitives", [])]
