@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pmviewer.kernels.bsdf.fresnel import fresnel_conductor
 from pmviewer.kernels.bsdf.diffuse_transmission import diffuse_transmission, sample_other_side
+from pmviewer.kernels.bsdf.fresnel import fresnel_conductor
 from pmviewer.kernels.bsdf.glossy import (
     glossy_f_pdf,
     is_glossy,

@@ -13,7 +13,6 @@ from pmviewer.kernels.bsdf.principled_lobes import LEAST_ALPHA
 from pmviewer.scene.description import LUMINANCE, Material, Principled
 from pmviewer.scene.texture import Checkerboard, Texture
 
-
 _SPREADING = ("rough dielectric", "principled", "diffuse transmitter")
 """Kinds whose FOLLOWED lobes are no deltas."""
 

@@ -114,9 +114,7 @@ class GltfMaterials:
         if "occlusionTexture" in fields.row:
             self._document.warn("Occlusion textures are ignored: light finds its way by itself.")
         material = self._opaque(name, fields, surface)
-        material = with_diffuse_transmission(
-            material, fields, surface, self._textures, self._document.diagnostics
-        )
+        material = with_diffuse_transmission(material, fields, surface, self._textures, self._document.diagnostics)
         material = with_transmission(material, fields, surface, self._textures, self._document.diagnostics)
         normal = self._normal(fields.texture("normalTexture"))
         if normal is not None:

@@ -1,5 +1,5 @@
-"""KHR_materials_transmission: glass, solid or thin, alone or in part; KHR_materials_diffuse_transmission: leaves, paper,
-cloth."""
+"""KHR_materials_transmission: glass, solid or thin, alone or in part; KHR_materials_diffuse_transmission: leaves and
+paper."""
 
 from __future__ import annotations
 

@@ -73,7 +73,8 @@ def principled_thin(p: Properties, name: str) -> Material:
     )
     sheet = _textured(p, sheet, {*_THIN_SHARES, "spec_trans", "diff_trans", "eta"})
     if through > 0 and glass < 1:
-        colours = {"transmittance": t for s, t in sheet.textures.items() if s == "reflectance"}
+        picture = sheet.textures.get("reflectance")
+        colours = {} if picture is None else {"transmittance": picture}
         if sheet.vertex_colours:
             what = f"{p.element}: colours at the vertices don't tint the light that 'diff_trans' lets through."
             p.document.warn(what, p.element)
