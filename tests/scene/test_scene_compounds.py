@@ -165,7 +165,7 @@ def test_plugins_of_others_are_read_as_what_they_are_called_after(tmp_path: Path
     found, warnings = material(tmp_path, f'<bsdf type="roughconductorGGX">{alpha}</bsdf>')
     assert (found.kind, found.alpha, found.distribution) == ("rough conductor", (0.3, 0.3), "ggx")
     assert "it is read as 'roughconductor'" in warnings[0]
-    for name, kind in {"glass": "dielectric", "mirror": "conductor", "lambertian": "diffuse"}.items():
+    for name, kind in {"glass": "dielectric", "mirror": "conductor", "disneybsdf": "principled"}.items():
         found, warnings = material(tmp_path, f'<bsdf type="{name}"/>')
         assert found.kind == kind
         assert f"it is read as '{kind}'" in warnings[0]
