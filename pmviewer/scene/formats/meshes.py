@@ -70,7 +70,7 @@ def load_mesh_scene(path: Path, choices: Mapping[str, str] | None = None) -> Sce
         name=path.stem,
         path=path,
         shapes=shapes,
-        materials=_visible(content.materials, [s for group in groups for s in group.shapes] + list(shapes), diagnostics),
+        materials=_visible(content.materials, shapes, diagnostics) if ending == ".obj" else tuple(content.materials),
         lights=lights,
         camera=shown.camera,
         width=shown.width,
