@@ -69,6 +69,8 @@ MATERIALS: Mapping[str, str] = {
     "roughdielectric, GGX": _rough("roughdielectric", "ggx"),
     "roughdielectric, Beckmann": _rough("roughdielectric", "beckmann"),
     "thindielectric": '<bsdf type="thindielectric"><float name="int_ior" value="1.5"/></bsdf>',
+    "principledthin, diffuse light through": '<bsdf type="principledthin"><rgb name="base_color" value="0.7 0.8 0.5"/>'
+    '<float name="roughness" value="0.6"/><float name="diff_trans" value="1.2"/></bsdf>',
     "plastic": _twosided(f'<bsdf type="plastic">{BASE}</bsdf>'),
     "plastic, nonlinear": _twosided(f'<bsdf type="plastic">{BASE}<boolean name="nonlinear" value="true"/></bsdf>'),
     "roughplastic, GGX": _twosided(_rough("roughplastic", "ggx", BASE + '<float name="alpha" value="0.2"/>')),

@@ -123,6 +123,8 @@ def decode_exr(data: bytes, path: str | Path | None = None) -> tuple[Layers, dic
         file = OpenEXR.File(io.BytesIO(data), separate_channels=True)
         header, channels = file.header(), file.channels()
         pixels = {name: np.asarray(channel.pixels) for name, channel in channels.items()}
+    except UnicodeDecodeError:
+        raise SceneError("This is not a whole OpenEXR file (a name in it is no text).", path) from None
     except (RuntimeError, ValueError, TypeError, OSError, MemoryError) as error:
         raise SceneError(f"This is not a whole OpenEXR file ({error}).", path) from None
     if len({plane.shape for plane in pixels.values()}) != 1 or any(plane.ndim != 2 for plane in pixels.values()):

@@ -135,6 +135,7 @@ class Material:
     base colour, `alpha` its roughness squared (with the aspect of anisotropy), `eta` the index that its specular
     reflection comes from; see `Principled` for the rest. A "blend" is `parts[0]` and `parts[1]` in the shares 1 −
     `weight` and `weight`, or the front and the back of the surface; all else of its own that counts is `opacity`.
+    A "diffuse transmitter" lets `transmittance` of the light through, alike in all directions, and reflects nothing.
     "null" is no surface: where a medium begins or ends that nothing bounds.
     """
 
@@ -203,8 +204,8 @@ class Material:
 
     @property
     def transparent(self) -> bool:
-        """Does it refract light?"""
-        return self.kind in ("dielectric", "rough dielectric", "thin dielectric")
+        """Does it let light through to its other side by a lobe?"""
+        return self.kind in ("dielectric", "rough dielectric", "thin dielectric", "diffuse transmitter")
 
 
 @dataclass(frozen=True)

@@ -69,6 +69,7 @@ SMOOTH = [
     Material("gold", "conductor", WHITE, metal=GOLD),
 ]
 DIFFUSE = Material("diffuse", "diffuse", (0.6, 0.4, 0.2))
+PAPER = Material("paper", "diffuse transmitter", (0.0,) * 3, (0.6, 0.4, 0.2), eta=1.0, alpha=(1.0, 1.0))
 EXTREME = [
     *(rough_metal((a, a), d) for a in (0.0, 1e-3, 1.0) for d in ("ggx", "beckmann")),
     *(rough_glass((a, a), d) for a in (0.0, 1e-3, 1.0) for d in ("ggx", "beckmann")),
@@ -83,7 +84,7 @@ ANGLES = (1.0, 0.5, 0.02)
 
 @pytest.fixture(scope="module")
 def probe():
-    return Probe([DIFFUSE, *GLOSSY, *GLASSES, *SMOOTH, *EXTREME])
+    return Probe([DIFFUSE, PAPER, *GLOSSY, *GLASSES, *SMOOTH, *EXTREME])
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +136,7 @@ def sides(material):
     return [c * s for c in ANGLES for s in ((1, -1) if material.transparent else (1,))]
 
 
-@pytest.mark.parametrize("material", [DIFFUSE, *GLOSSY, *GLASSES], ids=lambda m: m.name)
+@pytest.mark.parametrize("material", [DIFFUSE, PAPER, *GLOSSY, *GLASSES], ids=lambda m: m.name)
 def test_samples_follow_their_density(probe, numbers, material):
     """χ² of N samples; what falls below the surface is a cell of its own, with the probability that is left."""
     cosines = sides(material)
@@ -161,7 +162,7 @@ def test_samples_follow_their_density(probe, numbers, material):
         counts = np.append(counts[order[small:]], counts[head].sum())
         expected = np.append(expected[order[small:]], expected[head].sum())
         p = stats.chi2.sf(((counts - expected) ** 2 / np.maximum(expected, 1e-3)).sum(), len(counts) - 1)
-        tests = sum(len(sides(m)) for m in (DIFFUSE, *GLOSSY, *GLASSES))
+        tests = sum(len(sides(m)) for m in (DIFFUSE, PAPER, *GLOSSY, *GLASSES))
         assert p > 0.01 / tests, (cos, p, whole)
 
 
@@ -175,7 +176,7 @@ def albedo(probe, material, wo, group, glossy=EVERYTHING_STORED):
     return total
 
 
-@pytest.mark.parametrize("material", [DIFFUSE, *GLOSSY, *GLASSES], ids=lambda m: m.name)
+@pytest.mark.parametrize("material", [DIFFUSE, PAPER, *GLOSSY, *GLASSES], ids=lambda m: m.name)
 def test_white_furnace(probe, numbers, material):
     """The mean weight is the albedo by quadrature, and that is at most 1."""
     for cos in sides(material):
@@ -228,7 +229,7 @@ def test_plastic_loses_nothing_when_white(probe):
         assert base + coat[0] == pytest.approx(np.ones(3), abs=2e-4)
 
 
-@pytest.mark.parametrize("material", [DIFFUSE, *GLOSSY, *GLASSES, SMOOTH[0]], ids=lambda m: m.name)
+@pytest.mark.parametrize("material", [DIFFUSE, PAPER, *GLOSSY, *GLASSES, SMOOTH[0]], ids=lambda m: m.name)
 def test_reciprocity(probe, numbers, material):
     """f(wo, wi) = f(wi, wo), on refraction with radiance over η² instead of radiance."""
     wo = random_directions(3, both_sides=material.transparent)
@@ -247,7 +248,7 @@ def test_reciprocity(probe, numbers, material):
     assert np.median(off) < 1e-5
 
 
-@pytest.mark.parametrize("material", [DIFFUSE, *GLOSSY, *GLASSES], ids=lambda m: m.name)
+@pytest.mark.parametrize("material", [DIFFUSE, PAPER, *GLOSSY, *GLASSES], ids=lambda m: m.name)
 def test_weight_is_value_times_cosine_over_density(probe, numbers, material):
     """Also in a frame of its own, with a tangent that is neither unit nor orthogonal."""
     n = np.array([0.48, 0.6, 0.64], np.float32)
@@ -284,7 +285,7 @@ def test_no_direction_gives_anything_but_a_finite_number(probe):
     top = 1 - 2.0**-24
     cube = np.array([(a, b, c) for a in (0, 0.5, top) for b in (0, 0.5, top) for c in (0, 0.5, top)], np.float32)
     u, o = (x.reshape(-1, 3) for x in np.broadcast_arrays(cube[:, None], special[None]))
-    for material in (*EXTREME, *GLOSSY, *GLASSES, *SMOOTH, DIFFUSE):
+    for material in (*EXTREME, *GLOSSY, *GLASSES, *SMOOTH, DIFFUSE, PAPER):
         for group in (STORED, FOLLOWED):
             for glossy in (EVERYTHING_STORED, EVERYTHING_FOLLOWED):
                 f, pdf, compression = probe.evaluate(material, group, wo, wi, glossy)

@@ -154,3 +154,12 @@ def test_broken_files_are_explained(tmp_path):
             read_exr(path)
     with pytest.raises(SceneError, match="no such file"):
         read_exr(tmp_path / "none.exr")
+
+
+def test_a_name_that_is_no_text_is_said_in_words(tmp_path):
+    write_exr(tmp_path / "a.exr", {"": noise(3)}, {"note": "x"})
+    data = (tmp_path / "a.exr").read_bytes()
+    assert data.count(b"pmviewer.note\0") == 1
+    (tmp_path / "a.exr").write_bytes(data.replace(b"pmviewer.note\0", b"pmviewer.n\xa9te\0"))
+    with pytest.raises(SceneError, match="a name in it is no text"):
+        read_exr(tmp_path / "a.exr")

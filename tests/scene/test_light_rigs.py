@@ -14,6 +14,7 @@ from pmviewer.scene.arrays import primitives
 from pmviewer.scene.arrays.primitives import transformed
 from pmviewer.scene.defaults.completion import completed
 from pmviewer.scene.description import (
+    RGB,
     Camera,
     DirectionalLight,
     ImageEnvironment,
@@ -32,9 +33,10 @@ def names(scene: Scene) -> list[str]:
     return [shape.name for shape in scene.shapes]
 
 
-def glowing(scene: Scene, number: int, radiance: float, emission: Bitmap | None = None) -> Scene:
+def glowing(scene: Scene, number: int, radiance: float | RGB, emission: Bitmap | None = None) -> Scene:
     shapes = list(scene.shapes)
-    shapes[number] = replace(shapes[number], radiance=(radiance,) * 3, emission=emission)
+    colour = radiance if isinstance(radiance, tuple) else (radiance,) * 3
+    shapes[number] = replace(shapes[number], radiance=colour, emission=emission)
     return replace(scene, shapes=tuple(shapes))
 
 
@@ -103,6 +105,20 @@ def test_an_indicator_is_no_light():
 def test_surfaces_that_glow_by_themselves_need_no_light():
     scene = glowing(scene_of(ball()), 0, 0.7)
     assert names(completed(scene)) == names(scene)
+
+
+def test_a_tint_of_emission_is_no_light():
+    """Exporters leave a trace of emission on things that want light; on a black surface the same is all there is."""
+    grey = glowing(scene_of(ball()), 0, (0.0, 0.0, 0.1))
+    assert names(completed(grey))[1:] == ["light above", "floor"]
+    black = replace(grey, materials=(replace(grey.materials[0], reflectance=(0.0,) * 3), *grey.materials[1:]))
+    assert names(completed(black)) == names(black)
+
+
+def test_what_nobody_can_see_is_no_light():
+    scene = glowing(scene_of(ball()), 0, 0.7)
+    clear = replace(scene, materials=(replace(scene.materials[0], opacity=0.0), *scene.materials[1:]))
+    assert "light above" in names(completed(clear))
 
 
 def test_a_lamp_in_a_room_is_light_enough():

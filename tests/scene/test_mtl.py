@@ -157,3 +157,15 @@ def test_missing_and_odd_libraries(tmp_path: Path) -> None:
     assert "'gone.mtl' does not exist" in scene.warnings[0]
     (tmp_path / "a.mtl").write_text("newmtl m\nKd nan 1 1\nKs\nNs 1e999\nillum x\nd\n")
     assert math.isclose(np.max(read_scene(tmp_path / "a.obj").materials[0].reflectance), 0.7)
+
+
+def test_a_file_that_would_be_invisible_is_opaque(tmp_path: Path) -> None:
+    """Opacity 0 on everything is a mistake; beside something that shows, it is meant."""
+    scene = opened(tmp_path, "d 0\nKd 0.2 0.4 0.6\n")
+    found = scene.materials[scene.shapes[0].material]
+    assert (found.opacity, found.reflectance) == (1.0, (0.2, 0.4, 0.6))
+    assert any("shown opaque" in w for w in scene.warnings)
+    (tmp_path / "a.mtl").write_text("newmtl m\nd 0\nnewmtl n\nKd 1 0 0\n")
+    (tmp_path / "a.obj").write_text(TRIANGLE + "usemtl n\nf 1 3 2\n")
+    both = read_scene(tmp_path / "a.obj")
+    assert sorted(both.materials[s.material].opacity for s in both.shapes) == [0.0, 1.0]

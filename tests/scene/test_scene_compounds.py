@@ -137,7 +137,6 @@ def test_coats(tmp_path: Path) -> None:
     [
         ('<bsdf type="phong"/>', "ward", (0.5,) * 3),
         (f'<bsdf type="roughdiffuse">{BLUE.format("diffuseReflectance")}</bsdf>', "diffuse", (0.1, 0.2, 0.3)),
-        (f'<bsdf type="difftrans">{BLUE.format("transmittance")}</bsdf>', "diffuse", (0.1, 0.2, 0.3)),
         (f'<bsdf type="hk">{LAYER}</bsdf>', "diffuse", (0.75, 0.5, 0)),
         ('<bsdf type="pplastic"/>', "rough plastic", (0.5,) * 3),
         ('<bsdf type="irawan"/>', "diffuse", (0.5,) * 3),
@@ -152,13 +151,21 @@ def test_nearest_materials_are_named_once(tmp_path: Path, bsdf: str, kind: str, 
     assert "is not supported" in warnings[0]
 
 
+def test_paper_lets_light_through(tmp_path: Path) -> None:
+    found, warnings = material(tmp_path, f'<bsdf type="difftrans">{bitmap(tmp_path, "transmittance")}</bsdf>')
+    assert (found.kind, max(found.reflectance), warnings) == ("diffuse transmitter", 0, ())
+    assert found.textures.keys() == {"transmittance"}
+    older, _ = material(tmp_path, f'<bsdf type="difftrans">{BLUE.format("diffuseTransmittance")}</bsdf>')
+    assert older.transmittance == pytest.approx((0.1, 0.2, 0.3))
+
+
 def test_plugins_of_others_are_read_as_what_they_are_called_after(tmp_path: Path) -> None:
     """Of two public scenes; a name like no other stays grey."""
     alpha = '<float name="alpha" value="0.3"/>'
     found, warnings = material(tmp_path, f'<bsdf type="roughconductorGGX">{alpha}</bsdf>')
     assert (found.kind, found.alpha, found.distribution) == ("rough conductor", (0.3, 0.3), "ggx")
     assert "it is read as 'roughconductor'" in warnings[0]
-    for name, kind in {"glass": "dielectric", "mirror": "conductor", "lambertian": "diffuse"}.items():
+    for name, kind in {"glass": "dielectric", "mirror": "conductor", "disneybsdf": "principled"}.items():
         found, warnings = material(tmp_path, f'<bsdf type="{name}"/>')
         assert found.kind == kind
         assert f"it is read as '{kind}'" in warnings[0]

@@ -155,6 +155,21 @@ def test_thin_glass_and_blends(tmp_path: Path) -> None:
     assert blend.weight == pytest.approx(0.25)
 
 
+def test_leaves_and_paper(tmp_path: Path) -> None:
+    """KHR_materials_diffuse_transmission: its own colour, whatever the base colour is."""
+    values = {"diffuseTransmissionFactor": 0.4, "diffuseTransmissionColorFactor": [0.9, 0.5, 0.1]}
+    leaf = opened(tmp_path, pbr((0.2, 0.4, 0.1, 1), roughness=1, **ext("diffuse_transmission", **values)))
+    front, through = first(leaf).parts
+    assert (first(leaf).weight, front.kind, front.reflectance) == (0.4, "diffuse", (0.2, 0.4, 0.1))
+    assert (through.kind, through.transmittance) == ("diffuse transmitter", (0.9, 0.5, 0.1))
+    assert not [w for w in leaf.warnings if "extension" in w or "Highlights" in w]
+    shiny = opened(tmp_path, pbr(roughness=0.5, **ext("diffuse_transmission", **values)))
+    assert any("Highlights" in w for w in shiny.warnings)
+    mapped = ext("diffuse_transmission", diffuseTransmissionFactor=0.5, diffuseTransmissionTexture={"index": 0})
+    blend = first(opened(tmp_path, pbr(roughness=1, **mapped), {"t.png": [[[0, 0, 0, 255], [0, 0, 0, 0]]]}))
+    assert blend.textures["weight"].pixels[0, :, 0] == pytest.approx([0.5, 0])
+
+
 def test_alpha_mask_blend_and_opaque(tmp_path: Path) -> None:
     pixels = {"a.png": [[[255, 0, 0, 255], [255, 0, 0, 102], [255, 0, 0, 0]]]}
 

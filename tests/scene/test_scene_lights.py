@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -232,3 +233,16 @@ def test_portable_float_maps(tmp_path: Path) -> None:
     (tmp_path / "c.pfm").write_bytes(b"PF\n900000 900000\n-1\n")
     with pytest.raises(SceneError, match="cut off"):
         read_picture(tmp_path / "c.pfm", "c.pfm", raw=False)
+
+
+@pytest.mark.parametrize("kind", ["point", "spot", "directional"])
+def test_lights_without_a_surface_inside_a_shape_are_lights_of_their_own(tmp_path: Path, kind: str) -> None:
+    """As Mitsuba 3.9.1 renders them: where their own `to_world` says, and the shape is black without a BSDF."""
+    light = f'<emitter type="{kind}"><transform name="to_world"><translate x="2" y="3" z="4"/></transform></emitter>'
+    placed = f'>{light}<transform name="to_world"><scale value="9"/></transform></shape>'
+    beside, inside = load(tmp_path, SHAPE + light), load(tmp_path, SHAPE.replace("/>", placed))
+    assert len(inside.lights) == len(beside.lights) == 2  # and the sky
+    assert inside.lights[0] == replace(beside.lights[0], name=inside.lights[0].name)
+    assert inside.warnings == ()
+    assert inside.shapes[0].radiance is None
+    assert inside.materials[inside.shapes[0].material].reflectance == (0, 0, 0)

@@ -145,6 +145,24 @@ def test_a_camera_is_as_near_as_it_can():
     np.testing.assert_allclose(camera.origin, (0, 0, 1.06), atol=1e-12)
 
 
+@pytest.mark.parametrize("azimuth", [-60, 36, 75])
+def test_what_reaches_into_the_distance_is_in_the_middle_of_the_picture(azimuth):
+    """As far to the left as to the right, and up as down, in the picture and not in the world."""
+    row = np.array([[x, y, z] for x in range(0, 20, 2) for y in (0, 1) for z in (0, 1)], float)
+    camera = fitted(row, direction(azimuth, 23, "y"), "y", 40.0)
+    towards = np.subtract(camera.target, camera.origin)
+    towards /= np.linalg.norm(towards)
+    right = np.cross(towards, (0, 1, 0))
+    right /= np.linalg.norm(right)
+    depth = (row - camera.origin) @ towards
+    reach = []
+    for axis in (right, np.cross(right, towards)):
+        seen = (row - camera.origin) @ axis / depth
+        assert seen.max() == pytest.approx(-seen.min(), rel=1e-6)
+        reach.append(seen.max())
+    assert max(reach) == pytest.approx(np.tan(np.radians(20)) / 1.06, rel=1e-6)
+
+
 def test_z_is_up_where_the_ground_lies_across_it():
     ground = transformed(primitives.cube(), scaling(4, 4, 0.05))
     tower = transformed(primitives.cube(), translation(0, 0, 0.8) @ scaling(0.5, 0.5, 0.7))

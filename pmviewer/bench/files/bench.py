@@ -37,7 +37,8 @@ NOISE = 0.003
 """Relative standard error of a side's mean that is enough: together less than half of `NOISE_BOUND`."""
 EFFORT, QUICK_EFFORT = 8.0, 2.0
 """CPU seconds of a path tracer after which the noise is what it is."""
-LIMITS = Limits(cpu=120, idle=60, memory=6 << 30)
+LIMITS = Limits(cpu=120, idle=600, memory=6 << 30)
+"""Idle for long is who waits for a function that another process compiles, which on a busy machine takes minutes."""
 OPENS, RIGHT = 0.95, 1.0
 QUICK_FILES = 40
 NICE = 10

@@ -1,9 +1,9 @@
 """Mitsuba 3 renders a file that somebody wrote: small, to a given depth, and with as little as possible changed.
 
-Runs inside `pmviewer.bench.agree.mitsuba_server`. The file's film gets another size, and its integrator is replaced by
-the path tracer; a file that Mitsuba refuses then is tried again with properties that nothing reads ignored, with
-<lookAt>, as it was written before 0.5, and with 0.6's texture filters by their nearest equivalents. What was
-changed beyond size and integrator is told.
+Runs inside `pmviewer.bench.agree.mitsuba_server`. The file's film gets another size, its integrator is replaced by the
+path tracer, and smooth surfaces of files with blends become a little rough (`ROUGH`). A file that Mitsuba refuses then
+is tried again with properties that nothing reads ignored, with <lookAt>, as it was written before 0.5, and with 0.6's
+texture filters by their nearest equivalents. What was changed beyond that is told.
 """
 
 from __future__ import annotations
@@ -23,6 +23,10 @@ RR_DEPTH = 8
 PROJECTIVE = ("perspective", "thinlens", "orthographic")
 FILTERS = {"trilinear": "bilinear", "ewa": "bilinear", "isotropic": "bilinear", "none": "nearest"}
 """Mitsuba 0.6's texture filters in Mitsuba 3."""
+ROUGH = {"conductor": "roughconductor", "dielectric": "roughdielectric"}
+"""What stands for smooth surfaces in files with a `blendbsdf`: Mitsuba 3.9.1 adds probabilities of smooth lobes to
+densities of others there, and shows the blend some percent too dark or too bright."""
+NEARLY_SMOOTH = 0.002
 
 
 def answer(mi: Any, request: dict[str, Any]) -> dict[str, Any]:
@@ -120,8 +124,12 @@ def _parsed(mi: Any, config: Any, path: Path, lenient: bool) -> Any:
 def _adapt(mi: Any, state: Any, longest: int, lenient: bool) -> dict[str, Any]:
     """Change the parsed file; what kind of camera it has, its size, and whether its integrator hides emitters."""
     about: dict[str, Any] = {"camera": "", "size": [longest, longest], "file_size": None, "hidden": False}
+    blends = any(node.props.plugin_name() == "blendbsdf" for node in state.nodes)
     for node in state.nodes:
         props = node.props
+        if blends and props.plugin_name() in ROUGH:
+            props.set_plugin_name(ROUGH[props.plugin_name()])
+            props["distribution"], props["alpha"] = "ggx", NEARLY_SMOOTH
         if node.type == mi.ObjectType.Sensor and not about["camera"]:
             about["camera"] = props.plugin_name()
         elif node.type == mi.ObjectType.Film:

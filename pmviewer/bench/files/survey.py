@@ -10,6 +10,7 @@ import json
 import os
 import re
 import struct
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -32,8 +33,12 @@ NOT_READ = {"film", "integrator", "sampler", "rfilter", "subsurface"}
 """Elements whose file names are outputs, or caches that renderers make themselves."""
 NAMED_ENDINGS = {".obj", ".ply", ".stl", ".serialized", ".xml", ".png", ".jpg", ".jpeg", ".exr", ".hdr", ".tga", ".bmp",
                  ".rgbe", ".pfm", ".spd", ".vol", ".hair", ".gif", ".bsdf", ".eta"}  # fmt: skip
+_TRIANGLES = (4, 5, 6)
+"""Modes of glTF's primitives: triangles, strips and fans."""
 MOST_INCLUDES = 200
 MOST_TEXT = 64 << 20
+_INDENT = 64
+"""Blanks that may stand before a statement of OBJ."""
 LFS = b"version https://git-lfs"
 
 
@@ -169,24 +174,42 @@ def _gltf_document(document: dict[str, Any], path: Path, found: Survey) -> None:
         uri = entry.get("uri")
         if uri is not None and not uri.startswith("data:"):
             _name(found, unquote(uri), [path.parent])
+    for number, entry in enumerate(document.get("buffers", [])):
+        first_of_glb = number == 0 and path.suffix.lower() == ".glb"
+        if not (first_of_glb or "uri" in entry or entry.get("extensions")):
+            found.missing.append(f"the bytes of buffer {number}")
     if not document.get("meshes"):
         raise _Odd("foreign", "has no meshes")
+    modes = [part.get("mode", 4) for mesh in document["meshes"] for part in mesh.get("primitives", [])]
+    if modes and not any(mode in _TRIANGLES for mode in modes):
+        raise _Odd("foreign", "has no triangles")
 
 
 def _obj(path: Path, found: Survey) -> None:
-    has_vertex = has_face = False
-    with path.open("rb") as stream:
-        for line in stream:
-            start = line[:7].lstrip()
-            has_vertex = has_vertex or start[:2] in (b"v ", b"v\t")
-            has_face = has_face or start[:2] in (b"f ", b"f\t")
-            if start.startswith(b"mtllib"):
-                text = line.strip()[6:].decode("utf-8", "replace").strip()
-                place = _library(found, text, path.parent)
-                if place is not None:
-                    _mtl(place, found)
-    if not (has_vertex and has_face):
+    data = path.read_bytes()
+    if not all(any(_lines_of(data, word)) for word in (b"v", b"f")):
         raise _Odd("foreign", "has no faces")
+    for rest in _lines_of(data, b"mtllib"):
+        place = _library(found, rest.decode("utf-8", "replace").strip(), path.parent)
+        if place is not None:
+            _mtl(place, found)
+
+
+def _lines_of(data: bytes, word: bytes) -> Iterator[bytes]:
+    """What follows the word in the lines that begin with it, found without looking at each line: scenes have gigabytes
+    of them."""
+    at = -1
+    while (at := data.find(word, at + 1)) >= 0:
+        before = data[max(at - _INDENT, 0) : at]
+        begun = re.search(rb"(?:^|[\r\n])[ \t]*$" if at <= _INDENT else rb"[\r\n][ \t]*$", before)
+        if begun and data[at + len(word) : at + len(word) + 1] in (b" ", b"\t"):
+            yield _rest(data, at + len(word))
+
+
+def _rest(data: bytes, at: int) -> bytes:
+    """The rest of the line."""
+    end = data.find(b"\n", at)
+    return data[at : end if end >= 0 else len(data)]
 
 
 def _library(found: Survey, text: str, folder: Path) -> Path | None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 DIFFUSE, CONDUCTOR, DIELECTRIC = 0, 1, 2
 ROUGH_CONDUCTOR, ROUGH_DIELECTRIC, THIN_DIELECTRIC, PLASTIC, ROUGH_PLASTIC, SCHLICK, WARD = range(3, 10)
-PRINCIPLED, BLEND, NULL = 10, 11, 12
+PRINCIPLED, BLEND, NULL, DIFFUSE_TRANSMITTER = 10, 11, 12, 13
 
 
 class Kind(NamedTuple):
@@ -36,6 +36,7 @@ KINDS = {
     "principled": Kind(PRINCIPLED),
     "blend": Kind(BLEND),
     "null": Kind(NULL),
+    "diffuse transmitter": Kind(DIFFUSE_TRANSMITTER),
 }
 """By `Material.kind`. What principled materials and blends have depends on their numbers; null is the boundary of
 a medium that nothing else shows (`pmviewer.kernels.media.medium`)."""

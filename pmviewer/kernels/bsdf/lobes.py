@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pmviewer.kernels.bsdf.diffuse_transmission import diffuse_transmission, sample_other_side
 from pmviewer.kernels.bsdf.fresnel import fresnel_conductor
 from pmviewer.kernels.bsdf.glossy import (
     glossy_f_pdf,
@@ -28,6 +29,7 @@ from pmviewer.kernels.bsdf.kinds import (
     CONDUCTOR,
     DIELECTRIC,
     DIFFUSE,
+    DIFFUSE_TRANSMITTER,
     PLASTIC,
     ROUGH_CONDUCTOR,
     ROUGH_DIELECTRIC,
@@ -123,7 +125,7 @@ def frame(n, tangent):
 
 @device
 def _transparent(kind):
-    return kind in (DIELECTRIC, ROUGH_DIELECTRIC, THIN_DIELECTRIC)
+    return kind in (DIELECTRIC, ROUGH_DIELECTRIC, THIN_DIELECTRIC, DIFFUSE_TRANSMITTER)
 
 
 @device
@@ -161,7 +163,7 @@ def bsdf_at(scene, material, p, ng, ns, tangent, wo, glossy):
             if largest(colour) > _f4(0.0):
                 lobe = STORED if min(p.ax, p.ay) >= glossy else FOLLOWED
                 groups |= lobe
-        elif p.kind == ROUGH_DIELECTRIC:
+        elif p.kind == ROUGH_DIELECTRIC or p.kind == DIFFUSE_TRANSMITTER:
             if max(largest(p.reflectance), largest(p.transmittance)) > _f4(0.0):
                 groups |= FOLLOWED
         elif p.kind == PLASTIC:
@@ -277,6 +279,8 @@ def _f_pdf(b, group, o, i):
         return _BLACK, _f4(0.0)
     if p.kind == ROUGH_DIELECTRIC:
         return rough_dielectric_f_pdf(p, o, i)
+    if p.kind == DIFFUSE_TRANSMITTER:
+        return diffuse_transmission(p.transmittance, o, i)
     if p.kind == DIFFUSE:
         if i[2] <= _f4(0.0):
             return _BLACK, _f4(0.0)
@@ -357,6 +361,8 @@ def bsdf_sample(b, group, wo, u_lobe, u, v):
         i, useful = sample_rough_dielectric(p, o, u_lobe, u, v)
         if useful == 0:
             return wo, _BLACK, _f4(0.0), _f4(1.0)
+    elif p.kind == DIFFUSE_TRANSMITTER:
+        i = sample_other_side(o, u, v)
     elif p.kind != DIFFUSE and o[2] <= _f4(0.0):
         return wo, _BLACK, _f4(0.0), _f4(1.0)
     elif u_lobe < _glossy_probability(b, group, o[2]):

@@ -13,6 +13,9 @@ from pmviewer.kernels.bsdf.principled_lobes import LEAST_ALPHA
 from pmviewer.scene.description import LUMINANCE, Material, Principled
 from pmviewer.scene.texture import Checkerboard, Texture
 
+_SPREADING = ("rough dielectric", "principled", "diffuse transmitter")
+"""Kinds whose FOLLOWED lobes are no deltas."""
+
 
 def principled_of(material: Material) -> Principled:
     """The numbers of a principled material; the defaults if it was made without."""
@@ -55,12 +58,12 @@ def always_followed(material: Material) -> bool:
 
 def is_delta(material: Material) -> bool:
     """Are its FOLLOWED lobes deltas?"""
-    return always_followed(material) and material.kind not in ("rough dielectric", "principled")
+    return always_followed(material) and material.kind not in _SPREADING
 
 
 def is_rough_glass(material: Material) -> bool:
     """Does it transmit by a lobe that is no delta?"""
-    return always_followed(material) and material.kind in ("rough dielectric", "principled")
+    return always_followed(material) and material.kind in _SPREADING
 
 
 def glossy_roughness(material: Material) -> tuple[float, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
+from pmviewer.scene.arrays.covered_emission import without_unseen_lights
 from pmviewer.scene.arrays.instances import joint_bounds
 from pmviewer.scene.clean import check_camera
 from pmviewer.scene.defaults.framing import Up
@@ -33,6 +34,7 @@ def completed(scene: Scene, rig: Rig = "auto") -> Scene:
     auto: the file's lights; what it needs where they bring next to nothing. file: the file's alone. Any other rig
     replaces all of the file's lights but surfaces that glow. Raises SceneError for `file` if there are none.
     """
+    scene = without_unseen_lights(scene)
     own = bool(scene.lights) or any(s.radiance and max(s.radiance) > 0 for s in scene.shapes)
     if rig == "file" and not own:
         hint = "Choose another value of light.rig: auto adds light."

@@ -71,14 +71,26 @@ def fitted(points: Float, towards: Float, up: Up, fov: float = FOV) -> Camera:
     size = max(float(np.linalg.norm(np.ptp(points, axis=0))), 1e-12)
     near = (points - center) @ towards
     slope = math.tan(math.radians(fov) / 2) / MARGIN
-    # A point at (a, z) is inside if |a − x| ≤ slope (D − z): the tightest of all on either side give x and D.
+    # A point at (a, z) is inside if |a − x| ≤ slope (D − z): the tightest of all on either side give D.
     place, distance = center.copy(), float(near.max()) + 0.02 * size
     for axis in (right, above):
         across = (points - center) @ axis
         most, least = float((slope * near + across).max()), float((slope * near - across).max())
-        place += (most - least) / 2 * axis
         distance = max(distance, (most + least) / (2 * slope))
+    for axis in (right, above):
+        place += _middle((points - center) @ axis, distance - near) * axis
     return looking(place + distance * towards, place, up, fov)
+
+
+def _middle(across: Float, depth: Float) -> float:
+    """Where an eye must stand for points at these places and depths to reach as far to one side of it as to the
+    other."""
+    low, high = float(across.min()), float(across.max())
+    for _ in range(48):
+        middle = (low + high) / 2
+        seen = (across - middle) / depth
+        low, high = (middle, high) if seen.max() + seen.min() > 0 else (low, middle)
+    return (low + high) / 2
 
 
 def looking(eye: Float, target: Float, up: Up, fov: float) -> Camera:

@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.scene.arrays.blends import mean_colour
 from pmviewer.scene.arrays.tessellate import triangles_of
 from pmviewer.scene.defaults.picture_rating import picture_rays
 from pmviewer.scene.defaults.proxy import Proxy
@@ -21,6 +22,7 @@ from pmviewer.scene.description import (
     ConstantEnvironment,
     DirectionalLight,
     Light,
+    Material,
     PointLight,
     Scene,
     Shape,
@@ -40,6 +42,8 @@ LIT_SHARE = 0.3
 GLOWING_SHARE = 0.5
 """Of the picture, that needs no light."""
 GLOW = 0.02
+GLOW_OF_ALBEDO = 0.1
+"""Glow darker than this part of the albedo, by luminance, is a tint: exporters leave it on things that want light."""
 LIGHTS_SHARE = 0.2
 """Of the points that must be reached by the file's point, spot and directional lights, or its environment."""
 
@@ -54,7 +58,7 @@ def lights_enough(scene: Scene, proxy: Proxy, occluders: Proxy | None, camera: C
     if not hits.met.any():
         return True  # nothing to light
     shapes = proxy.shape[hits.triangle[hits.met]]
-    glowing = np.array([_glowing_share(shape) for shape in scene.all_shapes])
+    glowing = np.array([_glowing_share(shape, scene.materials[shape.material]) for shape in scene.all_shapes])
     if glowing[shapes].mean() >= GLOWING_SHARE:
         return True
     rays = rays[hits.met]
@@ -73,9 +77,12 @@ def lights_enough(scene: Scene, proxy: Proxy, occluders: Proxy | None, camera: C
     return bool((light > 1e-3 * light.max()).mean() >= LIGHTS_SHARE) if light.max() > 0 else False
 
 
-def _glowing_share(shape: Shape) -> float:
-    """Share of the shape's surface that glows visibly."""
+def _glowing_share(shape: Shape, material: Material) -> float:
+    """Share of the shape's surface that glows visibly, and so that it shows more than light on it would."""
     if shape.radiance is None or not max(shape.radiance) > 0:
+        return 0.0
+    albedo = np.dot(mean_colour(material, lambda part: part.reflectance), LUMINANCE)
+    if np.dot(shape.radiance, LUMINANCE) < GLOW_OF_ALBEDO * albedo:
         return 0.0
     if not isinstance(shape.emission, Bitmap):
         return float(max(shape.radiance) >= GLOW)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -17,6 +17,7 @@ from pmviewer.scene.clean import check_camera, check_faces, check_size, clean_li
 from pmviewer.scene.defaults.framing import Up, framed
 from pmviewer.scene.description import (
     Camera,
+    Material,
     Mesh,
     NamedCamera,
     Scene,
@@ -69,7 +70,7 @@ def load_mesh_scene(path: Path, choices: Mapping[str, str] | None = None) -> Sce
         name=path.stem,
         path=path,
         shapes=shapes,
-        materials=tuple(content.materials),
+        materials=_visible(content.materials, shapes, diagnostics) if ending == ".obj" else tuple(content.materials),
         lights=lights,
         camera=shown.camera,
         width=shown.width,
@@ -80,6 +81,20 @@ def load_mesh_scene(path: Path, choices: Mapping[str, str] | None = None) -> Sce
         cameras=cameras,
         up=up,
     )
+
+
+def _visible(materials: Sequence[Material], shapes: Sequence[Shape], diagnostics: Diagnostics) -> tuple[Material, ...]:
+    """The materials, opaque where all of the file would be invisible: an opacity of 0 everywhere is a mistake, of
+    programs that mean its opposite."""
+    used = {shape.material for shape in shapes}
+    if not used or not all(_invisible(materials[i]) for i in used):
+        return tuple(materials)
+    diagnostics.warn("All surfaces of the file are wholly transparent (opacity 0): they are shown opaque.")
+    return tuple(replace(m, opacity=1.0) if _invisible(m) else m for m in materials)
+
+
+def _invisible(material: Material) -> bool:
+    return material.opacity <= 0 and "opacity" not in material.textures
 
 
 def _named(camera: Camera, aspect: float, name: str, box: tuple[np.ndarray, np.ndarray], path: Path) -> NamedCamera:

@@ -15,6 +15,7 @@ HONOURED = frozenset(
         "KHR_lights_punctual",
         "KHR_materials_anisotropy",
         "KHR_materials_clearcoat",
+        "KHR_materials_diffuse_transmission",
         "KHR_materials_dispersion",
         "KHR_materials_emissive_strength",
         "KHR_materials_ior",
@@ -62,7 +63,6 @@ INVISIBLE = frozenset(
 
 _EFFECTS = {
     "KHR_animation_pointer": "what it animates stands as the file says without it",
-    "KHR_materials_diffuse_transmission": "light does not pass through leaves, paper and cloth",
     "KHR_materials_iridescence": "thin films do not shimmer in colours",
     "KHR_materials_volume_scatter": "light is not scattered inside of bodies",
     "KHR_gaussian_splatting": "splats are left out",

@@ -17,7 +17,7 @@ from pmviewer.scene.formats.gltf.opacity import with_opacity
 from pmviewer.scene.formats.gltf.specular_glossiness import SPECULAR_GLOSSINESS
 from pmviewer.scene.formats.gltf.surface import Surface, surface_of
 from pmviewer.scene.formats.gltf.texture import GltfTextures, uv_set
-from pmviewer.scene.formats.gltf.transmission import with_transmission
+from pmviewer.scene.formats.gltf.transmission import with_diffuse_transmission, with_transmission
 from pmviewer.scene.formats.meshfile import DEFAULT_MATERIAL
 from pmviewer.scene.texture import Texture
 
@@ -114,6 +114,7 @@ class GltfMaterials:
         if "occlusionTexture" in fields.row:
             self._document.warn("Occlusion textures are ignored: light finds its way by itself.")
         material = self._opaque(name, fields, surface)
+        material = with_diffuse_transmission(material, fields, surface, self._textures, self._document.diagnostics)
         material = with_transmission(material, fields, surface, self._textures, self._document.diagnostics)
         normal = self._normal(fields.texture("normalTexture"))
         if normal is not None:

@@ -1,4 +1,5 @@
-"""KHR_materials_transmission: glass, solid or thin, alone or in part; KHR_materials_dispersion of solid glass."""
+"""KHR_materials_transmission: glass, solid or thin, alone or in part; KHR_materials_dispersion of solid glass;
+KHR_materials_diffuse_transmission: leaves and paper."""
 
 from __future__ import annotations
 
@@ -32,6 +33,31 @@ def with_transmission(
     return Material(
         opaque.name, "blend", parts=(opaque, glass), weight=share, textures={} if weight is None else {"weight": weight}
     )
+
+
+def with_diffuse_transmission(
+    opaque: Material, material: Fields, surface: Surface, textures: GltfTextures, diagnostics: Diagnostics
+) -> Material:
+    """The opaque material, and in the extension's share a sheet that lets light through in all directions."""
+    extension = material.extension("KHR_materials_diffuse_transmission")
+    share = extension.number("diffuseTransmissionFactor", 0.0, 0.0, 1.0)
+    picture = textures.alpha(extension.texture("diffuseTransmissionTexture")) if share > 0 else None
+    share, weight = even(share * (1 - surface.metallic), picture)
+    if weight is None and share < _NONE:
+        return opaque
+    colour = extension.vector("diffuseTransmissionColorFactor", (1.0, 1.0, 1.0), 0.0, 1.0)
+    tint = textures.colour(extension.texture("diffuseTransmissionColorTexture"), colour)
+    through = Material(
+        f"{opaque.name} (through)",
+        "diffuse transmitter",
+        BLACK,
+        tint.mean if tint is not None else colour,
+        textures={} if tint is None else {"transmittance": tint},
+    )
+    if opaque.kind != "diffuse":
+        diagnostics.warn("Highlights of surfaces with diffuse transmission are dimmer by the share that it has.")
+    weights = {} if weight is None else {"weight": weight}
+    return Material(opaque.name, "blend", parts=(opaque, through), weight=share, textures=weights)
 
 
 def _glass(name: str, material: Fields, surface: Surface, diagnostics: Diagnostics) -> Material:

@@ -20,7 +20,8 @@ from pmviewer.scene.optics import IOR, METALS, metal
 _AROUND_ONE = frozenset(("twosided", "mask", "bumpmap", "bump", "normalmap", "coating", "roughcoating"))
 _COMPOUND = _AROUND_ONE | {"blendbsdf", "mixturebsdf"}
 _GREY = (0.5, 0.5, 0.5)
-_ELSEWHERE = {"glass": "dielectric", "mirror": "conductor", "lambertian": "diffuse", "matte": "diffuse"}
+_ELSEWHERE = {"glass": "dielectric", "mirror": "conductor", "lambertian": "diffuse", "matte": "diffuse",
+              "disney": "principled", "disneybsdf": "principled"}  # fmt: skip
 """Types of other renderers that read Mitsuba's format."""
 
 

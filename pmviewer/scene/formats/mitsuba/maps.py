@@ -10,6 +10,7 @@ from pmviewer.scene.formats.mitsuba.document import Properties
 from pmviewer.scene.formats.mitsuba.texture import has_vertex_colours
 from pmviewer.scene.texture import Texture, scaled
 
+_TRANSMITTANCES = ("specular_transmittance", "diffuse_transmittance", "transmittance")
 _ALPHAS = ("alpha", "alpha_u", "alpha_v")
 
 
@@ -21,7 +22,7 @@ def _slots(material: Material) -> dict[str, str]:
         "reflectance": "reflectance",
         "diffuse_reflectance": "reflectance",
         "specular_reflectance": specular,
-        "specular_transmittance": "transmittance",
+        **dict.fromkeys(_TRANSMITTANCES, "transmittance"),
         **dict.fromkeys(_ALPHAS, "alpha"),
     }
 

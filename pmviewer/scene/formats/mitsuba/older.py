@@ -58,10 +58,9 @@ def diffuse_name(p: Properties) -> str:
 
 
 def diffuse_transmitter(p: Properties, name: str) -> Material:
-    """Its colour is what it would transmit; a surface that reflects it stands in."""
-    _near(p, "a surface that reflects on both sides what it would let through replaces it")
-    names = [n for n in ("transmittance", "diffuse_transmittance") if n in p]
-    return Material(name, "diffuse", p.bounded_colour(names[0] if names else "transmittance", 0.5, 1), two_sided=True)
+    """`difftrans`: what it lets through leaves alike in all directions."""
+    colour = "diffuse_transmittance" if "diffuse_transmittance" in p else "transmittance"
+    return Material(name, "diffuse transmitter", BLACK, p.bounded_colour(colour, 0.5, 1))
 
 
 def hanrahan_krueger(p: Properties, name: str) -> Material:

@@ -9,7 +9,6 @@ from pmviewer.scene.description import BLACK, Material, Principled
 from pmviewer.scene.formats.mitsuba.document import Properties
 from pmviewer.scene.formats.mitsuba.interface import bounded, share
 from pmviewer.scene.formats.mitsuba.texture import has_vertex_colours, squared_luminance
-from pmviewer.scene.texture import scaled
 
 _SHARES = ("metallic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness", "clearcoat", "clearcoat_gloss")
 _THIN_SHARES = ("sheen", "sheen_tint", "flatness")
@@ -53,8 +52,8 @@ def principled(p: Properties, name: str) -> Material:
 
 
 def principled_thin(p: Properties, name: str) -> Material:
-    """A sheet without an inside: diffuse and sheen on both sides in the share 1 − `spec_trans`, thin glass in the
-    rest."""
+    """A sheet without an inside: in the share 1 − `spec_trans` diffuse and sheen on both sides, or, in half of
+    `diff_trans`, diffuse light through; thin glass in the rest."""
     numbers = {n: share(p, n) for n in _THIN_SHARES}
     glass = share(p, "spec_trans")
     through = bounded(p, "diff_trans", p.roughness("diff_trans", 0.0), 0.0, 2.0) / 2
@@ -74,11 +73,13 @@ def principled_thin(p: Properties, name: str) -> Material:
     )
     sheet = _textured(p, sheet, {*_THIN_SHARES, "spec_trans", "diff_trans", "eta"})
     if through > 0 and glass < 1:
-        p.document.warn(f"{p.element}: the light that 'diff_trans' lets through is left out.", p.element)
-        left = 1 - through
-        textures = {s: scaled(t, (left, left, left)) if s == "reflectance" else t for s, t in sheet.textures.items()}
-        r, g, b = (left * c for c in sheet.reflectance)
-        sheet = replace(sheet, reflectance=(r, g, b), textures=textures)
+        picture = sheet.textures.get("reflectance")
+        colours = {} if picture is None else {"transmittance": picture}
+        if sheet.vertex_colours:
+            what = f"{p.element}: colours at the vertices don't tint the light that 'diff_trans' lets through."
+            p.document.warn(what, p.element)
+        beyond = Material(f"{name} (through)", "diffuse transmitter", BLACK, colour, textures=colours)
+        sheet = Material(f"{name} (sheet)", "blend", BLACK, parts=(sheet, beyond), weight=through)
     if not glass > 0:
         return sheet
     p.document.warn(f"{p.element}: the share 'spec_trans' is shown as smooth thin glass.", p.element)

@@ -20,6 +20,8 @@ from pmviewer.scene.texture import Texture
 # Definitions that other objects refer to change nothing where they stand.
 _SILENT = SILENT_TAGS | {"bsdf", "texture", "spectrum", "alias", "medium", "phase", "volume"}
 _MERGE = "merge"
+_WITHOUT_SURFACE = ("point", "spot", "directional", "projector")
+"""Emitters that Mitsuba takes for lights of their own wherever they stand."""
 MOST_MERGED = 1 << 17
 BROKEN = "Meshes that can't be used, whose shapes are left out: {names}."
 
@@ -126,7 +128,7 @@ class Reader:
         if len(bsdfs) > 1:
             self.document.warn(f"{p.element} has more than one BSDF: the first is used.", p.element)
         if not bsdfs or id(bsdfs[0]) in self._grey:
-            return self.materials.default(emits=radiance is not None and not bsdfs)
+            return self.materials.default(emits=not bsdfs and bool(p.objects("emitter")))
         try:
             number = self.materials.of(bsdfs[0])
             if radiance is not None and is_clear(self.materials.list[number]):
@@ -146,6 +148,9 @@ class Reader:
             return None, None
         element = emitters[0]
         light = Properties(element, self.document)
+        if light.type in _WITHOUT_SURFACE:
+            self._emitter(element)  # as Mitsuba 3: it shines from its own place
+            return None, None
         if light.type != "area":
             self.document.ignore(element, "inside a shape is not supported: the shape gives no light")
             return None, None
