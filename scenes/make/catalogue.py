@@ -20,6 +20,7 @@ from make.museum import museum
 from make.office import office
 from make.plane import lit_plane
 from make.room import skylight_room
+from make.smoke import cornell_smoke
 
 SCENES: dict[str, Callable[[], MadeScene]] = {
     "car_cabin": car_cabin,
@@ -33,6 +34,7 @@ SCENES: dict[str, Callable[[], MadeScene]] = {
     "cornell_fractal": fractal_box,
     "cornell_glossy": glossy,
     "cornell_lights": lights,
+    "cornell_smoke": cornell_smoke,
     "cornell_water": water,
     "door_slit": door_slit,
     "fog_sphere": fog_sphere,
