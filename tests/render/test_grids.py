@@ -19,7 +19,7 @@ from tests.render.test_media import CAMERA, METHODS, SKY, cube_of, picture
 TO_CUBE = np.array([[2.0, 0, 0, -1], [0, 2, 0, -1], [0, 0, 2, -1], [0, 0, 0, 1]])
 """The unit cube to [−1, 1]³."""
 BARELY = (1e-6,) * 3
-"""Albedo of media that absorb: kernels are those of media that scatter."""
+"""Albedo of media that absorb, so that kernels are those of media that scatter; paths would be scattered by chance."""
 
 
 def ramp(n=64):
@@ -31,9 +31,9 @@ def ramp(n=64):
 def test_absorption_in_a_ramp_is_beer_and_lambert(method):
     """exp(−σ ∫ρ) within 0.1 %: through all of the ramp, 1, and from within at z = 0.5, 9/16."""
     sigma = (0.5, 1.0, 3.0)
-    medium = Medium("ramp", sigma, BARELY, density=ramp())
+    medium = Medium("ramp", sigma, (0, 0, 0) if method == "path" else BARELY, density=ramp())
     for z, inside, depth in ((4.0, -1, 1.0), (0.5, 0, 0.5625)):
-        camera = replace(CAMERA, origin=(0.0, 0.0, z), target=(0.0, 0.0, z - 1), fov=4.0, medium=inside)
+        camera = replace(CAMERA, origin=(0.0, 0.0, z), target=(0.0, 0.0, z - 1), fov=1.0, medium=inside)
         center = picture(cube_of(medium, SKY, camera=camera, size=4), method, 2).mean(axis=(0, 1))
         np.testing.assert_allclose(center, np.exp(-depth * np.array(sigma)), rtol=1e-3)
 
@@ -45,11 +45,16 @@ def cloud(channels=1, n=12, seed=3):
     return Grid(values.astype(np.float32), TO_CUBE)
 
 
+def closed(grid):
+    """With nothing at its border, where Mitsuba lets turned lattices go on to the corners of the box around them."""
+    return Grid(np.pad(grid.values, ((1, 1), (1, 1), (1, 1), (0, 0))), grid.to_world)
+
+
 @pytest.mark.parametrize("method", ["path", "progressive"])
 def test_white_cloud_under_a_white_sky_vanishes(method):
     medium = Medium("cloud", (3.0,) * 3, (1,) * 3, phase=Phase(0.4), density=cloud(3))
-    settings = {} if method == "path" else {"estimate": {"radius": 0.03}, "photons": {"N": 100_000}}
-    image = picture(cube_of(medium, SKY), method, 48 if method == "path" else 16, **settings)
+    settings = {} if method == "path" else {"estimate": {"radius": 0.03}, "photons": {"N": 200_000}}
+    image = picture(cube_of(medium, SKY), method, 48 if method == "path" else 24, **settings)
     np.testing.assert_allclose(image[2:14, 2:14].mean(axis=(0, 1)), 1, rtol=5e-3)
 
 
@@ -90,17 +95,18 @@ PLACE = (
     '<rotate y="1" angle="20"/></transform>'
 )
 MITSUBA = (
-    (0.20524, 0.27762, 0.38354),
-    (0.23499, 0.28614, 0.41144),
-    (0.13655, 0.16897, 0.21389),
-    (0.18232, 0.19335, 0.25577),
+    (0.25296, 0.33439, 0.48986),
+    (0.26164, 0.33963, 0.49835),
+    (0.20646, 0.24037, 0.30739),
+    (0.28295, 0.29973, 0.36992),
 )
-"""Means by quarter (top left, top right, bottom left, bottom right) and channel of Mitsuba 3.9.1's volpath, 16,384 samples a pixel."""
+"""Means by quarter (top left, top right, bottom left, bottom right) and channel of Mitsuba 3.9.1's volpath, 16,384
+samples a pixel."""
 
 
 def write_scene(folder):
     """Extinction and albedo of three channels each on lattices of their own, in a turned box."""
-    for name, grid in (("sigma", cloud(3)), ("albedo", cloud(3, 7, 4))):
+    for name, grid in (("sigma", closed(cloud(3))), ("albedo", cloud(3, 7, 4))):
         nz, ny, nx, channels = grid.values.shape
         head = struct.pack("<3sB5i6f", b"VOL", 3, 1, nx, ny, nz, channels, 0, 0, 0, 1, 1, 1)
         (folder / f"{name}.vol").write_bytes(head + grid.values.tobytes())

@@ -16,7 +16,7 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.kernels.dimensions import FURTHER_LIGHT, GATHER_VOLUME, GATHER_VOLUME_PHASE, VOLUME, VOLUME_PHASE
 from pmviewer.kernels.lights.light import sample_one_light
-from pmviewer.kernels.media.column import WORDS, column_of, through, through_all
+from pmviewer.kernels.media.column import WORDS, column_of, through_all
 from pmviewer.kernels.media.medium import has_media, phase_numbers, scatters
 from pmviewer.kernels.media.phase import phase, sample_phase
 from pmviewer.kernels.media.varying import albedo_at, sigma_at
@@ -71,7 +71,8 @@ def _scattered_at(scene, stretch, t, pdf):
         return _BLACK
     medium = stretch.medium
     p = along(stretch.o, stretch.d, t)
-    weight = mul(mul(sigma_at(scene, medium, p), albedo_at(scene, medium, p)), through(scene, stretch.column, t))
+    T = through_all(scene, medium, stretch.column, t)
+    weight = mul(mul(sigma_at(scene, medium, p), albedo_at(scene, medium, p)), T)
     return scale(weight, _f4(1.0) / pdf)
 
 
