@@ -88,11 +88,15 @@ VOLUME = """    <medium type="heterogeneous" id="smoke">
 """
 
 
+NUMBERS = struct.pack("<24f", *(n / 24 for n in range(24)))
+"""Of a volume of 4 × 3 × 2 places."""
+
+
 def vol(
     sides: tuple[int, int, int] = (4, 3, 2),
     channels: int = 1,
     box: tuple[float, ...] = (0, 0, 0, 1, 1, 1),
-    numbers: bytes = struct.pack("<24f", *(i / 24 for i in range(24))),
+    numbers: bytes = NUMBERS,
 ) -> bytes:
     """Mitsuba's volume file, version 3."""
     return struct.pack("<3sB5i6f", b"VOL", 3, 1, *sides, channels, *box) + numbers

@@ -32,6 +32,7 @@ def specials() -> list[tuple[str, Maker]]:
         ("NPY of sizes that are no numbers", "npy", lambda: _reshaped(b"(2, 3, 1j)")),
         ("NPY with a header of 4 GiB", "npy", lambda: b"\x93NUMPY\x02\x00\xff\xff\xff\xff" + npy()[10:]),
         ("NPY with a header of brackets", "npy", lambda: b"\x93NUMPY\x01\x00\xa0\x0f" + b"(" * 4000),
+        ("NPY of sizes without end", "npy", lambda: _reshaped(b"(2,3,4,,,)")),
         ("NPY of pickled objects", "npy", lambda: npy().replace(b"'<f4'", b"'|O' ")),
     ]
     return [(name, partial(_made, ending, content)) for name, ending, content in table]

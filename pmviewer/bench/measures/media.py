@@ -70,7 +70,7 @@ def formulas() -> Iterator[tuple[str, Scene, str, float, float]]:
     for sigma in (0.3, 3.0):
         ink = Medium("ink", (sigma,) * 3, (0.0,) * 3)
         yield f"absorption, depth {sigma:g}", slab(ink, sky), "beauty", math.exp(-sigma), BEER
-    rising = (np.arange(256, dtype=np.float32).reshape(-1, 1, 1, 1) + 0.5) / 256
+    rising = ((np.arange(256).reshape(-1, 1, 1, 1) + 0.5) / 256).astype(np.float32)
     box = np.array([[2 * WIDE, 0, 0, -WIDE], [0, 2 * WIDE, 0, -WIDE], [0, 0, 1, -1], [0, 0, 0, 1.0]])
     for sigma in (1.0, 6.0):
         ink = Medium("ink", (sigma,) * 3, (0.0,) * 3, density=Grid(rising, box))

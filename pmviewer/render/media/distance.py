@@ -9,6 +9,7 @@ import numpy as np
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import is_a, specialised
 from pmviewer.kernels.media.column import Column, stopped_by, through, where_depth
+from pmviewer.kernels.media.medium import extinction
 from pmviewer.kernels.media.varying import sigma_at
 from pmviewer.kernels.vector import along, dot, sub
 
@@ -87,12 +88,12 @@ def equiangular_pdf(o, d, length, pivot, t):
 
 
 @specialised
-def distance_in(scene, column, length, u):
+def distance_in(scene, medium, column, length, u):
     """A distance in the column, its channels' transmittance each as often, with the density `distance_pdf`."""
     if not is_a(column, Column):
-        return lambda scene, column, length, u: transmittance_distance(column, length, u)
+        return lambda scene, medium, column, length, u: transmittance_distance(extinction(scene, medium), length, u)
 
-    def of_lattice(scene, column, length, u):
+    def of_lattice(scene, medium, column, length, u):
         if column.grid < 0:
             return transmittance_distance(column.sigma, length, u)
         channel = min(int(_f8(u) * 3.0), 2)
@@ -110,7 +111,7 @@ def distance_in(scene, column, length, u):
 def distance_pdf(scene, medium, column, o, d, length, t):
     """Density of `distance_in` per length."""
     if not is_a(column, Column):
-        return lambda scene, medium, column, o, d, length, t: transmittance_pdf(column, length, t)
+        return lambda scene, medium, column, o, d, length, t: transmittance_pdf(extinction(scene, medium), length, t)
 
     def of_lattice(scene, medium, column, o, d, length, t):
         if column.grid < 0:

@@ -58,7 +58,7 @@ def _emitted_on_lattice(scene, medium, column, o, d):
     total = _BLACK
     if not column.step > 0.0:
         return total
-    parts = min(max(_i8(math.ceil(2.0 * _finest(scene, medium, column, o, d))), 1), _MOST_STEPS)
+    parts = min(_i8(2.0 * _finest(scene, medium, column, o, d)) + _i8(1), _i8(_MOST_STEPS))
     h = column.step / parts
     sigma, T = column.sigma, _WHITE
     for i in range(MARKS * parts):

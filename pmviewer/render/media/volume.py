@@ -82,7 +82,7 @@ def _by_light(scene, stretch, light, m, n_phase, u_t, u, v):
     o, d, length, medium, column = stretch
     kind = np.int32(light_number(scene, light, L_KIND))
     if kind in (ENVIRONMENT, DIRECTIONAL, IMAGE):
-        t = distance_in(scene, column, length, u_t)
+        t = distance_in(scene, medium, column, length, u_t)
         pdf = distance_pdf(scene, medium, column, o, d, length, t)
     else:
         _, pivot, _, _, _ = sample_one_light(scene, light, o, u, v)
@@ -90,7 +90,7 @@ def _by_light(scene, stretch, light, m, n_phase, u_t, u, v):
         if half:
             t = equiangular_distance(o, d, length, pivot, u_t)
         else:
-            t = distance_in(scene, column, length, u_t - _f4(1.0))
+            t = distance_in(scene, medium, column, length, u_t - _f4(1.0))
         around = equiangular_pdf(o, d, length, pivot, t)
         pdf = _f4(0.5) * (around + distance_pdf(scene, medium, column, o, d, length, t))
     weight = _scattered_at(scene, stretch, t, pdf)
@@ -106,7 +106,7 @@ def _by_phase(scene, stretch, choice, numbers):
     """Single scattering by one direction of the phase function: what light it finds."""
     o, d, length, medium, column = stretch
     lobes = phase_numbers(scene, medium)
-    t = distance_in(scene, column, length, numbers[0])
+    t = distance_in(scene, medium, column, length, numbers[0])
     weight = _scattered_at(scene, stretch, t, distance_pdf(scene, medium, column, o, d, length, t))
     if not largest(weight) > _f4(0.0):
         return _BLACK

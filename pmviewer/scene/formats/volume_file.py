@@ -5,11 +5,11 @@ What a header claims is compared with the file's size before anything is read, s
 
 from __future__ import annotations
 
-import io
 import math
+import re
 import struct
 from pathlib import Path
-from typing import BinaryIO, Literal, NamedTuple
+from typing import Any, BinaryIO, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,10 @@ LARGEST_SIDE = 1 << 14
 _HEADER = struct.Struct("<3sB5i6f")
 _ENCODINGS = {1: np.dtype("<f4"), 2: np.dtype("<f2"), 3: np.dtype("u1")}
 _NPY_HEADER = 1 << 12
+_KIND = re.compile(rb"'descr':\s*'([^']{1,16})'")
+_ORDER = re.compile(rb"'fortran_order':\s*(True|False)")
+_SIDES = re.compile(rb"'shape':\s*\(\s*(-?\d{1,19}(?:,\s*-?\d{1,19}){0,7}),?\s*\)")
+_KINDS = {f"{o}{k}{n}".encode() for o in "<>|=" for k in "fui" for n in (1, 2, 4, 8)} - {b"<f1", b">f1", b"|f1", b"=f1"}
 _AGAIN = "Write it again, or copy it again if it was cut off."
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
@@ -72,25 +76,24 @@ def _vol(file: BinaryIO, size: int, path: Path) -> VolumeFile:
 
 
 def _npy(file: BinaryIO, size: int, path: Path) -> VolumeFile:
-    try:
-        version = np.lib.format.read_magic(file)
-        length = struct.unpack("<H", file.read(2))[0] if version[0] == 1 else struct.unpack("<I", file.read(4))[0]
-        if version[0] not in (1, 2, 3) or length > _NPY_HEADER:
-            raise ValueError("its header is too long")
-        head = file.read(length)
-        again = io.BytesIO(struct.pack("<I", length) + head)
-        shape, fortran, kind = np.lib.format.read_array_header_2_0(again, max_header_size=_NPY_HEADER)
-    except (ValueError, struct.error, SyntaxError, TypeError, RecursionError, MemoryError, UnicodeError):
-        raise SceneError("The header of the NumPy file is broken.", path, 0, _AGAIN) from None
-    if kind.hasobject or kind.kind not in "fui" or kind.itemsize > 8:
+    start = file.read(8)
+    wide = len(start) == 8 and start[6] in (2, 3)
+    raw = file.read(4 if wide else 2)
+    length = int.from_bytes(raw, "little")
+    head = file.read(length) if length <= _NPY_HEADER else b""
+    kind, order, sides = (pattern.search(head) for pattern in (_KIND, _ORDER, _SIDES))
+    if start[6:7] not in (b"\1", b"\2", b"\3") or len(head) < length or not (kind and order and sides):
+        raise SceneError("The header of the NumPy file is broken.", path, 0, _AGAIN)
+    if kind[1] not in _KINDS:
         raise SceneError("The NumPy file holds no real numbers.", path, 0, "Save an array of float32.")
-    if len(shape) == 3:
-        shape = (*shape, 1)
-    if len(shape) != 4 or any(type(n) is not int for n in shape):
+    shape = tuple(int(n) for n in sides[1].split(b","))
+    if len(shape) not in (3, 4):
         what = f"The array has {len(shape)} axes; a volume has (z, y, x) or (z, y, x, channels)."
         raise SceneError(what, path, 0, "Save it in that shape.")
-    values = _numbers(file, kind, shape, size - file.tell(), path, "F" if fortran else "C")
-    return _mended(values, None)
+    nz, ny, nx, channels = shape if len(shape) == 4 else (*shape, 1)
+    fortran: Literal["C", "F"] = "F" if order[1] == b"True" else "C"
+    kind_of: np.dtype[Any] = np.dtype(kind[1].decode())
+    return _mended(_numbers(file, kind_of, (nz, ny, nx, channels), size - file.tell(), path, fortran), None)
 
 
 def _numbers(
