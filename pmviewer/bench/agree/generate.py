@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pmviewer.bench.agree import lights, materials, shapes
+from pmviewer.bench.agree import lights, materials, media, shapes
 from pmviewer.bench.agree.draw import Draw
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.materials import METALLIC, TRANSPARENT, Materials
@@ -24,7 +24,7 @@ class Profile:
     """`bsdfs`: types to draw from. `rich`, `more_lights`, `textured`, `instances`: the record's variants. `room`: how
     often the scene is closed. `tilted`: meshes have tilted vertex normals. `ground`: types of what surrounds the rest,
     `bsdfs` if empty. `nested`: glass inside glass, the camera sometimes within.
-    `lights`: types to draw from, by `more_lights` if empty."""
+    `lights`: types to draw from, by `more_lights` if empty. `medium`: something is filled with one."""
 
     name: str
     bsdfs: tuple[str, ...]
@@ -37,6 +37,7 @@ class Profile:
     ground: tuple[str, ...] = ()
     nested: bool = False
     lights: tuple[str, ...] = ()
+    medium: bool = False
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -58,6 +59,7 @@ PROFILES = (
     Profile("nested glass", TRANSPARENT, ground=("diffuse",), nested=True, room=0.4),
     Profile("rooms", materials.RICH, room=1.0, more_lights=True, ground=("diffuse", "diffuse", "roughplastic")),
     Profile("plain lights", materials.PLAIN, rich=False, room=0.5, ground=("diffuse",)),
+    Profile("media", materials.PLAIN, rich=False, ground=("diffuse",), lights=("constant",), medium=True),
 )
 SCALES = (1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3)
 HALF = 2.0
@@ -78,6 +80,9 @@ def scene_of(seed: int, index: int) -> Node:
     scene["lights"] = []
     _light(draw, made, profile, closed, scene)
     _require(draw, made, profile, scene)
+    if profile.medium:
+        scene["scale"] = 1.0
+        media.fill(draw, scene)
     scene["camera"] = _camera(draw, closed, scene)
     for deviation in DEVIATIONS:
         if deviation.rare and profile.name != "tilted normals" and draw.chance(0.85):
@@ -276,7 +281,7 @@ def _camera(draw: Draw, closed: bool, scene: Node) -> Node:
     distance = 1.7 if closed else draw.number(2.5, 4)
     origin = [round(distance * math.cos(angle), 4), round(distance * math.sin(angle), 4), draw.number(0.5, 2.1)]
     place = "outside"
-    if glass and draw.chance(0.35):
+    if glass and not media.has_media(scene) and draw.chance(0.35):
         place = "in glass"
         moved = [step[1] for step in glass[0]["to_world"] if step[0] == "translate"]
         centre = glass[0].get("center", [0.0, 0.0, 0.0]) if not moved else moved[-1]

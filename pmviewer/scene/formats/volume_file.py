@@ -21,7 +21,7 @@ LARGEST_BYTES = 4 << 30
 """Of numbers, as float32."""
 LARGEST_SIDE = 1 << 14
 _HEADER = struct.Struct("<3sB5i6f")
-_ENCODINGS = {1: np.dtype("<f4"), 2: np.dtype("<f2"), 3: np.dtype("u1")}
+_ENCODINGS: dict[int, np.dtype[Any]] = {1: np.dtype("<f4"), 2: np.dtype("<f2"), 3: np.dtype("u1")}
 _NPY_HEADER = 1 << 12
 _KIND = re.compile(rb"'descr':\s*'([^']{1,16})'")
 _ORDER = re.compile(rb"'fortran_order':\s*(True|False)")
