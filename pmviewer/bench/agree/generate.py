@@ -59,8 +59,10 @@ PROFILES = (
     Profile("nested glass", TRANSPARENT, ground=("diffuse",), nested=True, room=0.4),
     Profile("rooms", materials.RICH, room=1.0, more_lights=True, ground=("diffuse", "diffuse", "roughplastic")),
     Profile("plain lights", materials.PLAIN, rich=False, room=0.5, ground=("diffuse",)),
-    Profile("media", materials.PLAIN, rich=False, ground=("diffuse",), lights=("constant",), medium=True),
 )
+MEDIA = Profile("media", materials.PLAIN, rich=False, ground=("diffuse",), lights=("constant",), medium=True)
+EVERY = 13
+"""One in so many scenes has a medium."""
 SCALES = (1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3)
 HALF = 2.0
 """Half the edge of the ground, and of a room."""
@@ -68,7 +70,7 @@ HALF = 2.0
 
 def scene_of(seed: int, index: int) -> Node:
     """Scene `index` of `seed`."""
-    profile = PROFILES[index % len(PROFILES)]
+    profile = MEDIA if index % EVERY == EVERY - 1 else PROFILES[index % len(PROFILES)]
     draw = Draw(seed, index)
     closed = draw.chance(profile.room)
     profile = _choose(draw, profile, closed)
