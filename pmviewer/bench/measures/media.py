@@ -214,5 +214,9 @@ def run(quick: bool = False) -> BenchResult:
         more, speed = over_time(scene, goal, share, quick)
         rows += more
         targets.append(speed)
-    notes = [f"Mitsuba 3, {variant}, volpath", "the beam estimate alone looks the volume map up"]
+    notes = [
+        "cornell_smoke: the reference is our path tracer's, Mitsuba's pictures are 5 to 7 % darker (see docs/media.md)",
+        f"Mitsuba 3, {variant}, volpath",
+        "the beam estimate alone looks the volume map up",
+    ]
     return BenchResult("Participating media (T9, E7)", COLUMNS, rows, targets, notes)
