@@ -27,6 +27,7 @@ LACKING = (
 VIRTUAL = "Virtual lights do not know of media: the method progressive shows the scene."
 THIN = "Light passes thin glass as through all glass: simplified panes do not know of media."
 MAP_ALONE = "A map alone shows no light that media scatter: choose progressive, gather or path."
+EMITS = "No photons leave what media emit: it is seen, and lights surfaces by gather rays alone. Choose path."
 BLURRED_FROM = 0.99
 BLURRED = "Photons keep their directions to 0.06°: light that media scatter nearly straight on is blurred by that."
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
-from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, THIN, in_media
+from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, EMITS, THIN, in_media
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
 from pmviewer.render.filter import BOX, filter_of, is_signed
@@ -145,6 +145,8 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         "by setting" in traits.thin_glass and asked.render.thin_glass != "exact"
     ):
         said = (*said, THIN)
+    if traits.media_emit and settings.render.method != "path":
+        said = (*said, EMITS)
     return replace(plan, media=True, warnings=(*plan.warnings, *said))
 
 

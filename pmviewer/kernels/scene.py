@@ -81,6 +81,14 @@ MEDIA_FIELDS: list[tuple[str, str]] = [
     ("light_media", "i8"),  # int32 (n_lights,): the medium that photons of a light start in
 ]
 """Of scenes with participating media."""
+GRID_FIELDS: list[tuple[str, str]] = [
+    ("voxels", "i8"),  # float32: numbers of all lattices, see `pmviewer.kernels.media.lattice`
+    ("grid_blocks", "i8"),  # float32: the greatest of each block of cells
+    ("grid_frames", "i8"),  # float64 (n_grids, GRID_FRAME)
+    ("grid_sizes", "i8"),  # int64 (n_grids, GRID_SIZES)
+    ("medium_grids", "i8"),  # int32 (n_media, GRID_NUMBERS): lattices of extinction, albedo, emission, -1 for none
+]
+"""Of scenes with media whose numbers vary in space; they have MEDIA_FIELDS, too."""
 
 DISPERSION_FIELDS: list[tuple[str, str]] = [
     ("glasses", "i8"),  # float32 (n_glasses + 1, SPECTRUM_NODES): relative indices over the spectrum, row 0 unused
@@ -100,6 +108,7 @@ def scene_dtype(
     blends: bool = False,
     media: bool = False,
     dispersion: bool = False,
+    grids: bool = False,
 ) -> np.dtype:
     """The record of a scene with or without these features.
 
@@ -116,6 +125,7 @@ def scene_dtype(
         *(OPACITY_FIELDS if opacity else []),
         *(MEDIA_FIELDS if media else []),
         *(DISPERSION_FIELDS if dispersion else []),
+        *(GRID_FIELDS if grids else []),
     ]
     # In front, since numba warns where one record begins like another.
     return np.dtype([*extra, *_FIELDS], align=True)

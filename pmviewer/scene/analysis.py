@@ -59,6 +59,8 @@ class SceneTraits:
     has_other_specular: bool = False
     has_media: bool = False
     """Participating media."""
+    media_emit: bool = False
+    """Do some of them emit light?"""
     has_scattering: bool = False
     """Media that scatter light."""
     straightest: float = 0.0
@@ -124,6 +126,7 @@ def analyse(scene: Scene) -> SceneTraits:
         thin_glass=tuple(sorted({m.thin_rule for m in panes})),
         has_other_specular=any(always_followed(m) and not any(m is pane for pane in panes) for m in used),
         has_media=has_media(scene),
+        media_emit=has_media(scene) and any(max(m.emission) > 0 for m in scene.media),
         straightest=max((max(abs(m.phase.g), abs(m.phase.g_beside)) for m in scene.media), default=0.0),
         has_findable_lights=any(isinstance(light, Environment) for light in scene.lights)
         or any(s.radiance is not None and max(s.radiance) > 0 for s in scene.shapes),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pmviewer.scene.grid import Grid
+
 RGB = tuple[float, float, float]
 
 
@@ -19,16 +21,27 @@ class Phase:
 
 @dataclass(frozen=True)
 class Medium:
-    """The same everywhere: extinction `sigma_t` per scene unit and channel, `albedo` the share of it that is
-    scattering, and the radiance `emission` sent out per scene unit, in W/(m² sr)."""
+    """Extinction `sigma_t` per scene unit and channel, `albedo` the share of it that is scattering, and the radiance
+    `emission` sent out per scene unit, in W/(m² sr). The same everywhere, but for what grids multiply: `density` the
+    extinction, which is 0 outside of it, `albedo_grid` and `emission_grid` their own; a medium with any has density."""
 
     name: str
     sigma_t: RGB = (1.0, 1.0, 1.0)
     albedo: RGB = (0.75, 0.75, 0.75)
     emission: RGB = (0.0, 0.0, 0.0)
     phase: Phase = Phase()
+    density: Grid | None = None
+    albedo_grid: Grid | None = None
+    emission_grid: Grid | None = None
+
+    @property
+    def varies(self) -> bool:
+        """Do its numbers vary in space?"""
+        return self.density is not None
 
     @property
     def acts(self) -> bool:
         """Does it change light at all?"""
-        return max(*self.sigma_t, *self.emission) > 0
+        stops = max(self.sigma_t) * (1.0 if self.density is None else self.density.most)
+        emits = max(self.emission) * (1.0 if self.emission_grid is None else self.emission_grid.most)
+        return max(stops, emits) > 0

@@ -15,7 +15,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.scene.description import Group, ImageEnvironment, Instance, Light, Material, Mesh, Scene, Shape
+from pmviewer.scene.description import Group, ImageEnvironment, Instance, Light, Material, Medium, Mesh, Scene, Shape
+from pmviewer.scene.grid import Grid
 from pmviewer.scene.texture import Bitmap, Texture
 
 FACES = 8
@@ -36,10 +37,24 @@ def miniature(scene: Scene) -> Scene:
         shapes=_shapes(scene.shapes),
         materials=tuple(map(_material, scene.materials)),
         lights=tuple(map(_light, _two_each(scene.lights, type))),
+        media=tuple(map(_medium, scene.media)),
         instances=tuple(Instance(each.name, groups[id(each.group)], each.to_world) for each in shown),
         warnings=(),
         dropped={},
     )
+
+
+def _medium(medium: Medium) -> Medium:
+    return replace(
+        medium,
+        density=_fewer_numbers(medium.density),
+        albedo_grid=_fewer_numbers(medium.albedo_grid),
+        emission_grid=_fewer_numbers(medium.emission_grid),
+    )
+
+
+def _fewer_numbers(grid: Grid | None) -> Grid | None:
+    return grid and replace(grid, values=np.full((2, 2, 2, 1), grid.most, np.float32))
 
 
 def _two_each(things: Iterable[T], kind: Any) -> list[T]:

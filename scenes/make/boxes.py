@@ -21,7 +21,7 @@ TALL = [(0.742, 0.39), (0.837, 0.675), (0.552, 0.77), (0.457, 0.485)]
 SHORT = [(0.21, 0.115), (0.5, 0.205), (0.41, 0.49), (0.125, 0.4)]
 
 
-def _walls(*white: Mesh) -> tuple[dict[str, Mesh], list[str]]:
+def walls(*white: Mesh) -> tuple[dict[str, Mesh], list[str]]:
     """Meshes and shapes of the side walls and of everything white."""
     meshes = {"white": joined(*white), "green": RIGHT, "red": LEFT}
     return meshes, [mesh(stem, stem, flat=True) for stem in meshes]
@@ -29,7 +29,7 @@ def _walls(*white: Mesh) -> tuple[dict[str, Mesh], list[str]]:
 
 def glossy() -> MadeScene:
     """Glossy floor and a brushed-gold block (Jensen 1996, figure of the glossy box)."""
-    meshes, shapes = _walls(CEILING, BACK, prism(SHORT, 0, 0.3))
+    meshes, shapes = walls(CEILING, BACK, prism(SHORT, 0, 0.3))
     meshes |= {"floor": FLOOR, "block": prism(TALL, 0, 0.6)}
     rough = '<string name="distribution" value="ggx"/><float name="alpha" value="{}"/>'
     floor = ('<string name="material" value="none"/>', rough.format(0.12), rgb("specular_reflectance", 0.7, 0.68, 0.65))
@@ -61,7 +61,7 @@ def glossy() -> MadeScene:
 
 def lights() -> MadeScene:
     """Four coloured lights near the corners of the ceiling."""
-    meshes, shapes = _walls(FLOOR, CEILING, BACK, prism(SHORT, 0, 0.3), prism(TALL, 0, 0.6))
+    meshes, shapes = walls(FLOOR, CEILING, BACK, prism(SHORT, 0, 0.3), prism(TALL, 0, 0.6))
     colours = [(34, 6, 5), (6, 24, 5), (5, 8, 38), (24, 19, 4)]
     places = [(0.22, 0.25), (0.78, 0.25), (0.22, 0.78), (0.78, 0.78)]
     panels = [
@@ -109,7 +109,7 @@ def water() -> MadeScene:
     i = np.arange(cells)
     n = cells + 1
     pane = np.concatenate([np.stack([i, n + i, n + i + 1], 1), np.stack([i, n + i + 1, i + 1], 1)])
-    meshes, shapes = _walls(FLOOR, CEILING, BACK)
+    meshes, shapes = walls(FLOOR, CEILING, BACK)
     meshes |= {"water": surface, "pane": Mesh(np.concatenate([foot, edge]), pane.astype(np.int32))}
     return MadeScene(
         "Cornell box filled with water",

@@ -21,6 +21,7 @@ from make.office import office
 from make.plane import lit_plane
 from make.prism import prism_and_screen
 from make.room import skylight_room
+from make.smoke import cornell_smoke
 
 SCENES: dict[str, Callable[[], MadeScene]] = {
     "car_cabin": car_cabin,
@@ -34,6 +35,7 @@ SCENES: dict[str, Callable[[], MadeScene]] = {
     "cornell_fractal": fractal_box,
     "cornell_glossy": glossy,
     "cornell_lights": lights,
+    "cornell_smoke": cornell_smoke,
     "cornell_water": water,
     "door_slit": door_slit,
     "fog_sphere": fog_sphere,

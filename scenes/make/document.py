@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import shutil
+import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from make.mesh import Mesh, write_ply
 
@@ -18,7 +20,8 @@ Colour = tuple[float, float, float]
 class MadeScene:
     """What a generator returns. `bsdfs` and `shapes` are XML elements; `meshes` maps file stems to geometry; `defaults`
     are the scene's own parameters beside spp, integrator, max_depth, rr_depth and res. `media` are XML elements, too,
-    and `around` is the id of the one that the camera stands in."""
+    `around` is the id of the one that the camera stands in, and `grids` maps file stems to numbers (nz, ny, nx) or
+    (nz, ny, nx, 3)."""
 
     title: str
     description: str
@@ -34,6 +37,7 @@ class MadeScene:
     max_depth: int = -1
     media: tuple[str, ...] = ()
     around: str = ""
+    grids: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 
 
 def numbers(*values: float) -> str:
@@ -74,6 +78,21 @@ def fog(identifier: str, sigma_t: float, albedo: Colour, g: float = 0.0) -> str:
     phase = f'<phase type="hg">{number("g", g)}</phase>' if g else ""
     values = number("sigma_t", sigma_t) + rgb("albedo", *albedo)
     return f'<medium type="homogeneous" id="{identifier}">{values}{phase}</medium>'
+
+
+def grid(name: str, stem: str, low: Colour, high: Colour) -> str:
+    """Numbers of `grids/stem.vol` in a box."""
+    place = f'<scale value="{numbers(*(b - a for a, b in zip(low, high))).replace(" ", ", ")}"/>'
+    place += f'<translate value="{numbers(*low).replace(" ", ", ")}"/>'
+    file = f'<string name="filename" value="grids/{stem}.vol"/><transform name="to_world">{place}</transform>'
+    return f'<volume type="gridvolume" name="{name}">{file}</volume>'
+
+
+def smoke(identifier: str, stem: str, low: Colour, high: Colour, sigma: float, albedo: Colour) -> str:
+    """A medium of the density in `grids/stem.vol`, `sigma` its extinction per metre where that is 1."""
+    values = grid("sigma_t", stem, low, high) + number("scale", sigma)
+    values += f'<volume type="constvolume" name="albedo">{rgb("value", *albedo)}</volume>'
+    return f'<medium type="heterogeneous" id="{identifier}">{values}</medium>'
 
 
 def boundary(low: Colour, high: Colour, inside: str) -> str:
@@ -132,6 +151,15 @@ def lamp(center: Colour, target: Colour, half: tuple[float, float], radiance: Co
     return panel(center, tuple(u.tolist()), tuple(v.tolist()), "black", radiance)
 
 
+def write_vol(path: Path, values: NDArray[np.float32]) -> None:
+    """Mitsuba's volume file, version 3; the values (nz, ny, nx) or (nz, ny, nx, 3) fill the unit cube."""
+    values = values[..., None] if values.ndim == 3 else values
+    nz, ny, nx, channels = values.shape
+    path.parent.mkdir(exist_ok=True)
+    head = struct.pack("<3sB5i6f", b"VOL", 3, 1, nx, ny, nz, channels, 0, 0, 0, 1, 1, 1)
+    path.write_bytes(head + values.astype("<f4").tobytes())
+
+
 def _emitter(radiance: Colour | None) -> str:
     return "" if radiance is None else f'<emitter type="area">{rgb("radiance", *radiance)}</emitter>'
 
@@ -183,6 +211,8 @@ def write_scene(folder: Path, scene: MadeScene) -> Path:
         meshes.mkdir()
     for stem, geometry in scene.meshes.items():
         write_ply(meshes / f"{stem}.ply", geometry)
+    for stem, values in scene.grids.items():
+        write_vol(folder / "grids" / f"{stem}.vol", values)
     (folder / "scene.xml").write_bytes(_xml(scene).encode("utf-8"))
     texts = {"title": scene.title, "description": scene.description, "shows": scene.shows}
     lines = [f"{key} = {json.dumps(text, ensure_ascii=False)}\n" for key, text in texts.items()]

@@ -14,7 +14,7 @@ import pytest
 
 from pmviewer.bench.agree.features import features
 from pmviewer.bench.agree.files import make_mesh
-from pmviewer.bench.agree.generate import PROFILES, needs_particles, scene_of
+from pmviewer.bench.agree.generate import MEDIA, PROFILES, needs_particles, scene_of
 from pmviewer.bench.agree.tree import from_json, to_json, written_out
 from pmviewer.bench.agree.trial import HARMLESS
 from pmviewer.bench.agree.xml import number, scene_text, write_scene
@@ -26,11 +26,12 @@ shape: rectangle disk sphere cylinder cube obj ply instance
 shape: blob~mesh tetra~mesh sheet~mesh quad~mesh tilted~vertex~normals mesh~without~normals flipped~normals face~normals
 transform: mirrored uneven sheared groups~in~groups axis~not~of~unit~length
 bsdf: dispersion diffuse conductor roughconductor dielectric roughdielectric thindielectric plastic roughplastic
-bsdf: twosided bumpmap normalmap anisotropic ggx beckmann
+bsdf: twosided bumpmap normalmap anisotropic ggx beckmann null
 texture: bitmap checkerboard nearest bilinear repeat mirror clamp roughness
 light: point spot directional constant envmap several textured~area touches~or~crosses
 light: area~on~rectangle area~on~disk area~on~sphere area~on~cylinder area~on~cube area~on~obj area~on~ply
 light: caustics~that~paths~don't~find area~and~environment~alone
+medium: homogeneous heterogeneous hg coloured~lattice lattice~of~albedo
 scene: open closed metal~alone glass~alone nothing~diffuse nested~glass small~scale large~scale
 camera: outside near~a~wall in~glass
 """
@@ -48,7 +49,7 @@ def expected() -> set[str]:
 def test_every_feature_occurs_and_none_is_rare():
     count = Counter(name for i in range(500) for name in features(scene_of(1, i)))
     assert expected() - set(count) == set()
-    assert set(count) - expected() == {f"profile: {profile.name}" for profile in PROFILES}
+    assert set(count) - expected() == {f"profile: {profile.name}" for profile in (*PROFILES, MEDIA)}
     assert min(count.values()) >= 5, count.most_common()[-3:]
 
 
@@ -73,7 +74,7 @@ def test_every_scene_is_read_without_a_warning_and_few_variants_of_kernels_are_n
         scene = load_scene(path)
         assert [w for w in scene.warnings if not any(h in w for h in HARMLESS)] == [], (i, scene_of(2, i)["profile"])
         kinds.add(flatten(scene).record.dtype)
-    assert len(kinds) <= 6
+    assert len(kinds) <= 7
 
 
 def test_text_reads_back():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.immersion import immersed
-from pmviewer.engine.media_plan import BLURRED
+from pmviewer.engine.media_plan import BLURRED, EMITS
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
 from pmviewer.kernels.memory import at_address
@@ -155,3 +155,11 @@ def test_lobes_narrower_than_photons_directions_are_said(tmp_path):
         phase = f'<phase type="hg"><float name="g" value="{g}"/></phase>'
         traits = open_scene(scene_of(tmp_path, FOG.format(phase), CUBE.format(INSIDE))).traits
         assert (BLURRED in plan_of(Settings(), traits).warnings) == said
+
+
+def test_light_of_media_that_photons_do_not_carry_is_said(tmp_path):
+    for emission, method, said in (("1", "progressive", True), ("1", "path", False), ("0", "gather", False)):
+        fog = FOG.format(f'<rgb name="emission" value="{emission}"/>')
+        traits = open_scene(scene_of(tmp_path, fog, CUBE.format(INSIDE))).traits
+        plan = plan_of(with_values(Settings(), {"render.method": method}), traits)
+        assert (EMITS in plan.warnings) == said

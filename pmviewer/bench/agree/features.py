@@ -11,7 +11,7 @@ from pmviewer.bench.agree.lights import DELTA
 from pmviewer.bench.agree.materials import METALLIC, TRANSPARENT
 from pmviewer.bench.agree.tree import MAPS, TEXTURES, Node, bsdfs_of, emitters_of, nodes, shapes_of
 
-GROUPS = ("shape", "transform", "bsdf", "texture", "light", "scene", "camera", "profile")
+GROUPS = ("shape", "transform", "bsdf", "texture", "light", "medium", "scene", "camera", "profile")
 
 
 def features(scene: Node) -> set[str]:
@@ -21,6 +21,7 @@ def features(scene: Node) -> set[str]:
         *_transforms(scene),
         *_materials(scene),
         *_lights(scene),
+        *_media(scene),
         *_whole(scene),
         f"camera: {scene['camera']['place']}",
         f"profile: {scene['profile']}",
@@ -97,6 +98,17 @@ def _lights(scene: Node) -> Iterator[str]:
         yield "light: caustics that paths don't find"
     if not any(light["type"] in DELTA for light in scene["lights"]):
         yield "light: area and environment alone"
+
+
+def _media(scene: Node) -> Iterator[str]:
+    for medium in (shape["medium"] for shape in shapes_of(scene) if "medium" in shape):
+        yield f"medium: {medium['type']}"
+        if isinstance(medium["sigma_t"], dict) and medium["sigma_t"]["grid"]["channels"] == 3:
+            yield "medium: coloured lattice"
+        if isinstance(medium["albedo"], dict):
+            yield "medium: lattice of albedo"
+        if "phase" in medium:
+            yield "medium: hg"
 
 
 def _whole(scene: Node) -> Iterator[str]:

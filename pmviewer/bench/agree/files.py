@@ -184,3 +184,17 @@ def picture_file(spec: dict[str, Any], folder: Path) -> str:
         else:
             write_png(path, np.round(255 * pixels).clip(0, 255).astype(np.uint8))
     return name
+
+
+def grid_file(spec: dict[str, Any], folder: Path) -> str:
+    """Write the volume unless it is there; its file's name. Nothing is at its border, where Mitsuba lets turned
+    lattices go on up to the corners of the box around them."""
+    name = _name(spec, "vol")
+    path = folder / name
+    if not path.exists():
+        nx, ny, nz = spec["sides"]
+        values = np.random.default_rng(spec["seed"]).random((nz, ny, nx, spec["channels"]), np.float32) ** 2
+        values = np.pad(values, ((1, 1), (1, 1), (1, 1), (0, 0)))
+        head = struct.pack("<3sB5i6f", b"VOL", 3, 1, nx + 2, ny + 2, nz + 2, spec["channels"], 0, 0, 0, 1, 1, 1)
+        path.write_bytes(head + values.astype("<f4").tobytes())
+    return name

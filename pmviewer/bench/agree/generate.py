@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pmviewer.bench.agree import lights, materials, shapes
+from pmviewer.bench.agree import lights, materials, media, shapes
 from pmviewer.bench.agree.draw import Draw
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.materials import METALLIC, TRANSPARENT, Materials
@@ -24,7 +24,7 @@ class Profile:
     """`bsdfs`: types to draw from. `rich`, `more_lights`, `textured`, `instances`: the record's variants. `room`: how
     often the scene is closed. `tilted`: meshes have tilted vertex normals. `ground`: types of what surrounds the rest,
     `bsdfs` if empty. `nested`: glass inside glass, the camera sometimes within.
-    `lights`: types to draw from, by `more_lights` if empty."""
+    `lights`: types to draw from, by `more_lights` if empty. `medium`: something is filled with one."""
 
     name: str
     bsdfs: tuple[str, ...]
@@ -37,6 +37,7 @@ class Profile:
     ground: tuple[str, ...] = ()
     nested: bool = False
     lights: tuple[str, ...] = ()
+    medium: bool = False
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -61,6 +62,9 @@ PROFILES = (
 )
 DISPERSING, DISPERSION_SEED = "nested glass", 0xD15
 """The profile in whose scenes every second time the glass splits light, which Mitsuba's RGB variants don't know."""
+MEDIA = Profile("media", materials.PLAIN, rich=False, ground=("diffuse",), lights=("constant",), medium=True)
+EVERY = 13
+"""One in so many scenes has a medium."""
 SCALES = (1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3)
 HALF = 2.0
 """Half the edge of the ground, and of a room."""
@@ -68,7 +72,7 @@ HALF = 2.0
 
 def scene_of(seed: int, index: int) -> Node:
     """Scene `index` of `seed`."""
-    profile = PROFILES[index % len(PROFILES)]
+    profile = MEDIA if index % EVERY == EVERY - 1 else PROFILES[index % len(PROFILES)]
     draw = Draw(seed, index)
     closed = draw.chance(profile.room)
     profile = _choose(draw, profile, closed)
@@ -80,6 +84,9 @@ def scene_of(seed: int, index: int) -> Node:
     scene["lights"] = []
     _light(draw, made, profile, closed, scene)
     _require(draw, made, profile, scene)
+    if profile.medium:
+        scene["scale"] = 1.0
+        media.fill(draw, scene)
     scene["camera"] = _camera(draw, closed, scene)
     for deviation in DEVIATIONS:
         if deviation.rare and profile.name != "tilted normals" and draw.chance(0.85):
@@ -298,7 +305,7 @@ def _camera(draw: Draw, closed: bool, scene: Node) -> Node:
     distance = 1.7 if closed else draw.number(2.5, 4)
     origin = [round(distance * math.cos(angle), 4), round(distance * math.sin(angle), 4), draw.number(0.5, 2.1)]
     place = "outside"
-    if glass and draw.chance(0.35):
+    if glass and not media.has_media(scene) and draw.chance(0.35):
         place = "in glass"
         moved = [step[1] for step in glass[0]["to_world"] if step[0] == "translate"]
         centre = glass[0].get("center", [0.0, 0.0, 0.0]) if not moved else moved[-1]

@@ -14,7 +14,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
-from pmviewer.render.planes import PLANES, TERMS
+from pmviewer.render.planes import PLANES, terms_of
 from pmviewer.settings.access import Settings, with_values
 
 METHODS: Mapping[str, Mapping[str, object]] = {
@@ -48,7 +48,7 @@ class Effort:
 def our_runs(
     opened: OpenScene, method: str, effort: Effort, seeds: list[int], pool: WorkPool, max_depth: int = MAX_DEPTH
 ) -> NDArray[np.float32]:
-    """(runs, h, w, 15): the terms of `pmviewer.render.planes`, a run a seed."""
+    """(runs, h, w, 15): the terms of `pmviewer.render.planes`, a run a seed; with media 21, theirs behind."""
     values: dict[str, object] = {**DEPTH, **{**METHODS, **THIN_GLASS}[method], "render.max_depth": max_depth}
     passes = effort.spp
     if method != "path":
@@ -61,13 +61,15 @@ def our_runs(
         renderer = Renderer(opened, with_values(Settings(), values | {"render.seed": seed}), pool, StageStore(0))
         for _ in range(passes):
             renderer.step()
-        images.append(renderer.film.planes()[..., : PLANES[TERMS[-1]].stop])
+        planes = renderer.film.planes()
+        parts = [planes[..., PLANES[name]] for name in terms_of(planes.shape[-1])]
+        images.append(np.concatenate(parts, axis=-1))
     return np.array(images)
 
 
 def picture(terms: NDArray[np.float32]) -> NDArray[np.float64]:
-    """(runs, h, w, 3): the sum of (runs, h, w, 15)."""
-    parts = terms.astype(np.float64).reshape(*terms.shape[:3], len(TERMS), 3)
+    """(runs, h, w, 3): the sum of (runs, h, w, 15 or 21)."""
+    parts = terms.astype(np.float64).reshape(*terms.shape[:3], -1, 3)
     return np.asarray(parts.sum(axis=3))
 
 

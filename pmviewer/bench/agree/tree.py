@@ -1,10 +1,10 @@
 """Scenes as plain trees of dictionaries, lists and numbers, as Mitsuba has them too: easy to draw, cut and save.
 
 A node is {"type": plugin, name: value, …}. Values by their type: bool, int, float and str as they are; three numbers
-are a colour, or a point or vector where the name says so; a node under a name is a texture, or the BSDF or light of a
-shape; "to_world" and "to_uv" hold steps like ["rotate", [x, y, z], degrees] or ["matrix", [16 numbers]]; "mesh" and
-"picture" describe files that are made from numbers (`pmviewer.bench.agree.files`); "group" names one of the scene's
-groups.
+are a colour, or a point or vector where the name says so; a node under a name is a texture, or the BSDF, light or
+medium of a shape; "to_world" and "to_uv" hold steps like ["rotate", [x, y, z], degrees] or ["matrix", [16 numbers]];
+"mesh", "picture" and "grid" describe files that are made from numbers (`pmviewer.bench.agree.files`); "group" names one
+of the scene's groups.
 
 A scene is {"scale": s, "camera": {…}, "shapes": […], "lights": […], "groups": {name: [shape, …]}}. All lengths are
 multiplied by its scale when it is written.
@@ -29,7 +29,7 @@ def nodes(tree: Any) -> Iterator[Node]:
         if "type" in tree:
             yield tree
         for name, value in tree.items():
-            if name not in ("mesh", "picture"):
+            if name not in ("mesh", "picture", "grid"):
                 yield from nodes(value)
     elif isinstance(tree, list):
         for value in tree:

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from pmviewer.bench.agree.generate import disperses, has_distant_lights, needs_particles
 from pmviewer.bench.agree.materials import is_mapped
+from pmviewer.bench.agree.media import has_media
 from pmviewer.bench.agree.mitsuba_client import Mitsuba, MitsubaError
 from pmviewer.bench.agree.ours import METHODS, PHOTON_METHODS, THIN_GLASS, Effort, our_runs, picture, term
 from pmviewer.bench.agree.statistics import Outcome, compared, negligible, summaries
@@ -82,7 +83,7 @@ class Runs:
         return [int(s) >> 1 for s in np.random.SeedSequence(entropy).generate_state(runs)]
 
     def ours(self, method: str, stage: int, max_depth: int = 0) -> NDArray[np.float32]:
-        """(runs, h, w, 15) terms; `max_depth` 0 for whole paths."""
+        """(runs, h, w, 15 or, with media, 21) terms; `max_depth` 0 for whole paths."""
         key = (method, stage, max_depth)
         if key not in self._ours:
             effort = STAGES[stage]
@@ -93,6 +94,7 @@ class Runs:
 
     def theirs(self, mode: str, stage: int, max_depth: int = 0) -> NDArray[np.float64]:
         """(runs, h, w, 3)"""
+        mode = "volpath" if mode == "path" and has_media(self.scene) else mode
         key = (mode, stage, max_depth)
         if key not in self._theirs:
             effort = STAGES[stage]

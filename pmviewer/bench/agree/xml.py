@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
-from pmviewer.bench.agree.files import mesh_file, picture_file
+from pmviewer.bench.agree.files import grid_file, mesh_file, picture_file
+from pmviewer.bench.agree.media import has_media
 from pmviewer.bench.agree.tree import TEXTURES, Node, written_out
 
 SIZE = 32
@@ -52,7 +53,13 @@ def _property(name: str, value: Any, folder: Path) -> str:
             return f'<string name="filename" value="{mesh_file(value, folder)}"/>'
         if name == "picture":
             return f'<string name="filename" value="{picture_file(value, folder)}"/>'
-        tag = {"bsdf": "bsdf", "inside": "bsdf", "emitter": "emitter"}.get(name, "texture")
+        if name == "grid":
+            return f'<string name="filename" value="{grid_file(value, folder)}"/>'
+        if name == "medium":
+            return _element("medium", value, folder, "interior")
+        if value["type"] == "gridvolume":
+            return _element("volume", value, folder, name)
+        tag = {"bsdf": "bsdf", "inside": "bsdf", "emitter": "emitter", "phase": "phase"}.get(name, "texture")
         return _element(tag, value, folder, "" if tag != "texture" or name == "height" else name)
     if name == "group":
         return f"<ref id={quoteattr(value)}/>"
@@ -111,7 +118,8 @@ def scene_text(scene: Node, folder: Path, size: int = SIZE) -> str:
     s = scene["scale"]
     if not (s > 0 and math.isfinite(s)):
         raise ValueError(f"a scene of scale {s}")
-    integrator = f'<integrator type="path"><integer name="max_depth" value="{MAX_DEPTH + 1}"/></integrator>'
+    kind = "volpath" if has_media(scene) else "path"
+    integrator = f'<integrator type="{kind}"><integer name="max_depth" value="{MAX_DEPTH + 1}"/></integrator>'
     lines = ['<scene version="3.0.0">', integrator, _camera(scene["camera"], s, size)]
     for name, members in scene["groups"].items():
         inside = "\n ".join(_element("shape", shape, folder) for shape in members)

@@ -80,6 +80,34 @@ def serialized() -> bytes:
     return out + struct.pack("<2Q", *offsets) + struct.pack("<I", 2)
 
 
+VOLUME = """    <medium type="heterogeneous" id="smoke">
+      <volume name="sigma_t" type="gridvolume"><string name="filename" value="{file}"/>
+        <boolean name="use_grid_bbox" value="true"/></volume><float name="scale" value="2"/>
+      <volume name="albedo" type="constvolume"><rgb name="value" value="0.9 0.8 0.7"/></volume></medium>
+    <shape type="cube"><bsdf type="null"/><ref name="interior" id="smoke"/></shape>
+"""
+
+
+NUMBERS = struct.pack("<24f", *(n / 24 for n in range(24)))
+"""Of a volume of 4 × 3 × 2 places."""
+
+
+def vol(
+    sides: tuple[int, int, int] = (4, 3, 2),
+    channels: int = 1,
+    box: tuple[float, ...] = (0, 0, 0, 1, 1, 1),
+    numbers: bytes = NUMBERS,
+) -> bytes:
+    """Mitsuba's volume file, version 3."""
+    return struct.pack("<3sB5i6f", b"VOL", 3, 1, *sides, channels, *box) + numbers
+
+
+def npy() -> bytes:
+    """The same numbers as NumPy writes them."""
+    head = b"{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 4), }".ljust(117) + b"\n"
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head + vol()[48:]
+
+
 OBJ = "mtllib mesh.mtl\no pyramid\n" + "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS)
 OBJ += "".join(f"vt {u} {v}\n" for u, v in UVS) + "vn 0 0 1\ng sides\nusemtl painted\ns 1\n"
 OBJ += "".join(f"f {a + 1}/{a + 1}/1 {b + 1}/{b + 1}/1 {c + 1}/{c + 1}/1\n" for a, b, c in FACES[:4])
@@ -282,6 +310,9 @@ def seeds() -> list[Seed]:
     for kind, name, content, more in meshes:
         files = {"scene.xml": scene(MESHES.format(kind=kind, file=name, more=more)), name: content}
         made.append(Seed(f"xml with {kind}", f"Mitsuba XML with {kind}", "scene.xml", files, (name, name, "scene.xml")))
+    for name, content in (("smoke.vol", vol()), ("smoke.npy", npy())):
+        files = {"scene.xml": scene(VOLUME.format(file=name)), name: content}
+        made.append(Seed(f"volume {name[-3:]}", f"{name[-3:].upper()} volume", "scene.xml", files, (name,)))
     gltf = {"scene.gltf": json.dumps(gltf_document("data.bin")).encode(), "data.bin": buffer(), "tex.png": png()}
     made.append(Seed("gltf", "glTF", "scene.gltf", gltf, ("scene.gltf", "scene.gltf", "scene.gltf", "data.bin")))
     made.append(Seed("glb", "GLB", "scene.glb", {"scene.glb": glb(), "tex.png": png()}, ("scene.glb",)))

@@ -9,6 +9,7 @@ from pmviewer.bench.report import BenchResult, Cell, Target
 from pmviewer.bench.stress.drawn import drawn
 from pmviewer.bench.stress.inputs import inputs
 from pmviewer.bench.stress.lab import Case, Lab, Row, run_case
+from pmviewer.bench.stress.media import media
 from pmviewer.bench.stress.sizes import counts, meshes, pictures, radii, scales
 from pmviewer.bench.stress.surfaces import lights, materials, overlaps
 from pmviewer.engine.pool import WorkPool
@@ -20,7 +21,7 @@ LONGEST = 600.0
 def all_cases() -> list[Case]:
     """In the order of the table."""
     of_settings = [*scales(), *radii(), *counts()]
-    of_scenes = [*materials(), *overlaps(), *lights(), *meshes(), *pictures(), *inputs()]
+    of_scenes = [*materials(), *overlaps(), *lights(), *media(), *meshes(), *pictures(), *inputs()]
     return of_settings + of_scenes + drawn()
 
 

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.media.medium import depth_of
+from pmviewer.kernels.media.column import through
 from pmviewer.kernels.media.phase import phase
 from pmviewer.kernels.memory import load_u4
 from pmviewer.kernels.vector import dot, normalize, sub
@@ -29,7 +29,7 @@ _i8 = np.int64
 
 
 @device
-def _one(grid, i, o, d, length, r2, sigma, lobes):
+def _one(scene, grid, i, o, d, length, r2, column, lobes):
     """What photon i adds, and whether it is within the radius; the powers in units of the map's."""
     block, lane, p = photon_place(grid, i)
     offset = sub(p, o)
@@ -43,19 +43,15 @@ def _one(grid, i, o, d, length, r2, sigma, lobes):
     red, green, blue = decode_powers(load_u4(block + 4 * ROW_BYTES, lane), load_u4(block + 5 * ROW_BYTES, lane))
     # It travels along −wi and is scattered along −d: the same angle as from d to wi.
     f = phase(lobes, d, wi)
-    return (
-        True,
-        f * red * _f4(math.exp(-depth_of(sigma[0], t))),
-        f * green * _f4(math.exp(-depth_of(sigma[1], t))),
-        f * blue * _f4(math.exp(-depth_of(sigma[2], t))),
-    )
+    T = through(scene, column, t)
+    return True, f * red * T[0], f * green * T[1], f * blue * T[2]
 
 
 @device
-def beam_radiance(grid, o, d, length, radius, sigma, lobes):
+def beam_radiance(scene, grid, o, d, length, radius, column, lobes):
     """Radiance (red, green, blue) at o that photons send back along a ray of that length, unit direction d, through a
-    medium of extinction sigma and phase function `lobes`, and the number of photons that it is from. grid: record of
-    a PhotonGrid; a radius above the grid's own is lowered to it."""
+    medium of that column (`pmviewer.kernels.media.column`) and phase function `lobes`, and the number of photons that
+    it is from. grid: record of a PhotonGrid; a radius above the grid's own is lowered to it."""
     radius = min(radius, grid.radius)
     r2 = radius * radius
     slabs = slabs_of(grid, o, d, length, radius)
@@ -76,7 +72,7 @@ def beam_radiance(grid, o, d, length, radius, sigma, lobes):
                             _, _, p = photon_place(grid, i)
                             if not is_in_cell(grid, p, x, y, z):
                                 continue
-                        near, r, g, b = _one(grid, i, o, d, length, r2, sigma, lobes)
+                        near, r, g, b = _one(scene, grid, i, o, d, length, r2, column, lobes)
                         if near:
                             count += 1
                             red += _f8(r)

@@ -17,8 +17,9 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, specialised
 from pmviewer.kernels.dimensions import COPIES, PHOTON_FLIGHT, PHOTON_SCATTER
 from pmviewer.kernels.media.flight import fly
-from pmviewer.kernels.media.medium import has_media, medium_beyond, phase_numbers, scattering_albedo
+from pmviewer.kernels.media.medium import has_media, medium_beyond, phase_numbers
 from pmviewer.kernels.media.phase import sample_phase
+from pmviewer.kernels.media.varying import albedo_at
 from pmviewer.kernels.random import draw1, draw4
 from pmviewer.kernels.vector import dot, is_good, luminance, mul, scale
 from pmviewer.maps.record import BOUNCES, HAD_DIFFUSE
@@ -124,7 +125,7 @@ def _through_media(scene, pass_, photon, of, volume_out, counts, ledgers, paths)
             return met
         word = _u4(flags | _u4(min(bounces, BOUNCES)))
         extend_path(paths, of.i, 0, flight.p, d, scale(after, of.factor), word, of.light, wave)
-        before, scattered = luminance(after), mul(after, scattering_albedo(scene, medium))
+        before, scattered = luminance(after), mul(after, albedo_at(scene, medium, flight.p))
         if of.to_global and bounces > 0 and luminance(scattered) > _f4(0.0):
             _store(pass_, of, volume_out, counts, (flight.p, d, scattered, word, wave), bounces)
             ledgers[kind, E_STORED] += _f8(before * of.factor)

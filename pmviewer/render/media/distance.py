@@ -7,6 +7,10 @@ import math
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import is_a, specialised
+from pmviewer.kernels.media.column import Column, stopped_by, through, where_depth
+from pmviewer.kernels.media.medium import extinction
+from pmviewer.kernels.media.varying import sigma_at
 from pmviewer.kernels.vector import along, dot, sub
 
 _f4 = np.float32
@@ -81,3 +85,42 @@ def equiangular_pdf(o, d, length, pivot, t):
         return _f4(0.0)
     s = _f8(t) - foot
     return _f4(D / ((b - a) * (D * D + s * s)))
+
+
+@specialised
+def distance_in(scene, medium, column, length, u):
+    """A distance in the column, its channels' transmittance each as often, with the density `distance_pdf`."""
+    if not is_a(column, Column):
+        return lambda scene, medium, column, length, u: transmittance_distance(extinction(scene, medium), length, u)
+
+    def of_lattice(scene, medium, column, length, u):
+        if column.grid < 0:
+            return transmittance_distance(column.sigma, length, u)
+        channel = min(int(_f8(u) * 3.0), 2)
+        u = _f8(u) * 3.0 - channel
+        share = stopped_by(column, channel)
+        if not share > 0.0:
+            return _f4(u) * length
+        depth = -math.log1p(-u * share) / _f8(column.sigma[channel])
+        return min(_f4(where_depth(scene, column, channel, depth)), length)
+
+    return of_lattice
+
+
+@specialised
+def distance_pdf(scene, medium, column, o, d, length, t):
+    """Density of `distance_in` per length."""
+    if not is_a(column, Column):
+        return lambda scene, medium, column, o, d, length, t: transmittance_pdf(extinction(scene, medium), length, t)
+
+    def of_lattice(scene, medium, column, o, d, length, t):
+        if column.grid < 0:
+            return transmittance_pdf(column.sigma, length, t)
+        sigma, T = sigma_at(scene, medium, along(o, d, t)), through(scene, column, t)
+        total = 0.0
+        for c in range(3):
+            share = stopped_by(column, c)
+            total += _f8(sigma[c]) * _f8(T[c]) / share if share > 0.0 else 1.0 / _f8(length)
+        return _f4(total / 3.0)
+
+    return of_lattice

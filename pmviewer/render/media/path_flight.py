@@ -9,19 +9,17 @@ import numpy as np
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.dimensions import PATH_FLIGHT
+from pmviewer.kernels.media.column import WORDS, column_of, through_all
 from pmviewer.kernels.media.flight import fly
-from pmviewer.kernels.media.medium import (
-    emitted_along,
-    has_media,
-    phase_numbers,
-    scattering_albedo,
-    transmittance,
-)
+from pmviewer.kernels.media.medium import has_media, phase_numbers
 from pmviewer.kernels.media.phase import phase, sample_phase
+from pmviewer.kernels.media.varying import albedo_at
+from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.surface import surface_at
 from pmviewer.kernels.vector import add, mul
 from pmviewer.render.cast import Hit, Ray, cast
+from pmviewer.render.media.emitted import emitted_in
 from pmviewer.render.media.phase_light import phase_light
 from pmviewer.render.media.through import next_boundary
 
@@ -59,13 +57,15 @@ def _emitted_on_the_way(scene, ray, hit):
     """Radiance that media send back along the whole way to what was met."""
     total, T = BLACK, (_f4(1.0), _f4(1.0), _f4(1.0))
     o, medium, left = ray.o, ray.medium, hit.t
+    marks = stack_i4(WORDS)
     for k in range(hit.crossed + 1):
         length, beyond, next_medium = left, o, medium
         if k < hit.crossed:
             length, beyond, next_medium = next_boundary(scene, o, ray.d, medium)
         if medium >= 0:
-            total = add(total, mul(T, emitted_along(scene, medium, length)))
-            T = mul(T, transmittance(scene, medium, length))
+            column = column_of(scene, medium, o, ray.d, length, marks)
+            total = add(total, mul(T, emitted_in(scene, medium, column, o, ray.d, length)))
+            T = mul(T, through_all(scene, medium, column, length))
         o, medium = beyond, next_medium
         left -= length
     return total
@@ -112,7 +112,7 @@ def scatter_in_medium(scene, eye, ray, arrival, choice, sampler, numbers, places
     def scattered(scene, eye, ray, arrival, choice, sampler, numbers, places):
         p, medium = arrival.p, arrival.hit.medium
         lobes = phase_numbers(scene, medium)
-        beta = mul(arrival.beta, scattering_albedo(scene, medium))
+        beta = mul(arrival.beta, albedo_at(scene, medium, p))
         L, rays = phase_light(scene, p, ray.d, medium, lobes, choice, eye.mis, sampler, places)
         wi = sample_phase(lobes, ray.d, numbers[0], numbers[1], numbers[2])
         return Scattered(

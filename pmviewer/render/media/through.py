@@ -8,7 +8,8 @@ import numpy as np
 
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.media.medium import MOST_BOUNDARIES, is_boundary, medium_beyond, transmittance
+from pmviewer.kernels.media.medium import MOST_BOUNDARIES, is_boundary, medium_beyond
+from pmviewer.kernels.media.varying import transmitted
 from pmviewer.kernels.surface import leave, surface_at
 from pmviewer.kernels.vector import dot, mul, sub
 
@@ -28,10 +29,10 @@ def light_through(scene, o, end, medium):
         length = _f4(math.sqrt(dot(d, d)))
         t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), BEFORE_LIGHT)
         if prim < 0:
-            return mul(T, transmittance(scene, medium, length))
+            return mul(T, transmitted(scene, medium, o, d, _f4(1.0), length))
         if not is_boundary(scene, _i8(prim)):
             break
-        T = mul(T, transmittance(scene, medium, t * length))
+        T = mul(T, transmitted(scene, medium, o, d, t, t * length))
         p, ng, _, gap = surface_at(scene, _i8(prim), u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
         medium = medium_beyond(scene, _i8(prim), ng, d, medium)
         o = leave(p, ng, gap, d[0], d[1], d[2])
@@ -57,7 +58,7 @@ def way_through(scene, ray, hit):
     o, medium, left = ray.o, ray.medium, hit.t
     for _ in range(hit.crossed):
         t, beyond, next_medium = next_boundary(scene, o, ray.d, medium)
-        T = mul(T, transmittance(scene, medium, t))
+        T = mul(T, transmitted(scene, medium, o, ray.d, t, t))
         o, medium = beyond, next_medium
         left -= t
-    return mul(T, transmittance(scene, medium, left))
+    return mul(T, transmitted(scene, medium, o, ray.d, left, left))

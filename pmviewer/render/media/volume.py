@@ -16,16 +16,10 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.kernels.dimensions import FURTHER_LIGHT, GATHER_VOLUME, GATHER_VOLUME_PHASE, VOLUME, VOLUME_PHASE
 from pmviewer.kernels.lights.light import sample_one_light
-from pmviewer.kernels.media.medium import (
-    emitted_along,
-    extinction,
-    has_media,
-    phase_numbers,
-    scattering_albedo,
-    scatters,
-    transmittance,
-)
+from pmviewer.kernels.media.column import WORDS, column_of, through_all
+from pmviewer.kernels.media.medium import has_media, phase_numbers, scatters
 from pmviewer.kernels.media.phase import phase, sample_phase
+from pmviewer.kernels.media.varying import albedo_at, sigma_at
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.scene import DIRECTIONAL, ENVIRONMENT, IMAGE, L_KIND, light_number
@@ -35,12 +29,8 @@ from pmviewer.render.cast import Ray, cast
 from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power, chosen_light
 from pmviewer.render.direct.direct import found_light
 from pmviewer.render.given import Sampler
-from pmviewer.render.media.distance import (
-    equiangular_distance,
-    equiangular_pdf,
-    transmittance_distance,
-    transmittance_pdf,
-)
+from pmviewer.render.media.distance import distance_in, distance_pdf, equiangular_distance, equiangular_pdf
+from pmviewer.render.media.emitted import emitted_in
 from pmviewer.render.media.phase_light import one_light_sample
 from pmviewer.render.media.through import next_boundary, way_through
 from pmviewer.render.pixel import EMISSION, SPECULAR, VOLUME_INDIRECT, deposit
@@ -65,12 +55,13 @@ class FromMedia(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """A stretch of a ray in one medium: from o in direction d, its length, and the medium."""
+    """A stretch of a ray in one medium: from o in direction d, its length, the medium, and its column."""
 
     o: Any
     d: Any
     length: Any
     medium: Any
+    column: Any
 
 
 @device
@@ -79,28 +70,29 @@ def _scattered_at(scene, stretch, t, pdf):
     if not (pdf > _f4(0.0) and pdf < _INF):
         return _BLACK
     medium = stretch.medium
-    weight = mul(mul(extinction(scene, medium), scattering_albedo(scene, medium)), transmittance(scene, medium, t))
+    p = along(stretch.o, stretch.d, t)
+    T = through_all(scene, medium, stretch.column, t)
+    weight = mul(mul(sigma_at(scene, medium, p), albedo_at(scene, medium, p)), T)
     return scale(weight, _f4(1.0) / pdf)
 
 
 @device
 def _by_light(scene, stretch, light, m, n_phase, u_t, u, v):
     """Single scattering by one sample of a light, of which m are expected. Returns L and the rays cast."""
-    o, d, length, medium = stretch
-    sigma = extinction(scene, medium)
+    o, d, length, medium, column = stretch
     kind = np.int32(light_number(scene, light, L_KIND))
     if kind in (ENVIRONMENT, DIRECTIONAL, IMAGE):
-        t = transmittance_distance(sigma, length, u_t)
-        pdf = transmittance_pdf(sigma, length, t)
+        t = distance_in(scene, medium, column, length, u_t)
+        pdf = distance_pdf(scene, medium, column, o, d, length, t)
     else:
         _, pivot, _, _, _ = sample_one_light(scene, light, o, u, v)
         half, u_t = u_t < _f4(0.5), _f4(2.0) * u_t
         if half:
             t = equiangular_distance(o, d, length, pivot, u_t)
         else:
-            t = transmittance_distance(sigma, length, u_t - _f4(1.0))
+            t = distance_in(scene, medium, column, length, u_t - _f4(1.0))
         around = equiangular_pdf(o, d, length, pivot, t)
-        pdf = _f4(0.5) * (around + transmittance_pdf(sigma, length, t))
+        pdf = _f4(0.5) * (around + distance_pdf(scene, medium, column, o, d, length, t))
     weight = _scattered_at(scene, stretch, t, pdf)
     if not largest(weight) > _f4(0.0):
         return _BLACK, 0
@@ -112,10 +104,10 @@ def _by_light(scene, stretch, light, m, n_phase, u_t, u, v):
 @device
 def _by_phase(scene, stretch, choice, numbers):
     """Single scattering by one direction of the phase function: what light it finds."""
-    o, d, length, medium = stretch
-    sigma, lobes = extinction(scene, medium), phase_numbers(scene, medium)
-    t = transmittance_distance(sigma, length, numbers[0])
-    weight = _scattered_at(scene, stretch, t, transmittance_pdf(sigma, length, t))
+    o, d, length, medium, column = stretch
+    lobes = phase_numbers(scene, medium)
+    t = distance_in(scene, medium, column, length, numbers[0])
+    weight = _scattered_at(scene, stretch, t, distance_pdf(scene, medium, column, o, d, length, t))
     if not largest(weight) > _f4(0.0):
         return _BLACK
     p = along(o, d, t)
@@ -157,9 +149,9 @@ def _indirect(given, stretch):
         return lambda given, stretch: _BLACK
 
     def by_beam(given, stretch):
-        scene, (o, d, length, medium) = given.scene, stretch
-        sigma, lobes = extinction(scene, medium), phase_numbers(scene, medium)
-        L, _ = beam_radiance(given.volume_map, o, d, length, given.eye.volume_radius, sigma, lobes)
+        o, d, length, medium, column = stretch
+        lobes = phase_numbers(given.scene, medium)
+        L, _ = beam_radiance(given.scene, given.volume_map, o, d, length, given.eye.volume_radius, column, lobes)
         return L
 
     return by_beam
@@ -172,18 +164,20 @@ def from_media(given, ray, hit, sampler, numbers, of_phase, counts):
     scene, eye = given.scene, given.eye
     single, indirect, emitted, T = _BLACK, _BLACK, _BLACK, _WHITE
     o, medium, left = ray.o, ray.medium, hit.t
+    marks = stack_i4(WORDS)
     for k in range(hit.crossed + 1):
         length, beyond, next_medium = left, o, medium
         if k < hit.crossed:
             length, beyond, next_medium = next_boundary(scene, o, ray.d, medium)
         if medium >= 0:
+            column = column_of(scene, medium, o, ray.d, length, marks)
             if scene.emits != 0:
-                emitted = add(emitted, mul(T, emitted_along(scene, medium, length)))
+                emitted = add(emitted, mul(T, emitted_in(scene, medium, column, o, ray.d, length)))
             if scatters(scene, medium) and eye.volume_light != 0:
-                stretch = Stretch(o, ray.d, length, medium)
+                stretch = Stretch(o, ray.d, length, medium, column)
                 single = add(single, mul(T, _single(given, stretch, sampler, numbers, of_phase, counts)))
                 indirect = add(indirect, mul(T, _indirect(given, stretch)))
-            T = mul(T, transmittance(scene, medium, length))
+            T = mul(T, through_all(scene, medium, column, length))
         o, medium = beyond, next_medium
         left -= length
     return FromMedia(single, indirect, emitted, T)

@@ -22,6 +22,7 @@ from pmviewer.scene.arrays.flatten_textures import (
     light_arrays,
     needs_tangents,
 )
+from pmviewer.scene.arrays.grids import grid_arrays, has_grids
 from pmviewer.scene.arrays.instances import build_instanced, instance_bounds
 from pmviewer.scene.arrays.light_table import LightTable
 from pmviewer.scene.arrays.material_row import MaterialTable, is_rich, material_table, used_materials
@@ -163,6 +164,7 @@ def flatten(
         **lights.sky_arrays(),
         **_shading_arrays(scene, features, stored, materials, lights, emissions),
         **(_media_arrays(scene, stored) if features["media"] else {}),
+        **(grid_arrays(scene.media) if features["grids"] else {}),
     }
     for name, array in arrays.items():
         arrays[name] = np.ascontiguousarray(array)
@@ -227,6 +229,7 @@ def _features(scene: Scene, materials: MaterialTable, lights: LightTable, emits_
         "blends": "blend" in materials.kinds,
         "media": has_media(scene),
         "dispersion": any(m.disperses for m in used),
+        "grids": has_media(scene) and has_grids(scene.media),
     }
 
 

@@ -1,12 +1,18 @@
-"""Medium elements: homogeneous participating media, with their phase functions."""
+"""Medium elements: homogeneous and heterogeneous participating media, with their phase functions."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
 
 from pmviewer.scene.description import Material, Medium
 from pmviewer.scene.formats.mitsuba.document import Document, Properties
 from pmviewer.scene.formats.mitsuba.interface import bounded
 from pmviewer.scene.formats.mitsuba.older import is_clear
+from pmviewer.scene.formats.mitsuba.volume import Volumes
 from pmviewer.scene.formats.mitsuba.xml import Element
+from pmviewer.scene.grid import Grid
 from pmviewer.scene.medium import RGB, Phase
 
 _LARGEST_SIGMA = 1e9
@@ -19,6 +25,7 @@ class Media:
 
     def __init__(self, document: Document) -> None:
         self.document = document
+        self.volumes = Volumes(document)
         self.list: list[Medium] = []
         self._index: dict[int, int] = {}
 
@@ -54,18 +61,43 @@ class Media:
         return inside, outside
 
     def _read(self, p: Properties) -> Medium | None:
+        if p.type == "heterogeneous":
+            return self._varying(p)
         if p.type != "homogeneous":
             self.document.ignore(p.element, "is not supported: what it fills is clear")
             return None
         sigma_t, albedo = _coefficients(p)
-        scale = bounded(p, "scale", p.number("scale", 1.0), 0.0, _LARGEST_SIGMA)
-        r, g, b = (min(s * scale, _LARGEST_SIGMA) for s in sigma_t)
         emission = _colour(p, "emission", 0.0, None)
-        phase = _phase(p)
-        p.known("has_spectral_extinction", "sample_emitters")
-        p.warn_unused("phase", "volume")
-        name = p.element.attributes.get("id") or "medium"
-        return Medium(name, (r, g, b), albedo, emission, phase)
+        return _finished(p, Medium("medium", sigma_t, albedo, emission))
+
+    def _varying(self, p: Properties) -> Medium | None:
+        """A medium with grids; None, with a warning, where one can't be read."""
+        density = self.volumes.of(p, "density" if self.volumes.has(p, "density") else "sigma_t", 1.0, None)
+        albedo, emission = self.volumes.of(p, "albedo", 0.75, 1.0), self.volumes.of(p, "emission", 0.0, None)
+        p.known("method", "step_size")
+        if density is None or albedo is None or emission is None:
+            self.document.ignore(p.element, "lacks its numbers: what it fills is clear")
+            return None
+        other = albedo.grid or emission.grid
+        grid = density.grid
+        if grid is None and other is not None:
+            grid = Grid(np.ones((1, 1, 1, 1), np.float32), other.to_world, "box")
+        medium = Medium(
+            "medium", density.factor, albedo.factor, emission.factor,
+            density=grid, albedo_grid=albedo.grid, emission_grid=emission.grid,
+        )  # fmt: skip
+        return _finished(p, medium)
+
+
+def _finished(p: Properties, medium: Medium) -> Medium:
+    """The medium with its name, scale and phase function, and a warning about what nobody asked for."""
+    scale = bounded(p, "scale", p.number("scale", 1.0), 0.0, _LARGEST_SIGMA)
+    most = _LARGEST_SIGMA / max(1.0, medium.density.most if medium.density is not None else 1.0)
+    r, g, b = (min(s * scale, most) for s in medium.sigma_t)
+    phase = _phase(p)
+    p.known("has_spectral_extinction", "sample_emitters")
+    p.warn_unused("phase", "volume")
+    return replace(medium, name=p.element.attributes.get("id") or "medium", sigma_t=(r, g, b), phase=phase)
 
 
 def _coefficients(p: Properties) -> tuple[RGB, RGB]:
