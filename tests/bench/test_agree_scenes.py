@@ -74,7 +74,7 @@ def test_every_scene_is_read_without_a_warning_and_few_variants_of_kernels_are_n
         scene = load_scene(path)
         assert [w for w in scene.warnings if not any(h in w for h in HARMLESS)] == [], (i, scene_of(2, i)["profile"])
         kinds.add(flatten(scene).record.dtype)
-    assert len(kinds) <= 7
+    assert len(kinds) <= 8
 
 
 def test_text_reads_back():

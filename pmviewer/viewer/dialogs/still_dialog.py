@@ -8,11 +8,10 @@ from imgui_bundle import imgui
 
 from pmviewer.errors import PmviewerError
 from pmviewer.output.diagnostic_views import DIAGNOSTICS, HELD_WHILE_SHOWN
-from pmviewer.output.frame_export import LAYERS, VOLUME_LAYERS
 from pmviewer.viewer import theme
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.exports import default_path
-from pmviewer.viewer.state import ViewerState
+from pmviewer.viewer.state import LAYERS, ViewerState
 from pmviewer.viewer.still import LARGEST
 
 TITLE = "Export at another size"
@@ -65,7 +64,7 @@ class StillDialog:
         imgui.set_next_item_width(6 * em)
         _, still.passes = imgui.drag_int("passes##still", still.passes, 0.5, 1, 100_000, "%d", flags)
         view = self._state.settings.display.view
-        can = view in (*LAYERS, *VOLUME_LAYERS, *HELD_WHILE_SHOWN, *DIAGNOSTICS)
+        can = view in (*LAYERS, *HELD_WHILE_SHOWN, *DIAGNOSTICS)
         imgui.begin_disabled(view not in DIAGNOSTICS)
         _, still.legend = imgui.checkbox("with its legend##still", still.legend)
         imgui.end_disabled()
