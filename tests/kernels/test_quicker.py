@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import operator
+import os
+import subprocess
+import sys
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +28,7 @@ def test_it_is_installed():
     assert not jit.numba.config.DISABLE_JIT, "or nothing is compiled"
     spared = (base.BaseContext.get_abi_sizeof, npydecl.ufunc_find_matching_loop, ir.Inst._rec_list_vars,
               NRTContext.get_meminfos, Lower.storevar, Lower.delvar, PostProcessor.run, transforms.canonicalize_cfg,
-              types.BaseFunction.get_call_type, types.Record.__hash__)  # fmt: skip
+              types.BaseFunction.get_call_type)  # fmt: skip
     for function in spared:
         assert function.__module__ == quicker.__name__, function
 
@@ -163,11 +166,38 @@ def test_a_call_that_is_known_is_what_numba_finds():
                     assert resolver.get_call_type(context, arguments, {}) == again
 
 
-def test_types_that_differ_have_hashes_and_places_of_their_own():
-    one, other = (types.Record.make_c_struct([(name, float64)]) for name in "ab")
-    assert len({one, other, types.Record.make_c_struct([("a", float64)])}) == 2
-    assert hash(types.Tuple([one, int64])) == hash(types.Tuple([one, int64]))
-    assert types.Tuple([one, int64]) != types.Tuple([other, int64])
+LOADED_ONCE = """
+import numpy as np
+from pmviewer.kernels.compile import jit
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
+from pmviewer.settings.access import Settings, with_values
+
+loads, load = [], jit._KernelCache.load_overload
+jit._KernelCache.load_overload = lambda self, *a: (loads.append(self), load(self, *a))[1]
+values = {"photons.N": 1000, "camera.width": 16, "camera.height": 16}
+renderer = Renderer(open_scene("cornell_caustic"), with_values(Settings(), values), WorkPool(1), StageStore(0))
+for i in range(6):
+    renderer.step()
+    print(len(loads))
+"""
+
+
+def test_what_another_process_has_compiled_is_loaded_once():
+    """Types are saved with kernels, and have to be found again where strings have other hashes."""
+    for seed in ("1", "2"):
+        told = subprocess.run(
+            [sys.executable, "-c", LOADED_ONCE],
+            env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+    counts = [int(line) for line in told.split()]
+    assert counts[0] > 5
+    assert counts[-1] == counts[-2]
 
 
 def test_loops_keep_their_shape():

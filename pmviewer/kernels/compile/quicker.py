@@ -26,7 +26,7 @@ from numba.np import npyimpl
 def install() -> None:
     """From now on, in this process."""
     _without_lock_events()
-    for step in (_sizes, _loops, _options, _variables, _hashes, _references, _places, _lifetimes, _calls, _listings):
+    for step in (_sizes, _loops, _options, _variables, _references, _places, _lifetimes, _calls, _listings):
         step()
 
 
@@ -148,20 +148,6 @@ def _places() -> None:
     Lower.storevar, Lower.delvar = storevar, delvar
 
 
-def _hashes() -> None:
-    """A type's hash is that of its key, which for a record is a table of all its fields."""
-    original = types.Type.__hash__
-
-    def __hash__(self: Any) -> int:
-        found = self.__dict__.get("_pmviewer_hash")
-        if found is None:
-            found = self._pmviewer_hash = original(self)
-        return int(found)
-
-    for kind in (types.Record, types.NamedTuple, types.NamedUniTuple, types.Tuple, types.UniTuple):
-        kind.__hash__ = __hash__
-
-
 def _lifetimes() -> None:
     """Lifetimes of variables are found out when somebody asks; variables alive where a block begins concern
     generators and Python's objects alone."""
@@ -189,15 +175,16 @@ def _lifetimes() -> None:
 def _calls() -> None:
     """What a function of numba's returns for plain arguments, once found, stays: its candidates never change."""
     original = types.BaseFunction.get_call_type
+    found: dict[int, tuple[Any, dict[Any, Any]]] = {}  # by identity: types are saved with all that they hold
 
     def get_call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
         if kws or not all(map(_is_plain, args)):
             return original(self, context, args, kws)
-        known = self.__dict__.setdefault("_pmviewer_calls", {})
-        found = known.get((context, args))
-        if found is None:
-            found = known[context, args] = original(self, context, args, kws)
-        return found
+        _, known = found.setdefault(id(self), (self, {}))
+        answer = known.get((context, args))
+        if answer is None:
+            answer = known[context, args] = original(self, context, args, kws)
+        return answer
 
     types.BaseFunction.get_call_type = get_call_type
 
