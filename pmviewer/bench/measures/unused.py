@@ -152,7 +152,8 @@ def sides(opened: OpenScene, needs: Needs, pool: WorkPool) -> tuple[Side, Side]:
         "photons.indirect_caustics": needs.caustics,
         "render.outline_rays": Settings().render.outline_rays if needs.outline else 0,
     }
-    stripped = Side(stripped_scene(opened, needs), with_values(Settings(), by_hand), stripped_plan(needs), pool)
+    plan = replace(stripped_plan(needs), split=opened.traits.has_smooth_glass)  # glass is in use where there is some
+    stripped = Side(stripped_scene(opened, needs), with_values(Settings(), by_hand), plan, pool)
     return Side(opened, automatic, None, pool), stripped
 
 

@@ -83,7 +83,9 @@ class ErrorEstimate:
         total = film.moments.image.reshape(h, w, 3)[y0:y1, x0:x1].copy()
         half = self._sums.pop(n // 2, None) if n % 2 == 0 else None
         if half is not None:
-            self._levels.append(_level(half, total, n // 2, run))
+            level = _level(half, total, n // 2, run)
+            if math.isfinite(level.D) and math.isfinite(level.error):  # a film that is not tells nothing
+                self._levels.append(level)
         self._sums[n] = total
 
     @property
