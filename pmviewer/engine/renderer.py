@@ -42,7 +42,7 @@ from pmviewer.engine.tally import Tally
 from pmviewer.engine.wanted import wanted_of
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.camera import CameraPose, resolve_camera
-from pmviewer.render.film import Film
+from pmviewer.render.film import Film, Increment
 from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.gather.gather_points import POINT_COLUMNS
 from pmviewer.render.given import PassData
@@ -138,11 +138,31 @@ class Renderer:
         """
         start = time.perf_counter()
         self._pass(self.film, self.camera, self.passes, self.settings.photons.N)
+        self._close_pass()
+        self.tally.seconds += time.perf_counter() - start
+
+    def increment(self, index: int) -> Increment:
+        """What pass `index` adds to the film, which stays as it is: `add` takes it, here or elsewhere. Raises
+        ValueError where a pass needs what those before it found (`estimate.radius_rule` "pixel")."""
+        if radii_of_pixels(self.facts):
+            raise ValueError("radii of pixels depend on the passes before")
+        film = film_of(self.settings, self.plan, self.camera.width, self.camera.height)
+        film.region, film.passes = self.film.region, index
+        self._pass(film, self.camera, index, self.settings.photons.N)
+        return Increment(film.sums, film.weights)
+
+    def add(self, increment: Increment) -> None:
+        """Take the next pass from elsewhere. The film is as if `step` had rendered it; the tally is the caller's."""
+        self.film.add(increment)
+        if self.film.moments is not None:
+            self.film.moments.add(self.film.sums, self.film.channels, 0, len(self.film.sums))
+        self._close_pass()
+
+    def _close_pass(self) -> None:
         self.film.passes += 1
         if self.film.moments is not None:
             self.film.moments.close_pass()
         self.error.add(self.film, self.pool.run)
-        self.tally.seconds += time.perf_counter() - start
 
     def photons_alone(self, passes: int) -> PhotonMaps | None:
         """The photons of the last of so many passes, without a picture: what `step` would trace for it. None where the

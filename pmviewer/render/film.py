@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,13 +32,27 @@ def resolve(sums, passes, out, first, last):
             out[pixel, c] = np.float32(sums[pixel, c] * inverse)
 
 
+@dataclass(frozen=True, eq=False)
+class Increment:
+    """What passes add to pixels of a film: `sums` and `weights` like the film's, weights None where samples count 1."""
+
+    sums: NDArray[np.float64]
+    weights: NDArray[np.float64] | None
+
+
 class Film:
     """Sums of `passes` samples per pixel: `sums` (height·width, channels + further) float64, `channels` being those of
     `pmviewer.render.planes`, with media MEDIA_CHANNELS, and `further` sums that a method keeps beside the planes;
     `radii` of the pixels' look-ups in the latest pass
     (`pmviewer.render.pixel_radius`), None where all have that of the pass; `weights` (height·width, 2) float64, sums
     of what samples count by a filter with negative parts (`pmviewer.render.filter`), in the term emission and in all
-    others, None where each counts 1; `moments`, what passes tell of the noise, None where nobody keeps them."""
+    others, None where each counts 1; `moments`, what passes tell of the noise, None where nobody keeps them.
+
+    A pass is one addition to each sum, however many samples it has there: passes that are rendered elsewhere and added
+    in their order give the same film bit for bit."""
+
+    numbered: int | None = None
+    """Column of `sums` that is no sum but the highest of the numbers that passes put there, −1 for none."""
 
     def __init__(self, width: int, height: int, further: int = 0, channels: int = CHANNELS) -> None:
         self.width, self.height, self.channels = width, height, channels
@@ -46,6 +64,34 @@ class Film:
         self.region: tuple[int, int, int, int] | None = None
         """Columns x0 … x1−1 and rows y0 … y1−1 of (x0, y0, x1, y1), which alone are rendered from the second pass on;
         None for all."""
+
+    def add(self, increment: Increment, first: int = 0) -> None:
+        """Add to the pixels from `first` on. `passes` and moments are the caller's."""
+        part = self.sums[first : first + len(increment.sums)]
+        numbers = None
+        if self.numbered is not None:
+            numbers = np.maximum(part[:, self.numbered], increment.sums[:, self.numbered])
+        part += increment.sums
+        if self.numbered is not None:
+            part[:, self.numbered] = numbers
+        if increment.weights is not None:
+            if self.weights is None:
+                self.weights = np.zeros((len(self.sums), 2))
+            self.weights[first : first + len(increment.weights)] += increment.weights
+
+    @contextmanager
+    def one_addition(self, first: int, last: int) -> Iterator[None]:
+        """While it lasts the sums of pixels first … last−1 are what has been added to them meanwhile, and no more."""
+        sums = self.sums[first:last]
+        weights = None if self.weights is None else self.weights[first:last]
+        before = Increment(sums.copy(), None if weights is None else weights.copy())
+        sums[:] = 0.0
+        if self.numbered is not None:
+            sums[:, self.numbered] = -1.0
+        if weights is not None:
+            weights[:] = 0.0
+        yield
+        self.add(before, first)
 
     def spans(self) -> list[tuple[int, int]]:
         """First and last + 1 of the pixels, row by row, that the next pass renders."""

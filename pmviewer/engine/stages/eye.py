@@ -46,12 +46,13 @@ def render_into(
         def run() -> NDArray[np.int64]:
             counts = np.zeros(N_COUNTS, np.int64)
             for first, last in parts:
-                if plan.path:
-                    path_pass(given.scene, given.eye, film.sums, counts, first, last)
-                else:
-                    eye_pass(given, outline, film.radii, film.sums, counts, first, last)
-                if signed:
-                    add_weights(given.eye, outline, film.weights, first, last)
+                with film.one_addition(first, last):
+                    if plan.path:
+                        path_pass(given.scene, given.eye, film.sums, counts, first, last)
+                    else:
+                        eye_pass(given, outline, film.radii, film.sums, counts, first, last)
+                    if signed:
+                        add_weights(given.eye, outline, film.weights, first, last)
                 if film.moments is not None:
                     film.moments.add(film.sums, film.channels, first, last)
             return counts

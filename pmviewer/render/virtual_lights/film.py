@@ -95,9 +95,11 @@ def ratio(numerator: NDArray[Any], denominator: NDArray[Any]) -> F8:
 class WeightedFilm(Film):
     """The film of the method "virtual lights": SUMS columns beyond the planes, see `pmviewer.maps.virtual_lights`."""
 
+    numbered = CHANNELS + W_OBJECT
+
     def __init__(self, width: int, height: int, virtual: Virtual) -> None:
         super().__init__(width, height, SUMS)
-        self.sums[:, CHANNELS + W_OBJECT] = -1.0
+        self.sums[:, self.numbered] = -1.0
         self.virtual = virtual
         self.estimator = ESTIMATORS.index(virtual.estimator)
 
