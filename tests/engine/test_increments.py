@@ -1,0 +1,60 @@
+"""Passes rendered elsewhere, in any order, and added in their order: the same film bit for bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
+from pmviewer.settings.access import Settings, with_values
+
+PASSES = 4
+SMALL = {"camera.width": 20, "camera.height": 16, "photons.N": 3000, "gather.rays": 4}
+
+
+def renderer(settings: Settings, threads: int) -> Renderer:
+    return Renderer(open_scene("cornell_caustic"), settings, WorkPool(threads), StageStore())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "values",
+    [
+        {},
+        {"render.filter": "Mitchell-Netravali", "importance.map": "footprint"},
+        {"render.method": "gather", "region.on": True, "region.right": 0.6, "region.bottom": 0.5},
+        {"render.method": "virtual lights", "virtual.normalisation": "per object"},
+        {"render.method": "path"},
+        {"photons.renew": "once"},
+    ],
+    ids=["as it comes", "signed filter", "gather, region", "virtual lights", "path", "photons once"],
+)
+def test_passes_from_elsewhere_make_the_same_film(values):
+    settings = with_values(Settings(), {**SMALL, **values})
+    alone, whole = renderer(settings, 2), renderer(settings, 1)
+    elsewhere = [renderer(settings, 1), renderer(settings, 3)]
+    for _ in range(PASSES):
+        alone.step()
+    made = {index: elsewhere[index % 2].increment(index) for index in reversed(range(PASSES))}
+    assert all(other.passes == 0 for other in elsewhere)
+    for index in range(PASSES):
+        whole.add(made[index])
+    assert whole.film.passes == alone.film.passes == PASSES
+    assert alone.film.sums.any()
+    np.testing.assert_array_equal(whole.film.sums, alone.film.sums)
+    np.testing.assert_array_equal(whole.film.planes(), alone.film.planes())
+    if alone.film.weights is not None:
+        np.testing.assert_array_equal(whole.film.weights, alone.film.weights)
+    if alone.film.moments is not None:
+        np.testing.assert_array_equal(whole.film.moments.squares, alone.film.moments.squares)
+        assert whole.film.moments.efficiency == alone.film.moments.efficiency
+    assert whole.error.latest == alone.error.latest
+
+
+def test_radii_of_pixels_need_the_passes_before():
+    settings = with_values(Settings(), {**SMALL, "estimate.radius_rule": "pixel"})
+    with pytest.raises(ValueError, match="passes before"):
+        renderer(settings, 1).increment(1)
