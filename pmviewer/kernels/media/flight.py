@@ -15,17 +15,8 @@ import numpy as np
 
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.compile.specialise import specialised
-from pmviewer.kernels.media.medium import (
-    MOST_BOUNDARIES,
-    depth_of,
-    extinction,
-    is_boundary,
-    medium_beyond,
-    scatters,
-    transmittance,
-)
-from pmviewer.kernels.media.varying import cross, has_grids
+from pmviewer.kernels.media.medium import MOST_BOUNDARIES, is_boundary, medium_beyond, scatters
+from pmviewer.kernels.media.varying import cross
 from pmviewer.kernels.surface import leave, surface_at
 from pmviewer.kernels.vector import along, mul
 
@@ -75,60 +66,9 @@ def _weighed(value, shares, densities):
     return value[0] / total, value[1] / total, value[2] / total
 
 
-@specialised
+@device
 def fly(scene, o, d, far, medium, beta, u_channel, u_depth):
     """The Flight of a path with throughput beta from o in direction d, up to the distance far."""
-    if has_grids(scene):
-        return lambda scene, o, d, far, medium, beta, u_channel, u_depth: _fly_on_lattices(
-            scene, o, d, far, medium, beta, u_channel, u_depth
-        )
-    return lambda scene, o, d, far, medium, beta, u_channel, u_depth: _fly_evenly(
-        scene, o, d, far, medium, beta, u_channel, u_depth
-    )
-
-
-@device
-def _fly_evenly(scene, o, d, far, medium, beta, u_channel, u_depth):
-    """`fly` through media that are the same everywhere."""
-    channel, shares = _channel(beta, u_channel)
-    tau = -_f4(math.log(_f4(1.0) - u_depth))
-    one = _f4(1.0)
-    T, density = (one, one, one), (one, one, one)
-    travelled = _f4(0.0)
-    rays = 0
-    for _ in range(MOST_BOUNDARIES):
-        t, found, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), far)
-        prim = _i8(found)
-        rays += 1
-        scattering = scatters(scene, medium)
-        if scattering:
-            sigma = extinction(scene, medium)
-            if depth_of(sigma[channel], t) > tau:
-                s = min(tau / sigma[channel], t)
-                here = transmittance(scene, medium, s)
-                T, density = mul(mul(T, here), sigma), mul(mul(density, here), sigma)
-                weight = _weighed(T, shares, density)
-                return Flight(True, along(o, d, s), _i8(-1), u, v, s, o, medium, travelled + s, weight, rays)
-            tau -= depth_of(sigma[channel], t)
-        here = transmittance(scene, medium, t)
-        T = mul(T, here)
-        if scattering:
-            density = mul(density, here)
-        if prim < 0 or not is_boundary(scene, prim):
-            weight = _weighed(T, shares, density)
-            return Flight(False, o, prim, u, v, t, o, medium, travelled + t, weight, rays)
-        p, ng, _, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
-        medium = medium_beyond(scene, prim, ng, d, medium)
-        o = leave(p, ng, gap, d[0], d[1], d[2])
-        travelled += t
-        far -= t
-    black = (_f4(0.0), _f4(0.0), _f4(0.0))
-    return Flight(False, o, _i8(-1), _f4(0.0), _f4(0.0), far, o, medium, travelled, black, rays)
-
-
-@device
-def _fly_on_lattices(scene, o, d, far, medium, beta, u_channel, u_depth):
-    """`fly` where numbers of media vary."""
     channel, shares = _channel(beta, u_channel)
     tau = -_f4(math.log(_f4(1.0) - u_depth))
     one = _f4(1.0)

@@ -84,18 +84,19 @@ def transmitted(scene, medium, o, d, t, length):
     return through
 
 
+@device
+def _varied(scene, medium, which, factor, p, ends):
+    """The medium's factor times the value of a lattice of it at a point; `ends`: nothing outside of the lattice."""
+    grid = grid_of(scene, medium, which)
+    return factor if grid < 0 else mul(factor, value_at(scene, grid, p, ends))
+
+
 @specialised
 def sigma_at(scene, medium, p):
     """σt per channel at a point of the medium."""
     if not has_grids(scene):
         return lambda scene, medium, p: extinction(scene, medium)
-
-    def at(scene, medium, p):
-        grid = grid_of(scene, medium, OF_EXTINCTION)
-        sigma = extinction(scene, medium)
-        return sigma if grid < 0 else mul(sigma, value_at(scene, grid, p, True))
-
-    return at
+    return lambda scene, medium, p: _varied(scene, medium, OF_EXTINCTION, extinction(scene, medium), p, True)
 
 
 @specialised
@@ -103,21 +104,13 @@ def albedo_at(scene, medium, p):
     """σs/σt per channel at a point of the medium."""
     if not has_grids(scene):
         return lambda scene, medium, p: scattering_albedo(scene, medium)
-
-    def at(scene, medium, p):
-        grid = grid_of(scene, medium, OF_ALBEDO)
-        albedo = scattering_albedo(scene, medium)
-        return albedo if grid < 0 else mul(albedo, value_at(scene, grid, p, False))
-
-    return at
+    return lambda scene, medium, p: _varied(scene, medium, OF_ALBEDO, scattering_albedo(scene, medium), p, False)
 
 
 @device
 def emission_at(scene, medium, p):
     """Radiance that the medium emits per length at a point; in scenes with lattices."""
-    grid = grid_of(scene, medium, OF_EMISSION)
-    emission = emission_of(scene, medium)
-    return emission if grid < 0 else mul(emission, value_at(scene, grid, p, False))
+    return _varied(scene, medium, OF_EMISSION, emission_of(scene, medium), p, False)
 
 
 @device
@@ -132,25 +125,30 @@ def _evenly(scene, medium, t, channel, tau):
     return Crossed(False, t, transmittance(scene, medium, t), sigma, tau - depth_of(sigma[channel], t))
 
 
-@device
+@specialised
 def cross(scene, medium, o, d, t, channel, tau):
-    """The stretch of length t from o in the unit direction d until its optical depth in the channel is tau, Crossed; in
-    scenes with lattices."""
-    grid = grid_of(scene, medium, OF_EXTINCTION)
-    if grid < 0:
-        return _evenly(scene, medium, t, channel, tau)
-    sigma = extinction(scene, medium)
-    wanted = _f8(np.inf)
-    if scatters(scene, medium) and sigma[channel] > _f4(0.0):
-        wanted = _f8(tau) / _f8(sigma[channel])
-    line = line_of(scene, grid, o, d)
-    found = walk(scene, grid, line, 0.0, _f8(t), channel, wanted)
-    T = thinned(sigma, found.depth, 1.0)
-    s = min(_f4(found.t), t)
-    if found.stops:
-        if size_of(scene, grid, G_CHANNELS) > 1:
-            p = (o[0] + s * d[0], o[1] + s * d[1], o[2] + s * d[2])
-            sigma = mul(sigma, value_at(scene, grid, p, False))
-        return Crossed(True, s, T, sigma, tau)
-    left = _f8(tau) - _f8(sigma[channel]) * found.depth[channel]
-    return Crossed(False, t, T, sigma, _f4(max(left, 0.0)))
+    """The stretch of length t from o in the unit direction d until its optical depth in the channel is tau: Crossed."""
+    if not has_grids(scene):
+        return lambda scene, medium, o, d, t, channel, tau: _evenly(scene, medium, t, channel, tau)
+
+    def through(scene, medium, o, d, t, channel, tau):
+        grid = grid_of(scene, medium, OF_EXTINCTION)
+        if grid < 0:
+            return _evenly(scene, medium, t, channel, tau)
+        sigma = extinction(scene, medium)
+        wanted = _f8(np.inf)
+        if scatters(scene, medium) and sigma[channel] > _f4(0.0):
+            wanted = _f8(tau) / _f8(sigma[channel])
+        line = line_of(scene, grid, o, d)
+        found = walk(scene, grid, line, 0.0, _f8(t), channel, wanted)
+        T = thinned(sigma, found.depth, 1.0)
+        s = min(_f4(found.t), t)
+        if found.stops:
+            if size_of(scene, grid, G_CHANNELS) > 1:
+                p = (o[0] + s * d[0], o[1] + s * d[1], o[2] + s * d[2])
+                sigma = mul(sigma, value_at(scene, grid, p, False))
+            return Crossed(True, s, T, sigma, tau)
+        left = _f8(tau) - _f8(sigma[channel]) * found.depth[channel]
+        return Crossed(False, t, T, sigma, _f4(max(left, 0.0)))
+
+    return through
