@@ -7,6 +7,7 @@ import gc
 import os
 import sys
 from collections import defaultdict
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,16 @@ COST = "cost"
 _begun: pytest.StashKey[tuple[float, int]] = pytest.StashKey()
 _compiled: list[int] = []
 """The number of functions compiled so far, once numba is imported."""
+
+
+@pytest.fixture(scope="module")
+def pool() -> Iterator[Any]:
+    """Two threads for the tests of a file."""
+    from pmviewer.engine.pool import WorkPool  # brings numba along
+
+    made = WorkPool(2)
+    yield made
+    made.close()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -40,13 +40,6 @@ def settings(**compare_):
 
 
 @pytest.fixture(scope="module")
-def pool():
-    pool = WorkPool(2)
-    yield pool
-    pool.close()
-
-
-@pytest.fixture(scope="module")
 def scene():
     return open_scene(wide_floor())
 

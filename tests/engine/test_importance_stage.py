@@ -10,7 +10,6 @@ import pytest
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import open_scene
-from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.maps.record import unpack
@@ -22,13 +21,6 @@ SIZE = 16
 
 def settings(method="gather", map="average", **importance):
     return settings_of(render={"method": method}, photons={"N": 2000}, importance={"map": map, "N": 1500, **importance})
-
-
-@pytest.fixture(scope="module")
-def pool():
-    pool = WorkPool(2)
-    yield pool
-    pool.close()
 
 
 def test_off_computes_nothing_and_on_changes_no_pixel():

@@ -11,7 +11,6 @@ from numba.core.registry import CPUDispatcher
 
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene, open_scene
-from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare, steps_of, types_of
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.stages.pass_data import blank_eye, blank_pass
@@ -49,13 +48,6 @@ VARIANTS: dict[str, dict[str, object]] = {
 @pytest.fixture(scope="module")
 def box() -> OpenScene:
     return open_scene(cornell_box(size=8))
-
-
-@pytest.fixture(scope="module")
-def pool():
-    pool = WorkPool(2)
-    yield pool
-    pool.close()
 
 
 def settings_of(variant: str) -> Settings:

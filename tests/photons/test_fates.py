@@ -9,7 +9,6 @@ import pytest
 
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import open_scene
-from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.importance.lights import importance_of_lights
@@ -34,13 +33,6 @@ RULES = {
     "guided": {"deposition": "density control", "emission": "Peter-Pietrek"},
     "Christensen": {"emission": "Christensen keep"},
 }
-
-
-@pytest.fixture(scope="module")
-def pool():
-    pool = WorkPool(2)
-    yield pool
-    pool.close()
 
 
 @pytest.fixture(scope="module")

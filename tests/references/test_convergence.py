@@ -17,13 +17,6 @@ OWN_ERROR = {"cornell_diffuse": 2.0e-5, "cornell_caustic": 6.5e-5}
 """relMSE of the references themselves."""
 
 
-@pytest.fixture(scope="module")
-def pool():
-    pool = WorkPool()
-    yield pool
-    pool.close()
-
-
 def halved(image: np.ndarray) -> np.ndarray:
     """The picture of half as many pixels either way: a quarter of the work for the same error of a pixel, since the
     box of a pixel is that of four."""

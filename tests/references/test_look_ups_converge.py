@@ -8,7 +8,6 @@ import pytest
 
 from pmviewer.bench.measures.error import reference
 from pmviewer.engine.opened import open_scene
-from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.output.metric import loglog_slope, metrics
@@ -37,13 +36,6 @@ def radiance_of_floor(depth):
     x, y = np.meshgrid(v * depth * np.tan(np.radians(30)), v * depth * np.tan(np.radians(30)))
     L = ALBEDO / np.pi / (1 + x**2 + y**2) ** 1.5
     return L.reshape(SIDE, fine, SIDE, fine).mean(axis=(1, 3))
-
-
-@pytest.fixture(scope="module")
-def pool():
-    pool = WorkPool()
-    yield pool
-    pool.close()
 
 
 def errors(renderer, target, passes):

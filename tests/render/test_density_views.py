@@ -8,7 +8,6 @@ import pytest
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import open_scene
-from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.importance.rules import probability_of
@@ -24,13 +23,6 @@ SIZE = 16
 
 def encode_normals(n):
     return np.ascontiguousarray(naive.pack(np.zeros_like(n), n).view(np.uint32)[:, 3])
-
-
-@pytest.fixture(scope="module")
-def pool():
-    pool = WorkPool(2)
-    yield pool
-    pool.close()
 
 
 @pytest.fixture(scope="module")

@@ -21,13 +21,6 @@ GATHER = {"render.method": "gather", "gather.radiance_photons": "1/4"}
 
 
 @pytest.fixture(scope="module")
-def pool():
-    pool = WorkPool(2)
-    yield pool
-    pool.close()
-
-
-@pytest.fixture(scope="module")
 def box():
     return open_scene(diffuse_box(size=SIZE))
 

@@ -6,7 +6,6 @@ import pytest
 from pmviewer.engine.diagnose import noise_plane
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.opened import open_scene
-from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.render.film import Film
@@ -20,13 +19,6 @@ SMALL = {"camera.width": 32, "camera.height": 32, "photons.N": 4000, "render.met
 @pytest.fixture(scope="module")
 def opened():
     return open_scene("cornell_caustic")
-
-
-@pytest.fixture(scope="module")
-def pool():
-    pool = WorkPool()
-    yield pool
-    pool.close()
 
 
 def renderer(opened, pool, **values):

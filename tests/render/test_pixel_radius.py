@@ -21,13 +21,6 @@ def opened():
     return open_scene("cornell_caustic")
 
 
-@pytest.fixture(scope="module")
-def pool():
-    pool = WorkPool()
-    yield pool
-    pool.close()
-
-
 def stepped(opened, pool, values, passes=3):
     renderer = Renderer(opened, with_values(Settings(), SMALL | values), pool, StageStore(0))
     for _ in range(passes):

@@ -5,19 +5,11 @@ import pytest
 
 from pmviewer.engine.effects import inactive_reason
 from pmviewer.engine.opened import open_scene
-from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.stages.pass_data import blank_eye
 from pmviewer.engine.store import StageStore
 from pmviewer.render.planes import PLANES
 from tests.support.scenes import GLASS, ball_in_environment, cornell_box, diffuse_box, settings_of
-
-
-@pytest.fixture(scope="module")
-def pool():
-    pool = WorkPool()
-    yield pool
-    pool.close()
 
 
 def renderer(scene, pool, splits, **render):

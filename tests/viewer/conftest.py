@@ -8,6 +8,9 @@ from collections.abc import Iterator
 import pytest
 
 from pmviewer.bench.screen import screen
+from pmviewer.viewer.app import ViewerApp
+from tests.viewer.driver import make_app
+from tests.viewer.fake_session import FakeSession
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -18,6 +21,21 @@ def display() -> Iterator[None]:
         yield
     if before is None:
         del os.environ["DISPLAY"]
+
+
+@pytest.fixture
+def session() -> FakeSession:
+    """A session that renders nothing, with a scene open."""
+    fake = FakeSession()
+    fake.open("box")
+    return fake
+
+
+@pytest.fixture
+def app(session, tmp_path, monkeypatch) -> ViewerApp:
+    """The window on it, at work in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    return make_app(session, tmp_path)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -16,17 +16,10 @@ from pmviewer.render.planes import PLANES
 from pmviewer.settings.access import with_values
 from pmviewer.viewer.comparison import EARLIER_RUNS, next_mark, run_of
 from pmviewer.viewer.panels.error_panel import log_limits
-from tests.viewer.driver import chord, drive, make_app, on_window_thread, viewport_pixels
-from tests.viewer.fake_session import SIZE, FakeSession
+from tests.viewer.driver import chord, drive, on_window_thread, viewport_pixels
+from tests.viewer.fake_session import SIZE
 
 K = imgui.Key
-
-
-@pytest.fixture
-def session() -> FakeSession:
-    fake = FakeSession()
-    fake.open("box")
-    return fake
 
 
 @pytest.fixture
@@ -35,12 +28,6 @@ def truth(session, tmp_path):
     image = session.frame.image("beauty") * 0.8
     write_exr(tmp_path / "truth.exr", {"": image})
     return image
-
-
-@pytest.fixture
-def app(session, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return make_app(session, tmp_path)
 
 
 def wait(context, condition):

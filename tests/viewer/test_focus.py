@@ -12,7 +12,7 @@ from pmviewer.scene.description import Parallelogram, PointLight, Scene, Shape
 from pmviewer.settings.access import with_values
 from pmviewer.viewer.overlays.focal_plane import CELLS, COLOUR, plane_vertices
 from tests.support.scenes import diffuse
-from tests.viewer.driver import drive, make_app, on_window_thread
+from tests.viewer.driver import drive, on_window_thread
 from tests.viewer.fake_session import FakeSession
 
 WALL, QUAD = 5.0, 4.0
@@ -33,12 +33,6 @@ def session() -> FakeSession:
     fake.opened_scene = open_scene(Scene("box", None, shapes, (diffuse(),), (lamp,), camera, 64, 64))
     fake.scene = fake.opened_scene.scene
     return fake
-
-
-@pytest.fixture
-def app(session, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return make_app(session, tmp_path)
 
 
 def click(context, app, u, v, ctrl=True):

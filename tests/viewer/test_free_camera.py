@@ -3,29 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from pmviewer.render.free_camera import frustum_lines
 from pmviewer.settings.access import FreeCamera, Settings, with_values
 from pmviewer.viewer import theme
-from tests.viewer.driver import drag_picture, drive, make_app, on_window_thread, viewport_pixels
-from tests.viewer.fake_session import FakeSession
+from tests.viewer.driver import drag_picture, drive, on_window_thread, viewport_pixels
 
 FROM = {"free_camera.on": True, "free_camera.origin": (3.0, 2.0, 5.0), "free_camera.target": (0.0, 0.0, 1.0)}
-
-
-@pytest.fixture
-def session() -> FakeSession:
-    fake = FakeSession()
-    fake.open("box")
-    return fake
-
-
-@pytest.fixture
-def app(session, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return make_app(session, tmp_path)
 
 
 def test_the_button_frees_the_camera_and_navigation_moves_it_alone(app, session):

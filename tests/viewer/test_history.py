@@ -15,24 +15,10 @@ from pmviewer.viewer.dialogs.recent import RecentFiles
 from pmviewer.viewer.history import History
 from pmviewer.viewer.state import ViewerState
 from tests.support.scenes import diffuse_box, settings_of
-from tests.viewer.driver import chord, drag, drag_picture, drive, item, make_app
-from tests.viewer.fake_session import FakeSession
+from tests.viewer.driver import chord, drag, drag_picture, drive, item
 
 K = imgui.Key
 PATIENCE = 120.0
-
-
-@pytest.fixture
-def session() -> FakeSession:
-    fake = FakeSession()
-    fake.open("box")
-    return fake
-
-
-@pytest.fixture
-def app(session, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return make_app(session, tmp_path)
 
 
 def state_of(session, tmp_path) -> ViewerState:

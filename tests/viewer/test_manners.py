@@ -16,16 +16,8 @@ from pmviewer.viewer import state as viewer_state
 from pmviewer.viewer.dialogs import dialogs
 from pmviewer.viewer.viewport import controls
 from tests.viewer.driver import drag_picture, drive, item, make_app, on_window_thread
-from tests.viewer.fake_session import FakeSession
 
 K = imgui.Key
-
-
-@pytest.fixture
-def session() -> FakeSession:
-    fake = FakeSession()
-    fake.open("box")
-    return fake
 
 
 @pytest.fixture

@@ -2,30 +2,15 @@
 
 from __future__ import annotations
 
-import pytest
 from imgui_bundle import imgui
 
 from pmviewer.settings.access import SETTINGS, Settings, with_values
 from pmviewer.settings.presets import PRESETS
 from pmviewer.viewer.panels.palette import entries, found
-from tests.viewer.driver import chord, drive, item, make_app
-from tests.viewer.fake_session import FakeSession
+from tests.viewer.driver import chord, drive, item
 
 K = imgui.Key
 NO_ERROR = imgui.test_engine.TestOpFlags_.no_error
-
-
-@pytest.fixture
-def session() -> FakeSession:
-    fake = FakeSession()
-    fake.open("box")
-    return fake
-
-
-@pytest.fixture
-def app(session, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return make_app(session, tmp_path)
 
 
 def test_every_command_and_setting_is_found_by_its_name(app):

@@ -7,21 +7,7 @@ import pytest
 from imgui_bundle.glfw_utils import glfw_window_hello_imgui
 
 from pmviewer.viewer.panels.toolbar import Item, _how_many
-from tests.viewer.driver import drive, make_app, on_window_thread
-from tests.viewer.fake_session import FakeSession
-
-
-@pytest.fixture
-def session() -> FakeSession:
-    fake = FakeSession()
-    fake.open("box")
-    return fake
-
-
-@pytest.fixture
-def app(session, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return make_app(session, tmp_path)
+from tests.viewer.driver import drive, on_window_thread
 
 
 def test_panels_shrink_and_grow_with_the_window(app):

@@ -21,7 +21,7 @@ from pmviewer.settings.access import Settings, changed_stages, with_values
 from pmviewer.viewer import snapshots as strip
 from pmviewer.viewer.panels.snapshots.table import figure_rows, setting_rows
 from pmviewer.viewer.sides import frame_side, same_camera
-from tests.viewer.driver import chord, drag_picture, drive, make_app, on_window_thread, viewport_pixels
+from tests.viewer.driver import chord, drag_picture, drive, on_window_thread, viewport_pixels
 from tests.viewer.fake_session import SIZE, FakeSession
 
 K = imgui.Key
@@ -42,12 +42,6 @@ def session() -> FakeSession:
     fake = StillSession()
     fake.open("box")
     return fake
-
-
-@pytest.fixture
-def app(session, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return make_app(session, tmp_path)
 
 
 def brighter(session, factor):

@@ -15,7 +15,7 @@ from pmviewer.viewer.background import Background
 from pmviewer.viewer.viewport import surroundings
 from pmviewer.viewer.viewport.surface_rays import SurfaceRays
 from pmviewer.viewer.viewport.surroundings import GAP, NOTHING, OUTSIDE, UNLIT, Surroundings
-from tests.viewer.driver import drag_picture, drive, make_app
+from tests.viewer.driver import drag_picture, drive
 from tests.viewer.fake_session import FakeSession
 
 K = imgui.Key
@@ -156,19 +156,6 @@ def test_what_is_said_of_a_camera_that_sees_nothing():
     assert near.advice(own, own, replace(unlit, coarse=True)) == ""
     near.take(room(open_side=5), BACKGROUND)
     assert near.advice(outside, own, frame) == "", "no closed room"
-
-
-@pytest.fixture
-def session() -> FakeSession:
-    fake = FakeSession()
-    fake.open("box")
-    return fake
-
-
-@pytest.fixture
-def app(session, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return make_app(session, tmp_path)
 
 
 def closed(session: FakeSession) -> None:

@@ -24,22 +24,9 @@ from tests.viewer.driver import (
     overlay_item,
     viewport_pixels,
 )
-from tests.viewer.fake_session import SIZE, FakeSession
+from tests.viewer.fake_session import SIZE
 
 K = imgui.Key
-
-
-@pytest.fixture
-def session() -> FakeSession:
-    fake = FakeSession()
-    fake.open("box")
-    return fake
-
-
-@pytest.fixture
-def app(session, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return make_app(session, tmp_path)
 
 
 def test_opens_on_a_scene_and_shows_its_frame(app, session):
