@@ -203,8 +203,12 @@ class RandomUser:
         while state.history.done:
             state.undo()
         self._settle(context)
-        self._look("undoing all")
         settings, picture = self._start
+        if state.frame is not None and state.frame.statistics.passes > settings.render.passes:
+            state.session.restart()  # fewer passes asked for leave the finer picture as it is
+            context.yield_(2)
+            self._settle(context)
+        self._look("undoing all")
         where = f"after {self.report.actions} actions"
         if state.settings != settings:
             differing = [p for p in SETTINGS if get(state.settings, p) != get(settings, p)]
