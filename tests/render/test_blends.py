@@ -15,6 +15,8 @@ from pmviewer.scene.description import Material, PointLight, Principled, Scene, 
 from pmviewer.scene.texture import Bitmap, Checkerboard
 from tests.support.scenes import GLASS, MIRROR, box_camera, box_walls, diffuse, panel, rendered, settings_of
 
+pytestmark = pytest.mark.usefixtures("every_surface")
+
 METAL = Material("metal", "rough conductor", (0.9, 0.7, 0.5), alpha=(0.4, 0.4), two_sided=True)
 SMOOTHER = replace(METAL, name="smoother", alpha=(0.1, 0.1))
 BLACK = Material("black", "diffuse", (0.0,) * 3, two_sided=True)

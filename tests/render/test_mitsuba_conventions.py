@@ -19,6 +19,8 @@ from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from tests.support.scenes import settings_of
 
+pytestmark = pytest.mark.usefixtures("every_surface")
+
 FOLDER = Path(__file__).parents[1] / "scene" / "mitsuba_conventions"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text("utf-8"))
 SCENES = EXPECTED["scenes"]

@@ -29,6 +29,8 @@ from pmviewer.scene.description import (
 )
 from tests.support.scenes import settings_of
 
+pytestmark = pytest.mark.usefixtures("every_surface")
+
 FILE = Path(__file__).with_name("mitsuba_materials") / "expected.json"
 SCENES = {row["name"]: row for row in json.loads(FILE.read_text("utf-8"))["scenes"]}
 SIZE = 48

@@ -20,6 +20,8 @@ from pmviewer.engine.store import StageStore
 from tests.render.mitsuba_views.scenes import VIEWS, description
 from tests.support.scenes import settings_of
 
+pytestmark = pytest.mark.usefixtures("every_surface")
+
 EXPECTED = json.loads((Path(__file__).parent / "mitsuba_views" / "expected.json").read_text("utf-8"))
 RUNS = 6
 SIGNIFICANCE = 1e-4

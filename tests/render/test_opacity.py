@@ -23,6 +23,8 @@ from pmviewer.scene.description import (
 from pmviewer.scene.texture import Bitmap, Checkerboard
 from tests.support.scenes import diffuse, rendered, settings_of
 
+pytestmark = pytest.mark.usefixtures("every_surface")
+
 BLACK = diffuse("black", (0.0, 0.0, 0.0))
 FIELDS = Checkerboard((1.0,) * 3, (0.25,) * 3, (2.0, 0, 0, 0, 2.0, 0))
 GREY_FIELDS = Checkerboard((2.0, 1.0, 0.5), (0.5, 0.25, 0.125), (2.0, 0, 0, 0, 2.0, 0))

@@ -15,6 +15,8 @@ from pmviewer.engine.store import StageStore
 from pmviewer.scene.description import Material, Mesh, Scene, Shape, Sphere
 from tests.support.scenes import GLASS, MIRROR, box_camera, box_walls, diffuse, panel, rendered, settings_of
 
+pytestmark = pytest.mark.usefixtures("every_surface")
+
 COPPER = ((0.2, 0.9, 1.1), (3.9, 2.4, 2.2))
 MATERIALS = {
     "rough conductor, looked up": Material("m", "rough conductor", (1.0,) * 3, alpha=(0.4, 0.4), metal=COPPER),

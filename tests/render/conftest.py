@@ -1,0 +1,20 @@
+"""One type of scene for tests of materials, so that all of them run the same kernels.
+
+What isn't there is not met, and changes nothing. That kernels for less show the same is tested elsewhere
+(`test_terms.py`, `test_same_picture.py`, `test_replays.py`).
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from pmviewer.scene.arrays import flatten
+
+SURFACES = ("bsdfs", "lights", "textures", "opacity", "principled", "blends")
+
+
+@pytest.fixture
+def every_surface(monkeypatch):
+    """Scenes are opened as if every kind of material, texture and light were in them."""
+    features_of = flatten._features
+    monkeypatch.setattr(flatten, "_features", lambda *of: {**features_of(*of), **dict.fromkeys(SURFACES, True)})
