@@ -1,7 +1,6 @@
 """One type of scene for tests of materials, so that all of them run the same kernels.
 
-What isn't there is not met, and changes nothing. That kernels for less show the same is tested elsewhere
-(`test_terms.py`, `test_same_picture.py`, `test_replays.py`).
+What isn't there is not met, and changes nothing; `test_same_picture.py` compares with kernels for less.
 """
 
 from __future__ import annotations

@@ -105,3 +105,19 @@ def test_place_of_the_scene_changes_nothing():
         a, b = (rendered(s, settings_for(method), 6).frame(1).image().astype(float) for s in (scene, shifted))
         print(f"{method} moved: mean ratio {b.mean() / a.mean():.5f}")
         assert b.mean() == pytest.approx(a.mean(), rel=0.01)
+
+
+@pytest.mark.parametrize("method", ["path", "progressive", "gather"])
+def test_what_else_kernels_know_changes_no_picture(method, request):
+    """Kernels for scenes like this alone, and those for any material, texture and light."""
+    own, any_ = [], []
+    for pictures in (own, any_):
+        for seed in (1, 2, 3, 4):
+            settings = settings_of(render={"method": method, "seed": seed}, photons={"N": 20_000})
+            pictures.append(rendered(cornell_box(size=16), settings, 16).frame(1).image().mean((0, 1)))
+        if pictures is own:
+            request.getfixturevalue("every_surface")
+    error = np.hypot(*(np.std(pictures, axis=0, ddof=1) / 2 for pictures in (own, any_)))
+    difference = np.abs(np.mean(own, axis=0) - np.mean(any_, axis=0))
+    assert (difference < 4 * error + 1e-6).all(), (difference, error)
+    assert (error < 0.01 * np.mean(own, axis=0)).all(), "it could be seen"
