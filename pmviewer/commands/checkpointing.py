@@ -139,14 +139,16 @@ class Keeper:
         spent = seconds if self.found is None else self.found.header.trial_seconds
         self._job = files.Job(self._job.scene, self._job.parameters, asked, spent)
 
+    def check(self, renderer: Renderer) -> None:
+        """Before any work: raises SceneError where what was found is of another rendering than the renderer's."""
+        if self.found is not None and (said := self.found.check(renderer)):
+            print(f"pmviewer: warning: the last bits of the picture may differ: {said}", file=sys.stderr)
+
     @contextmanager
     def watching(self, renderer: Renderer) -> Iterator[None]:
         """While passes are rendered: the first SIGINT or SIGTERM waits for the end of the pass, unless the file has all
-        that there is; the second doesn't. Begins with what was found. Raises SceneError where that is of another
-        rendering."""
+        that there is; the second doesn't. Begins with what was found, for a renderer that passed `check`."""
         if self.found is not None:
-            if said := self.found.check(renderer):
-                print(f"pmviewer: warning: the last bits of the picture may differ: {said}", file=sys.stderr)
             self.found.resume(renderer)
             self._kept, self.found = renderer.passes, None  # its arrays are the renderer's
             print(f"pmviewer: going on after pass {renderer.passes} of {self.path}", file=sys.stderr)

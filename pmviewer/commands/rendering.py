@@ -123,6 +123,8 @@ def _rendered(
 ) -> Frame:
     renderer = Renderer(opened, choice.settings, pool, StageStore(0))
     renderer.error.bias = choice.bias
+    if keeper is not None:
+        keeper.check(renderer)
     resumed = keeper is not None and keeper.found is not None
     if opened.scene.exposure is None and choice.settings.display.exposure == "auto" and not resumed:
         renderer.coarse_frame(0)  # as in the window it decides the exposure

@@ -114,12 +114,13 @@ def other_bits(before: Mapping[str, str], now: Mapping[str, str]) -> str:
 def other_scene(before: Mapping[str, str], now: Mapping[str, str]) -> str:
     """Which parts differ, in words."""
     parts = [part for part in now if before.get(part) != now[part]]
-    return f"the scene has {_other(parts)}" if parts else ""
+    others = [part for part in parts if part != "camera"]
+    said = [f"other {_listed(others)}"] * bool(others) + ["another camera"] * ("camera" in parts)
+    return f"the scene has {_listed(said)}" if said else ""
 
 
-def _other(parts: Sequence[str]) -> str:
-    named = [f"another {part}" if part == "camera" else f"other {part}" for part in parts]
-    return named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
+def _listed(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def other_settings(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
