@@ -39,7 +39,7 @@ class Lock:
         self._path = path.with_name(path.name + LOCK)
         while True:
             try:
-                file = self._path.open("a+b")
+                file = self._path.open("a+b", buffering=0)  # on a full disk nothing is left to be written
             except OSError as error:
                 raise OutputError(f"{what}: no file can be made beside it ({error.strerror}).") from None
             try:
@@ -56,7 +56,6 @@ class Lock:
         with suppress(OSError):
             file.truncate(0)
             file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
-            file.flush()
         self._file: IO[bytes] | None = file
 
     def release(self) -> None:

@@ -173,11 +173,12 @@ def _full_disk(folder: Path) -> list[tuple[float, int, bool]]:
     _done(output, 6, "--checkpoint", "1h", "--keep-checkpoint")
     file = output.with_suffix(".checkpoint")
     before, found = file.read_bytes(), list[tuple[float, int, bool]]()
+    limited = "--checkpoint", "0.001s", "--resume", "--keep-checkpoint"
     for share in (0.0, 0.02, 0.5, 0.999):
         file.write_bytes(before)
         blocks = int(share * len(before)) // 512
         # In sh a block is 512 bytes; Python gets EFBIG, as ENOSPC one of the errors of a full disk.
-        done = _rendered(output, 9, "--checkpoint", "0.001s", "--resume", shell=f"ulimit -f {blocks}")
+        done = _rendered(output, 9, *limited, shell=f"ulimit -f {blocks}")
         stays = file.exists() and file.read_bytes() == before and not list(folder.glob(".pmviewer-*"))
         said = done.stderr.count("no room on the disk") - done.stderr.count("pmviewer: error")
         _done(output, 12, "--resume")

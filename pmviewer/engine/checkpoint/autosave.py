@@ -56,7 +56,7 @@ class KeptFilm:
             self._of, self._rendered = weakref.ref(renderer), 0.0
         start = time.monotonic()
         passed, new = start - self._at, renderer.tally.seconds - self._rendered
-        early = passed < SHARE * self._took or (passed < interval and not done)
+        early = passed < max(interval, SHARE * self._took) and not done
         if self.path is None or interval <= 0 or new < WORTH or early:
             return
         try:

@@ -115,7 +115,8 @@ def other_scene(before: Mapping[str, str], now: Mapping[str, str]) -> str:
     """Which parts differ, in words."""
     parts = [part for part in now if before.get(part) != now[part]]
     others = [part for part in parts if part != "camera"]
-    said = [f"other {_listed(others)}"] * bool(others) + ["another camera"] * ("camera" in parts)
+    said = [f"other {_listed(others)}"] if others else []
+    said += ["another camera"] if "camera" in parts else []
     return f"the scene has {_listed(said)}" if said else ""
 
 
