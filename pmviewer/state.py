@@ -18,11 +18,8 @@ class State:
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
     @staticmethod
-    def of_parts(
-        numbers: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], /, **parts: State | None
-    ) -> State:
-        """An object's own numbers and arrays, and by name the states of its parts, None for those that are not there.
-        """
+    def of_parts(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], /, **parts: State | None) -> State:
+        """Of an object's own numbers and arrays, and by name the states of its parts, None for those that it lacks."""
         found = {name: part for name, part in parts.items() if part is not None}
         of_parts = {f"{name}.{key}": array for name, part in found.items() for key, array in part.arrays.items()}
         return State({**numbers, **{name: part.numbers for name, part in found.items()}}, {**arrays, **of_parts})

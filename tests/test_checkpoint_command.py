@@ -232,7 +232,14 @@ def test_what_automatic_mode_has_chosen_stays(tmp_path, at_pass, monkeypatch, ca
 
 
 def test_times():
-    assert [seconds_of(text) for text in ("60s", "10min", "1h", "90", "1.5 min", "0.5s")] == [60, 600, 3600, 90, 90, 0.5]
+    assert [seconds_of(text) for text in ("60s", "10min", "1h", "90", "1.5 min", "0.5s")] == [
+        60,
+        600,
+        3600,
+        90,
+        90,
+        0.5,
+    ]
     for text in ("0", "-5s", "soon", "5 days", "", "1e3s", "nan"):
         with pytest.raises(SettingError, match="60s, 10min or 1h"):
             seconds_of(text)

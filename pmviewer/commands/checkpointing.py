@@ -49,6 +49,9 @@ class Asked:
         return self.interval is not None or self.resume
 
 
+NO_CHECKPOINTS = Asked()
+
+
 def seconds_of(text: str) -> float:
     """60s, 10min, 1h or bare seconds. Raises SettingError."""
     found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*(s|min|h|)\s*", text)

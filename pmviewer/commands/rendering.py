@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from pmviewer.commands.checkpointing import Asked, Keeper, checkpoints_of
+from pmviewer.commands.checkpointing import NO_CHECKPOINTS, Asked, Keeper, checkpoints_of
 from pmviewer.commands.choosing import Chosen, wants_choice, with_choice
 from pmviewer.commands.job import DEFAULT_PASSES, Job, Stop, check_output, overrides
 from pmviewer.commands.patience import patiently, print_warnings
@@ -50,7 +50,7 @@ def render_job(
     denoise: bool = False,
     reference: str | None = None,
     stats: bool = False,
-    checkpoints: Asked = Asked(),
+    checkpoints: Asked = NO_CHECKPOINTS,
 ) -> Frame:
     """Render and write the files; with a reference (a file or "auto") also print the error at passes 1, 2, 4, … and at
     the end; with `stats` photons, rays, times and the energy ledger.
@@ -133,9 +133,7 @@ def _rendered(
     return renderer.frame(1, replace(wanted, denoised=True) if denoise else wanted)
 
 
-def _run(
-    renderer: Renderer, pool: WorkPool, measure: Callable[[Renderer], None] | None, keeper: Keeper | None
-) -> None:
+def _run(renderer: Renderer, pool: WorkPool, measure: Callable[[Renderer], None] | None, keeper: Keeper | None) -> None:
     """Render until a stop rule holds; `measure` is called after passes 1, 2, 4, … and the last one."""
     with progress_bar(remaining=True) as bar:
         prepare(renderer.scene, renderer.settings, pool, bar.update)

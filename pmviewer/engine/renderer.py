@@ -166,8 +166,8 @@ class Renderer:
         self.error.add(self.film, self.pool.run)
 
     def state(self) -> State:
-        """The film and all that goes on with it: error estimate, counts, exposure, and what a pass takes over from those
-        before it. Arrays are the renderer's own: they hold until the next pass."""
+        """The film and all that goes on with it: error estimate, counts, exposure, and what a pass takes over from
+        those before it. Arrays are the renderer's own: they hold until the next pass."""
         maps = self.light.latest
         return State.of_parts(
             {"exposures": dict(self.scene.exposures)},

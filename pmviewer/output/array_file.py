@@ -69,9 +69,14 @@ def _plain(value: Any) -> Any:
 
 def _write(entry: IO[bytes], array: NDArray[Any]) -> None:
     npy.write_array_header_1_0(entry, npy.header_data_from_array_1_0(array))
-    content = memoryview(array.reshape(-1)).cast("B") if array.size else memoryview(b"")
+    content = _bytes_of(array)
     for start in range(0, len(content), CHUNK):
-        entry.write(content[start : start + CHUNK])
+        entry.write(content[start : start + CHUNK].data)
+
+
+def _bytes_of(array: NDArray[Any]) -> NDArray[np.uint8]:
+    """The memory of a contiguous array."""
+    return array.reshape(-1).view(np.uint8)
 
 
 def read_about(path: str | Path, what: str) -> dict[str, Any]:
@@ -127,12 +132,12 @@ def _read(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[Any]:
         if dtype.kind not in _KINDS or fortran or min(shape, default=0) < 0 or bytes_ > info.file_size:
             raise ValueError(info.filename)
         array = np.empty(shape, dtype)
-        content, filled = memoryview(array.reshape(-1)).cast("B") if array.size else memoryview(b""), 0
+        content, filled = _bytes_of(array), 0
         while filled < len(content):
             part = entry.read(min(CHUNK, len(content) - filled))
             if not part:
                 raise EOFError(info.filename)
-            content[filled : filled + len(part)] = part
+            content[filled : filled + len(part)] = np.frombuffer(part, np.uint8)
             filled += len(part)
         if entry.read(1):  # and at its end the checksum is compared
             raise ValueError(info.filename)

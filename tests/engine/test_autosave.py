@@ -19,7 +19,8 @@ from pmviewer.settings.access import Settings, with_values
 from tests.support.sessions import PATIENCE, until
 
 SMALL = with_values(
-    Settings(), {"camera.width": 20, "camera.height": 16, "photons.N": 2000, "render.passes": 5, "display.autosave": 0.01}
+    Settings(),
+    {"camera.width": 20, "camera.height": 16, "photons.N": 2000, "render.passes": 5, "display.autosave": 0.01},
 )
 
 

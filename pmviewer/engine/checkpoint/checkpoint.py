@@ -1,7 +1,7 @@
 """A checkpoint: the state of a renderer with what it is of, in one file.
 
-`write_checkpoint` replaces the file atomically; `read_checkpoint` reads it whole or not at all; `resume` refuses what is
-of another scene, program or setting, and says what differs.
+`write_checkpoint` replaces the file atomically; `read_checkpoint` reads it whole or not at all; `Checkpoint.check`
+refuses what is of another scene, program or setting, and says what differs.
 """
 
 from __future__ import annotations

@@ -49,8 +49,7 @@ class MapBuilder:
         return PassMaps(index, N, *self._empty())
 
     def maps(self, light: LightPlan, traced: TracedPass, carried: Carried) -> PassMaps:
-        """All maps of the pass. The radii of guides and light choice of the passes before are kept: they blur nothing.
-        """
+        """All maps of the pass. Radii of guides and light choice are kept from pass to pass: they blur nothing."""
         plan, photons = self.plan, traced.photons
         makes: list[Callable[[], Any]] = [
             lambda: self._guides(light, traced, carried.guides),

@@ -33,8 +33,8 @@ class LookUpMap:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """What a pass takes over from those before it: what guided emission has `known`, and the radii in scene units of the
-    `guides` and of the `chooser`, which the first pass has found; None for what is not there."""
+    """What a pass takes over from those before it: what guided emission has `known`, and the radii in scene units of
+    the `guides` and of the `chooser`, which the first pass has found; None for what is not there."""
 
     known: Known | None = None
     guides: float | None = None
@@ -117,8 +117,7 @@ class PassMaps:
         return self.photons.guided.lights if self.photons is not None and self.photons.guided is not None else None
 
     def carried(self, index: int) -> Carried:
-        """What pass `index` takes over from this one; what guided emission knows is handed on to the next pass alone.
-        """
+        """What pass `index` takes over from this one; what guided emission knows goes to the next pass alone."""
         guided = self.photons.guided if self.photons is not None else None
         known = guided.known if guided is not None and index == self.index + 1 else None
         return replace(self.taken_over, known=known)

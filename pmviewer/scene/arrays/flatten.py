@@ -38,7 +38,8 @@ Float = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class FlatScene:
-    """A scene's `arrays` by name. `record` is the one-element record array for kernels; the other fields keep its memory alive.
+    """A scene's `arrays` by name. `record` is the one-element record array for kernels; the other fields keep its
+    memory alive.
 
     `light_power` is (n_lights, 3) float64 in watts, in the order of the light table; `light_names` and
     the table's rows `lights` (n_lights, LIGHT_COLUMNS) likewise; `prim_light` is each stored primitive's light, −1 for
