@@ -96,8 +96,8 @@ def test_a_full_disk_leaves_the_file_before(kept, monkeypatch):
         written = [None] * limit
 
         def write(self, data, written=written):
-            written.pop()
-            if not written:
+            del written[-1:]
+            if not written:  # and ever after
                 raise OSError(errno.ENOSPC, "No space left on device")
             return len(data)
 
