@@ -207,6 +207,28 @@ def test_a_full_disk_costs_no_more_than_a_warning(kept, whole, capsys, monkeypat
     assert file.read_bytes() == before
 
 
+def test_an_output_that_cannot_be_written_costs_no_pass(tmp_path, whole, capsys, monkeypatch):
+    """And what a killed process has left half-written does not stay."""
+    from pmviewer.commands import rendering
+    from pmviewer.errors import OutputError
+
+    def full(*_, **__):
+        raise OutputError("a.exr: no room on the disk.")
+
+    path = tmp_path / "a.exr"
+    left = tmp_path / ".pmviewer-a.checkpoint.tmp"
+    left.write_bytes(b"half")
+    monkeypatch.setattr(rendering, "write_frame_exr", full)
+    words = ["-o", path, "--passes", 5, *SMALL, "--checkpoint", "1h"]
+    assert call(*words) == 2
+    assert "5 passes are kept" in capsys.readouterr().err
+    assert not left.exists()
+    assert read_header(path.with_suffix(".checkpoint")).passes == 5
+    monkeypatch.undo()
+    assert call(*words, "--resume") == 0
+    assert pictures(path) == whole
+
+
 def test_time_goes_on_counting(tmp_path, at_pass, monkeypatch):
     path, words = tmp_path / "a.exr", ["-o", tmp_path / "a.exr", "--as-set", *SMALL, "--checkpoint", "1h"]
     at_pass(3, send(signal.SIGTERM))

@@ -75,6 +75,9 @@ def checkpoints_of(asked: Asked, job: Job, outputs: Sequence[Path]) -> Iterator[
     keeper = Keeper(asked, job, outputs)
     try:
         yield keeper
+    except OutputError:
+        keeper.unwritten()
+        raise
     finally:
         keeper.release()
 
@@ -90,7 +93,9 @@ class Keeper:
         self._asked, self._job = asked, files.Job(job.scene, job.parameters)
         self._kept: int | None = None
         """Passes in the file."""
-        self._warned = self._leaving = False
+        self._warned = False
+        self._renderer: Renderer | None = None
+        """Once it renders."""
         self._came: int | None = None
         self._state_at = self._written_in = self._pass_began = 0.0
         self._passes: list[float] = []
@@ -155,6 +160,7 @@ class Keeper:
             self.found.resume(renderer)
             self._kept, self.found = renderer.passes, None  # its arrays are the renderer's
             print(f"pmviewer: going on after pass {renderer.passes} of {self.path}", file=sys.stderr)
+        self._renderer = renderer
         self._state_at = self._pass_began = time.monotonic()
         before = {number: signal.getsignal(number) for number in STATUS}
 
@@ -192,7 +198,7 @@ class Keeper:
         """Write one. Where that fails the one before stays, rendering goes on, and that is said once."""
         start = time.monotonic()
         try:
-            write_checkpoint(self.path, renderer, self._job)
+            write_checkpoint(self.path, renderer, self._job, locked=True)
         except OutputError as error:
             if not self._warned:
                 kept = f"the checkpoint of pass {self._kept} stays" if self._kept else "there is no checkpoint yet"
@@ -217,6 +223,13 @@ class Keeper:
         raise SystemExit(STATUS[number])
 
     # its end ----------------------------------------------------------------------------------------------------
+
+    def unwritten(self) -> None:
+        """An output could not be written: the checkpoint gets all passes, so that they are not rendered again."""
+        if self._renderer is not None and self._kept != self._renderer.passes:
+            self.write(self._renderer)
+        if self._kept:
+            print(f"pmviewer: {self._kept} passes are kept in {self.path}: go on with --resume", file=sys.stderr)
 
     def written(self) -> None:
         """All outputs are written: the checkpoint has done its work."""

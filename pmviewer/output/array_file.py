@@ -46,11 +46,11 @@ _BROKEN = (
 )
 
 
-def write_arrays(path: Path, suffix: str, about: Mapping[str, Any], state: State) -> int:
+def write_arrays(path: Path, suffix: str, about: Mapping[str, Any], state: State, *, alone: bool = False) -> int:
     """Write what the file is `about` and a state; returns how many bytes that takes. The file before stays whole on any
-    failure. Raises OutputError."""
+    failure. `alone` as for `pmviewer.output.files.replacing`. Raises OutputError."""
     size = sum(array.nbytes for array in state.arrays.values())
-    with replacing(path, (suffix,), size) as file:
+    with replacing(path, (suffix,), size, alone=alone) as file:
         with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
             tree = {**about, "numbers": state.numbers}
             archive.writestr(zipfile.ZipInfo(ABOUT, _EARLIEST), json.dumps(tree, default=_plain))

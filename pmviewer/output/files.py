@@ -49,12 +49,15 @@ def write_file(path: str | Path, data: bytes, suffixes: Sequence[str]) -> None:
 
 
 @contextmanager
-def replacing(path: str | Path, suffixes: Sequence[str], size: int = 0) -> Iterator[BinaryIO]:
+def replacing(path: str | Path, suffixes: Sequence[str], size: int = 0, *, alone: bool = False) -> Iterator[BinaryIO]:
     """The same for what is written piece by piece, `size` bytes in all: gives a file that takes the other's place
-    when the context ends, and goes when it is left by an exception."""
+    when the context ends, and goes when it is left by an exception. What a process that was killed has left lies about
+    for ever, unless whoever is `alone` in writing the file, by a lock, writes it again."""
     target = check_target(path, suffixes)
-    temporary = target.parent / f".pmviewer-{secrets.token_hex(8)}.tmp"
+    temporary = target.parent / f".pmviewer-{target.name if alone else secrets.token_hex(8)}.tmp"
     try:
+        if alone:
+            temporary.unlink(missing_ok=True)
         if target.exists() and not os.access(target, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         try:

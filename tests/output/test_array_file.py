@@ -101,7 +101,7 @@ def test_a_full_disk_leaves_the_file_before(kept, monkeypatch):
                 raise OSError(errno.ENOSPC, "No space left on device")
             return len(data)
 
-        monkeypatch.setattr(array_file, "replacing", lambda *given, write=write: _failing(*given, write))
+        monkeypatch.setattr(array_file, "replacing", lambda *given, write=write, **alone: _failing(*given, write, **alone))
         with pytest.raises(OutputError, match="no room on the disk"):
             write_arrays(kept, SUFFIX, {}, State({}, {"big": np.zeros(1 << 18)}))
         monkeypatch.undo()
@@ -109,7 +109,7 @@ def test_a_full_disk_leaves_the_file_before(kept, monkeypatch):
         assert [path.name for path in kept.parent.iterdir()] == [kept.name]
 
 
-def _failing(path, suffixes, size, write):
+def _failing(path, suffixes, size, write, alone):
     """`replacing` with a file whose writes end up on a disk that is full."""
     from contextlib import contextmanager
 
@@ -117,7 +117,7 @@ def _failing(path, suffixes, size, write):
 
     @contextmanager
     def replaced():
-        with replacing(path, suffixes, size) as file:
+        with replacing(path, suffixes, size, alone=alone) as file:
             yield type("Full", (io.BytesIO,), {"write": lambda self, data: write(self, data) and file.write(data)})()
 
     return replaced()

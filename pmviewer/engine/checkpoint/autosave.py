@@ -19,7 +19,7 @@ SHARE = 20.0
 
 
 class KeptFilm:
-    """Writes the film to `path` now and then, None for nowhere; on the thread that renders: the film stands still
+    """Writes the film to `path`, which nobody else does, now and then, None for nowhere; on the thread that renders: the film stands still
     meanwhile, and the window doesn't wait for it. `go_on_with` is a checkpoint that the next renderer goes on with.
     `say` gets lines for the log."""
 
@@ -60,7 +60,7 @@ class KeptFilm:
         if self.path is None or interval <= 0 or new < WORTH or early:
             return
         try:
-            write_checkpoint(self.path, renderer, Job(renderer.scene.source))
+            write_checkpoint(self.path, renderer, Job(renderer.scene.source), locked=True)
             self._failed = False
         except OutputError as error:
             if not self._failed:

@@ -75,9 +75,9 @@ class Checkpoint:
             raise SceneError(f"This checkpoint does not fit its own settings ({error}).", self.path) from None
 
 
-def write_checkpoint(path: Path, renderer: Renderer, job: Job) -> int:
-    """Write one between two passes; returns its size in bytes. On any failure the file before is whole. Raises
-    OutputError."""
+def write_checkpoint(path: Path, renderer: Renderer, job: Job, *, locked: bool = False) -> int:
+    """Write one between two passes; returns its size in bytes. On any failure the file before is whole. `locked`: by a
+    lock nobody else writes it. Raises OutputError."""
     settings = renderer.settings
     header = Header(
         scene=job.scene,
@@ -95,7 +95,7 @@ def write_checkpoint(path: Path, renderer: Renderer, job: Job) -> int:
         hashes=_hashes(renderer),
     )
     try:
-        return write_arrays(path, SUFFIX, header.tree(), renderer.state())
+        return write_arrays(path, SUFFIX, header.tree(), renderer.state(), alone=locked)
     except MemoryError:
         raise OutputError(f"{path}: not enough memory to write a checkpoint.") from None
 
