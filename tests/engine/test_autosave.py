@@ -105,7 +105,7 @@ def test_a_disk_that_is_full_is_said_once(session, tmp_path, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(checkpoint, "write_arrays", lambda path, *_: write_full(path, full))
+    monkeypatch.setattr(checkpoint, "write_arrays", lambda path, *_, **__: write_full(path, full))
     session.autosave(tmp_path / "kept.checkpoint")
     session.open("cornell_diffuse", with_values(SMALL, {"display.autosave": 1e-6}))
     assert session.wait(timeout=PATIENCE)

@@ -29,7 +29,7 @@ from pmviewer.output.exr import read_exr
 from pmviewer.settings.access import Settings, with_values
 
 SCENE, PASSES, INTERVAL = "cornell_caustic", 64, 1.0
-SIZE, N = 256, 100_000
+SIZE, N = 160, 30_000
 USUAL_INTERVAL = 60.0
 """Seconds, of what checkpoints cost."""
 TIMES = ("seconds", "cpu_seconds")
