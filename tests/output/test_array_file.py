@@ -101,7 +101,10 @@ def test_a_full_disk_leaves_the_file_before(kept, monkeypatch):
                 raise OSError(errno.ENOSPC, "No space left on device")
             return len(data)
 
-        monkeypatch.setattr(array_file, "replacing", lambda *given, write=write, **alone: _failing(*given, write, **alone))
+        def failing(*given, alone, write=write):
+            return _failing(*given, write, alone)
+
+        monkeypatch.setattr(array_file, "replacing", failing)
         with pytest.raises(OutputError, match="no room on the disk"):
             write_arrays(kept, SUFFIX, {}, State({}, {"big": np.zeros(1 << 18)}))
         monkeypatch.undo()

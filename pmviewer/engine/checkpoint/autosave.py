@@ -19,9 +19,9 @@ SHARE = 20.0
 
 
 class KeptFilm:
-    """Writes the film to `path`, which nobody else does, now and then, None for nowhere; on the thread that renders: the film stands still
-    meanwhile, and the window doesn't wait for it. `go_on_with` is a checkpoint that the next renderer goes on with.
-    `say` gets lines for the log."""
+    """Writes the film to `path`, which nobody else does, now and then, None for nowhere; on the thread that renders:
+    the film stands still meanwhile, and the window does not wait for it. `go_on_with` is a checkpoint that the next
+    renderer goes on with. `say` gets lines for the log."""
 
     def __init__(self, say: Callable[[Level, str], None]) -> None:
         self.path: Path | None = None
