@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 from pmviewer.commands.job import Stop
 from pmviewer.commands.progress_bar import progress_bar
+from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.candidates import given
 from pmviewer.engine.auto.choose import Goal, choose
 from pmviewer.engine.opened import OpenScene
@@ -30,18 +32,28 @@ def wants_choice(stop: Stop, settings: Settings) -> bool:
     return not told and (stop.seconds is not None or stop.error is not None)
 
 
-def with_choice(
-    opened: OpenScene, settings: Settings, pool: WorkPool
-) -> tuple[Settings, Callable[[int], float] | None]:
-    """The settings with what automatic mode chooses for their time or error, and the squared bias by passes, where a
-    trial has measured it. The trial's time counts."""
+@dataclass(frozen=True)
+class Chosen:
+    """The settings to render with, the bias that a trial has measured, and the seconds that it took."""
+
+    settings: Settings
+    bias: Bias | None = None
+    seconds: float = 0.0
+
+
+def with_choice(opened: OpenScene, settings: Settings, pool: WorkPool) -> Chosen:
+    """The settings with what automatic mode chooses for their time or error. The trial's time counts."""
     render = settings.render
     goal = Goal(render.time_limit * pool.threads, render.error)
     with progress_bar() as bar:
         choice = choose(opened, settings, goal, pool, bar.update)
     for number, sentence in enumerate(choice.sentences):
         print(f"{'automatic: ' if number == 0 else '  '}{sentence}", file=sys.stderr)
-    values = dict(choice.values)
-    if render.time_limit > 0:
-        values["render.time_limit"] = max(render.time_limit - choice.trial.seconds, LEAST_LEFT * render.time_limit)
-    return with_values(settings, values), choice.bias
+    values = dict(choice.values) | left_of(render.time_limit, choice.trial.seconds)
+    return Chosen(with_values(settings, values), choice.bias, choice.trial.seconds)
+
+
+def left_of(limit: float, spent: float) -> dict[str, Any]:
+    """The setting of how long is rendered, of a time limit in seconds of which a trial has taken some; none for no
+    limit."""
+    return {"render.time_limit": max(limit - spent, LEAST_LEFT * limit)} if limit > 0 else {}

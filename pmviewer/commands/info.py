@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING
 
 import typer
@@ -18,9 +19,12 @@ def info(
     define: ParameterOption = None,
     search_path: SearchOption = None,
 ) -> None:
-    """Say what is in a scene, what was ignored, and which stages it needs or skips."""
+    """Say what is in a scene, what was ignored, and which stages it needs or skips; or what a checkpoint holds."""
     from pmviewer.commands.job import load_job
 
+    if scene.lower().endswith(".checkpoint"):
+        typer.echo(checkpoint_report(scene))
+        return
     typer.echo(scene_report(load_job(scene, [], define or [], edit or [])))
 
 
@@ -40,5 +44,26 @@ def scene_report(job: Job) -> str:
     rows = describe(scene)
     rows.append((f"stages ({job.settings.render.method})", ", ".join(plan.running) or "none"))
     rows += [(f"skips {stage}", reason) for stage, reason in plan.skipped]
+    width = max(len(label) for label, _ in rows)
+    return "\n".join(f"{label:{width}s}  {text}" for label, text in rows)
+
+
+def checkpoint_report(path: str) -> str:
+    """What a checkpoint holds. Raises SceneError."""
+    from pmviewer.output.checkpoint_header import read_header
+    from pmviewer.settings.access import SETTINGS, flat
+
+    head = read_header(path)
+    rows = [
+        ("scene", head.scene),
+        ("size", f"{head.width} x {head.height}"),
+        ("passes", f"{head.passes:,} in {head.seconds:.1f} s"),
+        ("written", time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(head.when))),
+        ("program", f"pmviewer {head.program['version']} ({head.program['sources']}), {head.program['numba']}"),
+        ("processor", head.program["processor"]),
+    ]
+    rows += [(f"parameter {name}", value) for name, value in head.parameters.items()]
+    changed = {name: value for name, value in flat(head.settings).items() if value != SETTINGS[name].default}
+    rows += [(name, str(value)) for name, value in changed.items()]
     width = max(len(label) for label, _ in rows)
     return "\n".join(f"{label:{width}s}  {text}" for label, text in rows)

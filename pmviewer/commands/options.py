@@ -54,3 +54,22 @@ SnapshotOption = Annotated[
     list[Path] | None,
     typer.Option("--snapshot", metavar="FILE", help="EXR or PNG file to open as a snapshot; may be repeated."),
 ]
+CheckpointOption = Annotated[
+    str | None,
+    typer.Option(
+        "--checkpoint",
+        metavar="TIME",
+        help="Keep a checkpoint, so that never more than this time is lost: 60s, 10min, 1h. Ctrl+C and SIGTERM write "
+        "one, too.",
+    ),
+]
+ResumeOption = Annotated[
+    bool, typer.Option("--resume", help="Go on from the checkpoint, bit for bit; begin anew where there is none yet.")
+]
+CheckpointFileOption = Annotated[
+    Path | None,
+    typer.Option("--checkpoint-file", metavar="FILE", help="The checkpoint; by default OUTPUT.checkpoint."),
+]
+KeepCheckpointOption = Annotated[
+    bool, typer.Option("--keep-checkpoint", help="Keep it when all is rendered, to go on to more passes later.")
+]

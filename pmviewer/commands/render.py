@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from pmviewer.commands.options import EditOption, ParameterOption, SceneArgument, SetOption, ThreadsOption
+from pmviewer.commands.options import (
+    CheckpointFileOption,
+    CheckpointOption,
+    EditOption,
+    KeepCheckpointOption,
+    ParameterOption,
+    ResumeOption,
+    SceneArgument,
+    SetOption,
+    ThreadsOption,
+)
 from pmviewer.errors import SettingError
 
 
@@ -45,8 +55,13 @@ def render(
         typer.Option(metavar="FILE", help="EXR to print the error against; auto: the bundled scene's own."),
     ] = None,
     stats: Annotated[bool, typer.Option(help="Print photons, rays, times and the energy ledger.")] = False,
+    checkpoint: CheckpointOption = None,
+    resume: ResumeOption = False,
+    checkpoint_file: CheckpointFileOption = None,
+    keep_checkpoint: KeepCheckpointOption = False,
 ) -> None:
     """Render to a file without a window; the result is what the window shows after the same passes."""
+    from pmviewer.commands.checkpointing import Asked
     from pmviewer.commands.job import Stop, load_job
     from pmviewer.commands.rendering import render_job
 
@@ -66,4 +81,5 @@ def render(
         denoise=denoise,
         reference=reference,
         stats=stats,
+        checkpoints=Asked(checkpoint, checkpoint_file, resume, keep_checkpoint),
     )

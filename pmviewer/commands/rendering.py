@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from pmviewer.commands.choosing import wants_choice, with_choice
+from pmviewer.commands.checkpointing import NO_CHECKPOINTS, Asked, Keeper, checkpoints_of
+from pmviewer.commands.choosing import Chosen, wants_choice, with_choice
 from pmviewer.commands.job import DEFAULT_PASSES, Job, Stop, check_output, overrides
 from pmviewer.commands.patience import patiently, print_warnings
 from pmviewer.commands.progress_bar import progress_bar
@@ -48,11 +50,13 @@ def render_job(
     denoise: bool = False,
     reference: str | None = None,
     stats: bool = False,
+    checkpoints: Asked = NO_CHECKPOINTS,
 ) -> Frame:
     """Render and write the files; with a reference (a file or "auto") also print the error at passes 1, 2, 4, … and at
     the end; with `stats` photons, rays, times and the energy ledger.
 
-    `denoise` adds the picture without its noise as a layer of EXR files.
+    `denoise` adds the picture without its noise as a layer of EXR files; `checkpoints` are kept and gone on from as
+    asked for.
 
     Raises PmviewerError; refuses bad file names and references that don't fit before rendering.
     """
@@ -60,68 +64,88 @@ def render_job(
         check_output(path, FORMATS)
     stop = stop or Stop()
     settings = with_values(job.settings, overrides(stop.passes, stop.seconds, size, seed, job.passes, stop.error))
-    with patiently() as tell, watched(tell, threads=threads):
-        opened = open_scene(job.scene, job.parameters, arrangement_of(settings), beside(settings, threads))
-    print_warnings(opened.scene.warnings, opened.scene.dropped)
-    target = None
-    if reference is not None:
-        target = reference_for(None if reference == "auto" else reference, opened.scene, settings)
-    view = _view(settings, opened)
-    if denoise and (reason := inactive_reason(f"display.view={DENOISED}", settings, opened.traits)) is not None:
-        raise SettingError(f"--denoise: {reason}")
-    pool, bias = WorkPool(threads), None
-    try:
-        if wants_choice(stop, job.settings):
-            settings, bias = with_choice(opened, settings, pool)
-        frame = _rendered(opened, settings, pool, target, denoise, bias)
-    finally:
-        pool.close()
-    if (stats or settings.render.error > 0 or bias is not None) and (said := remaining_report(frame.statistics)):
+    with checkpoints_of(checkpoints, job, outputs) as keeper:
+        with patiently() as tell, watched(tell, threads=threads):
+            opened = open_scene(job.scene, job.parameters, arrangement_of(settings), beside(settings, threads))
+        print_warnings(opened.scene.warnings, opened.scene.dropped)
+        target = None
+        if reference is not None:
+            target = reference_for(None if reference == "auto" else reference, opened.scene, settings)
+        view = _view(settings, opened)
+        if denoise and (reason := inactive_reason(f"display.view={DENOISED}", settings, opened.traits)) is not None:
+            raise SettingError(f"--denoise: {reason}")
+        pool, choice = WorkPool(threads), Chosen(settings)
+        try:
+            if keeper is not None and keeper.found is not None:
+                choice = Chosen(keeper.settings(settings))
+            elif wants_choice(stop, job.settings):
+                choice = with_choice(opened, settings, pool)
+            if keeper is not None:
+                keeper.trial(settings, choice.seconds)
+            frame = _rendered(opened, choice, pool, target, denoise, keeper)
+        finally:
+            pool.close()
+        _report(frame, stats)
+        for path in outputs:
+            if path.suffix.lower() == ".exr":
+                write_frame_exr(path, frame, half=half)
+            elif path.suffix.lower() == ".toml":
+                stored = with_values(frame.settings, STOPS)
+                write_session(path, stored, job.scene, frame.statistics.passes, job.parameters)
+            else:
+                write_frame_png(path, frame, view=view)
+            print(f"wrote {path}")
+        if keeper is not None:
+            keeper.written()
+    return frame
+
+
+def _report(frame: Frame, stats: bool) -> None:
+    """What is printed of a picture that is finished."""
+    found, remaining = frame.statistics, frame.statistics.remaining
+    told = stats or frame.settings.render.error > 0 or (remaining is not None and remaining.bias is not None)
+    if told and (said := remaining_report(found)):
         print(said)
-    if said := pass_report(frame.statistics):
+    if said := pass_report(found):
         print(said)
     if stats:
-        print(statistics_report(frame.statistics))
-    print_warnings(frame.statistics.warnings, {})
-    for path in outputs:
-        if path.suffix.lower() == ".exr":
-            write_frame_exr(path, frame, half=half)
-        elif path.suffix.lower() == ".toml":
-            stored = with_values(frame.settings, STOPS)
-            write_session(path, stored, job.scene, frame.statistics.passes, job.parameters)
-        else:
-            write_frame_png(path, frame, view=view)
-        print(f"wrote {path}")
-    return frame
+        print(statistics_report(found))
+    print_warnings(found.warnings, {})
 
 
 def _rendered(
     opened: OpenScene,
-    settings: Settings,
+    choice: Chosen,
     pool: WorkPool,
     target: Reference | None,
     denoise: bool,
-    bias: Callable[[int], float] | None,
+    keeper: Keeper | None,
 ) -> Frame:
-    renderer = Renderer(opened, settings, pool, StageStore(0))
-    renderer.error.bias = bias
-    if opened.scene.exposure is None and settings.display.exposure == "auto":
+    renderer = Renderer(opened, choice.settings, pool, StageStore(0))
+    renderer.error.bias = choice.bias
+    if keeper is not None:
+        keeper.check(renderer)
+    resumed = keeper is not None and keeper.found is not None
+    if opened.scene.exposure is None and choice.settings.display.exposure == "auto" and not resumed:
         renderer.coarse_frame(0)  # as in the window it decides the exposure
-    _run(renderer, pool, None if target is None else partial(_print_error, target))
+    _run(renderer, pool, None if target is None else partial(_print_error, target), keeper)
     wanted = wanted_of(renderer.facts)
     return renderer.frame(1, replace(wanted, denoised=True) if denoise else wanted)
 
 
-def _run(renderer: Renderer, pool: WorkPool, measure: Callable[[Renderer], None] | None) -> None:
+def _run(renderer: Renderer, pool: WorkPool, measure: Callable[[Renderer], None] | None, keeper: Keeper | None) -> None:
     """Render until a stop rule holds; `measure` is called after passes 1, 2, 4, … and the last one."""
     with progress_bar(remaining=True) as bar:
         prepare(renderer.scene, renderer.settings, pool, bar.update)
         bar.restart("rendering")
-        while not renderer.finished:
-            renderer.step()
-            if measure is not None and (renderer.passes & (renderer.passes - 1) == 0 or renderer.finished):
-                measure(renderer)
-            bar.update(*_progress(renderer))
+        with nullcontext() if keeper is None else keeper.watching(renderer):
+            while not renderer.finished:
+                renderer.step()
+                if measure is not None and (renderer.passes & (renderer.passes - 1) == 0 or renderer.finished):
+                    measure(renderer)
+                bar.update(*_progress(renderer))
+                if keeper is not None:
+                    keeper.after_pass(renderer)
 
 
 def _progress(renderer: Renderer) -> tuple[str, float]:

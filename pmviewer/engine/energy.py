@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.state import State
+
 ENTRIES = ("emitted", "absorbed", "escaped", "terminated", "dropped")
 """Of a pass, in this order: what the lights emit, and what became of it. Terminated is light that was still on its way
 when `photons.max_bounces` ended it, dropped what photons held whose power became infinite or NaN."""
@@ -52,6 +54,19 @@ class EnergyLedger:
         self.sums += energy
         self.squares += (energy / lights) ** 2 if lights > 0 else 0.0
         self.lights = lights
+
+    def state(self) -> State:
+        """The ledgers so far."""
+        sums, squares = self.sums.tolist(), self.squares.tolist()
+        return State({"passes": self.passes, "sums": sums, "squares": squares, "lights": self.lights})
+
+    @staticmethod
+    def restored(state: State) -> EnergyLedger:
+        """From what `state` has told. Raises ValueError for what is no ledger."""
+        sums, squares = (np.array(state.number(name), np.float64) for name in ("sums", "squares"))
+        if not sums.shape == squares.shape == (len(ENTRIES),):
+            raise ValueError("the energy ledger has other entries")
+        return EnergyLedger(int(state.number("passes")), sums, squares, float(state.number("lights")))
 
     def close(self, with_tests: bool) -> Energy | None:
         """The ledger so far, `with_tests` if test photons carry power, too; None before the first pass."""

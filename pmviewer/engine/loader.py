@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 from pmviewer.engine.frame import Level, Status
 from pmviewer.engine.guarded import guarded
@@ -22,11 +23,12 @@ from pmviewer.settings.access import Settings
 @dataclass(frozen=True, eq=False)
 class Loaded:
     """A scene that is ready to be the open one, with its geometry for the window and the settings that it was asked for
-    with, None for those in use."""
+    with, None for those in use; `film` is a checkpoint to go on with."""
 
     opened: OpenScene
     geometry: DrawGeometry
     settings: Settings | None
+    film: Path | None = None
 
 
 PATIENCE = 0.5
@@ -64,18 +66,28 @@ class Loader:
         """Whether a scene that was asked for is still being loaded."""
         return self.done < self.asked
 
-    def start(self, load: Callable[[], OpenScene], name: str, settings: Settings | None) -> None:
+    def start(
+        self, load: Callable[[], OpenScene], name: str, settings: Settings | None, film: Path | None = None
+    ) -> None:
         """Load on a thread; what was asked for before is unwanted now."""
-        self._start(load, name, settings, rearranging=False)
+        self._start(load, name, settings, film, rearranging=False)
 
     def rearrange(self, opened: OpenScene, geometry: DrawGeometry | None) -> None:
         """Arrange the open scene, with its geometry, as is asked for now. While a scene is being loaded or arranged
         nothing is to be done: it gets the newest arrangement anyway."""
         if not self.pending:
             self._drawn = (opened.scene, geometry) if geometry is not None else None
-            self._start(lambda: opened, opened.source, None, rearranging=True)
+            self._start(lambda: opened, opened.source, None, None, rearranging=True)
 
-    def _start(self, load: Callable[[], OpenScene], name: str, settings: Settings | None, *, rearranging: bool) -> None:
+    def _start(
+        self,
+        load: Callable[[], OpenScene],
+        name: str,
+        settings: Settings | None,
+        film: Path | None,
+        *,
+        rearranging: bool,
+    ) -> None:
         with self._changed:
             self.asked += 1
             ticket = self.asked
@@ -83,7 +95,7 @@ class Loader:
         threading.Thread(
             target=guarded,
             args=(
-                lambda: self._load(ticket, load, name, settings),
+                lambda: self._load(ticket, load, name, settings, film),
                 lambda text: self._failed(ticket, "error", text),
                 lambda: self._dropped(ticket, name),
                 f"{name}: not enough memory for this scene.",
@@ -107,14 +119,16 @@ class Loader:
         taken, self.loaded = self.loaded, None
         return taken
 
-    def _load(self, ticket: int, load: Callable[[], OpenScene], name: str, settings: Settings | None) -> None:
+    def _load(
+        self, ticket: int, load: Callable[[], OpenScene], name: str, settings: Settings | None, film: Path | None
+    ) -> None:
         self._tell(ticket, name)
         with watched(lambda text: self._tell(ticket, f"{name}: {text}"), lambda: self._is_unwanted(ticket)):
             opened = load()
             if self._rearranging:
                 opened = self._newest(opened)
             while True:
-                if self._hand_over(ticket, Loaded(opened, self._geometry(opened.scene), settings)):
+                if self._hand_over(ticket, Loaded(opened, self._geometry(opened.scene), settings, film)):
                     return
                 opened = self._newest(opened)
 

@@ -33,7 +33,7 @@ from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.irradiance_cache import fill_cache, recipe
 from pmviewer.engine.stages.light import LightStage
 from pmviewer.engine.stages.pass_data import RenderedPass, pass_data, pass_record
-from pmviewer.engine.stages.pass_maps import PassMaps
+from pmviewer.engine.stages.pass_maps import Carried, PassMaps
 from pmviewer.engine.stages.shadow_photons import ShadowStage
 from pmviewer.engine.stages.thin_glass import with_thin_glass
 from pmviewer.engine.stages.virtual_lights import VirtualStage, film_of
@@ -50,6 +50,7 @@ from pmviewer.render.moments import Moments
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, RADIUS, first_radii, shrink
 from pmviewer.settings.access import Settings
 from pmviewer.settings.needs import Facts
+from pmviewer.state import State
 
 COARSE_SHRINK = 4
 COARSE_PHOTONS = 40_000
@@ -164,6 +165,34 @@ class Renderer:
             self.film.moments.close_pass()
         self.error.add(self.film, self.pool.run)
 
+    def state(self) -> State:
+        """The film and all that goes on with it: error estimate, counts, exposure, and what a pass takes over from
+        those before it. Arrays are the renderer's own: they hold until the next pass."""
+        maps = self.light.latest
+        return State.of_parts(
+            {"exposures": dict(self.scene.exposures)},
+            {},
+            film=self.film.state(),
+            error=self.error.state(),
+            tally=self.tally.state(),
+            carried=maps.taken_over.state() if maps is not None else None,
+        )
+
+    def restore(self, state: State) -> None:
+        """Go on from the state of a renderer of the same scene and settings, bit for bit, as if this one had rendered
+        its passes. What the latest of them looked up is made again, for whoever wants to see it.
+
+        Raises ValueError for a state of another film, and Cancelled when the pool is cancelled; either leaves the
+        renderer unusable.
+        """
+        self.film.restore(state.part("film"))
+        self.error.restore(state.part("error"))
+        self.scene.exposures.update({str(name): float(ev) for name, ev in state.number("exposures").items()})
+        if self.passes:
+            self.light.taken_over = Carried.restored(state.part("carried"))
+            self.latest = self._prepared(self.film, self.camera, self.passes - 1, self.settings.photons.N, again=True)
+        self.tally.restore(state.part("tally"))
+
     def photons_alone(self, passes: int) -> PhotonMaps | None:
         """The photons of the last of so many passes, without a picture: what `step` would trace for it. None where the
         plan has none. For a renderer that is used for nothing else."""
@@ -225,8 +254,14 @@ class Renderer:
         return Looked(self.scene, self.settings, self.plan, self.camera, film, *stages, self._watched)
 
     def _pass(self, film: Film, camera: CameraPose, index: int, N: int) -> None:
+        made = self._prepared(film, camera, index, N)
+        self.tally.timed(self.pool, "camera pass", lambda: self._eye_pass(made.given, film))
+        self.latest = made
+
+    def _prepared(self, film: Film, camera: CameraPose, index: int, N: int, again: bool = False) -> RenderedPass:
+        """All that the eye pass looks up; `again` for a pass that is in the film already."""
         settings, plan, tally, pool = self.settings, self.plan, self.tally, self.pool
-        maps = self._light(film, index, N)
+        maps = self._light(film, index, N, again)
         eye = pass_record(camera, settings, plan, maps, index)
         shadows = tally.timed(pool, "shadow photons", lambda: self.shadows.run(index)) if plan.shadows else None
         scene = self._lit.flat.record
@@ -248,12 +283,11 @@ class Renderer:
             tally.add_estimates(estimates.counts)
             tally.add_counts(counts)
             given = given._replace(cache=estimates.record)
-        tally.timed(pool, "camera pass", lambda: self._eye_pass(given, film))
-        self.latest = RenderedPass(given, maps, shadows, cache, virtual, estimates)
+        return RenderedPass(given, maps, shadows, cache, virtual, estimates)
 
-    def _light(self, film: Film, index: int, N: int) -> PassMaps:
+    def _light(self, film: Film, index: int, N: int, again: bool = False) -> PassMaps:
         self.importance.run(0 if self.settings.photons.renew == "once" else index)
-        widest = self._radii_of_pixels(film, index)
+        widest = self._radii_of_pixels(film, again)
         return self.light.run(index, N, self.first_radius, self.importance, widest)
 
     def _eye_pass(self, given: PassData, film: Film) -> None:
@@ -264,14 +298,15 @@ class Renderer:
             outline = self._outline
         self.tally.add_counts(render_into(film, given, outline, self.plan, self.pool))
 
-    def _radii_of_pixels(self, film: Film, index: int) -> dict[str, float]:
-        """Gives the pixels the radii of pass `index`; returns the largest by map. None without the rule."""
+    def _radii_of_pixels(self, film: Film, again: bool = False) -> dict[str, float]:
+        """Gives the pixels the radii of the next pass, unless they have them `again`; returns the largest by map. None
+        without the rule."""
         if not radii_of_pixels(self.facts):
             return {}
         estimate = self.settings.estimate
         if film.radii is None:
             film.radii = first_radii(len(film.sums), estimate.caustic_radius * self.first_radius, self.first_radius)
-        else:
+        elif not again:
             shrink(film.radii, estimate.alpha, estimate.floor * self.scene.flat.radius)
         caustic, global_ = (float(film.radii[:, RADIUS + which].max()) for which in (OF_CAUSTIC, OF_GLOBAL))
         return {"caustic": caustic, "global": global_ if self.plan.shown_directly else 0.0}

@@ -17,12 +17,13 @@ from pathlib import Path
 
 from pmviewer.engine.ahead.ahead import Ahead
 from pmviewer.engine.ahead.helper import Helper
+from pmviewer.engine.checkpoint.autosave import KeptFilm
 from pmviewer.engine.frame import Frame, Message, State, Status
+from pmviewer.engine.frugal import Frugal
 from pmviewer.engine.guarded import guarded
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.inspector.report import Pinned
 from pmviewer.engine.loader import Loaded, Loader
-from pmviewer.engine.memory import give_back
 from pmviewer.engine.opened import OpenScene, arrangement_of, is_edited, nobody, open_scene
 from pmviewer.engine.pool import WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
@@ -30,6 +31,7 @@ from pmviewer.engine.published import Published
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.wanted import wanted_of
+from pmviewer.engine.welcome import welcome
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.scene.arrays.tessellate import DrawGeometry
 from pmviewer.scene.description import Scene
@@ -39,8 +41,6 @@ from pmviewer.settings.needs import Facts
 Source = str | Path | Scene
 LONG_PASS, TELL_EVERY = 0.7, 0.2
 """Seconds after which a pass says what it is at, and how often."""
-MUCH_LESS, KEPT_BYTES = 8, 1 << 26
-"""From which factor fewer photons make results of before unwanted, and how many bytes of them are kept then."""
 NO_MEMORY = "Not enough memory for these settings: lower N or the image size."
 
 
@@ -77,9 +77,10 @@ class Session:
         self._pool = WorkPool(threads, behind_window=True)
         self._pool.on_progress = self._within_pass
         self._pass_began = self._told = 0.0
-        self._stepping = self._stopped = self._gives_back = False
-        self._N = 0
+        self._stepping = self._stopped = False
         self._store = StageStore()
+        self._frugal = Frugal(self._store)
+        self._film = KeptFilm(self._published.say)
         self._renderer: Renderer | None = None
         self._ahead = Ahead(self._pool.threads, self._published.notify, helper) if compiles_ahead else None
         self._worker = threading.Thread(target=self._work, name="pmviewer session", daemon=True)
@@ -88,16 +89,24 @@ class Session:
     # requests ---------------------------------------------------------------------------------------------------
 
     def open(
-        self, source: Source, settings: Settings | None = None, parameters: Mapping[str, str] | None = None
+        self,
+        source: Source,
+        settings: Settings | None = None,
+        parameters: Mapping[str, str] | None = None,
+        film: Path | None = None,
     ) -> None:
-        """Open a scene, with other settings if given. Until it is loaded the old one goes on; a failure becomes an
-        error message and changes nothing."""
+        """Open a scene, with other settings if given, and go on with the `film` of a checkpoint. Until it is loaded the
+        old one goes on; a failure becomes an error message and changes nothing."""
         with self._changed:
             chosen = settings or self._settings
             arrangement, ahead = arrangement_of(chosen), self._ahead
             on_type = nobody if ahead is None else partial(ahead.opening, settings=chosen)
             name = source.name if isinstance(source, Scene) else str(source)
-            self._loader.start(lambda: open_scene(source, parameters or {}, arrangement, on_type), name, settings)
+            self._loader.start(lambda: open_scene(source, parameters or {}, arrangement, on_type), name, settings, film)
+
+    def autosave(self, path: Path | None) -> None:
+        """Keep the film in that file now and then (`display.autosave`), from now on; nowhere with None."""
+        self._film.path = path
 
     def cancel_loading(self) -> None:
         """Give up the scene that is being loaded; the old one stays."""
@@ -331,7 +340,9 @@ class Session:
 
     def _turn(self, loaded: Loaded | None, before: OpenScene | None) -> None:
         if loaded is not None:
-            self._welcome(loaded.opened, before)
+            note = self.geometry.note if self.geometry is not None else ""
+            for level, text in welcome(loaded.opened, before, note):
+                self._published.say(level, text)
             return
         try:
             self._advance()
@@ -382,33 +393,11 @@ class Session:
             self._pixel = self._pinned = None
         self._store.clear()
         self._opened, self.geometry, self._renderer = loaded.opened, loaded.geometry, None
+        self._film.go_on_with = loaded.film
         if loaded.settings is not None:
             self._settings = loaded.settings
         self._version += 1
         self._stopped = False
-
-    def _welcome(self, opened: OpenScene, before: OpenScene | None) -> None:
-        """What the log says of a newly opened scene; of one with other lights than before only what is new."""
-        edited = is_edited(before, opened)
-        relit = before is not None and opened.content is not None and opened.content is before.content
-        for warning in opened.scene.warnings:
-            if not ((edited or relit) and before is not None and warning in before.scene.warnings):
-                self._published.say("warning", warning)
-        if edited:
-            return
-        if relit:
-            self._published.say("info", f"light rig: {opened.arrangement.rig}")
-            return
-        for reason, count in opened.scene.dropped.items():
-            self._published.say("warning", f"{count} × {reason} left out")
-        flat = opened.flat
-        self._published.say(
-            "info", f"opened {opened.source}: {flat.n_triangles:,} triangles, {flat.n_quadrics:,} round shapes"
-        )
-        if flat.n_instances:
-            self._published.say("info", f"{flat.n_instances:,} instances show {flat.n_elements:,} elements")
-        if self.geometry is not None and self.geometry.note:
-            self._published.say("info", self.geometry.note)
 
     def _advance(self) -> None:
         """A coarse frame for a new state, one pass for a known one."""
@@ -426,10 +415,12 @@ class Session:
             self._first_picture, self._attempt = True, version
         try:
             prepare(self._opened, settings, self._pool, lambda text, share: self._tell("preparing", text, share))
-            renderer = Renderer(self._opened, settings, self._pool, self._store, version)
-            self._make_room(settings.photons.N)
+            make = partial(Renderer, self._opened, settings, self._pool, self._store, version)
+            renderer = self._film.renderer(make)
+            self._frugal.begin(settings.photons.N)
             self._tell("rendering", "first picture")
-            frame = renderer.coarse_frame(self._published.serial + 1, self._wanted(renderer))
+            draw = renderer.frame if renderer.passes else renderer.coarse_frame
+            frame = draw(self._published.serial + 1, self._wanted(renderer))
             self._published.show(frame, self._version)
             for warning in set(frame.statistics.warnings) - self._warned:
                 self._published.say("warning", warning)
@@ -438,15 +429,11 @@ class Session:
             with self._changed:
                 self._first_picture = False
         self._renderer = renderer
-        if self._paused and not self._is_stale():
+        if renderer.passes:
+            with self._changed:
+                self._settle()
+        elif self._paused and not self._is_stale():
             self._step(renderer)
-
-    def _make_room(self, N: int) -> None:
-        """After a pass of far more photons, its maps are not kept for a return."""
-        if self._N >= MUCH_LESS * N:
-            self._store.shrink(KEPT_BYTES)
-            self._gives_back = True
-        self._N = N
 
     def _within_pass(self, stage: str, share: float | None) -> None:
         """What the pool is at. Said of passes that somebody may be waiting for."""
@@ -462,15 +449,14 @@ class Session:
             renderer.step()
             with self._changed:
                 self._stopped = False  # too late
-            if self._gives_back:  # the frame before, with its photons, is gone after this one
-                self._gives_back = renderer.passes < 2
-                give_back()
+            self._frugal.after_pass(renderer.passes)
         finally:
             with self._changed:
                 self._stepping = False
         self._published.show(renderer.frame(self._published.serial + 1, self._wanted(renderer)), self._version)
         if self._ahead is not None:
             self._ahead.shown(renderer.scene, self._settings)
+        self._film.after_pass(renderer, self._settings.display.autosave, self._is_finished())
         with self._changed:
             self._settle()
         self._published.notify()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.photons.deposition.deposited import Deposited
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.record import C_CACHED, C_CUT, C_DROPPED, C_GATHERED, C_RAYS, C_SAVED, C_SHADOW_RAYS
+from pmviewer.state import State
 
 
 @dataclass
@@ -41,6 +42,20 @@ class Tally:
     energy: EnergyLedger = field(default_factory=EnergyLedger)
     map_bytes: int = 0
     map_photons: int = 0
+
+    def state(self) -> State:
+        """All counts."""
+        return State({**asdict(self), "energy": self.energy.state().numbers})
+
+    def restore(self, state: State) -> None:
+        """Go on counting from there. Raises ValueError where that is nothing counted."""
+        for known in fields(self):
+            value = state.number(known.name)
+            if known.name == "deposited":
+                value = {name: Deposited.from_numbers(of_map) for name, of_map in value.items()}
+            elif known.name == "energy":
+                value = EnergyLedger.restored(state.part("energy"))
+            setattr(self, known.name, value)
 
     def timed(self, pool: WorkPool, stage: str, run: Callable[[], Any]) -> Any:
         """What `run` returns; the CPU seconds that the pool spends on it count for the stage."""

@@ -14,6 +14,7 @@ from typing import Any, Self
 
 from pmviewer.engine.ahead.beside import beside
 from pmviewer.engine.auto.choose import Choice, Goal, choose
+from pmviewer.engine.checkpoint.checkpoint import Job, read_checkpoint, write_checkpoint
 from pmviewer.engine.effects import facts_of, inactive_reason
 from pmviewer.engine.frame import Frame, PhotonCloud
 from pmviewer.engine.inspection import Inspection
@@ -219,6 +220,30 @@ class Rendering:
             if self._renderer is None or not self._renderer.passes:
                 raise SettingError("Nothing has been rendered with these settings yet: call render(passes=…).")
             return self._frame(self._renderer)
+
+    def save(self, path: str | Path) -> None:
+        """Write a checkpoint of what is rendered, a file ending in .checkpoint, with which another process goes on:
+        `resume`, or `pmviewer render --resume`. Raises SettingError before the first pass, and OutputError; the file
+        from before stays whole then."""
+        with self._alone():
+            if self._renderer is None or not self._renderer.passes:
+                raise SettingError("Nothing has been rendered with these settings yet: call render(passes=…).")
+            write_checkpoint(Path(path), self._renderer, Job(self._opened.source, self._parameters))
+
+    def resume(self, path: str | Path) -> None:
+        """Go on with the passes of a checkpoint, bit for bit, in place of what is rendered.
+
+        The scene's content and the settings must be the checkpoint's, but for those of the display and of when to stop.
+        Raises SceneError, which says what differs, and for a damaged file; what is rendered stays then.
+        """
+        with self._alone():
+            found = read_checkpoint(path)
+            prepare(self._opened, self._settings, self._pool, lambda text, share: None)
+            renderer = Renderer(self._opened, self._settings, self._pool, self._store)
+            if said := found.check(renderer):
+                self._warn(f"The last bits of the picture may differ from here on: {said}")
+            self._within_memory(lambda: found.resume(renderer))
+            self._renderer = renderer
 
     def photons(self, map: str = "global", passes: int = 1) -> Photons:
         """The photons that pass number `passes` has in the "global" or "caustic" map, without rendering a picture.

@@ -5,9 +5,10 @@ from __future__ import annotations
 import errno
 import os
 import secrets
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from pmviewer.errors import OutputError, SceneError
 
@@ -43,13 +44,29 @@ def write_file(path: str | Path, data: bytes, suffixes: Sequence[str]) -> None:
     On any failure what stood there before is whole and nothing else is left in the folder. A file that its owner
     made read-only stays. Raises OutputError; see `check_target` for `suffixes`.
     """
+    with replacing(path, suffixes, len(data)) as file:
+        file.write(data)
+
+
+@contextmanager
+def replacing(path: str | Path, suffixes: Sequence[str], size: int = 0, *, alone: bool = False) -> Iterator[BinaryIO]:
+    """The same for what is written piece by piece, `size` bytes in all: gives a file that takes the other's place
+    when the context ends, and goes when it is left by an exception. What a process that was killed has left lies about
+    for ever, unless whoever is `alone` in writing the file, by a lock, writes it again."""
     target = check_target(path, suffixes)
-    temporary = target.parent / f".pmviewer-{secrets.token_hex(8)}.tmp"
+    temporary = target.parent / f".pmviewer-{target.name if alone else secrets.token_hex(8)}.tmp"
     try:
+        if alone:
+            temporary.unlink(missing_ok=True)
         if target.exists() and not os.access(target, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         try:
-            _write_through(temporary, data)
+            # os.open rather than mkstemp: the file gets the permissions that the user's umask asks for.
+            handle = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+            with os.fdopen(handle, "wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
             if target.exists():
                 os.chmod(temporary, target.stat().st_mode & 0o777)
             os.replace(temporary, target)
@@ -58,30 +75,30 @@ def write_file(path: str | Path, data: bytes, suffixes: Sequence[str]) -> None:
                 temporary.unlink()
             raise
     except OSError as error:
-        raise _explained(Path(path), error, len(data)) from None
+        raise _explained(Path(path), error, size) from None
     _sync_folder(target.parent)
 
 
 def read_file(path: str | Path) -> bytes:
     """The whole file. Raises SceneError when it can't be read; pipes and devices are refused, they may never end."""
+    path = check_readable(path)
+    try:
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
+        raise SceneError(f"The file can't be read: {_reason(error)}.", path) from None
+
+
+def check_readable(path: str | Path) -> Path:
+    """Raises SceneError for what is not there, or is not a regular file: pipes and devices may never end."""
     path = Path(path)
     try:
         if not path.exists():
             raise SceneError("There is no such file.", path)
         if not path.is_file():
             raise SceneError("This is not a regular file.", path)
-        return path.read_bytes()
     except (OSError, ValueError) as error:
         raise SceneError(f"The file can't be read: {_reason(error)}.", path) from None
-
-
-def _write_through(path: Path, data: bytes) -> None:
-    # os.open rather than mkstemp: the file gets the permissions that the user's umask asks for.
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
-    with os.fdopen(handle, "wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
+    return path
 
 
 def _sync_folder(folder: Path) -> None:

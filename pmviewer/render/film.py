@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.render.moments import Moments
 from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS, PLANES, TERMS
+from pmviewer.state import State
 
 LEAST_WEIGHT = 0.5
 """Mean weight from which a pixel's samples are divided by it."""
@@ -124,6 +126,33 @@ class Film:
             inside = means[y0:y1, x0:x1].copy()
             means *= self.passes
             means[y0:y1, x0:x1] = inside
+
+    def state(self) -> State:
+        """What has been added so far, moments included."""
+        arrays: dict[str, NDArray[Any]] = {"sums": self.sums}
+        arrays |= {"radii": self.radii} if self.radii is not None else {}
+        arrays |= {"weights": self.weights} if self.weights is not None else {}
+        size = {"width": self.width, "height": self.height, "passes": self.passes}
+        moments = self.moments.state() if self.moments is not None else None
+        return State.of_parts({**size, "region": self.region}, arrays, moments=moments)
+
+    def restore(self, state: State) -> None:
+        """Go on from there. Raises ValueError where that is no state of such a film."""
+        if (state.number("width"), state.number("height")) != (self.width, self.height):
+            raise ValueError("the film has another size")
+        region = state.number("region")
+        if (None if region is None else tuple(region)) != self.region:
+            raise ValueError("the film has another region")
+        pixels, columns = self.sums.shape
+        self.sums = state.array("sums", (pixels, columns), np.float64)
+        self.radii = self.weights = None
+        if "radii" in state.arrays:
+            self.radii = state.array("radii", (pixels, None), np.float32)
+        if "weights" in state.arrays:
+            self.weights = state.array("weights", (pixels, 2), np.float64)
+        if self.moments is not None:
+            self.moments.restore(state.part("moments"))
+        self.passes = int(state.number("passes"))
 
     def planes(self) -> NDArray[np.float32]:
         """Means (height, width, channels) float32."""

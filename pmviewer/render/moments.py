@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS, PLANES, TERMS
+from pmviewer.state import State
 
 EPSILON = 0.01
 """Of relMSE, as in `pmviewer.output.metric`: (W/(m² sr))², so that dark pixels don't outweigh all others."""
@@ -108,6 +109,19 @@ class Moments:
             if independent > 0:
                 self._ratios.append(float(self._told(out).sum() / independent))
         self._half[:] = self.image
+
+    def state(self) -> State:
+        """What has been added so far."""
+        arrays = {"image": self.image, "squares": self.squares, "half": self._half}
+        return State({"passes": self.passes, "ratios": list(self._ratios)}, arrays)
+
+    def restore(self, state: State) -> None:
+        """Go on from there. Raises ValueError where that is of another film."""
+        self.image, self.squares, self._half = (
+            state.array(name, self.image.shape, np.float64) for name in ("image", "squares", "half")
+        )
+        self._ratios = [float(ratio) for ratio in state.number("ratios")]
+        self.passes = int(state.number("passes"))
 
     def _told(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         return values if self._refined is None else values[self._refined]

@@ -20,6 +20,7 @@ from pmviewer.viewer.actions import Commands
 from pmviewer.viewer.background import FILES
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.recent import RecentFiles
+from pmviewer.viewer.dialogs.restore_dialog import RestoreDialog
 from pmviewer.viewer.gl.framebuffers import Framebuffers
 from pmviewer.viewer.gl.freeing import free_collected
 from pmviewer.viewer.overlays.panel import OverlayPanel
@@ -63,6 +64,7 @@ class ViewerApp:
     shot: a picture to take, after which the window closes.
     picture_size: make a window of that size with the picture alone.
     captions: name views in the picture.
+    autosaves: the folder in which session and film are kept; None keeps nothing.
     """
 
     def __init__(
@@ -75,8 +77,12 @@ class ViewerApp:
         shot: Shot | None = None,
         picture_size: tuple[int, int] | None = None,
         captions: bool = True,
+        autosaves: Path | None = None,
     ) -> None:
-        self.state = ViewerState(session, inactive_reason, recent or RecentFiles(), remember=remember)
+        self.state = ViewerState(
+            session, inactive_reason, recent or RecentFiles(), remember=remember, autosaves=autosaves
+        )
+        self.restore_dialog = RestoreDialog(self.state.autosave, self.state.restore)
         self.viewport = Viewport(self.state)
         self.dialogs = FileDialogs()
         self.commands = Commands(self.state, self.viewport, self.dialogs)
@@ -176,6 +182,7 @@ class ViewerApp:
             glfw.set_window_size_limits(glfw_window_hello_imgui(), width, height, glfw.DONT_CARE, glfw.DONT_CARE)
         self.state.appearance.load()
         self.tour.begin_if_new()
+        self.state.autosave.begin()
         self._running = True
         self.state.session.on_update = self.wake
         self.state.gain.on_update = self.state.film.on_update = self.wake
@@ -208,7 +215,8 @@ class ViewerApp:
             self._title = title
 
     def _over_everything(self) -> None:
-        if not (self.dialogs.is_open or self.commands.palette.is_open or self.commands.still_dialog.is_open):
+        asking = self.restore_dialog.is_open or self.commands.still_dialog.is_open
+        if not (asking or self.dialogs.is_open or self.commands.palette.is_open):
             run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying, self.state.history)
         self.state.flipped = not self.dialogs.is_open and is_held(FLIP_KEY)
         self.commands.locate_scene()
@@ -216,6 +224,7 @@ class ViewerApp:
         draw_help(self.state)
         self.commands.palette.gui(self.commands.table)
         self.commands.still_dialog.gui()
+        self.restore_dialog.gui()
         self.tour.gui()
 
     def _before_swap(self) -> None:
@@ -247,6 +256,7 @@ class ViewerApp:
         if self.state.background.running(FILES):
             glfw.hide_window(glfw_window_hello_imgui())
         self.state.background.finish()
+        self.state.autosave.end()
 
     def _release(self) -> None:
         """Free everything that lies on the GPU, as long as it can be reached."""

@@ -78,9 +78,18 @@ class SessionLike(Protocol):
     def stop_compiling_ahead(self) -> None:
         """Compile nothing ahead until something is changed."""
 
-    def open(self, source: Any, settings: Settings | None = None, parameters: Mapping[str, str] | None = None) -> None:
-        """Open a scene in the background, with other settings if given; `parameters` replace the file's defaults. A
-        failure becomes a message."""
+    def open(
+        self,
+        source: Any,
+        settings: Settings | None = None,
+        parameters: Mapping[str, str] | None = None,
+        film: Path | None = None,
+    ) -> None:
+        """Open a scene in the background, with other settings if given; `parameters` replace the file's defaults, and
+        `film` is a checkpoint to go on with. A failure becomes a message."""
+
+    def autosave(self, path: Path | None) -> None:
+        """Keep the film in that file now and then, nowhere with None."""
 
     def set(self, settings: Settings) -> Any:
         """Use these settings from now on."""
@@ -118,7 +127,8 @@ class SessionLink(SessionLike):
         self._make = make
         self._session: SessionLike | None = None
         self._settings = settings or Settings()
-        self._source: tuple[str | Path | Scene, Settings | None, Mapping[str, str] | None] | None = None
+        self._source: tuple[str | Path | Scene, Settings | None, Mapping[str, str] | None, Path | None] | None = None
+        self._film: Path | None = None
         self._paused = False
         self._closed = False
         self._status = Status("preparing", "starting the engine")
@@ -143,6 +153,7 @@ class SessionLink(SessionLike):
                 session.close()
                 return ""
             session.set(self._settings)
+            session.autosave(self._film)
             if self._paused:
                 session.pause()
             if self._source is not None:
@@ -161,12 +172,19 @@ class SessionLink(SessionLike):
         source: str | Path | Scene,
         settings: Settings | None = None,
         parameters: Mapping[str, str] | None = None,
+        film: Path | None = None,
     ) -> None:
         with self._lock:
             if self._session is not None:
-                self._session.open(source, settings, parameters)
+                self._session.open(source, settings, parameters, film)
                 return
-            self._source = (source, settings, parameters)
+            self._source = (source, settings, parameters, film)
+
+    def autosave(self, path: Path | None) -> None:
+        with self._lock:
+            self._film = path
+            if self._session is not None:
+                self._session.autosave(path)
 
     def cancel_loading(self) -> None:
         with self._lock:
@@ -184,7 +202,7 @@ class SessionLink(SessionLike):
             if self._session is not None:
                 self._session.set(settings)
             elif self._source is not None and self._source[1] is not None:
-                self._source = (self._source[0], settings, self._source[2])
+                self._source = (self._source[0], settings, *self._source[2:])
 
     def pause(self) -> None:
         with self._lock:

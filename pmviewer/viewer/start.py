@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import glfw
+import platformdirs
 
 from pmviewer.errors import WindowError
 from pmviewer.settings.access import Settings
@@ -83,6 +84,11 @@ def _inactive_reason(path: str, settings: Settings, traits: Any) -> str | None:
     return inactive_reason(path, settings, traits)
 
 
+def autosaves() -> Path:
+    """Where windows keep what a crash shall not lose."""
+    return Path(platformdirs.user_state_dir("pmviewer")) / "autosave"
+
+
 def start_viewer(
     make_app: Callable[..., ViewerApp],
     source: str | Path | None,
@@ -94,10 +100,11 @@ def start_viewer(
     leave: bool = False,
 ) -> int:
     """See `pmviewer.viewer.app.run_viewer`. With `leave` the process ends here when the window has closed while the
-    engine is busy: a kernel that is being compiled can't be interrupted, and there is nothing of it to keep."""
+    engine is busy: a kernel that is being compiled can't be interrupted, and there is nothing of it to keep. Such a
+    window, the user's own, also keeps session and film on disk for the case of a crash."""
     check_screen()
     link = SessionLink(_make_session(threads, settings), settings)
-    app = make_app(link, inactive_reason=_inactive_reason)
+    app = make_app(link, inactive_reason=_inactive_reason, autosaves=autosaves() if leave else None)
     background = app.state.background
     app.state.open(source if source is not None else DEFAULT_SCENE, keep_camera=True, parameters=parameters)
     if snapshots:

@@ -32,6 +32,7 @@ from pmviewer.settings.film import FilmKey
 from pmviewer.settings.schema.compare import LAST, LIVE, REFERENCE
 from pmviewer.viewer.appearance import Appearance
 from pmviewer.viewer.automatic import AutomaticRun
+from pmviewer.viewer.autosave import Autosave
 from pmviewer.viewer.background import Background
 from pmviewer.viewer.comparison import COMPARED_VIEWS, Comparison
 from pmviewer.viewer.dialogs.recent import RecentFiles
@@ -78,7 +79,13 @@ class ViewerState:
     """Lives as long as the window."""
 
     def __init__(
-        self, session: SessionLike, inactive_reason: InactiveReason, recent: RecentFiles, *, remember: bool = False
+        self,
+        session: SessionLike,
+        inactive_reason: InactiveReason,
+        recent: RecentFiles,
+        *,
+        remember: bool = False,
+        autosaves: Path | None = None,
     ) -> None:
         self.session = session
         self.appearance = Appearance(remember=remember)
@@ -86,6 +93,7 @@ class ViewerState:
         self.recent = recent
         self.views = SavedViews(recent.folder / FILE)
         self.background = Background(self.say)
+        self.autosave = Autosave(autosaves, session, self.background)
         self.comparison = Comparison(session, self.background, self.say)
         self.gain = GainRun(session, self.background, self.say)
         self.automatic = AutomaticRun(session, self.background, self.say, self._change_by_itself)
@@ -356,8 +364,11 @@ class ViewerState:
         keep_camera: bool = False,
         parameters: Mapping[str, str] | None = None,
         scene: Path | None = None,
+        kept: Path | None = None,
+        remember: bool = True,
     ) -> None:
-        """Open a scene or a session file, whose scene may lie elsewhere now (`scene`).
+        """Open a scene or a session file, whose scene may lie elsewhere now (`scene`), and go on with the film that is
+        `kept` in a checkpoint. Without `remember` it is the scene that is a recent file, not the session.
 
         Settings stay when it is a scene, but for the camera's: that was another scene's unless `keep_camera` says
         otherwise. `parameters` are values for the scene file's `<default>` names.
@@ -392,8 +403,13 @@ class ViewerState:
                     "warning", f"{path}: its snapshots take the place of the {len(self.snapshots.all)} in the strip."
                 )
             self.snapshots.open([file for _, file in snapshots], [number for number, _ in snapshots])
-        self._opening, self._film = (str(path), dict(parameters or {})), film
-        self.session.open(source, settings, parameters)
+        self._opening, self._film = (str(path if remember else source), dict(parameters or {})), film
+        self.session.open(source, settings, parameters, kept)
+
+    def restore(self) -> None:
+        """Open what a crash has left."""
+        session, film = self.autosave.restore()
+        self.open(session, kept=film, remember=False)
 
     def say(self, level: Level, text: str) -> None:
         """A line for the log, from any thread."""
@@ -433,5 +449,7 @@ class ViewerState:
         self.snapshots.poll()
         self.film.poll()
         self.loaded.poll()
+        passes = self.frame.statistics.passes if self.frame is not None else 0
+        self.autosave.poll(self.parameters, self.snapshots, self.film.keys, passes)
         self.pair.poll(self.shown_pair())
         self.toasts = [toast for toast in self.toasts if not toast.is_over()]

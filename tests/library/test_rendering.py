@@ -303,3 +303,25 @@ def test_choosing_sets_what_it_says_and_refuses_what_is_no_time():
         assert "too few for a trial" in said[0]
         with pytest.raises(SettingError, match="above 0"):
             s.choose(error=-1)
+
+
+def test_a_checkpoint_goes_on_elsewhere(box, tmp_path):
+    """A scene that was made in Python is known by its content, too."""
+    file = tmp_path / "box.checkpoint"
+    with pytest.raises(SettingError, match="Nothing has been rendered"):
+        box.save(file)
+    box.render(passes=2)
+    box.save(file)
+    whole = box.render(passes=2)
+    with pmviewer.open(diffuse_box(size=16), SMALL, threads=1) as other:
+        other.resume(file)
+        assert other.passes == 2
+        assert np.array_equal(other.render(passes=2).beauty, whole.beauty)
+        assert other.frame().statistics.emitted == whole.statistics.emitted
+        other.set(radius=0.06)
+        other.render(passes=1)
+        with pytest.raises(SceneError, match=r"estimate\.radius was 0\.05 and is 0\.06"):
+            other.resume(file)
+        assert other.passes == 1
+    with pmviewer.open(cornell_box(size=16), SMALL) as stranger, pytest.raises(SceneError, match="other shapes"):
+        stranger.resume(file)

@@ -105,6 +105,8 @@ class FakeSession:
         self.stops = 0
         self.version = 1
         self.closed = False
+        self.film: Path | None = None
+        self.film_file: Path | None = None
         self.inspected: tuple[int, int] | None = None
         self.pinned = None
         self._messages: list[Message] = []
@@ -116,8 +118,12 @@ class FakeSession:
         self.stops_ahead += 1
         self.ahead = ""
 
-    def open(self, source: str | Path, settings: Settings | None = None, parameters=None) -> None:
+    def autosave(self, path: Path | None) -> None:
+        self.film_file = path
+
+    def open(self, source: str | Path, settings: Settings | None = None, parameters=None, film=None) -> None:
         self.opened.append(str(source))
+        self.film = film
         if "broken" in str(source):
             self._messages.append(Message("error", f"{source}:3: unknown shape 'blob'. Use sphere, cube or obj."))
             return

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
+from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, Candidate, assignments, candidates
-from pmviewer.engine.auto.model import FEWEST, WIDTHS, Option, bias_after, options, seconds_to
+from pmviewer.engine.auto.model import FEWEST, WIDTHS, Option, bias_of, options, seconds_to
 from pmviewer.engine.auto.trial import Tell, Trial, trial
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
@@ -50,7 +50,7 @@ class Choice:
     seconds: float
     sentences: tuple[str, ...]
     trial: Trial = field(default_factory=Trial)
-    bias: Callable[[int], float] | None = None
+    bias: Bias | None = None
 
     @property
     def changed(self) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
         picked.seconds,
         (_sentence(picked, goal), *_table(tried, picked), *said),
         tried,
-        partial(bias_after, picked.measured, picked.width),
+        bias_of(picked.measured, picked.width),
     )
 
 

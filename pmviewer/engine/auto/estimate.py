@@ -15,8 +15,7 @@ have: it is added where a trial has measured it (`pmviewer.engine.auto.trial`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 
 import numpy as np
@@ -24,11 +23,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 from scipy.optimize import nnls
 
+from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.method import Plan
 from pmviewer.engine.remaining import Remaining
 from pmviewer.output.metric import EPSILON
 from pmviewer.render.film import Film
 from pmviewer.settings.access import Settings
+from pmviewer.state import State
 from pmviewer.tasks import Runner, in_turn
 
 POWERS = (1.5, 1.0)
@@ -65,7 +66,7 @@ class ErrorEstimate:
     def __init__(self, width: int, height: int, settings: Settings, plan: Plan) -> None:
         self._size = width, height
         self.tells = plan.moments and settings.photons.renew == "each pass"
-        self.bias: Callable[[int], float] | None = None
+        self.bias: Bias | None = None
         shrinks = plan.shown_directly | plan.caustic_mask | plan.volume and settings.estimate.alpha < 1.0
         self._powers = (*POWERS, SHRINKING) if shrinks else POWERS
         self._sums: dict[int, F8] = {}
@@ -87,6 +88,20 @@ class ErrorEstimate:
             if math.isfinite(level.D) and math.isfinite(level.error):  # a film that is not tells nothing
                 self._levels.append(level)
         self._sums[n] = total
+
+    def state(self) -> State:
+        """What the passes have told so far; with the bias, where a trial has measured it."""
+        bias = None if self.bias is None else asdict(self.bias)
+        numbers = {"passes": self._passes, "levels": [asdict(level) for level in self._levels], "bias": bias}
+        return State(numbers, {f"sums.{n}": total for n, total in self._sums.items()})
+
+    def restore(self, state: State) -> None:
+        """Go on from there. Raises ValueError where that is of another film."""
+        names = {int(name.removeprefix("sums.")): name for name in state.arrays}
+        self._sums = {n: state.array(name, (None, None, 3), np.float64) for n, name in sorted(names.items())}
+        self._levels = [_Level(**level) for level in state.number("levels")]
+        self._passes, bias = int(state.number("passes")), state.number("bias")
+        self.bias = None if bias is None else Bias(**bias)
 
     @property
     def latest(self) -> Remaining | None:

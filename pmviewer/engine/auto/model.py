@@ -9,12 +9,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
 
-import numpy as np
-
-from pmviewer.engine.auto.trial import ORDER, Measured
-from pmviewer.maps.radius import progressive_radius
+from pmviewer.engine.auto.bias import Bias, mean_of, radius_sums
+from pmviewer.engine.auto.trial import Measured
 
 PHOTONS = (12_500, 25_000, 50_000, 100_000, 150_000, 200_000, 300_000, 600_000, 1_200_000, 2_400_000)
 COMPLEMENT = 1.25
@@ -43,35 +40,19 @@ class Option:
         return self.measured.candidate.name
 
 
-@cache
-def _sums() -> tuple[np.ndarray, np.ndarray]:
-    """Sums over the passes up to each of the first 4096: of r²₁/r²ᵢ, and of rᵢ/r₁ to the power that bias goes with."""
-    ratio = np.array([progressive_radius(1.0, i) ** 2 for i in range(1, 4097)])
-    return np.cumsum(1 / ratio), np.cumsum(ratio ** (ORDER / 2))
-
-
-def _mean(sums: np.ndarray, n: float, power: float) -> float:
-    """Mean over n passes, going on by its power law."""
-    last = len(sums)
-    if n <= last:
-        return float(np.interp(n, np.arange(1, last + 1), sums)) / n
-    return float(sums[-1]) / last * (n / last) ** power
-
-
 def error_after(m: Measured, N: int, width: float, passes: float) -> float:
     """relMSE after that many passes of N trajectories, with radii `width` times the trial's."""
     noisier, photons = 1.0, m.photons / N
     if m.candidate.shrinks:
         photons /= width**2
     if m.blurs:
-        noisier = _mean(_sums()[0], passes, 1 / 3)
-    return m.eye / passes**COMPLEMENT + photons * noisier / passes + bias_after(m, width, passes)
+        noisier = mean_of(radius_sums()[0], passes, 1 / 3)
+    return m.eye / passes**COMPLEMENT + photons * noisier / passes + bias_of(m, width)(passes)
 
 
-def bias_after(m: Measured, width: float, passes: float) -> float:
-    """Squared relative bias after that many passes: of what is interpolated it falls with their cube root."""
-    duller = passes ** (-1 / 6) if m.interpolated else _mean(_sums()[1], passes, -ORDER / 6)
-    return m.bias2 * width ** (2 * ORDER) * duller**2
+def bias_of(m: Measured, width: float) -> Bias:
+    """Of look-ups with radii `width` times the trial's."""
+    return Bias(m.bias2, width, m.interpolated)
 
 
 def options(m: Measured, widths: tuple[float, ...], seconds: float) -> list[Option]:

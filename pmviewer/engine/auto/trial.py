@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.auto.bias import ORDER
 from pmviewer.engine.auto.candidates import CACHE, GATHER, Candidate, assignments
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
@@ -50,8 +51,6 @@ SEEDS = (7_919, 104_729)
 STORE = 1 << 28
 WIDER = 2.0
 """Radius that bias is told from, relative to that of the first pass."""
-ORDER = 1.5
-"""Power of the radius that bias is taken to grow with: 2 in the open, 1 at edges."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.light_maps import MapBuilder, of_classes
 from pmviewer.engine.stages.light_plan import light_plan
 from pmviewer.engine.stages.light_trace import traced_pass
-from pmviewer.engine.stages.pass_maps import PassMaps
+from pmviewer.engine.stages.pass_maps import Carried, PassMaps
 from pmviewer.engine.stages.projection import projection_for
 from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.engine.store import StageStore
@@ -37,6 +37,8 @@ class LightStage:
         self.builder = MapBuilder(scene, settings, plan, pool, store)
         self.places = light_places(scene.flat) if plan.importance else None
         self.latest: PassMaps | None = None
+        self.taken_over = Carried()
+        """What the first pass that is run takes over from passes that were run elsewhere."""
 
     def run(
         self,
@@ -56,12 +58,11 @@ class LightStage:
             if self.latest is not None:
                 return self._told(self.latest)
             index = 0
-        before = self.latest
-        known = before.known if before is not None and before.index == index - 1 else None
+        carried = self.latest.carried(index) if self.latest is not None else self.taken_over
         light = light_plan(self.settings, self.plan, importance, index, N, first_radius, widest)
         tally, pool = self.tally, self.pool
-        traced = tally.timed(pool, "light pass", lambda: traced_pass(self.tracer, light, importance, known))
-        maps: PassMaps = tally.timed(pool, "maps", lambda: self.builder.maps(light, traced, before, known))
+        traced = tally.timed(pool, "light pass", lambda: traced_pass(self.tracer, light, importance, carried.known))
+        maps: PassMaps = tally.timed(pool, "maps", lambda: self.builder.maps(light, traced, carried))
         tally.add_photons(traced.photons, self.scene.flat.total_luminance)
         self.latest = maps
         return self._told(maps)

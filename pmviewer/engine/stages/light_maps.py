@@ -17,7 +17,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.stages.gather_guides import GUIDING_PHOTONS, guide_grid, guide_radius
 from pmviewer.engine.stages.light_plan import LightPlan
 from pmviewer.engine.stages.light_trace import TracedPass
-from pmviewer.engine.stages.pass_maps import LookUpMap, PassMaps, Structure
+from pmviewer.engine.stages.pass_maps import Carried, LookUpMap, PassMaps, Structure
 from pmviewer.engine.stages.radiance_photons import median_radius, radiance_photons_of
 from pmviewer.engine.store import StageStore
 from pmviewer.maps.radiance import RadianceMap
@@ -25,7 +25,6 @@ from pmviewer.maps.radius import automatic_radius, largest_power, neighbourhood
 from pmviewer.maps.record import DIRECT, in_classes
 from pmviewer.maps.search.grid import PhotonGrid, build_grid
 from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
-from pmviewer.photons.emission.guided import Known
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Settings
 
@@ -49,13 +48,12 @@ class MapBuilder:
         """For a method that looks nothing up."""
         return PassMaps(index, N, *self._empty())
 
-    def maps(self, light: LightPlan, traced: TracedPass, before: PassMaps | None, known: Known | None) -> PassMaps:
-        """All maps of the pass; `before` are those of the pass before, whose radii of guides and light choice are kept:
-        they blur nothing."""
+    def maps(self, light: LightPlan, traced: TracedPass, carried: Carried) -> PassMaps:
+        """All maps of the pass. Radii of guides and light choice are kept from pass to pass: they blur nothing."""
         plan, photons = self.plan, traced.photons
         makes: list[Callable[[], Any]] = [
-            lambda: self._guides(light, traced, before.guides.radius if before and before.guides else None),
-            lambda: self._chooser(light, traced, before.chooser.radius if before and before.chooser else None),
+            lambda: self._guides(light, traced, carried.guides),
+            lambda: self._chooser(light, traced, carried.chooser),
             lambda: self._volume(light, traced) if plan.volume else None,
         ]
         if light.kept:  # the stage store belongs to one thread
@@ -79,7 +77,7 @@ class MapBuilder:
             photons=photons,
             rules=light.rules,
             notes=traced.notes,
-            known_before=known,
+            known_before=carried.known,
             caustic=caustic,
             global_=global_,
             neighbours=light.neighbours,

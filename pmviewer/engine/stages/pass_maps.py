@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from pmviewer.photons.emission.guided import Known
 from pmviewer.photons.emission.light_importance import LightImportance
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Settings
+from pmviewer.state import State
 
 Structure = PhotonGrid | PhotonKdTree
 
@@ -28,6 +29,28 @@ class LookUpMap:
 
     structure: Structure
     radius: float
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """What a pass takes over from those before it: what guided emission has `known`, and the radii in scene units of
+    the `guides` and of the `chooser`, which the first pass has found; None for what is not there."""
+
+    known: Known | None = None
+    guides: float | None = None
+    chooser: float | None = None
+
+    def state(self) -> State:
+        """All of it."""
+        known = self.known.state() if self.known is not None else None
+        return State.of_parts({"guides": self.guides, "chooser": self.chooser}, {}, known=known)
+
+    @staticmethod
+    def restored(state: State) -> Carried:
+        """From what `state` has told. Raises ValueError for anything else."""
+        radii = (state.number(name) for name in ("guides", "chooser"))
+        known = Known.restored(state.part("known")) if "known" in state.numbers else None
+        return Carried(known, *(None if radius is None else float(radius) for radius in radii))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +116,17 @@ class PassMaps:
         """Importance of the lights by guided emission."""
         return self.photons.guided.lights if self.photons is not None and self.photons.guided is not None else None
 
+    def carried(self, index: int) -> Carried:
+        """What pass `index` takes over from this one; what guided emission knows goes to the next pass alone."""
+        guided = self.photons.guided if self.photons is not None else None
+        known = guided.known if guided is not None and index == self.index + 1 else None
+        return replace(self.taken_over, known=known)
+
     @property
-    def known(self) -> Known | None:
-        """What guided emission knows after the pass."""
-        return self.photons.guided.known if self.photons is not None and self.photons.guided is not None else None
+    def taken_over(self) -> Carried:
+        """What this pass has taken over: with it the same pass comes out again."""
+        guides, chooser = (None if grid is None else grid.radius for grid in (self.guides, self.chooser))
+        return Carried(self.known_before, guides, chooser)
 
 
 def blank_grid() -> PhotonGrid:

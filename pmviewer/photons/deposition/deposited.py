@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,15 @@ class Deposited:
     most have but for rounding, is within a bin."""
     converged: Converged | None = None
     """How much of the map needs no more photons, where that was asked for."""
+
+    @staticmethod
+    def from_numbers(numbers: Mapping[str, Any]) -> Deposited:
+        """The inverse of `dataclasses.asdict`."""
+        from pmviewer.maps.convergence import Converged
+
+        converged = numbers["converged"]
+        lists = {name: tuple(numbers[name]) for name in ("percentiles", "histogram")}
+        return Deposited(**{**numbers, **lists, "converged": None if converged is None else Converged(**converged)})
 
     @property
     def rejected(self) -> int:

@@ -47,6 +47,7 @@ from pmviewer.photons.emission.light_importance import LightImportance
 from pmviewer.photons.emission.strata import Strata, StrataTable, strata_of, table_of
 from pmviewer.photons.emission.tested import Runner, Sought, Tested, TraceBatch, trace_tests, weighed
 from pmviewer.scene.arrays.flatten import FlatScene
+from pmviewer.state import State
 
 Variant = Literal["Peter-Pietrek", "Christensen discard", "Christensen keep"]
 Float = NDArray[np.float64]
@@ -88,6 +89,16 @@ class Known:
 
     def __add__(self, other: Known) -> Known:
         return Known(self.met + other.met, self.tests + other.tests, self.hits + other.hits)
+
+    def state(self) -> State:
+        """All of it."""
+        return State({}, {"met": self.met, "tests": self.tests, "hits": self.hits})
+
+    @staticmethod
+    def restored(state: State) -> Known:
+        """From what `state` has told. Raises ValueError for anything else."""
+        n = len(state.array("met", (None,), np.float64))
+        return Known(*(state.array(name, (n,), np.float64) for name in ("met", "tests", "hits")))
 
 
 @dataclass(frozen=True, eq=False)

@@ -209,6 +209,16 @@ class Display(Group):
         scale="switch",
         title="compile ahead",
     )
+    autosave: float = setting(
+        60.0,
+        "The window keeps session and film on disk this often, and offers them after a crash; 0 is never. Films of "
+        "less than ten seconds of rendering are not kept.",
+        stage="display",
+        scale="linear",
+        unit="s",
+        ge=0.0,
+        le=3600.0,
+    )
     colours: Literal["violet-yellow", "fire", "blue-yellow", "grey"] = setting(
         "violet-yellow",
         "Colours of quantities from small to large. In all of them lightness alone tells the order, for colour-blind "
