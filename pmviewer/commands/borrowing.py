@@ -8,8 +8,13 @@ from typing import TYPE_CHECKING
 
 from pmviewer.commands.patience import print_warnings
 from pmviewer.commands.progress_bar import Bar
+from pmviewer.engine.method import plan_of
+from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.radius import check_apart
 from pmviewer.engine.renderer import Renderer
 from pmviewer.errors import ClusterError
+from pmviewer.settings.access import Settings
+from pmviewer.settings.needs import Facts
 
 if TYPE_CHECKING:  # Dask, which only those wait for who use it
     from pmviewer.engine.cluster.cluster import Cluster
@@ -18,13 +23,24 @@ Step = Callable[[], bool]
 """Renders the next pass into the film; False where no more will come of what there is."""
 
 
+def check_cluster(where: str | None) -> None:
+    """Raises SettingError and ClusterError for what can't be a cluster, before anything is read or rendered."""
+    if where is not None:
+        from pmviewer.engine.cluster.cluster import check_address
+
+        check_address(where)
+
+
 @contextmanager
-def borrowed(where: str | None, threads: int | None) -> Iterator[Cluster | None]:
-    """The cluster that was asked for, while the context lasts; None for this process. Raises SettingError and
-    ClusterError."""
+def borrowed(
+    where: str | None, threads: int | None, opened: OpenScene, settings: Settings
+) -> Iterator[Cluster | None]:
+    """The cluster that was asked for, while the context lasts; None for this process. Raises SettingError, for settings
+    whose passes can't be rendered apart too, and ClusterError."""
     if where is None:
         yield None
         return
+    check_apart(Facts(settings, plan_of(settings, opened.traits), opened.traits))
     from pmviewer.engine.cluster.cluster import Cluster
 
     cluster = Cluster(where, threads)

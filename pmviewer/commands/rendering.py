@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pmviewer.commands.borrowing import borrowed, passes_of
+from pmviewer.commands.borrowing import borrowed, check_cluster, passes_of
 from pmviewer.commands.choosing import wants_choice, with_choice
 from pmviewer.commands.job import DEFAULT_PASSES, Job, Stop, check_output, overrides
 from pmviewer.commands.patience import patiently, print_warnings
@@ -65,6 +65,7 @@ def render_job(
     """
     for path in outputs:
         check_output(path, FORMATS)
+    check_cluster(cluster)
     stop = stop or Stop()
     settings = with_values(job.settings, overrides(stop.passes, stop.seconds, size, seed, job.passes, stop.error))
     with patiently() as tell, watched(tell, threads=threads):
@@ -80,7 +81,7 @@ def render_job(
     try:
         if wants_choice(stop, job.settings):
             settings, bias = with_choice(opened, settings, pool)
-        with borrowed(cluster, threads) as elsewhere:
+        with borrowed(cluster, threads, opened, settings) as elsewhere:
             frame = _rendered(opened, settings, pool, target, denoise, bias, elsewhere)
     finally:
         pool.close()

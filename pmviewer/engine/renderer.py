@@ -26,7 +26,7 @@ from pmviewer.engine.memory import check_memory
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.radius import first_radius, radii_of_pixels
+from pmviewer.engine.radius import check_apart, first_radius, radii_of_pixels
 from pmviewer.engine.stages.estimation import estimate_gathers
 from pmviewer.engine.stages.eye import gather_rays_of, outline_of, render_into
 from pmviewer.engine.stages.importance import ImportanceStage
@@ -41,7 +41,6 @@ from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.engine.told import Told, told_of
 from pmviewer.engine.wanted import wanted_of
-from pmviewer.errors import SettingError
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.film import Film, Increment
@@ -147,19 +146,11 @@ class Renderer:
     def increment(self, index: int) -> Increment:
         """What pass `index` adds to the film, which stays as it is: `add` takes it, here or elsewhere. Raises
         SettingError where passes can't be rendered apart."""
-        self.check_apart()
+        check_apart(self.facts)
         film = film_of(self.settings, self.plan, self.camera.width, self.camera.height)
         film.region, film.passes = self.film.region, index
         self._pass(film, self.camera, index, self.settings.photons.N)
         return Increment(film.sums, film.weights)
-
-    def check_apart(self) -> None:
-        """Raises SettingError where a pass needs what those before it found."""
-        if radii_of_pixels(self.facts):
-            raise SettingError(
-                "estimate.radius_rule = pixel: the radii of a pass depend on the passes before it, so that passes can't "
-                "be rendered apart, as on a cluster; set estimate.radius_rule=pass."
-            )
 
     def told(self) -> Told:
         """What there is to say of the latest pass beyond the tally: of one from elsewhere what was said there."""

@@ -16,6 +16,7 @@ import warnings
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,10 @@ KEPT_SCENES = 2
 MOST_LOCAL = 256
 _ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss)://\S+")
 _LOCAL = re.compile(r"local:(\d{1,4})")
+_TLS = (
+    "set distributed.comm.tls.ca-file, .client.cert and .client.key in Dask's configuration, for example by "
+    "DASK_DISTRIBUTED__COMM__TLS__CA_FILE=ca.pem."
+)
 _NO_LIBRARY = "The extra 'cluster' is not installed here: pip install 'pmviewer[cluster]'."
 
 
@@ -58,11 +63,13 @@ def check_address(where: str) -> None:
         )
     if where.endswith(".json") and not Path(where).is_file():
         raise ClusterError(f"There is no scheduler file {where}; start one with: dask scheduler --scheduler-file {where}")
-    try:
-        import distributed  # noqa: F401
-        import lz4  # noqa: F401
-    except ImportError as error:
-        raise ClusterError(_NO_LIBRARY) from error
+    if not (find_spec("distributed") and find_spec("lz4")):
+        raise ClusterError(_NO_LIBRARY)
+    if where.startswith(("tls:", "wss:")):
+        from distributed import Security
+
+        if Security().get_connection_args("client").get("ssl_context") is None:
+            raise ClusterError(f"--cluster {where} needs certificates: {_TLS}")
 
 
 class Cluster:
@@ -200,6 +207,7 @@ def _started(count: int, threads: int | None) -> Any:
         dashboard_address=None,
         memory_limit=0,
         silence_logs=logging.CRITICAL,
+        preload=["pmviewer.engine.cluster.preload"],
     )
 
 
@@ -220,7 +228,9 @@ def _settings() -> Any:
 
 def _quiet() -> None:
     """What is to be said is said in a sentence; Dask's own log of connections lost is silent."""
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", *logging.root.manager.loggerDict):
+        if name.split(".")[0] == "distributed":
+            logging.getLogger(name).setLevel(logging.CRITICAL)
     warnings.filterwarnings("ignore", message="(?s).*Sending large graph.*", category=UserWarning)
 
 

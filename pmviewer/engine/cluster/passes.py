@@ -24,6 +24,7 @@ from pmviewer.engine.cluster.cluster import Cluster, SentScene
 from pmviewer.engine.cluster.members import Member
 from pmviewer.engine.cluster.packed import unpack
 from pmviewer.engine.cluster.worker import Asked, Failed, Rendered, render_pass, stop
+from pmviewer.engine.radius import check_apart
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.stages.virtual_lights import film_of
 from pmviewer.errors import ClusterError
@@ -59,7 +60,7 @@ class Elsewhere:
 
     def __init__(self, cluster: Cluster, renderer: Renderer) -> None:
         """Raises SettingError where passes can't be rendered apart."""
-        renderer.check_apart()
+        check_apart(renderer.facts)
         self.cluster, self.renderer = cluster, renderer
         self.run = uuid.uuid4().hex
         self._blank = film_of(renderer.settings, renderer.plan, 1, 1).sums[0].copy()
