@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from pmviewer.commands.patience import print_warnings
 from pmviewer.commands.progress_bar import Bar
+from pmviewer.engine.cluster.address import check_address
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.radius import check_apart
@@ -26,15 +27,11 @@ Step = Callable[[], bool]
 def check_cluster(where: str | None) -> None:
     """Raises SettingError and ClusterError for what can't be a cluster, before anything is read or rendered."""
     if where is not None:
-        from pmviewer.engine.cluster.cluster import check_address
-
         check_address(where)
 
 
 @contextmanager
-def borrowed(
-    where: str | None, threads: int | None, opened: OpenScene, settings: Settings
-) -> Iterator[Cluster | None]:
+def borrowed(where: str | None, threads: int | None, opened: OpenScene, settings: Settings) -> Iterator[Cluster | None]:
     """The cluster that was asked for, while the context lasts; None for this process. Raises SettingError, for settings
     whose passes can't be rendered apart too, and ClusterError."""
     if where is None:

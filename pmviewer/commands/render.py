@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from pmviewer.commands.options import ClusterOption, EditOption, ParameterOption, SceneArgument, SetOption, ThreadsOption
+from pmviewer.commands.options import (
+    ClusterOption,
+    EditOption,
+    ParameterOption,
+    SceneArgument,
+    SetOption,
+    ThreadsOption,
+)
 from pmviewer.errors import SettingError
 
 

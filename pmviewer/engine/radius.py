@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
+from pmviewer.errors import SettingError
 from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.maps.estimate.nearest import shrunk
 from pmviewer.maps.radius import progressive_radius
 from pmviewer.render.camera import CameraPose
 from pmviewer.scene.arrays.flatten import FlatScene
-from pmviewer.errors import SettingError
 from pmviewer.settings.access import Estimate, needs_of
 from pmviewer.settings.needs import Facts, unmet
 

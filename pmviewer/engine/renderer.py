@@ -232,7 +232,9 @@ class Renderer:
         looked = self._looked(film)
         inspection = inspected(wanted, looked, self.pool)
         told = self.told() if film is self.film else told_of(looked, self.tally)
-        made = replace(frame_of(looked, self.tally, inspection, told), serial=serial, version=self.version, coarse=coarse)
+        made = replace(
+            frame_of(looked, self.tally, inspection, told), serial=serial, version=self.version, coarse=coarse
+        )
         return replace(
             made,
             automatic=automatic_values(looked, self.settled_radius),

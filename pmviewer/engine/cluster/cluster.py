@@ -9,22 +9,20 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import logging
-import re
 import threading
 import time
 import warnings
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
+from pmviewer.engine.cluster.address import LOCAL, check_address
 from pmviewer.engine.cluster.identity import ASK, identity
 from pmviewer.engine.cluster.members import Member, Members
 from pmviewer.engine.cluster.worker import digest_of, kept, packed_scene
 from pmviewer.engine.opened import OpenScene
-from pmviewer.errors import ClusterError, SettingError
+from pmviewer.errors import ClusterError
 from pmviewer.progress import available_threads
 
 CONNECT = 10.0
@@ -32,14 +30,6 @@ CONNECT = 10.0
 WATCH = 0.5
 """Seconds between looks at the workers."""
 KEPT_SCENES = 2
-MOST_LOCAL = 256
-_ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss)://\S+")
-_LOCAL = re.compile(r"local:(\d{1,4})")
-_TLS = (
-    "set distributed.comm.tls.ca-file, .client.cert and .client.key in Dask's configuration, for example by "
-    "DASK_DISTRIBUTED__COMM__TLS__CA_FILE=ca.pem."
-)
-_NO_LIBRARY = "The extra 'cluster' is not installed here: pip install 'pmviewer[cluster]'."
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,27 +39,6 @@ class SentScene:
     future: Any
     digest: str
     arrays: str
-
-
-def check_address(where: str) -> None:
-    """Raises SettingError for what can't be the address of a cluster, ClusterError without Dask."""
-    local = _LOCAL.fullmatch(where)
-    if local and not 1 <= int(local[1]) <= MOST_LOCAL:
-        raise SettingError(f"--cluster {where}: from 1 to {MOST_LOCAL} workers can be started here.")
-    if not (local or _ADDRESS.fullmatch(where) or where.endswith(".json")):
-        raise SettingError(
-            f"--cluster {where} is no cluster: write local:N for N processes of this machine, the address of a Dask "
-            "scheduler (tcp://host:8786, tls://host:8786), or its scheduler file (.json)."
-        )
-    if where.endswith(".json") and not Path(where).is_file():
-        raise ClusterError(f"There is no scheduler file {where}; start one with: dask scheduler --scheduler-file {where}")
-    if not (find_spec("distributed") and find_spec("lz4")):
-        raise ClusterError(_NO_LIBRARY)
-    if where.startswith(("tls:", "wss:")):
-        from distributed import Security
-
-        if Security().get_connection_args("client").get("ssl_context") is None:
-            raise ClusterError(f"--cluster {where} needs certificates: {_TLS}")
 
 
 class Cluster:
@@ -88,7 +57,7 @@ class Cluster:
         self._local: Any = None
         try:
             with _settings():
-                if local := _LOCAL.fullmatch(where):
+                if local := LOCAL.fullmatch(where):
                     self._local = _started(int(local[1]), threads)
                     self.client = Client(self._local, timeout=CONNECT, set_as_default=False)
                 elif where.endswith(".json"):
@@ -121,7 +90,9 @@ class Cluster:
         if self.lost:
             raise ClusterError(self.lost)
         if self.members.refused:
-            raise ClusterError(self.members.messages[-1] if self.members.messages else "No worker of this cluster fits.")
+            raise ClusterError(
+                self.members.messages[-1] if self.members.messages else "No worker of this cluster fits."
+            )
 
     def take_messages(self) -> list[str]:
         """Sentences for the user since the last call."""
@@ -204,7 +175,7 @@ def _started(count: int, threads: int | None) -> Any:
         threads_per_worker=each,
         processes=True,
         host="127.0.0.1",
-        dashboard_address=None,
+        dashboard_address=":0",
         memory_limit=0,
         silence_logs=logging.CRITICAL,
         preload=["pmviewer.engine.cluster.preload"],
@@ -238,7 +209,9 @@ def _unreachable(where: str, error: BaseException) -> str:
     first = (str(error) or type(error).__name__).splitlines()[0]
     if where.startswith("local:"):
         return f"Workers of {where} can't be started: {first}"
-    return f"No Dask scheduler answers at {where} within {CONNECT:.0f} s. Is it running, and can it be reached? ({first})"
+    return (
+        f"No Dask scheduler answers at {where} within {CONNECT:.0f} s. Is it running, and can it be reached? ({first})"
+    )
 
 
 def _why_not(error: BaseException | None) -> str:

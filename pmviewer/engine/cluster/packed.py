@@ -100,10 +100,11 @@ def _unpack_into(out: NDArray[np.float64], rows: slice | NDArray[np.int64], colu
     from lz4.frame import decompress
 
     out[rows] = 0.0
-    for names, values in (
+    parts: list[tuple[tuple[int, ...], NDArray[np.floating]]] = [
         (columns.exact, np.frombuffer(decompress(columns.narrow), np.float32)),
         (columns.others, np.frombuffer(decompress(columns.wide), np.float64)),
-    ):
+    ]
+    for names, values in parts:
         if names:
             for column, sums in zip(names, values.reshape(len(names), -1)):
                 out[rows, column] = sums

@@ -41,6 +41,9 @@ FETCH = 60.0
 SLOW, LEAST_SLOW = 5.0, 10.0
 """From how many times the usual time of a pass, and from how many seconds on, another worker is asked for it."""
 RECENT = 32
+"""Passes whose times tell what is usual."""
+MOMENT, LOOK = 0.02, 0.2
+"""Seconds after which a cancelled pass is noticed, and between looks at the workers."""
 
 
 @dataclass
@@ -74,23 +77,30 @@ class Elsewhere:
         self._arrived: queue.SimpleQueue[tuple[str, Rendered | Failed | None]] = queue.SimpleQueue()
         self._fetchers = ThreadPoolExecutor(4, "pmviewer fetch")
 
-    def step(self, most: int | None = None, tell: Callable[[str], None] = lambda text: None) -> None:
+    def step(
+        self, most: int | None = None, tell: Callable[[str], None] = lambda text: None, patient: bool = True
+    ) -> bool:
         """Have the next pass in the film. `most` passes will be wanted in all, as many as the settings say without.
+        Where there are no workers `tell` hears that they are waited for, and who isn't `patient` is given False.
 
         Raises Cancelled when the renderer's pool is cancelled, ClusterError when the cluster has gone, and whatever a
         pass raises in a sentence; passes that are in the film stay there.
         """
         renderer, start = self.renderer, time.perf_counter()
-        most = renderer.settings.render.passes if most is None else most
+        most, looked = renderer.settings.render.passes if most is None else most, 0.0
+        self._ask(most)
         while renderer.passes not in self._done:
             if renderer.pool.cancel.is_set():
                 raise Cancelled
             self.cluster.check()
             if not self.cluster.members.ready:
+                if not patient:
+                    return False
                 tell(f"waiting for workers of {self.cluster.where}")
-            self._look_after()
-            self._ask(most)
-            self._receive()
+            if self._receive() or time.monotonic() - looked > LOOK:
+                looked = time.monotonic()
+                self._look_after()
+                self._ask(most)
         rendered, member = self._done.pop(renderer.passes)
         renderer.add(unpack(rendered.increment, self._blank), rendered.told)
         renderer.tally.merge(rendered.tally)
@@ -98,6 +108,7 @@ class Elsewhere:
         renderer.tally.workers[member.address] = member.threads, share[1] + 1
         self._ask(most)  # workers go on while the caller looks at the picture
         renderer.tally.seconds += time.perf_counter() - start
+        return True
 
     def close(self) -> None:
         """Nobody wants what is still on its way: workers drop it within some 30 ms."""
@@ -188,15 +199,17 @@ class Elsewhere:
             found = None
         self._arrived.put((future.key, found))
 
-    def _receive(self) -> None:
-        """Take what has arrived; wait a moment where nothing has."""
+    def _receive(self) -> bool:
+        """Take what has arrived, and tell whether anything has; wait a moment first."""
+        some = False
         try:
-            key, found = self._arrived.get(timeout=0.1)
+            key, found = self._arrived.get(timeout=MOMENT)
             while True:
+                some = True
                 self._take(key, found)
                 key, found = self._arrived.get_nowait()
         except queue.Empty:
-            return
+            return some
 
     def _take(self, key: str, found: Rendered | Failed | None) -> None:
         order = self._orders.pop(key, None)
@@ -250,4 +263,3 @@ class Elsewhere:
 
 def _text(error: BaseException | None) -> str:
     return f"{type(error).__name__}: {error}".splitlines()[0] if error is not None else "no reason given"
-

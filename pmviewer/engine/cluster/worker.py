@@ -15,8 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-import numpy as np
-
 from pmviewer.engine.cluster.packed import PackedIncrement, pack
 from pmviewer.engine.memory import give_back
 from pmviewer.engine.opened import OpenScene
@@ -109,7 +107,7 @@ def digest_of(flat: FlatScene) -> str:
     """Of the arrays that are derived from a scene's own: the tree and the lights."""
     found = hashlib.blake2b(digest_size=16)
     for array in (flat.bvh.nodes, flat.bvh.blocks, flat.bvh.quadrics, flat.lights, flat.light_power):
-        found.update(np.ascontiguousarray(array).view(np.uint8))
+        found.update(array.tobytes())
     return found.hexdigest()
 
 
