@@ -56,7 +56,7 @@ class PassMaker:
             if self._elsewhere is None or self._elsewhere.renderer is not renderer:
                 self.drop()
                 cluster.check()
-                if not cluster.members.ready:
+                if not cluster.ready:
                     return False
                 from pmviewer.engine.cluster.passes import Elsewhere
 

@@ -20,7 +20,7 @@ from typing import Any
 from pmviewer.engine.cluster.address import LOCAL, check_address
 from pmviewer.engine.cluster.identity import ASK, identity
 from pmviewer.engine.cluster.members import Member, Members
-from pmviewer.engine.cluster.worker import digest_of, kept, packed_scene
+from pmviewer.engine.cluster.worker import digest_of, packed_scene
 from pmviewer.engine.opened import OpenScene
 from pmviewer.errors import ClusterError
 from pmviewer.progress import available_threads
@@ -33,10 +33,10 @@ KEPT_SCENES = 2
 
 
 @dataclass(frozen=True, eq=False)
-class SentScene:
-    """A scene on the cluster: Dask's future of its bytes, their digest, and the digest of what is derived here."""
+class PackedScene:
+    """A scene for workers: its bytes, their digest, and the digest of what is derived from it here."""
 
-    future: Any
+    payload: bytes
     digest: str
     arrays: str
 
@@ -53,7 +53,7 @@ class Cluster:
         _quiet()
         self.where, self.lost, self._closed = where, "", threading.Event()
         self.members = Members(identity())
-        self._scenes: OrderedDict[int, SentScene] = OrderedDict()
+        self._scenes: OrderedDict[int, PackedScene] = OrderedDict()
         self._local: Any = None
         try:
             with _settings():
@@ -77,7 +77,7 @@ class Cluster:
         """Return as soon as a worker can render. `tell` hears what is waited for. Raises ClusterError when all are
         refused or the scheduler has gone."""
         told = ""
-        while not self.members.ready and not unwanted():
+        while not self.ready and not unwanted():
             self.check()
             waits = "starting workers" if self._local is not None else "waiting for workers"
             text = "checking workers" if self.members.here else f"{waits} of {self.where}"
@@ -99,19 +99,22 @@ class Cluster:
         taken, self.members.messages = self.members.messages, []
         return taken
 
-    def send(self, opened: OpenScene) -> SentScene:
-        """The scene there, which is sent when it isn't yet; the newest few stay."""
-        sent = self._scenes.get(opened.uid)
-        if sent is None or sent.future.status in ("cancelled", "lost", "error"):
+    def packed(self, opened: OpenScene) -> PackedScene:
+        """The scene for workers; the newest few are kept."""
+        made = self._scenes.get(opened.uid)
+        if made is None:
             payload = packed_scene(opened)
             digest = hashlib.blake2b(payload, digest_size=16).hexdigest()
-            key = f"pmviewer-scene-{digest}-{time.monotonic_ns()}"
-            sent = SentScene(self.client.submit(kept, payload, key=key), digest, digest_of(opened.flat))
-            self._scenes[opened.uid] = sent
+            made = self._scenes[opened.uid] = PackedScene(payload, digest, digest_of(opened.flat))
             while len(self._scenes) > KEPT_SCENES:
                 self._scenes.popitem(last=False)
         self._scenes.move_to_end(opened.uid)
-        return sent
+        return made
+
+    @property
+    def ready(self) -> list[Member]:
+        """Workers that can be given a pass now."""
+        return self.members.ready if self.is_connected else []
 
     @property
     def is_connected(self) -> bool:

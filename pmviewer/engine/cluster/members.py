@@ -23,6 +23,8 @@ class Member:
     name: str
     threads: int
     standing: Standing = "asked"
+    scenes: set[str] = field(default_factory=set)
+    """Digests of those that it holds, as far as is known."""
     heard: float = 0.0
     """What the scheduler says of its last heartbeat, by its own clock."""
     changed: float = field(default_factory=time.monotonic)

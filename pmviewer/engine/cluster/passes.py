@@ -4,6 +4,9 @@ Each worker has one pass in work and one waiting. Which worker gets which pass i
 has gone, is frozen or is far slower than the others costs its pass and no more: another is asked for the same pass, and
 the first result counts, as both are the same bit for bit. At most as many passes are on their way or wait for their
 turn as keeps all workers busy, so that memory doesn't grow.
+
+A worker is brought the scene once, from here. From worker to worker it would travel faster, but one that freezes while
+others wait for its data would hold them up for good.
 """
 
 from __future__ import annotations
@@ -20,16 +23,18 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
-from pmviewer.engine.cluster.cluster import Cluster, SentScene
+from pmviewer.engine.cluster.cluster import Cluster
 from pmviewer.engine.cluster.members import Member
 from pmviewer.engine.cluster.packed import unpack
-from pmviewer.engine.cluster.worker import Asked, Failed, Rendered, render_pass, stop
+from pmviewer.engine.cluster.worker import Asked, Failed, Rendered, hold_scene, render_pass, stop
 from pmviewer.engine.radius import check_apart
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.stages.virtual_lights import film_of
 from pmviewer.errors import ClusterError
 from pmviewer.progress import Cancelled
 
+BROUGHT = 4
+"""Workers that are brought the scene at the same time."""
 EACH = 2
 """Passes that a worker has at once: one in work, one waiting."""
 AHEAD = 2
@@ -52,7 +57,7 @@ class Order:
 
     index: int
     member: Member
-    future: Any
+    future: Any = None
     since: float = field(default_factory=time.monotonic)
     doubted: bool = False
     """Whether another was asked for the same pass."""
@@ -67,14 +72,17 @@ class Elsewhere:
         self.cluster, self.renderer = cluster, renderer
         self.run = uuid.uuid4().hex
         self._blank = film_of(renderer.settings, renderer.plan, 1, 1).sums[0].copy()
+        self._scene = cluster.packed(renderer.scene)
         self._orders: dict[str, Order] = {}
+        self._brought: dict[str, Order] = {}
+        """Workers that are being brought the scene."""
         self._again: list[int] = []
         self._next = renderer.passes
         self._done: dict[int, tuple[Rendered, Member]] = {}
         self._failures: dict[int, int] = {}
         self._took: list[float] = []
         self._numbers = itertools.count()
-        self._arrived: queue.SimpleQueue[tuple[str, Rendered | Failed | None]] = queue.SimpleQueue()
+        self._arrived: queue.SimpleQueue[tuple[str, Rendered | Failed | str | None]] = queue.SimpleQueue()
         self._fetchers = ThreadPoolExecutor(4, "pmviewer fetch")
 
     def step(
@@ -93,7 +101,7 @@ class Elsewhere:
             if renderer.pool.cancel.is_set():
                 raise Cancelled
             self.cluster.check()
-            if not self.cluster.members.ready:
+            if not self.cluster.ready:
                 if not patient:
                     return False
                 tell(f"waiting for workers of {self.cluster.where}")
@@ -118,15 +126,14 @@ class Elsewhere:
             with contextlib.suppress(Exception):  # gone meanwhile
                 if busy:
                     self.cluster.client.run(stop, self.run, workers=list(busy), wait=False, on_error="ignore")
-                for order in self._orders.values():
+                for order in (*self._orders.values(), *self._brought.values()):
                     order.future.release()
         self._orders.clear()
+        self._brought.clear()
 
     def _ask(self, most: int) -> None:
         """Give workers that have too few passes the next ones."""
-        if not self.cluster.is_connected:
-            return
-        ready = self.cluster.members.ready
+        ready = [member for member in self.cluster.ready if self._has_scene(member)]
         load = {member.address: 0 for member in ready}
         for order in self._orders.values():
             if order.member.address in load:
@@ -168,18 +175,26 @@ class Elsewhere:
         return None
 
     def _order(self, index: int, member: Member) -> None:
-        renderer = self.renderer
-        sent = self._scene()
-        asked = Asked(self.run, sent.digest, renderer.settings, index, member.threads)
+        asked = Asked(self.run, self._scene.digest, self.renderer.settings, index, member.threads)
         key = f"pmviewer-pass-{self.run}-{index}-{next(self._numbers)}"
-        future = self.cluster.client.submit(
-            render_pass, sent.future, asked, key=key, workers=[member.address], allow_other_workers=False
-        )
-        self._orders[key] = Order(index, member, future)
-        future.add_done_callback(self._finished)
+        self._submit(self._orders, Order(index, member), key, render_pass, asked)
 
-    def _scene(self) -> SentScene:
-        return self.cluster.send(self.renderer.scene)
+    def _has_scene(self, member: Member) -> bool:
+        """Whether the worker has it; it is brought if not."""
+        if self._scene.digest in member.scenes:
+            return True
+        under_way = {order.member.address for order in self._brought.values()}
+        if member.address not in under_way and len(under_way) < BROUGHT:
+            key = f"pmviewer-scene-{self.run}-{next(self._numbers)}"
+            scene = self._scene
+            self._submit(self._brought, Order(-1, member), key, hold_scene, scene.payload, scene.digest)
+        return False
+
+    def _submit(self, orders: dict[str, Order], order: Order, key: str, call: Callable[..., Any], *given: Any) -> None:
+        address = order.member.address
+        order.future = self.cluster.client.submit(call, *given, key=key, workers=[address], allow_other_workers=False)
+        orders[key] = order
+        order.future.add_done_callback(self._finished)
 
     def _finished(self, future: Any) -> None:
         """Called by a thread of Dask's."""
@@ -189,7 +204,7 @@ class Elsewhere:
             return
 
     def _fetch(self, future: Any) -> None:
-        found: Rendered | Failed | None = None
+        found: Rendered | Failed | str | None = None
         try:
             if future.status == "finished":
                 found = future.result(timeout=FETCH)
@@ -211,7 +226,10 @@ class Elsewhere:
         except queue.Empty:
             return some
 
-    def _take(self, key: str, found: Rendered | Failed | None) -> None:
+    def _take(self, key: str, found: Rendered | Failed | str | None) -> None:
+        if key in self._brought:
+            self._take_scene(self._brought.pop(key), found)
+            return
         order = self._orders.pop(key, None)
         if order is None:
             return
@@ -221,18 +239,28 @@ class Elsewhere:
             if not self._is_wanted(order.index):
                 return
             self._done[order.index] = found, order.member
-            if found.arrays != self._scene().arrays:
-                self.cluster.members.say_once(
-                    f"Worker {order.member.address} makes other arrays of this scene than this machine: its passes may "
-                    "differ in the last bits."
-                )
             for other in [k for k, o in self._orders.items() if o.index == order.index]:
                 self._orders.pop(other).future.release()
             return
         if isinstance(found, Failed) and found.final:
             raise ClusterError(f"Pass {order.index} failed on worker {order.member.address}: {found.text}")
-        said = found.text if isinstance(found, Failed) else ""
-        self._lose(order, said, counts=self.cluster.is_connected)
+        said, lacks = (found.text, found.lacks_scene) if isinstance(found, Failed) else ("", False)
+        if lacks:
+            order.member.scenes.discard(self._scene.digest)
+        self._lose(order, said, counts=self.cluster.is_connected and not lacks)
+
+    def _take_scene(self, order: Order, found: Any) -> None:
+        order.future.release()
+        member = order.member
+        if isinstance(found, str):
+            member.scenes.add(self._scene.digest)
+            if found != self._scene.arrays:
+                self.cluster.members.say_once(
+                    f"Worker {member.address} makes other arrays of this scene than this machine: its passes may "
+                    "differ in the last bits."
+                )
+        elif isinstance(found, Failed):
+            self.cluster.members.judge(member, found.text)
 
     def _lose(self, order: Order, said: str, counts: bool = True) -> None:
         """Ask again for a pass. Raises ClusterError when it was lost too often."""
@@ -248,6 +276,10 @@ class Elsewhere:
     def _look_after(self) -> None:
         """Take back what workers have that are gone, and ask others for what silent ones have."""
         here = self.cluster.members.here
+        for key, order in list(self._brought.items()):
+            if here.get(order.member.address) is not order.member or order.member.is_silent:
+                del self._brought[key]
+                order.future.release()
         for key, order in list(self._orders.items()):
             if here.get(order.member.address) is not order.member:
                 del self._orders[key]

@@ -50,23 +50,23 @@ class Asked:
 
 @dataclass(frozen=True)
 class Rendered:
-    """A pass: what it adds, what was counted and what is told of it, the seconds it took, and the digest of the arrays
-    that the worker made of the scene."""
+    """A pass: what it adds, what was counted and what is told of it, and the seconds it took."""
 
     increment: PackedIncrement
     tally: Tally
     told: Told
     seconds: float
-    arrays: str
 
 
 @dataclass(frozen=True)
 class Failed:
-    """Why there is no pass. `final`: it would fail everywhere; `cancelled`: nobody wants it any more."""
+    """Why there is no pass. `final`: it would fail everywhere; `cancelled`: nobody wants it any more; `lacks_scene`:
+    the worker doesn't have the scene, or no longer."""
 
     text: str
     final: bool = False
     cancelled: bool = False
+    lacks_scene: bool = False
 
 
 class _Bench:
@@ -93,14 +93,11 @@ class _Bench:
 _bench = _Bench()
 
 
-def kept(payload: bytes) -> bytes:
-    """The scene's bytes as a task of its own, so that Dask brings them to a worker once, from the nearest."""
-    return payload
-
-
 def packed_scene(opened: OpenScene) -> bytes:
     """The scene as it is rendered, with all its arrays: nothing is read where it arrives."""
-    return pickle.dumps((opened.scene, opened.source), pickle.HIGHEST_PROTOCOL)
+    from lz4.frame import compress
+
+    return bytes(compress(pickle.dumps((opened.scene, opened.source), pickle.HIGHEST_PROTOCOL)))
 
 
 def digest_of(flat: FlatScene) -> str:
@@ -111,17 +108,30 @@ def digest_of(flat: FlatScene) -> str:
     return found.hexdigest()
 
 
-def render_pass(payload: bytes, asked: Asked) -> Rendered | Failed:
-    """The pass. What goes wrong is told, not raised: Dask's log has no use for it."""
+def hold_scene(payload: bytes, digest: str) -> str | Failed:
+    """Keep a scene for the passes that follow; returns the digest of the arrays that are derived from it here."""
+    with _bench.turn:
+        try:
+            return _kept(_bench.scenes, digest, KEPT_SCENES, lambda: _opened(payload))[1]
+        except MemoryError:
+            return Failed("not enough memory for this scene")
+        except Exception as error:  # whatever it is, the client must hear of it
+            return Failed(f"{type(error).__name__}: {error}")
+
+
+def render_pass(asked: Asked) -> Rendered | Failed:
+    """The pass, of a scene that is held. What goes wrong is told, not raised: Dask's log has no use for it."""
     with _bench.turn:
         with _bench.lock:
             if asked.run in _bench.stopped:
                 return Failed("stopped", cancelled=True)
+            if asked.scene not in _bench.scenes:
+                return Failed("the scene is not there", lacks_scene=True)
             pool = _bench.pool_of(asked.threads)
             pool.cancel.clear()
             _bench.running = asked.run
         try:
-            return _rendered(payload, asked, pool)
+            return _rendered(asked, pool)
         except Cancelled:
             return Failed("stopped", cancelled=True)
         except PmviewerError as error:
@@ -148,9 +158,10 @@ def stop(run: str) -> None:
             _bench.pool.cancel.set()
 
 
-def _rendered(payload: bytes, asked: Asked, pool: WorkPool) -> Rendered:
+def _rendered(asked: Asked, pool: WorkPool) -> Rendered:
     start = time.perf_counter()
-    opened, arrays = _kept(_bench.scenes, asked.scene, KEPT_SCENES, lambda: _opened(payload))
+    opened, _ = _bench.scenes[asked.scene]
+    _bench.scenes.move_to_end(asked.scene)
 
     def make() -> Renderer:
         made = Renderer(opened, asked.settings, pool, StageStore(KEPT_BYTES))
@@ -167,11 +178,13 @@ def _rendered(payload: bytes, asked: Asked, pool: WorkPool) -> Rendered:
     spans = renderer.film.spans(asked.index)
     tally, told = renderer.tally.take(asked.index), renderer.told()
     packed = pack(increment, spans)
-    return Rendered(packed, tally, told, time.perf_counter() - start, arrays)
+    return Rendered(packed, tally, told, time.perf_counter() - start)
 
 
 def _opened(payload: bytes) -> tuple[OpenScene, str]:
-    scene, source = pickle.loads(payload)
+    from lz4.frame import decompress
+
+    scene, source = pickle.loads(decompress(payload))
     flat = flatten(scene)
     return OpenScene(scene, flat, analyse(scene), source), digest_of(flat)
 
