@@ -12,9 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.render.film import Increment
 
 Span = tuple[int, int]
+BLOCK = 2048
+"""Rows that are turned to columns, or back, at a time: they stay in the processor's cache."""
 
 
 @dataclass(frozen=True)
@@ -52,18 +55,28 @@ def pack(increment: Increment, spans: Sequence[Span]) -> PackedIncrement:
     return PackedIncrement(len(increment.sums), tuple(spans), _packed(increment.sums[rows]), weights)
 
 
-def unpack(packed: PackedIncrement, blank: NDArray[np.float64]) -> Increment:
+def unpack(packed: PackedIncrement, blank: NDArray[np.float64], into: NDArray[np.float64] | None = None) -> Increment:
     """The increment again; `blank` (columns,) are the sums of a pixel of an empty film, which those have that nothing
-    was rendered of."""
+    was rendered of. The sums are written to `into` (pixels, columns), if it is given: new memory costs as much time."""
 
-    def whole(columns: Columns, empty: NDArray[np.float64]) -> NDArray[np.float64]:
-        out = np.empty((packed.pixels, columns.columns))
-        out[:] = empty
-        _unpack_into(out, _rows(packed.spans), columns)
+    def whole(
+        columns: Columns, empty: NDArray[np.float64], out: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
+        if out is None:
+            out = np.empty((packed.pixels, columns.columns))
+        rows = _rows(packed.spans)
+        if packed.spans != ((0, packed.pixels),):
+            out[:] = empty
+        if isinstance(rows, slice):
+            _unpack_into(out[rows], columns)
+        else:
+            inside = np.empty((len(rows), columns.columns))
+            _unpack_into(inside, columns)
+            out[rows] = inside
         return out
 
     weights = None if packed.weights is None else whole(packed.weights, np.zeros(packed.weights.columns))
-    return Increment(whole(packed.sums, blank), weights)
+    return Increment(whole(packed.sums, blank, into), weights)
 
 
 def _rows(spans: Sequence[Span]) -> slice | NDArray[np.int64]:
@@ -75,36 +88,71 @@ def _rows(spans: Sequence[Span]) -> slice | NDArray[np.int64]:
 def _packed(values: NDArray[np.float64]) -> Columns:
     from lz4.frame import compress
 
-    by_column = np.ascontiguousarray(values.T)
-    with np.errstate(over="ignore", invalid="ignore"):
-        narrow = by_column.astype(np.float32)
-        same = [_same_bits(column, wide) for column, wide in zip(narrow, by_column)]
-    empty = [not column.view(np.uint64).any() for column in by_column]
-    exact = tuple(c for c, is_same in enumerate(same) if is_same and not empty[c])
-    others = tuple(c for c, is_same in enumerate(same) if not is_same)
-    return Columns(
-        values.shape[1],
-        exact,
-        others,
-        compress(narrow[list(exact)].tobytes()),
-        compress(by_column[list(others)].tobytes()),
+    pixels, columns = values.shape
+    narrow, inexact, filled = (
+        np.empty((columns, pixels), np.float32),
+        np.zeros(columns, np.bool_),
+        np.zeros(columns, np.bool_),
     )
+    values = np.ascontiguousarray(values)
+    narrowed(values, values.view(np.uint64), narrow, inexact, filled)
+    exact = np.flatnonzero(filled & ~inexact)
+    others = np.flatnonzero(inexact)
+    wide = np.empty((len(others), pixels))
+    turned(values, others, wide)
+    kept = narrow if len(exact) == columns else narrow[exact]
+    return Columns(columns, tuple(map(int, exact)), tuple(map(int, others)), compress(kept.data), compress(wide.data))
 
 
-def _same_bits(narrow: NDArray[np.float32], wide: NDArray[np.float64]) -> bool:
-    """Whether each comes back from float32 bit for bit; signs of zeros and NaN count."""
-    return bool(np.array_equal(narrow.astype(np.float64).view(np.uint64), wide.view(np.uint64)))
+@kernel
+def narrowed(values, bits, out, inexact, filled):
+    """Values (n, c) float64, and their bits, turned to out (c, n) float32; which columns are not exact so, and which
+    are not all zero."""
+    n, columns = values.shape
+    for first in range(0, n, BLOCK):
+        last = min(first + BLOCK, n)
+        for c in range(columns):
+            lossy, some = False, False
+            for row in range(first, last):
+                value = np.float32(values[row, c])
+                out[c, row] = value
+                lossy |= np.float64(value) != values[row, c]
+                some |= bits[row, c] != 0
+            inexact[c] |= lossy
+            filled[c] |= some
 
 
-def _unpack_into(out: NDArray[np.float64], rows: slice | NDArray[np.int64], columns: Columns) -> None:
+@kernel
+def turned(values, chosen, out):
+    """Columns of values (n, c) as rows of out (len(chosen), n)."""
+    n = len(values)
+    for first in range(0, n, BLOCK):
+        last = min(first + BLOCK, n)
+        for k in range(len(chosen)):
+            for row in range(first, last):
+                out[k, row] = values[row, chosen[k]]
+
+
+@kernel
+def turned_back(numbers, chosen, out):
+    """Rows of numbers (len(chosen), n) as columns of out (n, c)."""
+    n = len(out)
+    for first in range(0, n, BLOCK):
+        last = min(first + BLOCK, n)
+        for k in range(len(chosen)):
+            for row in range(first, last):
+                out[row, chosen[k]] = np.float64(numbers[k, row])
+
+
+def _unpack_into(out: NDArray[np.float64], columns: Columns) -> None:
     from lz4.frame import decompress
 
-    out[rows] = 0.0
-    parts: list[tuple[tuple[int, ...], NDArray[np.floating]]] = [
-        (columns.exact, np.frombuffer(decompress(columns.narrow), np.float32)),
-        (columns.others, np.frombuffer(decompress(columns.wide), np.float64)),
-    ]
-    for names, values in parts:
-        if names:
-            for column, sums in zip(names, values.reshape(len(names), -1)):
-                out[rows, column] = sums
+    empty = set(range(columns.columns)).difference(columns.exact, columns.others)
+    out[:, sorted(empty)] = 0.0
+    for names, packed, dtype in (
+        (columns.exact, columns.narrow, np.float32),
+        (columns.others, columns.wide, np.float64),
+    ):
+        if names and len(out):
+            numbers = np.frombuffer(decompress(packed), dtype).reshape(len(names), -1)
+            turned_back(numbers, np.array(names), out)

@@ -23,6 +23,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from pmviewer.engine.cluster.cluster import Cluster
 from pmviewer.engine.cluster.members import Member
 from pmviewer.engine.cluster.packed import unpack
@@ -73,6 +75,7 @@ class Elsewhere:
         self.run = uuid.uuid4().hex
         self._blank = film_of(renderer.settings, renderer.plan, 1, 1).sums[0].copy()
         self._scene = cluster.packed(renderer.scene)
+        self._sums = np.empty_like(renderer.film.sums)
         self._orders: dict[str, Order] = {}
         self._brought: dict[str, Order] = {}
         """Workers that are being brought the scene."""
@@ -110,7 +113,7 @@ class Elsewhere:
                 self._look_after()
                 self._ask(most)
         rendered, member = self._done.pop(renderer.passes)
-        renderer.add(unpack(rendered.increment, self._blank), rendered.told)
+        renderer.add(unpack(rendered.increment, self._blank, self._sums), rendered.told)
         renderer.tally.merge(rendered.tally)
         share = renderer.tally.workers.get(member.address, (member.threads, 0))
         renderer.tally.workers[member.address] = member.threads, share[1] + 1
