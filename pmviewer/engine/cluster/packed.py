@@ -16,7 +16,7 @@ from pmviewer.kernels.compile.jit import kernel
 from pmviewer.render.film import Increment
 
 Span = tuple[int, int]
-BLOCK = 2048
+BLOCK = 128
 """Rows that are turned to columns, or back, at a time: they stay in the processor's cache."""
 
 
