@@ -73,6 +73,10 @@ BENCHES: dict[str, tuple[str, str]] = {
         "Renderings killed and resumed, full disks, damaged files, cost (X5)",
         "pmviewer.bench.measures.checkpoint:run",
     ),
+    "cluster": (
+        "Passes on a cluster: faults, memory, throughput against one process (X5)",
+        "pmviewer.bench.measures.cluster:run",
+    ),
     "all": ("Every bench, each in its own process, within 40 minutes", "pmviewer.bench.measures.everything:run"),
     "report": ("The page of what bench all has found", "pmviewer.bench.measures.everything:report"),
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 import signal
@@ -9,7 +10,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 
@@ -36,17 +37,19 @@ STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 
 @dataclass(frozen=True)
 class Asked:
-    """The command line's words: an interval, a file, whether to go on from it, and whether to keep it at the end."""
+    """The command line's words: an interval, a file, whether to go on from it, and whether to keep it at the end.
+    `if_cut_short`: one is written if the rendering ends early, as where a cluster is lost."""
 
     interval: str | None = None
     file: Path | None = None
     resume: bool = False
     keep: bool = False
+    if_cut_short: bool = False
 
     @property
     def any(self) -> bool:
         """Whether checkpoints are asked for at all."""
-        return self.interval is not None or self.resume
+        return self.interval is not None or self.resume or self.if_cut_short
 
 
 NO_CHECKPOINTS = Asked()
@@ -88,7 +91,8 @@ class Keeper:
     def __init__(self, asked: Asked, job: Job, outputs: Sequence[Path]) -> None:
         """Raises SettingError, OutputError and SceneError, before anything is rendered: for a file that can't be
         written, is another process's, is damaged, or would be overwritten."""
-        self.interval = USUAL_INTERVAL if asked.interval is None else seconds_of(asked.interval)
+        usual = math.inf if asked.if_cut_short and not asked.resume else USUAL_INTERVAL
+        self.interval = usual if asked.interval is None else seconds_of(asked.interval)
         self.path = asked.file or outputs[0].with_suffix(SUFFIX)
         self._asked, self._job = asked, files.Job(job.scene, job.parameters)
         self._kept: int | None = None
@@ -181,6 +185,13 @@ class Keeper:
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
+
+    def cut_short(self, renderer: Renderer) -> None:
+        """No more passes come: the file gets all that there are, and stays."""
+        self._asked = replace(self._asked, keep=True)
+        self.write(renderer)
+        if self._kept == renderer.passes:
+            print(f"pmviewer: {self._kept} passes are kept in {self.path}: go on with --resume", file=sys.stderr)
 
     def after_pass(self, renderer: Renderer) -> None:
         """Write a checkpoint if one is due, so that never more than an interval is lost, or if the program is to end;

@@ -73,3 +73,12 @@ CheckpointFileOption = Annotated[
 KeepCheckpointOption = Annotated[
     bool, typer.Option("--keep-checkpoint", help="Keep it when all is rendered, to go on to more passes later.")
 ]
+ClusterOption = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="WHERE",
+        help="Render the passes on a Dask cluster: local:N for N processes here, a scheduler's address "
+        "(tcp://host:8786, tls://…) or its scheduler file (.json).",
+    ),
+]

@@ -10,6 +10,7 @@ import typer
 from pmviewer.commands.options import (
     CheckpointFileOption,
     CheckpointOption,
+    ClusterOption,
     EditOption,
     KeepCheckpointOption,
     ParameterOption,
@@ -54,6 +55,7 @@ def render(
         str | None,
         typer.Option(metavar="FILE", help="EXR to print the error against; auto: the bundled scene's own."),
     ] = None,
+    cluster: ClusterOption = None,
     stats: Annotated[bool, typer.Option(help="Print photons, rays, times and the energy ledger.")] = False,
     checkpoint: CheckpointOption = None,
     resume: ResumeOption = False,
@@ -81,5 +83,6 @@ def render(
         denoise=denoise,
         reference=reference,
         stats=stats,
-        checkpoints=Asked(checkpoint, checkpoint_file, resume, keep_checkpoint),
+        checkpoints=Asked(checkpoint, checkpoint_file, resume, keep_checkpoint, if_cut_short=cluster is not None),
+        cluster=cluster,
     )

@@ -7,7 +7,9 @@ from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from pmviewer.commands.borrowing import borrowed, check_cluster, passes_of
 from pmviewer.commands.checkpointing import NO_CHECKPOINTS, Asked, Keeper, checkpoints_of
 from pmviewer.commands.choosing import Chosen, wants_choice, with_choice
 from pmviewer.commands.job import DEFAULT_PASSES, Job, Stop, check_output, overrides
@@ -33,6 +35,9 @@ from pmviewer.output.session_file import write_session
 from pmviewer.progress import watched
 from pmviewer.settings.access import Settings, with_values
 
+if TYPE_CHECKING:  # Dask, which only those wait for who use it
+    from pmviewer.engine.cluster.cluster import Cluster
+
 FORMATS = (".exr", ".png", ".toml")
 STOPS = {"render.time_limit": 0.0, "render.error": 0.0, "render.passes": DEFAULT_PASSES}
 """In a session file the number of passes alone says when to stop: it gives the same picture again."""
@@ -51,17 +56,19 @@ def render_job(
     reference: str | None = None,
     stats: bool = False,
     checkpoints: Asked = NO_CHECKPOINTS,
+    cluster: str | None = None,
 ) -> Frame:
     """Render and write the files; with a reference (a file or "auto") also print the error at passes 1, 2, 4, … and at
     the end; with `stats` photons, rays, times and the energy ledger.
 
     `denoise` adds the picture without its noise as a layer of EXR files; `checkpoints` are kept and gone on from as
-    asked for.
+    asked for; `cluster` renders the passes elsewhere (`pmviewer.engine.cluster`).
 
     Raises PmviewerError; refuses bad file names and references that don't fit before rendering.
     """
     for path in outputs:
         check_output(path, FORMATS)
+    check_cluster(cluster)
     stop = stop or Stop()
     settings = with_values(job.settings, overrides(stop.passes, stop.seconds, size, seed, job.passes, stop.error))
     with checkpoints_of(checkpoints, job, outputs) as keeper:
@@ -82,7 +89,8 @@ def render_job(
                 choice = with_choice(opened, settings, pool)
             if keeper is not None:
                 keeper.trial(settings, choice.seconds)
-            frame = _rendered(opened, choice, pool, target, denoise, keeper)
+            with borrowed(cluster, threads, opened, choice.settings) as elsewhere:
+                frame = _rendered(opened, choice, pool, target, denoise, keeper, elsewhere)
         finally:
             pool.close()
         _report(frame, stats)
@@ -120,6 +128,7 @@ def _rendered(
     target: Reference | None,
     denoise: bool,
     keeper: Keeper | None,
+    elsewhere: Cluster | None,
 ) -> Frame:
     renderer = Renderer(opened, choice.settings, pool, StageStore(0))
     renderer.error.bias = choice.bias
@@ -128,19 +137,31 @@ def _rendered(
     resumed = keeper is not None and keeper.found is not None
     if opened.scene.exposure is None and choice.settings.display.exposure == "auto" and not resumed:
         renderer.coarse_frame(0)  # as in the window it decides the exposure
-    _run(renderer, pool, None if target is None else partial(_print_error, target), keeper)
+    _run(renderer, pool, None if target is None else partial(_print_error, target), keeper, elsewhere)
     wanted = wanted_of(renderer.facts)
     return renderer.frame(1, replace(wanted, denoised=True) if denoise else wanted)
 
 
-def _run(renderer: Renderer, pool: WorkPool, measure: Callable[[Renderer], None] | None, keeper: Keeper | None) -> None:
+def _run(
+    renderer: Renderer,
+    pool: WorkPool,
+    measure: Callable[[Renderer], None] | None,
+    keeper: Keeper | None,
+    elsewhere: Cluster | None,
+) -> None:
     """Render until a stop rule holds; `measure` is called after passes 1, 2, 4, … and the last one."""
     with progress_bar(remaining=True) as bar:
         prepare(renderer.scene, renderer.settings, pool, bar.update)
-        bar.restart("rendering")
-        with nullcontext() if keeper is None else keeper.watching(renderer):
+        with (
+            nullcontext() if keeper is None else keeper.watching(renderer),
+            passes_of(renderer, elsewhere, bar) as step,
+        ):
+            bar.restart("rendering")
             while not renderer.finished:
-                renderer.step()
+                if not step():
+                    if keeper is not None:
+                        keeper.cut_short(renderer)
+                    return
                 if measure is not None and (renderer.passes & (renderer.passes - 1) == 0 or renderer.finished):
                     measure(renderer)
                 bar.update(*_progress(renderer))

@@ -25,6 +25,7 @@ from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.inspector.report import Pinned
 from pmviewer.engine.loader import Loaded, Loader
 from pmviewer.engine.opened import OpenScene, arrangement_of, is_edited, nobody, open_scene
+from pmviewer.engine.pass_maker import PassMaker
 from pmviewer.engine.pool import WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.published import Published
@@ -54,8 +55,10 @@ class Session:
         *,
         compiles_ahead: bool = False,
         helper: Helper | None = None,
+        cluster: str | None = None,
     ) -> None:
-        """compiles_ahead: in a process beside this one, `pmviewer.engine.ahead`, first in `helper` if that waits."""
+        """compiles_ahead: in a process beside this one, `pmviewer.engine.ahead`, first in `helper` if that waits;
+        cluster: whose workers render passes (`pmviewer.engine.pass_maker`)."""
         self.geometry: DrawGeometry | None = None
         self._published = Published()
         self._changed = self._published.changed
@@ -81,6 +84,7 @@ class Session:
         self._store = StageStore()
         self._frugal = Frugal(self._store)
         self._film = KeptFilm(self._published.say)
+        self._passes = PassMaker(self._published, cluster, self._pool.threads)
         self._renderer: Renderer | None = None
         self._ahead = Ahead(self._pool.threads, self._published.notify, helper) if compiles_ahead else None
         self._worker = threading.Thread(target=self._work, name="pmviewer session", daemon=True)
@@ -192,6 +196,7 @@ class Session:
         if self._ahead is not None:
             self._ahead.close()
         self._worker.join()
+        self._passes.close()
         self._pool.close()
 
     def _outdate(self) -> None:
@@ -353,6 +358,7 @@ class Session:
     def _drop(self) -> None:
         """What was being rendered is out of date, or unwanted."""
         self._renderer = None
+        self._passes.drop()
         if self._stopped:
             self._tell("paused", "stopped within a pass; going on begins anew")
 
@@ -446,7 +452,7 @@ class Session:
         with self._changed:
             self._pass_began, self._stepping = time.monotonic(), True
         try:
-            renderer.step()
+            self._passes.step(renderer, self._settings.render.passes)
             with self._changed:
                 self._stopped = False  # too late
             self._frugal.after_pass(renderer.passes)
@@ -466,8 +472,13 @@ class Session:
         frame = self.frame
         assert frame is not None
         self._tell("rendering", "making what is shown")
+        shown, serial = frame.clouds, self._published.serial + 1
         inspection = renderer.inspect(wanted)
-        self._published.show(replace(frame, serial=self._published.serial + 1, inspection=inspection), self._version)
+        if wanted.points and not shown:  # the pass was rendered elsewhere
+            looked_at = renderer.frame(serial, wanted)
+        else:
+            looked_at = replace(frame, serial=serial, inspection=inspection)
+        self._published.show(looked_at, self._version)
         with self._changed:
             self._settle()
         self._published.notify()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from types import MappingProxyType
 
 import numpy as np
@@ -40,6 +41,16 @@ class LightStage:
         self.taken_over = Carried()
         """What the first pass that is run takes over from passes that were run elsewhere."""
 
+    @property
+    def lacks_first(self) -> bool:
+        """Whether radii are missing that the photons of the first pass decide for all: a pass rendered apart needs
+        these photons first."""
+        if self.latest is not None or self.settings.photons.renew == "once":
+            return False
+        guides, chooser = self.plan.guided_rays > 0, self.plan.choice != "power"
+        carried = self.taken_over
+        return self.plan.photons and ((guides and carried.guides is None) or (chooser and carried.chooser is None))
+
     def run(
         self,
         index: int,
@@ -63,7 +74,8 @@ class LightStage:
         tally, pool = self.tally, self.pool
         traced = tally.timed(pool, "light pass", lambda: traced_pass(self.tracer, light, importance, carried.known))
         maps: PassMaps = tally.timed(pool, "maps", lambda: self.builder.maps(light, traced, carried))
-        tally.add_photons(traced.photons, self.scene.flat.total_luminance)
+        with tally.once("photons") if self.settings.photons.renew == "once" else nullcontext():
+            tally.add_photons(traced.photons, self.scene.flat.total_luminance)
         self.latest = maps
         return self._told(maps)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,7 +60,8 @@ class ShadowStage:
         shape = direct.shadow_N, direct.shadow_fewest, direct.shadow_radius
         key = ("shadows", self.scene.uid, seed, index, *shape, glossy)
         made: ShadowMap = make() if index >= KEPT_PASSES else self.store.get(key, make, lambda shadows: shadows.bytes)
-        self.tally.rays += made.rays
+        with self.tally.once("shadow photons") if s.photons.renew == "once" else nullcontext():
+            self.tally.rays += made.rays
         self.latest = made
         return made
 

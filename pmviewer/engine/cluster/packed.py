@@ -1,0 +1,158 @@
+"""What a pass adds to the film, as small as it gets without losing a bit.
+
+Each column goes as float32 where that is exact, which it is for what kernels compute in float32, as float64 otherwise,
+and not at all where it is zero; of a region its pixels alone. LZ4 halves the rest once more at a gigabyte a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.kernels.compile.jit import kernel
+from pmviewer.render.film import Increment
+
+Span = tuple[int, int]
+BLOCK = 128
+"""Rows that are turned to columns, or back, at a time: they stay in the processor's cache."""
+
+
+@dataclass(frozen=True)
+class Columns:
+    """A (rows, columns) array of float64 sums: `exact` are the numbers of the columns in `narrow` (float32), `others`
+    those in `wide` (float64), each column after column and compressed; all others are zero."""
+
+    columns: int
+    exact: tuple[int, ...]
+    others: tuple[int, ...]
+    narrow: bytes
+    wide: bytes
+
+
+@dataclass(frozen=True)
+class PackedIncrement:
+    """An increment on the wire. `spans` are the pixels that the pass renders, first and last + 1."""
+
+    pixels: int
+    spans: tuple[Span, ...]
+    sums: Columns
+    weights: Columns | None
+
+    @property
+    def bytes(self) -> int:
+        """What travels."""
+        parts = [self.sums] if self.weights is None else [self.sums, self.weights]
+        return sum(len(part.narrow) + len(part.wide) for part in parts)
+
+
+def pack(increment: Increment, spans: Sequence[Span]) -> PackedIncrement:
+    """Without a loss: every bit comes back. Pixels beyond `spans` are as in an empty film and don't travel."""
+    rows = _rows(spans)
+    weights = None if increment.weights is None else _packed(increment.weights[rows])
+    return PackedIncrement(len(increment.sums), tuple(spans), _packed(increment.sums[rows]), weights)
+
+
+def unpack(packed: PackedIncrement, blank: NDArray[np.float64], into: NDArray[np.float64] | None = None) -> Increment:
+    """The increment again; `blank` (columns,) are the sums of a pixel of an empty film, which those have that nothing
+    was rendered of. The sums are written to `into` (pixels, columns), if it is given: new memory costs as much time."""
+
+    def whole(
+        columns: Columns, empty: NDArray[np.float64], out: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
+        if out is None:
+            out = np.empty((packed.pixels, columns.columns))
+        rows = _rows(packed.spans)
+        if packed.spans != ((0, packed.pixels),):
+            out[:] = empty
+        if isinstance(rows, slice):
+            _unpack_into(out[rows], columns)
+        else:
+            inside = np.empty((len(rows), columns.columns))
+            _unpack_into(inside, columns)
+            out[rows] = inside
+        return out
+
+    weights = None if packed.weights is None else whole(packed.weights, np.zeros(packed.weights.columns))
+    return Increment(whole(packed.sums, blank, into), weights)
+
+
+def _rows(spans: Sequence[Span]) -> slice | NDArray[np.int64]:
+    if len(spans) == 1:
+        return slice(*spans[0])
+    return np.concatenate([np.arange(first, last) for first, last in spans])
+
+
+def _packed(values: NDArray[np.float64]) -> Columns:
+    from lz4.frame import compress
+
+    pixels, columns = values.shape
+    narrow, inexact, filled = (
+        np.empty((columns, pixels), np.float32),
+        np.zeros(columns, np.bool_),
+        np.zeros(columns, np.bool_),
+    )
+    values = np.ascontiguousarray(values)
+    narrowed(values, values.view(np.uint64), narrow, inexact, filled)
+    exact = np.flatnonzero(filled & ~inexact)
+    others = np.flatnonzero(inexact)
+    wide = np.empty((len(others), pixels))
+    turned(values, others, wide)
+    kept = narrow if len(exact) == columns else narrow[exact]
+    return Columns(columns, tuple(map(int, exact)), tuple(map(int, others)), compress(kept.data), compress(wide.data))
+
+
+@kernel
+def narrowed(values, bits, out, inexact, filled):
+    """Values (n, c) float64, and their bits, turned to out (c, n) float32; which columns are not exact so, and which
+    are not all zero."""
+    n, columns = values.shape
+    for first in range(0, n, BLOCK):
+        last = min(first + BLOCK, n)
+        for c in range(columns):
+            lossy, some = False, False
+            for row in range(first, last):
+                value = np.float32(values[row, c])
+                out[c, row] = value
+                lossy |= np.float64(value) != values[row, c]
+                some |= bits[row, c] != 0
+            inexact[c] |= lossy
+            filled[c] |= some
+
+
+@kernel
+def turned(values, chosen, out):
+    """Columns of values (n, c) as rows of out (len(chosen), n)."""
+    n = len(values)
+    for first in range(0, n, BLOCK):
+        last = min(first + BLOCK, n)
+        for k in range(len(chosen)):
+            for row in range(first, last):
+                out[k, row] = values[row, chosen[k]]
+
+
+@kernel
+def turned_back(numbers, chosen, out):
+    """Rows of numbers (len(chosen), n) as columns of out (n, c)."""
+    n = len(out)
+    for first in range(0, n, BLOCK):
+        last = min(first + BLOCK, n)
+        for k in range(len(chosen)):
+            for row in range(first, last):
+                out[row, chosen[k]] = np.float64(numbers[k, row])
+
+
+def _unpack_into(out: NDArray[np.float64], columns: Columns) -> None:
+    from lz4.frame import decompress
+
+    empty = set(range(columns.columns)).difference(columns.exact, columns.others)
+    out[:, sorted(empty)] = 0.0
+    for names, packed, dtype in (
+        (columns.exact, columns.narrow, np.float32),
+        (columns.others, columns.wide, np.float64),
+    ):
+        if names and len(out):
+            numbers = np.frombuffer(decompress(packed), dtype).reshape(len(names), -1)
+            turned_back(numbers, np.array(names), out)
