@@ -158,9 +158,9 @@ def test_another_scene_is_refused_by_what_differs_in_it(kept, capsys):
 
 
 def test_another_program_is_refused(kept, capsys, monkeypatch):
-    from pmviewer.engine.checkpoint import checkpoint, identity
+    from pmviewer.engine.checkpoint import checkpoint
 
-    now = identity.program()
+    now = checkpoint.program()
     monkeypatch.setattr(checkpoint, "program", lambda: {**now, "version": "9.9.9"})
     assert call("-o", kept, "--passes", 5, "--resume", *SMALL) == 2
     assert f"pmviewer {now['version']}, and this is 9.9.9" in capsys.readouterr().err

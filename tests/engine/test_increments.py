@@ -30,8 +30,19 @@ def renderer(settings: Settings, threads: int) -> Renderer:
         {"render.method": "virtual lights", "virtual.normalisation": "per object"},
         {"render.method": "path"},
         {"photons.renew": "once"},
+        {"render.method": "gather", "gather.directions": "photon cones", "direct.choice": "photons"},
+        {"render.method": "gather", "gather.cache": "on"},
     ],
-    ids=["as it comes", "signed filter", "gather, region", "virtual lights", "path", "photons once"],
+    ids=[
+        "as it comes",
+        "signed filter",
+        "gather, region",
+        "virtual lights",
+        "path",
+        "photons once",
+        "radii of the first pass",
+        "irradiance cache",
+    ],
 )
 def test_passes_from_elsewhere_make_the_same_film(values):
     settings = with_values(Settings(), {**SMALL, **values})
@@ -55,7 +66,9 @@ def test_passes_from_elsewhere_make_the_same_film(values):
     assert whole.error.latest == alone.error.latest
 
 
-def test_radii_of_pixels_need_the_passes_before():
-    settings = with_values(Settings(), {**SMALL, "estimate.radius_rule": "pixel"})
-    with pytest.raises(SettingError, match="passes before"):
-        renderer(settings, 1).increment(1)
+@pytest.mark.parametrize(
+    "values", [{"estimate.radius_rule": "pixel"}, {"importance.map": "screen", "importance.emission": "Peter-Pietrek"}]
+)
+def test_passes_that_need_those_before_are_refused(values):
+    with pytest.raises(SettingError, match=f"{list(values)[-1]} = .* can't be rendered apart"):
+        renderer(with_values(Settings(), {**SMALL, **values}), 1).increment(1)

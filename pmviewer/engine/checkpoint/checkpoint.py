@@ -19,9 +19,9 @@ from pmviewer.engine.checkpoint.identity import (
     other_program,
     other_scene,
     other_settings,
-    program,
     scene_hashes,
 )
+from pmviewer.engine.program import program
 from pmviewer.engine.renderer import Renderer
 from pmviewer.errors import OutputError, SceneError
 from pmviewer.output.array_file import read_arrays, write_arrays

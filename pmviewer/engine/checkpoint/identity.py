@@ -1,8 +1,8 @@
 """What a rendering is of: hashes of the scene by its parts, settings, and the program; and in words what differs.
 
 The scene is what kernels read, whatever the file is called and whenever it was changed. The program is its version and
-the sources that decide about a picture: those of the renderer and all that it imports. Numba and the processor decide
-about the last bits of compiled code: other ones are no reason to refuse, and said.
+the sources that decide about a picture (`pmviewer.engine.program`). Libraries and the processor decide about the last
+bits of compiled code: other ones are no reason to refuse, and said.
 """
 
 from __future__ import annotations
@@ -10,25 +10,17 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
-from functools import cache
-from pathlib import Path
 from typing import Any
 
-import llvmlite
-import llvmlite.binding
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer import __version__
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.program import DECISIVE, PROCESSOR
 from pmviewer.kernels.accel.instance import G_BLOCKS, G_NODES, G_QUADRICS
-from pmviewer.kernels.compile.sources import PACKAGE, sources_of
 from pmviewer.render.camera import CameraPose
 from pmviewer.settings.access import SETTINGS, Settings, flat
 
-ROOMS = ("engine", "importance", "kernels", "maps", "photons", "render", "scene", "settings")
-"""Whose sources decide about a picture."""
 PARTS = {
     "materials": ("materials", "prim_material", "bsdf_tables", "glasses", "spectrum"),
     "textures": ("textures", "texel_starts", "texels"),
@@ -67,23 +59,6 @@ def _without_addresses(name: str, array: NDArray[Any]) -> NDArray[Any]:
     return np.delete(array, [G_NODES, G_BLOCKS, G_QUADRICS], axis=1) if name == "groups" else array
 
 
-@cache
-def program() -> dict[str, str]:
-    """The program that renders, by what tells it from others: `version` and `sources` decide about the picture, `numba`
-    and `processor` about its last bits."""
-    renderer = Path(__file__).parents[1] / "renderer.py"
-    files = sorted(file for file in sources_of(renderer) if file.relative_to(PACKAGE).parts[0] in ROOMS)
-    content = hashlib.sha256()
-    for file in files:
-        content.update(file.relative_to(PACKAGE).as_posix().encode() + b"\0" + file.read_bytes())
-    return {
-        "version": __version__,
-        "sources": content.hexdigest()[:16],
-        "numba": f"{numba.__version__} with LLVM of llvmlite {llvmlite.__version__}, numpy {np.__version__}",
-        "processor": llvmlite.binding.get_host_cpu_name(),
-    }
-
-
 def decisive(settings: Settings) -> dict[str, Any]:
     """By full name, the settings that a film depends on, as JSON holds them."""
     return {path: as_json(value) for path, value in flat(settings).items() if SETTINGS[path].stage not in FREE}
@@ -107,8 +82,13 @@ def other_program(before: Mapping[str, str], now: Mapping[str, str]) -> str:
 
 def other_bits(before: Mapping[str, str], now: Mapping[str, str]) -> str:
     """What decides about last bits alone and differs, in words; "" where nothing does."""
-    said = [f"{before[name]}, now {now[name]}" for name in ("numba", "processor") if before[name] != now[name]]
+    others = [name for name in now if name not in DECISIVE and before.get(name) != now[name]]
+    said = [f"{name} {_shown(name, before.get(name, 'unknown'))}, now {_shown(name, now[name])}" for name in others]
     return "; ".join(said)
+
+
+def _shown(name: str, value: str) -> str:
+    return value.split(" ")[0] if name == PROCESSOR else value  # without all that it can do
 
 
 def other_scene(before: Mapping[str, str], now: Mapping[str, str]) -> str:

@@ -18,10 +18,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from pmviewer.engine.cluster.address import LOCAL, check_address
-from pmviewer.engine.cluster.identity import ASK, identity
+from pmviewer.engine.cluster.identity import ASK
 from pmviewer.engine.cluster.members import Member, Members
 from pmviewer.engine.cluster.worker import digest_of, packed_scene
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.program import program
 from pmviewer.errors import ClusterError
 from pmviewer.progress import available_threads
 
@@ -52,7 +53,7 @@ class Cluster:
 
         _quiet()
         self.where, self.lost, self._closed = where, "", threading.Event()
-        self.members = Members(identity())
+        self.members = Members(program())
         self._scenes: OrderedDict[int, PackedScene] = OrderedDict()
         self._local: Any = None
         try:

@@ -122,8 +122,8 @@ def test_a_wait_ends_when_nobody_wants_the_pass(borrowed):
 
 
 def test_workers_of_another_version_are_refused_with_both(borrowed, monkeypatch):
-    mine = module.identity()
-    monkeypatch.setattr(module, "identity", lambda: {**mine, "numba": "9.9"})
+    mine = module.program()
+    monkeypatch.setattr(module, "program", lambda: {**mine, "numba": "9.9"})
     other = Cluster(borrowed[0].scheduler_address)
     try:
         with pytest.raises(ClusterError, match=f"numba {mine['numba']} there, 9.9 here"):

@@ -6,8 +6,9 @@ import pytest
 
 from pmviewer.engine.cluster import members as module
 from pmviewer.engine.cluster.address import check_address
-from pmviewer.engine.cluster.identity import PROCESSOR, identity, refusal
+from pmviewer.engine.cluster.identity import refusal
 from pmviewer.engine.cluster.members import Members
+from pmviewer.engine.program import PROCESSOR, program
 from pmviewer.errors import ClusterError, PmviewerError
 
 MINE = {"pmviewer": "1.0", "numba": "0.62", PROCESSOR: "znver3 avx2"}
@@ -65,9 +66,9 @@ def test_another_processor_is_said_once():
 
 
 def test_a_worker_like_this_process_is_right():
-    mine = identity()
-    assert refusal(mine, identity()) == ""
-    assert "sources" in refusal(mine, {**mine, "pmviewer's sources": "0"})
+    mine = program()
+    assert refusal(mine, program()) == ""
+    assert "pmviewer's sources 0 there" in refusal(mine, {**mine, "sources": "0"})
 
 
 @pytest.mark.parametrize("where", ["nowhere", "local:0", "local:257", "local:x", "tcp:host", "http://a"])
