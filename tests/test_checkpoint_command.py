@@ -148,7 +148,8 @@ def test_what_does_not_belong_together_is_refused(words, told, kept, capsys):
 
 
 def test_info_tells_what_a_checkpoint_holds(kept, capsys):
-    main(["info", str(kept.with_suffix(".checkpoint"))])
+    with pytest.raises(SystemExit):
+        main(["info", str(kept.with_suffix(".checkpoint"))])
     told = dict(line.split(None, 1) for line in capsys.readouterr().out.splitlines())
     assert told["scene"] == "cornell_diffuse"
     assert told["passes"].startswith("3 in ")
