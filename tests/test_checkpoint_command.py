@@ -147,6 +147,15 @@ def test_what_does_not_belong_together_is_refused(words, told, kept, capsys):
     assert kept.with_suffix(".checkpoint").read_bytes() == before
 
 
+def test_info_tells_what_a_checkpoint_holds(kept, capsys):
+    with pytest.raises(SystemExit):
+        main(["info", str(kept.with_suffix(".checkpoint"))])
+    told = dict(line.split(None, 1) for line in capsys.readouterr().out.splitlines())
+    assert told["scene"] == "cornell_diffuse"
+    assert told["passes"].startswith("3 in ")
+    assert (told["size"], told["photons.N"]) == ("16 x 12", "2000")
+
+
 def test_another_scene_is_refused_by_what_differs_in_it(kept, capsys):
     """The same name and settings, and another content."""
     other = ["cornell_caustic", "-o", kept, "--passes", "5", "--resume", *SMALL]

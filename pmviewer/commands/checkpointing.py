@@ -121,8 +121,8 @@ class Keeper:
         elif there:
             passes = read_header(self.path).passes
             raise OutputError(
-                f"{self.path} holds {passes} passes of a rendering that has not ended: go on with --resume, or remove "
-                "the file."
+                f"{self.path} holds {passes} passes of a rendering: go on with --resume, remove the file, or name "
+                "another one (--checkpoint-file)."
             )
 
     # going on ---------------------------------------------------------------------------------------------------
