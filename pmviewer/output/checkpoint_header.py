@@ -77,7 +77,7 @@ def header_of(about: Mapping[str, Any], path: str | Path) -> Header:
         if not isinstance(about.get(name), kind):
             raise SceneError(f"This is no whole {KIND}: {name} is missing.", path)
     program = about["program"]
-    if not {"version", "sources", "numba", "processor"} <= program.keys():
+    if not {"version", "sources"} <= program.keys():
         raise SceneError(f"This is no whole {KIND}: program is missing.", path)
     told = {name: about[name] for name in _TYPES}
     return Header(**{**told, "settings": _settings(told, "settings", path), "asked": _settings(told, "asked", path)})
