@@ -18,8 +18,8 @@ KEPT_PASSES = 4
 @dataclass(frozen=True, eq=False)
 class LightPlan:
     """Pass `index` of N trajectories: radii of look-ups by map in scene units, how far its maps have to `reach` (the
-    largest radius in use), how many nearest photons are looked up and in which `share` of their disc's area they count,
-    whether photons need the `normals` of their surfaces, and the deposition `rules`."""
+    largest radius in use), how many nearest photons are looked up in each of so many `maps` and in which `share` of
+    their disc's area they count, whether photons need the `normals` of their surfaces, and the deposition `rules`."""
 
     index: int
     N: int
@@ -29,6 +29,7 @@ class LightPlan:
     share: float
     normals: bool
     rules: Rules
+    maps: int = 1
 
     @property
     def kept(self) -> bool:
@@ -55,4 +56,4 @@ def light_plan(
     if plan.deposition != "all":
         rules = rules_of(settings, plan, importance, index, radii, first_radius)
     normals = plan.radiance or (plan.corners and estimate.lookup == "nearest")
-    return LightPlan(index, N, radii, reach, *pass_neighbours(index, estimate), normals, rules)
+    return LightPlan(index, N, radii, reach, *pass_neighbours(index, estimate, plan.maps), normals, rules, plan.maps)

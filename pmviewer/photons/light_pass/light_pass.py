@@ -3,7 +3,7 @@ and the global map."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,7 +30,8 @@ from pmviewer.photons.light_pass.batch import (
     trace_batch,
 )
 from pmviewer.photons.light_pass.deposit import deposit
-from pmviewer.photons.light_pass.ledger import C_DROPPED, C_RAYS, N_COUNTS, empty_ledger
+from pmviewer.photons.light_pass.ledger import C_DROPPED, C_RAYS
+from pmviewer.photons.light_pass.parts import cuts_of, joined_batches, trace_parts
 from pmviewer.photons.light_pass.paths import PhotonPaths
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.photons.light_pass.plan import PassPlan, pass_record, plan_pass
@@ -53,6 +54,7 @@ def trace_pass(
     deposition: Deposition | None = None,
     guided: Guided | None = None,
     watch: PhotonPaths | Fates | None = None,
+    parts: int = 1,
 ) -> PhotonMaps:
     """Trace one pass of N trajectories; `pmviewer.photons.light_pass.plan.plan_pass` says which these are, with
     projection maps or with guided emission.
@@ -60,7 +62,8 @@ def trace_pass(
     With `deposition` its rules decide about storing; the maps then hold the path classes that it names alone.
 
     With `watch` only the first trajectories: paths are written there; or photons are kept there with what the rules of
-    `deposition` made of them, of whole batches.
+    `deposition` made of them, of whole batches. A pass in several `parts`, which takes no rules, tells which photons
+    each has brought (`pmviewer.photons.light_pass.parts`).
     """
     plan = plan_pass(scene, settings, seed, first_index, N, has_specular, projection, guided)
     paths = watch if isinstance(watch, PhotonPaths) else None
@@ -70,6 +73,8 @@ def trace_pass(
     if deposition is not None:
         fates = watch if isinstance(watch, Fates) else None
         maps = deposit(plan, deposition, batches, last, first_index, run, fates)
+    elif parts > 1 and paths is None:
+        maps = joined_parts(plan, trace_parts(scene, plan, parts, normals, run))
     else:
         results = bounded([task for _, task in batches], BATCH * plan.most_stored, run)
         maps = _joined(plan, results, last)
@@ -97,22 +102,27 @@ def _mixed(traced: list[Numbered], kept: list[Numbered]) -> list[Numbered]:
     return [task for _, _, task in sorted(places, key=lambda place: place[:2])]
 
 
-def _joined(plan: PassPlan, results: list[Batch], last: int) -> PhotonMaps:
+def joined_parts(plan: PassPlan, parts: Sequence[Batch]) -> PhotonMaps:
+    """The maps of a planned pass from all of its parts, in order, wherever they were traced
+    (`pmviewer.photons.light_pass.parts.trace_part`)."""
+    return replace(_joined(plan, parts, plan.traced), cuts=cuts_of(parts))
+
+
+def _joined(plan: PassPlan, results: Sequence[Batch], last: int) -> PhotonMaps:
     """The maps of a pass that stores all that arrives, of its first `last` trajectories."""
-    counts = sum((r.counts for r in results), np.zeros(N_COUNTS, np.int64))
-    ledgers = sum((r.ledgers for r in results), empty_ledger())
+    whole = joined_batches(results)
     return PhotonMaps(
-        caustic=joined(r.caustic for r in results),
-        global_=joined(r.global_ for r in results),
+        caustic=whole.caustic,
+        global_=whole.global_,
         caustic_unit=plan.caustic_unit(plan.traced),
         global_unit=plan.global_unit,
         emitted=last,
-        rays=int(counts[C_RAYS]),
-        dropped=int(counts[C_DROPPED]),
-        ledgers=ledgers,
-        energy=plan.energy(ledgers),
-        normals=joined_codes(r.global_normals for r in results),
-        volume=joined(r.volume for r in results),
+        rays=int(whole.counts[C_RAYS]),
+        dropped=int(whole.counts[C_DROPPED]),
+        ledgers=whole.ledgers,
+        energy=plan.energy(whole.ledgers),
+        normals=whole.global_normals,
+        volume=whole.volume,
         volume_unit=plan.global_unit * plan.store_probability,
     )
 
