@@ -85,8 +85,8 @@ def moments(M, in_each, rim, combine, share=1.0, trials=60, places=400, n=1600, 
 @pytest.mark.parametrize(("M", "in_each"), [(4, 5), (8, 3)])
 def test_bias_and_noise_are_those_of_the_gamma_law(M, in_each):
     """As the source counts (the k-th photons whole) sums of irradiances are too bright by 1/(κ − 1), the combination
-    by 1/(Mκ − 1). With one photon left out both are exact, and the noise is that of κ or of Mκ photons. The variance of a
-    mean of M estimates by few photons hardly settles, so that of the combination alone is compared."""
+    by 1/(Mκ − 1). With one photon left out both are exact, and the noise is that of κ or of Mκ photons; that of sums by
+    very few photons hardly settles."""
     k = M * in_each
     for combine, rim, bias in (
         ("irradiances", RIM_WHOLE, 1 / (in_each - 1)),

@@ -121,8 +121,8 @@ def nearest_of_parts(
     found = []
     for first, end in pairwise(cuts):
         here = np.flatnonzero((near.rows >= first) & (near.rows < end))
-        inside, on_rim, r2, part = _disc(near.reach[here], asked)
-        found.append((here[inside], on_rim, float(r2), float(part)))
+        inside, on_rim, whole_r2, used_r2 = _disc(near.reach[here], asked)
+        found.append((here[inside], on_rim, float(whole_r2), float(used_r2)))
     area = float(np.mean([part for *_, part in found]))
     rims = sum(on_rim for _, on_rim, _, _ in found)
     within_discs = sum(len(rows) for rows, *_ in found) - rims
@@ -135,17 +135,19 @@ def nearest_of_parts(
             rim += kept
         elif within_discs:
             inner += kept * rims / within_discs
-    places, x2, factors = [], [], []
+    places: list[NDArray[np.int64]] = []
+    x2: list[NDArray[np.float64]] = []
+    factors: list[NDArray[np.float64]] = []
     for rows, on_rim, r2, part in found:
         factor: NDArray[np.float64] = np.full(len(rows), inner)
         if on_rim:
             factor[-1] = rim
         if part < r2:
             factor[near.reach[rows] >= np.float32(part)] = 0
-        kept = factor > 0
-        places.append(rows[kept])
-        x2.append(near.reach[rows[kept]].astype(np.float64) / part)
-        factors.append(factor[kept] * (area / part if combination == "irradiances" else 1.0))
+        counted = factor > 0
+        places.append(rows[counted])
+        x2.append(near.reach[rows[counted]].astype(np.float64) / part)
+        factors.append(factor[counted] * (area / part if combination == "irradiances" else 1.0))
     return Chosen(np.concatenate(places), np.concatenate(x2), np.concatenate(factors), float(np.sqrt(area)))
 
 

@@ -11,7 +11,7 @@ from pmviewer.photons.deposition.rules import Deposition
 from pmviewer.photons.emission.guided import Guidance, Guided, Known
 from pmviewer.photons.light_pass.batch import GLOBAL_NORMALS, NO_NORMALS, Batch
 from pmviewer.photons.light_pass.light_pass import guided_emission_of, joined_parts, trace_pass
-from pmviewer.photons.light_pass.parts import trace_part
+from pmviewer.photons.light_pass.parts import trace_part, trace_parts
 from pmviewer.photons.light_pass.paths import PhotonPaths
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.photons.light_pass.plan import PassPlan, plan_pass, trajectories
@@ -53,6 +53,10 @@ class Tracer:
         """Photons of pass `index`; see `pmviewer.photons.light_pass.light_pass.trace_pass` for what is asked of them.
         Raises SettingError where they can't fit into memory."""
         settings = self.settings
+        if self.plan.maps > 1 and deposition is None and watch is None:
+            wanted = GLOBAL_NORMALS if normals else NO_NORMALS
+            plan = self.planned(index, N, None)
+            return joined_parts(plan, trace_parts(self.flat, plan, self.plan.maps, wanted, self.run))
         return trace_pass(
             self.flat,
             settings.photons,
@@ -66,7 +70,6 @@ class Tracer:
             deposition=deposition,
             guided=guided,
             watch=watch,
-            parts=self.plan.maps,
         )
 
     def trace_part(self, index: int, N: int, part: int, *, normals: bool = False) -> Batch:

@@ -31,7 +31,7 @@ from pmviewer.photons.light_pass.batch import (
 )
 from pmviewer.photons.light_pass.deposit import deposit
 from pmviewer.photons.light_pass.ledger import C_DROPPED, C_RAYS
-from pmviewer.photons.light_pass.parts import cuts_of, joined_batches, trace_parts
+from pmviewer.photons.light_pass.parts import cuts_of, joined_batches
 from pmviewer.photons.light_pass.paths import PhotonPaths
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.photons.light_pass.plan import PassPlan, pass_record, plan_pass
@@ -54,7 +54,6 @@ def trace_pass(
     deposition: Deposition | None = None,
     guided: Guided | None = None,
     watch: PhotonPaths | Fates | None = None,
-    parts: int = 1,
 ) -> PhotonMaps:
     """Trace one pass of N trajectories; `pmviewer.photons.light_pass.plan.plan_pass` says which these are, with
     projection maps or with guided emission.
@@ -62,8 +61,7 @@ def trace_pass(
     With `deposition` its rules decide about storing; the maps then hold the path classes that it names alone.
 
     With `watch` only the first trajectories: paths are written there; or photons are kept there with what the rules of
-    `deposition` made of them, of whole batches. A pass in several `parts`, which takes no rules, tells which photons
-    each has brought (`pmviewer.photons.light_pass.parts`).
+    `deposition` made of them, of whole batches.
     """
     plan = plan_pass(scene, settings, seed, first_index, N, has_specular, projection, guided)
     paths = watch if isinstance(watch, PhotonPaths) else None
@@ -73,8 +71,6 @@ def trace_pass(
     if deposition is not None:
         fates = watch if isinstance(watch, Fates) else None
         maps = deposit(plan, deposition, batches, last, first_index, run, fates)
-    elif parts > 1 and paths is None:
-        maps = joined_parts(plan, trace_parts(scene, plan, parts, normals, run))
     else:
         results = bounded([task for _, task in batches], BATCH * plan.most_stored, run)
         maps = _joined(plan, results, last)
