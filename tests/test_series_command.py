@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pmviewer.commands.cli import main
-from pmviewer.commands.series_plan import swept, way_of
+from pmviewer.commands.series_plan import varied, way_of
 from pmviewer.errors import SettingError
 from pmviewer.output.png import read_png
 from pmviewer.settings.access import Settings
@@ -32,9 +32,8 @@ def test_ways():
 
 
 def test_several_ways_at_once():
-    made = swept(
-        Settings(), [way_of("photons.N=100..10000"), way_of("light.1.power=1,2,4"), way_of("light.2.power=3..1")], None
-    )
+    ways = [way_of("photons.N=100..10000"), way_of("light.1.power=1,2,4"), way_of("light.2.power=3..1")]
+    made = varied([Settings()] * 3, ways)
     assert [one.photons.N for one in made] == [100, 1000, 10_000]
     assert [one.edit.changes for one in made] == [
         {"light.1.power": (power,), "light.2.power": (other,)} for power, other in ((1.0, 3.0), (2.0, 2.0), (4.0, 1.0))
@@ -45,13 +44,13 @@ def test_several_ways_at_once():
     ("words", "said"),
     [
         (["--vary", "photons.N"], "write NAME=FROM..TO"),
-        (["--vary", "photons.N=1000..2000..3000"], "write NAME=FROM..TO"),
+        (["--vary", "photons.N=1000..2000.."], "write NAME=FROM..TO"),
         (["--vary", "photon.N=1..2"], "no setting 'photon.N'"),
         (["--vary", "light.1.size=1..2"], "no property 'size' of a light"),
         (["--vary", "photons.N=1,2", "--vary", "photons.q=0.1,0.2,0.3"], "lists of 2 and of 3 values"),
         (["--vary", "photons.N=100,200", "--pictures", "5"], "--vary lists 2 values"),
         ([], "give one of them"),
-        (["--orbit", "90", "--vary", "photons.N=1..2"], "give one of them"),
+        (["--orbit", "90", "--pictures", "3", "--vary", "photons.N=100,200"], "--vary lists 2 values"),
     ],
 )
 def test_what_is_no_series(tmp_path, capsys, words, said):

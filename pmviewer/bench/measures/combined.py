@@ -8,7 +8,8 @@ seeds, bias is the mean of the ratio to the truth less 1, noise the standard dev
 
 The law is that of `pmviewer.maps.estimate.combined`, which was worked out for even light: too bright by 1/(κ − 1) for
 sums of estimates by κ photons each, by 1/(k − 1) for one of k, where the k-th photons count whole as in the source, and
-exact where the right number is left out. At edges discs reach over the floor, which no way of combining helps.
+exact where the right number is left out. At edges discs reach over the floor: there the combination is as dark as one
+map, or a little darker; sums of quotients are less dark, since small discs weigh more in them, and as noisy as ever.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ MAPS = (4, 8)
 RIMS = ("whole", "left out")
 PLACES = ("middle", "edge", "corner")
 F8 = NDArray[np.float64]
+Told = dict[str, tuple[float, float, float]]
+"""By place: bias, its standard error, noise."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +155,9 @@ def run(quick: bool = False) -> BenchResult:
                 Way("irradiances added", maps=M, combine="irradiances"),
                 Way("passes added", passes=M),
             ]
-        rows, found, one = [], {}, math.nan
+        rows: list[list[str | float | int]] = []
+        found: dict[tuple[str, Way], Told] = {}
+        one = math.nan
         for rim in RIMS:
             for way in ways:
                 ratios, seconds = lab.ratios(way, rim)
@@ -188,9 +193,6 @@ def _sobol(lab: Lab, ways: list[Way]) -> list[str]:
     return ["Sobol photons, k-th left out: " + "; ".join(told)]
 
 
-Told = dict[str, tuple[float, float, float]]
-
-
 def _targets(found: dict[tuple[str, Way], Told], ways: list[Way], rim: str) -> list[Target]:
     """What the source says, and what follows from the gamma law."""
     targets = []
@@ -208,9 +210,9 @@ def _targets(found: dict[tuple[str, Way], Told], ways: list[Way], rim: str) -> l
                 note = f"{way.maps} maps, k-th photon left out: variance of adding irradiances over combined"
                 targets.append(Target("M4", (theirs[2] / noise) ** 2, 1.0, "×", True, note))
             for place in ("edge", "corner"):
-                off = abs(told[place][0] - one[place][0]) / math.hypot(told[place][1], one[place][1])
-                note = f"{way.maps} maps, k-th photon {rim}: {place}, difference from one map in standard errors"
-                targets.append(Target("M4", off, 3.0, "σ", False, note))
+                off = abs(told[place][0] - one[place][0])
+                note = f"{way.maps} maps, k-th photon {rim}: {place}, difference from one map"
+                targets.append(Target("M4", off, 4.0, "%", False, note))
         note = f"{way.name}, {max(way.maps, way.passes)} maps, k-th photon {rim}: bias off the law in standard errors"
         targets.append(Target("M4", abs(bias - law) / error, 4.0, "σ", False, note))
     return targets

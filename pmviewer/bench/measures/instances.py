@@ -35,7 +35,7 @@ def written_out(scene: Scene) -> Scene:
 def megabytes(flat: FlatScene) -> float:
     """Of the arrays that kernels read."""
     trees = (flat.bvh, *flat.trees)
-    return (sum(a.nbytes for a in flat.arrays) + sum(tree.bytes for tree in trees)) / 1e6
+    return (sum(a.nbytes for a in flat.arrays.values()) + sum(tree.bytes for tree in trees)) / 1e6
 
 
 def many(scene: Scene, count: int) -> Scene:

@@ -5,7 +5,7 @@ Primitives are numbered triangles first, then quadrics (spheres, cylinders, disk
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -38,7 +38,8 @@ Float = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class FlatScene:
-    """Arrays of a scene. `record` is the one-element record array for kernels; the other fields keep its memory alive.
+    """A scene's `arrays` by name. `record` is the one-element record array for kernels; the other fields keep its
+    memory alive.
 
     `light_power` is (n_lights, 3) float64 in watts, in the order of the light table; `light_names` and
     the table's rows `lights` (n_lights, LIGHT_COLUMNS) likewise; `prim_light` is each stored primitive's light, −1 for
@@ -48,7 +49,7 @@ class FlatScene:
 
     record: NDArray[np.void]
     bvh: Bvh
-    arrays: tuple[NDArray, ...]
+    arrays: Mapping[str, NDArray]
     light_power: NDArray[np.float64]
     light_names: tuple[str, ...]
     lights: Float
@@ -185,7 +186,7 @@ def flatten(
     return FlatScene(
         record=record,
         bvh=bvh,
-        arrays=(*arrays.values(), stored.quadrics, *(shown.arrays if shown else ())),
+        arrays={**arrays, "quadrics": stored.quadrics, **(shown.arrays if shown else {})},
         light_power=lights.power,
         light_names=lights.names,
         lights=lights.rows,

@@ -105,9 +105,10 @@ class InstanceTables:
         record["n_stored"], record["n_own_quadrics"] = n_stored, n_own_quadrics
 
     @property
-    def arrays(self) -> tuple[NDArray, ...]:
-        """What kernels read by address, to be kept alive as long as the record that holds the addresses."""
-        return (self.rows, self.base, self.groups)
+    def arrays(self) -> dict[str, NDArray]:
+        """What kernels read by address, to be kept alive as long as the record that holds the addresses. The `groups`
+        have addresses in their turn."""
+        return {"instances": self.rows, "instance_base": self.base, "groups": self.groups}
 
 
 def build_instanced(
