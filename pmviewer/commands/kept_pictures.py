@@ -42,9 +42,10 @@ Row = Mapping[str, Any]
 class KeptPictures:
     """The finished pictures of a series, in a folder that is made if need be."""
 
-    def __init__(self, folder: Path, with_pixels: bool) -> None:
-        """with_pixels: whether a picture's pixels will be asked for. Raises OutputError."""
-        self.folder, self.with_pixels = folder, with_pixels
+    def __init__(self, folder: Path, with_pixels: bool, measured: Mapping[str, str]) -> None:
+        """with_pixels: whether a picture's pixels will be asked for; measured: what rows depend on besides the picture.
+        Raises OutputError."""
+        self.folder, self.with_pixels, self.measured = folder, with_pixels, dict(measured)
         self.again: list[str] = []
         """Why pictures that had been finished are rendered again, in sentences."""
         self._scene: tuple[int, Mapping[str, str]] = (0, {})
@@ -96,6 +97,7 @@ class KeptPictures:
             "scene": {**self._scene[1], "camera": camera},
             "settings": {path: as_json(value) for path, value in flat(settings).items()},
             "exposure": picture.exposure,
+            "measured": self.measured,
         }
 
     def _file(self, number: int, suffix: str) -> Path:
@@ -114,7 +116,9 @@ class KeptPictures:
 
     def _differences(self, told: Mapping[str, Any], now: Mapping[str, Any], files: Sequence[Path]) -> str:
         """Why a kept picture is none any more, "" if it still is."""
-        before, exposure = told["made_of"], ""
+        before, exposure, measured = told["made_of"], "", ""
+        if before.get("measured") != now["measured"]:
+            measured = "it was not measured against this reference"
         if before.get("exposure") != now["exposure"]:
             exposure = f"its exposure was {before.get('exposure')} and is {now['exposure']}"
         try:
@@ -123,7 +127,7 @@ class KeptPictures:
             of_settings = other_settings(before["settings"], now["settings"])
         except (KeyError, TypeError, AttributeError):
             return "what was kept of it can't be read"
-        return differences([of_program, of_scene, of_settings, exposure]) or _changed(told["files"], files)
+        return differences([of_program, of_scene, of_settings, exposure, measured]) or _changed(told["files"], files)
 
 
 def _changed(digests: Mapping[str, str], files: Sequence[Path]) -> str:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +40,7 @@ class Outputs:
 
     def __post_init__(self) -> None:
         if not self._all:
-            more = "" if self.table is None else ", or a table with --table"
-            raise OutputError(f"Nothing would be written: name files with -o, or a sheet with --sheet{more}.")
+            raise OutputError("Nothing would be written: name files with -o, or a sheet with --sheet.")
         for path in self.paths:
             check_output(path, (".png", ".exr", *FILMS))
         if self.sheet is not None:
@@ -76,10 +76,10 @@ class Outputs:
 class PictureFiles:
     """The numbered files of `count` pictures, and what is kept of them."""
 
-    def __init__(self, outputs: Outputs, count: int) -> None:
-        """Raises OutputError."""
+    def __init__(self, outputs: Outputs, count: int, measured: Mapping[str, str] = MappingProxyType({})) -> None:
+        """measured: what rows depend on besides the picture. Raises OutputError."""
         self.outputs, self.count = outputs, count
-        self.kept = KeptPictures(outputs.folder, outputs.with_pixels) if outputs.resume else None
+        self.kept = KeptPictures(outputs.folder, outputs.with_pixels, measured) if outputs.resume else None
         self.spared = 0
         """Pictures that were there already."""
 

@@ -57,9 +57,11 @@ def missing(
     tell: Tell,
     is_there: Callable[[Picture], bool],
     steps: Steps = here,
+    share: bool = True,
 ) -> Iterator[tuple[Picture, Frame | None]]:
-    """The same with what each is a picture of; None for those that are there already, which are not rendered."""
-    store = StageStore(max(BUDGET, (available_memory() or 0) // 4))
+    """The same with what each is a picture of; None for those that are there already, which are not rendered. With
+    `share` false nothing is kept from picture to picture, so that their times can be compared."""
+    store = StageStore(0 if not share else max(BUDGET, (available_memory() or 0) // 4))
     for number, settings in enumerate(pictures):
         before, opened = opened, rearranged(opened, arrangement_of(settings))
         if opened is not before:
