@@ -56,6 +56,7 @@ BENCHES: dict[str, tuple[str, str]] = {
         "pmviewer.bench.measures.dispersion:run",
     ),
     "virtual": ("Virtual lights: estimators against the plain sum (R10)", "pmviewer.bench.measures.virtual:run"),
+    "series": ("Series: time saved on a camera's way, and flicker", "pmviewer.bench.measures.series:run"),
     "thin-glass": (
         "Thin glass ignored or tinted against exact caustics (R9)",
         "pmviewer.bench.measures.thin_glass:run",
