@@ -106,8 +106,15 @@ def _picture(renderer: Renderer, said: Tell, steps: Steps, keep: bool) -> Frame:
     with steps(renderer) as step:
         while not renderer.finished:
             said(f"pass {renderer.passes + 1}", min(renderer.passes / renderer.settings.render.passes, 1.0))
+            before = renderer.store.bytes
             step()
-            if keep and renderer.store.bytes < 0.9 * renderer.store.budget:
-                # More than fit would drive each other out: every picture asks for the first pass first.
-                renderer.store.passes += 1
+            if keep:
+                _make_room(renderer.store, renderer.passes, renderer.store.bytes - before)
     return renderer.frame(1, wanted_of(renderer.facts))
+
+
+def _make_room(store: StageStore, done: int, needed: int) -> None:
+    """After a pass whose photons and maps needed so many bytes, keep those of the next one if they fit, too. More would
+    drive each other out: every picture asks for the first pass first."""
+    if needed > 0:
+        store.passes = done + 1 if store.bytes + needed <= store.budget else done
