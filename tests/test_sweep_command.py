@@ -100,7 +100,9 @@ def test_the_grid_has_labels_on_both_sides_and_pictures_in_their_places():
 
 def test_a_wide_sheet_is_made_to_fit():
     pictures = [np.zeros((10, 1000, 3), np.uint8)] * 4
-    assert grid_sheet(pictures, [""], list("abcd"), [""] * 4).shape[1] <= 2400 + 3 * 8
+    assert grid_sheet(pictures, [""], list("abcd"), ["a long text of figures"] * 4).shape[1] <= 2400
+    tiny = [np.zeros((10, 10, 3), np.uint8)] * 60
+    assert grid_sheet(tiny, [""], ["x"] * 60, ["a long text of figures"] * 60).shape[1] <= 2400
 
 
 @pytest.mark.parametrize(

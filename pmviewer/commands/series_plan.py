@@ -179,6 +179,7 @@ def _with(settings: Settings, name: str, value: str) -> Settings:
 
 
 def caption(way: Way, settings: Settings) -> str:
+    """What is written beside a picture by these settings, of one way."""
     value = settings.edit.changes[way.name] if way.is_edit else get(settings, way.name)
     if isinstance(value, tuple):
         return f"{way.name} {', '.join(f'{v:.3g}' for v in value)}"

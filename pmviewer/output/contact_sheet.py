@@ -52,9 +52,12 @@ def grid_sheet(
     left = max((font.getlength(part) for row in rows for part in drawable(row).split("\n")), default=0.0)
     left = min(math.ceil(left), WIDEST // 4) + (GAP if left else 0)
     across = len(columns)
-    scale = min(1.0, (WIDEST - 2 * MARGIN - left - GAP * (across - 1)) / (across * width))
+    most = (WIDEST - 2 * MARGIN - left - GAP * (across - 1)) / across
+    scale = min(1.0, most / width)
     wide, tall = max(1, round(width * scale)), max(1, round(height * scale))
-    cell, top = max(wide, 8 * TEXT) + GAP, line * max(text.count("\n") + 1 for text in columns) + TEXT // 4
+    told = max((math.ceil(font.getlength(drawable(text))) for text in figures), default=0)
+    cell = max(wide, min(told, int(most))) + GAP
+    top = line * max(text.count("\n") + 1 for text in columns) + TEXT // 4
     beside = max(tall + line, line * max(text.count("\n") + 1 for text in rows)) + GAP
     sheet = Image.new(
         "RGB", (left + across * cell - GAP + 2 * MARGIN, top + len(rows) * beside - GAP + 2 * MARGIN), GROUND
