@@ -34,6 +34,10 @@ class OutputError(PmviewerError):
     """A file that can't be written; what stood there before is untouched."""
 
 
+class ClusterError(PmviewerError):
+    """A cluster that can't be reached, or whose workers can't render what this program would."""
+
+
 class WindowError(PmviewerError):
     """No window can be opened (no screen, no OpenGL)."""
 

@@ -177,15 +177,16 @@ def test_the_window_does_not_wait_for_the_compiler():
 def test_the_window_is_given_scene_settings_threads_and_parameters(monkeypatch, tmp_path):
     given = {}
 
-    def run_viewer(scene, settings, threads, parameters, snapshots):
+    def run_viewer(scene, settings, threads, parameters, snapshots, cluster):
         given.update(scene=scene, N=settings.photons.N, threads=threads, parameters=dict(parameters))
-        given["snapshots"] = snapshots
+        given.update(snapshots=snapshots, cluster=cluster)
         return 0
 
     monkeypatch.setattr("pmviewer.viewer.app.run_viewer", run_viewer)
     (tmp_path / "a.exr").touch()
     options = ("--set", "photons.N=7", "--threads", "2", "-D", "res=64", "--snapshot", str(tmp_path / "a.exr"))
+    options += ("--cluster", "local:2")
     assert call("a.xml", *options) == 0
     wanted = {"scene": "a.xml", "N": 7, "threads": 2, "parameters": {"res": "64"}}
-    assert given == wanted | {"snapshots": ((1, tmp_path / "a.exr"),)}
+    assert given == wanted | {"snapshots": ((1, tmp_path / "a.exr"),), "cluster": "local:2"}
     assert call("a.xml", "--snapshot", str(tmp_path / "none.exr")) != 0

@@ -74,6 +74,10 @@ BENCHES: dict[str, tuple[str, str]] = {
         "Two threads against one, serial share by stage (P19)",
         "pmviewer.bench.measures.threads:run",
     ),
+    "cluster": (
+        "Passes on a cluster: faults, memory, throughput against one process (X5)",
+        "pmviewer.bench.measures.cluster:run",
+    ),
     "all": ("Every bench, each in its own process, within 40 minutes", "pmviewer.bench.measures.everything:run"),
     "report": ("The page of what bench all has found", "pmviewer.bench.measures.everything:report"),
 }

@@ -64,3 +64,12 @@ SnapshotOption = Annotated[
     list[Path] | None,
     typer.Option("--snapshot", metavar="FILE", help="EXR or PNG file to open as a snapshot; may be repeated."),
 ]
+ClusterOption = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="WHERE",
+        help="Render the passes on a Dask cluster: local:N for N processes here, a scheduler's address "
+        "(tcp://host:8786, tls://…) or its scheduler file (.json).",
+    ),
+]

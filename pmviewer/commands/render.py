@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from pmviewer.commands.options import EditOption, ParameterOption, SceneArgument, SetOption, ThreadsOption
+from pmviewer.commands.options import (
+    ClusterOption,
+    EditOption,
+    ParameterOption,
+    SceneArgument,
+    SetOption,
+    ThreadsOption,
+)
 from pmviewer.errors import SettingError
 
 
@@ -44,6 +51,7 @@ def render(
         str | None,
         typer.Option(metavar="FILE", help="EXR to print the error against; auto: the bundled scene's own."),
     ] = None,
+    cluster: ClusterOption = None,
     stats: Annotated[bool, typer.Option(help="Print photons, rays, times and the energy ledger.")] = False,
 ) -> None:
     """Render to a file without a window; the result is what the window shows after the same passes."""
@@ -66,4 +74,5 @@ def render(
         denoise=denoise,
         reference=reference,
         stats=stats,
+        cluster=cluster,
     )

@@ -6,7 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from pmviewer.commands.borrowing import borrowed, check_cluster, passes_of
 from pmviewer.commands.choosing import wants_choice, with_choice
 from pmviewer.commands.job import DEFAULT_PASSES, Job, Stop, check_output, overrides
 from pmviewer.commands.patience import patiently, print_warnings
@@ -31,6 +33,9 @@ from pmviewer.output.session_file import write_session
 from pmviewer.progress import watched
 from pmviewer.settings.access import Settings, with_values
 
+if TYPE_CHECKING:  # Dask, which only those wait for who use it
+    from pmviewer.engine.cluster.cluster import Cluster
+
 FORMATS = (".exr", ".png", ".toml")
 STOPS = {"render.time_limit": 0.0, "render.error": 0.0, "render.passes": DEFAULT_PASSES}
 """In a session file the number of passes alone says when to stop: it gives the same picture again."""
@@ -48,16 +53,19 @@ def render_job(
     denoise: bool = False,
     reference: str | None = None,
     stats: bool = False,
+    cluster: str | None = None,
 ) -> Frame:
     """Render and write the files; with a reference (a file or "auto") also print the error at passes 1, 2, 4, … and at
     the end; with `stats` photons, rays, times and the energy ledger.
 
-    `denoise` adds the picture without its noise as a layer of EXR files.
+    `denoise` adds the picture without its noise as a layer of EXR files. `cluster` renders the passes elsewhere
+    (`pmviewer.engine.cluster`).
 
     Raises PmviewerError; refuses bad file names and references that don't fit before rendering.
     """
     for path in outputs:
         check_output(path, FORMATS)
+    check_cluster(cluster)
     stop = stop or Stop()
     settings = with_values(job.settings, overrides(stop.passes, stop.seconds, size, seed, job.passes, stop.error))
     with patiently() as tell, watched(tell, threads=threads):
@@ -73,7 +81,8 @@ def render_job(
     try:
         if wants_choice(stop, job.settings):
             settings, bias = with_choice(opened, settings, pool)
-        frame = _rendered(opened, settings, pool, target, denoise, bias)
+        with borrowed(cluster, threads, opened, settings) as elsewhere:
+            frame = _rendered(opened, settings, pool, target, denoise, bias, elsewhere)
     finally:
         pool.close()
     if (stats or settings.render.error > 0 or bias is not None) and (said := remaining_report(frame.statistics)):
@@ -102,26 +111,31 @@ def _rendered(
     target: Reference | None,
     denoise: bool,
     bias: Callable[[int], float] | None,
+    elsewhere: Cluster | None,
 ) -> Frame:
     renderer = Renderer(opened, settings, pool, StageStore(0))
     renderer.error.bias = bias
     if opened.scene.exposure is None and settings.display.exposure == "auto":
         renderer.coarse_frame(0)  # as in the window it decides the exposure
-    _run(renderer, pool, None if target is None else partial(_print_error, target))
+    _run(renderer, pool, None if target is None else partial(_print_error, target), elsewhere)
     wanted = wanted_of(renderer.facts)
     return renderer.frame(1, replace(wanted, denoised=True) if denoise else wanted)
 
 
-def _run(renderer: Renderer, pool: WorkPool, measure: Callable[[Renderer], None] | None) -> None:
+def _run(
+    renderer: Renderer, pool: WorkPool, measure: Callable[[Renderer], None] | None, elsewhere: Cluster | None
+) -> None:
     """Render until a stop rule holds; `measure` is called after passes 1, 2, 4, … and the last one."""
     with progress_bar(remaining=True) as bar:
         prepare(renderer.scene, renderer.settings, pool, bar.update)
-        bar.restart("rendering")
-        while not renderer.finished:
-            renderer.step()
-            if measure is not None and (renderer.passes & (renderer.passes - 1) == 0 or renderer.finished):
-                measure(renderer)
-            bar.update(*_progress(renderer))
+        with passes_of(renderer, elsewhere, bar) as step:
+            bar.restart("rendering")
+            while not renderer.finished:
+                if not step():
+                    return
+                if measure is not None and (renderer.passes & (renderer.passes - 1) == 0 or renderer.finished):
+                    measure(renderer)
+                bar.update(*_progress(renderer))
 
 
 def _progress(renderer: Renderer) -> tuple[str, float]:

@@ -10,11 +10,12 @@ from pmviewer.bench.report import BenchResult, Cell, format_number, print_result
 from pmviewer.commands.kept_pictures import Pixels, Row
 from pmviewer.commands.picture_files import Outputs, PictureFiles, check_sizes
 from pmviewer.commands.progress_bar import progress_bar
+from pmviewer.commands.series_steps import steps_on
 from pmviewer.commands.sweep_plan import Sweep
 from pmviewer.engine.comparison.reference import reference_for
 from pmviewer.engine.frame import Frame
 from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.series.render import Steps, here, missing
+from pmviewer.engine.series.render import missing
 from pmviewer.output.compare import Reference
 from pmviewer.output.contact_sheet import grid_sheet
 from pmviewer.output.files import write_file
@@ -27,9 +28,9 @@ ERRORS = ("relMSE", "relMSE, 0.1 % left out", "mean ratio", "block error")
 
 
 def render_sweep(
-    sweep: Sweep, outputs: Outputs, reference: str | None, threads: int | None, steps: Steps = here
+    sweep: Sweep, outputs: Outputs, reference: str | None, threads: int | None, cluster: str | None = None
 ) -> None:
-    """Render what is missing, print the table and write everything. `steps` says where passes are rendered. Raises
+    """Render what is missing, on the `cluster` if one is named, print the table and write everything. Raises
     PmviewerError, before anything is rendered for a reference that does not fit all pictures."""
     plan = sweep.plan
     check_sizes(outputs, plan.pictures)
@@ -39,7 +40,7 @@ def render_sweep(
     seen: list[Pixels] = []
     files, pool = PictureFiles(outputs, len(plan.pictures), measured), WorkPool(threads)
     try:
-        with progress_bar(remaining=True) as bar:
+        with progress_bar(remaining=True) as bar, steps_on(cluster, threads, plan, bar) as steps:
             for picture, frame in missing(
                 plan.opened, plan.pictures, pool, bar.update, files.is_there, steps, share=False
             ):

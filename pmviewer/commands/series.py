@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pmviewer.commands.options import EditOption, ParameterOption, ResumeOption, SetOption, ThreadsOption
+from pmviewer.commands.options import ClusterOption, EditOption, ParameterOption, ResumeOption, SetOption, ThreadsOption
 
 
 def series(
@@ -42,16 +42,19 @@ def series(
     resume: ResumeOption = False,
     passes: Annotated[int | None, typer.Option(min=1, help="Passes to render for each.")] = None,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Image size, for example 1280x720.")] = None,
+    cluster: ClusterOption = None,
     threads: ThreadsOption = None,
     set_: SetOption = None,
     edit: EditOption = None,
     define: ParameterOption = None,
 ) -> None:
     """Render a series of pictures: a camera's way, an object's, or what a setting does."""
+    from pmviewer.commands.borrowing import check_cluster
     from pmviewer.commands.picture_files import Outputs
     from pmviewer.commands.rendering_series import render_series
     from pmviewer.commands.series_plan import load_keys, plan_series
 
+    check_cluster(cluster)
     outputs = Outputs(output or [], sheet, fps, resume)
     loaded = load_keys(keys, (set_ or [], define or [], edit or []), passes, size)
-    render_series(plan_series(loaded, vary or [], orbit, pictures, threads), outputs, threads)
+    render_series(plan_series(loaded, vary or [], orbit, pictures, threads), outputs, threads, cluster)

@@ -62,6 +62,8 @@ def statistics_report(s: Statistics) -> str:
     """Text of `pmviewer render --stats`."""
     rows = [("passes", f"{s.passes:,}"), ("rays", f"{s.rays:,}"), ("rendering time", f"{s.seconds:.2f} s")]
     rows += [(f"CPU time, {stage}", f"{seconds:.2f} s") for stage, seconds in s.stage_seconds.items()]
+    for address, (threads, passes) in s.workers.items():
+        rows.append((f"passes of {address}", f"{passes:,} on {threads} thread{'s' if threads > 1 else ''}"))
     if s.emitted:
         rows.append(("photons emitted", f"{s.emitted:,}"))
         rows += [(f"photons in the {name} map", f"{count:,}") for name, count in s.stored.items()]

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from pmviewer.commands.options import (
+    ClusterOption,
     EditOption,
     ParameterOption,
     ResumeOption,
@@ -44,12 +45,14 @@ def sweep(
     time: Annotated[float | None, typer.Option(min=0.001, metavar="S", help="Seconds to render each.")] = None,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Image size, for example 1280x720.")] = None,
     resume: ResumeOption = False,
+    cluster: ClusterOption = None,
     threads: ThreadsOption = None,
     set_: SetOption = None,
     edit: EditOption = None,
     define: ParameterOption = None,
 ) -> None:
     """Render every combination of some settings, and compare them: a sheet with labels, times and errors."""
+    from pmviewer.commands.borrowing import check_cluster
     from pmviewer.commands.picture_files import Outputs
     from pmviewer.commands.rendering_sweep import render_sweep
     from pmviewer.commands.sweep_plan import load_sweep, plan_sweep
@@ -58,6 +61,7 @@ def sweep(
         raise SettingError("--passes and --time exclude each other: give one of them.")
     if not (output or sheet or table):
         raise OutputError("Nothing would be written: name files with -o, a sheet with --sheet or a table with --table.")
+    check_cluster(cluster)
     outputs = Outputs(output or [], sheet, resume=resume, table=table)
     job = load_sweep(scene, (set_ or [], define or [], edit or []), passes, time, size)
-    render_sweep(plan_sweep(job, vary, steps, threads), outputs, reference, threads)
+    render_sweep(plan_sweep(job, vary, steps, threads), outputs, reference, threads, cluster)

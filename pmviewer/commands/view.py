@@ -8,6 +8,7 @@ import typer
 
 from pmviewer.commands.options import (
     DEFAULT_SCENE,
+    ClusterOption,
     EditOption,
     ParameterOption,
     SceneArgument,
@@ -31,15 +32,20 @@ def view(
     define: ParameterOption = None,
     search_path: SearchOption = None,
     snapshot: SnapshotOption = None,
+    cluster: ClusterOption = None,
 ) -> None:
     """Open the window (the default command)."""
     from pmviewer.commands.job import load_job, with_snapshots
+    from pmviewer.engine.cluster.address import check_address
+
+    if cluster is not None:
+        check_address(cluster)
 
     job = with_snapshots(load_job(scene, set_ or [], define or [], edit or []), snapshot or [])
     try:
         from pmviewer.viewer.app import run_viewer
 
-        code = run_viewer(job.scene, job.settings, threads, job.parameters, job.snapshots)
+        code = run_viewer(job.scene, job.settings, threads, job.parameters, job.snapshots, cluster)
     except WindowError as error:
         typer.echo(f"{error}", err=True)
         target = Path(f"{Path(job.scene).stem}.png")
@@ -52,6 +58,7 @@ def view(
             edit=edit,
             threads=threads,
             define=define,
+            cluster=cluster,
         )
         code = 0
     raise typer.Exit(code)

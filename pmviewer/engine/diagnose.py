@@ -85,7 +85,7 @@ def inspected(wanted: Wanted, looked: Looked, pool: WorkPool) -> Inspection:
         return Inspection()
     tracer, maps, importance = looked.light.tracer, looked.latest.maps, looked.importance
     return Inspection(
-        wanted,
+        replace(wanted, points=True),
         planes=diagnostic_planes(wanted, looked, pool) | (_denoised(looked, pool) if wanted.denoised else {}),
         paths=paths_of(tracer, maps, wanted.paths) if wanted.paths else None,
         gathered=gather_rays_of(looked.latest.given, *wanted.pixel, pool) if wanted.pixel else None,

@@ -53,6 +53,13 @@ class EnergyLedger:
         self.squares += (energy / lights) ** 2 if lights > 0 else 0.0
         self.lights = lights
 
+    def merge(self, other: EnergyLedger) -> None:
+        """Add the passes of another ledger of the same lights."""
+        self.passes += other.passes
+        self.sums += other.sums
+        self.squares += other.squares
+        self.lights = other.lights if other.passes else self.lights
+
     def close(self, with_tests: bool) -> Energy | None:
         """The ledger so far, `with_tests` if test photons carry power, too; None before the first pass."""
         n = self.passes

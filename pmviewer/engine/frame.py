@@ -82,6 +82,8 @@ class Statistics:
     importons: int = 0
     """Importons traced for the importance maps of the latest pass, 0 without; `stored_in_pass` tells how many are
     stored."""
+    workers: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    """Threads and passes of the workers of a cluster, by address; empty for passes that were rendered here."""
     warnings: tuple[str, ...] = ()
     """Sentences for the log about what can't work with this scene and camera."""
     skipped: tuple[tuple[str, str], ...] = ()

@@ -24,7 +24,8 @@ if TYPE_CHECKING:  # numba, which the window doesn't wait for
 class Wanted:
     """What the display asks for: a family of diagnostic planes (of which map, for look-ups), so many photon paths, the
     gather rays of a pixel (x, y), the fates of the photons of so many trajectories, the importance of the lights, the
-    picture without its noise, and what made a pixel."""
+    picture without its noise, what made a pixel, and the photons and other points of the latest pass, which a pass that
+    was rendered here has anyway."""
 
     family: Family | None = None
     map: str = ""
@@ -34,6 +35,12 @@ class Wanted:
     lights: bool = False
     denoised: bool = False
     pinned: Pinned | None = None
+    points: bool = False
+
+    @property
+    def of_pass(self) -> bool:
+        """Whether photons or maps of the latest pass are needed."""
+        return self != Wanted()
 
     def lacks(self, held: Wanted) -> bool:
         """Whether a frame that holds `held` lacks something of this."""
@@ -45,7 +52,7 @@ class Wanted:
             return True
         if self.lights and not held.lights:
             return True
-        if self.denoised and not held.denoised:
+        if (self.denoised and not held.denoised) or (self.points and not held.points):
             return True
         if self.pinned is not None and self.pinned != held.pinned:
             return True

@@ -10,16 +10,15 @@ from pmviewer.engine.inspection import Inspection
 from pmviewer.engine.stages.irradiance_cache import cache_cloud
 from pmviewer.engine.stages.virtual_lights import bias_of
 from pmviewer.engine.tally import Tally
-from pmviewer.maps.importance.importance_map import NO_IMPORTANCE
+from pmviewer.engine.told import Told
 from pmviewer.maps.irradiance_cache import REACH
 from pmviewer.render.virtual_lights.film import WeightedFilm
 
 
-def frame_of(looked: Looked, tally: Tally, inspection: Inspection) -> Frame:
-    """The film as it stands, with the clouds of the latest pass. Serial number, version and coarseness are the
-    caller's to set."""
+def frame_of(looked: Looked, tally: Tally, inspection: Inspection, told: Told) -> Frame:
+    """The film as it stands, with the clouds of the latest pass where it was rendered here, and what is told of it.
+    Serial number, version and coarseness are the caller's to set."""
     scene, light = looked.scene, looked.light
-    clouds = _clouds(looked)
     projection, maps = light.tracer.projection, light.latest
     return Frame(
         serial=0,
@@ -28,8 +27,8 @@ def frame_of(looked: Looked, tally: Tally, inspection: Inspection) -> Frame:
         planes=looked.film.planes(),
         settings=looked.settings,
         camera=looked.camera,
-        statistics=_statistics(looked, tally, clouds),
-        clouds=clouds,
+        statistics=_statistics(looked, tally, told),
+        clouds=_clouds(looked),
         projections=projection.maps if projection is not None else {},
         light_places=light.places,
         exposure=scene.exposure(looked.settings.camera.name),
@@ -64,13 +63,9 @@ def _clouds(looked: Looked) -> dict[str, PhotonCloud]:
     return clouds
 
 
-def _statistics(looked: Looked, tally: Tally, clouds: dict[str, PhotonCloud]) -> Statistics:
-    film, plan, importance = looked.film, looked.plan, looked.importance.latest
-    stored_in_pass = dict(tally.stored_in_pass)
-    for name in clouds.keys() & {"radiance", "shadow", "cache", "virtual"}:
-        stored_in_pass[name] = len(clouds[name].photons)
-    if importance is not None:
-        stored_in_pass["importons"] = importance.n
+def _statistics(looked: Looked, tally: Tally, told: Told) -> Statistics:
+    film, plan = looked.film, looked.plan
+    stored_in_pass = {**tally.stored_in_pass, **told.held}
     samples = max(len(film.sums) * film.passes, 1)
     energy = tally.energy.close(plan.emission.startswith("Christensen"))
     return Statistics(
@@ -97,24 +92,16 @@ def _statistics(looked: Looked, tally: Tally, clouds: dict[str, PhotonCloud]) ->
         estimates=dict(tally.estimates),
         noise=film.moments.relmse() if film.moments is not None else None,
         clamped=film.lost if isinstance(film, WeightedFilm) else 0.0,
-        importons=importance.traced if importance is not None else 0,
-        warnings=_warnings(looked, tally, energy),
+        importons=told.importons,
+        warnings=_warnings(looked, tally, energy, told),
         deposited=dict(tally.deposited),
+        workers=dict(tally.workers),
     )
 
 
-def _warnings(looked: Looked, tally: Tally, energy: Energy | None) -> tuple[str, ...]:
+def _warnings(looked: Looked, tally: Tally, energy: Energy | None, told: Told) -> tuple[str, ...]:
     """Sentences for the log."""
-    latest, plan, maps, film = looked.importance.latest, looked.plan, looked.light.latest, looked.film
-    unimportant: tuple[str, ...] = ()
-    if latest is not None and latest.n and plan.deposition in ("Keller-Wald", "density control"):
-        unimportant = tuple(
-            f"{plan.deposition}: none of the {map_.arrived:,} photons that arrived for the {name} map in "
-            "this pass is in an important place. Does light reach what the camera sees?"
-            for name, map_ in tally.deposited.items()
-            if map_.important == 0 and latest.record(name).dtype != NO_IMPORTANCE.dtype
-        )
+    plan, film = looked.plan, looked.film
     cut = caveats(looked.settings, plan, tally, energy, looked.scene.flat.radius, len(film.sums), film.passes)
-    notes = maps.notes if maps is not None else ()
     biased = bias_of(looked.settings) if plan.virtual else ()
-    return (*plan.warnings, *biased, *(latest.warnings if latest else ()), *notes, *unimportant, *cut)
+    return (*plan.warnings, *biased, *told.sentences, *cut)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from pmviewer.errors import SettingError
 from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.maps.estimate.nearest import shrunk
 from pmviewer.maps.radius import progressive_radius
@@ -67,3 +68,12 @@ def radii_of_pixels(facts: Facts) -> bool:
 def pass_radius(first: float, index: int, estimate: Estimate, scene_radius: float) -> float:
     """Radius of pass `index` (E6), never below the floor."""
     return progressive_radius(first, index + 1, estimate.alpha, estimate.floor * scene_radius)
+
+
+def check_apart(facts: Facts) -> None:
+    """Raises SettingError where a pass needs what those before it found, so that passes can't be rendered apart."""
+    if radii_of_pixels(facts):
+        raise SettingError(
+            "estimate.radius_rule = pixel: the radii of a pass depend on the passes before it, so that passes can't be "
+            "rendered apart, as on a cluster; set estimate.radius_rule=pass."
+        )

@@ -26,7 +26,7 @@ from pmviewer.engine.memory import check_memory
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.radius import first_radius, radii_of_pixels
+from pmviewer.engine.radius import check_apart, first_radius, radii_of_pixels
 from pmviewer.engine.stages.estimation import estimate_gathers
 from pmviewer.engine.stages.eye import gather_rays_of, outline_of, render_into
 from pmviewer.engine.stages.importance import ImportanceStage
@@ -39,6 +39,7 @@ from pmviewer.engine.stages.thin_glass import with_thin_glass
 from pmviewer.engine.stages.virtual_lights import VirtualStage, film_of
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
+from pmviewer.engine.told import Told, told_of
 from pmviewer.engine.wanted import wanted_of
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.camera import CameraPose, resolve_camera
@@ -108,6 +109,7 @@ class Renderer:
         self.shadows = ShadowStage(scene, settings, pool, store, self.tally)
         self.virtual = VirtualStage(scene, settings, pool, store, self.tally)
         self.latest: RenderedPass | None = None
+        self._told: Told | None = None
         self._outline: NDArray[np.uint8] | None = None
         self._watched = Watched()
 
@@ -143,20 +145,31 @@ class Renderer:
 
     def increment(self, index: int) -> Increment:
         """What pass `index` adds to the film, which stays as it is: `add` takes it, here or elsewhere. Raises
-        ValueError where a pass needs what those before it found (`estimate.radius_rule` "pixel")."""
-        if radii_of_pixels(self.facts):
-            raise ValueError("radii of pixels depend on the passes before")
+        SettingError where passes can't be rendered apart."""
+        check_apart(self.facts)
         film = film_of(self.settings, self.plan, self.camera.width, self.camera.height)
         film.region, film.passes = self.film.region, index
         self._pass(film, self.camera, index, self.settings.photons.N)
         return Increment(film.sums, film.weights)
 
-    def add(self, increment: Increment) -> None:
-        """Take the next pass from elsewhere. The film is as if `step` had rendered it; the tally is the caller's."""
+    def told(self) -> Told:
+        """What there is to say of the latest pass beyond the tally: of one from elsewhere what was said there."""
+        return self._told if self._told is not None else told_of(self._looked(self.film), self.tally)
+
+    def add(self, increment: Increment, told: Told | None = None) -> None:
+        """Take the next pass from elsewhere, with what was told of it there. The film is as if `step` had rendered it;
+        the tally is the caller's. Its photons and maps are not here: `latest` is None until `recall`."""
         self.film.add(increment)
+        self.latest, self._told = None, told
         if self.film.moments is not None:
             self.film.moments.add(self.film.sums, self.film.channels, 0, len(self.film.sums))
         self._close_pass()
+
+    def recall(self) -> None:
+        """Have photons and maps of the latest pass here, when it was rendered elsewhere; nothing counts again."""
+        if self.latest is None and self.passes:
+            with self.tally.aside():
+                self._maps(self.film, self.camera, self.passes - 1, self.settings.photons.N)
 
     def _close_pass(self) -> None:
         self.film.passes += 1
@@ -199,6 +212,7 @@ class Renderer:
 
     def inspect(self, wanted: Wanted) -> Inspection:
         """What is wanted of the latest pass. The film stays as it is."""
+        self.recall()
         return inspected(wanted, self._looked(self.film), self.pool)
 
     def gather_points(self, x: int, y: int) -> NDArray[np.float32]:
@@ -206,14 +220,21 @@ class Renderer:
 
         None with methods that don't gather, before the first pass, and for pixels outside the image.
         """
+        self.recall()
         if self.latest is None:
             return np.empty((0, POINT_COLUMNS), np.float32)
         return gather_rays_of(self.latest.given, x, y, self.pool)
 
     def _frame(self, serial: int, film: Film, coarse: bool, wanted: Wanted | None) -> Frame:
+        wanted = wanted or wanted_of(self.facts)
+        if wanted.of_pass and film is self.film:
+            self.recall()
         looked = self._looked(film)
-        inspection = inspected(wanted or wanted_of(self.facts), looked, self.pool)
-        made = replace(frame_of(looked, self.tally, inspection), serial=serial, version=self.version, coarse=coarse)
+        inspection = inspected(wanted, looked, self.pool)
+        told = self.told() if film is self.film else told_of(looked, self.tally)
+        made = replace(
+            frame_of(looked, self.tally, inspection, told), serial=serial, version=self.version, coarse=coarse
+        )
         return replace(
             made,
             automatic=automatic_values(looked, self.settled_radius),
@@ -225,6 +246,11 @@ class Renderer:
         return Looked(self.scene, self.settings, self.plan, self.camera, film, *stages, self._watched)
 
     def _pass(self, film: Film, camera: CameraPose, index: int, N: int) -> None:
+        made = self._maps(film, camera, index, N)
+        self.tally.timed(self.pool, "camera pass", lambda: self._eye_pass(made.given, film))
+
+    def _maps(self, film: Film, camera: CameraPose, index: int, N: int) -> RenderedPass:
+        """All of pass `index` but its picture."""
         settings, plan, tally, pool = self.settings, self.plan, self.tally, self.pool
         maps = self._light(film, index, N)
         eye = pass_record(camera, settings, plan, maps, index)
@@ -248,8 +274,8 @@ class Renderer:
             tally.add_estimates(estimates.counts)
             tally.add_counts(counts)
             given = given._replace(cache=estimates.record)
-        tally.timed(pool, "camera pass", lambda: self._eye_pass(given, film))
-        self.latest = RenderedPass(given, maps, shadows, cache, virtual, estimates)
+        self.latest, self._told = RenderedPass(given, maps, shadows, cache, virtual, estimates), None
+        return self.latest
 
     def _light(self, film: Film, index: int, N: int) -> PassMaps:
         self.importance.run(0 if self.settings.photons.renew == "once" else index)

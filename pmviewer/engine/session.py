@@ -22,12 +22,13 @@ from pmviewer.engine.guarded import guarded
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.inspector.report import Pinned
 from pmviewer.engine.loader import Loaded, Loader
-from pmviewer.engine.memory import give_back
 from pmviewer.engine.opened import OpenScene, arrangement_of, is_edited, nobody, open_scene
+from pmviewer.engine.pass_maker import PassMaker
 from pmviewer.engine.pool import WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.published import Published
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.room import Room
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.wanted import wanted_of
 from pmviewer.scene.analysis import SceneTraits
@@ -39,8 +40,6 @@ from pmviewer.settings.needs import Facts
 Source = str | Path | Scene
 LONG_PASS, TELL_EVERY = 0.7, 0.2
 """Seconds after which a pass says what it is at, and how often."""
-MUCH_LESS, KEPT_BYTES = 8, 1 << 26
-"""From which factor fewer photons make results of before unwanted, and how many bytes of them are kept then."""
 NO_MEMORY = "Not enough memory for these settings: lower N or the image size."
 
 
@@ -54,8 +53,10 @@ class Session:
         *,
         compiles_ahead: bool = False,
         helper: Helper | None = None,
+        cluster: str | None = None,
     ) -> None:
-        """compiles_ahead: in a process beside this one, `pmviewer.engine.ahead`, first in `helper` if that waits."""
+        """compiles_ahead: in a process beside this one, `pmviewer.engine.ahead`, first in `helper` if that waits;
+        cluster: whose workers render passes (`pmviewer.engine.pass_maker`)."""
         self.geometry: DrawGeometry | None = None
         self._published = Published()
         self._changed = self._published.changed
@@ -77,9 +78,10 @@ class Session:
         self._pool = WorkPool(threads, behind_window=True)
         self._pool.on_progress = self._within_pass
         self._pass_began = self._told = 0.0
-        self._stepping = self._stopped = self._gives_back = False
-        self._N = 0
+        self._stepping = self._stopped = False
         self._store = StageStore()
+        self._room = Room(self._store)
+        self._passes = PassMaker(self._published, cluster, self._pool.threads)
         self._renderer: Renderer | None = None
         self._ahead = Ahead(self._pool.threads, self._published.notify, helper) if compiles_ahead else None
         self._worker = threading.Thread(target=self._work, name="pmviewer session", daemon=True)
@@ -183,6 +185,7 @@ class Session:
         if self._ahead is not None:
             self._ahead.close()
         self._worker.join()
+        self._passes.close()
         self._pool.close()
 
     def _outdate(self) -> None:
@@ -342,6 +345,7 @@ class Session:
     def _drop(self) -> None:
         """What was being rendered is out of date, or unwanted."""
         self._renderer = None
+        self._passes.drop()
         if self._stopped:
             self._tell("paused", "stopped within a pass; going on begins anew")
 
@@ -427,7 +431,7 @@ class Session:
         try:
             prepare(self._opened, settings, self._pool, lambda text, share: self._tell("preparing", text, share))
             renderer = Renderer(self._opened, settings, self._pool, self._store, version)
-            self._make_room(settings.photons.N)
+            self._room.make(settings.photons.N)
             self._tell("rendering", "first picture")
             frame = renderer.coarse_frame(self._published.serial + 1, self._wanted(renderer))
             self._published.show(frame, self._version)
@@ -441,13 +445,6 @@ class Session:
         if self._paused and not self._is_stale():
             self._step(renderer)
 
-    def _make_room(self, N: int) -> None:
-        """After a pass of far more photons, its maps are not kept for a return."""
-        if self._N >= MUCH_LESS * N:
-            self._store.shrink(KEPT_BYTES)
-            self._gives_back = True
-        self._N = N
-
     def _within_pass(self, stage: str, share: float | None) -> None:
         """What the pool is at. Said of passes that somebody may be waiting for."""
         now = time.monotonic()
@@ -459,12 +456,10 @@ class Session:
         with self._changed:
             self._pass_began, self._stepping = time.monotonic(), True
         try:
-            renderer.step()
+            self._passes.step(renderer, self._settings.render.passes)
             with self._changed:
                 self._stopped = False  # too late
-            if self._gives_back:  # the frame before, with its photons, is gone after this one
-                self._gives_back = renderer.passes < 2
-                give_back()
+            self._room.after_pass(renderer.passes)
         finally:
             with self._changed:
                 self._stepping = False
@@ -480,8 +475,13 @@ class Session:
         frame = self.frame
         assert frame is not None
         self._tell("rendering", "making what is shown")
+        shown, serial = frame.clouds, self._published.serial + 1
         inspection = renderer.inspect(wanted)
-        self._published.show(replace(frame, serial=self._published.serial + 1, inspection=inspection), self._version)
+        if wanted.points and not shown:  # the pass was rendered elsewhere
+            looked_at = renderer.frame(serial, wanted)
+        else:
+            looked_at = replace(frame, serial=serial, inspection=inspection)
+        self._published.show(looked_at, self._version)
         with self._changed:
             self._settle()
         self._published.notify()

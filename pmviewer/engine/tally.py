@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,11 +16,16 @@ from pmviewer.photons.deposition.deposited import Deposited
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.record import C_CACHED, C_CUT, C_DROPPED, C_GATHERED, C_RAYS, C_SAVED, C_SHADOW_RAYS
 
+NUMBERS = "emitted", "rays", "shadow_rays", "saved_rays", "cached", "cut", "gathered", "records", "cpu_seconds"
+BY_NAME = "stored", "dropped", "estimates", "stage_seconds"
+OF_LATEST = "stored_in_pass", "deposited", "radius", "map_bytes", "map_photons"
+
 
 @dataclass
 class Tally:
     """Sums over all passes, but for `stored_in_pass`, `deposited`, `radius`, `map_bytes` and `map_photons`: those of
-    the latest."""
+    the latest. `shared` is what was counted of things made once for many passes, by what they are, with the first pass
+    that needs them: of passes rendered in several places it counts once."""
 
     emitted: int = 0
     rays: int = 0
@@ -41,6 +47,72 @@ class Tally:
     energy: EnergyLedger = field(default_factory=EnergyLedger)
     map_bytes: int = 0
     map_photons: int = 0
+    shared: dict[str, tuple[int, Tally]] = field(default_factory=dict)
+    workers: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """Threads and passes of the workers of a cluster, by address."""
+    in_parts: bool = False
+    """Whether sums leave out what is shared, because `take` hands them on."""
+
+    @contextmanager
+    def once(self, name: str, index: int = 0) -> Iterator[None]:
+        """What is counted meanwhile is of that name, made once, needed from pass `index` on."""
+        before = self._swapped()
+        yield
+        made = self._swapped(before)
+        self.shared[name] = index, made
+        if not self.in_parts:
+            self._sum(made)
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """What is counted meanwhile counts for nothing."""
+        latest = {name: getattr(self, name) for name in OF_LATEST}
+        before, shared = self._swapped(), dict(self.shared)
+        self.radius, self.deposited = dict(self.radius), dict(self.deposited)
+        try:
+            yield
+        finally:
+            self._swapped(before)
+            self.shared = shared
+            for name, value in latest.items():
+                setattr(self, name, value)
+
+    def take(self, index: int) -> Tally:
+        """What was counted since the last `take`, of pass `index` alone, for `merge`; the sums begin anew. What is
+        shared is told each time, as nobody knows which passes arrive."""
+        part = self._swapped()
+        part.shared = {name: (first, made) for name, (first, made) in self.shared.items() if first <= index}
+        for name in OF_LATEST:
+            value = getattr(self, name)
+            setattr(part, name, dict(value) if isinstance(value, dict) else value)
+        return part
+
+    def merge(self, part: Tally) -> None:
+        """Add what `take` gave elsewhere; seconds are the caller's."""
+        self._sum(part)
+        for name, (index, made) in part.shared.items():
+            if name not in self.shared:
+                self.shared[name] = index, made
+                self._sum(made)
+        for name in OF_LATEST:
+            setattr(self, name, getattr(part, name))
+
+    def _swapped(self, other: Tally | None = None) -> Tally:
+        """The sums, which are those of `other` from now on, 0 without."""
+        held, other = Tally(), other or Tally()
+        for name in (*NUMBERS, *BY_NAME, "energy"):
+            setattr(held, name, getattr(self, name))
+            setattr(self, name, getattr(other, name))
+        return held
+
+    def _sum(self, part: Tally) -> None:
+        for name in NUMBERS:
+            setattr(self, name, getattr(self, name) + getattr(part, name))
+        for name in BY_NAME:
+            mine = getattr(self, name)
+            for key, value in getattr(part, name).items():
+                mine[key] = mine.get(key, 0) + value
+        self.energy.merge(part.energy)
 
     def timed(self, pool: WorkPool, stage: str, run: Callable[[], Any]) -> Any:
         """What `run` returns; the CPU seconds that the pool spends on it count for the stage."""

@@ -12,6 +12,9 @@ from pmviewer.settings.access import Settings, get, needs_of
 from pmviewer.settings.needs import Facts, unmet
 from pmviewer.settings.schema.display import MAP_VIEWS
 
+POINTS = "caustic", "global", "volume", "radiance", "cache", "shadow", "virtual", "importons"
+"""Overlays of points of the latest pass."""
+
 
 def wanted_of(facts: Facts, pixel: tuple[int, int] | None = None, pinned: Pinned | None = None) -> Wanted:
     """What the settings show of what the plan makes, with `pixel` the one whose gather rays were asked for and what is
@@ -23,7 +26,7 @@ def wanted_of(facts: Facts, pixel: tuple[int, int] | None = None, pinned: Pinned
         path = f"overlays.{overlay}.show"
         return get(settings, path) and unmet(needs_of(path), facts) is None
 
-    wanted = Wanted(pinned=pinned)
+    wanted = Wanted(pinned=pinned, points=any(map(shown, POINTS)))
     if view in DIAGNOSTICS and unmet(needs_of(f"display.view={view}"), facts) is None:
         map_ = looked_map(settings, facts.plan) if view in MAP_VIEWS else ""
         wanted = replace(wanted, family=DIAGNOSTICS[view].family, map=map_)

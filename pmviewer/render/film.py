@@ -93,9 +93,9 @@ class Film:
         yield
         self.add(before, first)
 
-    def spans(self) -> list[tuple[int, int]]:
-        """First and last + 1 of the pixels, row by row, that the next pass renders."""
-        if self.region is None or self.passes == 0:
+    def spans(self, index: int | None = None) -> list[tuple[int, int]]:
+        """First and last + 1 of the pixels, row by row, that pass `index` renders, the next one without."""
+        if self.region is None or (self.passes if index is None else index) == 0:
             return [(0, len(self.sums))]
         x0, y0, x1, y1 = self.region
         return [(y * self.width + x0, y * self.width + x1) for y in range(y0, y1)]

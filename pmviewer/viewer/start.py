@@ -56,7 +56,7 @@ def check_screen() -> None:
         glfw.set_error_callback(reporting)
 
 
-def _make_session(threads: int | None, settings: Settings | None) -> Callable[[], SessionLike]:
+def _make_session(threads: int | None, settings: Settings | None, cluster: str | None) -> Callable[[], SessionLike]:
     def make() -> SessionLike:
         from pmviewer.engine.ahead.early import early_helper
         from pmviewer.kernels.compile import elsewhere
@@ -69,7 +69,7 @@ def _make_session(threads: int | None, settings: Settings | None) -> Callable[[]
         from pmviewer.engine.session import Session
 
         few_arenas()
-        return Session(threads, settings, compiles_ahead=True, helper=helper)
+        return Session(threads, settings, compiles_ahead=True, helper=helper, cluster=cluster)
 
     return make
 
@@ -91,12 +91,13 @@ def start_viewer(
     parameters: Mapping[str, str] | None,
     *,
     snapshots: Sequence[tuple[int, Path]] = (),
+    cluster: str | None = None,
     leave: bool = False,
 ) -> int:
     """See `pmviewer.viewer.app.run_viewer`. With `leave` the process ends here when the window has closed while the
     engine is busy: a kernel that is being compiled can't be interrupted, and there is nothing of it to keep."""
     check_screen()
-    link = SessionLink(_make_session(threads, settings), settings)
+    link = SessionLink(_make_session(threads, settings, cluster), settings)
     app = make_app(link, inactive_reason=_inactive_reason)
     background = app.state.background
     app.state.open(source if source is not None else DEFAULT_SCENE, keep_camera=True, parameters=parameters)

@@ -9,6 +9,7 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
+from pmviewer.errors import SettingError
 from pmviewer.settings.access import Settings, with_values
 
 PASSES = 4
@@ -56,5 +57,5 @@ def test_passes_from_elsewhere_make_the_same_film(values):
 
 def test_radii_of_pixels_need_the_passes_before():
     settings = with_values(Settings(), {**SMALL, "estimate.radius_rule": "pixel"})
-    with pytest.raises(ValueError, match="passes before"):
+    with pytest.raises(SettingError, match="passes before"):
         renderer(settings, 1).increment(1)

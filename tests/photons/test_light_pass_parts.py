@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
 import numpy as np
 import pytest
 
@@ -50,6 +53,21 @@ def test_parts_traced_elsewhere_are_those_of_the_pass(projection):
             stored = parts[part].caustic if name == "caustic" else parts[part].global_
             assert len(stored) > 1000
             np.testing.assert_array_equal(whole.parts(name)[part], stored)
+
+
+def part_elsewhere(part):
+    """What another process does: it opens the scene itself, and traces one part."""
+    return tracer_of(maps=PARTS).trace_part(INDEX, N, part)
+
+
+@pytest.mark.slow
+def test_parts_from_other_processes_are_those_of_the_pass():
+    with ProcessPoolExecutor(2, get_context("spawn")) as processes:
+        parts = list(processes.map(part_elsewhere, range(PARTS)))
+    here = tracer_of(maps=PARTS)
+    joined, whole = here.of_parts(INDEX, N, parts), here.trace(INDEX, N)
+    for name in FIELDS:
+        np.testing.assert_array_equal(getattr(joined, name), getattr(whole, name))
 
 
 def test_the_parts_are_the_pass_undivided():

@@ -166,16 +166,18 @@ class ImportanceStage:
         key = ("importance", self.key, rule)
         eye = eye_record(self.camera, s, 0)
         while len(self._parts) < count:
-            first = len(self._parts) * N
+            number = len(self._parts)
+            first = number * N
 
             def more(first: int = first) -> Traced:
                 return trace(self.scene.flat, eye, rule, s.render.seed, first, N, self.pool.run)
 
             part = self.store.get((*key, "importons", first), more, lambda made: made.bytes)
             self._parts.append(part)
-            self.tally.rays += part.rays
-            if part.dropped:
-                self.tally.dropped["importons"] = self.tally.dropped.get("importons", 0) + part.dropped
+            with self.tally.once(f"importons {number}", number):
+                self.tally.rays += part.rays
+                if part.dropped:
+                    self.tally.dropped["importons"] = part.dropped
 
         def build() -> ImportanceMaps:
             pixels = 1 if self.pixel is not None else self.camera.width * self.camera.height

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from types import MappingProxyType
 
 import numpy as np
@@ -62,7 +63,8 @@ class LightStage:
         tally, pool = self.tally, self.pool
         traced = tally.timed(pool, "light pass", lambda: traced_pass(self.tracer, light, importance, known))
         maps: PassMaps = tally.timed(pool, "maps", lambda: self.builder.maps(light, traced, before, known))
-        tally.add_photons(traced.photons, self.scene.flat.total_luminance)
+        with tally.once("photons") if self.settings.photons.renew == "once" else nullcontext():
+            tally.add_photons(traced.photons, self.scene.flat.total_luminance)
         self.latest = maps
         return self._told(maps)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +61,8 @@ class ShadowStage:
         made: ShadowMap = (
             make() if index >= self.store.passes else self.store.get(key, make, lambda shadows: shadows.bytes)
         )
-        self.tally.rays += made.rays
+        with self.tally.once("shadow photons") if s.photons.renew == "once" else nullcontext():
+            self.tally.rays += made.rays
         self.latest = made
         return made
 

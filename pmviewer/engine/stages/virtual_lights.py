@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,8 +83,9 @@ class VirtualStage:
         made: VirtualMap = (
             self.store.get(key, lambda: self._make(index), lambda m: m.bytes) if keep else self._make(index)
         )
-        self.tally.rays += made.lights.rays
-        self.tally.dropped["photons"] += made.lights.dropped
+        with self.tally.once("virtual lights") if s.photons.renew == "once" else nullcontext():
+            self.tally.rays += made.lights.rays
+            self.tally.dropped["photons"] += made.lights.dropped
         self.latest = made
         return made
 

@@ -16,6 +16,8 @@ from pmviewer.viewer.state import ViewerState
 
 Rows = list[tuple[str, str]]
 
+MOST_WORKERS = 12
+"""That are listed."""
 LEDGER = {
     "absorbed": "Absorbed",
     "escaped": "Escaped from the scene",
@@ -87,6 +89,18 @@ def time_rows(s: Statistics) -> Rows:
     return rows
 
 
+def worker_rows(s: Statistics) -> Rows:
+    """The workers of a cluster, with what each has rendered."""
+    shown = list(s.workers.items())[:MOST_WORKERS]
+    rows = [(f"{address}, {threads} thread{'s' if threads > 1 else ''}", grouped(n)) for address, (threads, n) in shown]
+    more = len(s.workers) - len(shown)
+    return rows + (
+        [(f"{more} more", grouped(sum(n for _, n in s.workers.values()) - sum(n for _, (_, n) in shown)))]
+        if more
+        else []
+    )
+
+
 def convergence_rows(s: Statistics) -> Rows:
     """How much of the caustic map's light lies where no more photons are needed; none without the criterion."""
     deposited = s.deposited.get("caustic")
@@ -142,6 +156,8 @@ class StatisticsPanel:
             imgui.tree_pop()
         imgui.table_next_column()
         table("Time", time_rows(s))
+        if s.workers:
+            table("Passes by workers of the cluster", worker_rows(s))
         imgui.table_next_column()
         self._stages(s, self._state.comparison.latest(frame))
         imgui.end_table()

@@ -1,0 +1,1 @@
+"""Passes rendered by other processes and machines, by Dask."""

@@ -1,0 +1,170 @@
+"""Passes on real worker processes: the picture of one process, whatever becomes of the workers."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pmviewer.bench.measures.cluster import until, workers
+from pmviewer.engine.cluster import cluster as module
+from pmviewer.engine.cluster.cluster import Cluster
+from pmviewer.engine.cluster.passes import Elsewhere
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.session import Session
+from pmviewer.engine.store import StageStore
+from pmviewer.errors import ClusterError
+from pmviewer.progress import Cancelled
+from pmviewer.resources import data_folder
+from pmviewer.settings.access import Settings, with_values
+
+pytestmark = pytest.mark.slow
+
+SMALL = {"camera.width": 20, "camera.height": 16, "photons.N": 3000, "gather.rays": 4, "render.passes": 6}
+
+
+@pytest.fixture(scope="module")
+def borrowed():
+    """Two workers of one thread each: Dask's cluster, and ours."""
+    with workers(2) as both:
+        yield both
+
+
+def renderer(scene="cornell_caustic", **values):
+    return Renderer(open_scene(scene), with_values(Settings(), {**SMALL, **values}), WorkPool(1), StageStore(0))
+
+
+def rendered(cluster, made, between=lambda index: None):
+    elsewhere = Elsewhere(cluster, made)
+    try:
+        while not made.finished:
+            between(made.passes)
+            elsewhere.step()
+    finally:
+        elsewhere.close()
+    return made
+
+
+def alone(**values):
+    made = renderer(**values)
+    while not made.finished:
+        made.step()
+    return made
+
+
+@pytest.mark.parametrize(
+    "values",
+    [{}, {"render.filter": "Mitchell-Netravali", "region.on": True, "region.right": 0.5}],
+    ids=["as it comes", "region, signed filter"],
+)
+def test_the_picture_is_that_of_one_process(borrowed, values):
+    one, many = alone(**values), rendered(borrowed[1], renderer(**values))
+    np.testing.assert_array_equal(many.film.sums, one.film.sums)
+    np.testing.assert_array_equal(many.frame(0).planes, one.frame(0).planes)
+    assert many.error.latest == one.error.latest
+    assert many.tally.rays == one.tally.rays
+    shares = many.frame(0).statistics.workers
+    assert shares.keys() <= borrowed[1].members.here.keys()
+    assert sum(passes for _, passes in shares.values()) == many.passes
+
+
+def test_the_scene_is_read_here_alone(borrowed, tmp_path):
+    shutil.copytree(data_folder("scenes") / "cornell_diffuse", tmp_path / "scene")
+    made = renderer(scene=str(tmp_path / "scene" / "scene.xml"))
+    shutil.rmtree(tmp_path / "scene")
+    np.testing.assert_array_equal(rendered(borrowed[1], made).film.sums, alone(scene="cornell_diffuse").film.sums)
+
+
+def test_a_killed_worker_costs_its_pass(borrowed):
+    local, cluster = borrowed
+
+    def kill(index):
+        if index == 2:
+            os.kill(next(iter(local.workers.values())).pid, signal.SIGKILL)
+
+    many = rendered(cluster, renderer(), kill)
+    np.testing.assert_array_equal(many.film.sums, alone().film.sums)
+    until(lambda: len(cluster.members.ready) == 2)  # Dask starts another
+
+
+def test_a_frozen_worker_holds_nobody_up(borrowed):
+    local, cluster = borrowed
+    pid = next(iter(local.workers.values())).pid
+
+    def freeze(index):
+        if index == 1:
+            os.kill(pid, signal.SIGSTOP)
+
+    try:
+        many = rendered(cluster, renderer(), freeze)
+    finally:
+        os.kill(pid, signal.SIGCONT)
+    np.testing.assert_array_equal(many.film.sums, alone().film.sums)
+    until(lambda: len(cluster.members.ready) == 2)
+
+
+def test_a_wait_ends_when_nobody_wants_the_pass(borrowed):
+    made = renderer(**{"photons.N": 5_000_000})
+    elsewhere = Elsewhere(borrowed[1], made)
+    threading.Timer(0.2, made.pool.cancel.set).start()
+    with pytest.raises(Cancelled):
+        elsewhere.step()
+    elsewhere.close()
+    made.pool.cancel.clear()
+    np.testing.assert_array_equal(rendered(borrowed[1], renderer()).film.sums, alone().film.sums)
+
+
+def test_workers_of_another_version_are_refused_with_both(borrowed, monkeypatch):
+    mine = module.identity()
+    monkeypatch.setattr(module, "identity", lambda: {**mine, "numba": "9.9"})
+    other = Cluster(borrowed[0].scheduler_address)
+    try:
+        with pytest.raises(ClusterError, match=f"numba {mine['numba']} there, 9.9 here"):
+            other.wait_for_workers(lambda text: None)
+    finally:
+        other.close()
+
+
+def test_nobody_answers():
+    with pytest.raises(ClusterError, match=r"No Dask scheduler answers at tcp://127\.0\.0\.1:9 "):
+        Cluster("tcp://127.0.0.1:9")
+
+
+def test_the_window_borrows_workers_and_goes_on_without_them(monkeypatch):
+    """The session: the same picture, photons of passes from elsewhere when they are looked at, and when the scheduler
+    has gone a sentence, and the picture goes on."""
+    monkeypatch.setattr(module, "CONNECT", 2.0)
+    shown = with_values(Settings(), SMALL)
+    with workers(1) as (local, _):
+        session = Session(1, shown, cluster=local.scheduler_address)
+        try:
+            until(lambda: session._passes._cluster is not None and session._passes._cluster.members.ready)
+            session.open("cornell_caustic")
+            assert session.wait(timeout=100)
+            frame = session.frame
+            np.testing.assert_array_equal(frame.planes, alone().frame(0).planes)
+            assert [passes for _, passes in frame.statistics.workers.values()] == [6]
+            assert not frame.clouds
+            session.set(with_values(shown, {"overlays.global.show": True}))
+            until(lambda: session.frame.clouds)
+            assert len(session.frame.clouds["global"].photons) == frame.statistics.stored_in_pass["global"]
+            assert session.frame.statistics == replace(frame.statistics)
+            local.scheduler.loop.add_callback(local.scheduler.close)
+            session.set(with_values(shown, {"render.seed": 1}))
+            assert session.wait(timeout=100)
+            np.testing.assert_array_equal(session.frame.planes, alone(**{"render.seed": 1}).frame(0).planes)
+            gone = session._passes._cluster
+            until(lambda: gone.lost)
+            session.restart()
+            until(lambda: session._passes._cluster is None)
+            said = [message.text for message in session.take_messages()]
+            assert any("has gone" in text and "rendered here" in text for text in said)
+        finally:
+            session.close()

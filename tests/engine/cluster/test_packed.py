@@ -1,0 +1,52 @@
+"""Increments on the wire: every bit comes back, and less travels than there is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pmviewer.engine.cluster.packed import pack, unpack
+from pmviewer.render.film import Increment
+
+
+def bits(values):
+    return np.ascontiguousarray(values).view(np.uint64)
+
+
+def awkward(rng, n):
+    """Columns of every kind: float32, float64, zeros, negative zeros, NaN and infinities, beyond float32."""
+    single = rng.normal(size=n).astype(np.float32).astype(np.float64)
+    special = single.copy()
+    special[:5] = np.nan, np.inf, -np.inf, -0.0, 1e-45
+    payload = np.full(n, np.nan).view(np.uint64) | np.uint64(1)
+    return np.stack(
+        [single, rng.normal(size=n), np.zeros(n), -np.zeros(n), special, 1e300 * single, payload.view(np.float64)],
+        axis=1,
+    )
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize("spans", [[(0, 60)], [(12, 15), (22, 25)], [(0, 0)]], ids=["all", "region", "nothing"])
+def test_every_bit_comes_back(spans, weighted):
+    rng = np.random.default_rng(1)
+    blank = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
+    sums = np.tile(blank, (60, 1))
+    weights = np.zeros((60, 2)) if weighted else None
+    for first, last in spans:
+        sums[first:last] = awkward(rng, 60)[first:last]
+        if weights is not None:
+            weights[first:last] = rng.normal(size=(last - first, 2))
+    back = unpack(pack(Increment(sums, weights), spans), blank)
+    np.testing.assert_array_equal(bits(back.sums), bits(sums))
+    if weights is None:
+        assert back.weights is None
+    else:
+        np.testing.assert_array_equal(bits(back.weights), bits(weights))
+
+
+def test_less_travels_than_there_is():
+    rng = np.random.default_rng(2)
+    sums = np.zeros((1000, 22))
+    sums[:, :4] = rng.normal(size=(1000, 4)).astype(np.float32)
+    assert pack(Increment(sums, None), [(0, 1000)]).bytes < 1000 * 4 * 4.2, "float32 of the columns that aren't empty"
+    assert pack(Increment(sums, None), [(10, 20)]).bytes < 10 * 4 * 4 + 100, "of a region its pixels"
