@@ -7,13 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from pmviewer.commands.job import Job, load_job, overrides
 from pmviewer.commands.patience import patiently, print_warnings
 from pmviewer.engine.ahead.beside import beside
 from pmviewer.engine.opened import OpenScene, arrangement_of, open_scene
-from pmviewer.engine.series.keys import automatic_radius, completed_keys, orbits
+from pmviewer.engine.series.keys import completed_keys, orbits, with_one_radius
 from pmviewer.errors import SettingError
 from pmviewer.progress import watched
 from pmviewer.settings.access import SETTINGS, Settings, get, parse_assignments, parse_edits, with_values
@@ -133,16 +131,6 @@ def stops(settings: Settings, way: Way, count: int) -> list[Settings]:
     """Settings at so many places on a way. Raises SettingError."""
     keys = [_with(settings, way.name, value) for value in way.values]
     return [between(keys, at) for at in places(count, len(keys))] if way.spread else keys
-
-
-def with_one_radius(opened: OpenScene, settings: Sequence[Settings]) -> list[Settings]:
-    """An automatic radius, which follows the camera in steps, as one number for the whole film: the geometric mean of
-    what its pictures would have alone."""
-    radii = [automatic_radius(opened, one) for one in settings if one.estimate.radius == "auto"]
-    if not radii or min(radii) == max(radii):
-        return list(settings)
-    value = float(np.exp(np.mean(np.log(radii))))
-    return [with_values(one, {"estimate.radius": value}) if one.estimate.radius == "auto" else one for one in settings]
 
 
 def way_of(text: str) -> Way:

@@ -80,6 +80,16 @@ def automatic_radius(opened: OpenScene, settings: Settings) -> float:
     return first_radius(flat, camera, automatic, plan.gather) / flat.radius
 
 
+def with_one_radius(opened: OpenScene, settings: Sequence[Settings]) -> list[Settings]:
+    """An automatic radius, which follows the camera in steps, as one number for the whole film: the geometric mean of
+    what its pictures would have alone."""
+    radii = [automatic_radius(opened, one) for one in settings if one.estimate.radius == "auto"]
+    if not radii or min(radii) == max(radii):
+        return list(settings)
+    value = float(np.exp(np.mean(np.log(radii))))
+    return [with_values(one, {"estimate.radius": value}) if one.estimate.radius == "auto" else one for one in settings]
+
+
 def _turned(v: NDArray[np.float64], axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
     """About a unit axis (Rodrigues)."""
     c, s = np.cos(angle), np.sin(angle)
