@@ -25,6 +25,7 @@ TEXTS = (
     "importance.md",
     "inspector.md",
     "series.md",
+    "several-maps.md",
     "thin-glass.md",
     "virtual.md",
     "views.md",

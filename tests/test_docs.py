@@ -22,7 +22,12 @@ def test_commands_of_figures_name_scenes_and_settings_that_there_are(figure):
     assert len(set(figure.files)) == len(figure.commands)
     assert figure.panels
     for words in figure.commands:
-        assert words[:2] in (("pmviewer", "shot"), ("pmviewer", "render"), ("pmviewer", "series"))
+        assert words[:2] in (
+            ("pmviewer", "shot"),
+            ("pmviewer", "render"),
+            ("pmviewer", "series"),
+            ("pmviewer", "sweep"),
+        )
         assert words[2] in {scene.name for scene in bundled_scenes()}
         load_job(words[2], [words[i + 1] for i, word in enumerate(words) if word == "--set"], [])
 

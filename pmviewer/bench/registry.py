@@ -15,6 +15,10 @@ BENCHES: dict[str, tuple[str, str]] = {
     "rays": ("Rays per second against Embree (P6)", "pmviewer.bench.measures.rays:run"),
     "instances": ("Rays through instances against the scene written out (X3)", "pmviewer.bench.measures.instances:run"),
     "lookup": ("Photon look-ups against scipy's cKDTree (P7)", "pmviewer.bench.measures.lookup:run"),
+    "combined": (
+        "Several photon maps: bias and noise of the combined look-up (M4)",
+        "pmviewer.bench.measures.combined:run",
+    ),
     "photons": ("Photons per second and bytes per photon (P8, P13)", "pmviewer.bench.measures.photons:run"),
     "error": ("Error against CPU time on the bundled scenes (P1–P5)", "pmviewer.bench.measures.error:run"),
     "auto": ("Automatic mode: against Mitsuba, and errors asked for (P17, P21)", "pmviewer.bench.measures.auto:run"),
@@ -52,6 +56,7 @@ BENCHES: dict[str, tuple[str, str]] = {
         "pmviewer.bench.measures.dispersion:run",
     ),
     "virtual": ("Virtual lights: estimators against the plain sum (R10)", "pmviewer.bench.measures.virtual:run"),
+    "series": ("Series: time saved on a camera's way, and flicker", "pmviewer.bench.measures.series:run"),
     "thin-glass": (
         "Thin glass ignored or tinted against exact caustics (R9)",
         "pmviewer.bench.measures.thin_glass:run",

@@ -20,6 +20,7 @@ from pmviewer.commands.scenes import scenes
 from pmviewer.commands.series import series
 from pmviewer.commands.settings import settings
 from pmviewer.commands.shot import shot
+from pmviewer.commands.sweep import sweep
 from pmviewer.commands.view import view
 from pmviewer.errors import PmviewerError
 
@@ -28,6 +29,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "render": render,
     "photons": photons,
     "series": series,
+    "sweep": sweep,
     "shot": shot,
     "compare": compare,
     "compare-importance": compare_importance,

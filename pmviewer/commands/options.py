@@ -37,6 +37,16 @@ ParameterOption = Annotated[
 ]
 
 
+ResumeSeriesOption = Annotated[
+    bool,
+    typer.Option(
+        "--resume",
+        help="Keep finished pictures in a folder beside the first output, and leave out those that an earlier run with "
+        "the same words has finished.",
+    ),
+]
+
+
 def _search(folders: list[Path] | None) -> list[Path] | None:
     if folders:
         from pmviewer.scene.load import search_also

@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from pmviewer.commands.options import EditOption, ParameterOption, SetOption, ThreadsOption
+from pmviewer.commands.options import (
+    ClusterOption,
+    EditOption,
+    ParameterOption,
+    ResumeSeriesOption,
+    SetOption,
+    ThreadsOption,
+)
 
 
 def series(
@@ -27,8 +34,8 @@ def series(
         list[str] | None,
         typer.Option(
             metavar="NAME=FROM..TO",
-            help="A setting or edit that changes from picture to picture: from one value to another, or NAME=A,B,C for "
-            "these values. Several vary together.",
+            help="A setting or edit that changes from picture to picture: from one value to another (or over several, "
+            "A..B..C), or NAME=A,B,C for these values. Several vary together, with --orbit and between keys too.",
         ),
     ] = None,
     orbit: Annotated[
@@ -39,17 +46,22 @@ def series(
     ] = None,
     sheet: Annotated[Path | None, typer.Option(metavar="FILE", help="All pictures on one sheet, a PNG file.")] = None,
     fps: Annotated[float, typer.Option(min=0.1, max=240.0, help="Pictures a second, of a film.")] = 24.0,
+    resume: ResumeSeriesOption = False,
     passes: Annotated[int | None, typer.Option(min=1, help="Passes to render for each.")] = None,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Image size, for example 1280x720.")] = None,
+    cluster: ClusterOption = None,
     threads: ThreadsOption = None,
     set_: SetOption = None,
     edit: EditOption = None,
     define: ParameterOption = None,
 ) -> None:
     """Render a series of pictures: a camera's way, an object's, or what a setting does."""
-    from pmviewer.commands.rendering_series import Outputs, render_series
+    from pmviewer.commands.borrowing import check_cluster
+    from pmviewer.commands.picture_files import Outputs
+    from pmviewer.commands.rendering_series import render_series
     from pmviewer.commands.series_plan import load_keys, plan_series
 
-    outputs = Outputs(output or [], sheet, fps)
+    check_cluster(cluster)
+    outputs = Outputs(output or [], sheet, fps, resume)
     loaded = load_keys(keys, (set_ or [], define or [], edit or []), passes, size)
-    render_series(plan_series(loaded, vary or [], orbit, pictures, threads), outputs, threads)
+    render_series(plan_series(loaded, vary or [], orbit, pictures, threads), outputs, threads, cluster)

@@ -11,7 +11,7 @@ from pmviewer.commands.job import Job, load_job, overrides
 from pmviewer.commands.patience import patiently, print_warnings
 from pmviewer.engine.ahead.beside import beside
 from pmviewer.engine.opened import OpenScene, arrangement_of, open_scene
-from pmviewer.engine.series.keys import completed_keys, orbits
+from pmviewer.engine.series.keys import completed_keys, orbits, with_one_radius
 from pmviewer.errors import SettingError
 from pmviewer.progress import watched
 from pmviewer.settings.access import SETTINGS, Settings, get, parse_assignments, parse_edits, with_values
@@ -29,16 +29,18 @@ A_TURN = 72
 
 @dataclass(frozen=True)
 class Plan:
-    """The open scene, and for each picture its settings and what the sheet says of it."""
+    """The open scene, for each picture its settings and what the sheet says of it, and the job that asked for it."""
 
     opened: OpenScene
     pictures: tuple[Settings, ...]
     captions: tuple[str, ...]
+    job: Job
 
 
 @dataclass(frozen=True)
 class Way:
-    """How one setting or edit changes: through `values`, or evenly from the first to the last if it is `spread`."""
+    """How one setting or edit changes: through `values`, or evenly from the first over all to the last if it is
+    `spread`."""
 
     name: str
     values: tuple[str, ...]
@@ -73,42 +75,62 @@ def plan_series(
 ) -> Plan:
     """Open the scene and work out every picture's settings. Raises PmviewerError."""
     job, ways = keys[0], [way_of(text) for text in vary]
-    if sum((len(keys) > 1, bool(ways), orbit is not None)) != 1:
+    if (len(keys) > 1 and orbit is not None) or not (len(keys) > 1 or ways or orbit is not None):
         raise SettingError("A series is several sessions, or one scene with --vary or --orbit: give one of them.")
+    opened = opened_for(job, threads)
+    settings, moves = [job.settings] * _count_of(ways, pictures, SWEPT), False
+    if orbit is not None:
+        count = _count_of(ways, pictures, max(2, round(abs(orbit) / 360 * A_TURN)))
+        settings, moves = orbits(opened.scene, job.settings, count, orbit), True
+    elif len(keys) > 1:
+        assert opened.whole is not None
+        of_keys = completed_keys(opened.scene, opened.whole, [key.settings for key in keys])
+        count = _count_of(ways, pictures, (len(of_keys) - 1) * BETWEEN_KEYS + 1)
+        settings, moves = [between(of_keys, at) for at in places(count, len(of_keys))], True
+    settings = varied(settings, ways)
+    if moves or all(way.name.startswith("camera.") or way.is_edit for way in ways):
+        settings = with_one_radius(opened, settings)
+    captions = tuple("\n".join(caption(way, one) for way in ways) for one in settings)
+    if not ways:
+        captions = tuple(str(number + 1) for number in range(len(settings)))
+    return Plan(opened, tuple(settings), captions, job)
+
+
+def opened_for(job: Job, threads: int | None) -> OpenScene:
+    """The job's scene, with its warnings printed. Raises SceneError."""
     with patiently() as tell, watched(tell, threads=threads):
         opened = open_scene(job.scene, job.parameters, arrangement_of(job.settings), beside(job.settings, threads))
     print_warnings(opened.scene.warnings, opened.scene.dropped)
-    if ways:
-        settings = swept(job.settings, ways, pictures)
-        return Plan(opened, tuple(settings), tuple("\n".join(_caption(way, one) for way in ways) for one in settings))
-    if orbit is not None:
-        settings = orbits(opened.scene, job.settings, pictures or max(2, round(abs(orbit) / 360 * A_TURN)), orbit)
-    else:
-        assert opened.whole is not None
-        of_keys = completed_keys(opened.scene, opened.whole, [key.settings for key in keys])
-        count = pictures or (len(of_keys) - 1) * BETWEEN_KEYS + 1
-        settings = [between(of_keys, at) for at in places(count, len(of_keys))]
-    return Plan(opened, tuple(settings), tuple(str(number + 1) for number in range(len(settings))))
+    return opened
 
 
-def swept(settings: Settings, ways: Sequence[Way], pictures: int | None) -> list[Settings]:
-    """Settings of pictures on all of these ways at once. Raises SettingError."""
+def _count_of(ways: Sequence[Way], pictures: int | None, otherwise: int) -> int:
+    """How many pictures there are: as many as lists have values, as many as were asked for, or `otherwise`. Raises
+    SettingError."""
     lengths = sorted({len(way.values) for way in ways if not way.spread})
     if len(lengths) > 1:
         raise SettingError(f"--vary: lists of {lengths[0]} and of {lengths[-1]} values: give as many to each.")
-    count = lengths[0] if lengths else pictures or SWEPT
-    if pictures is not None and pictures != count:
-        raise SettingError(f"--pictures {pictures}, but --vary lists {count} values.")
-    made = [settings] * count
+    if lengths and pictures not in (None, lengths[0]):
+        raise SettingError(f"--pictures {pictures}, but --vary lists {lengths[0]} values.")
+    return lengths[0] if lengths else pictures or otherwise
+
+
+def varied(settings: Sequence[Settings], ways: Sequence[Way]) -> list[Settings]:
+    """The pictures' settings with all of these ways in them. Raises SettingError."""
+    made = list(settings)
     for way in ways:
-        keys = [_with(settings, way.name, value) for value in way.values]
-        stops = [between(keys, at) for at in places(count, len(keys))] if way.spread else keys
-        for number, stop in enumerate(stops):
+        for number, stop in enumerate(stops(settings[0], way, len(made))):
             values: dict[str, Any] = {way.name: get(stop, way.name)} if not way.is_edit else {}
             if way.is_edit:
                 values["edit.changes"] = {**made[number].edit.changes, way.name: stop.edit.changes[way.name]}
             made[number] = with_values(made[number], values)
     return made
+
+
+def stops(settings: Settings, way: Way, count: int) -> list[Settings]:
+    """Settings at so many places on a way. Raises SettingError."""
+    keys = [_with(settings, way.name, value) for value in way.values]
+    return [between(keys, at) for at in places(count, len(keys))] if way.spread else keys
 
 
 def way_of(text: str) -> Way:
@@ -119,7 +141,7 @@ def way_of(text: str) -> Way:
     spread = ".." in raw
     values = raw.split("..") if spread else re.split(";" if commas else ",", raw)
     values = [value.strip() for value in values]
-    if not raw or not all(values) or (spread and len(values) != 2):
+    if not raw or not all(values):
         raise SettingError(f"--vary {text}: write NAME=FROM..TO or NAME=A,B,C, for example photons.N=1000..1000000.")
     return Way(name, tuple(values), spread)
 
@@ -144,7 +166,8 @@ def _with(settings: Settings, name: str, value: str) -> Settings:
     return with_values(settings, parse_assignments([f"{name}={value}"]))
 
 
-def _caption(way: Way, settings: Settings) -> str:
+def caption(way: Way, settings: Settings) -> str:
+    """What is written beside a picture by these settings, of one way."""
     value = settings.edit.changes[way.name] if way.is_edit else get(settings, way.name)
     if isinstance(value, tuple):
         return f"{way.name} {', '.join(f'{v:.3g}' for v in value)}"

@@ -9,7 +9,7 @@ from pmviewer.engine.diagnose import Looked
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.radiance_photons import AUTOMATIC_CUTOFF, AUTOMATIC_CUTOFF_NEAREST
-from pmviewer.maps.search.kdtree import PhotonKdTree
+from pmviewer.maps.search.grid import PhotonGrid
 from pmviewer.settings.access import Settings
 
 
@@ -32,9 +32,9 @@ def automatic_values(looked: Looked, first_radius: float) -> dict[str, Any]:
 def _of_maps(latest: RenderedPass, settings: Settings, radius: float) -> dict[str, Any]:
     """Of a pass, in a scene of that bounding-sphere radius."""
     maps, found = latest.maps, dict[str, Any]()
-    widest = [made.radius for made in maps.by_name.values() if isinstance(made.structure, PhotonKdTree)]
+    widest = [made.radius for made in maps.by_name.values() if not isinstance(made.structure, PhotonGrid)]
     if widest:
-        shrunk = math.sqrt(maps.neighbours / settings.estimate.k)
+        shrunk = math.sqrt(maps.neighbours * maps.parts / settings.estimate.k)
         found["estimate.max_radius"] = max(widest) / shrunk / radius
     if maps.chooser is not None:
         found["direct.choice_radius"] = maps.chooser.radius / radius

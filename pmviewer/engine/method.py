@@ -46,7 +46,8 @@ class Plan:
     functions can meet a light; `dispersion` whether glass splits light into colours; `lens` whether the render camera
     has one, `filtered` whether the film has another reconstruction filter than the plain box, `moments` whether the
     film keeps what passes tell of its noise, `split` whether camera paths go both ways at glass; `thin_glass` are the
-    rules by which light passes panes of glass, () where all of it is exact; `warnings` are sentences for the log about
+    rules by which light passes panes of glass, () where all of it is exact; `maps` are the parts of the light pass that
+    have photon maps of their own; `warnings` are sentences for the log about
     what was asked for and can't be."""
 
     path: bool = False
@@ -82,6 +83,7 @@ class Plan:
     global_caustics: int = 0
     global_classes: int = 0
     choice: str = "power"
+    maps: int = 1
     skipped: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -192,8 +194,14 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     else:
         plan = replace(plan, emission=how.emission)
     if how.map == "off":
-        return replace(plan, skipped=(*plan.skipped, ("importance", "importance.map is off")))
-    return replace(plan, importance=True)
+        plan = replace(plan, skipped=(*plan.skipped, ("importance", "importance.map is off")))
+    return replace(plan, importance=how.map != "off", maps=_maps(settings, plan))
+
+
+def _maps(settings: Settings, plan: Plan) -> int:
+    """Parts of the light pass whose maps are looked up each, where that is not the same as one map of all."""
+    of_k = settings.estimate.lookup == "nearest" and estimator_of(settings) == "disc"
+    return settings.photons.maps if of_k and not plan.chooses_photons else 1
 
 
 SPLIT_TWICE = (

@@ -46,10 +46,16 @@ def first_radius(scene: FlatScene, camera: CameraPose, estimate: Estimate, gathe
     return 2.0 ** (round(4 * math.log2(wanted)) / 4) * scene.radius
 
 
-def pass_neighbours(index: int, estimate: Estimate) -> tuple[int, float]:
-    """Neighbours that a k-nearest look-up of pass `index` searches, and the share of their disc's area that it uses: in
-    all the share r²ᵢ/r²₁ of the area that `estimate.k` fill (`pmviewer.maps.estimate.nearest`)."""
-    return shrunk(estimate.k, progressive_radius(1.0, index + 1, estimate.alpha) ** 2)
+def pass_neighbours(index: int, estimate: Estimate, maps: int = 1) -> tuple[int, float]:
+    """Neighbours that a k-nearest look-up of pass `index` searches in each of so many maps, and the share of their
+    disc's area that it uses: in all the share r²ᵢ/r²₁ of the area that `estimate.k` fill
+    (`pmviewer.maps.estimate.nearest`). Several maps are asked for equally many, for two at least."""
+    s = progressive_radius(1.0, index + 1, estimate.alpha) ** 2
+    if maps == 1:
+        return shrunk(estimate.k, s)
+    k = maps * max(math.ceil(estimate.k / maps), 2)
+    in_each = max(math.ceil(shrunk(k, s)[0] / maps), 2)
+    return in_each, s * k / (in_each * maps)
 
 
 def radii_of_pixels(facts: Facts) -> bool:

@@ -8,14 +8,19 @@ from typing import Any
 
 BUDGET = 1 << 30
 """Bytes of results that are kept; the ones unused for longest go first."""
+KEPT_PASSES = 4
+"""Photons and maps of the first passes are kept, so that a new camera or radius starts from them."""
 
 
 class StageStore:
-    """A least-recently-used store with a budget in bytes. Not thread-safe: the session's worker owns it."""
+    """A least-recently-used store with a budget in bytes. Not thread-safe: the session's worker owns it.
+
+    Light passes below the number `passes` put their photons and maps here."""
 
     def __init__(self, budget: int = BUDGET) -> None:
         self.budget = budget
         self.bytes = 0
+        self.passes = KEPT_PASSES
         self._entries: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
 
     def get(self, key: Hashable, make: Callable[[], Any], size: Callable[[Any], int]) -> Any:

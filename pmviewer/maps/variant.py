@@ -9,6 +9,7 @@ field            record of
 `absent`         nothing: ABSENT stands for a map that there is none of
 `blocks`         a grid (`pmviewer.maps.search.grid`)
 `planes`         a kd-tree (`pmviewer.maps.search.kdtree`)
+`parts`          several kd-trees (`pmviewer.maps.search.parts`)
 `hull`           either, looked up by the convex hull of photons (`pmviewer.maps.estimate.hull`)
 `differential`   either, looked up with differential checking (`pmviewer.maps.estimate.differential`)
 `importons`      a kd-tree of importons (`pmviewer.maps.importance`)
@@ -60,6 +61,11 @@ def marked(record: NDArray[np.void], mark: Mark, value: int = 1) -> NDArray[np.v
 def looked_up_by(record: NDArray[np.void], estimator: Estimator) -> NDArray[np.void]:
     """The record (1,) of a map for look-ups by that estimate."""
     return record if estimator == "disc" else marked(record, estimator)
+
+
+def is_parts(record: Any) -> bool:
+    """Whether a record, or its type, is that of a map in several parts."""
+    return has(record, "parts")
 
 
 def is_kdtree(record: Any) -> bool:

@@ -1,4 +1,5 @@
-"""One look-up for both kinds of map: a grid searches the pass's radius, a kd-tree the k nearest photons.
+"""One look-up for all kinds of map: a grid searches the pass's radius, a kd-tree the k nearest photons, several trees
+some of them in each.
 
 Kernels are compiled for the kind of map they are given and for the mark it may bear (`pmviewer.maps.variant`),
 so that nobody compiles a search or an estimate that is not used.
@@ -10,6 +11,7 @@ import numpy as np
 
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.memory import stack_i4
+from pmviewer.maps.estimate.combined import combined
 from pmviewer.maps.estimate.differential import checked_irradiance, reach
 from pmviewer.maps.estimate.estimate import irradiance_knn, irradiance_radius
 from pmviewer.maps.estimate.filters import Filter
@@ -26,7 +28,7 @@ from pmviewer.maps.radiance import (
 )
 from pmviewer.maps.search.disc import Place
 from pmviewer.maps.search.stored import ALL_CLASSES
-from pmviewer.maps.variant import ABSENT, is_kdtree
+from pmviewer.maps.variant import ABSENT, is_kdtree, is_parts
 
 _f4 = np.float32
 _i8 = np.int64
@@ -36,8 +38,8 @@ _i8 = np.int64
 def irradiance(photons, eye, radius, p, n, class_mask):
     """Irradiance (red, green, blue) at the point p with normal n from photons of the classes in `class_mask`.
 
-    `photons` is the record of a grid or a kd-tree, `eye` an EYE_DTYPE record, `radius` the radius of the pass or the
-    maximum radius of the search for neighbours.
+    `photons` is the record of a grid, a kd-tree or several trees, `eye` an EYE_DTYPE record, `radius` the radius of the
+    pass or the maximum radius of the search for neighbours.
     """
     if has(photons, "hull"):
 
@@ -52,6 +54,20 @@ def irradiance(photons, eye, radius, p, n, class_mask):
             return checked_irradiance(photons, eye, radius, p, n, class_mask)
 
         return checked
+
+    if is_parts(photons):
+
+        def of_parts(photons, eye, radius, p, n, class_mask):
+            E, _, _ = combined(
+                photons,
+                Place(p, n, eye.flatness, class_mask),
+                Neighbours(eye.k, radius, eye.rim, eye.share),
+                Filter(eye.filter, eye.cone_k),
+                None,
+            )
+            return E
+
+        return of_parts
 
     if is_kdtree(photons):
 
@@ -80,7 +96,8 @@ def looked_up(photons, eye, radius, p, n, class_mask):
     """Radius of a look-up as `irradiance` makes it, and photons in it.
 
     Of a convex hull, the disc in which its photons were searched. With differential checking the mean of the folds'
-    discs (of their areas), and the photons summed.
+    discs (of their areas), and the photons summed. Of a map in several parts that of the mean area of their discs, and
+    the photons of all.
     """
     if has(photons, "hull"):
 
@@ -105,6 +122,20 @@ def looked_up(photons, eye, radius, p, n, class_mask):
             return reach(photons, eye, radius, p, n, class_mask)
 
         return checked
+
+    if is_parts(photons):
+
+        def of_parts(photons, eye, radius, p, n, class_mask):
+            _, count, r = combined(
+                photons,
+                Place(p, n, eye.flatness, class_mask),
+                Neighbours(eye.k, radius, eye.rim, eye.share),
+                Filter(eye.filter, eye.cone_k),
+                None,
+            )
+            return r, _f4(count)
+
+        return of_parts
 
     if is_kdtree(photons):
 

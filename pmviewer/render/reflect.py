@@ -10,10 +10,14 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import part, specialised
 from pmviewer.kernels.surface import STRAIGHT
 from pmviewer.kernels.vector import add, dot, mul, scale
+from pmviewer.maps.estimate.combined import Lobe, combined
+from pmviewer.maps.estimate.filters import Filter
 from pmviewer.maps.estimate.glossy import radiance_knn, radiance_radius
+from pmviewer.maps.estimate.nearest import Neighbours
 from pmviewer.maps.record import CAUSTIC, UNFOUND
+from pmviewer.maps.search.disc import Place
 from pmviewer.maps.search.stored import ALL_CLASSES
-from pmviewer.maps.variant import is_kdtree
+from pmviewer.maps.variant import is_kdtree, is_parts
 from pmviewer.render.lookup import gathered_irradiance, irradiance
 
 _f4 = np.float32
@@ -34,8 +38,22 @@ def _by_nearest(photons, eye, radius, si, n, group, flags, class_mask):
     return radiance_knn(photons, eye, radius, si.p, n, class_mask, si.bsdf, group, flags, si.wo)
 
 
+@device
+def _by_parts(photons, eye, radius, si, n, group, flags, class_mask):
+    L, _, _ = combined(
+        photons,
+        Place(si.p, n, eye.flatness, class_mask),
+        Neighbours(eye.k, radius, eye.rim, eye.share),
+        Filter(eye.filter, eye.cone_k),
+        Lobe(n, si.bsdf, group, flags, si.wo),
+    )
+    return L
+
+
 def _photon_by_photon(photons):
     """The search for the kind of map that the type of its record says."""
+    if is_parts(photons):
+        return _by_parts
     return _by_nearest if is_kdtree(photons) else _by_radius
 
 

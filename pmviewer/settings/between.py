@@ -34,7 +34,7 @@ def between(keys: Sequence[Settings], at: float) -> Settings:
         if info.scale == "edits":
             values[path] = _edits(of_keys, at)
         elif info.kind in (int, float, tuple):
-            values[path] = _value(info, of_keys, at)
+            values[path] = of_keys[int(at)] if at == int(at) else _value(info, of_keys, at)
         else:
             values[path] = of_keys[first if at < first + 1 else first + 1]
     return with_values(keys[0], values)

@@ -245,6 +245,7 @@ class FilmEditor:
 
     def _run(self, path: Path, how: Export, opened: Any, pictures: list[Settings], pool: WorkPool) -> str:
         from pmviewer.engine.pool import lower_priority
+        from pmviewer.engine.series.keys import with_one_radius
         from pmviewer.engine.series.render import series
         from pmviewer.output.film import Film, numbered
         from pmviewer.output.frame_export import shown_pixels, write_frame_png
@@ -254,6 +255,7 @@ class FilmEditor:
         film = None
         try:
             film = Film(path, how.fps) if path.suffix.lower() != ".png" else None
+            pictures = with_one_radius(opened, pictures)
             for number, frame in enumerate(series(opened, pictures, pool, self._tell), 1):
                 if film is None:
                     write_frame_png(numbered(path, number, len(pictures)), frame)

@@ -105,6 +105,20 @@ def test_the_nearest_photons_of_a_pixel(pool):
         assert look_up.value == pytest.approx(added, rel=1e-6)
 
 
+@pytest.mark.parametrize("combine", ["powers and areas", "irradiances"])
+def test_the_nearest_photons_in_several_maps(pool, combine):
+    """What the listed photons add is what the eye pass took, in the first pass and in a part of the discs later."""
+    estimate = {"lookup": "nearest", "k": 30, "rim": "half", "combine": combine}
+    renderer = renderer_of(pool, estimate=estimate, photons={"N": 20_000, "maps": 3})
+    for _ in range(2):
+        renderer.step()
+        for x, y in DIFFUSE:
+            for look_up in report(renderer, x, y).look_ups:
+                assert look_up.k == 3 * int(renderer.latest.given.eye[0]["k"])
+                assert look_up.sum == pytest.approx(look_up.value, rel=1e-4, abs=1e-7)
+                assert look_up.found.n <= look_up.k
+
+
 def test_look_ups_over_mirrors_and_through_glass(pool):
     """They are of the last surface of the way, and what their photons add is seen through what is before it."""
     renderer = renderer_of(pool)

@@ -98,7 +98,9 @@ def look(scene, origins, directions):
 
 
 def _materials(flat):
-    return next(a for a in flat.arrays if a.dtype == np.int32 and len(a) == flat.n_triangles + flat.n_quadrics).tolist()
+    return next(
+        a for a in flat.arrays.values() if a.dtype == np.int32 and len(a) == flat.n_triangles + flat.n_quadrics
+    ).tolist()
 
 
 def rays(n=2000, reach=0.3):

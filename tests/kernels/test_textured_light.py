@@ -135,7 +135,7 @@ def test_points_have_the_density_that_they_claim(name):
 def arrays(flat):
     """The light's table as (rows, columns) of probabilities."""
     record = flat.record[0]
-    by_address = {a.ctypes.data: a for a in flat.arrays}
+    by_address = {a.ctypes.data: a for a in flat.arrays.values()}
     settings, table = by_address[int(record["light_textures"])], by_address[int(record["light_tables"])].astype(float)
     _, first, rows, columns = settings.reshape(-1, 4)[0]
     marginal = np.diff(table[first : first + rows], prepend=0)
@@ -144,7 +144,7 @@ def arrays(flat):
 
 
 def area(flat):
-    by_address = {a.ctypes.data: a for a in flat.arrays}
+    by_address = {a.ctypes.data: a for a in flat.arrays.values()}
     return float(by_address[int(flat.record[0]["lights"])].reshape(-1, 20)[0, 13])
 
 

@@ -165,7 +165,7 @@ def test_what_becomes_infinite_is_dropped_with_what_it_had():
     """A reflectance beyond float32's range is what no loader lets through; the ledger holds even then."""
     scene = diffuse_box(albedo=0.5)
     flat = flatten(scene)
-    row = flat.arrays[3][0]  # materials
+    row = flat.arrays["materials"][0]
     row[4:7] = 3e38  # M_REFLECTANCE
     maps = trace(flat, scene, 1, 2000)
     assert maps.dropped > 0

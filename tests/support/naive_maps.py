@@ -90,3 +90,36 @@ def pack(position, wi=(0.0, 0.0, 1.0), power=1.0, flags=0, light=0) -> np.ndarra
     words[:, 4] = codes[:, 0] | codes[:, 1] << 16
     words[:, 5] = codes[:, 2] | np.broadcast_to(np.asarray(light, np.uint32), n) << 16
     return photons
+
+
+def combined_knn(parts, power_unit, point, normal, k, max_radius, flatness, kind, rim, share, combine):
+    """Irradiance (3,) from the k nearest photons of each of the `parts`, lists of photons, by the course guide's two
+    ways; of M photons that end a disc M − 1 count, and one as `rim` (0, 1, 2) says."""
+    powers, rims, areas, inside = [], [], [], 0
+    for photons in parts:
+        offset, power = _candidates(photons, power_unit, point, normal, 0b1111)
+        d = np.maximum(np.linalg.norm(offset, axis=1), np.abs(offset @ normal) / flatness)
+        order = np.argsort(d, kind="stable")[:k]
+        order = order[d[order] < max_radius]
+        radius, ends = max_radius, len(order) == k
+        if ends:
+            radius = d[order[-1]]
+            rims.append(power[order[-1]])
+            order = order[:-1]
+        else:
+            rims.append(None)
+        inside += len(order)
+        used = order[d[order] < np.sqrt(share) * radius] if share < 1 else order
+        powers.append(WEIGHTS[kind](d[used] / (np.sqrt(share) * radius), 1.1) @ power[used])
+        areas.append(np.pi * share * radius**2 * disc_mean(kind, 1.1))
+    of_rim = float(WEIGHTS[kind](np.ones(1), 1.1)[0]) * rim / 2 if share == 1 else 0.0
+    if combine == "irradiances":
+        on_rims = [np.zeros(3) if power is None else of_rim * power for power in rims]
+        return sum((P + R) / a for P, R, a in zip(powers, on_rims, areas, strict=True))
+    ended = [power for power in rims if power is not None]
+    M, total, at_rims = len(parts), sum(powers), sum(ended, np.zeros(3))
+    if kind == "constant" and share == 1:
+        total = total + (M - 1 + of_rim) / M * at_rims
+    else:
+        total = total * (1 + len(ended) * (M - 1) / M / max(inside, 1)) + of_rim / M * at_rims
+    return total / np.mean(areas)

@@ -9,15 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.inspector.curves import WEIGHTS, WIDER, curves_of, disc_mean
-from pmviewer.engine.inspector.near import Chosen, Disc, Near, nearest, photons_near, within
+from pmviewer.engine.inspector.near import (
+    Chosen,
+    Disc,
+    Near,
+    Neighbours,
+    nearest,
+    nearest_of_parts,
+    photons_near,
+    within,
+)
 from pmviewer.engine.inspector.report import Float, Found, LookUp, luminance
 from pmviewer.engine.method import estimator_of
 from pmviewer.engine.stages.pass_data import RenderedPass
-from pmviewer.engine.stages.pass_maps import LookUpMap
+from pmviewer.engine.stages.pass_maps import PassMaps
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED
 from pmviewer.maps.estimate.filters import FILTERS
 from pmviewer.maps.record import UNFOUND, bands, unpack
+from pmviewer.maps.search.grid import PhotonGrid
 from pmviewer.maps.search.kdtree import PhotonKdTree
+from pmviewer.maps.search.parts import Combination, PhotonParts
 from pmviewer.render.diagnostics.pixel_replay import (
     AS_CAUSTICS,
     AS_DIRECT,
@@ -80,15 +91,11 @@ def look_ups_of(replay: Replay, rendered: RenderedPass, settings: Settings, band
 def _look_up(row: np.void, replay: Replay, rendered: RenderedPass, settings: Settings, banded: bool) -> LookUp:
     eye, maps, purpose = rendered.given.eye[0], rendered.maps, int(row["purpose"])
     name = "caustic" if purpose in (OF_CAUSTICS, NOT_FOUND) else "global"
-    made, photons = maps.by_name.get(name), maps.photons
-    stored, unit = np.zeros((0, 6), np.float32), 1.0
-    if made is not None and photons is not None:
-        stored = photons.caustic if name == "caustic" else photons.global_
-        unit = photons.caustic_unit if name == "caustic" else photons.global_unit
+    stored, unit = _stored(maps, name)
     group, flags = (FOLLOWED, UNFOUND) if purpose == NOT_FOUND else (STORED, 0)
     both = bool(row["both_sides"])
     disc = Disc(row["p"], row["n"], float(eye["flatness"]), int(row["class_mask"]), both, flags)
-    near, chosen = _chosen(stored, disc, made, float(row["radius"]), eye)
+    near, chosen = _chosen(maps, name, disc, float(row["radius"]), eye, settings.estimate.combine)
     records = np.ascontiguousarray(stored[near.rows])
     unpacked = unpack(records, unit)
     unpacked["wavelength"] = of_bands(bands(records) if banded else np.zeros(len(records), np.int64))
@@ -109,7 +116,7 @@ def _look_up(row: np.void, replay: Replay, rendered: RenderedPass, settings: Set
         wo=row["wo"].astype(np.float64),
         radius=chosen.radius,
         flatness=disc.flatness,
-        k=int(eye["k"]) if made is not None and isinstance(made.structure, PhotonKdTree) else 0,
+        k=_asked(maps, name, eye),
         kernel=kernel,
         value=beta * row["L"],
         found=_found(stored, near, chosen, unpacked, share, weight, adds),
@@ -118,17 +125,51 @@ def _look_up(row: np.void, replay: Replay, rendered: RenderedPass, settings: Set
 
 
 def _chosen(
-    stored: NDArray[np.float32], disc: Disc, made: LookUpMap | None, radius: float, eye: np.void
+    maps: PassMaps, name: str, disc: Disc, radius: float, eye: np.void, combination: Combination
 ) -> tuple[Near, Chosen]:
-    """The photons around the place, farther than the look-up goes, and those that it takes."""
+    """The photons of that map around the place, farther than the look-up goes, and those that it takes."""
+    made = maps.by_name.get(name)
     structure = made.structure if made is not None else None
-    if not isinstance(structure, PhotonKdTree):
+    stored = _stored(maps, name)[0]
+    if structure is None or isinstance(structure, PhotonGrid):
         radius = min(radius, structure.radius) if structure is not None else radius
         near = photons_near(stored, disc, WIDER * radius)
         return near, within(near, radius)
     near = photons_near(stored, disc, radius)
-    smallest = float(structure.record["smallest_radius"][0])
-    return near, nearest(near, int(eye["k"]), radius, float(eye["share"]), int(eye["rim"]), smallest)
+    if isinstance(structure, PhotonParts):
+        assert maps.photons is not None
+        return near, nearest_of_parts(
+            near,
+            maps.photons.cuts[name],
+            _neighbours(structure, radius, eye),
+            combination,
+            FILTERS[int(eye["filter"])] == "constant",
+        )
+    return near, nearest(near, _neighbours(structure, radius, eye))
+
+
+def _stored(maps: PassMaps, name: str) -> tuple[NDArray[np.float32], float]:
+    """The photons (n, 6) of the map of that name as they are stored, and their unit; none where it isn't there."""
+    photons = maps.photons
+    if photons is None or name not in maps.by_name:
+        return np.zeros((0, 6), np.float32), 1.0
+    if name == "caustic":
+        return photons.caustic, photons.caustic_unit
+    return photons.global_, photons.global_unit
+
+
+def _asked(maps: PassMaps, name: str, eye: np.void) -> int:
+    """How many nearest photons a look-up in that map asks for, in all its parts; 0 with a fixed radius."""
+    made = maps.by_name.get(name)
+    if made is None or isinstance(made.structure, PhotonGrid):
+        return 0
+    return int(eye["k"]) * maps.parts
+
+
+def _neighbours(structure: PhotonKdTree | PhotonParts, largest: float, eye: np.void) -> Neighbours:
+    tree = structure.trees[0] if isinstance(structure, PhotonParts) else structure
+    smallest = float(tree.record["smallest_radius"][0])
+    return Neighbours(int(eye["k"]), largest, float(eye["share"]), int(eye["rim"]), smallest)
 
 
 def _found(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.maps.record import decode_directions
+from pmviewer.maps.search.parts import Combination
 
 CHUNK = 1 << 20
 """Photons looked at in one go."""
@@ -45,6 +47,17 @@ class Chosen(NamedTuple):
     x2: NDArray[np.float64]
     factor: NDArray[np.float64]
     radius: float
+
+
+class Neighbours(NamedTuple):
+    """What a look-up of the `k` nearest is asked for: `largest` radius, `share` of the disc's area that it uses, what
+    the farthest counts (`rim`/2 where the disc is entire), and the map's `smallest` radius. Radii in scene units."""
+
+    k: int
+    largest: float
+    share: float
+    rim: int
+    smallest: float
 
 
 def photons_near(photons: NDArray[np.float32], disc: Disc, radius: float) -> Near:
@@ -86,20 +99,63 @@ def within(near: Near, radius: float) -> Chosen:
     return Chosen(places, near.d2[places].astype(np.float64) / float(r2), np.ones(len(places)), radius)
 
 
-def nearest(near: Near, k: int, largest: float, share: float, rim: int, smallest: float) -> Chosen:
-    """The k nearest within `largest`, in the `share` of their disc's area; the farthest counts rim/2 where the disc is
-    entire (`pmviewer.maps.estimate.nearest`). Radii in scene units."""
-    bound, least = np.float32(largest) ** 2, np.float32(smallest) ** 2
-    inside = np.flatnonzero(near.reach < bound)[:k]
-    r2, factor = bound, np.ones(len(inside))
-    if len(inside) == k:
-        r2 = near.reach[inside[-1]]
-        factor[-1] = rim / 2
-    r2 = max(r2, least)
-    part = max(np.float32(share) * r2, least)
+def nearest(near: Near, asked: Neighbours) -> Chosen:
+    """The k nearest (`pmviewer.maps.estimate.nearest`)."""
+    inside, on_rim, r2, part = _disc(near.reach, asked)
+    factor = np.ones(len(inside))
     if part < r2:
         inside = inside[near.reach[inside] < part]
-        r2, factor = part, np.ones(len(inside))
+        factor = np.ones(len(inside))
+    elif on_rim:
+        factor[-1] = asked.rim / 2
     counted = factor > 0
     inside, factor = inside[counted], factor[counted]
-    return Chosen(inside, near.reach[inside].astype(np.float64) / float(r2), factor, float(np.sqrt(r2)))
+    return Chosen(inside, near.reach[inside].astype(np.float64) / float(part), factor, float(np.sqrt(part)))
+
+
+def nearest_of_parts(
+    near: Near, cuts: NDArray[np.int64], asked: Neighbours, combination: Combination, even: bool
+) -> Chosen:
+    """The k nearest of each part, whose photons' rows are between two of `cuts`, with the factors and the radius by
+    which they add up to what `pmviewer.maps.estimate.combined` says. even: whether the kernel is constant."""
+    found = []
+    for first, end in pairwise(cuts):
+        here = np.flatnonzero((near.rows >= first) & (near.rows < end))
+        inside, on_rim, whole_r2, used_r2 = _disc(near.reach[here], asked)
+        found.append((here[inside], on_rim, float(whole_r2), float(used_r2)))
+    area = float(np.mean([part for *_, part in found]))
+    rims = sum(on_rim for _, on_rim, _, _ in found)
+    within_discs = sum(len(rows) for rows, *_ in found) - rims
+    whole = asked.share >= 1
+    rim, inner = asked.rim / 2 if whole else 0.0, 1.0
+    if combination == "powers and areas":
+        kept = 1 - 1 / len(found)
+        rim /= len(found)
+        if whole and even:
+            rim += kept
+        elif within_discs:
+            inner += kept * rims / within_discs
+    places: list[NDArray[np.int64]] = []
+    x2: list[NDArray[np.float64]] = []
+    factors: list[NDArray[np.float64]] = []
+    for rows, on_rim, r2, part in found:
+        factor: NDArray[np.float64] = np.full(len(rows), inner)
+        if on_rim:
+            factor[-1] = rim
+        if part < r2:
+            factor[near.reach[rows] >= np.float32(part)] = 0
+        counted = factor > 0
+        places.append(rows[counted])
+        x2.append(near.reach[rows[counted]].astype(np.float64) / part)
+        factors.append(factor[counted] * (area / part if combination == "irradiances" else 1.0))
+    return Chosen(np.concatenate(places), np.concatenate(x2), np.concatenate(factors), float(np.sqrt(area)))
+
+
+def _disc(reach: NDArray[np.float32], asked: Neighbours) -> tuple[NDArray[np.int64], bool, np.float32, np.float32]:
+    """The nearest by ascending `reach`, whether the last of them ends their disc, its squared radius and that of the
+    share that is used."""
+    bound, least = np.float32(asked.largest) ** 2, np.float32(asked.smallest) ** 2
+    inside = np.flatnonzero(reach < bound)[: asked.k]
+    on_rim = len(inside) == asked.k
+    r2 = max(reach[inside[-1]] if on_rim else bound, least)
+    return inside, on_rim, r2, min(max(np.float32(asked.share) * r2, least), r2)

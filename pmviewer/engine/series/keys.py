@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.method import plan_of
+from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.radius import first_radius
 from pmviewer.errors import SettingError
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.scene.description import Scene
@@ -67,6 +70,24 @@ def orbits(scene: Scene, settings: Settings, pictures: int, degrees: float) -> l
         )
         for o in origins
     ]
+
+
+def automatic_radius(opened: OpenScene, settings: Settings) -> float:
+    """The look-up radius, relative to the scene's, that a picture by these settings takes where it is automatic."""
+    flat, plan = opened.flat, plan_of(settings, opened.traits)
+    camera = resolve_camera(opened.scene, settings.camera)
+    automatic = with_values(settings, {"estimate.radius": "auto"}).estimate
+    return first_radius(flat, camera, automatic, plan.gather) / flat.radius
+
+
+def with_one_radius(opened: OpenScene, settings: Sequence[Settings]) -> list[Settings]:
+    """An automatic radius, which follows the camera in steps, as one number for the whole film: the geometric mean of
+    what its pictures would have alone."""
+    radii = [automatic_radius(opened, one) for one in settings if one.estimate.radius == "auto"]
+    if not radii or min(radii) == max(radii):
+        return list(settings)
+    value = float(np.exp(np.mean(np.log(radii))))
+    return [with_values(one, {"estimate.radius": value}) if one.estimate.radius == "auto" else one for one in settings]
 
 
 def _turned(v: NDArray[np.float64], axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:

@@ -24,7 +24,8 @@ from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import automatic_radius, largest_power, neighbourhood
 from pmviewer.maps.record import DIRECT, in_classes
 from pmviewer.maps.search.grid import PhotonGrid, build_grid
-from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
+from pmviewer.maps.search.kdtree import build_kdtree
+from pmviewer.maps.search.parts import parts_of
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Settings
 
@@ -81,6 +82,7 @@ class MapBuilder:
             caustic=caustic,
             global_=global_,
             neighbours=light.neighbours,
+            parts=light.maps,
             share=light.share,
             radiance=radiance,
             radiance_reach=reach,
@@ -94,7 +96,8 @@ class MapBuilder:
         none = np.empty((0, 6), np.float32)
         grid = self.store.get(("empty", "radius"), lambda: build_grid(none, 1.0, 1.0), lambda _: 0)
         if self.settings.estimate.lookup == "nearest":
-            return self.store.get(("empty", "nearest"), lambda: build_kdtree(none, 1.0), lambda _: 0), grid
+            tree = self.store.get(("empty", "nearest"), lambda: build_kdtree(none, 1.0), lambda _: 0)
+            return (parts_of([tree]) if self.plan.maps > 1 else tree), grid
         return grid, grid
 
     def _kept(self, light: LightPlan, key: tuple[Any, ...], make: Callable[[], Any], size: Callable[[Any], int]) -> Any:
@@ -116,7 +119,7 @@ class MapBuilder:
 
     def _look_up_key(self, light: LightPlan, name: str) -> tuple[Any, ...]:
         if self.settings.estimate.lookup == "nearest":
-            return ("nearest", self.settings.estimate)
+            return ("nearest", self.settings.estimate, light.maps)
         return "radius", light.radii[name], light.reach[name]
 
     def _classes(self, name: str) -> int:
@@ -132,7 +135,11 @@ class MapBuilder:
         chosen = of_classes(stored, classes)
         if self.settings.estimate.lookup == "nearest":
             brightest = self._brightest(name, photons, chosen, unit)
-            return LookUpMap(build_kdtree(chosen, unit), self._max_radius(brightest, light.neighbours))
+            widest = self._max_radius(brightest, light.neighbours * light.maps)
+            if light.maps == 1:
+                return LookUpMap(build_kdtree(chosen, unit), widest)
+            parts = (of_classes(part, classes) for part in photons.parts(name))
+            return LookUpMap(parts_of([build_kdtree(part, unit) for part in parts]), widest)
         return LookUpMap(build_grid(chosen, light.reach[name], unit), light.radii[name])
 
     def _brightest(self, name: str, photons: PhotonMaps, chosen: Float, unit: float) -> float:
@@ -154,7 +161,7 @@ class MapBuilder:
 
     def _typical_radius(self, light: LightPlan, photons: PhotonMaps, global_: LookUpMap) -> float:
         """Of look-ups in the global map: that of the pass, or the median of k-nearest ones."""
-        if isinstance(global_.structure, PhotonKdTree):
+        if not isinstance(global_.structure, PhotonGrid):
             return median_radius(photons, global_.structure, global_.radius, self.settings.estimate, light)
         return global_.radius
 

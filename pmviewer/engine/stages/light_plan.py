@@ -11,15 +11,13 @@ from pmviewer.engine.stages.deposition import Rules, rules_of
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.settings.access import Settings
 
-KEPT_PASSES = 4
-"""Photons and maps of the first passes are kept, so that a new camera or radius starts from them."""
-
 
 @dataclass(frozen=True, eq=False)
 class LightPlan:
     """Pass `index` of N trajectories: radii of look-ups by map in scene units, how far its maps have to `reach` (the
-    largest radius in use), how many nearest photons are looked up and in which `share` of their disc's area they count,
-    whether photons need the `normals` of their surfaces, and the deposition `rules`."""
+    largest radius in use), how many nearest photons are looked up in each of so many `maps` and in which `share` of
+    their disc's area they count, whether photons need the `normals` of their surfaces, the deposition `rules`, and
+    whether the results are `kept` in the stage store."""
 
     index: int
     N: int
@@ -29,11 +27,8 @@ class LightPlan:
     share: float
     normals: bool
     rules: Rules
-
-    @property
-    def kept(self) -> bool:
-        """Whether its results go to the stage store."""
-        return self.index < KEPT_PASSES
+    maps: int
+    kept: bool
 
 
 def light_plan(
@@ -55,4 +50,6 @@ def light_plan(
     if plan.deposition != "all":
         rules = rules_of(settings, plan, importance, index, radii, first_radius)
     normals = plan.radiance or (plan.corners and estimate.lookup == "nearest")
-    return LightPlan(index, N, radii, reach, *pass_neighbours(index, estimate), normals, rules)
+    neighbours = pass_neighbours(index, estimate, plan.maps)
+    kept = index < importance.store.passes
+    return LightPlan(index, N, radii, reach, *neighbours, normals, rules, plan.maps, kept)

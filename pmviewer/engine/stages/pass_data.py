@@ -15,6 +15,7 @@ from pmviewer.engine.stages.shadow_photons import ShadowMap
 from pmviewer.engine.stages.virtual_lights import VirtualMap, virtual_dtype
 from pmviewer.maps.irradiance_cache import NO_CACHE, IrradianceCache
 from pmviewer.maps.irradiance_cache import RECORD as CACHE_RECORD
+from pmviewer.maps.search.parts import PhotonParts
 from pmviewer.maps.shadow import shadow_record
 from pmviewer.maps.variant import looked_up_by
 from pmviewer.render.camera import CameraPose
@@ -86,7 +87,10 @@ def pass_data(
     estimator = estimator_of(settings)
 
     def photon_map(made: LookUpMap | None) -> NDArray[np.void]:
-        return looked_up_by((made.structure if made is not None else maps.empty).record, estimator)
+        structure = made.structure if made is not None else maps.empty
+        if isinstance(structure, PhotonParts):
+            return structure.combined_by(settings.estimate.combine)
+        return looked_up_by(structure.record, estimator)
 
     guides, corner = gather_records(plan, maps.guides)
     return PassData(

@@ -14,13 +14,14 @@ from pmviewer.maps.search.grid import RECORD as GRID_RECORD
 from pmviewer.maps.search.grid import PhotonGrid
 from pmviewer.maps.search.kdtree import RECORD as TREE_RECORD
 from pmviewer.maps.search.kdtree import PhotonKdTree
+from pmviewer.maps.search.parts import PhotonParts, parts_of
 from pmviewer.photons.emission.guided import Known
 from pmviewer.photons.emission.light_importance import LightImportance
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Settings
 from pmviewer.state import State
 
-Structure = PhotonGrid | PhotonKdTree
+Structure = PhotonGrid | PhotonKdTree | PhotonParts
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,10 +61,10 @@ class PassMaps:
     `caustic` and `global_` are None where nothing looks them up, and so are `chooser`, the grid of direct photons
     that choose lights, `volume`, the photons in media, `guides`, that of photons that guide gather rays, and
     `radiance`, the radiance photons, which are used up to `radiance_reach`. `neighbours` nearest photons are looked
-    up, which count in the `share` of their disc's area; gather rays shorter than `corner` gather again. Lengths are
-    in scene units. `rules` have decided about storing the `photons`, and `known_before` is what guided emission knew
-    before the pass. `empty` and `empty_grid` stand in for maps that are not there: kernels take all maps, whether or
-    not they look them up."""
+    up in each of the `parts` of a map, which count in the `share` of their disc's area; gather rays shorter than
+    `corner` gather again. Lengths are in scene units. `rules` have decided about storing the `photons`, and
+    `known_before` is what guided emission knew before the pass. `empty` and `empty_grid` stand in for maps that are not
+    there: kernels take all maps, whether or not they look them up."""
 
     index: int
     N: int
@@ -76,6 +77,7 @@ class PassMaps:
     caustic: LookUpMap | None = None
     global_: LookUpMap | None = None
     neighbours: int = 0
+    parts: int = 1
     share: float = 0.0
     radiance: RadianceMap | None = None
     radiance_reach: float = 0.0
@@ -143,7 +145,9 @@ def blank_tree() -> PhotonKdTree:
 
 def blank_maps(settings: Settings, plan: Plan) -> PassMaps:
     """Maps of the types that passes with these settings have, for compiling ahead; not to be looked up."""
-    structure: Structure = blank_tree() if settings.estimate.lookup == "nearest" else blank_grid()
+    structure: Structure = blank_grid()
+    if settings.estimate.lookup == "nearest":
+        structure = parts_of([blank_tree()]) if plan.maps > 1 else blank_tree()
     grid = blank_grid()
     return PassMaps(
         index=0,

@@ -14,7 +14,9 @@ from pmviewer.maps.estimate.filters import FILTERS, Filter
 from pmviewer.maps.estimate.nearest import Neighbours
 from pmviewer.maps.radiance import RadianceMap, build_radiance_map
 from pmviewer.maps.record import decode_directions
+from pmviewer.maps.search.grid import PhotonGrid
 from pmviewer.maps.search.kdtree import PhotonKdTree
+from pmviewer.maps.search.parts import PhotonParts
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.record import RIMS
@@ -40,7 +42,7 @@ def radiance_photons_of(
     share, radius = settings.gather.radiance_photons, global_.radius
     assert share != "off"
     cutoff = AUTOMATIC_CUTOFF
-    if isinstance(global_.structure, PhotonKdTree):
+    if not isinstance(global_.structure, PhotonGrid):
         radius = median_radius(photons, global_.structure, radius, settings.estimate, light)
         cutoff = AUTOMATIC_CUTOFF_NEAREST
     if settings.gather.cutoff != "auto":
@@ -51,9 +53,15 @@ def radiance_photons_of(
 
 
 def median_radius(
-    photons: PhotonMaps, tree: PhotonKdTree, max_radius: float, estimate: Estimate, light: LightPlan
+    photons: PhotonMaps,
+    trees: PhotonKdTree | PhotonParts,
+    max_radius: float,
+    estimate: Estimate,
+    light: LightPlan,
 ) -> float:
-    """Median radius, in scene units, of the pass's k-nearest look-ups at photons spread evenly over the map."""
+    """Median radius, in scene units, of the pass's k-nearest look-ups at photons spread evenly over the map. Of a map
+    in several parts that of look-ups in the first: their areas are alike."""
+    tree = trees.trees[0] if isinstance(trees, PhotonParts) else trees
     n = len(photons.global_)
     if n == 0:
         return max_radius

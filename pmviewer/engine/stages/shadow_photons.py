@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.stages.light_plan import KEPT_PASSES
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.kernels.dimensions import SHADOW_SALT
@@ -59,7 +58,9 @@ class ShadowStage:
 
         shape = direct.shadow_N, direct.shadow_fewest, direct.shadow_radius
         key = ("shadows", self.scene.uid, seed, index, *shape, glossy)
-        made: ShadowMap = make() if index >= KEPT_PASSES else self.store.get(key, make, lambda shadows: shadows.bytes)
+        made: ShadowMap = (
+            make() if index >= self.store.passes else self.store.get(key, make, lambda shadows: shadows.bytes)
+        )
         with self.tally.once("shadow photons") if s.photons.renew == "once" else nullcontext():
             self.tally.rays += made.rays
         self.latest = made

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pmviewer.engine.method import Plan
 from pmviewer.photons.deposition.fates import Fates
 from pmviewer.photons.deposition.rules import Deposition
 from pmviewer.photons.emission.guided import Guidance, Guided, Known
-from pmviewer.photons.light_pass.light_pass import guided_emission_of, trace_pass
+from pmviewer.photons.light_pass.batch import GLOBAL_NORMALS, NO_NORMALS, Batch
+from pmviewer.photons.light_pass.light_pass import guided_emission_of, joined_parts, trace_pass
+from pmviewer.photons.light_pass.parts import trace_part, trace_parts
 from pmviewer.photons.light_pass.paths import PhotonPaths
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.photons.light_pass.plan import PassPlan, plan_pass, trajectories
@@ -50,6 +53,10 @@ class Tracer:
         """Photons of pass `index`; see `pmviewer.photons.light_pass.light_pass.trace_pass` for what is asked of them.
         Raises SettingError where they can't fit into memory."""
         settings = self.settings
+        if self.plan.maps > 1 and deposition is None and watch is None:
+            wanted = GLOBAL_NORMALS if normals else NO_NORMALS
+            plan = self.planned(index, N, None)
+            return joined_parts(plan, trace_parts(self.flat, plan, self.plan.maps, wanted, self.run))
         return trace_pass(
             self.flat,
             settings.photons,
@@ -64,6 +71,16 @@ class Tracer:
             guided=guided,
             watch=watch,
         )
+
+    def trace_part(self, index: int, N: int, part: int, *, normals: bool = False) -> Batch:
+        """Part `part` of the `plan.maps` parts of pass `index`, traced alone, as a worker does: a function of scene,
+        settings and these numbers. Raises SettingError where the photons can't fit into memory."""
+        wanted = GLOBAL_NORMALS if normals else NO_NORMALS
+        return trace_part(self.flat, self.planned(index, N, None), part, self.plan.maps, wanted, self.run)
+
+    def of_parts(self, index: int, N: int, parts: Sequence[Batch]) -> PhotonMaps:
+        """What `trace` gives as pass `index`, from all of its parts in order, wherever they were traced."""
+        return joined_parts(self.planned(index, N, None), parts)
 
     def planned(self, index: int, N: int, guided: Guided | None) -> PassPlan:
         """What `trace` traces as pass `index`."""

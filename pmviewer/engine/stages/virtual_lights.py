@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.stages.light_plan import KEPT_PASSES
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.maps.virtual_lights import (
@@ -80,7 +79,7 @@ class VirtualStage:
             index = 0
         traced = s.photons.max_bounces, s.photons.glossy, s.photons.sequence
         key = ("virtual lights", self.scene.uid, s.render.seed, index, s.virtual, *traced)
-        keep = index < KEPT_PASSES
+        keep = index < self.store.passes
         made: VirtualMap = (
             self.store.get(key, lambda: self._make(index), lambda m: m.bytes) if keep else self._make(index)
         )

@@ -40,7 +40,11 @@ def specialised(choose: Callable[..., Callable[..., Any]]) -> Any:
 
 
 def has(record: Any, field: str) -> bool:
-    """Whether a record, or its type, has that field."""
+    """Whether a record or a named tuple, or its type, has that field."""
+    if isinstance(record, types.BaseNamedTuple):
+        return field in record.fields
+    if isinstance(record, tuple):
+        return field in getattr(record, "_fields", ())
     if isinstance(record, types.Record):
         return field in record.fields
     return field in (record.dtype.names or ())

@@ -96,8 +96,9 @@ def radiance_radius(grid, eye, radius, p, n, class_mask, b, group, flags, wo):
 
 
 @device
-def _scattered_power(tree, place, n, b, group, flags, wo):
-    """What the photon at a place adds, in units of the map's power; nothing without all of the flags."""
+def scattered_power(tree, place, n, b, group, flags, wo):
+    """What the photon at a place of a tree adds to the radiance towards wo, see `radiance_knn`, in units of the map's
+    power; nothing without all of the flags."""
     word = load_u4(tree.payload, 3 * place)
     if _u4(word & flags) != flags:
         return _f4(0.0), _f4(0.0), _f4(0.0)
@@ -117,13 +118,13 @@ def radiance_knn(tree, eye, max_radius, p, n, class_mask, b, group, flags, wo):
     for j in range(count):
         key = stack_get_i8(keys, j)
         w = filter_weight(filter_kind, cone_k, float_of_bits(_u4(key >> 32)) / r2)
-        r, g, bl = _scattered_power(tree, key & _i8(0xFFFFFFFF), n, b, group, flags, wo)
+        r, g, bl = scattered_power(tree, key & _i8(0xFFFFFFFF), n, b, group, flags, wo)
         red += _f8(w * r)
         green += _f8(w * g)
         blue += _f8(w * bl)
     if rim_place >= 0:
         w = _f4(0.5) * _f4(rim) * filter_weight(filter_kind, cone_k, _f4(1.0))
-        r, g, bl = _scattered_power(tree, rim_place, n, b, group, flags, wo)
+        r, g, bl = scattered_power(tree, rim_place, n, b, group, flags, wo)
         red += _f8(w * r)
         green += _f8(w * g)
         blue += _f8(w * bl)

@@ -3,7 +3,7 @@ and the global map."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,7 +30,8 @@ from pmviewer.photons.light_pass.batch import (
     trace_batch,
 )
 from pmviewer.photons.light_pass.deposit import deposit
-from pmviewer.photons.light_pass.ledger import C_DROPPED, C_RAYS, N_COUNTS, empty_ledger
+from pmviewer.photons.light_pass.ledger import C_DROPPED, C_RAYS
+from pmviewer.photons.light_pass.parts import cuts_of, joined_batches
 from pmviewer.photons.light_pass.paths import PhotonPaths
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.photons.light_pass.plan import PassPlan, pass_record, plan_pass
@@ -97,22 +98,27 @@ def _mixed(traced: list[Numbered], kept: list[Numbered]) -> list[Numbered]:
     return [task for _, _, task in sorted(places, key=lambda place: place[:2])]
 
 
-def _joined(plan: PassPlan, results: list[Batch], last: int) -> PhotonMaps:
+def joined_parts(plan: PassPlan, parts: Sequence[Batch]) -> PhotonMaps:
+    """The maps of a planned pass from all of its parts, in order, wherever they were traced
+    (`pmviewer.photons.light_pass.parts.trace_part`)."""
+    return replace(_joined(plan, parts, plan.traced), cuts=cuts_of(parts))
+
+
+def _joined(plan: PassPlan, results: Sequence[Batch], last: int) -> PhotonMaps:
     """The maps of a pass that stores all that arrives, of its first `last` trajectories."""
-    counts = sum((r.counts for r in results), np.zeros(N_COUNTS, np.int64))
-    ledgers = sum((r.ledgers for r in results), empty_ledger())
+    whole = joined_batches(results)
     return PhotonMaps(
-        caustic=joined(r.caustic for r in results),
-        global_=joined(r.global_ for r in results),
+        caustic=whole.caustic,
+        global_=whole.global_,
         caustic_unit=plan.caustic_unit(plan.traced),
         global_unit=plan.global_unit,
         emitted=last,
-        rays=int(counts[C_RAYS]),
-        dropped=int(counts[C_DROPPED]),
-        ledgers=ledgers,
-        energy=plan.energy(ledgers),
-        normals=joined_codes(r.global_normals for r in results),
-        volume=joined(r.volume for r in results),
+        rays=int(whole.counts[C_RAYS]),
+        dropped=int(whole.counts[C_DROPPED]),
+        ledgers=whole.ledgers,
+        energy=plan.energy(whole.ledgers),
+        normals=whole.global_normals,
+        volume=whole.volume,
         volume_unit=plan.global_unit * plan.store_probability,
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,14 @@ class PhotonMaps:
     """Photons (n, 6) that collided in media after they were scattered, with the power that they were scattered with, in
     units of `volume_unit`."""
     volume_unit: float = 0.0
+    cuts: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
+    """Of a pass in M parts: (M + 1,) rows between which the photons of each part are, in the caustic and the global
+    map."""
+
+    def parts(self, name: str) -> list[Float]:
+        """The photons (n, 6) of each part in the map "caustic" or "global"."""
+        stored, cuts = self.caustic if name == "caustic" else self.global_, self.cuts[name]
+        return [stored[first:end] for first, end in pairwise(cuts)]
 
     @property
     def ledger(self) -> NDArray[np.float64]:

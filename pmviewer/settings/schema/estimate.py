@@ -35,6 +35,7 @@ SHRINKING_RADIUS = Need(
     lambda f: f.settings.estimate.lookup == "nearest" or f.settings.estimate.alpha != 1.0,
     "The radius does not shrink with alpha = 1.",
 )
+SEVERAL_MAPS = Need(lambda f: f.plan.maps > 1, "One map is looked up (photons.maps).")
 DISC = Need(
     lambda f: f.settings.estimate.area != "convex hull",
     "The convex hull weighs all photons alike and has no dark edges to check for.",
@@ -150,6 +151,15 @@ class Estimate(Group):
             NEAREST,
             DISC,
         ),
+    )
+    combine: Literal["powers and areas", "irradiances"] = setting(
+        "powers and areas",
+        "What several maps tell of a place (photons.maps). powers and areas: the sum of their powers over the mean "
+        "area of their discs, as good as one map of all photons. irradiances: the sum of what each map says, whose "
+        "noise, and bias where the k-th photon counts, are those of k/M photons.",
+        stage="image",
+        scale="choice",
+        needs=(SEVERAL_MAPS,),
     )
     max_radius: float | Auto = setting(
         "auto",

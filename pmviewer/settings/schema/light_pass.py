@@ -17,6 +17,17 @@ PLAIN_EMISSION = Need(
 PLAIN_EMISSION_FOR_Q = Need(
     lambda f: f.plan.emission == "off", "With guided emission q is the probability of storing a global photon."
 )
+LOOKED_UP_BY_K = Need(
+    lambda f: f.settings.estimate.lookup == "nearest",
+    "Look-ups of a fixed radius find the same photons in several maps as in one (estimate.lookup).",
+)
+PLAIN_DISC = Need(
+    lambda f: f.settings.estimate.area == "disc" and not f.settings.estimate.differential,
+    "Hulls and differential checking go through the photons of one map.",
+)
+ALL_STORED = Need(
+    lambda f: not f.plan.chooses_photons, "Deposition rules and guided emission ask the whole pass, not its parts."
+)
 
 
 class Photons(Group):
@@ -61,6 +72,17 @@ class Photons(Group):
         stage="photons",
         scale="switch",
         needs=(TERMS_OF_PATHS, FOLLOWED),
+    )
+    maps: int = setting(
+        1,
+        "Parts of the light pass, each with maps of its own, as so many workers would make them: k nearest look-ups "
+        "then find k/M photons in each of M maps (course guide §5.6).",
+        stage="photons",
+        scale="integer",
+        ge=1,
+        le=64,
+        title="photon maps",
+        needs=(PHOTONS, LOOKED_UP_BY_K, PLAIN_DISC, ALL_STORED),
     )
     renew: Literal["each pass", "once"] = setting(
         "each pass",
