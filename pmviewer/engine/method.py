@@ -38,7 +38,7 @@ class Plan:
     direct light chooses lights, `radiance` whether gather rays use radiance photons, `directions` how they look about:
     photons of the classes `guide_mask` guide `guided_rays` of them; `corners` is whether short ones gather again,
     `cache` whether diffuse surfaces gather through an irradiance cache, `estimation` whether pixels that show them are
-    interpolated between sparse gathers, `shadows` whether shadow photons save shadow
+    interpolated between sparse gathers, `reprojection` whether these take hit points of one another, `shadows` whether shadow photons save shadow
     rays, `importance` whether there are importance maps, `deposition` which photons maps store, `emission` how
     importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0 without; `virtual`
     is whether virtual lights bring the indirect light; `media` whether the scene has participating media, and `volume`
@@ -61,6 +61,7 @@ class Plan:
     corners: bool = False
     cache: bool = False
     estimation: bool = False
+    reprojection: bool = False
     virtual: bool = False
     thin_glass: tuple[str, ...] = ()
     shadows: bool = False
@@ -128,6 +129,7 @@ class Plan:
             "final gather": self.gather,
             "irradiance cache": self.cache,
             "gather estimation": self.estimation,
+            "gather reprojection": self.reprojection,
             "importance": self.importance,
             "path tracer": self.path,
         }
@@ -328,6 +330,9 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
         estimation, why = _estimation(settings, traits)
         if not estimation:
             skipped.append(("gather estimation", why))
+        reprojection = estimation and settings.gather.reprojection == "on"
+        if estimation and not reprojection:
+            skipped.append(("gather reprojection", "off"))
         return replace(
             shown,
             gather=True,
@@ -338,6 +343,7 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
             corners=settings.gather.secondary > 0,
             cache=cache,
             estimation=estimation,
+            reprojection=reprojection,
             global_classes=ALL,
             skipped=tuple(skipped),
         )

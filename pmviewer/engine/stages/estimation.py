@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.stages.reprojection import KnownHits
 from pmviewer.maps.hemisphere import strata
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.gather.estimation import ESTIMATE, ESTIMATES, SAMPLE, TOLD, gather_samples, trace_samples
@@ -62,6 +63,8 @@ class Estimates:
     how: NDArray[np.uint8]
     level: NDArray[np.uint8]
     sparse: int
+    told: NDArray[np.float32]
+    known: KnownHits | None
 
     @property
     def counts(self) -> dict[str, int]:
@@ -141,12 +144,16 @@ def estimate_gathers(
     rule = _rule(gather, shrink, seed, index)
     batch = max(1, BATCH_RAYS // int(record["rings"][0] * record["sectors"][0]))
     depth = sparse = 0
+    known = KnownHits(given, samples, gather, spacing, shrink) if gather.reprojection == "on" else None
     while len(tiles):
         wanted = np.zeros((height, width), np.uint8)
         pool.run([partial(ask_corners, tiles, unsafe, how, wanted)])
         corners = np.flatnonzero(wanted).astype(np.int32)
-        gathered = partial(gather_samples, given, corners, samples, plane, told)
-        counts += _parallel(pool, len(corners), batch, gathered)
+        if known is not None:
+            counts += known.gather(given, corners, plane, told, pool)
+        else:
+            gathered = partial(gather_samples, given, corners, samples, plane, told)
+            counts += _parallel(pool, len(corners), batch, gathered)
         good = corners[plane[corners, 3] > 0]
         how.reshape(-1)[good], level.reshape(-1)[good] = GATHERED, depth
         sparse += len(good) if depth == 0 else 0
@@ -154,7 +161,7 @@ def estimate_gathers(
         divided = partial(divide_tiles, tiles, unsafe, samples, plane, told, how, level, depth, rule, parts)
         tiles = parts[: pool.run([divided])[0]]
         depth += 1
-    return Estimates(record, plane, mask, how, level, sparse), counts
+    return Estimates(record, plane, mask, how, level, sparse, told, known), counts
 
 
 def _rule(gather: Gather, shrink: float, seed: int, index: int) -> tuple[float, float, int, float, int]:

@@ -1,0 +1,145 @@
+"""Reprojection of known hit points within the estimation of a pass (R8; course guide §6.3.3).
+
+What gathers of the pass have shot is kept until the next one: `KnownHits`. In each round of
+`pmviewer.engine.stages.estimation` the corners that have to gather do so in two steps: those near which too little is
+known gather in full, some of them first, so that the others find them; the rest takes what the full gathers around it
+know. A share of the corners that grows with the pass gathers in full whatever is known, and the contrast that
+reprojection may overlook falls, as radii do, so that in the limit nothing is reprojected. Every step depends on the
+steps before alone, and nothing on threads.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.engine.pool import WorkPool
+from pmviewer.render.gather.estimation import ESTIMATE, SAMPLE, TOLD
+from pmviewer.render.gather.reprojection import FULL, NOT_GATHERED, PARTIAL, SOURCES, gather_reprojected, sources_of
+from pmviewer.render.gather.zbuffer import HIT
+from pmviewer.render.given import PassData
+from pmviewer.render.record import N_COUNTS
+from pmviewer.settings.schema import Gather
+
+FEWEST = 2
+"""Sources without which a corner gathers in full: one alone hides what only others see."""
+BATCH_HITS = 16384
+"""Directions a task."""
+
+
+class KnownHits:
+    """What the gathers of a pass have found, and which gathered how: `how` uint8 (h, w) of NOT_GATHERED, PARTIAL, FULL;
+    `begin` int64 and `count` int32 (pixels,) of their rows in `hits`, float32 (m, HIT)."""
+
+    def __init__(self, given: PassData, samples: NDArray[np.float32], gather: Gather, spacing: int, shrink: float):
+        eye, record = given.eye[0], given.cache[0]
+        self.height, self.width = int(eye["height"]), int(eye["width"])
+        self.samples, self.reach = samples, spacing
+        self.cells = int(record["rings"]) * int(record["sectors"])
+        self.rule = np.float32(gather.reprojection_contrast * shrink), np.int64(gather.reprojection_parts)
+        self.how = np.zeros((self.height, self.width), np.uint8)
+        self.begin = np.zeros(self.height * self.width, np.int64)
+        self.count = np.zeros(self.height * self.width, np.int32)
+        self.hits = np.zeros((0, HIT), np.float32)
+        chance = np.random.default_rng([int(eye["seed"]), int(eye["index"]), 2])
+        self.anew = chance.random(self.height * self.width) >= shrink
+        """Pixels that gather in full whatever is known."""
+
+    def gather(
+        self,
+        given: PassData,
+        corners: NDArray[np.int32],
+        estimates: NDArray[np.float32],
+        told: NDArray[np.float32],
+        pool: WorkPool,
+    ) -> NDArray[np.int64]:
+        """Gathers at pixels `corners`, into estimates and told as `gather_samples` does; the counts of its kernels."""
+        counts = np.zeros(N_COUNTS, np.int64)
+        for chosen, sources in self._steps(corners, pool):
+            counts += self._gather(given, chosen, sources, estimates, told, pool)
+        return counts
+
+    def sources(self, pixels: NDArray[np.int32], pool: WorkPool) -> NDArray[np.int32]:
+        """The full gathers around pixels, (n, SOURCES)."""
+        found = np.empty((len(pixels), SOURCES), np.int32)
+        batch = 1024
+        run = [
+            partial(sources_of, pixels[a : a + batch], self.samples, self.how, self.reach, found[a : a + batch])
+            for a in range(0, len(pixels), batch)
+        ]
+        pool.run(run)
+        return found
+
+    def _steps(self, corners: NDArray[np.int32], pool: WorkPool) -> Any:
+        """Which corners gather, step by step, and from what."""
+        none = np.full((len(corners), SOURCES), -1, np.int32)
+        alone = self.anew[corners] | self._lonely(self.sources(corners, pool))
+        first = alone & (self.anew[corners] | self._spread(corners))
+        yield corners[first], none[first]
+        rest = corners[~first]
+        sources = self.sources(rest, pool)
+        sources[self._lonely(sources)] = -1
+        yield rest, sources
+
+    def _lonely(self, sources: NDArray[np.int32]) -> NDArray[np.bool_]:
+        return (sources >= 0).sum(axis=1) < FEWEST
+
+    def _spread(self, corners: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """The first of the corners in each square of half a tile of the undivided grid."""
+        side = max(self.reach // 2, 1)
+        square = corners // self.width // side * self.width + corners % self.width // side
+        chosen = np.zeros(len(corners), bool)
+        chosen[np.unique(square, return_index=True)[1]] = True
+        return chosen
+
+    def _gather(
+        self,
+        given: PassData,
+        pixels: NDArray[np.int32],
+        sources: NDArray[np.int32],
+        estimates: NDArray[np.float32],
+        told: NDArray[np.float32],
+        pool: WorkPool,
+    ) -> NDArray[np.int64]:
+        batch = max(1, BATCH_HITS // self.cells)
+        known = self.begin, self.count, self.hits
+
+        def task(first: int) -> Any:
+            def run() -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32]]:
+                span = first, min(first + batch, len(pixels))
+                counts, made = np.zeros(N_COUNTS, np.int64), np.zeros(span[1] - span[0], np.int32)
+                found = np.empty((len(made) * self.cells, HIT), np.float32)
+                gather_reprojected(
+                    given, pixels, sources, self.samples, known, self.rule, estimates, told, found, made, counts, span
+                )
+                return counts, made, found[: made.sum()].copy()
+
+            return run
+
+        parts = pool.run([task(first) for first in range(0, len(pixels), batch)])
+        if not parts:
+            return np.zeros(N_COUNTS, np.int64)
+        counts, made, found = zip(*parts, strict=True)
+        self.count[pixels] = np.concatenate(made)
+        self.begin[pixels] = len(self.hits) + np.cumsum(self.count[pixels]) - self.count[pixels]
+        self.hits = np.concatenate([self.hits, *found])
+        good = estimates[pixels, 3] > 0
+        full = (sources < 0).all(axis=1)
+        how = self.how.reshape(-1)
+        how[pixels[good & full]], how[pixels[good & ~full]] = FULL, PARTIAL
+        return np.asarray(sum(counts))
+
+
+def prepare_reprojection(given: PassData) -> None:
+    """Call every kernel of this stage once, on nothing. given: as for the eye pass, with a blank record of estimates."""
+    nobody, how = np.empty(0, np.int32), np.full((1, 1), NOT_GATHERED, np.uint8)
+    samples, plane, told, hits = (np.zeros((1, columns), np.float32) for columns in (SAMPLE, ESTIMATE, TOLD, HIT))
+    sources = np.empty((0, SOURCES), np.int32)
+    sources_of(nobody, samples, how, 1, sources)
+    known = np.zeros(1, np.int64), np.zeros(1, np.int32), hits
+    rule, counts = (np.float32(0), np.int64(1)), np.zeros(N_COUNTS, np.int64)
+    made = np.empty(0, np.int32)
+    gather_reprojected(given, nobody, sources, samples, known, rule, plane, told, hits, made, counts, (0, 0))
