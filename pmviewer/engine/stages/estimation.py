@@ -55,7 +55,9 @@ TILE = 4096
 class Estimates:
     """Of one pass. `record`: ESTIMATES (1,), valid while this object lives; `plane`: float32 (pixels, ESTIMATE); `mask`
     and `how`: uint8 (h, w), see `pmviewer.render.gather.tiles`; `level`: uint8 (h, w), how often the tile was divided
-    in which a pixel was interpolated or for which it gathered; `sparse`: full gathers of the undivided grid."""
+    in which a pixel was interpolated or for which it gathered; `sparse`: full gathers of the undivided grid; `told`:
+    float32 (pixels, TOLD), the share of reprojected directions of what was interpolated, too; `known`: what gathers
+    have found, where they are reprojected."""
 
     record: NDArray[np.void]
     plane: NDArray[np.float32]
@@ -64,13 +66,14 @@ class Estimates:
     level: NDArray[np.uint8]
     sparse: int
     told: NDArray[np.float32]
-    known: KnownHits | None
+    known: KnownHits | None = None
 
     @property
     def counts(self) -> dict[str, int]:
         """Pixels by what they are (`safe`, `critical`, `other`) and by how safe ones get their light (`gathered`,
-        `interpolated`, `left` to the eye pass)."""
+        `interpolated`, `left` to the eye pass); with reprojection, what `KnownHits.counts` tells."""
         safe = self.mask == SAFE
+        reprojected = {} if self.known is None else self.known.counts
         return {
             "safe": int(safe.sum()),
             "critical": int((self.mask == CRITICAL).sum()),
@@ -79,6 +82,7 @@ class Estimates:
             "gathered": int((self.how == GATHERED).sum()),
             "interpolated": int((self.how == INTERPOLATED).sum()),
             "left": int((safe & (self.how == LEFT)).sum()),
+            **reprojected,
         }
 
     def views(self) -> dict[str, NDArray[np.float32]]:
@@ -88,6 +92,9 @@ class Estimates:
         points = np.where(nothing, -1.0, self.how)
         level = np.where(self.how == LEFT, -1.0, self.level)
         planes = {"estimation mask": mask, "gathered points": points, "subdivision level": level}
+        if self.known is not None:
+            share = 100 * self.told[:, 2].reshape(self.how.shape)
+            planes["reprojected share"] = np.where(self.how == LEFT, -1.0, share)
         return {name: np.ascontiguousarray(plane[..., None], np.float32) for name, plane in planes.items()}
 
 

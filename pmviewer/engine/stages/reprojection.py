@@ -3,8 +3,8 @@
 What gathers of the pass have shot is kept until the next one: `KnownHits`. In each round of
 `pmviewer.engine.stages.estimation` the corners that have to gather do so in two steps: those near which too little is
 known gather in full, some of them first, so that the others find them; the rest takes what the full gathers around it
-know. A share of the corners that grows with the pass gathers in full whatever is known, and the contrast that
-reprojection may overlook falls, as radii do, so that in the limit nothing is reprojected. Every step depends on the
+know. A share of the corners that grows with the pass gathers in full whatever is known, and the cover
+that hits must have of a cell tends to all of it, as fast as radii shrink, so that in the limit nothing is reprojected. Every step depends on the
 steps before alone, and nothing on threads.
 """
 
@@ -39,7 +39,7 @@ class KnownHits:
         self.height, self.width = int(eye["height"]), int(eye["width"])
         self.samples, self.reach = samples, spacing
         self.cells = int(record["rings"]) * int(record["sectors"])
-        self.rule = np.float32(gather.reprojection_contrast * shrink), np.int64(gather.reprojection_parts)
+        self.rule = np.float32(1.0 - (1.0 - gather.reprojection_cover) * shrink), np.int64(gather.reprojection_parts)
         self.how = np.zeros((self.height, self.width), np.uint8)
         self.begin = np.zeros(self.height * self.width, np.int64)
         self.count = np.zeros(self.height * self.width, np.int32)
@@ -47,6 +47,13 @@ class KnownHits:
         chance = np.random.default_rng([int(eye["seed"]), int(eye["index"]), 2])
         self.anew = chance.random(self.height * self.width) >= shrink
         """Pixels that gather in full whatever is known."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Gathers in full (`full`) and those that reprojected directions (`partial`), and how many directions both
+        have shot (`shot`)."""
+        full, some = int((self.how == FULL).sum()), int((self.how == PARTIAL).sum())
+        return {"full": full, "partial": some, "shot": len(self.hits)}
 
     def gather(
         self,

@@ -19,7 +19,7 @@ from pmviewer.maps.hemisphere import cell_direction, irradiance_and_gradients
 from pmviewer.render.chain import BLACK, WHITE, arrive
 from pmviewer.render.gather.cache_fill import gather_cell
 from pmviewer.render.gather.estimation import FACE, GAP, NORMAL, POINT, standard_error
-from pmviewer.render.gather.zbuffer import EMPTY, HIT, LIGHT, PATCH, PLACE, USABLE, WAY, Hemisphere, clear, plot, resolve
+from pmviewer.render.gather.zbuffer import HIT, LIGHT, PATCH, PLACE, USABLE, WAY, Hemisphere, clear, plot, resolve
 from pmviewer.render.gather.zbuffer import FACE as HIT_FACE
 from pmviewer.render.given import opened
 from pmviewer.render.pixel import pixel_seed
@@ -99,7 +99,7 @@ def _shoot_cells(given, view, gap, seed, known, cells, found, counts):
     for k in range(view.sectors):
         for j in range(view.rings):
             here = j + view.rings * k
-            if known[here] != EMPTY:
+            if known[here]:
                 continue
             u, v, _, _ = draw4(eye.sequence, seed, _u4(here), HEMISPHERE)
             wi = cell_direction(view.n, view.rings, view.sectors, j, k, u, v)
@@ -133,21 +133,21 @@ def _fill(row, place, face, patch, usable):
 
 
 @device
-def see_known(view, sources, begin, count, hits, contrast, depth, owner, cells, known):
+def see_known(view, sources, begin, count, hits, cover, depth, owner, cells, known):
     """Plot the hits of `sources` (pixels, −1: none) and fill `cells` and `known` (`resolve`); returns how many cells
     are known."""
     points = 0
     for source in sources:
         points += 1 if source >= 0 else 0
     if points == 0:
-        known[:] = EMPTY
+        known[:] = False
         return 0
-    clear(depth, owner)
+    clear(owner)
     for source in sources:
         if source >= 0:
             for row in range(begin[source], begin[source] + count[source]):
                 plot(view, hits, row, points, depth, owner)
-    return resolve(view, hits, contrast, depth, owner, cells, known)
+    return resolve(view, hits, cover, depth, owner, cells, known)
 
 
 @device
@@ -166,24 +166,24 @@ def gather_reprojected(given, pixels, sources, samples, known_hits, rule, estima
 
     given: as for the eye pass; pixels: int32 (n,); sources: int32 (n, SOURCES); samples: float32 (pixels, SAMPLE);
     known_hits: begin int64 and count int32 (pixels,) of what is known of each pixel in hits, float32 (m, HIT); rule:
-    the contrast of `resolve`, and into how many parts rings and sectors of cells are divided; estimates: float32
+    the cover that `resolve` asks for, and into how many parts rings and sectors of cells are divided; estimates: float32
     (pixels, ESTIMATE) and told: float32 (pixels, TOLD), filled in; found: float32 (cells · (last − first), HIT), what
     was shot, one pixel after the other, and made: int32 (last − first,), how many each; counts: int64 (N_COUNTS,);
     span: first and last. A gather that is not finite is counted as dropped and left without an estimate.
     """
     given = opened(given)
     begin, count, hits = known_hits
-    contrast, parts = rule
+    cover, parts = rule
     first, last = span
     eye, n = given.eye, given.cache.rings * given.cache.sectors
-    cells, known = np.zeros((n, 5), np.float32), np.empty(n, np.int64)
+    cells, known = np.zeros((n, 5), np.float32), np.empty(n, np.bool_)
     depth, owner = np.empty(n * parts * parts, np.float32), np.empty(n * parts * parts, np.int32)
     E, rotation, translation = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     filled = 0
     for i in range(first, last):
         pixel = pixels[i]
         view = view_from(given, samples[pixel], parts)
-        reprojected = see_known(view, sources[i], begin, count, hits, contrast, depth, owner, cells, known)
+        reprojected = see_known(view, sources[i], begin, count, hits, cover, depth, owner, cells, known)
         seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(CACHE_SALT))
         shot = _shoot_cells(given, view, samples[pixel, GAP], seed, known, cells, found[filled:], counts)
         mean = irradiance_and_gradients(cells, view.rings, view.sectors, view.n, E, rotation, translation)

@@ -276,15 +276,15 @@ class Gather(Group):
         scale="choice",
         needs=(ESTIMATION,),
     )
-    reprojection_contrast: float = setting(
-        0.25,
-        "Directions in which a near and a far surface are seen side by side are gathered anew if their radiance "
-        "differs by more than this share of the mean. It shrinks with the sixth root of the pass.",
+    reprojection_cover: float = setting(
+        0.5,
+        "Share of a direction's cell that known hit points must cover in the first pass, else a ray is cast there. In "
+        "later passes it grows towards all of it.",
         stage="image",
-        scale="log",
-        title="reprojection contrast",
-        ge=0.01,
-        le=10.0,
+        scale="linear",
+        title="reprojection cover",
+        ge=0.0,
+        le=1.0,
         needs=(REPROJECTION,),
     )
     reprojection_parts: int = setting(
