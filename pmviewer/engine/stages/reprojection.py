@@ -30,6 +30,20 @@ BATCH_HITS = 16384
 """Directions a task."""
 
 
+Hits = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32]]
+"""`begin`, `count` and `hits` of `KnownHits`."""
+
+
+def rule_of(gather: Gather, shrink: float) -> tuple[np.float32, np.int64]:
+    """The cover that cells must have in a pass by which radii have shrunk so far, and the parts that they have."""
+    return np.float32(1.0 - (1.0 - gather.reprojection_cover) * shrink), np.int64(gather.reprojection_parts)
+
+
+def no_hits() -> Hits:
+    """Nothing is known of a single pixel."""
+    return np.zeros(1, np.int64), np.zeros(1, np.int32), np.zeros((1, HIT), np.float32)
+
+
 class KnownHits:
     """What the gathers of a pass have found, and which gathered how: `how` uint8 (h, w) of NOT_GATHERED, PARTIAL, FULL;
     `begin` int64 and `count` int32 (pixels,) of their rows in `hits`, float32 (m, HIT)."""
@@ -39,7 +53,7 @@ class KnownHits:
         self.height, self.width = int(eye["height"]), int(eye["width"])
         self.samples, self.reach = samples, spacing
         self.cells = int(record["rings"]) * int(record["sectors"])
-        self.rule = np.float32(1.0 - (1.0 - gather.reprojection_cover) * shrink), np.int64(gather.reprojection_parts)
+        self.rule = rule_of(gather, shrink)
         self.how = np.zeros((self.height, self.width), np.uint8)
         self.begin = np.zeros(self.height * self.width, np.int64)
         self.count = np.zeros(self.height * self.width, np.int32)
@@ -70,7 +84,7 @@ class KnownHits:
         return counts
 
     def sources(self, pixels: NDArray[np.int32], pool: WorkPool) -> NDArray[np.int32]:
-        """The full gathers around pixels, (n, SOURCES)."""
+        """The full gathers around pixels, (n, SOURCES); all −1 where they are too few."""
         found = np.empty((len(pixels), SOURCES), np.int32)
         batch = 1024
         run = [
@@ -78,21 +92,16 @@ class KnownHits:
             for a in range(0, len(pixels), batch)
         ]
         pool.run(run)
+        found[(found >= 0).sum(axis=1) < FEWEST] = -1
         return found
 
     def _steps(self, corners: NDArray[np.int32], pool: WorkPool) -> Any:
         """Which corners gather, step by step, and from what."""
-        none = np.full((len(corners), SOURCES), -1, np.int32)
-        alone = self.anew[corners] | self._lonely(self.sources(corners, pool))
-        first = alone & (self.anew[corners] | self._spread(corners))
-        yield corners[first], none[first]
-        rest = corners[~first]
-        sources = self.sources(rest, pool)
-        sources[self._lonely(sources)] = -1
-        yield rest, sources
-
-    def _lonely(self, sources: NDArray[np.int32]) -> NDArray[np.bool_]:
-        return (sources >= 0).sum(axis=1) < FEWEST
+        alone = (self.sources(corners, pool) < 0).all(axis=1)
+        first = self.anew[corners] | (alone & self._spread(corners))
+        chosen, rest = corners[first], corners[~first]
+        yield chosen, np.full((len(chosen), SOURCES), -1, np.int32)
+        yield rest, self.sources(rest, pool)
 
     def _spread(self, corners: NDArray[np.int32]) -> NDArray[np.bool_]:
         """The first of the corners in each square of half a tile of the undivided grid."""
@@ -146,7 +155,6 @@ def prepare_reprojection(given: PassData) -> None:
     samples, plane, told, hits = (np.zeros((1, columns), np.float32) for columns in (SAMPLE, ESTIMATE, TOLD, HIT))
     sources = np.empty((0, SOURCES), np.int32)
     sources_of(nobody, samples, how, 1, sources)
-    known = np.zeros(1, np.int64), np.zeros(1, np.int32), hits
-    rule, counts = (np.float32(0), np.int64(1)), np.zeros(N_COUNTS, np.int64)
+    rule, counts = rule_of(Gather(), 1.0), np.zeros(N_COUNTS, np.int64)
     made = np.empty(0, np.int32)
-    gather_reprojected(given, nobody, sources, samples, known, rule, plane, told, hits, made, counts, (0, 0))
+    gather_reprojected(given, nobody, sources, samples, no_hits(), rule, plane, told, hits, made, counts, (0, 0))

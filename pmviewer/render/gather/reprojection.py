@@ -196,3 +196,22 @@ def gather_reprojected(given, pixels, sources, samples, known_hits, rule, estima
         told[pixel, 0], told[pixel, 1], told[pixel, 2] = mean, standard_error(cells), _f4(reprojected) / _f4(n)
         estimates[pixel, 0], estimates[pixel, 1], estimates[pixel, 2] = E[0], E[1], E[2]
         estimates[pixel, 3] = _f4(1.0)
+
+
+@kernel
+def look_around(given, pixel, sources, samples, known_hits, rule, cells, known, axes, counts):
+    """The hemisphere of one pixel's sample as `gather_reprojected` makes it: `cells` (rings·sectors, 5) float32, in
+    `known`, bool (rings·sectors,), which of them were reprojected, and in `axes` (2, 3) the tangents from which azimuths
+    count. sources: int32 (SOURCES,); the rest as there."""
+    given = opened(given)
+    begin, count, hits = known_hits
+    cover, parts = rule
+    n = given.cache.rings * given.cache.sectors
+    depth, owner = np.empty(n * parts * parts, np.float32), np.empty(n * parts * parts, np.int32)
+    view = view_from(given, samples[pixel], parts)
+    see_known(view, sources, begin, count, hits, cover, depth, owner, cells, known)
+    seed = hash3(pixel_seed(given.eye, pixel), given.eye.index, _u4(CACHE_SALT))
+    found = np.empty((n, HIT), np.float32)
+    _shoot_cells(given, view, samples[pixel, GAP], seed, known, cells, found, counts)
+    for axis in range(3):
+        axes[0, axis], axes[1, axis] = view.s[axis], view.t[axis]
