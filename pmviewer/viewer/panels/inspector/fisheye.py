@@ -93,7 +93,7 @@ class FisheyeDiscs:
 
         names = ("gathered",) if of.reprojected is None else ("gathered", "reprojected", "difference")
         room, gap = imgui.get_content_region_avail().x, imgui.get_style().item_spacing.x
-        side = min(max((room - 2 * gap) / 3, 7 * imgui.get_font_size()), 12 * imgui.get_font_size(), room)
+        side = min(max((room - 2 * gap) / 3, 5.5 * imgui.get_font_size()), 12 * imgui.get_font_size(), room)
         a_row = max(1, int((room + gap) / (side + gap)))
         for number, name in enumerate(names):
             if number % a_row:

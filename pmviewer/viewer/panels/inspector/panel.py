@@ -66,13 +66,13 @@ class InspectorPanel:
         for note in report.notes:
             _note(note)
         self._section("Light", lambda: draw_terms(report))
+        if report.fisheye is not None:
+            seen = report.fisheye
+            self._section("Hemisphere of a gather", lambda: self._fisheye.draw(seen))
         if report.look_ups:
             self._look_ups(report)
         elif report.way.size:
             wrapped("In the latest pass the path of this pixel looked no photons up.")
-        if report.fisheye is not None:
-            seen = report.fisheye
-            self._section("Hemisphere of a gather", lambda: self._fisheye.draw(seen))
         if report.samples is not None and len(report.lights) > 1:
             self._section("Light samples of a pass", lambda: _facts(light_rows(report)))
         self._section("History", lambda: draw_history(report.history))
