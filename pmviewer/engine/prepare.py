@@ -20,11 +20,11 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import radii_of_pixels
 from pmviewer.engine.stages.convergence import prepare_convergence
 from pmviewer.engine.stages.estimation import prepare_estimation
-from pmviewer.engine.stages.reprojection import prepare_reprojection
 from pmviewer.engine.stages.importance import prepare_importance
 from pmviewer.engine.stages.irradiance_cache import prepare_cache
 from pmviewer.engine.stages.pass_data import blank_eye, blank_pass
 from pmviewer.engine.stages.projection import projection_for
+from pmviewer.engine.stages.reprojection import prepare_reprojection
 from pmviewer.engine.stages.thin_glass import thin_record, with_thin_glass
 from pmviewer.engine.stages.virtual_lights import prepare_virtual
 from pmviewer.kernels.accel.raycast import cast_closest

@@ -15,17 +15,17 @@ from pmviewer.render.record import N_COUNTS
 from pmviewer.settings.schema import Gather
 
 
-def fisheye_of(
-    rendered: RenderedPass, pixel: int, origin: Float, gather: Gather, pool: WorkPool
-) -> Fisheye | None:
-    """Of a pixel whose camera ray starts at `origin` (3,), with the numbers of that pass; None where the pixel's first surface is no diffuse one.
+def fisheye_of(rendered: RenderedPass, pixel: int, origin: Float, gather: Gather, pool: WorkPool) -> Fisheye | None:
+    """Of a pixel whose camera ray starts at `origin` (3,), with the numbers of that pass; None where its first surface
+    is no diffuse one.
 
     A pixel that gathered itself is not among its own sources: what would have been found without it is told.
     """
     estimates, given = rendered.estimates, rendered.given
     assert estimates is not None
     eye, record = given.eye[0], given.cache[0]
-    samples, counts = np.empty((int(eye["width"]) * int(eye["height"]), SAMPLE), np.float32), np.zeros(N_COUNTS, np.int64)
+    pixels, counts = int(eye["width"]) * int(eye["height"]), np.zeros(N_COUNTS, np.int64)
+    samples = np.empty((pixels, SAMPLE), np.float32)
     pool.run([lambda: trace_samples(given, samples, counts, pixel, pixel + 1)])
     sample = samples[pixel]
     if sample[KIND] != np.float32(DIFFUSE):

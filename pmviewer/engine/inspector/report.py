@@ -133,9 +133,9 @@ class PhotonLife:
 @dataclass(frozen=True, eq=False)
 class Fisheye:
     """What a gather at the pixel's first surface sees: radiance `gathered` (rings, sectors, 3) by a ray in each cell of
-    the hemisphere (`pmviewer.maps.hemisphere`), around the unit normal n with the tangents s and t, (3,) each, seen from
-    wo (3,). `reprojected` (rings, sectors, 3) is what other gathers of the pass tell instead, and `shot` (rings,
-    sectors) where they tell too little; None without reprojection."""
+    the hemisphere (`pmviewer.maps.hemisphere`), around the unit normal n with the tangents s and t, all of them and wo,
+    the way to the viewer, (3,). `reprojected` (rings, sectors, 3) is what other gathers of the pass tell instead, and
+    `shot` (rings, sectors) where they tell too little; None without reprojection."""
 
     gathered: Float
     n: Float

@@ -3,9 +3,9 @@
 What gathers of the pass have shot is kept until the next one: `KnownHits`. In each round of
 `pmviewer.engine.stages.estimation` the corners that have to gather do so in two steps: those near which too little is
 known gather in full, some of them first, so that the others find them; the rest takes what the full gathers around it
-know. A share of the corners that grows with the pass gathers in full whatever is known, and the cover
-that hits must have of a cell tends to all of it, as fast as radii shrink, so that in the limit nothing is reprojected. Every step depends on the
-steps before alone, and nothing on threads.
+know. A share of the corners that grows with the pass gathers in full whatever is known, and the cover that hits must
+have of a cell tends to all of it, as fast as radii shrink, so that in the limit nothing is reprojected. Every step
+depends on the steps before alone, and nothing on threads.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ class KnownHits:
 
 
 def prepare_reprojection(given: PassData) -> None:
-    """Call every kernel of this stage once, on nothing. given: as for the eye pass, with a blank record of estimates."""
+    """Call every kernel of this stage once, on nothing. given: as for the eye pass, with a record of estimates."""
     nobody, how = np.empty(0, np.int32), np.full((1, 1), NOT_GATHERED, np.uint8)
     samples, plane, told, hits = (np.zeros((1, columns), np.float32) for columns in (SAMPLE, ESTIMATE, TOLD, HIT))
     sources = np.empty((0, SOURCES), np.int32)

@@ -16,11 +16,11 @@ from pmviewer.kernels.dimensions import CACHE_SALT, HEMISPHERE
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import basis, dot, mul
 from pmviewer.maps.hemisphere import cell_direction, irradiance_and_gradients
-from pmviewer.render.chain import BLACK, WHITE, arrive
+from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.gather.cache_fill import gather_cell
 from pmviewer.render.gather.estimation import FACE, GAP, NORMAL, POINT, standard_error
-from pmviewer.render.gather.zbuffer import HIT, LIGHT, PATCH, PLACE, USABLE, WAY, Hemisphere, clear, plot, resolve
 from pmviewer.render.gather.zbuffer import FACE as HIT_FACE
+from pmviewer.render.gather.zbuffer import HIT, LIGHT, PATCH, PLACE, USABLE, WAY, Hemisphere, clear, plot, resolve
 from pmviewer.render.given import opened
 from pmviewer.render.pixel import pixel_seed
 from pmviewer.render.record import C_DROPPED
@@ -166,10 +166,10 @@ def gather_reprojected(given, pixels, sources, samples, known_hits, rule, estima
 
     given: as for the eye pass; pixels: int32 (n,); sources: int32 (n, SOURCES); samples: float32 (pixels, SAMPLE);
     known_hits: begin int64 and count int32 (pixels,) of what is known of each pixel in hits, float32 (m, HIT); rule:
-    the cover that `resolve` asks for, and into how many parts rings and sectors of cells are divided; estimates: float32
-    (pixels, ESTIMATE) and told: float32 (pixels, TOLD), filled in; found: float32 (cells · (last − first), HIT), what
-    was shot, one pixel after the other, and made: int32 (last − first,), how many each; counts: int64 (N_COUNTS,);
-    span: first and last. A gather that is not finite is counted as dropped and left without an estimate.
+    the cover that `resolve` asks for, and into how many parts rings and sectors of cells are divided; estimates:
+    float32 (pixels, ESTIMATE) and told: float32 (pixels, TOLD), filled in; found: float32 (cells · (last − first),
+    HIT), what was shot, one pixel after the other, and made: int32 (last − first,), how many each; counts: int64
+    (N_COUNTS,); span: first and last. A gather that is not finite is counted as dropped and left without an estimate.
     """
     given = opened(given)
     begin, count, hits = known_hits
@@ -201,8 +201,8 @@ def gather_reprojected(given, pixels, sources, samples, known_hits, rule, estima
 @kernel
 def look_around(given, pixel, sources, samples, known_hits, rule, cells, known, axes, counts):
     """The hemisphere of one pixel's sample as `gather_reprojected` makes it: `cells` (rings·sectors, 5) float32, in
-    `known`, bool (rings·sectors,), which of them were reprojected, and in `axes` (2, 3) the tangents from which azimuths
-    count. sources: int32 (SOURCES,); the rest as there."""
+    `known`, bool (rings·sectors,), which of them were reprojected, and in `axes` (2, 3) the tangents from which
+    azimuths count. sources: int32 (SOURCES,); the rest as there."""
     given = opened(given)
     begin, count, hits = known_hits
     cover, parts = rule

@@ -125,15 +125,15 @@ def _spread(rings, sectors, radius, phi, covered, what, buffer):
     width = half / max(radius, half) * (_f4(sectors) / _TURN)
     K0, K1 = _i8(math.floor(phi - width + _f4(0.5))), _i8(math.floor(phi + width + _f4(0.5)))
     for K in range(K0, min(K1, K0 + sectors)):
-        at = rings * (K + sectors if K < 0 else (K - sectors if K >= sectors else K))
+        at = rings * (K + sectors if K < 0 else (K - sectors if sectors <= K else K))
         for J in range(J0, min(J1, rings)):
             _put(depth, owner, at + J, z, who)
 
 
 @device
 def _see(view, j, k, hits, cover, depth, owner, cells, here):
-    """Mean radiance and harmonic mean distance of the parts of cell (j, k) into a row of `cells`; returns whether enough is
-    known."""
+    """Mean radiance and harmonic mean distance of the parts of cell (j, k) into the row `here` of `cells`; returns
+    whether enough is known."""
     high = view.rings * view.parts
     first = _i8(j) * view.parts + high * (_i8(k) * view.parts)
     covered = 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import moderngl
 import numpy as np
 from imgui_bundle import imgui
@@ -69,9 +71,9 @@ def described(of: Fisheye) -> str:
         return text + "."
     ours = float(luminance(of.irradiance(of.reprojected)))
     return (
-        f"{text}; reprojected {si(ours, 'W/m²')}. {1 - of.shot.mean():.0%} of the directions are what full gathers near "
-        "it know, the others are gathered here in both. Difference: orange where reprojection is brighter, blue where "
-        "it is darker."
+        f"{text}; reprojected {si(ours, 'W/m²')}. {1 - of.shot.mean():.0%} of the directions are what full gathers "
+        "near it know, the others are gathered here in both. Difference: orange where reprojection is brighter, blue "
+        "where it is darker."
     )
 
 
@@ -99,7 +101,7 @@ class FisheyeDiscs:
             if number % a_row:
                 imgui.same_line()
             texture = self._textures.setdefault(name, HeldTexture(moderngl.get_context()))
-            texture.take((Same(of), Same(theme.look)), lambda name=name: picture(name))
+            texture.take((Same(of), Same(theme.look)), partial(picture, name))
             imgui.begin_group()
             assert texture.texture is not None
             imgui.image(imgui.ImTextureRef(texture.texture.glo), (side, side))
