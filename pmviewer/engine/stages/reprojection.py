@@ -45,8 +45,9 @@ def no_hits() -> Hits:
 
 
 class KnownHits:
-    """What the gathers of a pass have found, and which gathered how: `how` uint8 (h, w) of NOT_GATHERED, PARTIAL, FULL;
-    `begin` int64 and `count` int32 (pixels,) of their rows in `hits`, float32 (m, HIT)."""
+    """What the full gathers of a pass have found, and which pixel gathered how: `how` uint8 (h, w) of NOT_GATHERED,
+    PARTIAL, FULL; `begin` int64 and `count` int32 (pixels,) of their rows in `hits`, float32 (m, HIT); `shot`: rays of
+    all gathers."""
 
     def __init__(self, given: PassData, samples: NDArray[np.float32], gather: Gather, spacing: int, shrink: float):
         eye, record = given.eye[0], given.cache[0]
@@ -58,6 +59,7 @@ class KnownHits:
         self.begin = np.zeros(self.height * self.width, np.int64)
         self.count = np.zeros(self.height * self.width, np.int32)
         self.hits = np.zeros((0, HIT), np.float32)
+        self.shot = 0
         chance = np.random.default_rng([int(eye["seed"]), int(eye["index"]), 2])
         self.anew = chance.random(self.height * self.width) >= shrink
         """Pixels that gather in full whatever is known."""
@@ -67,7 +69,7 @@ class KnownHits:
         """Gathers in full (`full`) and those that reprojected directions (`partial`), and how many directions both
         have shot (`shot`)."""
         full, some = int((self.how == FULL).sum()), int((self.how == PARTIAL).sum())
-        return {"full": full, "partial": some, "shot": len(self.hits)}
+        return {"full": full, "partial": some, "shot": self.shot}
 
     def gather(
         self,
@@ -122,6 +124,7 @@ class KnownHits:
     ) -> NDArray[np.int64]:
         batch = max(1, BATCH_HITS // self.cells)
         known = self.begin, self.count, self.hits
+        full = (sources < 0).all(axis=1)
 
         def task(first: int) -> Any:
             def run() -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32]]:
@@ -131,7 +134,8 @@ class KnownHits:
                 gather_reprojected(
                     given, pixels, sources, self.samples, known, self.rule, estimates, told, found, made, counts, span
                 )
-                return counts, made, found[: made.sum()].copy()
+                kept = np.repeat(full[slice(*span)], made)  # no one asks for the others' hits
+                return counts, made, found[: made.sum()][kept]
 
             return run
 
@@ -139,11 +143,12 @@ class KnownHits:
         if not parts:
             return np.zeros(N_COUNTS, np.int64)
         counts, made, found = zip(*parts, strict=True)
-        self.count[pixels] = np.concatenate(made)
+        shot = np.concatenate(made)
+        self.shot += int(shot.sum())
+        self.count[pixels] = np.where(full, shot, 0)
         self.begin[pixels] = len(self.hits) + np.cumsum(self.count[pixels]) - self.count[pixels]
         self.hits = np.concatenate([self.hits, *found])
         good = estimates[pixels, 3] > 0
-        full = (sources < 0).all(axis=1)
         how = self.how.reshape(-1)
         how[pixels[good & full]], how[pixels[good & ~full]] = FULL, PARTIAL
         return np.asarray(sum(counts))
