@@ -17,12 +17,14 @@ from pmviewer.viewer.gl.textures import HeldTexture, Same
 from pmviewer.viewer.overlays.legend import wrapped
 from pmviewer.viewer.panels.inspector.plots import on_hemisphere
 
-SIDE = 160
+SIDE = 320
 """Pixels of a disc across."""
 BRIGHTEST = 98.0
 """Percentile of the luminance that is shown white, and of the difference that has its full colour."""
 LESS, MORE = (0.30, 0.55, 1.0), (1.0, 0.55, 0.15)
 """Colours of what reprojection sees darker and brighter."""
+LARGE = 20.0
+"""Side of a disc under the mouse, in font sizes."""
 
 
 def disc(cells: NDArray[np.floating], of: Fisheye, ground: tuple[float, float, float]) -> NDArray[np.float32]:
@@ -96,6 +98,7 @@ class FisheyeDiscs:
         names = ("gathered",) if of.reprojected is None else ("gathered", "reprojected", "difference")
         room, gap = imgui.get_content_region_avail().x, imgui.get_style().item_spacing.x
         side = min(max((room - 2 * gap) / 3, 5.5 * imgui.get_font_size()), 12 * imgui.get_font_size(), room)
+        large = LARGE * imgui.get_font_size()
         a_row = max(1, int((room + gap) / (side + gap)))
         for number, name in enumerate(names):
             if number % a_row:
@@ -105,6 +108,9 @@ class FisheyeDiscs:
             imgui.begin_group()
             assert texture.texture is not None
             imgui.image(imgui.ImTextureRef(texture.texture.glo), (side, side))
+            if imgui.begin_item_tooltip():
+                imgui.image(imgui.ImTextureRef(texture.texture.glo), (large, large))
+                imgui.end_tooltip()
             imgui.text_colored(imgui.ImVec4(*theme.DIM), name)
             imgui.end_group()
         wrapped(described(of))
