@@ -44,7 +44,7 @@ BENCHES: dict[str, tuple[str, str]] = {
     "corners": ("Secondary gathering: error at edges and elsewhere (R5)", "pmviewer.bench.measures.corners:run"),
     "cache": ("Irradiance cache against the plain final gather (R6)", "pmviewer.bench.measures.irradiance_cache:run"),
     "estimation": (
-        "Estimated gathers against the plain one and the cache (R7)",
+        "Estimated and reprojected gathers against the plain one and the cache (R7, R8)",
         "pmviewer.bench.measures.estimation:run",
     ),
     "gather": ("Radiance photons against the plain final gather (R3)", "pmviewer.bench.measures.gather:run"),

@@ -52,9 +52,13 @@ def _estimation(s: Statistics) -> str:
     """What became of the pixels with estimated gathers."""
     pixels, safe = sum(s.estimates[name] for name in ("safe", "critical", "other")), max(s.estimates["safe"], 1)
     gathered, interpolated, left = (s.estimates[name] / safe for name in ("gathered", "interpolated", "left"))
+    partly = ""
+    if "partial" in s.estimates:
+        gathered, shot = s.estimates["full"] / safe, s.estimates["shot"] / safe
+        partly = f"{s.estimates['partial'] / safe:.2%} partly reprojected ({shot:.2g} rays a safe pixel for both), "
     return (
         f"gather estimation: {s.estimates['safe'] / max(pixels, 1):.1%} of the pixels safe; of these {gathered:.2%} "
-        f"fully gathered, {interpolated:.1%} interpolated, {left:.1%} gathered as usual, mean of all passes"
+        f"fully gathered, {partly}{interpolated:.1%} interpolated, {left:.1%} gathered as usual, mean of all passes"
     )
 
 

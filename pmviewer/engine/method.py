@@ -34,21 +34,21 @@ class Plan:
     light, `direct_mask` as direct light and `global_caustics` as caustics of the global map are shown directly;
     `caustic_classes` and `global_classes` are what the maps have to hold, 0 means that the map is not built. `direct`
     is whether direct light is sampled at lobes that photons are stored for, `followed_direct` whether at those that are
-    followed; `unfound` whether these look up what no path finds (`pmviewer.render.reflect`). `choice` is how
-    direct light chooses lights, `radiance` whether gather rays use radiance photons, `directions` how they look about:
-    photons of the classes `guide_mask` guide `guided_rays` of them; `corners` is whether short ones gather again,
-    `cache` whether diffuse surfaces gather through an irradiance cache, `estimation` whether pixels that show them are
-    interpolated between sparse gathers, `shadows` whether shadow photons save shadow
-    rays, `importance` whether there are importance maps, `deposition` which photons maps store, `emission` how
-    importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0 without; `virtual`
-    is whether virtual lights bring the indirect light; `media` whether the scene has participating media, and `volume`
-    whether photons are stored in them and light that they scatter is looked up, `phase_rays` whether rays by phase
-    functions can meet a light; `dispersion` whether glass splits light into colours; `lens` whether the render camera
-    has one, `filtered` whether the film has another reconstruction filter than the plain box, `moments` whether the
-    film keeps what passes tell of its noise, `split` whether camera paths go both ways at glass; `thin_glass` are the
-    rules by which light passes panes of glass, () where all of it is exact; `maps` are the parts of the light pass that
-    have photon maps of their own; `warnings` are sentences for the log about
-    what was asked for and can't be."""
+    followed; `unfound` whether these look up what no path finds (`pmviewer.render.reflect`). `choice` is how direct
+    light chooses lights, `radiance` whether gather rays use radiance photons, `directions` how they look about: photons
+    of the classes `guide_mask` guide `guided_rays` of them; `corners` is whether short ones gather again, `cache`
+    whether diffuse surfaces gather through an irradiance cache, `estimation` whether pixels that show them are
+    interpolated between sparse gathers, `reprojection` whether these take hit points of one another, `shadows` whether
+    shadow photons save shadow rays, `importance` whether there are importance maps, `deposition` which photons maps
+    store, `emission` how importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0
+    without; `virtual` is whether virtual lights bring the indirect light; `media` whether the scene has participating
+    media, and `volume` whether photons are stored in them and light that they scatter is looked up, `phase_rays`
+    whether rays by phase functions can meet a light; `dispersion` whether glass splits light into colours; `lens`
+    whether the render camera has one, `filtered` whether the film has another reconstruction filter than the plain box,
+    `moments` whether the film keeps what passes tell of its noise, `split` whether camera paths go both ways at glass;
+    `thin_glass` are the rules by which light passes panes of glass, () where all of it is exact; `maps` are the parts of
+    the light pass that have photon maps of their own; `warnings` are sentences for the log about what was asked for and
+    can't be."""
 
     path: bool = False
     direct: bool = False
@@ -62,6 +62,7 @@ class Plan:
     corners: bool = False
     cache: bool = False
     estimation: bool = False
+    reprojection: bool = False
     virtual: bool = False
     thin_glass: tuple[str, ...] = ()
     shadows: bool = False
@@ -130,6 +131,7 @@ class Plan:
             "final gather": self.gather,
             "irradiance cache": self.cache,
             "gather estimation": self.estimation,
+            "gather reprojection": self.reprojection,
             "importance": self.importance,
             "path tracer": self.path,
         }
@@ -336,6 +338,9 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
         estimation, why = _estimation(settings, traits)
         if not estimation:
             skipped.append(("gather estimation", why))
+        reprojection = estimation and settings.gather.reprojection == "on"
+        if estimation and not reprojection:
+            skipped.append(("gather reprojection", "off"))
         return replace(
             shown,
             gather=True,
@@ -346,6 +351,7 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
             corners=settings.gather.secondary > 0,
             cache=cache,
             estimation=estimation,
+            reprojection=reprojection,
             global_classes=ALL,
             skipped=tuple(skipped),
         )

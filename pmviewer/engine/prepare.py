@@ -24,6 +24,7 @@ from pmviewer.engine.stages.importance import prepare_importance
 from pmviewer.engine.stages.irradiance_cache import prepare_cache
 from pmviewer.engine.stages.pass_data import blank_eye, blank_pass
 from pmviewer.engine.stages.projection import projection_for
+from pmviewer.engine.stages.reprojection import prepare_reprojection
 from pmviewer.engine.stages.thin_glass import thin_record, with_thin_glass
 from pmviewer.engine.stages.virtual_lights import prepare_virtual
 from pmviewer.kernels.accel.raycast import cast_closest
@@ -162,5 +163,7 @@ def eye_steps(record: NDArray[np.void], traits: SceneTraits, settings: Settings,
         steps.append(Step("irradiance cache", prepare_cache, (given,)))
     if plan.estimation:
         steps.append(Step("gather estimation", prepare_estimation, (given,)))
+    if plan.reprojection:
+        steps.append(Step("gather reprojection", prepare_reprojection, (given,)))
     radii = first_radii(1, 0.0, 0.0) if radii_of_pixels(Facts(settings, plan, traits)) else None
     return [*steps, Step("camera pass", eye_pass, (given, outline, radii, film, counts, 0, 0))]

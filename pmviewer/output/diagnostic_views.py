@@ -188,6 +188,13 @@ DIAGNOSTICS: Mapping[str, DiagnosticView] = {
         "divisions",
         "gathered as usual",
     ),
+    "reprojected share": DiagnosticView(
+        "estimation",
+        "share of the directions of a gather that the latest pass took from others near it, interpolated in between",
+        "%",
+        "gathered as usual",
+        fixed=(0.0, 100.0),
+    ),
     "noise": DiagnosticView(
         "noise",
         "standard error of the pixel relative to the pixel, from how the passes differ",

@@ -32,6 +32,8 @@ def renderer(settings: Settings, threads: int) -> Renderer:
         {"photons.renew": "once"},
         {"render.method": "gather", "gather.directions": "photon cones", "direct.choice": "photons"},
         {"render.method": "gather", "gather.cache": "on"},
+        {"render.method": "gather", "gather.estimation": "on", "gather.reprojection": "on"},
+        {"estimate.lookup": "nearest", "photons.maps": 4},
     ],
     ids=[
         "as it comes",
@@ -42,6 +44,8 @@ def renderer(settings: Settings, threads: int) -> Renderer:
         "photons once",
         "radii of the first pass",
         "irradiance cache",
+        "gather reprojection",
+        "several maps",
     ],
 )
 def test_passes_from_elsewhere_make_the_same_film(values):

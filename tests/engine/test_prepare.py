@@ -36,6 +36,7 @@ VARIANTS: dict[str, dict[str, object]] = {
     "hemisphere grid": GATHER | {"gather.directions": "hemisphere grid"},
     "irradiance cache": GATHER | {"gather.cache": "on"},
     "gather estimation": GATHER | {"gather.estimation": "on"},
+    "gather reprojection": GATHER | {"gather.estimation": "on", "gather.reprojection": "on"},
     "virtual lights": VIRTUAL,
     "virtual lights, paths": VIRTUAL | {"virtual.estimator": "every vertex"},
     "shadow photons": {"direct.shadow_photons": True},

@@ -85,7 +85,7 @@ def test_views_are_made_on_demand_in_the_legends_colours(app, tmp_path):
         assert "stored" in app.state.refused_view("storing probability")
 
     drive(app, script)
-    estimation = ["estimation mask", "gathered points", "subdivision level"]
+    estimation = ["estimation mask", "gathered points", "subdivision level", "reprojected share"]
     assert refused == ["storing probability", "virtual light error", "sum of weights", "normalisation", *estimation]
     for frame, (view, pixels) in zip(frames[1:], seen.items(), strict=True):
         assert frame.planes is frames[0].planes

@@ -1,11 +1,16 @@
-"""Final gather estimation against the plain final gather and the irradiance cache (R7): full gathers, difference of
-pictures, and CPU time to a difference.
+"""Final gather estimation, alone (R7) and with reprojection (R8), against the plain final gather and the irradiance
+cache: full gathers, gather rays, difference of pictures, and CPU time to a difference.
 
 Shares are of the safe pixels, in the first pass at the source's resolution, with the default settings. The difference
 is in indirect light: the root mean square of the picture's difference from the plain gather's in the limit, over its
 mean, pixel by pixel and over blocks of 8 × 8 pixels, which keep what the eye sees as blotches. The limit is known by
 two independent long plain renderings a and b: the mean of (x − a)·(x − b) holds none of their noise. Look-up radii stay
 what they are in the first pass, so that all methods have the same limit.
+
+The source's gathers at 65 × 65 are adaptive and cast some thousand rays each. Rays per safe pixel are told for gathers
+of as many rays, and of as many as a hemisphere of 65 × 65 has cells (the most that the setting allows); with them the
+difference that reprojection makes: of irradiance at points that take known hits, from that of full gathers of as many
+rays there, both against two independent sets of full gathers.
 
 A method that does not reach the difference within the time is carried on from its last point by 1/√time, which is the
 law of noise: that is too good for what has a bias left, and is said.
@@ -16,6 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -28,6 +34,9 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
+from pmviewer.render.gather.estimation import ESTIMATE, TOLD, gather_samples
+from pmviewer.render.gather.reprojection import PARTIAL
+from pmviewer.render.record import N_COUNTS
 from pmviewer.settings.access import Settings, with_values
 
 SCENES: Mapping[str, dict[str, Any]] = {
@@ -48,9 +57,19 @@ METHODS: Mapping[str, dict[str, Any]] = {
     "plain gather": {},
     "irradiance cache": {"gather.cache": "on"},
     "gather estimation": {"gather.estimation": "on"},
+    "gather reprojection": {"gather.estimation": "on", "gather.reprojection": "on"},
 }
+COMPARED = (
+    ("R7", "gather estimation", ("plain gather", "irradiance cache")),
+    ("R8", "gather reprojection", ("plain gather", "irradiance cache", "gather estimation")),
+)
+"""Whose CPU time is compared with whose."""
 FULL, DIFFERENCE = 4.0, 2.0
 """Per cent of the safe pixels that gather in full, and of the difference."""
+FULL_REPROJECTED, RAYS_A_PIXEL = 2.0, 19.0
+"""Per cent of the safe pixels that gather in full with reprojection, and gather rays per safe pixel."""
+ADAPTIVE, WHOLE = 1024, 4096
+"""Rays of the source's full gathers, and about as many as 65 × 65 cells."""
 BLOCK = 8
 F8 = NDArray[np.float64]
 
@@ -143,16 +162,70 @@ def shares(name: str, size: tuple[int, int], pool: WorkPool) -> tuple[list[float
     return told, Target("R7", of_safe[1], FULL, "%", False, note)
 
 
+def reprojected(name: str, size: tuple[int, int], samples: int, pool: WorkPool) -> tuple[str, list[Target]]:
+    """A pass with reprojected gathers of so many rays in words, and the targets of its shares."""
+    values = {"gather.estimation_samples": samples, "gather.rays": 1}
+    renderer = Lab(name, *size, pool).renderer({**METHODS["gather reprojection"], **values})
+    renderer.step()
+    counts = renderer.tally.estimates
+    full, some, rays = (counts[key] / counts["safe"] for key in ("full", "partial", "shot"))
+    after, expected = errors(renderer, samples, pool)
+    spent = renderer.tally.stage_seconds["gather estimation"]
+    note = (
+        f"{name}, {size[0]} × {size[1]}, reprojected gathers of {samples} rays: {full:.2%} of the safe pixels in full, "
+        f"{some:.2%} in part, {rays:.1f} rays per safe pixel, {spent:.1f} CPU s; irradiance of those in part off by "
+        f"{after:.1%} (rms of its mean), of full gathers there by {expected:.1%}"
+    )
+    setting = f"gather.reprojection, gather.estimation_samples={samples}"
+    return note, [
+        Target("R8", 100 * full, FULL_REPROJECTED, "%", False, f"{name}: safe pixels that gather in full; {setting}"),
+        Target("R8", rays, RAYS_A_PIXEL, "rays", False, f"{name}: gather rays per safe pixel; {setting}"),
+    ]
+
+
+def errors(renderer: Renderer, samples: int, pool: WorkPool, points: int = 256) -> tuple[float, float]:
+    """Root mean squares of the errors of irradiance, over its mean, at points that have reprojected directions: of the
+    pass's estimates, and of full gathers there. The truth is known by two independent sets of full gathers, whose noise
+    is in neither product."""
+    latest = renderer.latest
+    estimates = latest.estimates if latest is not None else None
+    assert latest is not None
+    assert estimates is not None
+    known = estimates.known
+    assert known is not None
+    there = np.flatnonzero(known.how.reshape(-1) == PARTIAL).astype(np.int32)
+    there = there[:: max(1, len(there) // points)]
+
+    def gathered(index: int) -> F8:
+        eye = latest.given.eye.copy()
+        eye["index"] += index
+        given = latest.given._replace(eye=eye)
+        plane, told = (np.zeros((len(known.count), columns), np.float32) for columns in (ESTIMATE, TOLD))
+        counts = np.zeros(N_COUNTS, np.int64)
+        pool.run(
+            [
+                partial(gather_samples, given, part, known.samples, plane, told, counts, 0, len(part))
+                for part in np.array_split(there, 8 * pool.threads)
+            ]
+        )
+        return plane[there, :3].astype(np.float64)
+
+    first, second, full = gathered(1), gathered(2), gathered(3)
+    ours = estimates.plane[there, :3].astype(np.float64)
+    return difference(ours, first, second) / 100, difference(full, first, second) / 100
+
+
 def times(name: str, curves: Mapping[str, list[Point]]) -> list[Target]:
-    """CPU time of the estimation to the difference against each of the others."""
+    """CPU time of the estimation to the difference against each of the others, and of reprojection against that."""
     targets = []
     for by_blocks, what in ((False, "pixels"), (True, "blocks")):
-        ours, measured = time_to(curves["gather estimation"], DIFFERENCE, by_blocks)
-        for other in ("plain gather", "irradiance cache"):
-            theirs, known = time_to(curves[other], DIFFERENCE, by_blocks)
-            carried = "" if measured and known else ", carried on"
-            note = f"{name}: CPU time to {DIFFERENCE:g} % by {what}, of estimation over {other}{carried}"
-            targets.append(Target("R7", ours / theirs, 1.0, "×", False, note))
+        for feature, ours_name, others in COMPARED:
+            ours, measured = time_to(curves[ours_name], DIFFERENCE, by_blocks)
+            for other in others:
+                theirs, known = time_to(curves[other], DIFFERENCE, by_blocks)
+                carried = "" if measured and known else ", carried on"
+                note = f"{name}: CPU time to {DIFFERENCE:g} % by {what}, of {ours_name} over {other}{carried}"
+                targets.append(Target(feature, ours / theirs, 1.0, "×", False, note))
     return targets
 
 
@@ -174,6 +247,10 @@ def run(quick: bool = False) -> BenchResult:
                 f"{told[1]:.2f} % sparse gathers, {told[2]:.2f} % full gathers in all, {told[3]:.1f} % interpolated, "
                 f"{told[4]:.1f} % left to the plain gather"
             )
+            for samples in (ADAPTIVE,) if quick else (ADAPTIVE, WHOLE):
+                note, shown = reprojected(name, size, samples, pool)
+                notes.append(note)
+                targets += [] if quick else shown
             lab = Lab(name, width, 3 * width // 4, pool)
             limits = lab.limit(1, rays, passes), lab.limit(2, rays, passes)
             curves = {method: lab.curve(values, limits, budget) for method, values in METHODS.items()}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.engine.inspector.fisheye import fisheye_of
 from pmviewer.engine.inspector.life import life_of
 from pmviewer.engine.inspector.look_ups import Replay, look_ups_of
 from pmviewer.engine.inspector.report import Float, LookUp, PhotonAt, PhotonLife, Pinned, PixelReport, Seen
@@ -63,6 +64,7 @@ def pixel_report(looked: Looked, pinned: Pinned, measures: Measures, pool: WorkP
         samples=samples,
         life=_life(looked, pinned.photon),
         notes=_notes(plan, look_ups),
+        fisheye=fisheye_of(rendered, number, way[0], looked.settings.gather, pool) if plan.estimation else None,
     )
 
 

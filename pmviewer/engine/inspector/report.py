@@ -130,6 +130,26 @@ class PhotonLife:
     """In nm, of the photon on its way to each vertex, NaN as long as no glass has split it; () in scenes without."""
 
 
+@dataclass(frozen=True, eq=False)
+class Fisheye:
+    """What a gather at the pixel's first surface sees: radiance `gathered` (rings, sectors, 3) by a ray in each cell of
+    the hemisphere (`pmviewer.maps.hemisphere`), around the unit normal n with the tangents s and t, all of them and wo,
+    the way to the viewer, (3,). `reprojected` (rings, sectors, 3) is what other gathers of the pass tell instead, and
+    `shot` (rings, sectors) where they tell too little; None without reprojection."""
+
+    gathered: Float
+    n: Float
+    s: Float
+    t: Float
+    wo: Float
+    reprojected: Float | None = None
+    shot: NDArray[np.bool_] | None = None
+
+    def irradiance(self, radiance: Float) -> Float:
+        """(3,) W/m² of one of both: cells have equal projected solid angles."""
+        return np.asarray(np.pi * radiance.mean(axis=(0, 1)))
+
+
 @dataclass(frozen=True)
 class Seen:
     """What the eye path met: names of shape and material, and the shape's `area` in square scene units; 0 of an
@@ -166,6 +186,8 @@ class PixelReport:
     samples: NDArray[np.float32] | None
     life: PhotonLife | None = None
     notes: tuple[str, ...] = ()
+    fisheye: Fisheye | None = None
+    """With estimated gathers, where the first surface is a diffuse one."""
 
 
 def luminance(colour: Any) -> Any:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.stages.reprojection import KnownHits
 from pmviewer.maps.hemisphere import strata
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.gather.estimation import ESTIMATE, ESTIMATES, SAMPLE, TOLD, gather_samples, trace_samples
@@ -54,7 +55,9 @@ TILE = 4096
 class Estimates:
     """Of one pass. `record`: ESTIMATES (1,), valid while this object lives; `plane`: float32 (pixels, ESTIMATE); `mask`
     and `how`: uint8 (h, w), see `pmviewer.render.gather.tiles`; `level`: uint8 (h, w), how often the tile was divided
-    in which a pixel was interpolated or for which it gathered; `sparse`: full gathers of the undivided grid."""
+    in which a pixel was interpolated or for which it gathered; `sparse`: full gathers of the undivided grid; `told`:
+    float32 (pixels, TOLD), the share of reprojected directions of what was interpolated, too; `known`: what gathers
+    have found, where they are reprojected."""
 
     record: NDArray[np.void]
     plane: NDArray[np.float32]
@@ -62,12 +65,15 @@ class Estimates:
     how: NDArray[np.uint8]
     level: NDArray[np.uint8]
     sparse: int
+    told: NDArray[np.float32]
+    known: KnownHits | None = None
 
     @property
     def counts(self) -> dict[str, int]:
         """Pixels by what they are (`safe`, `critical`, `other`) and by how safe ones get their light (`gathered`,
-        `interpolated`, `left` to the eye pass)."""
+        `interpolated`, `left` to the eye pass); with reprojection, what `KnownHits.counts` tells."""
         safe = self.mask == SAFE
+        reprojected = {} if self.known is None else self.known.counts
         return {
             "safe": int(safe.sum()),
             "critical": int((self.mask == CRITICAL).sum()),
@@ -76,6 +82,7 @@ class Estimates:
             "gathered": int((self.how == GATHERED).sum()),
             "interpolated": int((self.how == INTERPOLATED).sum()),
             "left": int((safe & (self.how == LEFT)).sum()),
+            **reprojected,
         }
 
     def views(self) -> dict[str, NDArray[np.float32]]:
@@ -85,6 +92,9 @@ class Estimates:
         points = np.where(nothing, -1.0, self.how)
         level = np.where(self.how == LEFT, -1.0, self.level)
         planes = {"estimation mask": mask, "gathered points": points, "subdivision level": level}
+        if self.known is not None:
+            share = 100 * self.told[:, 2].reshape(self.how.shape)
+            planes["reprojected share"] = np.where(self.how == LEFT, -1.0, share)
         return {name: np.ascontiguousarray(plane[..., None], np.float32) for name, plane in planes.items()}
 
 
@@ -141,12 +151,16 @@ def estimate_gathers(
     rule = _rule(gather, shrink, seed, index)
     batch = max(1, BATCH_RAYS // int(record["rings"][0] * record["sectors"][0]))
     depth = sparse = 0
+    known = KnownHits(given, samples, gather, spacing, shrink) if gather.reprojection == "on" else None
     while len(tiles):
         wanted = np.zeros((height, width), np.uint8)
         pool.run([partial(ask_corners, tiles, unsafe, how, wanted)])
         corners = np.flatnonzero(wanted).astype(np.int32)
-        gathered = partial(gather_samples, given, corners, samples, plane, told)
-        counts += _parallel(pool, len(corners), batch, gathered)
+        if known is not None:
+            counts += known.gather(given, corners, plane, told, pool)
+        else:
+            gathered = partial(gather_samples, given, corners, samples, plane, told)
+            counts += _parallel(pool, len(corners), batch, gathered)
         good = corners[plane[corners, 3] > 0]
         how.reshape(-1)[good], level.reshape(-1)[good] = GATHERED, depth
         sparse += len(good) if depth == 0 else 0
@@ -154,7 +168,7 @@ def estimate_gathers(
         divided = partial(divide_tiles, tiles, unsafe, samples, plane, told, how, level, depth, rule, parts)
         tiles = parts[: pool.run([divided])[0]]
         depth += 1
-    return Estimates(record, plane, mask, how, level, sparse), counts
+    return Estimates(record, plane, mask, how, level, sparse, told, known), counts
 
 
 def _rule(gather: Gather, shrink: float, seed: int, index: int) -> tuple[float, float, int, float, int]:

@@ -79,6 +79,19 @@ def uncovered_hit(given, pixel, counts):
 
 
 @device
+def gather_cell(given, p, ng, gap, wi, seed, here, counts):
+    """What the gather ray of cell `here` brings back from direction wi: the Hit, how far it is (inf: none), the tint of
+    its way and the radiance before it."""
+    counts[C_RAYS] += 1
+    wave = new_wave(given.scene, given.eye.sequence, seed, _u4(here), GATHER_WAVE)
+    ray = ray_from(p, ng, gap, wi, None, wave)  # never in scenes with media
+    hit, tint = cast_on(given.scene, ray, True)
+    if hit.prim < 0:
+        return hit, _INF, tint, BLACK
+    return hit, way(given.scene, ray.o, wi, hit), tint, gather_light(given, hit, wi, seed, _u4(here), counts)
+
+
+@device
 def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
     """Fill `cells` (see `irradiance_and_gradients`) with what gather rays from p bring back."""
     eye, cache = given.eye, given.cache
@@ -90,16 +103,9 @@ def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
             cos = dot(wi, n)
             cells[here, 0] = cells[here, 1] = cells[here, 2] = _f4(0.0)
             cells[here, 3], cells[here, 4] = _INF, _f4(1.0) - cos * cos
-            if dot(wi, ng) <= _f4(0.0):
-                continue
-            counts[C_RAYS] += 1
-            wave = new_wave(given.scene, eye.sequence, seed, _u4(here), GATHER_WAVE)
-            ray = ray_from(p, ng, gap, wi, None, wave)  # never in scenes with media
-            hit, tint = cast_on(given.scene, ray, True)
-            if hit.prim >= 0:
-                cells[here, 3] = way(given.scene, ray.o, wi, hit)
-                L = mul(tint, gather_light(given, hit, wi, seed, _u4(here), counts))
-                cells[here, 0], cells[here, 1], cells[here, 2] = L
+            if dot(wi, ng) > _f4(0.0):
+                _, cells[here, 3], tint, L = gather_cell(given, p, ng, gap, wi, seed, here, counts)
+                cells[here, 0], cells[here, 1], cells[here, 2] = mul(tint, L)
 
 
 @kernel

@@ -41,9 +41,10 @@ OTHER, DIFFUSE = 0.0, 1.0
 """Whether the first surface of the sample has Lambertian stored lobes."""
 ESTIMATE = 4
 """Floats of a pixel's estimate: irradiance (red, green, blue), and 1 where there is one."""
-TOLD = 2
-"""Floats of what a full gather tells besides: the harmonic mean of the distances that its rays went, and the standard
-error of its irradiance's luminance, taken as if its directions were independent."""
+TOLD = 3
+"""Floats of what a gather tells besides: the harmonic mean of the distances that its rays went, the standard error of
+its irradiance's luminance, taken as if its directions were independent, and the share of its directions that was
+reprojected (`pmviewer.render.gather.reprojection`)."""
 
 ESTIMATES = np.dtype(
     [
@@ -85,7 +86,7 @@ def trace_samples(given, samples, counts, first, last):
 
 
 @device
-def _standard_error(cells):
+def standard_error(cells):
     """Of the irradiance's luminance, from `cells` (n, ≥ 3) of radiance."""
     n = len(cells)
     total, squares = _f8(0.0), _f8(0.0)
@@ -123,7 +124,7 @@ def gather_samples(given, pixels, samples, estimates, told, counts, first, last)
         if not E[0] + E[1] + E[2] < _f8(np.inf):
             counts[C_DROPPED] += 1
             continue
-        told[pixel, 0], told[pixel, 1] = mean, _standard_error(cells)
+        told[pixel, 0], told[pixel, 1], told[pixel, 2] = mean, standard_error(cells), _f4(0.0)
         estimates[pixel, 0], estimates[pixel, 1], estimates[pixel, 2] = E[0], E[1], E[2]
         estimates[pixel, 3] = _f4(1.0)
 

@@ -131,8 +131,8 @@ def _may_interpolate(tile, samples, estimates, told, how, limits):
 
 
 @device
-def _interpolate(tile, estimates, how, level, depth):
-    """Bilinear irradiance for the pixels of a tile that have none yet."""
+def _interpolate(tile, estimates, told, how, level, depth):
+    """Bilinear irradiance for the pixels of a tile that have none yet, and share of reprojected directions."""
     x0, y0, x1, y1 = tile
     width = how.shape[1]
     for y in range(y0, y1 + 1):
@@ -147,6 +147,9 @@ def _interpolate(tile, estimates, how, level, depth):
                 lower = (_f4(1.0) - u) * estimates[y1 * width + x0, k] + u * estimates[y1 * width + x1, k]
                 out[k] = max((_f4(1.0) - v) * upper + v * lower, _f4(0.0))  # v may round to above 1
             out[3] = _f4(1.0)
+            upper = (_f4(1.0) - u) * told[y0 * width + x0, 2] + u * told[y0 * width + x1, 2]
+            lower = (_f4(1.0) - u) * told[y1 * width + x0, 2] + u * told[y1 * width + x1, 2]
+            told[y * width + x, 2] = (_f4(1.0) - v) * upper + v * lower
             how[y, x], level[y, x] = INTERPOLATED, depth
 
 
@@ -169,7 +172,7 @@ def divide_tiles(tiles, unsafe, samples, estimates, told, how, level, depth, rul
                 u = _f8(hash3(_u4(key), _u4(x0), _u4(y0))) * _f8(2.0**-32)
                 enough = u < share
             if enough:
-                _interpolate((x0, y0, x1, y1), estimates, how, level, depth)
+                _interpolate((x0, y0, x1, y1), estimates, told, how, level, depth)
                 continue
         if ends:
             continue

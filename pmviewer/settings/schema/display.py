@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pmviewer.settings.needs import BOTH_MAPS, IMPORTANCE, MEDIA, SHADOW_PHOTONS, Need, Needs
 from pmviewer.settings.schema.base import Auto, Group, setting
-from pmviewer.settings.schema.gather import ESTIMATION
+from pmviewer.settings.schema.gather import ESTIMATION, REPROJECTION
 from pmviewer.settings.schema.virtual import VIRTUAL_LIGHTS, WEIGHTED
 
 LOOKED_UP = Need(
@@ -53,6 +53,7 @@ VIEW_NEEDS: dict[str, Needs] = {
     "estimation mask": (ESTIMATION,),
     "gathered points": (ESTIMATION,),
     "subdivision level": (ESTIMATION,),
+    "reprojected share": (ESTIMATION, REPROJECTION),
     "noise": (MOMENTS,),
 }
 """Of the views that a frame holds only while they are shown."""
@@ -148,6 +149,7 @@ class Display(Group):
         "estimation mask",
         "gathered points",
         "subdivision level",
+        "reprojected share",
         "noise",
     ] = setting(
         "beauty",

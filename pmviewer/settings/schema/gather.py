@@ -23,6 +23,7 @@ DIFFUSE = Need(
     lambda f: f.traits.has_diffuse, "No diffuse surface in this scene: glossy and smooth ones gather as usual."
 )
 ESTIMATION = Need(lambda f: f.plan.estimation, "Only with estimated gathers (gather.estimation).")
+REPROJECTION = Need(lambda f: f.plan.reprojection, "Only with reprojected gathers (gather.reprojection).")
 
 
 class Gather(Group):
@@ -264,4 +265,35 @@ class Gather(Group):
         ge=0.01,
         le=100.0,
         needs=(ESTIMATION,),
+    )
+    reprojection: Literal["off", "on"] = setting(
+        "off",
+        "Final gather reprojection: gathers of divided tiles take the hit points of full gathers around them as they "
+        "are seen from there, and cast rays only where these tell too little (course guide §6.3.3). Pays with many "
+        "estimation samples.",
+        section="Final gather reprojection",
+        stage="image",
+        scale="choice",
+        needs=(ESTIMATION,),
+    )
+    reprojection_cover: float = setting(
+        0.5,
+        "Share of a direction's cell that known hit points must cover in the first pass, else a ray is cast there. In "
+        "later passes it grows towards all of it.",
+        stage="image",
+        scale="linear",
+        title="reprojection cover",
+        ge=0.0,
+        le=1.0,
+        needs=(REPROJECTION,),
+    )
+    reprojection_parts: int = setting(
+        4,
+        "Into how many parts along each side the z-buffer divides the cells of a gather's hemisphere.",
+        stage="image",
+        scale="integer",
+        title="z-buffer parts",
+        ge=1,
+        le=8,
+        needs=(REPROJECTION,),
     )

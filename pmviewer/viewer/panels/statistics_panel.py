@@ -75,7 +75,8 @@ def time_rows(s: Statistics) -> Rows:
         safe, pixels = max(s.estimates["safe"], 1), sum(s.estimates[name] for name in ("safe", "critical", "other"))
         rows += [
             ("Safe pixels", f"{safe / max(pixels, 1):.1%}"),
-            ("of them fully gathered", f"{s.estimates['gathered'] / safe:.1%}"),
+            ("of them fully gathered", f"{s.estimates.get('full', s.estimates['gathered']) / safe:.1%}"),
+            *([("partly reprojected", f"{s.estimates['partial'] / safe:.1%}")] if "partial" in s.estimates else []),
             ("interpolated", f"{s.estimates['interpolated'] / safe:.1%}"),
             ("gathered as usual", f"{s.estimates['left'] / safe:.1%}"),
         ]

@@ -12,6 +12,7 @@ from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import grouped, si
 from pmviewer.viewer.overlays.legend import wrapped
+from pmviewer.viewer.panels.inspector.fisheye import FisheyeDiscs
 from pmviewer.viewer.panels.inspector.light import draw_history, draw_terms
 from pmviewer.viewer.panels.inspector.photons import NARROW, PhotonTable, draw_life
 from pmviewer.viewer.panels.inspector.plots import draw_curves, draw_directions
@@ -49,6 +50,7 @@ class InspectorPanel:
     def __init__(self, state: ViewerState) -> None:
         self._state = state
         self._photons = PhotonTable()
+        self._fisheye = FisheyeDiscs()
 
     def gui(self) -> None:
         """Draw the tab."""
@@ -64,6 +66,9 @@ class InspectorPanel:
         for note in report.notes:
             _note(note)
         self._section("Light", lambda: draw_terms(report))
+        if report.fisheye is not None:
+            seen = report.fisheye
+            self._section("Hemisphere of a gather", lambda: self._fisheye.draw(seen))
         if report.look_ups:
             self._look_ups(report)
         elif report.way.size:
