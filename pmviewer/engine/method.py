@@ -46,9 +46,9 @@ class Plan:
     whether rays by phase functions can meet a light; `dispersion` whether glass splits light into colours; `lens`
     whether the render camera has one, `filtered` whether the film has another reconstruction filter than the plain box,
     `moments` whether the film keeps what passes tell of its noise, `split` whether camera paths go both ways at glass;
-    `thin_glass` are the rules by which light passes panes of glass, () where all of it is exact; `maps` are the parts of
-    the light pass that have photon maps of their own; `warnings` are sentences for the log about what was asked for and
-    can't be."""
+    `thin_glass` are the rules by which light passes panes of glass, () where all of it is exact; `maps` is how many
+    parts of the light pass have photon maps of their own; `warnings` are sentences for the log about what was asked for
+    and can't be."""
 
     path: bool = False
     direct: bool = False
