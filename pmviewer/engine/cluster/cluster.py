@@ -91,9 +91,7 @@ class Cluster:
         if self.lost:
             raise ClusterError(self.lost)
         if self.members.refused:
-            raise ClusterError(
-                self.members.messages[-1] if self.members.messages else "No worker of this cluster fits."
-            )
+            raise ClusterError(self.members.take_refusal())
 
     def take_messages(self) -> list[str]:
         """Sentences for the user since the last call."""

@@ -49,6 +49,7 @@ class Members:
         self.here: dict[str, Member] = {}
         self.messages: list[str] = []
         self._said: set[str] = set()
+        self._refusal = ""
 
     def update(self, workers: Mapping[str, Mapping[str, Any]]) -> list[Member]:
         """Take over what the scheduler says of its workers; returns those that are new."""
@@ -85,6 +86,7 @@ class Members:
                 )
             return
         member.standing = "refused"
+        self._refusal = said
         self.say(said)
 
     def say(self, sentence: str) -> None:
@@ -96,6 +98,11 @@ class Members:
         if sentence not in self._said:
             self._said.add(sentence)
             self.say(sentence)
+
+    def take_refusal(self) -> str:
+        """The sentence about the worker that was refused last, which need not be said again."""
+        self.messages = [said for said in self.messages if said != self._refusal]
+        return self._refusal
 
     @property
     def ready(self) -> list[Member]:

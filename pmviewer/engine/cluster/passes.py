@@ -29,7 +29,7 @@ from pmviewer.engine.apart import check_apart
 from pmviewer.engine.cluster.cluster import Cluster
 from pmviewer.engine.cluster.members import Member
 from pmviewer.engine.cluster.packed import unpack
-from pmviewer.engine.cluster.worker import Asked, Failed, Rendered, hold_scene, render_pass, stop
+from pmviewer.engine.cluster.worker import Asked, Failed, Rendered, hold_scene, packed_settings, render_pass, stop
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.stages.virtual_lights import film_of
 from pmviewer.errors import ClusterError
@@ -74,7 +74,7 @@ class Elsewhere:
         self.cluster, self.renderer = cluster, renderer
         self.run = uuid.uuid4().hex
         self._blank = film_of(renderer.settings, renderer.plan, 1, 1).sums[0].copy()
-        self._scene = cluster.packed(renderer.scene)
+        self._scene, self._settings = cluster.packed(renderer.scene), packed_settings(renderer.settings)
         self._sums = np.empty_like(renderer.film.sums)
         self._orders: dict[str, Order] = {}
         self._brought: dict[str, Order] = {}
@@ -178,7 +178,7 @@ class Elsewhere:
         return None
 
     def _order(self, index: int, member: Member) -> None:
-        asked = Asked(self.run, self._scene.digest, self.renderer.settings, index, member.threads)
+        asked = Asked(self.run, self._scene.digest, self._settings, index, member.threads)
         key = f"pmviewer-pass-{self.run}-{index}-{next(self._numbers)}"
         self._submit(self._orders, Order(index, member), key, render_pass, asked)
 

@@ -39,11 +39,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Asked:
-    """Pass `index` of the scene with that digest and these settings, in the course of `run`."""
+    """Pass `index` of the scene with that digest and these settings (`packed_settings`), in the course of `run`. Small:
+    Dask's scheduler remembers the last thousands of what it was asked."""
 
     run: str
     scene: str
-    settings: Settings
+    settings: bytes
     index: int
     threads: int
 
@@ -75,7 +76,7 @@ class _Bench:
     def __init__(self) -> None:
         self.turn, self.lock = threading.Lock(), threading.Lock()
         self.scenes: OrderedDict[str, tuple[OpenScene, str]] = OrderedDict()
-        self.renderers: OrderedDict[tuple[str, str], Renderer] = OrderedDict()
+        self.renderers: OrderedDict[tuple[str, bytes], Renderer] = OrderedDict()
         self.stopped: OrderedDict[str, None] = OrderedDict()
         self.running = ""
         self.pool: WorkPool | None = None
@@ -98,6 +99,21 @@ def packed_scene(opened: OpenScene) -> bytes:
     from lz4.frame import compress
 
     return bytes(compress(pickle.dumps((opened.scene, opened.source), pickle.HIGHEST_PROTOCOL)))
+
+
+def packed_settings(settings: Settings) -> bytes:
+    """What differs from the defaults, or all of them where that would not give the same again."""
+    changed = settings.model_dump(by_alias=True, exclude_defaults=True)
+    try:
+        same = Settings.model_validate(changed) == settings
+    except ValueError:
+        same = False
+    return pickle.dumps(changed if same else settings)
+
+
+def _settings(packed: bytes) -> Settings:
+    found = pickle.loads(packed)
+    return found if isinstance(found, Settings) else Settings.model_validate(found)
 
 
 def digest_of(flat: FlatScene) -> str:
@@ -164,11 +180,11 @@ def _rendered(asked: Asked, pool: WorkPool) -> Rendered:
     _bench.scenes.move_to_end(asked.scene)
 
     def make() -> Renderer:
-        made = Renderer(opened, asked.settings, pool, StageStore(KEPT_BYTES))
+        made = Renderer(opened, _settings(asked.settings), pool, StageStore(KEPT_BYTES))
         made.tally.in_parts = True
         return made
 
-    key = asked.scene, asked.settings.model_dump_json()
+    key = asked.scene, asked.settings
     renderer: Renderer = _kept(_bench.renderers, key, KEPT_RENDERERS, make)
     try:
         increment = renderer.increment(asked.index)

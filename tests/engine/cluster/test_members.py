@@ -84,3 +84,12 @@ def test_a_scheduler_file_that_is_missing_and_tls_without_certificates(tmp_path)
         check_address("tls://127.0.0.1:9")
     check_address("tcp://127.0.0.1:9")
     check_address("local:2")
+
+
+def test_why_rendering_ends_is_said_once():
+    members = Members(MINE)
+    for worker in members.update(told(a=1.0, b=1.0)):
+        members.judge(worker, f"nothing fits on {worker.address}")
+    assert "nothing fits on b" in members.take_refusal()
+    assert [said for said in members.messages if "on b" in said] == []
+    assert len(members.messages) == 1

@@ -13,6 +13,7 @@ from pmviewer.engine.cluster.worker import (
     digest_of,
     hold_scene,
     packed_scene,
+    packed_settings,
     render_pass,
     stop,
 )
@@ -32,7 +33,7 @@ def bench(monkeypatch):
 
 
 def asked(run="run", scene="scene", index=0, **values):
-    return Asked(run, scene, with_values(Settings(), {**SMALL, **values}), index, 1)
+    return Asked(run, scene, packed_settings(with_values(Settings(), {**SMALL, **values})), index, 1)
 
 
 def test_a_few_scenes_and_renderers_are_kept(bench):
@@ -60,6 +61,14 @@ def test_what_goes_wrong_is_told(monkeypatch):
     monkeypatch.undo()
     hold_scene(packed_scene(open_scene("cornell_diffuse")), "scene")
     assert isinstance(render_pass(asked()), Rendered), "and the worker goes on"
+
+
+@pytest.mark.parametrize("values", [{}, {"overlays.global.show": True, "edit.changes": {"light.1.power": 2.0}}])
+def test_settings_travel_as_what_was_changed(values):
+    settings = with_values(Settings(), {**SMALL, **values})
+    packed = packed_settings(settings)
+    assert len(packed) < 400
+    assert worker._settings(packed) == settings
 
 
 def test_passes_of_a_run_that_was_stopped_are_not_rendered():
