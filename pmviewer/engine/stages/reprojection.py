@@ -124,7 +124,7 @@ class KnownHits:
     ) -> NDArray[np.int64]:
         batch = max(1, BATCH_HITS // self.cells)
         known = self.begin, self.count, self.hits
-        full = (sources < 0).all(axis=1)
+        full: NDArray[np.bool_] = np.all(sources < 0, axis=1)
 
         def task(first: int) -> Any:
             def run() -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32]]:
