@@ -44,7 +44,7 @@ from pmviewer.engine.told import Told, told_of
 from pmviewer.engine.wanted import wanted_of
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.camera import CameraPose, resolve_camera
-from pmviewer.render.film import Film, Increment
+from pmviewer.render.film import Addable, Film, Increment
 from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.gather.gather_points import POINT_COLUMNS
 from pmviewer.render.given import PassData
@@ -111,6 +111,7 @@ class Renderer:
         self.shadows = ShadowStage(scene, settings, pool, store, self.tally)
         self.virtual = VirtualStage(scene, settings, pool, store, self.tally)
         self.latest: RenderedPass | None = None
+        self._apart: Film | None = None
         self._told: Told | None = None
         self._outline: NDArray[np.uint8] | None = None
         self._watched = Watched()
@@ -146,11 +147,14 @@ class Renderer:
         self.tally.seconds += time.perf_counter() - start
 
     def increment(self, index: int) -> Increment:
-        """What pass `index` adds to the film, which stays as it is: `add` takes it, here or elsewhere. Raises
-        SettingError where passes can't be rendered apart."""
+        """What pass `index` adds to the film, which stays as it is: `add` takes it, here or elsewhere. Its arrays hold
+        until the next one is asked for. Raises SettingError where passes can't be rendered apart."""
         check_apart(self.facts)
-        film = film_of(self.settings, self.plan, self.camera.width, self.camera.height)
-        film.region, film.passes = self.film.region, index
+        film = self._apart
+        if film is None or film.region is not None:  # pixels beyond a region would keep what they had
+            film = self._apart = film_of(self.settings, self.plan, self.camera.width, self.camera.height)
+            film.region, film.latest_alone = self.film.region, True
+        film.passes = index
         self._pass(film, self.camera, index, self.settings.photons.N)
         return Increment(film.sums, film.weights)
 
@@ -158,10 +162,10 @@ class Renderer:
         """What there is to say of the latest pass beyond the tally: of one from elsewhere what was said there."""
         return self._told if self._told is not None else told_of(self._looked(self.film), self.tally)
 
-    def add(self, increment: Increment, told: Told | None = None) -> None:
+    def add(self, increment: Addable, told: Told | None = None) -> None:
         """Take the next pass from elsewhere, with what was told of it there. The film is as if `step` had rendered it;
         the tally is the caller's. Its photons and maps are not here: `latest` is None until `recall`."""
-        self.film.add(increment)
+        increment.add_to(self.film)
         self.latest, self._told = None, told
         if self.film.moments is not None:
             self.film.moments.add(self.film.sums, self.film.channels, 0, len(self.film.sums))

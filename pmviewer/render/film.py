@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +34,22 @@ def resolve(sums, passes, out, first, last):
             out[pixel, c] = np.float32(sums[pixel, c] * inverse)
 
 
+class Addable(Protocol):
+    """What passes add, in whatever form."""
+
+    def add_to(self, film: Film) -> None:
+        """Add it to the film, whose `passes` and moments are the caller's."""
+
+
 @dataclass(frozen=True, eq=False)
 class Increment:
     """What passes add to pixels of a film: `sums` and `weights` like the film's, weights None where samples count 1."""
 
     sums: NDArray[np.float64]
     weights: NDArray[np.float64] | None
+
+    def add_to(self, film: Film) -> None:
+        film.add(self)
 
 
 class Film:
@@ -66,6 +76,16 @@ class Film:
         self.region: tuple[int, int, int, int] | None = None
         """Columns x0 … x1−1 and rows y0 … y1−1 of (x0, y0, x1, y1), which alone are rendered from the second pass on;
         None for all."""
+        self.latest_alone = False
+        """Whether sums are what the latest pass has added, and those of passes before are forgotten."""
+
+    @property
+    def blank(self) -> NDArray[np.float64]:
+        """(columns,) sums of a pixel of an empty film."""
+        blank = np.zeros(self.sums.shape[1])
+        if self.numbered is not None:
+            blank[self.numbered] = -1.0
+        return blank
 
     def add(self, increment: Increment, first: int = 0) -> None:
         """Add to the pixels from `first` on. `passes` and moments are the caller's."""
@@ -86,14 +106,15 @@ class Film:
         """While it lasts the sums of pixels first … last−1 are what has been added to them meanwhile, and no more."""
         sums = self.sums[first:last]
         weights = None if self.weights is None else self.weights[first:last]
-        before = Increment(sums.copy(), None if weights is None else weights.copy())
-        sums[:] = 0.0
-        if self.numbered is not None:
-            sums[:, self.numbered] = -1.0
+        before = None
+        if not self.latest_alone:
+            before = Increment(sums.copy(), None if weights is None else weights.copy())
+        sums[:] = self.blank
         if weights is not None:
             weights[:] = 0.0
         yield
-        self.add(before, first)
+        if before is not None:
+            self.add(before, first)
 
     def spans(self, index: int | None = None) -> list[tuple[int, int]]:
         """First and last + 1 of the pixels, row by row, that pass `index` renders, the next one without."""

@@ -1,21 +1,24 @@
 """What a pass adds to the film, as small as it gets without losing a bit.
 
 Each column goes as float32 where that is exact, which it is for what kernels compute in float32, as float64 otherwise,
-and not at all where it is zero; of a region its pixels alone. LZ4 halves the rest once more at a gigabyte a second.
+and not at all where it is zero; of a region its pixels alone. Between machines LZ4 makes a quarter of the rest at a
+gigabyte a second.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.render.film import Increment
+from pmviewer.render.film import Film, Increment
 
 Span = tuple[int, int]
+Numbers = bytes | NDArray[Any]
 BLOCK = 128
 """Rows that are turned to columns, or back, at a time: they stay in the processor's cache."""
 
@@ -23,13 +26,29 @@ BLOCK = 128
 @dataclass(frozen=True)
 class Columns:
     """A (rows, columns) array of float64 sums: `exact` are the numbers of the columns in `narrow` (float32), `others`
-    those in `wide` (float64), each column after column and compressed; all others are zero."""
+    those in `wide` (float64), (columns, rows) each, or compressed; all others are zero."""
 
     columns: int
     exact: tuple[int, ...]
     others: tuple[int, ...]
-    narrow: bytes
-    wide: bytes
+    narrow: Numbers
+    wide: Numbers
+
+    @property
+    def bytes(self) -> int:
+        """Of all numbers."""
+        return sum(len(part) if isinstance(part, bytes) else part.nbytes for part in (self.narrow, self.wide))
+
+    def parts(self) -> Iterator[tuple[tuple[int, ...], NDArray[Any]]]:
+        """Columns and their numbers, float32 and float64."""
+        for names, part, dtype in ((self.exact, self.narrow, np.float32), (self.others, self.wide, np.float64)):
+            if not names:
+                continue
+            if isinstance(part, bytes):
+                from lz4.frame import decompress
+
+                part = np.frombuffer(decompress(part), dtype).reshape(len(names), -1)
+            yield names, part
 
 
 @dataclass(frozen=True)
@@ -45,38 +64,46 @@ class PackedIncrement:
     def bytes(self) -> int:
         """What travels."""
         parts = [self.sums] if self.weights is None else [self.sums, self.weights]
-        return sum(len(part.narrow) + len(part.wide) for part in parts)
+        return sum(part.bytes for part in parts)
+
+    def add_to(self, film: Film) -> None:
+        """What the increment's own does, without writing it down before."""
+        if self.weights is not None or film.numbered is not None:
+            unpack(self, film.blank).add_to(film)
+            return
+        for names, numbers in self.sums.parts():
+            begin = 0
+            for first, last in self.spans:
+                turned_onto(numbers[:, begin : begin + last - first], np.array(names), film.sums[first:last])
+                begin += last - first
 
 
-def pack(increment: Increment, spans: Sequence[Span]) -> PackedIncrement:
+def pack(increment: Increment, spans: Sequence[Span], compressed: bool = True) -> PackedIncrement:
     """Without a loss: every bit comes back. Pixels beyond `spans` are as in an empty film and don't travel."""
     rows = _rows(spans)
-    weights = None if increment.weights is None else _packed(increment.weights[rows])
-    return PackedIncrement(len(increment.sums), tuple(spans), _packed(increment.sums[rows]), weights)
+    weights = None if increment.weights is None else _packed(increment.weights[rows], compressed)
+    return PackedIncrement(len(increment.sums), tuple(spans), _packed(increment.sums[rows], compressed), weights)
 
 
-def unpack(packed: PackedIncrement, blank: NDArray[np.float64], into: NDArray[np.float64] | None = None) -> Increment:
+def unpack(packed: PackedIncrement, blank: NDArray[np.float64]) -> Increment:
     """The increment again; `blank` (columns,) are the sums of a pixel of an empty film, which those have that nothing
-    was rendered of. The sums are written to `into` (pixels, columns), if it is given: new memory costs as much time."""
+    was rendered of."""
 
-    def whole(
-        columns: Columns, empty: NDArray[np.float64], out: NDArray[np.float64] | None = None
-    ) -> NDArray[np.float64]:
-        if out is None:
-            out = np.empty((packed.pixels, columns.columns))
+    def whole(columns: Columns, empty: NDArray[np.float64]) -> NDArray[np.float64]:
+        out = np.empty((packed.pixels, columns.columns))
         rows = _rows(packed.spans)
         if packed.spans != ((0, packed.pixels),):
             out[:] = empty
-        if isinstance(rows, slice):
-            _unpack_into(out[rows], columns)
-        else:
-            inside = np.empty((len(rows), columns.columns))
-            _unpack_into(inside, columns)
+        inside = out[rows] if isinstance(rows, slice) else np.empty((len(rows), columns.columns))
+        inside[:, sorted({*range(columns.columns)}.difference(columns.exact, columns.others))] = 0.0
+        for names, numbers in columns.parts():
+            turned_back(numbers, np.array(names), inside)
+        if not isinstance(rows, slice):
             out[rows] = inside
         return out
 
     weights = None if packed.weights is None else whole(packed.weights, np.zeros(packed.weights.columns))
-    return Increment(whole(packed.sums, blank, into), weights)
+    return Increment(whole(packed.sums, blank), weights)
 
 
 def _rows(spans: Sequence[Span]) -> slice | NDArray[np.int64]:
@@ -85,9 +112,7 @@ def _rows(spans: Sequence[Span]) -> slice | NDArray[np.int64]:
     return np.concatenate([np.arange(first, last) for first, last in spans])
 
 
-def _packed(values: NDArray[np.float64]) -> Columns:
-    from lz4.frame import compress
-
+def _packed(values: NDArray[np.float64], compressed: bool) -> Columns:
     pixels, columns = values.shape
     narrow, inexact, filled = (
         np.empty((columns, pixels), np.float32),
@@ -101,7 +126,12 @@ def _packed(values: NDArray[np.float64]) -> Columns:
     wide = np.empty((len(others), pixels))
     turned(values, others, wide)
     kept = narrow if len(exact) == columns else narrow[exact]
-    return Columns(columns, tuple(map(int, exact)), tuple(map(int, others)), compress(kept.data), compress(wide.data))
+    names = tuple(map(int, exact)), tuple(map(int, others))
+    if not compressed:
+        return Columns(columns, *names, kept, wide)
+    from lz4.frame import compress
+
+    return Columns(columns, *names, compress(kept.data), compress(wide.data))
 
 
 @kernel
@@ -144,15 +174,12 @@ def turned_back(numbers, chosen, out):
                 out[row, chosen[k]] = np.float64(numbers[k, row])
 
 
-def _unpack_into(out: NDArray[np.float64], columns: Columns) -> None:
-    from lz4.frame import decompress
-
-    empty = set(range(columns.columns)).difference(columns.exact, columns.others)
-    out[:, sorted(empty)] = 0.0
-    for names, packed, dtype in (
-        (columns.exact, columns.narrow, np.float32),
-        (columns.others, columns.wide, np.float64),
-    ):
-        if names and len(out):
-            numbers = np.frombuffer(decompress(packed), dtype).reshape(len(names), -1)
-            turned_back(numbers, np.array(names), out)
+@kernel
+def turned_onto(numbers, chosen, sums):
+    """Add rows of numbers (len(chosen), n) to columns of sums (n, c)."""
+    n = len(sums)
+    for first in range(0, n, BLOCK):
+        last = min(first + BLOCK, n)
+        for k in range(len(chosen)):
+            for row in range(first, last):
+                sums[row, chosen[k]] += np.float64(numbers[k, row])

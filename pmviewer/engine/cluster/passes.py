@@ -23,15 +23,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from pmviewer.engine.apart import check_apart
 from pmviewer.engine.cluster.cluster import Cluster
 from pmviewer.engine.cluster.members import Member
-from pmviewer.engine.cluster.packed import unpack
 from pmviewer.engine.cluster.worker import Asked, Failed, Rendered, hold_scene, packed_settings, render_pass, stop
 from pmviewer.engine.renderer import Renderer
-from pmviewer.engine.stages.virtual_lights import film_of
 from pmviewer.errors import ClusterError
 from pmviewer.progress import Cancelled
 
@@ -73,9 +69,7 @@ class Elsewhere:
         check_apart(renderer.facts)
         self.cluster, self.renderer = cluster, renderer
         self.run = uuid.uuid4().hex
-        self._blank = film_of(renderer.settings, renderer.plan, 1, 1).sums[0].copy()
         self._scene, self._settings = cluster.packed(renderer.scene), packed_settings(renderer.settings)
-        self._sums = np.empty_like(renderer.film.sums)
         self._orders: dict[str, Order] = {}
         self._brought: dict[str, Order] = {}
         """Workers that are being brought the scene."""
@@ -113,7 +107,7 @@ class Elsewhere:
                 self._look_after()
                 self._ask(most)
         rendered, member = self._done.pop(renderer.passes)
-        renderer.add(unpack(rendered.increment, self._blank, self._sums), rendered.told)
+        renderer.add(rendered.increment, rendered.told)
         renderer.tally.merge(rendered.tally)
         share = renderer.tally.workers.get(member.address, (member.threads, 0))
         renderer.tally.workers[member.address] = member.threads, share[1] + 1
@@ -178,7 +172,7 @@ class Elsewhere:
         return None
 
     def _order(self, index: int, member: Member) -> None:
-        asked = Asked(self.run, self._scene.digest, self._settings, index, member.threads)
+        asked = Asked(self.run, self._scene.digest, self._settings, index, member.threads, not member.is_local)
         key = f"pmviewer-pass-{self.run}-{index}-{next(self._numbers)}"
         self._submit(self._orders, Order(index, member), key, render_pass, asked)
 

@@ -47,6 +47,7 @@ class Asked:
     settings: bytes
     index: int
     threads: int
+    compressed: bool
 
 
 @dataclass(frozen=True)
@@ -193,7 +194,7 @@ def _rendered(asked: Asked, pool: WorkPool) -> Rendered:
         raise
     spans = renderer.film.spans(asked.index)
     tally, told = renderer.tally.take(asked.index), renderer.told()
-    packed = pack(increment, spans)
+    packed = pack(increment, spans, asked.compressed)
     return Rendered(packed, tally, told, time.perf_counter() - start)
 
 

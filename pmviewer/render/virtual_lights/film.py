@@ -99,7 +99,7 @@ class WeightedFilm(Film):
 
     def __init__(self, width: int, height: int, virtual: Virtual) -> None:
         super().__init__(width, height, SUMS)
-        self.sums[:, self.numbered] = -1.0
+        self.sums[:] = self.blank
         self.virtual = virtual
         self.estimator = ESTIMATORS.index(virtual.estimator)
 

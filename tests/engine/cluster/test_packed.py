@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.cluster.packed import pack, unpack
-from pmviewer.render.film import Increment
+from pmviewer.render.film import Film, Increment
 
 
 def bits(values):
@@ -25,9 +25,10 @@ def awkward(rng, n):
     )
 
 
+@pytest.mark.parametrize("compressed", [False, True])
 @pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("spans", [[(0, 60)], [(12, 15), (22, 25)], [(0, 0)]], ids=["all", "region", "nothing"])
-def test_every_bit_comes_back(spans, weighted):
+def test_every_bit_comes_back(spans, weighted, compressed):
     rng = np.random.default_rng(1)
     blank = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
     sums = np.tile(blank, (60, 1))
@@ -36,12 +37,32 @@ def test_every_bit_comes_back(spans, weighted):
         sums[first:last] = awkward(rng, 60)[first:last]
         if weights is not None:
             weights[first:last] = rng.normal(size=(last - first, 2))
-    back = unpack(pack(Increment(sums, weights), spans), blank)
+    back = unpack(pack(Increment(sums, weights), spans, compressed), blank)
     np.testing.assert_array_equal(bits(back.sums), bits(sums))
     if weights is None:
         assert back.weights is None
     else:
         np.testing.assert_array_equal(bits(back.weights), bits(weights))
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize("region", [None, (2, 1, 5, 4)])
+def test_it_is_added_as_the_increment_is(region, compressed):
+    rng = np.random.default_rng(3)
+    films = Film(10, 6), Film(10, 6)
+    for film in films:
+        film.region = region
+    for index in range(3):
+        sums = np.zeros_like(films[0].sums)
+        spans = films[0].spans(index)
+        for first, last in spans:
+            sums[first:last, 4:8] = rng.normal(size=(last - first, 4))
+            sums[first:last, :4] = rng.normal(size=(last - first, 4)).astype(np.float32)
+        whole = Increment(sums, None)
+        whole.add_to(films[0])
+        pack(whole, spans, compressed).add_to(films[1])
+    assert films[0].sums.any()
+    np.testing.assert_array_equal(bits(films[1].sums), bits(films[0].sums))
 
 
 def test_less_travels_than_there_is():
