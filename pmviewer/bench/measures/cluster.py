@@ -153,8 +153,9 @@ def _throughput(opened: OpenScene, passes: int, rounds: int, rows: Rows) -> list
     clock: list[float] = []
     spent = {"one process": 0.0, "workers": 0.0}
 
-    with workers(2) as (local, cluster):
-        processes = [psutil.Process(), *(psutil.Process(nanny.pid) for nanny in local.workers.values())]
+    with contextlib.closing(Cluster("local:2", 2)) as cluster:
+        until(lambda: len(cluster.members.ready) == 2)
+        processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
 
         def cpu() -> float:
             return sum(sum(p.cpu_times()[:2]) for p in processes)

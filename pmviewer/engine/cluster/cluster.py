@@ -17,7 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from pmviewer.engine.cluster.address import LOCAL, check_address
+from pmviewer.engine.cluster.address import LOCAL, check_address, is_loopback
 from pmviewer.engine.cluster.identity import ASK
 from pmviewer.engine.cluster.members import Member, Members
 from pmviewer.engine.cluster.worker import digest_of, packed_scene
@@ -60,11 +60,13 @@ class Cluster:
             with _settings():
                 if local := LOCAL.fullmatch(where):
                     self._local = _started(int(local[1]), threads)
-                    self.client = Client(self._local, timeout=CONNECT, set_as_default=False)
+                    self.client = Client(self._local, timeout=CONNECT, set_as_default=False, direct_to_workers=True)
                 elif where.endswith(".json"):
                     self.client = Client(scheduler_file=where, timeout=CONNECT, set_as_default=False)
                 else:
-                    self.client = Client(where, timeout=CONNECT, set_as_default=False)
+                    # On one machine results come straight here; elsewhere only the scheduler may be within reach.
+                    here = is_loopback(where)
+                    self.client = Client(where, timeout=CONNECT, set_as_default=False, direct_to_workers=here)
         except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:
             self._give_up_local()
             raise ClusterError(_unreachable(where, error)) from error
@@ -194,6 +196,7 @@ def _settings() -> Any:
             "distributed.comm.timeouts.connect": f"{CONNECT:.0f}s",
             "distributed.scheduler.worker-ttl": "60s",
             "distributed.worker.multiprocessing-method": "spawn",
+            "distributed.worker.profile.enabled": False,  # a hundred looks a second, which nobody asks for
         }
     ):
         yield

@@ -31,11 +31,6 @@ class Member:
     """When that has changed, by ours."""
 
     @property
-    def is_local(self) -> bool:
-        """Whether it is on this machine, by the address that it has."""
-        return self.address.partition("://")[2].startswith(("127.", "localhost", "[::1]"))
-
-    @property
     def is_silent(self) -> bool:
         """Whether nothing was heard of it for some time: frozen, or cut off."""
         return time.monotonic() - self.changed > SILENT_AFTER

@@ -1,8 +1,8 @@
 """What a pass adds to the film, as small as it gets without losing a bit.
 
 Each column goes as float32 where that is exact, which it is for what kernels compute in float32, as float64 otherwise,
-and not at all where it is zero; of a region its pixels alone. Between machines LZ4 makes a quarter of the rest at a
-gigabyte a second.
+and not at all where it is zero; of a region its pixels alone. LZ4 makes a quarter of the rest at a gigabyte a second,
+which pays between processes of one machine, too.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from pmviewer.kernels.compile.jit import kernel
 from pmviewer.render.film import Film, Increment
 
 Span = tuple[int, int]
-Numbers = bytes | NDArray[Any]
 BLOCK = 128
 """Rows that are turned to columns, or back, at a time: they stay in the processor's cache."""
 
@@ -26,29 +25,26 @@ BLOCK = 128
 @dataclass(frozen=True)
 class Columns:
     """A (rows, columns) array of float64 sums: `exact` are the numbers of the columns in `narrow` (float32), `others`
-    those in `wide` (float64), (columns, rows) each, or compressed; all others are zero."""
+    those in `wide` (float64), (columns, rows) each and compressed; all others are zero."""
 
     columns: int
     exact: tuple[int, ...]
     others: tuple[int, ...]
-    narrow: Numbers
-    wide: Numbers
+    narrow: bytes
+    wide: bytes
 
     @property
     def bytes(self) -> int:
         """Of all numbers."""
-        return sum(len(part) if isinstance(part, bytes) else part.nbytes for part in (self.narrow, self.wide))
+        return len(self.narrow) + len(self.wide)
 
     def parts(self) -> Iterator[tuple[tuple[int, ...], NDArray[Any]]]:
         """Columns and their numbers, float32 and float64."""
-        for names, part, dtype in ((self.exact, self.narrow, np.float32), (self.others, self.wide, np.float64)):
-            if not names:
-                continue
-            if isinstance(part, bytes):
-                from lz4.frame import decompress
+        from lz4.frame import decompress
 
-                part = np.frombuffer(decompress(part), dtype).reshape(len(names), -1)
-            yield names, part
+        for names, part, dtype in ((self.exact, self.narrow, np.float32), (self.others, self.wide, np.float64)):
+            if names:
+                yield names, np.frombuffer(decompress(part), dtype).reshape(len(names), -1)
 
 
 @dataclass(frozen=True)
@@ -78,11 +74,11 @@ class PackedIncrement:
                 begin += last - first
 
 
-def pack(increment: Increment, spans: Sequence[Span], compressed: bool = True) -> PackedIncrement:
+def pack(increment: Increment, spans: Sequence[Span]) -> PackedIncrement:
     """Without a loss: every bit comes back. Pixels beyond `spans` are as in an empty film and don't travel."""
     rows = _rows(spans)
-    weights = None if increment.weights is None else _packed(increment.weights[rows], compressed)
-    return PackedIncrement(len(increment.sums), tuple(spans), _packed(increment.sums[rows], compressed), weights)
+    weights = None if increment.weights is None else _packed(increment.weights[rows])
+    return PackedIncrement(len(increment.sums), tuple(spans), _packed(increment.sums[rows]), weights)
 
 
 def unpack(packed: PackedIncrement, blank: NDArray[np.float64]) -> Increment:
@@ -112,7 +108,9 @@ def _rows(spans: Sequence[Span]) -> slice | NDArray[np.int64]:
     return np.concatenate([np.arange(first, last) for first, last in spans])
 
 
-def _packed(values: NDArray[np.float64], compressed: bool) -> Columns:
+def _packed(values: NDArray[np.float64]) -> Columns:
+    from lz4.frame import compress
+
     pixels, columns = values.shape
     narrow, inexact, filled = (
         np.empty((columns, pixels), np.float32),
@@ -126,12 +124,7 @@ def _packed(values: NDArray[np.float64], compressed: bool) -> Columns:
     wide = np.empty((len(others), pixels))
     turned(values, others, wide)
     kept = narrow if len(exact) == columns else narrow[exact]
-    names = tuple(map(int, exact)), tuple(map(int, others))
-    if not compressed:
-        return Columns(columns, *names, kept, wide)
-    from lz4.frame import compress
-
-    return Columns(columns, *names, compress(kept.data), compress(wide.data))
+    return Columns(columns, tuple(map(int, exact)), tuple(map(int, others)), compress(kept.data), compress(wide.data))
 
 
 @kernel

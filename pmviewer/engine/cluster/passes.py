@@ -172,7 +172,7 @@ class Elsewhere:
         return None
 
     def _order(self, index: int, member: Member) -> None:
-        asked = Asked(self.run, self._scene.digest, self._settings, index, member.threads, not member.is_local)
+        asked = Asked(self.run, self._scene.digest, self._settings, index, member.threads)
         key = f"pmviewer-pass-{self.run}-{index}-{next(self._numbers)}"
         self._submit(self._orders, Order(index, member), key, render_pass, asked)
 

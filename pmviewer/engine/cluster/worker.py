@@ -47,7 +47,6 @@ class Asked:
     settings: bytes
     index: int
     threads: int
-    compressed: bool
 
 
 @dataclass(frozen=True)
@@ -194,7 +193,7 @@ def _rendered(asked: Asked, pool: WorkPool) -> Rendered:
         raise
     spans = renderer.film.spans(asked.index)
     tally, told = renderer.tally.take(asked.index), renderer.told()
-    packed = pack(increment, spans, asked.compressed)
+    packed = pack(increment, spans)
     return Rendered(packed, tally, told, time.perf_counter() - start)
 
 

@@ -25,10 +25,9 @@ def awkward(rng, n):
     )
 
 
-@pytest.mark.parametrize("compressed", [False, True])
 @pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("spans", [[(0, 60)], [(12, 15), (22, 25)], [(0, 0)]], ids=["all", "region", "nothing"])
-def test_every_bit_comes_back(spans, weighted, compressed):
+def test_every_bit_comes_back(spans, weighted):
     rng = np.random.default_rng(1)
     blank = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
     sums = np.tile(blank, (60, 1))
@@ -37,7 +36,7 @@ def test_every_bit_comes_back(spans, weighted, compressed):
         sums[first:last] = awkward(rng, 60)[first:last]
         if weights is not None:
             weights[first:last] = rng.normal(size=(last - first, 2))
-    back = unpack(pack(Increment(sums, weights), spans, compressed), blank)
+    back = unpack(pack(Increment(sums, weights), spans), blank)
     np.testing.assert_array_equal(bits(back.sums), bits(sums))
     if weights is None:
         assert back.weights is None
@@ -45,9 +44,8 @@ def test_every_bit_comes_back(spans, weighted, compressed):
         np.testing.assert_array_equal(bits(back.weights), bits(weights))
 
 
-@pytest.mark.parametrize("compressed", [False, True])
 @pytest.mark.parametrize("region", [None, (2, 1, 5, 4)])
-def test_it_is_added_as_the_increment_is(region, compressed):
+def test_it_is_added_as_the_increment_is(region):
     rng = np.random.default_rng(3)
     films = Film(10, 6), Film(10, 6)
     for film in films:
@@ -60,7 +58,7 @@ def test_it_is_added_as_the_increment_is(region, compressed):
             sums[first:last, :4] = rng.normal(size=(last - first, 4)).astype(np.float32)
         whole = Increment(sums, None)
         whole.add_to(films[0])
-        pack(whole, spans, compressed).add_to(films[1])
+        pack(whole, spans).add_to(films[1])
     assert films[0].sums.any()
     np.testing.assert_array_equal(bits(films[1].sums), bits(films[0].sums))
 

@@ -33,7 +33,7 @@ def bench(monkeypatch):
 
 
 def asked(run="run", scene="scene", index=0, **values):
-    return Asked(run, scene, packed_settings(with_values(Settings(), {**SMALL, **values})), index, 1, True)
+    return Asked(run, scene, packed_settings(with_values(Settings(), {**SMALL, **values})), index, 1)
 
 
 def test_a_few_scenes_and_renderers_are_kept(bench):
