@@ -42,7 +42,7 @@ class Addable(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Increment:
+class Increment(Addable):
     """What passes add to pixels of a film: `sums` and `weights` like the film's, weights None where samples count 1."""
 
     sums: NDArray[np.float64]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.render.film import Film, Increment
+from pmviewer.render.film import Addable, Film, Increment
 
 Span = tuple[int, int]
 BLOCK = 128
@@ -48,7 +48,7 @@ class Columns:
 
 
 @dataclass(frozen=True)
-class PackedIncrement:
+class PackedIncrement(Addable):
     """An increment on the wire. `spans` are the pixels that the pass renders, first and last + 1."""
 
     pixels: int
@@ -63,7 +63,6 @@ class PackedIncrement:
         return sum(part.bytes for part in parts)
 
     def add_to(self, film: Film) -> None:
-        """What the increment's own does, without writing it down before."""
         if self.weights is not None or film.numbered is not None:
             unpack(self, film.blank).add_to(film)
             return
