@@ -1,4 +1,4 @@
-"""`pmviewer render --cluster`: the same picture; and a cluster that is lost leaves outputs, a checkpoint and a sentence."""
+"""`pmviewer render --cluster`: a cluster that is lost leaves outputs, a checkpoint and a sentence."""
 
 from __future__ import annotations
 

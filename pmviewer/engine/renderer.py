@@ -193,7 +193,7 @@ class Renderer:
             film=self.film.state(),
             error=self.error.state(),
             tally=self.tally.state(),
-            carried=maps.taken_over.state() if maps is not None else None,
+            carried=(maps.taken_over if maps is not None else self.light.taken_over).state(),
         )
 
     def restore(self, state: State) -> None:
