@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pmviewer.version import __version__
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from pmviewer.library.rendering import Rendering
     from pmviewer.scene.description import Scene
 
-__version__ = "0.1.0"
+__all__ = ["__version__", "open"]
 
 
 def open(

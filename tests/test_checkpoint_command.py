@@ -37,6 +37,14 @@ def pictures(path: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture
+def heard():
+    """Ctrl+C is, which a process that was started in the background ignores."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture
 def at_pass(monkeypatch):
     """Has something done while that pass is being rendered."""
     step = Renderer.step
@@ -113,7 +121,7 @@ def test_nothing_is_waited_for_when_all_is_kept(tmp_path, at_pass):
     assert read_header(path.with_suffix(".checkpoint")).passes == 2
 
 
-def test_without_checkpoints_ctrl_c_hints_at_them(tmp_path, at_pass, capsys):
+def test_without_checkpoints_ctrl_c_hints_at_them(tmp_path, at_pass, heard, capsys):
     at_pass(2, send(signal.SIGINT))
     assert call("-o", tmp_path / "a.exr", "--passes", 5, *SMALL) == 130
     assert "--checkpoint 60s keeps" in capsys.readouterr().err

@@ -11,11 +11,11 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from pmviewer import __version__
 from pmviewer.bench.report import BenchResult, Target
 from pmviewer.errors import OutputError, SceneError
 from pmviewer.output.files import read_file, write_file
 from pmviewer.progress import available_threads
+from pmviewer.version import __version__
 
 PACKAGES = ("numpy", "numba", "llvmlite", "scipy", "mitsuba", "embreex", "pyoidn", "moderngl", "imgui-bundle")
 

@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 import typer
 
-from pmviewer import __version__
 from pmviewer.commands.bench import bench
 from pmviewer.commands.compare import compare
 from pmviewer.commands.compare_importance import compare_importance
@@ -23,6 +22,7 @@ from pmviewer.commands.shot import shot
 from pmviewer.commands.sweep import sweep
 from pmviewer.commands.view import view
 from pmviewer.errors import PmviewerError
+from pmviewer.version import __version__
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "view": view,

@@ -15,8 +15,8 @@ import llvmlite.binding
 import numba
 import numpy as np
 
-from pmviewer import __version__
 from pmviewer.kernels.compile.sources import PACKAGE, sources_of
+from pmviewer.version import __version__
 
 ROOMS = ("engine", "importance", "kernels", "maps", "photons", "render", "scene", "settings")
 """Whose sources decide about a picture."""

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer import __version__
 from pmviewer.engine.frame import PhotonCloud
 from pmviewer.errors import SettingError
 from pmviewer.maps.record import bands, unpack
 from pmviewer.output.ply import write_ply
 from pmviewer.scene.spectrum import of_bands
 from pmviewer.settings.access import SETTINGS, Settings, flat
+from pmviewer.version import __version__
 
 MAPS = ("global", "caustic")
 PATH_CLASSES = ("direct LD", "indirect", "caustic LS+D", "indirect caustic")

@@ -9,7 +9,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer import __version__
 from pmviewer.errors import OutputError
 from pmviewer.output.diagnostic_views import DENOISED, DIAGNOSTICS, HELD_WHILE_SHOWN, coloured
 from pmviewer.output.exr import BEAUTY, PREFIX, Value, write_exr
@@ -20,6 +19,7 @@ from pmviewer.output.side_by_side import side_by_side
 from pmviewer.output.tone import display_image, to_uint8
 from pmviewer.settings.access import Display, Settings, flat
 from pmviewer.settings.edits import as_text
+from pmviewer.version import __version__
 
 LAYERS = ("beauty", "emission", "direct", "specular", "caustic", "indirect", "albedo", "normal", "depth")
 """The beauty image, its terms in the order in which their sum gives it bit for bit, and the first hit's properties."""

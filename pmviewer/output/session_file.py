@@ -38,13 +38,13 @@ from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
-from pmviewer import __version__
 from pmviewer.errors import OutputError, PmviewerError, SceneError, SettingError
 from pmviewer.output.files import read_file, write_file
 from pmviewer.progress import check
 from pmviewer.resources import data_folder
 from pmviewer.settings.access import SETTINGS, Settings, flat, with_values
 from pmviewer.settings.film import FilmKey, as_tree, from_tree
+from pmviewer.version import __version__
 
 if TYPE_CHECKING:  # brings OpenEXR along, which the window doesn't wait for
     from pmviewer.output.snapshot import Snapshot
