@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pmviewer.engine.cluster.packed import pack, unpack
+from pmviewer.engine.cluster.packed import pack
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
@@ -73,7 +73,8 @@ def received() -> float:
 
 
 def measured() -> tuple[Costs, float, float, float]:
-    """The costs of a pass; of the client's seconds those for unpacking, adding and the task."""
+    """The costs of a pass; of the client's seconds those for unpacking onto the film, for the estimate of the
+    error, and for the task."""
     settings = with_values(Settings(), {"camera.width": SIZE, "camera.height": SIZE})
     opened = open_scene(SCENE)
     there, here = (Renderer(opened, settings, WorkPool(1), StageStore(0)) for _ in range(2))
@@ -83,17 +84,16 @@ def measured() -> tuple[Costs, float, float, float]:
     pack(made[0], spans)
     packing = median(lambda: pack(made[0], spans), 5)
     packed = pack(made[0], spans)
-    blank = np.zeros(made[0].sums.shape[1])
-    into = np.empty_like(made[0].sums)
-    unpacking = median(lambda: unpack(packed, blank, into), 5)
-    queue = iter(made)
-    adding = median(lambda: here.add(next(queue)), PASSES)
+    film = there.film
+    packed.add_to(film)
+    unpacking = median(lambda: packed.add_to(film), 5)
+    adding = median(lambda: here.add(packed), PASSES) - unpacking
     task = received()
     raw = made[0].sums.nbytes
     print(
         f"{SCENE} {SIZE}²: pass {work:.3f} s, packing {packing:.3f} s, {raw / 1e6:.1f} MB → {packed.bytes / 1e6:.2f} MB"
     )
-    print(f"client: unpacking {unpacking:.4f} s, adding {adding:.4f} s, a task {task:.4f} s")
+    print(f"client: unpacking onto the film {unpacking:.4f} s, error and moments {adding:.4f} s, a task {task:.4f} s")
     return Costs(work + packing, packed.bytes, unpacking + adding + task), unpacking, adding, task
 
 

@@ -39,8 +39,3 @@ def check_address(where: str) -> None:
 
         if Security().get_connection_args("client").get("ssl_context") is None:
             raise ClusterError(f"--cluster {where} needs certificates: {_TLS}")
-
-
-def is_loopback(address: str) -> bool:
-    """Whether `scheme://host:port` is on this machine, by its name."""
-    return address.partition("://")[2].startswith(("127.", "localhost:", "[::1]"))

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from pmviewer.engine.cluster.address import LOCAL, check_address, is_loopback
+from pmviewer.engine.cluster.address import LOCAL, check_address
 from pmviewer.engine.cluster.identity import ASK
 from pmviewer.engine.cluster.members import Member, Members
 from pmviewer.engine.cluster.worker import digest_of, packed_scene
@@ -64,9 +64,8 @@ class Cluster:
                 elif where.endswith(".json"):
                     self.client = Client(scheduler_file=where, timeout=CONNECT, set_as_default=False)
                 else:
-                    # On one machine results come straight here; elsewhere only the scheduler may be within reach.
-                    here = is_loopback(where)
-                    self.client = Client(where, timeout=CONNECT, set_as_default=False, direct_to_workers=here)
+                    # Results come through the scheduler, which may be all that can be reached from here.
+                    self.client = Client(where, timeout=CONNECT, set_as_default=False)
         except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:
             self._give_up_local()
             raise ClusterError(_unreachable(where, error)) from error
