@@ -59,8 +59,8 @@ def checkpoint_report(path: str) -> str:
         ("size", f"{head.width} x {head.height}"),
         ("passes", f"{head.passes:,} in {head.seconds:.1f} s"),
         ("written", time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(head.when))),
-        ("program", f"pmviewer {head.program['version']} ({head.program['sources']}), numba {head.program['numba']}"),
-        ("processor", head.program["processor"].partition(" ")[0]),
+        ("program", f"pmviewer {head.program['version']} ({head.program['sources']}), numba {head.program.get('numba', 'unknown')}"),
+        ("processor", head.program.get("processor", "unknown").partition(" ")[0]),
     ]
     rows += [(f"parameter {name}", value) for name, value in head.parameters.items()]
     changed = {name: value for name, value in flat(head.settings).items() if value != SETTINGS[name].default}
