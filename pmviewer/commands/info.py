@@ -54,13 +54,14 @@ def checkpoint_report(path: str) -> str:
     from pmviewer.settings.access import SETTINGS, flat
 
     head = read_header(path)
+    made = head.program
     rows = [
         ("scene", head.scene),
         ("size", f"{head.width} x {head.height}"),
         ("passes", f"{head.passes:,} in {head.seconds:.1f} s"),
         ("written", time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(head.when))),
-        ("program", f"pmviewer {head.program['version']} ({head.program['sources']}), numba {head.program.get('numba', 'unknown')}"),
-        ("processor", head.program.get("processor", "unknown").partition(" ")[0]),
+        ("program", f"pmviewer {made['version']} ({made['sources']}), numba {made.get('numba', 'unknown')}"),
+        ("processor", made.get("processor", "unknown").partition(" ")[0]),
     ]
     rows += [(f"parameter {name}", value) for name, value in head.parameters.items()]
     changed = {name: value for name, value in flat(head.settings).items() if value != SETTINGS[name].default}
