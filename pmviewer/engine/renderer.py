@@ -146,14 +146,16 @@ class Renderer:
         self._close_pass()
         self.tally.seconds += time.perf_counter() - start
 
-    def increment(self, index: int) -> Increment:
-        """What pass `index` adds to the film, which stays as it is: `add` takes it, here or elsewhere. Its arrays hold
-        until the next one is asked for. Raises SettingError where passes can't be rendered apart."""
+    def increment(self, index: int, lent: bool = False) -> Increment:
+        """What pass `index` adds to the film, which stays as it is: `add` takes it, here or elsewhere. `lent` arrays
+        hold until the next increment alone, and cost no new memory. Raises SettingError where passes can't be rendered
+        apart."""
         check_apart(self.facts)
         film = self._apart
         if film is None or film.region is not None:  # pixels beyond a region would keep what they had
-            film = self._apart = film_of(self.settings, self.plan, self.camera.width, self.camera.height)
+            film = film_of(self.settings, self.plan, self.camera.width, self.camera.height)
             film.region, film.latest_alone = self.film.region, True
+        self._apart = film if lent else None
         film.passes = index
         self._pass(film, self.camera, index, self.settings.photons.N)
         return Increment(film.sums, film.weights)

@@ -10,7 +10,6 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.errors import SettingError
-from pmviewer.render.film import Increment
 from pmviewer.settings.access import Settings, with_values
 
 PASSES = 4
@@ -19,11 +18,6 @@ SMALL = {"camera.width": 20, "camera.height": 16, "photons.N": 3000, "gather.ray
 
 def renderer(settings: Settings, threads: int) -> Renderer:
     return Renderer(open_scene("cornell_caustic"), settings, WorkPool(threads), StageStore())
-
-
-def copied(increment: Increment) -> Increment:
-    """It holds until the next one alone."""
-    return Increment(increment.sums.copy(), None if increment.weights is None else increment.weights.copy())
 
 
 @pytest.mark.slow
@@ -60,7 +54,7 @@ def test_passes_from_elsewhere_make_the_same_film(values):
     elsewhere = [renderer(settings, 1), renderer(settings, 3)]
     for _ in range(PASSES):
         alone.step()
-    made = {index: copied(elsewhere[index % 2].increment(index)) for index in reversed(range(PASSES))}
+    made = {index: elsewhere[index % 2].increment(index) for index in reversed(range(PASSES))}
     assert all(other.passes == 0 for other in elsewhere)
     for index in range(PASSES):
         whole.add(made[index])
@@ -74,6 +68,17 @@ def test_passes_from_elsewhere_make_the_same_film(values):
         np.testing.assert_array_equal(whole.film.moments.squares, alone.film.moments.squares)
         assert whole.film.moments.efficiency == alone.film.moments.efficiency
     assert whole.error.latest == alone.error.latest
+
+
+@pytest.mark.slow
+def test_what_is_lent_is_the_same():
+    settings = with_values(Settings(), {**SMALL, "render.filter": "Mitchell-Netravali"})
+    owner, lender = renderer(settings, 1), renderer(settings, 1)
+    for index in (2, 0, 1):
+        own, lent = owner.increment(index), lender.increment(index, lent=True)
+        np.testing.assert_array_equal(lent.sums, own.sums)
+        np.testing.assert_array_equal(lent.weights, own.weights)
+    assert lender.increment(0, lent=True).sums is lender.increment(1, lent=True).sums
 
 
 @pytest.mark.parametrize(

@@ -187,7 +187,7 @@ def _rendered(asked: Asked, pool: WorkPool) -> Rendered:
     key = asked.scene, asked.settings
     renderer: Renderer = _kept(_bench.renderers, key, KEPT_RENDERERS, make)
     try:
-        increment = renderer.increment(asked.index)
+        increment = renderer.increment(asked.index, lent=True)
     except BaseException:
         del _bench.renderers[key]  # what was counted of half a pass
         raise
