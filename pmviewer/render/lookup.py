@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.maps.estimate.combined import combined
@@ -32,6 +33,13 @@ from pmviewer.maps.variant import ABSENT, is_kdtree, is_parts
 
 _f4 = np.float32
 _i8 = np.int64
+
+
+@device
+def _in_parts(photons, eye, radius, p, n, class_mask):
+    """`combined` by the eye record: irradiance, photons that count, and the radius."""
+    place, neighbours = Place(p, n, eye.flatness, class_mask), Neighbours(eye.k, radius, eye.rim, eye.share)
+    return combined(photons, place, neighbours, Filter(eye.filter, eye.cone_k), None)
 
 
 @specialised
@@ -58,13 +66,7 @@ def irradiance(photons, eye, radius, p, n, class_mask):
     if is_parts(photons):
 
         def of_parts(photons, eye, radius, p, n, class_mask):
-            E, _, _ = combined(
-                photons,
-                Place(p, n, eye.flatness, class_mask),
-                Neighbours(eye.k, radius, eye.rim, eye.share),
-                Filter(eye.filter, eye.cone_k),
-                None,
-            )
+            E, _, _ = _in_parts(photons, eye, radius, p, n, class_mask)
             return E
 
         return of_parts
@@ -126,13 +128,7 @@ def looked_up(photons, eye, radius, p, n, class_mask):
     if is_parts(photons):
 
         def of_parts(photons, eye, radius, p, n, class_mask):
-            _, count, r = combined(
-                photons,
-                Place(p, n, eye.flatness, class_mask),
-                Neighbours(eye.k, radius, eye.rim, eye.share),
-                Filter(eye.filter, eye.cone_k),
-                None,
-            )
+            _, count, r = _in_parts(photons, eye, radius, p, n, class_mask)
             return r, _f4(count)
 
         return of_parts
