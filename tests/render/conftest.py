@@ -9,11 +9,9 @@ import pytest
 
 from pmviewer.scene.arrays import flatten
 
-SURFACES = ("bsdfs", "lights", "textures", "opacity", "principled", "blends")
-
 
 @pytest.fixture
 def every_surface(monkeypatch):
     """Scenes are opened as if every kind of material, texture and light were in them."""
     features_of = flatten._features
-    monkeypatch.setattr(flatten, "_features", lambda *of: {**features_of(*of), **dict.fromkeys(SURFACES, True)})
+    monkeypatch.setattr(flatten, "_features", lambda *of: {**features_of(*of), **dict.fromkeys(flatten.SURFACES, True)})

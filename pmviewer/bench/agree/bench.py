@@ -19,7 +19,7 @@ from pmviewer.bench.agree.statistics import LEVEL, rejected
 from pmviewer.bench.agree.triage import save, smallest, without_all
 from pmviewer.bench.agree.trial import FORGIVEN, STAGES
 from pmviewer.bench.agree.verdict import Comparison, Verdict
-from pmviewer.bench.agree.workers import try_scenes
+from pmviewer.bench.agree.workers import OWN_KERNELS, try_scenes
 from pmviewer.bench.agree.xml import MAX_DEPTH, SIZE
 from pmviewer.bench.report import BenchResult, Cell, Target
 from pmviewer.errors import PmviewerError, SettingError
@@ -162,6 +162,8 @@ def _settings_notes() -> list[str]:
         f"{SIZE}² pixels; stages, each with fresh seeds, as long as there is doubt: {stages}",
         f"photon methods may be off by {FORGIVEN:g} × this radius, {FORGIVEN * STAGES[-1].radius:.0%} of a block in "
         "the last stage: look-ups lose light at edges, in proportion to the radius",
+        f"each scene whose number {OWN_KERNELS} divides runs kernels for what is in it alone, the others those for all "
+        "kinds of materials, textures and lights",
         "Mitsuba renders every scene at scale 1: its rays leave surfaces by 9e-5 of a unit at least",
         f"nearest: estimate.lookup=nearest with k = 10 within {NEAREST_REACH:g} of these radii",
         f"a disagreement is one by Holm's correction at {LEVEL:g} over all comparisons of the run",

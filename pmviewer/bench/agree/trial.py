@@ -20,7 +20,7 @@ a bright and a dark surface meet, the limit for r = 0 counts, twice the last sta
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -39,6 +39,7 @@ from pmviewer.bench.agree.xml import write_scene
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.errors import PmviewerError
+from pmviewer.scene.arrays.flatten import SURFACES, flatten
 
 STAGES = (
     Effort(runs=12, spp=64, passes=8, photons=20_000, radius=0.01),
@@ -70,11 +71,23 @@ SAFE_TERMS = ("emission", "direct")
 class Runs:
     """Independent pictures of a scene by whoever is asked, rendered once a stage. `salt` gives other seeds."""
 
-    def __init__(self, scene: Node, folder: Path, mitsuba: Mitsuba, pool: WorkPool, salt: tuple[int, ...]) -> None:
-        """Raises PmviewerError when our loader refuses the scene."""
+    def __init__(
+        self,
+        scene: Node,
+        folder: Path,
+        mitsuba: Mitsuba,
+        pool: WorkPool,
+        salt: tuple[int, ...],
+        shared_kernels: bool = False,
+    ) -> None:
+        """With `shared_kernels` those for all kinds of surfaces run, which need not be compiled for each scene. Raises
+        PmviewerError when our loader refuses the scene."""
         self.scene, self.mitsuba, self.pool, self.salt = scene, mitsuba, pool, salt
         self.path, self.flat_path = write_scene(scene, folder, "scene")
         self.opened: OpenScene = open_scene(self.path)
+        if shared_kernels:
+            flat = flatten(self.opened.scene, features_at_least=SURFACES)
+            self.opened = replace(self.opened, flat=flat)
         self._ours: dict[tuple[str, int, int], NDArray[np.float32]] = {}
         self._theirs: dict[tuple[str, int, int], NDArray[np.float64]] = {}
 
@@ -222,11 +235,17 @@ def questions(runs: Runs) -> Iterator[Question]:
 
 
 def tried(
-    scene: Node, folder: Path, mitsuba: Mitsuba, pool: WorkPool, salt: tuple[int, ...], stages: int = len(STAGES)
+    scene: Node,
+    folder: Path,
+    mitsuba: Mitsuba,
+    pool: WorkPool,
+    salt: tuple[int, ...],
+    stages: int = len(STAGES),
+    shared_kernels: bool = False,
 ) -> Verdict:
-    """Ask all questions about a scene; its files go into `folder`."""
+    """Ask all questions about a scene; its files go into `folder`. `shared_kernels` as for `Runs`."""
     try:
-        runs = Runs(scene, folder, mitsuba, pool, salt)
+        runs = Runs(scene, folder, mitsuba, pool, salt, shared_kernels)
         for warning in runs.opened.scene.warnings:
             if not any(harmless in warning for harmless in HARMLESS):
                 return Verdict(refused=f"pmviewer warns: {warning}")

@@ -22,13 +22,17 @@ from pmviewer.bench.agree.trial import tried
 from pmviewer.bench.agree.verdict import Verdict
 from pmviewer.engine.pool import available_threads
 
+OWN_KERNELS = 8
+"""Each such scene runs the kernels that are compiled for what is in it and no more, as users' scenes do. Compiling
+them takes longer than rendering, so that the others share those for all kinds of surfaces."""
+
 
 def try_scene(seed: int, index: int) -> Verdict:
     """All comparisons of a scene, in this process, and what those that may be disagreements come from."""
     folder, mitsuba, pool = tools()
     scene, salt = scene_of(seed, index), (seed, index)
     with tempfile.TemporaryDirectory(dir=folder) as place:
-        verdict = tried(scene, Path(place), mitsuba, pool, salt)
+        verdict = tried(scene, Path(place), mitsuba, pool, salt, shared_kernels=index % OWN_KERNELS > 0)
     return replace(verdict, comparisons=[explained(scene, c, salt) for c in verdict.comparisons])
 
 

@@ -5,7 +5,7 @@ Primitives are numbered triangles first, then quadrics (spheres, cylinders, disk
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -124,9 +124,11 @@ def flatten(
     scene: Scene,
     on_type: Callable[[np.dtype], None] = lambda of_record: None,
     like: FlatScene | None = None,
+    features_at_least: Collection[str] = (),
 ) -> FlatScene:
     """Build arrays, acceleration structure and light table. `on_type` hears of what type the record will be, before the
-    tree is built. The tree of `like` serves for the same surfaces.
+    tree is built. The tree of `like` serves for the same surfaces. With `features_at_least` the record is that of
+    a scene with those SURFACES, too: what isn't there is not met and changes nothing but which kernels run.
 
     Raises SceneError when the scene has no surface or no light that emits.
     """
@@ -139,7 +141,7 @@ def flatten(
     lights = LightTable(lit, stored.vertices, stored.shape_of_prim, radius)
     of_shape = np.concatenate([lights.of_shape, np.full(len(stored.shapes) - len(scene.shapes), -1)])
     prim_light = of_shape.astype(np.int32)[stored.shape_of_prim]
-    features = _features(scene, materials, lights, bool(emissions))
+    features = {**_features(scene, materials, lights, bool(emissions)), **dict.fromkeys(features_at_least, True)}
     record = np.zeros(1, K.scene_dtype(**features))
     r = record[0]
     on_type(record.dtype)
@@ -205,6 +207,9 @@ def flatten(
         said=tuple(said),
     )
 
+
+SURFACES = ("bsdfs", "lights", "textures", "opacity", "principled", "blends")
+"""All kinds of materials, textures and lights, by the names that `_features` has for them."""
 
 _FLAGS = {
     "bsdfs": "bsdfs",
