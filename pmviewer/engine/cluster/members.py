@@ -31,6 +31,11 @@ class Member:
     """When that has changed, by ours."""
 
     @property
+    def is_near(self) -> bool:
+        """Whether it may be on this machine, and see its memory."""
+        return "://127.0.0.1:" in self.address
+
+    @property
     def is_silent(self) -> bool:
         """Whether nothing was heard of it for some time: frozen, or cut off."""
         return time.monotonic() - self.changed > SILENT_AFTER

@@ -26,10 +26,12 @@ from typing import Any
 from pmviewer.engine.apart import check_apart
 from pmviewer.engine.cluster.cluster import Cluster
 from pmviewer.engine.cluster.members import Member
+from pmviewer.engine.cluster.nearby import Piece, Pieces, Written
 from pmviewer.engine.cluster.worker import Asked, Failed, Rendered, hold_scene, packed_settings, render_pass, stop
 from pmviewer.engine.renderer import Renderer
 from pmviewer.errors import ClusterError
 from pmviewer.progress import Cancelled
+from pmviewer.render.film import Addable
 
 BROUGHT = 4
 """Workers that are brought the scene at the same time."""
@@ -59,6 +61,8 @@ class Order:
     since: float = field(default_factory=time.monotonic)
     doubted: bool = False
     """Whether another was asked for the same pass."""
+    piece: Piece | None = None
+    """Memory for what the pass adds, which its worker sees."""
 
 
 class Elsewhere:
@@ -75,12 +79,13 @@ class Elsewhere:
         """Workers that are being brought the scene."""
         self._again: list[int] = []
         self._next = renderer.passes
-        self._done: dict[int, tuple[Rendered, Member]] = {}
+        self._done: dict[int, tuple[Rendered, Order]] = {}
         self._failures: dict[int, int] = {}
         self._took: list[float] = []
         self._numbers = itertools.count()
         self._arrived: queue.SimpleQueue[tuple[str, Rendered | Failed | str | None]] = queue.SimpleQueue()
         self._fetchers = ThreadPoolExecutor(4, "pmviewer fetch")
+        self._pieces = Pieces(renderer.film)
 
     def step(
         self, most: int | None = None, tell: Callable[[str], None] = lambda text: None, patient: bool = True
@@ -106,9 +111,11 @@ class Elsewhere:
                 looked = time.monotonic()
                 self._look_after()
                 self._ask(most)
-        rendered, member = self._done.pop(renderer.passes)
-        renderer.add(rendered.increment, rendered.told)
+        rendered, order = self._done.pop(renderer.passes)
+        renderer.add(_increment(rendered, order), rendered.told)
+        self._pieces.give_back(order.piece)
         renderer.tally.merge(rendered.tally)
+        member = order.member
         share = renderer.tally.workers.get(member.address, (member.threads, 0))
         renderer.tally.workers[member.address] = member.threads, share[1] + 1
         self._ask(most)  # workers go on while the caller looks at the picture
@@ -125,8 +132,14 @@ class Elsewhere:
                     self.cluster.client.run(stop, self.run, workers=list(busy), wait=False, on_error="ignore")
                 for order in (*self._orders.values(), *self._brought.values()):
                     order.future.release()
+        for order in self._orders.values():
+            self._pieces.lose(order.piece)
+        for _, order in self._done.values():
+            self._pieces.give_back(order.piece)
+        self._pieces.close()
         self._orders.clear()
         self._brought.clear()
+        self._done.clear()
 
     def _ask(self, most: int) -> None:
         """Give workers that have too few passes the next ones."""
@@ -172,9 +185,11 @@ class Elsewhere:
         return None
 
     def _order(self, index: int, member: Member) -> None:
-        asked = Asked(self.run, self._scene.digest, self._settings, index, member.threads)
+        piece = self._pieces.take() if member.is_near else None
+        place = None if piece is None else piece.place
+        asked = Asked(self.run, self._scene.digest, self._settings, index, member.threads, place)
         key = f"pmviewer-pass-{self.run}-{index}-{next(self._numbers)}"
-        self._submit(self._orders, Order(index, member), key, render_pass, asked)
+        self._submit(self._orders, Order(index, member, piece=piece), key, render_pass, asked)
 
     def _has_scene(self, member: Member) -> bool:
         """Whether the worker has it; it is brought if not."""
@@ -234,11 +249,13 @@ class Elsewhere:
         if isinstance(found, Rendered):
             self._took = [*self._took[1 - RECENT :], time.monotonic() - order.since]
             if not self._is_wanted(order.index):
+                self._pieces.give_back(order.piece)
                 return
-            self._done[order.index] = found, order.member
+            self._done[order.index] = found, order
             for other in [k for k, o in self._orders.items() if o.index == order.index]:
-                self._orders.pop(other).future.release()
+                self._drop(other)
             return
+        self._pieces.lose(order.piece)
         if isinstance(found, Failed) and found.final:
             raise ClusterError(f"Pass {order.index} failed on worker {order.member.address}: {found.text}")
         said, lacks = (found.text, found.lacks_scene) if isinstance(found, Failed) else ("", False)
@@ -279,15 +296,28 @@ class Elsewhere:
                 order.future.release()
         for key, order in list(self._orders.items()):
             if here.get(order.member.address) is not order.member:
-                del self._orders[key]
-                order.future.release()
+                self._drop(key)
                 self._lose(order, "")
             elif order.member.is_silent and not order.doubted:
                 order.doubted = True
                 heapq.heappush(self._again, order.index)
 
+    def _drop(self, key: str) -> None:
+        """An order whose worker is not waited for any more."""
+        order = self._orders.pop(key)
+        order.future.release()
+        self._pieces.lose(order.piece)
+
     def _is_wanted(self, index: int) -> bool:
         return index >= self.renderer.passes and index not in self._done
+
+
+def _increment(rendered: Rendered, order: Order) -> Addable:
+    """What the pass adds, from wherever it is."""
+    if not isinstance(rendered.increment, Written):
+        return rendered.increment
+    assert order.piece is not None, "written to no place"
+    return order.piece.increment(rendered.increment)
 
 
 def _text(error: BaseException | None) -> str:

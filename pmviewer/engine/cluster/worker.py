@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from pmviewer.engine.cluster.nearby import Place, Writer, Written
 from pmviewer.engine.cluster.packed import PackedIncrement, pack
 from pmviewer.engine.memory import give_back
 from pmviewer.engine.opened import OpenScene
@@ -39,21 +40,24 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Asked:
-    """Pass `index` of the scene with that digest and these settings (`packed_settings`), in the course of `run`. Small:
-    Dask's scheduler remembers the last thousands of what it was asked."""
+    """Pass `index` of the scene with that digest and these settings (`packed_settings`), in the course of `run`. What
+    it adds goes to `place` where the worker is on the same machine. Small: the scheduler remembers the last thousands
+    of what it was asked."""
 
     run: str
     scene: str
     settings: bytes
     index: int
     threads: int
+    place: Place | None = None
 
 
 @dataclass(frozen=True)
 class Rendered:
-    """A pass: what it adds, what was counted and what is told of it, and the seconds it took."""
+    """A pass: what it adds (or that it has been written to its place), what was counted and what is told of it, and
+    the seconds it took."""
 
-    increment: PackedIncrement
+    increment: PackedIncrement | Written
     tally: Tally
     told: Told
     seconds: float
@@ -80,6 +84,7 @@ class _Bench:
         self.stopped: OrderedDict[str, None] = OrderedDict()
         self.running = ""
         self.pool: WorkPool | None = None
+        self.writer = Writer()
 
     def pool_of(self, threads: int) -> WorkPool:
         """The pool, with so many threads."""
@@ -193,8 +198,10 @@ def _rendered(asked: Asked, pool: WorkPool) -> Rendered:
         raise
     spans = renderer.film.spans(asked.index)
     tally, told = renderer.tally.take(asked.index), renderer.told()
-    packed = pack(increment, spans)
-    return Rendered(packed, tally, told, time.perf_counter() - start)
+    written = None
+    if asked.place is not None and spans == [(0, len(increment.sums))]:
+        written = _bench.writer.write(asked.run, asked.place, increment)
+    return Rendered(written or pack(increment, spans), tally, told, time.perf_counter() - start)
 
 
 def _opened(payload: bytes) -> tuple[OpenScene, str]:

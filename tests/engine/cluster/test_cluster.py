@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import sys
 import threading
 from dataclasses import replace
 
@@ -14,6 +15,7 @@ import pytest
 from pmviewer.bench.measures.cluster import until, workers
 from pmviewer.engine.cluster import cluster as module
 from pmviewer.engine.cluster.cluster import Cluster
+from pmviewer.engine.cluster.nearby import Piece
 from pmviewer.engine.cluster.passes import Elsewhere
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
@@ -64,8 +66,12 @@ def alone(**values):
     [{}, {"render.filter": "Mitchell-Netravali", "region.on": True, "region.right": 0.5}],
     ids=["as it comes", "region, signed filter"],
 )
-def test_the_picture_is_that_of_one_process(borrowed, values):
+def test_the_picture_is_that_of_one_process(borrowed, values, monkeypatch):
+    seen, whole = [], Piece.increment
+    monkeypatch.setattr(Piece, "increment", lambda piece, written: seen.append(written) or whole(piece, written))
     one, many = alone(**values), rendered(borrowed[1], renderer(**values))
+    near = (1 if values else many.passes) if sys.platform == "linux" else 0
+    assert len(seen) == near, "whole films come through memory that both see; the first pass of a region is one"
     np.testing.assert_array_equal(many.film.sums, one.film.sums)
     np.testing.assert_array_equal(many.frame(0).planes, one.frame(0).planes)
     assert many.error.latest == one.error.latest
@@ -87,11 +93,13 @@ def test_a_killed_worker_costs_its_pass(borrowed):
 
     def kill(index):
         if index == 2:
-            os.kill(next(iter(local.workers.values())).pid, signal.SIGKILL)
+            os.kill(pid, signal.SIGKILL)
 
+    pid = next(iter(local.workers.values())).pid
     many = rendered(cluster, renderer(), kill)
     np.testing.assert_array_equal(many.film.sums, alone().film.sums)
-    until(lambda: len(cluster.members.ready) == 2)  # Dask starts another
+    # Dask starts another.
+    until(lambda: pid not in [nanny.pid for nanny in local.workers.values()] and len(cluster.members.ready) == 2)
 
 
 def test_a_frozen_worker_holds_nobody_up(borrowed):
@@ -150,7 +158,9 @@ def test_the_window_borrows_workers_and_goes_on_without_them(monkeypatch):
             assert session.wait(timeout=100)
             frame = session.frame
             np.testing.assert_array_equal(frame.planes, alone().frame(0).planes)
-            assert [passes for _, passes in frame.statistics.workers.values()] == [6]
+            # Where the machine is busy a heartbeat may come late, and a pass is rendered here meanwhile.
+            assert sum(passes for _, passes in frame.statistics.workers.values()) in range(1, 7)
+            assert all(message.level != "error" for message in session.take_messages())
             assert not frame.clouds
             session.set(with_values(shown, {"overlays.global.show": True}))
             until(lambda: session.frame.clouds)
