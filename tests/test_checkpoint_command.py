@@ -106,11 +106,11 @@ def test_a_signal_ends_after_the_pass_with_a_checkpoint(number, status, tmp_path
 def test_the_second_signal_does_not_wait_for_the_pass(tmp_path, at_pass, monkeypatch):
     path = tmp_path / "a.exr"
     words = ["-o", path, "--passes", 5, *SMALL]
-    at_pass(2, send(signal.SIGTERM))
+    at_pass(3, send(signal.SIGTERM))
     assert call(*words, "--checkpoint", "1h") == 143
-    at_pass(4, send(signal.SIGINT, signal.SIGTERM))
+    at_pass(5, send(signal.SIGINT, signal.SIGTERM))
     assert call(*words, "--checkpoint", "1h", "--resume") == 130
-    assert read_header(path.with_suffix(".checkpoint")).passes == 2
+    assert read_header(path.with_suffix(".checkpoint")).passes == 3
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.checkpoint"]
 
 
@@ -282,3 +282,12 @@ def test_times():
     for text in ("0", "-5s", "soon", "5 days", "", "1e3s", "nan"):
         with pytest.raises(SettingError, match="60s, 10min or 1h"):
             seconds_of(text)
+
+
+def test_the_first_pass_is_kept_whatever_the_interval(tmp_path, at_pass):
+    """It may have had to compile: a rendering that is killed soon afterwards has lost nothing of it."""
+    seen = []
+    path = tmp_path / "a.checkpoint"
+    at_pass(3, lambda: seen.append(read_header(path).passes))
+    assert call("-o", tmp_path / "a.exr", "--passes", 3, *SMALL, "--checkpoint", "10h") == 0
+    assert seen == [1]

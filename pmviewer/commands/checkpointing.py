@@ -194,12 +194,13 @@ class Keeper:
             print(f"pmviewer: {self._kept} passes are kept in {self.path}: go on with --resume", file=sys.stderr)
 
     def after_pass(self, renderer: Renderer) -> None:
-        """Write a checkpoint if one is due, so that never more than an interval is lost, or if the program is to end;
-        then it ends here, by SystemExit."""
+        """Write a checkpoint after the first pass, which may have had to compile, and when one is due, so that never
+        more than an interval is lost, or if the program is to end; then it ends here, by SystemExit."""
         now = time.monotonic()
         self._passes = [*self._passes, now - self._pass_began][-LATEST:]
         by_then = now - self._state_at + LATE * max(self._passes) + self._written_in
-        if self._came is not None or by_then > self.interval:
+        first = self._kept is None and not self._warned and math.isfinite(self.interval)
+        if self._came is not None or first or by_then > self.interval:
             self.write(renderer)
         if self._came is not None:
             self._leave()
