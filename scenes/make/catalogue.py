@@ -16,6 +16,7 @@ from make.egg import glass_egg
 from make.fog import fog_sphere
 from make.fractal import fractal_box
 from make.glasses import cognac, three_glasses
+from make.marble import marble
 from make.museum import museum
 from make.office import office
 from make.plane import lit_plane
@@ -42,6 +43,7 @@ SCENES: dict[str, Callable[[], MadeScene]] = {
     "glass_egg": glass_egg,
     "glossy_room": glossy_room,
     "lit_plane": lit_plane,
+    "marble": marble,
     "museum": museum,
     "office": office,
     "prism": prism_and_screen,
