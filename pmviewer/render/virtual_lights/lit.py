@@ -39,6 +39,7 @@ from pmviewer.render.pixel import INDIRECT, SPECULAR, weighed
 from pmviewer.render.planes import CHANNELS
 from pmviewer.render.record import C_DROPPED, C_RAYS, C_SHADOW_RAYS
 from pmviewer.render.straight import visible
+from pmviewer.render.virtual_lights.descent import descend
 from pmviewer.render.virtual_lights.light import scattered, towards, weight_of
 from pmviewer.render.virtual_lights.walk import normalisation
 
@@ -62,7 +63,52 @@ def virtual_light(given, si, beta, pixel, whole):
 
 
 @device
-def _one(given, si, j):
+def asked_for(given, seed):
+    """How many virtual lights a pixel with that seed asks for, for how many each of them stands by an even choice, and
+    where between two of them the choice begins, in [0, 1)."""
+    virtual, eye = given.virtual, given.eye
+    n, m = virtual.n, min(virtual.per_pixel, virtual.n)
+    start = _f4(0.0)
+    if m < n or chosen_by_tree(virtual):
+        start = draw1(eye.sequence, seed, eye.index, VIRTUAL_SUBSET)
+    return m, _f4(n) / _f4(max(m, _i8(1))), start
+
+
+@specialised
+def chosen_by_tree(virtual):
+    """Whether pixels go down a tree over the lights: then by chance even to as many as there are."""
+    if has(virtual, "descent"):
+        return lambda virtual: True
+    return lambda virtual: False
+
+
+@specialised
+def asked_light(given, si, i, asked):
+    """The number of the light that a pixel asks for as its i-th at a surface, and for how many lights it stands; −1
+    for none. `asked`: of `asked_for`."""
+    if has(part(given, "virtual"), "descent"):
+
+        def by_tree(given, si, i, asked):
+            m, _, start = asked
+            j, probability = descend(given.virtual, si.p, si.ng, (_f8(i) + _f8(start)) / _f8(m))
+            if j < 0:
+                return j, _f4(0.0)
+            return j, _f4(1.0 / (probability * _f8(m)))
+
+        return by_tree
+
+    def evenly(given, si, i, asked):
+        _, each, start = asked
+        n = given.virtual.n
+        if given.virtual.per_pixel < n:
+            return min(_i8((_f8(i) + _f8(start)) * _f8(each)), n - 1), each
+        return _i8(i), each
+
+    return evenly
+
+
+@device
+def one_light(given, si, j):
     """Virtual light j at the surface before visibility: reflected radiance F, its weight G, the geometry term, the
     direction and the end of the shadow ray. F is black where nothing can arrive."""
     scene, virtual, b = given.scene, given.virtual, si.bsdf
@@ -86,21 +132,17 @@ def _one(given, si, j):
 @device
 def from_virtual_lights(given, si, beta, pixel, whole):
     """See `virtual_light`."""
-    scene, eye, virtual, film, counts = given.scene, given.eye, given.virtual, pixel.film, pixel.counts
+    scene, virtual, film, counts = given.scene, given.virtual, pixel.film, pixel.counts
     weighted = virtual.estimator != UNWEIGHTED and virtual.estimator != CLAMPED
-    n, m = virtual.n, min(virtual.per_pixel, virtual.n)
-    start = _f4(0.0)
-    if m < n:
-        start = draw1(eye.sequence, pixel.seed, eye.index, VIRTUAL_SUBSET)
-    each = _f4(n) / _f4(max(m, _i8(1)))
+    asked = asked_for(given, pixel.seed)
     base = CHANNELS + (W_INDIRECT if whole else W_SPECULAR)
     plane = _i8(INDIRECT if whole else SPECULAR)
     throughput = luminance(beta)
-    for i in range(m):
-        j = _i8(i)
-        if m < n:
-            j = min(_i8((_f8(i) + _f8(start)) * _f8(each)), n - 1)
-        F, G, geometry, wi, end = _one(given, si, j)
+    for i in range(asked[0]):
+        j, each = asked_light(given, si, i, asked)
+        if j < 0:
+            continue
+        F, G, geometry, wi, end = one_light(given, si, j)
         if not (F[0] + F[1] + F[2] > _f4(0.0) or _f4(0.0) < G):
             continue
         counts[C_RAYS] += 1
@@ -124,7 +166,7 @@ def from_virtual_lights(given, si, beta, pixel, whole):
         film[pixel.number, target] += weighed(pixel, _f8(F[0]))
         film[pixel.number, target + 1] += weighed(pixel, _f8(F[1]))
         film[pixel.number, target + 2] += weighed(pixel, _f8(F[2]))
-    film[pixel.number, CHANNELS + W_LIGHTS] += _f8(m)
+    film[pixel.number, CHANNELS + W_LIGHTS] += _f8(asked[0])
     if weighted:
         albedo, counted = normalisation(given, si, pixel)
         if virtual.estimator == PRINTED_FULL:
