@@ -78,7 +78,8 @@ VIRTUAL_DTYPE = np.dtype(
 PATHS_DTYPE = with_mark(VIRTUAL_DTYPE, "paths")
 """Of estimators that whole light paths weigh: their walks alone compile emission."""
 TREE_FIELDS: list[tuple[str, Any]] = [("tree", "i8"), ("leaves", "i8")]
-"""Of records of virtual lights with the mark `descent`: the address of the nodes and how many leaves there are."""
+"""Of records of virtual lights with the mark `descent`, 1 where pixels choose by the tree, 0 where they ask for all
+lights: the address of the nodes and how many leaves there are."""
 NODE_COLUMNS = 11
 N_CENTRE, N_AXIS = _columns[[0, 3]]
 N_RADIUS, N_COS, N_SIN, N_WORTH, N_LIGHT = _columns[6:11]

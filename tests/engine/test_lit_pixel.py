@@ -113,7 +113,7 @@ def test_each_light_adds_what_a_sum_over_all_of_them_says(pool, estimator):
 def test_over_a_mirror_and_with_a_part_of_the_lights(pool):
     """The surface is the one that the mirror shows, whose light is dimmed by the mirror, and lights stand for those
     that are not asked."""
-    renderer = renderer_of(pool, estimator="unweighted", per_pixel=30, choice="even")
+    renderer = renderer_of(pool, estimator="unweighted", per_pixel=30)
     told = report(renderer, *MIRROR)
     (place,) = told.lit
     assert (place.shows, place.depth, place.asked) == ("specular", 1, 30)

@@ -109,11 +109,12 @@ class VirtualStage:
 def virtual_dtype(virtual: Virtual) -> np.dtype:
     """Type of the record of virtual lights for that estimator and choice."""
     dtype = PATHS_DTYPE if ESTIMATORS.index(virtual.estimator) in OF_PATHS else VIRTUAL_DTYPE
-    return with_mark(dtype, "descent", TREE_FIELDS) if by_tree(virtual) else dtype
+    return with_mark(dtype, "descent", TREE_FIELDS) if virtual.choice == "light tree" else dtype
 
 
 def by_tree(virtual: Virtual) -> bool:
-    """Whether pixels choose some of the lights by a tree over them."""
+    """Whether pixels choose some of the lights by a tree over them. The type of the record doesn't depend on numbers,
+    so that sliders compile nothing."""
     return virtual.choice == "light tree" and 0 < virtual.per_pixel < virtual.number
 
 
@@ -132,7 +133,7 @@ def virtual_record(
     r["walks"], r["max_bounces"] = virtual.walks, settings.photons.max_bounces
     r["clamp"] = virtual.clamp / flat.radius**2
     if tree is not None:
-        r["tree"], r["leaves"] = tree.ctypes.data, len(tree) // 2
+        r["descent"], r["tree"], r["leaves"] = 1, tree.ctypes.data, len(tree) // 2
     r["objects"], r["n_objects"] = flat.shape_of_prim.ctypes.data, int(flat.shape_of_prim.max(initial=-1)) + 1
     return record
 

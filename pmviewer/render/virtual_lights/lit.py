@@ -78,7 +78,7 @@ def asked_for(given, seed):
 def chosen_by_tree(virtual):
     """Whether pixels go down a tree over the lights: then by chance even to as many as there are."""
     if has(virtual, "descent"):
-        return lambda virtual: True
+        return lambda virtual: virtual.descent != 0
     return lambda virtual: False
 
 
@@ -86,25 +86,26 @@ def chosen_by_tree(virtual):
 def asked_light(given, si, i, asked):
     """The number of the light that a pixel asks for as its i-th at a surface, and for how many lights it stands; −1
     for none. `asked`: of `asked_for`."""
-    if has(part(given, "virtual"), "descent"):
+    if not has(part(given, "virtual"), "descent"):
+        return lambda given, si, i, asked: _evenly(given.virtual, i, asked)
 
-        def by_tree(given, si, i, asked):
-            m, _, start = asked
-            j, probability = descend(given.virtual, si.p, si.ng, (_f8(i) + _f8(start)) / _f8(m))
-            if j < 0:
-                return j, _f4(0.0)
-            return j, _f4(1.0 / (probability * _f8(m)))
+    def perhaps_by_tree(given, si, i, asked):
+        if given.virtual.descent == 0:
+            return _evenly(given.virtual, i, asked)
+        m, _, start = asked
+        j, probability = descend(given.virtual, si.p, si.ng, (_f8(i) + _f8(start)) / _f8(m))
+        return j, (_f4(1.0 / (probability * _f8(m))) if j >= 0 else _f4(0.0))
 
-        return by_tree
+    return perhaps_by_tree
 
-    def evenly(given, si, i, asked):
-        _, each, start = asked
-        n = given.virtual.n
-        if given.virtual.per_pixel < n:
-            return min(_i8((_f8(i) + _f8(start)) * _f8(each)), n - 1), each
-        return _i8(i), each
 
-    return evenly
+@device
+def _evenly(virtual, i, asked):
+    _, each, start = asked
+    j = _i8(i)
+    if virtual.per_pixel < virtual.n:
+        j = min(_i8((_f8(i) + _f8(start)) * _f8(each)), virtual.n - 1)
+    return j, each
 
 
 @device
