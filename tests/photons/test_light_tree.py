@@ -7,12 +7,13 @@ import pytest
 
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.stages.virtual_lights import virtual_dtype
+from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.memory import stack_i4
 from pmviewer.maps.virtual_lights import COLUMNS, V_F, V_FIRST, V_LAMBERTIAN, V_N, V_P, V_PHI, V_Q, V_WI, W_F, W_G
 from pmviewer.photons.virtual.tree import light_tree, worths
 from pmviewer.render.planes import CHANNELS, PLANES
-from pmviewer.render.virtual_lights.descent import ALIKE, LEAST, SMALL, descend
+from pmviewer.render.virtual_lights.descent import ALIKE, CUT, CUT_WORDS, LEAST, SMALL, ask_cut, descend
 from pmviewer.settings.access import Virtual
-from tests.support.device import from_python
 from tests.support.scenes import diffuse_box, rendered, settings_of
 
 UNWEIGHTED, SINGLE, EVERY = 0, 2, 4
@@ -44,6 +45,14 @@ def record_of(rows, tree, m):
     record = np.zeros(1, virtual_dtype(Virtual(choice="light tree", per_pixel=m, number=max(len(rows), m + 1))))
     record[0]["n"], record[0]["tree"], record[0]["leaves"] = len(rows), tree.ctypes.data, len(tree) // 2
     return record
+
+
+@kernel
+def way(records, p, n, u):
+    """A light and its probability, by the kernels' way down."""
+    cut = stack_i4(CUT_WORDS)
+    ask_cut(records[0], p, n, cut)
+    return descend(records[0], p, n, cut, u)
 
 
 def probabilities(rows, tree, worth, p, n):
@@ -92,22 +101,26 @@ def probabilities(rows, tree, worth, p, n):
             if one > 0:
                 go(2 * node + child, probability * one / (pair[0][0] + pair[1][0]), here)
 
-    go(1, 1.0, False)
+    first = min(CUT, leaves)  # all ways begin at the nodes of one level, by what they promise
+    begin = [promise(node) for node in range(first, 2 * first)]
+    for k, (one, alike) in enumerate(begin):
+        if one > 0:
+            go(first + k, one / sum(other for other, _ in begin), alike)
     return out
 
 
-@pytest.mark.parametrize("n", [1, 2, 5, 64, 100])
+@pytest.mark.parametrize("n", [1, 5, 64, 200])
 def test_ways_end_at_lights_with_the_probability_that_they_are_told(n):
     rows = lights(n)
     tree, worth = light_tree(rows, UNWEIGHTED, 1.7), worths(rows, UNWEIGHTED)
-    record, way = record_of(rows, tree, 8), from_python(descend)
+    record = record_of(rows, tree, 8)
     normal = np.array([0.0, 0.0, 1.0])
     for p in (np.array([0.1, -0.2, -1.2]), np.array([0.3, 0.3, 0.2])):
         expected = probabilities(rows, tree, worth, p, normal)
         counted, told = np.zeros(n), np.zeros(n)
         ways = 2000
         for u in (np.arange(ways) + 0.5) / ways:
-            j, probability = way(record[0], tuple(np.float32(p)), tuple(np.float32(normal)), np.float64(u))
+            j, probability = way(record, tuple(np.float32(p)), tuple(np.float32(normal)), np.float64(u))
             if j >= 0:
                 counted[j] += 1 / ways
                 told[j] = probability
@@ -148,7 +161,7 @@ def test_lights_in_one_place_without_power_make_a_tree():
     record = record_of(rows, tree, 4)
     p, n = tuple(np.float32([0.1, 0.2, 3.0])), tuple(np.float32([0, 0, -1]))
     for u in (0.0, 0.3, 1 - 1e-12):
-        j, probability = from_python(descend)(record[0], p, n, np.float64(u))
+        j, probability = way(record, p, n, np.float64(u))
         assert (j == -1 and probability == 0) or (0 <= j < 9 and 0 < probability <= 1)
 
 

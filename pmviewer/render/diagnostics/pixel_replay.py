@@ -23,6 +23,7 @@ from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, own_radius
 from pmviewer.render.reflect import reflected, unfound
 from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import visible
+from pmviewer.render.virtual_lights.descent import CUT_WORDS
 from pmviewer.render.virtual_lights.lit import asked_for, asked_light, one_light
 
 OF_CAUSTICS, AS_INDIRECT, AS_DIRECT, AS_CAUSTICS, NOT_FOUND, GATHERED = range(6)
@@ -123,9 +124,10 @@ def _lit(given, si, beta, seed, numbers, lights, n):
 @device
 def _each_light(given, si, beta, seed, numbers, lights, n):
     virtual = given.virtual
-    asked = asked_for(given, seed)
+    cut = stack_i4(CUT_WORDS)
+    asked = asked_for(given, si, seed, cut)
     for i in range(asked[0]):
-        j, each = asked_light(given, si, i, asked)
+        j, each = asked_light(given, si, i, asked, cut)
         if j < 0 or n >= len(lights):
             continue
         F, G, geometry, wi, end = one_light(given, si, j)

@@ -13,7 +13,7 @@ from pmviewer.kernels.bsdf.scattering import STORED, bsdf_f, same_side, shading_
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.dimensions import VIRTUAL_SUBSET
-from pmviewer.kernels.memory import load_i4
+from pmviewer.kernels.memory import load_i4, stack_i4
 from pmviewer.kernels.random import draw1
 from pmviewer.kernels.scene import load3
 from pmviewer.kernels.surface import leave
@@ -39,7 +39,7 @@ from pmviewer.render.pixel import INDIRECT, SPECULAR, weighed
 from pmviewer.render.planes import CHANNELS
 from pmviewer.render.record import C_DROPPED, C_RAYS, C_SHADOW_RAYS
 from pmviewer.render.straight import visible
-from pmviewer.render.virtual_lights.descent import descend
+from pmviewer.render.virtual_lights.descent import CUT_WORDS, ask_cut, descend
 from pmviewer.render.virtual_lights.light import scattered, towards, weight_of
 from pmviewer.render.virtual_lights.walk import normalisation
 
@@ -62,38 +62,43 @@ def virtual_light(given, si, beta, pixel, whole):
     return lit
 
 
+@specialised
+def asked_for(given, si, seed, cut):
+    """How many virtual lights a pixel with that seed asks for at a surface, for how many each of them stands by an even
+    choice, and where between two of them the choice begins, in [0, 1). `cut` points to CUT_WORDS words of scratch."""
+    if not has(part(given, "virtual"), "descent"):
+        return lambda given, si, seed, cut: _asked(given, seed, min(given.virtual.per_pixel, given.virtual.n), False)
+
+    def perhaps_by_tree(given, si, seed, cut):
+        virtual = given.virtual
+        by_tree = virtual.descent != 0
+        if by_tree:
+            ask_cut(virtual, si.p, si.ng, cut)
+        return _asked(given, seed, min(virtual.per_pixel, virtual.n), by_tree)
+
+    return perhaps_by_tree
+
+
 @device
-def asked_for(given, seed):
-    """How many virtual lights a pixel with that seed asks for, for how many each of them stands by an even choice, and
-    where between two of them the choice begins, in [0, 1)."""
-    virtual, eye = given.virtual, given.eye
-    n, m = virtual.n, min(virtual.per_pixel, virtual.n)
-    start = _f4(0.0)
-    if m < n or chosen_by_tree(virtual):
-        start = draw1(eye.sequence, seed, eye.index, VIRTUAL_SUBSET)
+def _asked(given, seed, m, by_chance):
+    n, start = given.virtual.n, _f4(0.0)
+    if m < n or by_chance:
+        start = draw1(given.eye.sequence, seed, given.eye.index, VIRTUAL_SUBSET)
     return m, _f4(n) / _f4(max(m, _i8(1))), start
 
 
 @specialised
-def chosen_by_tree(virtual):
-    """Whether pixels go down a tree over the lights: then by chance even to as many as there are."""
-    if has(virtual, "descent"):
-        return lambda virtual: virtual.descent != 0
-    return lambda virtual: False
-
-
-@specialised
-def asked_light(given, si, i, asked):
+def asked_light(given, si, i, asked, cut):
     """The number of the light that a pixel asks for as its i-th at a surface, and for how many lights it stands; −1
-    for none. `asked`: of `asked_for`."""
+    for none. `asked`, cut: of `asked_for`."""
     if not has(part(given, "virtual"), "descent"):
-        return lambda given, si, i, asked: _evenly(given.virtual, i, asked)
+        return lambda given, si, i, asked, cut: _evenly(given.virtual, i, asked)
 
-    def perhaps_by_tree(given, si, i, asked):
+    def perhaps_by_tree(given, si, i, asked, cut):
         if given.virtual.descent == 0:
             return _evenly(given.virtual, i, asked)
         m, _, start = asked
-        j, probability = descend(given.virtual, si.p, si.ng, (_f8(i) + _f8(start)) / _f8(m))
+        j, probability = descend(given.virtual, si.p, si.ng, cut, (_f8(i) + _f8(start)) / _f8(m))
         return j, (_f4(1.0 / (probability * _f8(m))) if j >= 0 else _f4(0.0))
 
     return perhaps_by_tree
@@ -135,12 +140,13 @@ def from_virtual_lights(given, si, beta, pixel, whole):
     """See `virtual_light`."""
     scene, virtual, film, counts = given.scene, given.virtual, pixel.film, pixel.counts
     weighted = virtual.estimator != UNWEIGHTED and virtual.estimator != CLAMPED
-    asked = asked_for(given, pixel.seed)
+    cut = stack_i4(CUT_WORDS)
+    asked = asked_for(given, si, pixel.seed, cut)
     base = CHANNELS + (W_INDIRECT if whole else W_SPECULAR)
     plane = _i8(INDIRECT if whole else SPECULAR)
     throughput = luminance(beta)
     for i in range(asked[0]):
-        j, each = asked_light(given, si, i, asked)
+        j, each = asked_light(given, si, i, asked, cut)
         if j < 0:
             continue
         F, G, geometry, wi, end = one_light(given, si, j)
