@@ -55,6 +55,7 @@ BENCHES: dict[str, tuple[str, str]] = {
         "Dispersion: prism angles, white, paths and photons (T10)",
         "pmviewer.bench.measures.dispersion:run",
     ),
+    "virtual-many": ("Very many virtual lights, few for each pixel (R10)", "pmviewer.bench.measures.virtual_many:run"),
     "virtual": ("Virtual lights: estimators against the plain sum (R10)", "pmviewer.bench.measures.virtual:run"),
     "series": ("Series: time saved on a camera's way, and flicker", "pmviewer.bench.measures.series:run"),
     "thin-glass": (

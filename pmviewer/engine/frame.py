@@ -110,6 +110,9 @@ class PhotonCloud:
     """Of records: (n,) distances up to which they are used, in scene units."""
     banded: bool = False
     """Do photons tell their wavelengths (`pmviewer.maps.record.bands`)?"""
+    objects: NDArray[np.int64] | None = None
+    """Of virtual lights: (n,) the objects that they lie on, as places in `object_names`."""
+    object_names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

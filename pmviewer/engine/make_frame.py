@@ -8,7 +8,7 @@ from pmviewer.engine.energy import Energy
 from pmviewer.engine.frame import Frame, PhotonCloud, Statistics
 from pmviewer.engine.inspection import Inspection
 from pmviewer.engine.stages.irradiance_cache import cache_cloud
-from pmviewer.engine.stages.virtual_lights import bias_of
+from pmviewer.engine.stages.virtual_lights import bias_of, objects_of
 from pmviewer.engine.tally import Tally
 from pmviewer.engine.told import Told
 from pmviewer.maps.irradiance_cache import REACH
@@ -59,7 +59,9 @@ def _clouds(looked: Looked) -> dict[str, PhotonCloud]:
     if cache is not None:
         clouds["cache"] = PhotonCloud(*cache_cloud(cache), cache.rows[:, REACH].copy())
     if (virtual := looked.latest.virtual) is not None:
-        clouds["virtual"] = PhotonCloud(virtual.lights.photons, virtual.lights.power_unit)
+        lights = virtual.lights
+        on, names = objects_of(looked.scene.flat, lights.rows)
+        clouds["virtual"] = PhotonCloud(lights.photons, lights.power_unit, objects=on, object_names=names)
     return clouds
 
 

@@ -18,6 +18,7 @@ field            record of
 `cells`          a grid of photons that guide gather rays by cells of the hemisphere
 `virtual`        virtual lights (`pmviewer.maps.virtual_lights`)
 `paths`          virtual lights for estimators that whole light paths weigh
+`descent`        virtual lights that pixels choose from by a tree (`pmviewer.photons.virtual.tree`)
 `modes`          projection maps (`pmviewer.photons.projection`)
 `strata`         strata of guided emission (`pmviewer.photons.emission.strata`)
 `scattered`      importons that are scattered on (`pmviewer.photons.emission.scattered`)
@@ -37,7 +38,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels.compile.specialise import has
 
 Estimator = Literal["disc", "hull", "differential"]
-Mark = Literal["hull", "differential", "importons", "fewest", "cones", "cells", "paths"]
+Mark = Literal["hull", "differential", "importons", "fewest", "cones", "cells", "paths", "descent"]
 
 ABSENT = np.zeros(1, np.dtype([("absent", np.int32)]))
 """Stands for what is not there: `pmviewer.kernels.compile.specialise.absent` tells it from all else."""

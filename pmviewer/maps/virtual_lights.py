@@ -26,6 +26,7 @@ Lights whose path no gathering walk makes, as those behind a mirror, have q = 0 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -76,6 +77,15 @@ VIRTUAL_DTYPE = np.dtype(
 )
 PATHS_DTYPE = with_mark(VIRTUAL_DTYPE, "paths")
 """Of estimators that whole light paths weigh: their walks alone compile emission."""
+TREE_FIELDS: list[tuple[str, Any]] = [("tree", "i8"), ("leaves", "i8")]
+"""Of records of virtual lights with the mark `descent`, 1 where pixels choose by the tree, 0 where they ask for all
+lights: the address of the nodes and how many leaves there are."""
+NODE_COLUMNS = 11
+N_CENTRE, N_AXIS = _columns[[0, 3]]
+N_RADIUS, N_COS, N_SIN, N_WORTH, N_LIGHT = _columns[6:11]
+"""Columns of a node of the tree over virtual lights, float32: the sphere around its lights, the axis of the cone around
+their normals, the sphere's radius, the cone's cosine and sine, what its lights may bring together, of a leaf the number
+of its light."""
 NO_VIRTUAL = ABSENT
 """Stands for virtual lights where there are none."""
 

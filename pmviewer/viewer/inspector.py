@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 from pmviewer.engine.frame import Frame
-from pmviewer.engine.inspector.report import LookUp, PhotonAt, Pinned, PixelReport, luminance
+from pmviewer.engine.inspector.report import LitPlace, LookUp, PhotonAt, Pinned, PixelReport, luminance
 from pmviewer.viewer.session_link import SessionLike
+
+
+class ChosenLight(NamedTuple):
+    """A virtual light: its number in that pass."""
+
+    index: int
+    number: int
 
 
 class Inspector:
     """`pinned` is the pixel (x, y) of the image, `photon` one whose life is told, `number` that of the chosen look-up,
-    None until there is one: then the one that adds most. `raised` is True until the panel has come to the front."""
+    None until there is one: then the one that adds most, `surface` likewise of the surfaces that virtual lights reach,
+    `light` the virtual light that is marked, as long as its pass is the latest one. `raised` is True until the panel
+    has come to the front."""
 
     def __init__(self, session: SessionLike, frame: Callable[[], Frame | None]) -> None:
         self._session = session
@@ -19,6 +29,8 @@ class Inspector:
         self.pinned: tuple[int, int] | None = None
         self.photon: PhotonAt | None = None
         self.number: int | None = None
+        self.surface: int | None = None
+        self.light: ChosenLight | None = None
         self.raised = False
 
     def click(self, pixel: tuple[int, int]) -> None:
@@ -33,7 +45,7 @@ class Inspector:
         if self.pinned is None:
             self.raised = True
         if pixel != self.pinned:
-            self.number = None
+            self.number = self.surface = self.light = None
         self.pinned, self.photon = pixel, photon
         self._session.pin(Pinned(*pixel, photon))
 
@@ -41,7 +53,7 @@ class Inspector:
         """Let everything go."""
         if self.pinned is not None:
             self.pinned = self.photon = None
-            self.number = None
+            self.number = self.surface = self.light = None
             self._session.pin(None)
 
     def choose(self, photon: PhotonAt | None) -> None:
@@ -77,3 +89,14 @@ class Inspector:
             adds = [(float(luminance(one.value)) > 0, one.used, float(luminance(one.value))) for one in report.look_ups]
             self.number = adds.index(max(adds))
         return report.look_ups[min(self.number, len(report.look_ups) - 1)]
+
+    @property
+    def lit(self) -> LitPlace | None:
+        """The chosen surface that virtual lights reach, or the last where the path is shorter than it was."""
+        report = self.report
+        if report is None or not report.lit:
+            return None
+        if self.surface is None:
+            adds = [float(luminance(place.sum)) for place in report.lit]
+            self.surface = adds.index(max(adds))
+        return report.lit[min(self.surface, len(report.lit) - 1)]

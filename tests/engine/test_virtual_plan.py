@@ -70,6 +70,7 @@ def test_the_schema_has_the_estimators_in_the_order_of_their_numbers():
         ("virtual.walks", {"normalisation": "per object"}, {"estimator": "unweighted"}),
         ("virtual.window", {}, {"normalisation": "per pixel"}),
         ("virtual.number", {}, None),
+        ("virtual.choice", {"per_pixel": 20}, {}),
     ],
 )
 def test_a_setting_that_does_nothing_says_why(path, does, does_not):

@@ -12,8 +12,8 @@ from pmviewer.engine import diagnose
 from pmviewer.engine.inspector.report import PhotonAt, Pinned
 from pmviewer.render.camera import resolve_camera
 from pmviewer.viewer.overlays.inspected import CHOSEN_COLOUR, DISC_COLOUR, disc_lines
-from pmviewer.viewer.panels.inspector.photons import ordered, unit_of
 from pmviewer.viewer.panels.inspector.plots import on_hemisphere
+from pmviewer.viewer.panels.inspector.sorted_table import ordered, unit_of
 from pmviewer.viewer.viewport.picking import on_picture
 from tests.viewer.driver import app_on_engine, drag_picture, drive, finished, make_app, viewport_pixels, wait_until
 from tests.viewer.fake_session import FakeSession

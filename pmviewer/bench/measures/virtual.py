@@ -20,6 +20,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
+from pmviewer.engine.tally import Tally
 from pmviewer.settings.access import Settings, with_values
 
 SCENES = ("corner_room", "glossy_room")
@@ -66,14 +67,22 @@ class Lab:
 
     def render(self, values: Mapping[str, Any], passes: int) -> tuple[F8, float]:
         """Luminance of the indirect light (h, w), and the CPU seconds of a pass."""
+        image, tally = self._rendered(values, passes)
+        return image, tally.cpu_seconds / passes
+
+    def staged(self, values: Mapping[str, Any]) -> tuple[F8, Mapping[str, float]]:
+        """Luminance of the indirect light (h, w) of one pass, and its CPU seconds by stage."""
+        image, tally = self._rendered(values, 1)
+        return image, tally.stage_seconds
+
+    def _rendered(self, values: Mapping[str, Any], passes: int) -> tuple[F8, Tally]:
         size = {"camera.width": self.effort.size, "camera.height": self.effort.size}
         settings = with_values(Settings(), {**size, **values})
         prepare(self.opened, settings, self.pool, lambda text, share: None)
         renderer = Renderer(self.opened, settings, self.pool, StageStore(0))
         for _ in range(passes):
             renderer.step()
-        image = renderer.frame(0).image("indirect").astype(np.float64) @ LUMINANCE
-        return image, renderer.tally.cpu_seconds / passes
+        return renderer.frame(0).image("indirect").astype(np.float64) @ LUMINANCE, renderer.tally
 
     def lit(self, changes: Mapping[str, Any], passes: int, seeds: int, lights: int | None = None) -> tuple[F8, float]:
         """Pictures (seeds, h, w) by virtual lights; the least CPU seconds of a pass."""

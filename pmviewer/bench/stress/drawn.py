@@ -46,6 +46,7 @@ STRUCTURAL = {
     "importance.convergence",
     "importance.emission",
     "virtual.estimator",
+    "virtual.choice",
 }
 """Settings that kernels are compiled for."""
 MOST = {
@@ -96,6 +97,7 @@ STRUCTURES: dict[str, dict[str, Any]] = PLAIN | {
     "gather reprojection": {"render.method": "gather", "gather.estimation": "on", "gather.reprojection": "on"},
     "shadow photons": {"direct.shadow_photons": True},
     "virtual lights": {"render.method": "virtual lights"},
+    "virtual lights, tree": {"render.method": "virtual lights", "virtual.choice": "light tree"},
     "virtual lights, paths": {"render.method": "virtual lights", "virtual.estimator": "every vertex"},
     "Keller-Wald": {**_IMPORTANCE, "importance.deposition": "Keller-Wald"},
     "density control": {**_IMPORTANCE, "importance.deposition": "density control", "importance.convergence": "cube"},

@@ -23,6 +23,7 @@ from pmviewer.engine.inspector.report import Float, Found, LookUp, luminance
 from pmviewer.engine.method import estimator_of
 from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.pass_maps import PassMaps
+from pmviewer.engine.stages.virtual_lights import lights_asked
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED
 from pmviewer.maps.estimate.filters import FILTERS
 from pmviewer.maps.record import UNFOUND, bands, unpack
@@ -36,7 +37,9 @@ from pmviewer.render.diagnostics.pixel_replay import (
     GATHERED,
     NOT_FOUND,
     OF_CAUSTICS,
+    as_lit,
     as_look_ups,
+    empty_lights,
     empty_rows,
     replay_pixel,
 )
@@ -44,6 +47,8 @@ from pmviewer.scene.spectrum import of_bands
 from pmviewer.settings.access import Settings
 
 MOST_LOOK_UPS, MOST_POINTS = 64, 64
+MOST_SURFACES, MOST_LIT = 16, 1 << 20
+"""Of a pixel at which all virtual lights are told, and how many of them at all."""
 _SHOWS = {
     OF_CAUSTICS: "caustic",
     AS_INDIRECT: "indirect",
@@ -58,13 +63,17 @@ Shares = Callable[[int, int, NDArray[np.float32]], NDArray[np.float32]]
 class Replay:
     """A pixel of a pass, replayed: `rows` are its look-ups (`pmviewer.render.diagnostics.pixel_replay.ROW`), `way`
     (v, 3) the camera ray's origin and the points met, `prims` (v − 1,) the primitives there, `samples` (n_lights,) the
-    light samples that are expected on each light where light is sampled, None where it is nowhere."""
+    light samples that are expected on each light where light is sampled, None where it is nowhere; `lights` are the
+    virtual lights that face its surfaces (`pmviewer.render.diagnostics.pixel_replay.LIT`)."""
 
     def __init__(self, rendered: RenderedPass, radii: NDArray[np.float32] | None, pixel: int, n_lights: int) -> None:
         self._arguments = rendered.given, radii, np.int64(pixel)
         self._expected = np.zeros(n_lights, np.float32)
+        self._lights = empty_lights(min(MOST_SURFACES * lights_asked(rendered.given.virtual), MOST_LIT))
         self.samples: NDArray[np.float32] | None = None
-        self.rows, self.way, self.prims = self._run(-1, 0, np.zeros((0, 3), np.float32))[:3]
+        self.rows, self.way, self.prims, _, lit = self._run(-1, 0, np.zeros((0, 3), np.float32))
+        self.lights = as_lit(self._lights[:lit])
+        self._lights = empty_lights(0)  # they are asked once
 
     def shares(self, surface: int, group: int, wi: NDArray[np.float32]) -> NDArray[np.float32]:
         """(m, 3), 1/sr: what the lobes of that group reflect at that surface of light from wi (m, 3)."""
@@ -72,15 +81,15 @@ class Replay:
 
     def _run(
         self, surface: int, group: int, wi: NDArray[np.float32]
-    ) -> tuple[np.ndarray, Float, NDArray[np.int64], NDArray[np.float32]]:
-        asked, counts = np.array([surface, group], np.int64), np.zeros(3, np.int64)
+    ) -> tuple[np.ndarray, Float, NDArray[np.int64], NDArray[np.float32], int]:
+        asked, counts = np.array([surface, group], np.int64), np.zeros(4, np.int64)
         rows, shares = empty_rows(MOST_LOOK_UPS), np.zeros((len(wi), 3), np.float32)
         way, prims = np.zeros((MOST_POINTS, 3), np.float32), np.full(MOST_POINTS, -1, np.int64)
         wi = np.ascontiguousarray(wi, np.float32)
-        replay_pixel(*self._arguments, asked, wi, shares, rows, way, prims, self._expected, counts)
+        replay_pixel(*self._arguments, asked, wi, shares, rows, way, prims, self._expected, self._lights, counts)
         self.samples = self._expected if counts[2] else None
         made = as_look_ups(rows[: counts[0]])
-        return made, way[: counts[1]].astype(np.float64), prims[1 : counts[1]].copy(), shares
+        return made, way[: counts[1]].astype(np.float64), prims[1 : counts[1]].copy(), shares, int(counts[3])
 
 
 def look_ups_of(replay: Replay, rendered: RenderedPass, settings: Settings, banded: bool) -> tuple[LookUp, ...]:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.inspector.fisheye import fisheye_of
 from pmviewer.engine.inspector.life import life_of
+from pmviewer.engine.inspector.lit import lit_places
 from pmviewer.engine.inspector.look_ups import Replay, look_ups_of
-from pmviewer.engine.inspector.report import Float, LookUp, PhotonAt, PhotonLife, Pinned, PixelReport, Seen
+from pmviewer.engine.inspector.report import Float, LitPlace, LookUp, PhotonAt, PhotonLife, Pinned, PixelReport, Seen
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
@@ -19,6 +20,7 @@ from pmviewer.engine.stages.eye import gather_rays_of
 from pmviewer.engine.wanted import looked_map
 from pmviewer.render.film import Film
 from pmviewer.render.planes import PLANES, terms_of
+from pmviewer.render.virtual_lights.film import WeightedFilm
 from pmviewer.scene.describe import area
 
 if TYPE_CHECKING:
@@ -42,11 +44,14 @@ def pixel_report(looked: Looked, pinned: Pinned, measures: Measures, pool: WorkP
     mean = _mean(film, number)
     terms = np.array([mean[PLANES[name]] for name in terms_of(film.channels)])
     look_ups: tuple[LookUp, ...] = ()
+    lit: tuple[LitPlace, ...] = ()
     way, prims, samples = np.zeros((0, 3)), np.zeros(0, np.int64), None
     if not plan.path:
         replay = pool.run([lambda: Replay(rendered, film.radii, number, len(looked.scene.flat.light_names))])[0]
         way, prims, samples = replay.way, replay.prims, replay.samples
         look_ups = pool.run([lambda: look_ups_of(replay, rendered, looked.settings, plan.banded)])[0]
+        if rendered.virtual is not None and isinstance(film, WeightedFilm):
+            lit = lit_places(replay, rendered.virtual, film, number, looked.scene)
     map_ = looked_map(looked.settings, plan)
     return PixelReport(
         of=pinned,
@@ -65,6 +70,7 @@ def pixel_report(looked: Looked, pinned: Pinned, measures: Measures, pool: WorkP
         life=_life(looked, pinned.photon),
         notes=_notes(plan, look_ups),
         fisheye=fisheye_of(rendered, number, way[0], looked.settings.gather, pool) if plan.estimation else None,
+        lit=lit,
     )
 
 

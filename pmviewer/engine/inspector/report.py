@@ -104,6 +104,40 @@ class LookUp:
 
 
 @dataclass(frozen=True, eq=False)
+class LitPlace:
+    """The m virtual lights of the latest pass that reach a surface of the pixel, by what they add, most first.
+
+    `number` (m,) are their rows in the pass's cloud, `points` (m, 3) where they are, `Phi` (m, 3) watts, `distance`
+    (m,) scene units, `adds` (m, 3) the radiance that the pixel gets from each in this pass, `weight` (m,) what each
+    counts in the sum of weights, 0 of light that is not weighted; `blocked` (b, 3) are the points of those that face
+    the surface and are hidden, `asked` how many the pixel asked at all, `quotient` what weighted light was multiplied
+    by, 1 without.
+    """
+
+    shows: str
+    depth: int
+    p: Float
+    n: Float
+    asked: int
+    quotient: float
+    number: NDArray[np.int64]
+    points: Float
+    Phi: Float
+    distance: Float
+    adds: Float
+    weight: Float
+    bounces: NDArray[np.int64]
+    light: NDArray[np.int64]
+    objects: tuple[str, ...]
+    blocked: Float
+
+    @property
+    def sum(self) -> Float:
+        """(3,) of what they add."""
+        return np.asarray(self.adds.sum(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
 class History:
     """A pixel since it was pinned: `passes` (n,), the `mean` (n, 3) of all passes up to each, and the standard `error`
     (n,) of its luminance, by the spread of the single passes since then; NaN while there are fewer than two."""
@@ -188,6 +222,8 @@ class PixelReport:
     notes: tuple[str, ...] = ()
     fisheye: Fisheye | None = None
     """With estimated gathers, where the first surface is a diffuse one."""
+    lit: tuple[LitPlace, ...] = ()
+    """With virtual lights, the surfaces of the pixel that they light."""
 
 
 def luminance(colour: Any) -> Any:

@@ -13,16 +13,20 @@ from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
+from pmviewer.maps.variant import with_mark
 from pmviewer.maps.virtual_lights import (
     CLAMPED,
     ESTIMATORS,
     OF_PATHS,
     PATHS_DTYPE,
     PRINTED,
+    TREE_FIELDS,
     UNWEIGHTED,
+    V_PRIM,
     VIRTUAL_DTYPE,
 )
 from pmviewer.photons.virtual.lights import VirtualLights, virtual_lights
+from pmviewer.photons.virtual.tree import light_tree
 from pmviewer.render.film import Film
 from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS
 from pmviewer.render.virtual_lights.film import WeightedFilm
@@ -55,11 +59,13 @@ class VirtualMap:
 
     lights: VirtualLights
     record: NDArray[np.void]
+    tree: NDArray[np.float32] | None = None
+    """Of `pmviewer.photons.virtual.tree`, where pixels choose by it."""
 
     @property
     def bytes(self) -> int:
         """For the stage store."""
-        return self.lights.bytes
+        return self.lights.bytes + (self.tree.nbytes if self.tree is not None else 0)
 
 
 class VirtualStage:
@@ -92,16 +98,30 @@ class VirtualStage:
     def _make(self, index: int) -> VirtualMap:
         s, flat = self.settings, self.scene.flat
         lights = virtual_lights(flat, s.virtual, s.photons, s.render.seed, index, self.pool.run)
-        return VirtualMap(lights, virtual_record(flat, s, lights.rows))
+        tree = None
+        if by_tree(s.virtual):
+            tree = self.pool.run([lambda: light_tree(lights.rows, ESTIMATORS.index(s.virtual.estimator), flat.radius)])[
+                0
+            ]
+        return VirtualMap(lights, virtual_record(flat, s, lights.rows, tree), tree)
 
 
 def virtual_dtype(virtual: Virtual) -> np.dtype:
-    """Type of the record of virtual lights for that estimator."""
-    return PATHS_DTYPE if ESTIMATORS.index(virtual.estimator) in OF_PATHS else VIRTUAL_DTYPE
+    """Type of the record of virtual lights for that estimator and choice."""
+    dtype = PATHS_DTYPE if ESTIMATORS.index(virtual.estimator) in OF_PATHS else VIRTUAL_DTYPE
+    return with_mark(dtype, "descent", TREE_FIELDS) if virtual.choice == "light tree" else dtype
 
 
-def virtual_record(flat: FlatScene, settings: Settings, rows: NDArray[np.float32]) -> NDArray[np.void]:
-    """The record (1,) for kernels of virtual lights (n, COLUMNS)."""
+def by_tree(virtual: Virtual) -> bool:
+    """Whether pixels choose some of the lights by a tree over them. The type of the record doesn't depend on numbers,
+    so that sliders compile nothing."""
+    return virtual.choice == "light tree" and 0 < virtual.per_pixel < virtual.number
+
+
+def virtual_record(
+    flat: FlatScene, settings: Settings, rows: NDArray[np.float32], tree: NDArray[np.float32] | None = None
+) -> NDArray[np.void]:
+    """The record (1,) for kernels of virtual lights (n, COLUMNS), and of the tree over them by which pixels choose."""
     virtual = settings.virtual
     estimator = ESTIMATORS.index(virtual.estimator)
     record = np.zeros(1, virtual_dtype(virtual))
@@ -112,8 +132,21 @@ def virtual_record(flat: FlatScene, settings: Settings, rows: NDArray[np.float32
     r["normalised"] = virtual.normalisation != "none" and estimator not in PRINTED
     r["walks"], r["max_bounces"] = virtual.walks, settings.photons.max_bounces
     r["clamp"] = virtual.clamp / flat.radius**2
+    if tree is not None:
+        r["descent"], r["tree"], r["leaves"] = 1, tree.ctypes.data, len(tree) // 2
     r["objects"], r["n_objects"] = flat.shape_of_prim.ctypes.data, int(flat.shape_of_prim.max(initial=-1)) + 1
     return record
+
+
+def objects_of(flat: FlatScene, rows: NDArray[np.float32]) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+    """The objects (n,) that virtual lights (n, COLUMNS) lie on, and their names: the scene's shapes in their order, and
+    behind them one for all instances."""
+    shapes = flat.owner.shapes
+    prims = np.ascontiguousarray(rows[:, V_PRIM]).view(np.int32).astype(np.int64)
+    stored = prims < len(flat.shape_of_prim)
+    numbers = np.full(len(rows), len(shapes), np.int64)
+    numbers[stored] = np.minimum(flat.shape_of_prim[prims[stored]], len(shapes))
+    return numbers, (*(shape.name for shape in shapes), "instances")
 
 
 def lights_asked(record: NDArray[np.void]) -> int:

@@ -1,5 +1,5 @@
 """One pixel's sample of a pass once more, with the numbers that the eye pass used: its way from the camera, and what it
-looked up in the photon maps there (V4). Nothing is changed by it."""
+looked up in the photon maps there, or which virtual lights it asked (V4). Nothing is changed by it."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ import numpy as np
 
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, transmits
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.kernels.memory import stack_i4
-from pmviewer.kernels.vector import dot, largest, scale
+from pmviewer.kernels.vector import dot, largest, luminance, mul, scale
 from pmviewer.maps.estimate.glossy import reflected_share
 from pmviewer.maps.record import CAUSTIC
 from pmviewer.maps.search.stored import ALL_CLASSES
+from pmviewer.maps.virtual_lights import CLAMPED
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import arrive
 from pmviewer.render.direct.choice import LIST_WORDS, choose, expected_samples
@@ -20,6 +22,9 @@ from pmviewer.render.pixel import sampled_ray
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, own_radius
 from pmviewer.render.reflect import reflected, unfound
 from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
+from pmviewer.render.straight import visible
+from pmviewer.render.virtual_lights.descent import CUT_WORDS
+from pmviewer.render.virtual_lights.lit import asked_for, asked_light, one_light
 
 OF_CAUSTICS, AS_INDIRECT, AS_DIRECT, AS_CAUSTICS, NOT_FOUND, GATHERED = range(6)
 """What a look-up is for: the caustic map; the global map as indirect light, as direct light, as caustics; the caustic
@@ -44,6 +49,21 @@ radiance that the look-up found, its radius (scene units; with the k nearest the
 number of the surface on its way, whether photons from behind count too, and the surface's number among all that are
 met, ways that waited where paths split behind the others."""
 _COLUMNS = ROW.itemsize // 4
+LIT = np.dtype(
+    [
+        ("p", "f4", 3),
+        ("n", "f4", 3),
+        ("F", "f4", 3),
+        ("G", "f4"),
+        ("seen", "f4"),
+        *((name, "i4") for name in ("light", "depth", "surface", "asked")),
+    ]
+)
+"""A virtual light at a surface of the pixel that it faces: the surface's place and normal on the viewer's side, the
+radiance F that the pixel would get from it and its weight G, both times the lights that it stands for and what the
+pixel takes of light from there, whether it is visible; its number in the pass, the number of the surface on its way
+and among all that are met, and how many lights were asked there."""
+_LIT_COLUMNS = LIT.itemsize // 4
 
 _f4 = np.float32
 _i4 = np.int32
@@ -92,6 +112,44 @@ def _stored(given, radii, pixel, si, beta, numbers, rows, row):
     return row
 
 
+@specialised
+def _lit(given, si, beta, seed, numbers, lights, n):
+    """The virtual lights at a surface with those numbers on its way and among all, from row n on, where there are any.
+    Returns the next free row."""
+    if absent(part(given, "virtual")):
+        return lambda given, si, beta, seed, numbers, lights, n: n
+    return lambda given, si, beta, seed, numbers, lights, n: _each_light(given, si, beta, seed, numbers, lights, n)
+
+
+@device
+def _each_light(given, si, beta, seed, numbers, lights, n):
+    virtual = given.virtual
+    cut = stack_i4(CUT_WORDS)
+    asked = asked_for(given, si, seed, cut)
+    for i in range(asked[0]):
+        j, each = asked_light(given, si, i, asked, cut)
+        if j < 0 or n >= len(lights):
+            continue
+        F, G, geometry, wi, end = one_light(given, si, j)
+        if not (F[0] + F[1] + F[2] > _f4(0.0) or _f4(0.0) < G):
+            continue
+        F = scale(mul(beta, F), each)
+        if virtual.estimator == CLAMPED and geometry > virtual.clamp:
+            F = scale(F, virtual.clamp / geometry)
+        for k in range(3):
+            lights[n, k], lights[n, 3 + k], lights[n, 6 + k] = si.p[k], si.ng[k], F[k]
+        lights[n, 9] = luminance(beta) * each * G
+        lights[n, 10] = _f4(1.0) if visible(given.scene, si.p, si.ng, si.gap, wi, end) else _f4(0.0)
+        lights[n, 11], lights[n, 12], lights[n, 13], lights[n, 14] = (
+            _f4(j),
+            _f4(numbers[0]),
+            _f4(numbers[1]),
+            _f4(asked[0]),
+        )
+        n += 1
+    return n
+
+
 @device
 def _shares(si, group, wi, shares):
     """What a group of lobes reflects of light from each wi (m, 3), into shares (m, 3)."""
@@ -112,7 +170,7 @@ def _expected(given, si, expected):
 
 
 @kernel
-def replay_pixel(given, radii, pixel, asked, wi, shares, rows, vertices, prims, expected, counts):
+def replay_pixel(given, radii, pixel, asked, wi, shares, rows, vertices, prims, expected, lights, counts):
     """Replay a pixel in the pass of the eye record.
 
     given: as for `pmviewer.render.eye.eye_pass`; radii: as there; pixel: int64; asked: int64 (2,), the number of a
@@ -120,9 +178,10 @@ def replay_pixel(given, radii, pixel, asked, wi, shares, rows, vertices, prims, 
     (m, 3), goes into shares (m, 3); rows: float32 (n, columns of ROW) of what is looked up, in the order of the eye
     pass; vertices: float32 (v, 3), the ray's origin and the points that the path meets, of its ways where it splits the
     one that never waits; prims: int64 (v,), the primitives there; expected: float32 (n_lights,), light samples that the
-    first surface of that way that stores photons spends on each light, left alone where there is none; counts: int64
-    (3,), how many rows and points there are, and at the surface number counts[2] − 1 the lights were chosen, 0 for
-    nowhere.
+    first surface of that way that stores photons spends on each light, left alone where there is none; lights: float32
+    (n, columns of LIT) of the virtual lights that face the surfaces of the pixel; counts: int64 (4,), how many rows and
+    points there are, at the surface number counts[2] − 1 the lights were chosen, 0 for nowhere, and how many of
+    `lights` are filled.
     """
     given = opened(given)
     scene, eye = given.scene, given.eye
@@ -156,6 +215,7 @@ def replay_pixel(given, radii, pixel, asked, wi, shares, rows, vertices, prims, 
                     _expected(given, si, expected)
                     counts[2] = depth + 1
                 row = _stored(given, radii, pixel, si, beta, (_i8(depth), surface), rows, row)
+                counts[3] = _lit(given, si, beta, seed, (_i8(depth), surface), lights, counts[3])
             if groups & FOLLOWED == 0 or depth == eye.max_depth:
                 break
             if eye.unfound != 0 and not is_delta(si.bsdf):
@@ -176,6 +236,21 @@ def replay_pixel(given, radii, pixel, asked, wi, shares, rows, vertices, prims, 
 def empty_rows(n: int) -> np.ndarray:
     """Room for n look-ups, as `replay_pixel` takes it."""
     return np.zeros((n, _COLUMNS), np.float32)
+
+
+def empty_lights(n: int) -> np.ndarray:
+    """Room for n virtual lights, as `replay_pixel` takes it."""
+    return np.zeros((n, _LIT_COLUMNS), np.float32)
+
+
+def as_lit(rows: np.ndarray) -> np.ndarray:
+    """Filled rows as records (n,) of LIT: the kernel writes whole numbers as float32."""
+    made = np.zeros(len(rows), LIT)
+    for k, name in enumerate(("p", "n", "F")):
+        made[name] = rows[:, 3 * k : 3 * k + 3]
+    for k, name in enumerate(("G", "seen", "light", "depth", "surface", "asked")):
+        made[name] = rows[:, 9 + k]
+    return made
 
 
 def as_look_ups(rows: np.ndarray) -> np.ndarray:

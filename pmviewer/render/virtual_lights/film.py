@@ -54,36 +54,37 @@ _NORMAL, _DEPTH = PLANES["normal"].start, PLANES["depth"].start
 
 
 @kernel
-def shared_sums(sums, width, height, radius, base, out):
+def shared_sums(sums, width, height, radius, base, rows, out):
     """ΣA and ΣC over the pixels within `radius` of each pixel that show the same surface, out (n, 2).
 
-    sums: float64 (n, CHANNELS + SUMS); base: first column of the term's sums.
+    sums: float64 (n, CHANNELS + SUMS); base: first column of the term's sums; rows: the first pixel of `out` and the
+    one after the last.
     """
     step = max(1, math.ceil(radius / TAPS))
     reach = int(radius) // step
-    for y in range(height):
-        for x in range(width):
-            here = y * width + x
-            nx, ny, nz = sums[here, _NORMAL], sums[here, _NORMAL + 1], sums[here, _NORMAL + 2]
-            length, depth = math.sqrt(nx * nx + ny * ny + nz * nz), sums[here, _DEPTH]
-            out[here, 0], out[here, 1] = 0.0, 0.0
-            for j in range(-reach, reach + 1):
-                for i in range(-reach, reach + 1):
-                    u, v = x + i * step, y + j * step
-                    if u < 0 or v < 0 or u >= width or v >= height:
+    for here in range(rows[0], rows[1]):
+        y, x = here // width, here % width
+        nx, ny, nz = sums[here, _NORMAL], sums[here, _NORMAL + 1], sums[here, _NORMAL + 2]
+        length, depth = math.sqrt(nx * nx + ny * ny + nz * nz), sums[here, _DEPTH]
+        total_a, total_c = 0.0, 0.0
+        for j in range(-reach, reach + 1):
+            for i in range(-reach, reach + 1):
+                u, v = x + i * step, y + j * step
+                if u < 0 or v < 0 or u >= width or v >= height:
+                    continue
+                there = v * width + u
+                if there != here:
+                    if sums[there, CHANNELS + W_OBJECT] != sums[here, CHANNELS + W_OBJECT]:
                         continue
-                    there = v * width + u
-                    if there != here:
-                        if sums[there, CHANNELS + W_OBJECT] != sums[here, CHANNELS + W_OBJECT]:
-                            continue
-                        mx, my, mz = sums[there, _NORMAL], sums[there, _NORMAL + 1], sums[there, _NORMAL + 2]
-                        other = math.sqrt(mx * mx + my * my + mz * mz)
-                        if nx * mx + ny * my + nz * mz < ALIKE * length * other:
-                            continue
-                        if abs(sums[there, _DEPTH] - depth) > SAME_DEPTH * abs(depth):
-                            continue
-                    out[here, 0] += sums[there, base + W_A]
-                    out[here, 1] += sums[there, base + W_C]
+                    mx, my, mz = sums[there, _NORMAL], sums[there, _NORMAL + 1], sums[there, _NORMAL + 2]
+                    other = math.sqrt(mx * mx + my * my + mz * mz)
+                    if nx * mx + ny * my + nz * mz < ALIKE * length * other:
+                        continue
+                    if abs(sums[there, _DEPTH] - depth) > SAME_DEPTH * abs(depth):
+                        continue
+                total_a += sums[there, base + W_A]
+                total_c += sums[there, base + W_C]
+        out[here - rows[0], 0], out[here - rows[0], 1] = total_a, total_c
 
 
 def ratio(numerator: NDArray[Any], denominator: NDArray[Any]) -> F8:
@@ -123,24 +124,35 @@ class WeightedFilm(Film):
         sums = self.sums
         if not sums[:, base + W_G].any():
             return np.zeros((len(sums), 3))
-        scale = ratio(sums[:, base + W_A] * self.normalisation(base), sums[:, base + W_G]) / max(self.passes, 1)
-        return np.asarray(sums[:, base + W_F : base + W_F + 3] * scale[:, None])
+        return np.asarray(sums[:, base + W_F : base + W_F + 3] * (self._quotient(base) / max(self.passes, 1))[:, None])
 
-    def normalisation(self, base: int) -> F8:
-        """c (n,) of the term whose sums begin at that column."""
+    def _quotient(self, base: int, rows: tuple[int, int] | None = None) -> F8:
+        """ΣA·c/ΣG (n,), which weighted light is multiplied by; `rows` as in `normalisation`."""
+        these = slice(*rows) if rows is not None else slice(None)
+        return ratio(self.sums[these, base + W_A] * self.normalisation(base, rows), self.sums[these, base + W_G])
+
+    def quotient(self, pixel: int, term: str) -> float:
+        """ΣA·c/ΣG of one pixel, which weighted light of that term ("indirect", "specular") is multiplied by."""
+        base = CHANNELS + {"indirect": W_INDIRECT, "specular": W_SPECULAR}[term]
+        return float(self._quotient(base, (pixel, pixel + 1))[0])
+
+    def normalisation(self, base: int, rows: tuple[int, int] | None = None) -> F8:
+        """c (n,) of the term whose sums begin at that column; of the pixels from the first of `rows` up to the second,
+        without them of all."""
         sums, normalisation = self.sums, self.virtual.normalisation
+        first, last = rows if rows is not None else (0, len(sums))
         A, C = sums[:, base + W_A], sums[:, base + W_C]
         if self.estimator in PRINTED or normalisation == "none":
-            return np.ones(len(sums))
+            return np.ones(last - first)
         if normalisation == "per object":
             numbers = sums[:, CHANNELS + W_OBJECT].astype(np.int64) + 1
-            return ratio(np.bincount(numbers, C), np.bincount(numbers, A))[numbers]
+            return ratio(np.bincount(numbers, C), np.bincount(numbers, A))[numbers[first:last]]
         if normalisation == "interpolated":
             radius = self.virtual.window / max(self.passes, 1) ** 0.25
-            shared = np.empty((len(sums), 2))
-            shared_sums(sums, self.width, self.height, radius, base, shared)
+            shared = np.empty((last - first, 2))
+            shared_sums(sums, self.width, self.height, radius, base, (first, last), shared)
             return ratio(shared[:, 1], shared[:, 0])
-        return ratio(C, A)
+        return ratio(C[first:last], A[first:last])
 
     @property
     def lost(self) -> float:

@@ -13,7 +13,7 @@ from pmviewer.kernels.bsdf.scattering import STORED, bsdf_f, same_side, shading_
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.dimensions import VIRTUAL_SUBSET
-from pmviewer.kernels.memory import load_i4
+from pmviewer.kernels.memory import load_i4, stack_i4
 from pmviewer.kernels.random import draw1
 from pmviewer.kernels.scene import load3
 from pmviewer.kernels.surface import leave
@@ -39,6 +39,7 @@ from pmviewer.render.pixel import INDIRECT, SPECULAR, weighed
 from pmviewer.render.planes import CHANNELS
 from pmviewer.render.record import C_DROPPED, C_RAYS, C_SHADOW_RAYS
 from pmviewer.render.straight import visible
+from pmviewer.render.virtual_lights.descent import CUT_WORDS, ask_cut, descend
 from pmviewer.render.virtual_lights.light import scattered, towards, weight_of
 from pmviewer.render.virtual_lights.walk import normalisation
 
@@ -61,8 +62,59 @@ def virtual_light(given, si, beta, pixel, whole):
     return lit
 
 
+@specialised
+def asked_for(given, si, seed, cut):
+    """How many virtual lights a pixel with that seed asks for at a surface, for how many each of them stands by an even
+    choice, and where between two of them the choice begins, in [0, 1). `cut` points to CUT_WORDS words of scratch."""
+    if not has(part(given, "virtual"), "descent"):
+        return lambda given, si, seed, cut: _asked(given, seed, min(given.virtual.per_pixel, given.virtual.n), False)
+
+    def perhaps_by_tree(given, si, seed, cut):
+        virtual = given.virtual
+        by_tree = virtual.descent != 0
+        if by_tree:
+            ask_cut(virtual, si.p, si.ng, cut)
+        return _asked(given, seed, min(virtual.per_pixel, virtual.n), by_tree)
+
+    return perhaps_by_tree
+
+
 @device
-def _one(given, si, j):
+def _asked(given, seed, m, by_chance):
+    n, start = given.virtual.n, _f4(0.0)
+    if m < n or by_chance:
+        start = draw1(given.eye.sequence, seed, given.eye.index, VIRTUAL_SUBSET)
+    return m, _f4(n) / _f4(max(m, _i8(1))), start
+
+
+@specialised
+def asked_light(given, si, i, asked, cut):
+    """The number of the light that a pixel asks for as its i-th at a surface, and for how many lights it stands; −1
+    for none. `asked`, cut: of `asked_for`."""
+    if not has(part(given, "virtual"), "descent"):
+        return lambda given, si, i, asked, cut: _evenly(given.virtual, i, asked)
+
+    def perhaps_by_tree(given, si, i, asked, cut):
+        if given.virtual.descent == 0:
+            return _evenly(given.virtual, i, asked)
+        m, _, start = asked
+        j, probability = descend(given.virtual, si.p, si.ng, cut, (_f8(i) + _f8(start)) / _f8(m))
+        return j, (_f4(1.0 / (probability * _f8(m))) if j >= 0 else _f4(0.0))
+
+    return perhaps_by_tree
+
+
+@device
+def _evenly(virtual, i, asked):
+    _, each, start = asked
+    j = _i8(i)
+    if virtual.per_pixel < virtual.n:
+        j = min(_i8((_f8(i) + _f8(start)) * _f8(each)), virtual.n - 1)
+    return j, each
+
+
+@device
+def one_light(given, si, j):
     """Virtual light j at the surface before visibility: reflected radiance F, its weight G, the geometry term, the
     direction and the end of the shadow ray. F is black where nothing can arrive."""
     scene, virtual, b = given.scene, given.virtual, si.bsdf
@@ -86,21 +138,18 @@ def _one(given, si, j):
 @device
 def from_virtual_lights(given, si, beta, pixel, whole):
     """See `virtual_light`."""
-    scene, eye, virtual, film, counts = given.scene, given.eye, given.virtual, pixel.film, pixel.counts
+    scene, virtual, film, counts = given.scene, given.virtual, pixel.film, pixel.counts
     weighted = virtual.estimator != UNWEIGHTED and virtual.estimator != CLAMPED
-    n, m = virtual.n, min(virtual.per_pixel, virtual.n)
-    start = _f4(0.0)
-    if m < n:
-        start = draw1(eye.sequence, pixel.seed, eye.index, VIRTUAL_SUBSET)
-    each = _f4(n) / _f4(max(m, _i8(1)))
+    cut = stack_i4(CUT_WORDS)
+    asked = asked_for(given, si, pixel.seed, cut)
     base = CHANNELS + (W_INDIRECT if whole else W_SPECULAR)
     plane = _i8(INDIRECT if whole else SPECULAR)
     throughput = luminance(beta)
-    for i in range(m):
-        j = _i8(i)
-        if m < n:
-            j = min(_i8((_f8(i) + _f8(start)) * _f8(each)), n - 1)
-        F, G, geometry, wi, end = _one(given, si, j)
+    for i in range(asked[0]):
+        j, each = asked_light(given, si, i, asked, cut)
+        if j < 0:
+            continue
+        F, G, geometry, wi, end = one_light(given, si, j)
         if not (F[0] + F[1] + F[2] > _f4(0.0) or _f4(0.0) < G):
             continue
         counts[C_RAYS] += 1
@@ -124,7 +173,7 @@ def from_virtual_lights(given, si, beta, pixel, whole):
         film[pixel.number, target] += weighed(pixel, _f8(F[0]))
         film[pixel.number, target + 1] += weighed(pixel, _f8(F[1]))
         film[pixel.number, target + 2] += weighed(pixel, _f8(F[2]))
-    film[pixel.number, CHANNELS + W_LIGHTS] += _f8(m)
+    film[pixel.number, CHANNELS + W_LIGHTS] += _f8(asked[0])
     if weighted:
         albedo, counted = normalisation(given, si, pixel)
         if virtual.estimator == PRINTED_FULL:

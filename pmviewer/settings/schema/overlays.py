@@ -72,6 +72,17 @@ class PhotonOverlay(PointOverlay):
     )
 
 
+class VirtualOverlay(PointOverlay):
+    """Virtual lights drawn as points"""
+
+    colour: Literal["power", "bounce", "light", "object"] = setting(  # type: ignore[assignment]
+        "power",
+        "Colour by power, by number of bounces, by the light that it came from, or by the object that it lies on.",
+        stage="display",
+        scale="choice",
+    )
+
+
 def coloured_by_irradiance(what: str) -> Any:
     """The colour of points that are light of many photons."""
     return setting(
@@ -298,7 +309,7 @@ class Overlays(Group):
     cache: CacheOverlay = subgroup(CacheOverlay, "irradiance cache", TRACED, CACHE_SHOWN)
     volume: PhotonOverlay = subgroup(PhotonOverlay, "volume photons", VOLUME)
     shadow: ShadowOverlay = subgroup(ShadowOverlay, "shadow photons", SHADOW_PHOTONS)
-    virtual: PointOverlay = subgroup(PointOverlay, "virtual lights", VIRTUAL_LIGHTS)
+    virtual: VirtualOverlay = subgroup(VirtualOverlay, "virtual lights", VIRTUAL_LIGHTS)
     importons: ImportonOverlay = subgroup(ImportonOverlay, "importons", TRACED, IMPORTANCE)
     fates: FateOverlay = subgroup(FateOverlay, "photons by fate", TRACED, JUDGED)
     lights: LightOverlay = subgroup(LightOverlay, "light importance", TRACED, IMPORTANCE)

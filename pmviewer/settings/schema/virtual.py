@@ -38,6 +38,12 @@ WINDOWED = Need(
 )
 
 
+SOME = Need(
+    lambda f: 0 < f.settings.virtual.per_pixel < f.settings.virtual.number,
+    "A pixel asks for all virtual lights (virtual.per_pixel).",
+)
+
+
 class Virtual(Group):
     """Virtual lights"""
 
@@ -55,14 +61,23 @@ class Virtual(Group):
     )
     per_pixel: int = setting(
         0,
-        "Virtual lights that a pixel asks for in a pass, drawn evenly among all of them; 0 asks for all. Fewer spare "
-        "shadow rays and turn spots that neighbours share into noise.",
+        "Virtual lights that a pixel asks for in a pass, each pixel for others; 0 asks for all. Fewer spare shadow "
+        "rays and turn spots that neighbours share into noise.",
         stage="image",
         scale="integer",
         unit="lights",
         ge=0,
         le=100_000,
         title="lights per pixel",
+    )
+    choice: Literal["even", "light tree"] = setting(
+        "even",
+        "How a pixel chooses them. even: each alike, one after the other through all of them. light tree: those that "
+        "may bring most, by a tree over all of them, with probabilities that the sums are divided by; choosing takes "
+        "longer than a shadow ray in a small scene, and leaves fewer bright pixels.",
+        stage="image",
+        scale="choice",
+        needs=(SOME,),
     )
     estimator: Estimator = setting(
         "single step",

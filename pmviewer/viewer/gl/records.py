@@ -65,6 +65,13 @@ def tags(records: NDArray[np.float32]) -> NDArray[np.uint32]:
     return records.view(np.uint32)[:, 5] >> np.uint32(16)
 
 
+def with_tags(records: NDArray[np.float32], numbers: NDArray[np.integer]) -> NDArray[np.float32]:
+    """Records (n, 6) with those numbers (n,) in the lights' places; the largest that there is room for is 65535."""
+    words = records.view(np.uint32).copy()
+    words[:, 5] = (words[:, 5] & np.uint32(0xFFFF)) | np.minimum(numbers, 0xFFFF).astype(np.uint32) << np.uint32(16)
+    return words.view(np.float32)
+
+
 @dataclass(frozen=True)
 class CloudSummary:
     """For the legend: records in all, those drawn, and the ends of the scale of their power in watts."""

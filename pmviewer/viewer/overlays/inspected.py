@@ -1,5 +1,5 @@
-"""What is pinned, over the picture: the pixel, its eye path, the disc and the photons of the chosen look-up, and the
-path of the chosen photon. Surfaces hide none of it."""
+"""What is pinned, over the picture: the pixel, its eye path, the disc and the photons of the chosen look-up, the path
+of the chosen photon, and the virtual lights that reach the pixel. Surfaces hide none of it."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ import numpy as np
 from imgui_bundle import imgui
 from numpy.typing import NDArray
 
-from pmviewer.engine.inspector.report import LookUp, PixelReport, luminance
+from pmviewer.engine.inspector.report import LitPlace, LookUp, PixelReport, luminance
 from pmviewer.settings.access import Settings
 from pmviewer.viewer import theme
 from pmviewer.viewer.gl.marks import Marks, Strokes
 from pmviewer.viewer.gl.program import Drawing, Shaders
+from pmviewer.viewer.inspector import ChosenLight
 from pmviewer.viewer.overlays.overlay import Needs, Overlay, Source
 
 if TYPE_CHECKING:
@@ -23,10 +24,15 @@ if TYPE_CHECKING:
 DISC_COLOUR = theme.ACCENT[:3]
 LOW, HIGH = (0.45, 0.30, 0.10), (1.0, 0.93, 0.62)
 """Of photons that add nothing and of the one that adds most."""
+DIM_LIGHT, BRIGHT_LIGHT = (0.10, 0.32, 0.22), (0.62, 1.0, 0.78)
+"""Of virtual lights, likewise."""
+REACH_COLOUR = (0.36, 0.78, 0.55)
+MOST_REACHING = 16
+"""Virtual lights that lines are drawn to, those that add most."""
 CHOSEN_COLOUR = (0.30, 0.85, 1.0)
 WAY_COLOUR = (0.85, 0.85, 0.85)
-SMALLEST, LARGEST, CHOSEN_SIZE = 2.5, 7.0, 9.0
-"""Of a photon's disc in points, by how far apart they are; of the chosen one's."""
+SMALLEST, LARGEST, CHOSEN_SIZE, LIGHT_SIZE = 2.5, 7.0, 9.0, 5.0
+"""Of a photon's disc in points, by how far apart they are; of the chosen one's; of a virtual light's."""
 _AROUND = 64
 _SHORTEST = 6.0
 """The pinned pixel is framed at least so wide, in points."""
@@ -49,8 +55,18 @@ def chain(points: NDArray[np.floating]) -> NDArray[np.float64]:
 
 def levels(look_up: LookUp) -> NDArray[np.float64]:
     """How bright its photons are drawn, (m,), by what they add to the pixel."""
-    adds = luminance(look_up.found.adds)
-    return np.sqrt(adds / max(float(adds.max(initial=0.0)), 1e-30))
+    return brightness(look_up.found.adds)
+
+
+def brightness(adds: NDArray[np.float64]) -> NDArray[np.float64]:
+    """In 0 … 1, (m,), of what adds (m, 3) to the pixel."""
+    Y = luminance(adds)
+    return np.asarray(np.sqrt(Y / max(float(Y.max(initial=0.0)), 1e-30)))
+
+
+def spokes(p: NDArray[np.floating], points: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Lines (2m, 3) from p to each of points (m, 3)."""
+    return np.stack([np.broadcast_to(p, points.shape), points], axis=1).reshape(-1, 3).astype(np.float64)
 
 
 class Inspected(Overlay):
@@ -64,6 +80,7 @@ class Inspected(Overlay):
         super().__init__(shaders)
         self._way, self._disc, self._path = Strokes(shaders), Strokes(shaders), Strokes(shaders)
         self._photons, self._chosen = Marks(shaders), Marks(shaders)
+        self._reach, self._lights = Strokes(shaders), Marks(shaders)
         self._held = False
         self._place: tuple[NDArray[np.float64], float, int] | None = None
 
@@ -85,9 +102,17 @@ class Inspected(Overlay):
 
     def needs(self, source: Source) -> Needs | None:
         report = source.inspector.report if source.inspector is not None else None
-        return None if report is None or source.inspector is None else (report, source.inspector.look_up)
+        if report is None or source.inspector is None:
+            return None
+        return report, source.inspector.look_up, source.inspector.lit, source.inspector.light
 
-    def take(self, report: PixelReport, look_up: LookUp | None) -> None:
+    def take(
+        self,
+        report: PixelReport,
+        look_up: LookUp | None,
+        lit: LitPlace | None = None,
+        light: ChosenLight | None = None,
+    ) -> None:
         self.release()
         self._held = True
         if len(report.way) > 2:  # seen over mirrors: what the camera sees directly is a point
@@ -96,20 +121,40 @@ class Inspected(Overlay):
         if look_up is not None:
             self._disc.upload(disc_lines(look_up.p, look_up.n, look_up.radius))
             self._photons.upload(look_up.found.records[:, :3], levels(look_up))
+        if lit is not None:
+            self._take_lights(lit, light.number if light is not None and light.index == report.index else None)
         life = report.life
         if life is not None and len(life.vertices):
             self._path.upload(chain(life.vertices[:, :3]))
             self._chosen.upload(np.array([life.of.position]), np.ones(1))
 
+    def _take_lights(self, lit: LitPlace, chosen: int | None) -> None:
+        self._lights.upload(lit.points, brightness(lit.adds))
+        self._reach.upload(spokes(lit.p, lit.points[:MOST_REACHING]))
+        at = np.flatnonzero(lit.number == chosen)[:1] if chosen is not None else []
+        if len(at):
+            self._path.upload(spokes(lit.p, lit.points[at]))
+            self._chosen.upload(lit.points[at], np.ones(1))
+
     def release(self) -> None:
         self._held = False
-        for part in (self._way, self._disc, self._path, self._photons, self._chosen):
+        for part in (
+            self._way,
+            self._disc,
+            self._path,
+            self._photons,
+            self._chosen,
+            self._reach,
+            self._lights,
+        ):
             part.release()
 
     def draw_over(self, drawing: Drawing, settings: Settings) -> None:
         self._way.draw(drawing, WAY_COLOUR, 1.5)
+        self._reach.draw(drawing, REACH_COLOUR, 1.5)
         self._path.draw(drawing, CHOSEN_COLOUR, 2.0)
         self._photons.draw(drawing, LOW, HIGH, self._size(drawing))
+        self._lights.draw(drawing, DIM_LIGHT, BRIGHT_LIGHT, LIGHT_SIZE)
         self._disc.draw(drawing, DISC_COLOUR, 2.0)
         self._chosen.draw(drawing, CHOSEN_COLOUR, CHOSEN_COLOUR, CHOSEN_SIZE)
 

@@ -14,8 +14,10 @@ from pmviewer.viewer.format import grouped, si
 from pmviewer.viewer.overlays.legend import wrapped
 from pmviewer.viewer.panels.inspector.fisheye import FisheyeDiscs
 from pmviewer.viewer.panels.inspector.light import draw_history, draw_terms
-from pmviewer.viewer.panels.inspector.photons import NARROW, PhotonTable, draw_life
+from pmviewer.viewer.panels.inspector.photons import PhotonTable, draw_life
 from pmviewer.viewer.panels.inspector.plots import draw_curves, draw_directions
+from pmviewer.viewer.panels.inspector.sorted_table import NARROW
+from pmviewer.viewer.panels.inspector.virtual_lights import LightTable, place_name, place_rows
 from pmviewer.viewer.panels.statistics_panel import table
 from pmviewer.viewer.state import ViewerState
 
@@ -50,6 +52,7 @@ class InspectorPanel:
     def __init__(self, state: ViewerState) -> None:
         self._state = state
         self._photons = PhotonTable()
+        self._lights = LightTable()
         self._fisheye = FisheyeDiscs()
 
     def gui(self) -> None:
@@ -69,9 +72,11 @@ class InspectorPanel:
         if report.fisheye is not None:
             seen = report.fisheye
             self._section("Hemisphere of a gather", lambda: self._fisheye.draw(seen))
+        if report.lit:
+            self._lit(report)
         if report.look_ups:
             self._look_ups(report)
-        elif report.way.size:
+        elif report.way.size and not report.lit:
             wrapped("In the latest pass the path of this pixel looked no photons up.")
         if report.samples is not None and len(report.lights) > 1:
             self._section("Light samples of a pass", lambda: _facts(light_rows(report)))
@@ -94,20 +99,24 @@ class InspectorPanel:
             last = report.objects[-1]
             imgui.set_item_tooltip(f"{last.shape}: material {last.material}, area {last.area:.4g} m²")
 
+    def _lit(self, report: PixelReport) -> None:
+        inspector = self._state.inspector
+        place = inspector.lit
+        assert place is not None
+        names = [place_name(one) for one in report.lit]
+        chosen = one_of("##surface", names, report.lit.index(place), "whose virtual lights are listed and drawn")
+        inspector.surface = chosen if chosen is not None else inspector.surface
+        _facts(place_rows(place))
+        title = f"Virtual lights ({grouped(len(place.number))})###virtual lights"
+        self._section(title, lambda: self._lights.draw(report, place, inspector))
+
     def _look_ups(self, report: PixelReport) -> None:
         inspector = self._state.inspector
         look_up = inspector.look_up
         assert look_up is not None
-        if len(report.look_ups) > 1:
-            imgui.set_next_item_width(-1)
-            if imgui.begin_combo("##look-up", look_up_name(look_up)):
-                for number, one in enumerate(report.look_ups):
-                    if imgui.selectable(f"{look_up_name(one)}##{number}", one is look_up)[0]:
-                        inspector.number = number
-                imgui.end_combo()
-            imgui.set_item_tooltip("The look-up whose photons are listed and drawn")
-        else:
-            imgui.text_colored(imgui.ImVec4(*theme.DIM), look_up_name(look_up))
+        names = [look_up_name(one) for one in report.look_ups]
+        chosen = one_of("##look-up", names, report.look_ups.index(look_up), "whose photons are listed and drawn")
+        inspector.number = chosen if chosen is not None else inspector.number
         _facts(look_up_rows(look_up))
         if not look_up.used:
             wrapped("The final gather looks this map up where its rays end. Here is what it holds at the pixel itself.")
@@ -126,6 +135,22 @@ class InspectorPanel:
     def _section(title: str, draw: Callable[[], None]) -> None:
         if imgui.collapsing_header(title, imgui.TreeNodeFlags_.default_open):
             draw()
+
+
+def one_of(label: str, names: list[str], current: int, tip: str) -> int | None:
+    """A choice among the names, of which one is current, where there is more than one; the number chosen just now."""
+    if len(names) < 2:
+        imgui.text_colored(imgui.ImVec4(*theme.DIM), theme.drawable(names[current]))
+        return None
+    chosen = None
+    imgui.set_next_item_width(-1)
+    if imgui.begin_combo(label, theme.drawable(names[current])):
+        for number, name in enumerate(names):
+            if imgui.selectable(f"{theme.drawable(name)}##{number}", number == current)[0]:
+                chosen = number
+        imgui.end_combo()
+    imgui.set_item_tooltip(f"The one {tip}")
+    return chosen
 
 
 def object_text(seen: Seen) -> str:
