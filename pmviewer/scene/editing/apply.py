@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.scene.arrays.flatten import shape_bounds
+from pmviewer.scene.arrays.shape_bounds import shape_bounds
 from pmviewer.scene.arrays.instances import instance_bounds
 from pmviewer.scene.description import ImageEnvironment, Light, Material, Scene, Shape
 from pmviewer.scene.editing.catalogue import Target, catalogue_of, refusal
