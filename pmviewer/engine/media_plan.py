@@ -34,7 +34,8 @@ BLURRED = "Photons keep their directions to 0.06°: light that media scatter nea
 
 
 def in_media(settings: Settings, emit: bool) -> tuple[Settings, tuple[str, ...]]:
-    """The settings that a scene with media, which `emit` light or don't, goes by, and sentences about those that are others than were asked for."""
+    """The settings that a scene with media, which `emit` light or don't, goes by, and sentences about those that are
+    others than were asked for."""
     changes: dict[str, Any] = {}
     said: list[str] = []
     for lacking in (*LACKING, *((LOOKED_FOR,) if emit and settings.render.method != "path" else ())):

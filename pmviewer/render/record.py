@@ -97,8 +97,8 @@ themselves; paths from the camera that `max_depth` ended."""
 @dataclass(frozen=True)
 class Evaluation:
     """How a pass evaluates the terms of the picture: what it samples, and what it looks up in which maps. Each field is
-    one of EYE_DTYPE by its name, the last of scenes with media and of paths that split, but for `looked_for`, which sets
-    `mis`; radii and `corner` are in scene units. The defaults sample and look up nothing."""
+    one of EYE_DTYPE by its name, the last of scenes with media and of paths that split, but for `looked_for`, which
+    sets `mis`; radii and `corner` are in scene units. The defaults sample and look up nothing."""
 
     direct: bool = False
     followed_direct: bool = False

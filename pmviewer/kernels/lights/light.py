@@ -172,8 +172,8 @@ def sample_one_light(scene, light, x, u, v):
 
     Returns unit `wi`, the end point of the shadow ray, the radiance L arriving if nothing is in between, its pdf per
     solid angle (0: no contribution; for point lights and spots L/pdf is intensity/distance², for directional ones
-    irradiance) and whether a BSDF sample could have found it (False for point, spot and directional lights, and for media
-    that emit, which are sampled where rays don't look for them).
+    irradiance) and whether a BSDF sample could have found it (False for point, spot and directional lights, and for
+    media that emit, which are sampled where rays don't look for them).
     """
     if has_media(scene):
         return _sample_with_glows

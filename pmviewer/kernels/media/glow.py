@@ -186,7 +186,7 @@ def near_glow(scene, medium, x):
 @device
 def near_a_glow(scene, x):
     """The same of any medium that emits."""
+    near = False
     for glow in range(scene.emits):
-        if _in_wide_box(scene, _i8(glow) * GLOW_COLUMNS, x):
-            return True
-    return False
+        near = near or _in_wide_box(scene, _i8(glow) * GLOW_COLUMNS, x)
+    return near

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.dimensions import PATH_FLIGHT
 from pmviewer.kernels.media.flight import fly

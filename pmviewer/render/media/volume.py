@@ -161,8 +161,9 @@ def _indirect(given, stretch):
 
 @device
 def from_media(given, ray, hit, sampler, numbers, of_phase, counts, looks):
-    """What media send back along the ray up to what it met, FromMedia; what they have emitted if it `looks` for that. numbers, of_phase: four random numbers each,
-    which all stretches share, as nothing multiplies what two of them find."""
+    """What media send back along the ray up to what it met, FromMedia; what they have emitted if it `looks` for that.
+    numbers, of_phase: four random numbers each, which all stretches share, as nothing multiplies what two of them
+    find."""
     scene, eye = given.scene, given.eye
     single, indirect, emitted, T = _BLACK, _BLACK, _BLACK, _WHITE
     o, medium, left = ray.o, ray.medium, hit.t

@@ -32,7 +32,7 @@ from pmviewer.scene.arrays.media import has_media, light_media, media_of_prims, 
 from pmviewer.scene.arrays.shape_bounds import shape_bounds
 from pmviewer.scene.arrays.stored_geometry import StoredGeometry, same_surfaces, stored_geometry
 from pmviewer.scene.arrays.textured_emission import Emission, textured_lights
-from pmviewer.scene.description import LUMINANCE, Mesh, Scene
+from pmviewer.scene.description import LUMINANCE, Scene
 from pmviewer.scene.grid import Grid
 from pmviewer.scene.spectrum import spectrum
 

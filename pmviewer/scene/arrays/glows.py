@@ -116,7 +116,7 @@ def _density(medium: Medium, box: Float) -> tuple[Grid, Float, bool]:
 
 
 def _resampled(grid: Grid, box: Float) -> tuple[NDArray[np.float32], Float]:
-    """The grid's largest values around each number of a lattice on the box that is as fine, and its mean per channel."""
+    """The grid's largest values around each number of a lattice on the box that is as fine, and its mean a channel."""
     from scipy.ndimage import map_coordinates  # not for scenes that are opened every day
 
     size = np.array(grid.values.shape[2::-1])

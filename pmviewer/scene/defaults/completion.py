@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.arrays.covered_emission import without_unseen_lights
-from pmviewer.scene.arrays.media import media_emitting
 from pmviewer.scene.arrays.instances import joint_bounds
+from pmviewer.scene.arrays.media import media_emitting
 from pmviewer.scene.clean import check_camera
 from pmviewer.scene.defaults.framing import Up
 from pmviewer.scene.defaults.light_reach import lights_enough
