@@ -9,6 +9,7 @@ from pmviewer.kernels.lights.in_media import media_of_lights
 from pmviewer.kernels.media.glow import GL_MEDIUM
 from pmviewer.kernels.media.locate import UNKNOWN, media_at
 from pmviewer.kernels.media.medium import MD_GLOW, MEDIUM_COLUMNS, SAME
+from pmviewer.scene.arrays.shape_bounds import shape_bounds
 from pmviewer.scene.description import Medium, Scene, Shape
 
 _PHOTONS = 16
@@ -22,6 +23,13 @@ def has_media(scene: Scene) -> bool:
     bounded = any(shape.media is not None and max(shape.media) >= 0 for shape in scene.all_shapes)
     cameras = (scene.camera, *(named.camera for named in scene.cameras))
     return bool(scene.media) and (bounded or any(camera.medium >= 0 for camera in cameras))
+
+
+def media_bounds(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest corner (3,) of the box around what bounds media; around all surfaces where nothing does."""
+    bounding = [s for s in scene.shapes if s.media is not None and max(s.media) >= 0]
+    boxes = np.array([shape_bounds(shape) for shape in bounding or scene.shapes])
+    return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
 
 
 def media_emitting(scene: Scene) -> int:
