@@ -6,7 +6,7 @@ nothing; the session adds what is missing to the frame that is there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -39,14 +39,23 @@ from pmviewer.photons.deposition.rules import SMALLEST_EPSILON
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.diagnostics.density import WIDEST, counting_eye, counting_tree, density_view
 from pmviewer.render.diagnostics.diagnostics import FAMILY_CHANNELS, lookup_view, radiance_view, shadow_view
+from pmviewer.render.diagnostics.matter import beam_view, depth_view, slice_view
 from pmviewer.render.film import Film
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL
 from pmviewer.render.planes import view_of
 from pmviewer.render.virtual_lights.film import WeightedFilm
+from pmviewer.scene.arrays.media import media_bounds
 from pmviewer.settings.access import Settings, needs_of
 from pmviewer.settings.needs import Facts, unmet
 
 TILE = 2048
+MATTER: Mapping[str, tuple[str, str]] = {
+    "depth in media": ("optical depth", "mean free path"),
+    "beams": ("volume radius", "volume photon count"),
+    "slice": ("extinction slice", "photon slice"),
+}
+"""Views of media by their family, in the order of the channels."""
+MATTER_CHANNELS = {family: len(views) for family, views in MATTER.items()}
 CELL_NEIGHBOURS = 12
 
 
@@ -130,7 +139,7 @@ def diagnostic_planes(wanted: Wanted, looked: Looked, pool: WorkPool) -> dict[st
         return estimates.views() if estimates is not None else {}
     if wanted.family == "noise":
         return noise_plane(looked.film)
-    channels = {**FAMILY_CHANNELS, "importance": IMPORTANCE_CHANNELS, "density": 1, "storing": 1}
+    channels = {**FAMILY_CHANNELS, **MATTER_CHANNELS, "importance": IMPORTANCE_CHANNELS, "density": 1, "storing": 1}
     planes = _drawn(looked, channels[wanted.family], lambda out: _kernel(wanted, looked, out), pool)
 
     def plane(*channels: int) -> NDArray[np.float32]:
@@ -140,6 +149,8 @@ def diagnostic_planes(wanted: Wanted, looked: Looked, pool: WorkPool) -> dict[st
         return {"look-up radius": plane(0), "photon count": plane(1)}
     if wanted.family == "shadow rays":
         return {"shadow rays skipped": plane(0)}
+    if wanted.family in MATTER:
+        return {view: plane(channel) for channel, view in enumerate(MATTER[wanted.family])}
     has_required = looked.plan.importance or bool(looked.rendered.maps.rules.everywhere)
     if wanted.family == "importance":
         return (
@@ -211,6 +222,12 @@ def _kernel(wanted: Wanted, looked: Looked, out: NDArray[np.float32]) -> Callabl
         cells = cells_of(radiance)
         draw = partial(radiance_view, scene, eye, given.global_map, given.radiance, cells.record, out)
         return lambda first, last: (draw(first, last), cells)  # the grid lives as long as its record is used
+    if wanted.family == "depth in media":
+        return partial(depth_view, scene, eye, out)
+    if wanted.family == "beams":
+        return partial(beam_view, scene, eye, given.volume_map, out)
+    if wanted.family == "slice":
+        return partial(slice_view, scene, eye, given.volume_map, *_plane_of_slice(wanted, looked), out)
     latest, asked = looked.importance.latest, looked.settings.importance
     if wanted.family == "importance":
         importance = NO_IMPORTANCE if latest is None else latest.record(wanted.map)
@@ -226,6 +243,13 @@ def _kernel(wanted: Wanted, looked: Looked, out: NDArray[np.float32]) -> Callabl
         draw = partial(density_view, scene, counting_eye(eye), tree.record, widest, out)
         return lambda first, last: (draw(first, last), tree)  # the tree lives as long as its record is used
     return _lookup_kernel(wanted.map, looked, out)
+
+
+def _plane_of_slice(wanted: Wanted, looked: Looked) -> tuple[np.int64, np.float32]:
+    """Axis and coordinate of the slice that is wanted."""
+    axis, share = wanted.slice
+    low, high = media_bounds(looked.scene.scene)
+    return np.int64(axis), np.float32(low[axis] + share * (high[axis] - low[axis]))
 
 
 def _lookup_kernel(name: str, looked: Looked, out: NDArray[np.float32]) -> Callable[[int, int], Any]:

@@ -22,7 +22,8 @@ if TYPE_CHECKING:  # numba, which the window doesn't wait for
 
 @dataclass(frozen=True)
 class Wanted:
-    """What the display asks for: a family of diagnostic planes (of which map, for look-ups), so many photon paths, the
+    """What the display asks for: a family of diagnostic planes (of which map, for look-ups, or of which `slice`: axis
+    and place from 0 to 1), so many photon paths, the
     gather rays of a pixel (x, y), the fates of the photons of so many trajectories, the importance of the lights, the
     picture without its noise, what made a pixel, and the photons and other points of the latest pass, which a pass that
     was rendered here has anyway."""
@@ -36,6 +37,7 @@ class Wanted:
     denoised: bool = False
     pinned: Pinned | None = None
     points: bool = False
+    slice: tuple[int, float] = (2, 0.5)
 
     @property
     def of_pass(self) -> bool:
@@ -45,6 +47,8 @@ class Wanted:
     def lacks(self, held: Wanted) -> bool:
         """Whether a frame that holds `held` lacks something of this."""
         if self.family is not None and (self.family, self.map) != (held.family, held.map):
+            return True
+        if self.family == "slice" and self.slice != held.slice:
             return True
         if self.pixel is not None and self.pixel != held.pixel:
             return True

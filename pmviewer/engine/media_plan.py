@@ -27,16 +27,18 @@ LACKING = (
 VIRTUAL = "Virtual lights do not know of media: the method progressive shows the scene."
 THIN = "Light passes thin glass as through all glass: simplified panes do not know of media."
 MAP_ALONE = "A map alone shows no light that media scatter: choose progressive, gather or path."
-EMITS = "No photons leave what media emit: it is seen, and lights surfaces by gather rays alone. Choose path."
+LOOKED_FOR = Lacking("direct.mis", True, "Direct light is looked for by rays, too: media that emit light need it.")
+"""Where media emit: what is near to them is lit by what rays find."""
 BLURRED_FROM = 0.99
 BLURRED = "Photons keep their directions to 0.06°: light that media scatter nearly straight on is blurred by that."
 
 
-def in_media(settings: Settings) -> tuple[Settings, tuple[str, ...]]:
-    """The settings that a scene with media goes by, and sentences about those that are others than were asked for."""
+def in_media(settings: Settings, emit: bool) -> tuple[Settings, tuple[str, ...]]:
+    """The settings that a scene with media, which `emit` light or don't, goes by, and sentences about those that are
+    others than were asked for."""
     changes: dict[str, Any] = {}
     said: list[str] = []
-    for lacking in LACKING:
+    for lacking in (*LACKING, *((LOOKED_FOR,) if emit and settings.render.method != "path" else ())):
         group, name = lacking.name.split(".")
         if getattr(getattr(settings, group), name) != lacking.instead:
             changes[lacking.name] = lacking.instead

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
-from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, EMITS, THIN, in_media
+from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, THIN, in_media
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
 from pmviewer.render.filter import BOX, filter_of, is_signed
@@ -43,7 +43,8 @@ class Plan:
     store, `emission` how importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0
     without; `virtual` is whether virtual lights bring the indirect light; `media` whether the scene has participating
     media, and `volume` whether photons are stored in them and light that they scatter is looked up, `phase_rays`
-    whether rays by phase functions can meet a light; `dispersion` whether glass splits light into colours; `lens`
+    whether rays by phase functions can meet a light, `looked_for` whether direct light is looked for by rays whatever
+    `direct.mis` says; `dispersion` whether glass splits light into colours; `lens`
     whether the render camera has one, `filtered` whether the film has another reconstruction filter than the plain box,
     `moments` whether the film keeps what passes tell of its noise, `split` whether camera paths go both ways at glass;
     `thin_glass` are the rules by which light passes panes of glass, () where all of it is exact; `maps` is how many
@@ -77,6 +78,7 @@ class Plan:
     media: bool = False
     volume: bool = False
     phase_rays: bool = False
+    looked_for: bool = False
     dispersion: bool = False
     caustic_mask: int = 0
     global_mask: int = 0
@@ -143,15 +145,14 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     if not traits.has_media:
         return _plan_of(settings, traits)
     asked = settings
-    settings, said = in_media(settings)
+    settings, said = in_media(settings, traits.media_emit)
     plan = _plan_of(settings, traits)
     if any(rule not in ("exact", "by setting") for rule in traits.thin_glass) or (
         "by setting" in traits.thin_glass and asked.render.thin_glass != "exact"
     ):
         said = (*said, THIN)
-    if traits.media_emit and settings.render.method != "path":
-        said = (*said, EMITS)
-    return replace(plan, media=True, warnings=(*plan.warnings, *said))
+    looked_for = traits.media_emit and not plan.path
+    return replace(plan, media=True, looked_for=looked_for, warnings=(*plan.warnings, *said))
 
 
 def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
@@ -160,7 +161,7 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         plan = replace(
             plan,
             volume=True,
-            phase_rays=traits.has_findable_lights,
+            phase_rays=traits.has_findable_lights or traits.media_emit,
             skipped=tuple(s for s in plan.skipped if s[0] != "light pass"),
             warnings=(*plan.warnings, *((BLURRED,) if traits.straightest > BLURRED_FROM else ())),
         )

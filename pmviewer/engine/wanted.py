@@ -10,7 +10,7 @@ from pmviewer.engine.method import Plan
 from pmviewer.output.diagnostic_views import DENOISED, DIAGNOSTICS
 from pmviewer.settings.access import Settings, get, needs_of
 from pmviewer.settings.needs import Facts, unmet
-from pmviewer.settings.schema.display import MAP_VIEWS
+from pmviewer.settings.schema.display import MAP_VIEWS, SLICE_VIEWS
 
 POINTS = "caustic", "global", "volume", "radiance", "cache", "shadow", "virtual", "importons"
 """Overlays of points of the latest pass."""
@@ -30,6 +30,8 @@ def wanted_of(facts: Facts, pixel: tuple[int, int] | None = None, pinned: Pinned
     if view in DIAGNOSTICS and unmet(needs_of(f"display.view={view}"), facts) is None:
         map_ = looked_map(settings, facts.plan) if view in MAP_VIEWS else ""
         wanted = replace(wanted, family=DIAGNOSTICS[view].family, map=map_)
+        if view in SLICE_VIEWS:
+            wanted = replace(wanted, slice=("xyz".index(settings.display.slice_axis), settings.display.slice))
     if view == DENOISED and unmet(needs_of(f"display.view={view}"), facts) is None:
         wanted = replace(wanted, denoised=True)
     if shown("paths"):

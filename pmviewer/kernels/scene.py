@@ -77,7 +77,9 @@ THIN_FIELDS: list[tuple[str, str]] = [
 MEDIA_FIELDS: list[tuple[str, str]] = [
     ("media", "i8"),  # float32 (n_media, MEDIUM_COLUMNS), see `pmviewer.kernels.media.medium`
     ("prim_media", "i8"),  # int32 (n_prims, 2): the media inside and outside of each primitive, SAME where none ends
-    ("emits", "i8"),  # whether some of them emit light
+    ("emits", "i8"),  # how many of them emit light
+    ("glows", "i8"),  # float64 (emits, GLOW_COLUMNS), see `pmviewer.kernels.media.glow`
+    ("glow_cdf", "i8"),  # float64: cumulative shares of the numbers of their lattices
     ("light_media", "i8"),  # int32 (n_lights,): the medium that photons of a light start in
 ]
 """Of scenes with participating media."""
@@ -172,8 +174,9 @@ M_GLASS = _columns[43]
 """
 BSDF_TABLE_SIZE = 64
 
-PARALLELOGRAM, DISK, SPHERE, CYLINDER, MESH, POINT, ENVIRONMENT, SPOT, DIRECTIONAL, IMAGE = range(10)
-"""Kinds of lights; those from SPOT on are in scenes whose record has LIGHT_FIELDS alone."""
+PARALLELOGRAM, DISK, SPHERE, CYLINDER, MESH, POINT, ENVIRONMENT, SPOT, DIRECTIONAL, IMAGE, GLOW = range(11)
+"""Kinds of lights; SPOT, DIRECTIONAL and IMAGE are in scenes whose record has LIGHT_FIELDS alone, GLOW (a medium that
+emits, its row in `glows` being L_FIRST) where it has MEDIA_FIELDS."""
 LIGHT_COLUMNS = 20
 L_KIND, L_RADIANCE, L_A, L_B, L_C = _columns[[0, 1, 4, 7, 10]]
 L_AREA, L_RADIUS, L_LENGTH, L_FLIP, L_FIRST, L_COUNT = _columns[13:19]

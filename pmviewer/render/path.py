@@ -76,8 +76,9 @@ def path_pass(scenes, eyes, film, counts, first, last):
         by_chain = False  # whether it took one right after the first of these
         in_medium = False  # whether the first of these was a collision in a medium
         origin, pdf = ray.o, _f4(0.0)  # where the last direction was sampled, and its density, 0 if the lobe is a delta
+        followed = True  # whether that was by the camera or followed lobes, where media's light is not sampled
         for depth in range(eye.max_depth + 1):
-            arrival = arrive_by_flight(scene, eye, ray, beta, seed, depth)
+            arrival = arrive_by_flight(scene, eye, ray, beta, seed, depth, origin, followed)
             hit = arrival.hit
             counts[C_RAYS] += arrival.rays
             term = EMISSION
@@ -109,6 +110,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 if not u_end < survival:
                     break
                 origin, ray, pdf, beta = after.ray.o, after.ray, after.pdf, scale(after.beta, _f4(1.0) / survival)
+                followed = False
                 continue
             if hit.prim >= 0:
                 si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
@@ -154,4 +156,4 @@ def path_pass(scenes, eyes, film, counts, first, last):
             if not u_end < survival:
                 break
             beta = scale(beta, _f4(1.0) / survival)
-            origin, ray = si.p, leaving(si, wi)
+            origin, ray, followed = si.p, leaving(si, wi), group == FOLLOWED

@@ -97,8 +97,8 @@ themselves; paths from the camera that `max_depth` ended."""
 @dataclass(frozen=True)
 class Evaluation:
     """How a pass evaluates the terms of the picture: what it samples, and what it looks up in which maps. Each field is
-    one of EYE_DTYPE by its name, the last four of scenes with media and of paths that split; radii and `corner` are in
-    scene units. The defaults sample and look up nothing."""
+    one of EYE_DTYPE by its name, the last of scenes with media and of paths that split, but for `looked_for`, which
+    sets `mis`; radii and `corner` are in scene units. The defaults sample and look up nothing."""
 
     direct: bool = False
     followed_direct: bool = False
@@ -123,6 +123,7 @@ class Evaluation:
     radiance_cutoff: float = 0.0
     volume_light: bool = False
     phase_rays: bool = False
+    looked_for: bool = False
     volume_radius: float = 0.0
     splits: int = 0
 
@@ -152,7 +153,7 @@ def eye_record(
     r["outline_rays"] = settings.render.outline_rays
     r["glossy"] = settings.photons.glossy
     direct = settings.direct
-    r["light_samples"], r["mis"] = direct.samples, direct.mis
+    r["light_samples"], r["mis"] = direct.samples, direct.mis or evaluation.looked_for
     r["con_samples"], r["noncon_samples"] = direct.con_samples, direct.noncon_samples
     estimate = settings.estimate
     r["filter"], r["rim"] = FILTERS.index(estimate.filter), RIMS.index(estimate.rim)

@@ -24,7 +24,7 @@ from pmviewer.kernels.surface import leave
 from pmviewer.kernels.vector import dot, largest, mul, sub
 from pmviewer.render.cast import Ray, cast, leaving, medium_towards
 from pmviewer.render.chain import BLACK, WHITE
-from pmviewer.render.media.through import BEFORE_LIGHT, light_through, way_through
+from pmviewer.render.media.through import BEFORE_LIGHT, light_through, place_of, way_through
 
 MOST_PANES = 256
 """A ray is stopped by the pane after so many."""
@@ -41,20 +41,22 @@ def visible(scene, p, ng, gap, wi, end):
 
 
 @specialised
-def transmission(scene, si, wi, end, straight):
-    """The share (red, green, blue) of light from `end`, in direction wi, that reaches a SurfaceInteraction: all, none,
-    or what media, and where it may go `straight` panes, let through."""
+def transmission(scene, si, light, wi, end, straight):
+    """The share (red, green, blue) of a light sample, from `end` in direction wi, that reaches a SurfaceInteraction:
+    all, none, or what media, and where it may go `straight` panes, let through."""
     if has_media(scene):
 
-        def through_media(scene, si, wi, end, straight):
+        def through_media(scene, si, light, wi, end, straight):
             o = leave(si.p, si.ng, si.gap, wi[0], wi[1], wi[2])
-            return light_through(scene, o, end, medium_towards(si, wi))
+            return light_through(scene, o, end, medium_towards(si, wi), place_of(scene, light))
 
         return through_media
     if not has_thin_glass(scene):
-        return lambda scene, si, wi, end, straight: WHITE if visible(scene, si.p, si.ng, si.gap, wi, end) else BLACK
+        return lambda scene, si, light, wi, end, straight: (
+            WHITE if visible(scene, si.p, si.ng, si.gap, wi, end) else BLACK
+        )
 
-    def through(scene, si, wi, end, straight):
+    def through(scene, si, light, wi, end, straight):
         p, ng, gap = si.p, si.ng, si.gap
         if not straight:
             return WHITE if visible(scene, p, ng, gap, wi, end) else BLACK

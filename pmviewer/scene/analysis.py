@@ -13,7 +13,7 @@ from pmviewer.scene.arrays.material_lobes import (
     is_rough_glass,
 )
 from pmviewer.scene.arrays.material_row import is_rich, used_materials
-from pmviewer.scene.arrays.media import has_media
+from pmviewer.scene.arrays.media import has_media, media_emitting
 from pmviewer.scene.description import (
     Camera,
     DirectionalLight,
@@ -114,7 +114,9 @@ def analyse(scene: Scene) -> SceneTraits:
         has_diffuse=any(has_diffuse_lobe(m) for m in used),
         has_environment=any(isinstance(light, Environment) for light in scene.lights),
         has_smooth_normals=any(getattr(s.geometry, "normals", None) is not None for s in scene.all_shapes),
-        n_lights=len(scene.lights) + sum(s.radiance is not None and max(s.radiance) > 0 for s in scene.shapes),
+        n_lights=len(scene.lights)
+        + sum(s.radiance is not None and max(s.radiance) > 0 for s in scene.shapes)
+        + media_emitting(scene),
         rich=is_rich(scene),
         has_delta=any(is_delta(m) for m in used),
         has_rough_glass=any(is_rough_glass(m) for m in used),
@@ -126,7 +128,7 @@ def analyse(scene: Scene) -> SceneTraits:
         thin_glass=tuple(sorted({m.thin_rule for m in panes})),
         has_other_specular=any(always_followed(m) and not any(m is pane for pane in panes) for m in used),
         has_media=has_media(scene),
-        media_emit=has_media(scene) and any(max(m.emission) > 0 for m in scene.media),
+        media_emit=media_emitting(scene) > 0,
         straightest=max((max(abs(m.phase.g), abs(m.phase.g_beside)) for m in scene.media), default=0.0),
         has_findable_lights=any(isinstance(light, Environment) for light in scene.lights)
         or any(s.radiance is not None and max(s.radiance) > 0 for s in scene.shapes),

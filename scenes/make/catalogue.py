@@ -7,6 +7,7 @@ from functools import partial
 
 from make.boxes import glossy, lights, water
 from make.cabin import car_cabin
+from make.candle import candle_flame
 from make.cardioid import cardioid
 from make.colonnade import colonnade
 from make.corners import corner_room, glossy_room
@@ -26,6 +27,7 @@ from make.smoke import cornell_smoke
 
 SCENES: dict[str, Callable[[], MadeScene]] = {
     "car_cabin": car_cabin,
+    "candle_flame": candle_flame,
     "cardioid_100": partial(cardioid, 1.0),
     "cardioid_050": partial(cardioid, 0.5),
     "cardioid_010": partial(cardioid, 0.1),

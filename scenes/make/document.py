@@ -95,6 +95,13 @@ def smoke(identifier: str, stem: str, low: Colour, high: Colour, sigma: float, a
     return f'<medium type="heterogeneous" id="{identifier}">{values}</medium>'
 
 
+def flame(identifier: str, soot: str, light: str, box: tuple[Colour, Colour], sigma: float, albedo: Colour) -> str:
+    """`smoke` that emits the radiance per metre in `grids/light.vol`, which is the program's own."""
+    values = grid("sigma_t", soot, *box) + grid("emission", light, *box) + number("scale", sigma)
+    values += f'<volume type="constvolume" name="albedo">{rgb("value", *albedo)}</volume>'
+    return f'<medium type="heterogeneous" id="{identifier}">{values}</medium>'
+
+
 def boundary(low: Colour, high: Colour, inside: str) -> str:
     """A box that nothing shows but the medium in it."""
     size = ", ".join(numbers((b - a) / 2) for a, b in zip(low, high))

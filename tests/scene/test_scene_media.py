@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.immersion import immersed
-from pmviewer.engine.media_plan import BLURRED, EMITS
+from pmviewer.engine.media_plan import BLURRED, LOOKED_FOR
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
 from pmviewer.kernels.memory import at_address
@@ -157,9 +157,9 @@ def test_lobes_narrower_than_photons_directions_are_said(tmp_path):
         assert (BLURRED in plan_of(Settings(), traits).warnings) == said
 
 
-def test_light_of_media_that_photons_do_not_carry_is_said(tmp_path):
+def test_where_media_emit_rays_look_for_light_whatever_is_asked(tmp_path):
     for emission, method, said in (("1", "progressive", True), ("1", "path", False), ("0", "gather", False)):
         fog = FOG.format(f'<rgb name="emission" value="{emission}"/>')
         traits = open_scene(scene_of(tmp_path, fog, CUBE.format(INSIDE))).traits
-        plan = plan_of(with_values(Settings(), {"render.method": method}), traits)
-        assert (EMITS in plan.warnings) == said
+        plan = plan_of(with_values(Settings(), {"render.method": method, "direct.mis": False}), traits)
+        assert (LOOKED_FOR.sentence in plan.warnings) == said

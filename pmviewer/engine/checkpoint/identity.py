@@ -29,7 +29,7 @@ PARTS = {
         *("light_textures", "light_frames", "light_tables", "sky_texels", "sky_rows", "sky_cells"),
     ),
     "media": (
-        *("media", "prim_media", "light_media"),
+        *("media", "prim_media", "light_media", "glows", "glow_cdf"),
         *("voxels", "grid_blocks", "grid_frames", "grid_sizes", "medium_grids"),
     ),
 }

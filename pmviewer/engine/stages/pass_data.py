@@ -70,6 +70,7 @@ def _evaluation(settings: Settings, plan: Plan, maps: PassMaps) -> Evaluation:
         radiance_cutoff=maps.radiance_reach,
         volume_light=plan.volume,
         phase_rays=plan.phase_rays,
+        looked_for=plan.looked_for,
         splits=settings.render.splits if plan.split else 0,
         volume_radius=maps.volume.radius if maps.volume is not None else 0.0,
     )

@@ -4,9 +4,9 @@ Area lights are one-sided: they emit where their normal points; a mesh with vert
 Mitsuba 3. Photons leave it with the surface's own cosine in that half of all directions, whose integral is π whatever
 the vertex normals are: cosines and densities are always those of the surface.
 
-Lights are picked with probability proportional to their power's luminance. Spots, directional lights and image
-environments have files of their own; scenes without them have another type of record (`pmviewer.kernels.scene`) and
-compile nothing of them.
+Lights are picked with probability proportional to their power's luminance. Spots, directional lights, image
+environments and media that emit have files of their own; scenes without them have another type of record
+(`pmviewer.kernels.scene`) and compile nothing of them.
 """
 
 from __future__ import annotations
@@ -21,12 +21,15 @@ from pmviewer.kernels.lights.distant import behind_scene, emit_directional, outs
 from pmviewer.kernels.lights.environment import emit_image, image_pdf, image_radiance, sample_image
 from pmviewer.kernels.lights.spot import emit_spot, sample_spot
 from pmviewer.kernels.lights.textured_light import area_density, emission_at, picked_triangle, radiance_from, spread
+from pmviewer.kernels.media.glow import emit_glow, sample_glow
+from pmviewer.kernels.media.medium import has_media
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.scene import (
     CYLINDER,
     DIRECTIONAL,
     DISK,
     ENVIRONMENT,
+    GLOW,
     IMAGE,
     L_A,
     L_AREA,
@@ -169,8 +172,26 @@ def sample_one_light(scene, light, x, u, v):
 
     Returns unit `wi`, the end point of the shadow ray, the radiance L arriving if nothing is in between, its pdf per
     solid angle (0: no contribution; for point lights and spots L/pdf is intensity/distance², for directional ones
-    irradiance) and whether a BSDF sample could have found it (False for point, spot and directional lights).
+    irradiance) and whether a BSDF sample could have found it (False for point, spot and directional lights, and for
+    media that emit, which are sampled where rays don't look for them).
     """
+    if has_media(scene):
+        return _sample_with_glows
+    return _sampler_but_of_glows(scene)
+
+
+def _sample_with_glows(scene, light, x, u, v):
+    if np.int32(light_number(scene, light, L_KIND)) == GLOW:
+        return sample_glow(scene, light, x, u, v)
+    return _sample_but_glows(scene, light, x, u, v)
+
+
+@specialised
+def _sample_but_glows(scene, light, x, u, v):
+    return _sampler_but_of_glows(scene)
+
+
+def _sampler_but_of_glows(scene):
     if not has(scene, "more_lights"):
 
         def plain(scene, light, x, u, v):
@@ -324,7 +345,25 @@ def emit_photon(scene, u_pick, position, direction):
 
 @specialised
 def emit_from(scene, light, position, direction):
-    """Origin, unit direction and power of a photon that leaves that light; the power's luminance is 1."""
+    """Origin, unit direction and power of a photon that leaves that light; the power's luminance is 1, or 0 of a place
+    that a medium which emits turns out not to fill."""
+    if has_media(scene):
+        return _emit_with_glows
+    return _emitter_but_of_glows(scene)
+
+
+def _emit_with_glows(scene, light, position, direction):
+    if np.int32(light_number(scene, light, L_KIND)) == GLOW:
+        return emit_glow(scene, light, position, direction)
+    return _emit_but_glows(scene, light, position, direction)
+
+
+@specialised
+def _emit_but_glows(scene, light, position, direction):
+    return _emitter_but_of_glows(scene)
+
+
+def _emitter_but_of_glows(scene):
     if not has(scene, "more_lights"):
 
         def plain(scene, light, position, direction):

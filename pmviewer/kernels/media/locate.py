@@ -7,22 +7,18 @@ import numpy as np
 from pmviewer.kernels.accel.instance import stored_prim
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.compile.jit import device, kernel
-from pmviewer.kernels.dimensions import EMISSION
-from pmviewer.kernels.lights.light import emit_from
 from pmviewer.kernels.media.medium import MOST_BOUNDARIES, SAME
 from pmviewer.kernels.memory import load_i4
-from pmviewer.kernels.random import INDEPENDENT, draw4
 from pmviewer.kernels.surface import leave, surface_at
 from pmviewer.kernels.vector import dot
 
 _f4 = np.float32
 _i8 = np.int64
-_u4 = np.uint32
 UNKNOWN = -2
 
 
 @device
-def _medium_behind(scene, o, d):
+def medium_behind(scene, o, d):
     """The medium at o, UNKNOWN where no boundary is met in direction d. Surfaces that separate no media are passed."""
     for _ in range(MOST_BOUNDARIES):
         t, found, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), _f4(np.inf))
@@ -46,15 +42,4 @@ def media_at(scenes, origins, directions, found):
     for i in range(len(origins)):
         o = (origins[i, 0], origins[i, 1], origins[i, 2])
         d = (directions[i, 0], directions[i, 1], directions[i, 2])
-        found[i] = _medium_behind(scene, o, d)
-
-
-@kernel
-def media_of_lights(scenes, found):
-    """The media that photons of each light start in, of as many photons as found (n_lights, m) int64 has columns."""
-    scene = scenes[0]
-    for light in range(found.shape[0]):
-        for j in range(found.shape[1]):
-            u0, u1, u2, u3 = draw4(INDEPENDENT, _u4(light), _u4(j), EMISSION)
-            p, d, _ = emit_from(scene, _i8(light), (u0, u1), (u2, u3))
-            found[light, j] = _medium_behind(scene, p, d)
+        found[i] = medium_behind(scene, o, d)

@@ -23,10 +23,11 @@ from pmviewer.kernels.vector import dot, largest
 _f4 = np.float32
 _i8 = np.int64
 
-MEDIUM_COLUMNS = 12
-MD_SIGMA_T, MD_ALBEDO, MD_EMISSION, MD_G, MD_G_BESIDE, MD_BESIDE = np.array([0, 3, 6, 9, 10, 11], np.int64)
+MEDIUM_COLUMNS = 13
+MD_SIGMA_T, MD_ALBEDO, MD_EMISSION, MD_G, MD_G_BESIDE, MD_BESIDE, MD_GLOW = np.array([0, 3, 6, 9, 10, 11, 12], np.int64)
 """Columns of a medium's row: extinction per length, albedo, radiance emitted per length, each RGB; the mean cosines of
-the two lobes of the phase function, and the share of the second."""
+the two lobes of the phase function, the share of the second; and its glow (`pmviewer.kernels.media.glow`), −1 where
+nothing is emitted."""
 VACUUM = np.int64(-1)
 SAME = -2
 """Of a side of a surface that ends no medium."""

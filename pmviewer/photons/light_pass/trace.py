@@ -34,11 +34,11 @@ from pmviewer.kernels.compile.jit import inlined, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import COPIES, EMISSION, EMITTER, FURTHER_PHOTONS_SALT, PHOTON_SCATTER, STORE, WAVE
 from pmviewer.kernels.lights.light import is_delta_light
-from pmviewer.kernels.media.medium import light_medium
+from pmviewer.kernels.media.medium import has_media, light_medium
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import STRAIGHT, adjoint_cosines, face, leave, surface_at
-from pmviewer.kernels.vector import dot, is_good, luminance, mul, scale
+from pmviewer.kernels.vector import dot, is_good, largest, luminance, mul, scale
 from pmviewer.maps.photon_words import encode_direction
 from pmviewer.maps.record import BOUNCES, CAUSTIC, HAD_DIFFUSE, INDIRECT_CAUSTIC, LAST_SPECULAR, UNFOUND
 from pmviewer.photons.light_pass.banded import write_of_wave
@@ -136,8 +136,9 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
         good = is_good(beta)
         if not (good and starts):
             counts[C_DROPPED] += 0 if good else 1
-            ledgers[kind, E_ESCAPED if good else E_DROPPED] += _f8(factor)
+            ledgers[kind, _of_no_start(scene, beta) if good else E_DROPPED] += _f8(factor)
             continue
+        _book_start(scene, beta, factor, ledgers, kind)
         begin_path(paths, i, p, d, scale(beta, factor), light)
         of = Trajectory(i, seed, index, light, factor, to_global)
         photon = Photon(p, d, light_medium(scene, light), beta, _u4(0), 0, _wave(scene, pass_, seed, index))
@@ -220,6 +221,31 @@ def _emitted(scene, pass_, projection, i, seed, index):
     u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, EMISSION)
     u_pick = draw1(pass_.sequence, seed, index, EMITTER)
     return emission(scene, projection, i, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1))
+
+
+@specialised
+def _of_no_start(scene, beta):
+    """The entry of a photon that does not start: where it would meet nothing, or in a place that a medium which emits
+    does not fill, for which the others have more power."""
+    if not has_media(scene):
+        return lambda scene, beta: E_ESCAPED
+    return lambda scene, beta: E_ESCAPED if largest(beta) > _f4(0.0) else E_ABSORBED
+
+
+@specialised
+def _book_start(scene, beta, factor, ledgers, kind):
+    """Book what a photon of a medium has more or less than the mean, which is nothing in the mean."""
+    if not has_media(scene):
+
+        def nothing(scene, beta, factor, ledgers, kind):
+            pass
+
+        return nothing
+
+    def booked(scene, beta, factor, ledgers, kind):
+        ledgers[kind, E_ABSORBED] += _f8(factor) - _f8(luminance(beta) * factor)
+
+    return booked
 
 
 @inlined

@@ -26,12 +26,13 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, specialised
 from pmviewer.kernels.dimensions import PROJECTION_ACCEPT
 from pmviewer.kernels.lights.light import emit_from, emit_photon, light_point
+from pmviewer.kernels.media.medium import has_media
 from pmviewer.kernels.memory import load_f4, load_i4
 from pmviewer.kernels.random import draw1
 from pmviewer.kernels.scene import DISK, L_KIND, L_RADIANCE, PARALLELOGRAM, light_number, light_vector
 from pmviewer.kernels.surface import leave
 from pmviewer.kernels.table import find_interval
-from pmviewer.kernels.vector import along, basis, dot, luminance, scale
+from pmviewer.kernels.vector import along, basis, dot, largest, luminance, scale
 from pmviewer.kernels.warp import square_to_disk, square_to_sphere
 from pmviewer.maps.variant import ABSENT
 from pmviewer.photons.emission.scattered import emit_scattered
@@ -98,6 +99,14 @@ def emission(scene, projection, i, sequence, seed, index, u_pick, position, dire
     NO_PROJECTION, of strata (`pmviewer.photons.emission.strata`) or of importons
     (`pmviewer.photons.emission.scattered`); i is its
     trajectory's number in the pass; the rest as `emit_photon`."""
+    if absent(projection) and has_media(scene):
+
+        def in_media(scene, projection, i, sequence, seed, index, u_pick, position, direction):
+            p, d, beta, light = emit_photon(scene, u_pick, position, direction)
+            return p, d, beta, light, largest(beta) > _f4(0.0), _f4(1.0)
+
+        return in_media
+
     if absent(projection):
 
         def everywhere(scene, projection, i, sequence, seed, index, u_pick, position, direction):

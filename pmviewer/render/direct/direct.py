@@ -9,14 +9,17 @@ import numpy as np
 
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, bsdf_f, bsdf_pdf, compressed, same_side, shading_normal
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.dimensions import FURTHER_LIGHT
 from pmviewer.kernels.lights.light import emitted, environment_radiance, one_light_pdf, sample_one_light
+from pmviewer.kernels.media.medium import has_media
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.vector import add, dot, largest, mul, scale
 from pmviewer.render.chain import BLACK, WHITE
 from pmviewer.render.direct.choice import chosen_light, expected_samples
 from pmviewer.render.direct.shadow import LIT, UNKNOWN, known_visibility
+from pmviewer.render.media.through import ANYWHERE, place_of
 from pmviewer.render.record import C_RAYS, C_SAVED, C_SHADOW_RAYS
 from pmviewer.render.straight import transmission
 
@@ -43,6 +46,15 @@ def radiance_of(scene, light, hit, d):
     return environment_radiance(scene, d) if hit.prim < 0 else emitted(scene, light, hit.prim, hit.p, hit.ng, d)
 
 
+@specialised
+def left_to_rays(scene, light, group):
+    """Whether the rays that leave by the lobes bring a light's light, and samples of it none: what media emit is seen
+    along followed rays."""
+    if not has_media(scene):
+        return lambda scene, light, group: False
+    return lambda scene, light, group: group == FOLLOWED and place_of(scene, light) != ANYWHERE
+
+
 @device
 def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, numbers):
     """Radiance towards wo from the light samples of the choice, reflected by a group of the BSDF's lobes.
@@ -60,7 +72,7 @@ def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, numbers):
             u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, FURTHER_LIGHT + s)
         light, m = chosen_light(scene, choice, s, u_pick)
         wi, end, L, pdf, findable = sample_one_light(scene, light, p, u, v)
-        if not m * pdf > _f4(0.0) or same_side(b, group, ng, wo, wi) == 0:
+        if not m * pdf > _f4(0.0) or same_side(b, group, ng, wo, wi) == 0 or left_to_rays(scene, light, group):
             continue
         f = compressed(b, wo, wi, bsdf_f(b, group, wo, wi))
         cos = abs(dot(wi, shading_normal(b)))
@@ -72,7 +84,7 @@ def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, numbers):
                 saved += 1
             tint = WHITE if known == LIT else BLACK
             if known == UNKNOWN:
-                tint = transmission(scene, si, wi, end, group != FOLLOWED or not findable)
+                tint = transmission(scene, si, light, wi, end, group != FOLLOWED or not findable)
             if largest(tint) > _f4(0.0):
                 weight = cos / (m * pdf)
                 if findable and n_bsdf > 0:

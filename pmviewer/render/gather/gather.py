@@ -19,6 +19,7 @@ from pmviewer.render.chain import BLACK, WHITE, arrive, follow
 from pmviewer.render.direct.direct import found_light
 from pmviewer.render.gather.corner import gather_again, is_corner
 from pmviewer.render.gather.guide import gather_direction
+from pmviewer.render.media.emitted import emitted_nearby
 from pmviewer.render.media.volume import gathered_from_media
 from pmviewer.render.record import C_RAYS
 from pmviewer.render.reflect import gathered
@@ -136,6 +137,9 @@ def gather_rays(given, si, beta, rays, counts):
         if eye.gather_rays > 0:
             from_media, _ = gathered_from_media(given, leaving(si, wi), hit, rays.seed, sample, 0, counts)
             indirect = add(indirect, scale(mul(weight, from_media), share))
+        if eye.direct != 0:
+            nearby = emitted_nearby(scene, leaving(si, wi), hit, si.p)
+            direct = add(direct, scale(mul(weight, nearby), share))
         weight = mul(weight, tint)
         if eye.direct != 0 and eye.mis != 0 and pdf > _f4(0.0):
             L = found_light(scene, si.p, wi, pdf, n_bsdf, rays.choice, eye.biased, hit)

@@ -8,11 +8,14 @@ import numpy as np
 
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
-from pmviewer.kernels.media.column import MARKS
+from pmviewer.kernels.media.column import MARKS, WORDS, column_of, through_all
+from pmviewer.kernels.media.glow import near_a_glow, near_glow
 from pmviewer.kernels.media.lattice import line_of, walk
-from pmviewer.kernels.media.medium import emission_of, emitted_along
+from pmviewer.kernels.media.medium import emission_of, emitted_along, has_media
 from pmviewer.kernels.media.varying import OF_EMISSION, OF_EXTINCTION, emission_at, grid_of, has_grids, thinned
+from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.vector import add, along, largest, mul, scale
+from pmviewer.render.media.through import next_boundary
 
 _f4 = np.float32
 _f8 = np.float64
@@ -85,3 +88,36 @@ def _emitted_on_lattice(scene, medium, column, o, d):
 def _gap(depth):
     """(1 − exp(−τ))/τ"""
     return _f4(-math.expm1(-depth) / depth) if depth > 1e-6 else _f4(1.0)
+
+
+@device
+def emitted_on_the_way(scene, ray, hit, x, everything):
+    """Radiance that media send back along a ray that left x, up to what it met: `everything`, or of media that light
+    samples at x leave out (`pmviewer.kernels.media.glow`)."""
+    total, T = _BLACK, _WHITE
+    o, medium, left = ray.o, ray.medium, hit.t
+    marks = stack_i4(WORDS)
+    for k in range(hit.crossed + 1):
+        length, beyond, next_medium = left, o, medium
+        if k < hit.crossed:
+            length, beyond, next_medium = next_boundary(scene, o, ray.d, medium)
+        if medium >= 0:
+            column = column_of(scene, medium, o, ray.d, length, marks)
+            if everything or near_glow(scene, medium, x):
+                total = add(total, mul(T, emitted_in(scene, medium, column, o, ray.d, length)))
+            T = mul(T, through_all(scene, medium, column, length))
+        o, medium = beyond, next_medium
+        left -= length
+    return total
+
+
+@specialised
+def emitted_nearby(scene, ray, hit, x):
+    """The same of media that light samples at x leave out."""
+    if not has_media(scene):
+        return lambda scene, ray, hit, x: _BLACK
+
+    def nearby(scene, ray, hit, x):
+        return emitted_on_the_way(scene, ray, hit, x, False) if near_a_glow(scene, x) else _BLACK
+
+    return nearby

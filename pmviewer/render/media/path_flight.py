@@ -6,22 +6,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.dimensions import PATH_FLIGHT
-from pmviewer.kernels.media.column import WORDS, column_of, through_all
 from pmviewer.kernels.media.flight import fly
+from pmviewer.kernels.media.glow import near_a_glow
 from pmviewer.kernels.media.medium import has_media, phase_numbers
 from pmviewer.kernels.media.phase import phase, sample_phase
 from pmviewer.kernels.media.varying import albedo_at
-from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.surface import surface_at
-from pmviewer.kernels.vector import add, mul
+from pmviewer.kernels.vector import mul
 from pmviewer.render.cast import Hit, Ray, cast
-from pmviewer.render.media.emitted import emitted_in
+from pmviewer.render.media.emitted import emitted_on_the_way
 from pmviewer.render.media.phase_light import phase_light
-from pmviewer.render.media.through import next_boundary
 
 _f4 = np.float32
 _i8 = np.int64
@@ -52,41 +49,24 @@ class Scattered(NamedTuple):
     rays: Any
 
 
-@device
-def _emitted_on_the_way(scene, ray, hit):
-    """Radiance that media send back along the whole way to what was met."""
-    total, T = BLACK, (_f4(1.0), _f4(1.0), _f4(1.0))
-    o, medium, left = ray.o, ray.medium, hit.t
-    marks = stack_i4(WORDS)
-    for k in range(hit.crossed + 1):
-        length, beyond, next_medium = left, o, medium
-        if k < hit.crossed:
-            length, beyond, next_medium = next_boundary(scene, o, ray.d, medium)
-        if medium >= 0:
-            column = column_of(scene, medium, o, ray.d, length, marks)
-            total = add(total, mul(T, emitted_in(scene, medium, column, o, ray.d, length)))
-            T = mul(T, through_all(scene, medium, column, length))
-        o, medium = beyond, next_medium
-        left -= length
-    return total
-
-
 @specialised
-def arrive_by_flight(scene, eye, ray, beta, seed, depth):
-    """The Arrival of a path at surface or collision number `depth`. In scenes without media the ray is cast and that is
-    all."""
+def arrive_by_flight(scene, eye, ray, beta, seed, depth, left, everything):
+    """The Arrival of a path at surface or collision number `depth`, with `everything` that media emit or what light
+    samples where it `left` leave out. In scenes without media the ray is cast and that is all."""
     if not has_media(scene):
-        return lambda scene, eye, ray, beta, seed, depth: Arrival(cast(scene, ray), False, ray.o, BLACK, beta, 1)
+        return lambda scene, eye, ray, beta, seed, depth, left, everything: Arrival(
+            cast(scene, ray), False, ray.o, BLACK, beta, 1
+        )
 
-    def through_media(scene, eye, ray, beta, seed, depth):
+    def through_media(scene, eye, ray, beta, seed, depth, left, everything):
         o, d = ray.o, ray.d
         u_channel, u_depth, _, _ = draw4(eye.sequence, seed, eye.index, PATH_FLIGHT + depth)
         flight = fly(scene, o, d, ray.far, ray.medium, beta, u_channel, u_depth)
         rays = flight.rays
         emitted = BLACK
-        if scene.emits != 0:
+        if scene.emits != 0 and (everything or near_a_glow(scene, left)):
             # Of the whole way, whether or not the path goes all of it: exact for each ray.
-            emitted = _emitted_on_the_way(scene, ray, cast(scene, ray))
+            emitted = emitted_on_the_way(scene, ray, cast(scene, ray), left, everything)
             rays += 1
         beta = mul(beta, flight.weight)
         no, prim = _f4(0.0), flight.prim

@@ -13,7 +13,7 @@ from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import add, largest, scale
 from pmviewer.render.direct.choice import chosen_light
 from pmviewer.render.direct.direct import power_heuristic
-from pmviewer.render.media.through import light_through
+from pmviewer.render.media.through import light_through, place_of
 
 _f4 = np.float32
 
@@ -30,7 +30,7 @@ def one_light_sample(scene, p, d, medium, numbers, light, m, n_phase, u, v):
     f = phase(numbers, d, wi)
     if not f * largest(L) > _f4(0.0):
         return black, 0
-    T = light_through(scene, p, end, medium)
+    T = light_through(scene, p, end, medium, place_of(scene, light))
     weight = f / (m * pdf)
     if findable and n_phase > 0:
         weight *= power_heuristic(m, pdf, _f4(n_phase), f)

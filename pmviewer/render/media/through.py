@@ -8,8 +8,10 @@ import numpy as np
 
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.media.glow import glow_medium
 from pmviewer.kernels.media.medium import MOST_BOUNDARIES, is_boundary, medium_beyond
 from pmviewer.kernels.media.varying import transmitted
+from pmviewer.kernels.scene import GLOW, L_KIND, light_number
 from pmviewer.kernels.surface import leave, surface_at
 from pmviewer.kernels.vector import dot, mul, sub
 
@@ -19,16 +21,29 @@ _INF = _f4(np.inf)
 BEFORE_LIGHT = np.float32(1.0 - 2.0**-13)
 """Shadow rays end a little before the light's own surface."""
 
+ANYWHERE = np.int64(-2)
+
 
 @device
-def light_through(scene, o, end, medium):
-    """The share (red, green, blue) of light from `end` that reaches the point o in the medium."""
+def place_of(scene, light):
+    """The medium that the light's samples have to lie in, ANYWHERE for lights that are no media."""
+    if np.int32(light_number(scene, light, L_KIND)) == GLOW:
+        return glow_medium(scene, light)
+    return ANYWHERE
+
+
+@device
+def light_through(scene, o, end, medium, within):
+    """The share (red, green, blue) of light from `end` that reaches the point o in the medium; none where `end` is not
+    `within` that medium (ANYWHERE: any)."""
     T = (_f4(1.0), _f4(1.0), _f4(1.0))
     for _ in range(MOST_BOUNDARIES):
         d = sub(end, o)
         length = _f4(math.sqrt(dot(d, d)))
         t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), BEFORE_LIGHT)
         if prim < 0:
+            if within != ANYWHERE and within != medium:
+                break
             return mul(T, transmitted(scene, medium, o, d, _f4(1.0), length))
         if not is_boundary(scene, _i8(prim)):
             break

@@ -30,7 +30,7 @@ from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power, chosen_li
 from pmviewer.render.direct.direct import found_light
 from pmviewer.render.given import Sampler
 from pmviewer.render.media.distance import distance_in, distance_pdf, equiangular_distance, equiangular_pdf
-from pmviewer.render.media.emitted import emitted_in
+from pmviewer.render.media.emitted import emitted_in, emitted_nearby
 from pmviewer.render.media.phase_light import one_light_sample
 from pmviewer.render.media.through import next_boundary, way_through
 from pmviewer.render.pixel import EMISSION, SPECULAR, VOLUME_INDIRECT, deposit
@@ -103,7 +103,8 @@ def _by_light(scene, stretch, light, m, n_phase, u_t, u, v):
 
 @device
 def _by_phase(scene, stretch, choice, numbers):
-    """Single scattering by one direction of the phase function: what light it finds."""
+    """Single scattering by one direction of the phase function: what light it finds, and what media send along it that
+    light samples leave out."""
     o, d, length, medium, column = stretch
     lobes = phase_numbers(scene, medium)
     t = distance_in(scene, medium, column, length, numbers[0])
@@ -114,10 +115,11 @@ def _by_phase(scene, stretch, choice, numbers):
     wi = sample_phase(lobes, d, numbers[1], numbers[2], numbers[3])
     ray = Ray(p, wi, _f4(0.0), _INF, medium, None)
     hit = cast(scene, ray)
+    total = emitted_nearby(scene, ray, hit, p)
     L = found_light(scene, p, wi, phase(lobes, d, wi), _f4(1.0), choice, 0, hit)
-    if not largest(L) > _f4(0.0):
-        return _BLACK
-    return mul(mul(weight, L), way_through(scene, ray, hit))
+    if largest(L) > _f4(0.0):
+        total = add(total, mul(L, way_through(scene, ray, hit)))
+    return mul(weight, total)
 
 
 @device
@@ -158,9 +160,10 @@ def _indirect(given, stretch):
 
 
 @device
-def from_media(given, ray, hit, sampler, numbers, of_phase, counts):
-    """What media send back along the ray up to what it met, FromMedia. numbers, of_phase: four random numbers each,
-    which all stretches share, as nothing multiplies what two of them find."""
+def from_media(given, ray, hit, sampler, numbers, of_phase, counts, looks):
+    """What media send back along the ray up to what it met, FromMedia; what they have emitted if it `looks` for that.
+    numbers, of_phase: four random numbers each, which all stretches share, as nothing multiplies what two of them
+    find."""
     scene, eye = given.scene, given.eye
     single, indirect, emitted, T = _BLACK, _BLACK, _BLACK, _WHITE
     o, medium, left = ray.o, ray.medium, hit.t
@@ -171,7 +174,7 @@ def from_media(given, ray, hit, sampler, numbers, of_phase, counts):
             length, beyond, next_medium = next_boundary(scene, o, ray.d, medium)
         if medium >= 0:
             column = column_of(scene, medium, o, ray.d, length, marks)
-            if scene.emits != 0:
+            if looks and scene.emits != 0:
                 emitted = add(emitted, mul(T, emitted_in(scene, medium, column, o, ray.d, length)))
             if scatters(scene, medium) and eye.volume_light != 0:
                 stretch = Stretch(o, ray.d, length, medium, column)
@@ -194,7 +197,7 @@ def deposit_media(given, ray, hit, beta, pixel, depth):
         sampler = Sampler(eye.sequence, pixel.seed, eye.index)
         numbers = draw4(eye.sequence, pixel.seed, eye.index, VOLUME + depth)
         of_phase = draw4(eye.sequence, pixel.seed, eye.index, VOLUME_PHASE + depth)
-        L = from_media(given, ray, hit, sampler, numbers, of_phase, pixel.counts)
+        L = from_media(given, ray, hit, sampler, numbers, of_phase, pixel.counts, True)
         whole = depth == 0
         deposit(pixel, SINGLE if whole else SPECULAR, mul(beta, L.single))
         deposit(pixel, VOLUME_INDIRECT if whole else SPECULAR, mul(beta, L.indirect))
@@ -206,7 +209,8 @@ def deposit_media(given, ray, hit, beta, pixel, depth):
 
 @specialised
 def gathered_from_media(given, ray, hit, seed, index, depth, counts):
-    """Radiance that media send along stretch number `depth` of a gather ray, and the transmittance of the way."""
+    """Radiance that media scatter along stretch number `depth` of a gather ray, and the transmittance of the way. What
+    they emit is direct light of the surface that gathers."""
     if not has_media(part(given, "scene")):
         return lambda given, ray, hit, seed, index, depth, counts: (_BLACK, _WHITE)
 
@@ -214,7 +218,7 @@ def gathered_from_media(given, ray, hit, seed, index, depth, counts):
         eye = given.eye
         numbers = draw4(eye.sequence, seed, index, GATHER_VOLUME + depth)
         of_phase = draw4(eye.sequence, seed, index, GATHER_VOLUME_PHASE + depth)
-        L = from_media(given, ray, hit, Sampler(eye.sequence, seed, index), numbers, of_phase, counts)
-        return add(add(L.single, L.indirect), L.emitted), L.T
+        L = from_media(given, ray, hit, Sampler(eye.sequence, seed, index), numbers, of_phase, counts, False)
+        return add(L.single, L.indirect), L.T
 
     return gathered

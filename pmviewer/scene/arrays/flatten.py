@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels import scene as K
 from pmviewer.kernels.accel.bvh import Bvh, build
+from pmviewer.kernels.lights.in_media import shares_in_media
 from pmviewer.progress import stage
 from pmviewer.scene.arrays.covered_emission import with_covered_emission
 from pmviewer.scene.arrays.flatten_textures import (
@@ -22,15 +23,17 @@ from pmviewer.scene.arrays.flatten_textures import (
     light_arrays,
     needs_tangents,
 )
-from pmviewer.scene.arrays.grids import grid_arrays, has_grids
+from pmviewer.scene.arrays.glows import PHOTONS, Glow, glow_arrays, glows_of, weaken
+from pmviewer.scene.arrays.grids import grid_arrays, has_grids, numbers_of_grids
 from pmviewer.scene.arrays.instances import build_instanced, instance_bounds
 from pmviewer.scene.arrays.light_table import LightTable
 from pmviewer.scene.arrays.material_row import MaterialTable, is_rich, material_table, used_materials
 from pmviewer.scene.arrays.media import has_media, light_media, media_of_prims, medium_rows
+from pmviewer.scene.arrays.shape_bounds import shape_bounds
 from pmviewer.scene.arrays.stored_geometry import StoredGeometry, same_surfaces, stored_geometry
 from pmviewer.scene.arrays.textured_emission import Emission, textured_lights
-from pmviewer.scene.description import LUMINANCE, Cylinder, Mesh, Parallelogram, Scene, Shape
-from pmviewer.scene.meshes.mesh_bounds import mesh_bounds
+from pmviewer.scene.description import LUMINANCE, Scene
+from pmviewer.scene.grid import Grid
 from pmviewer.scene.spectrum import spectrum
 
 Float = NDArray[np.float32]
@@ -105,21 +108,6 @@ def bounding_sphere(scene: Scene) -> tuple[NDArray[np.float64], float]:
     return center, max(float(np.linalg.norm(high - low)) / 2, 1e-30)
 
 
-def shape_bounds(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest corner (3,) of a box around the shape."""
-    g = shape.geometry
-    if isinstance(g, Mesh):
-        return mesh_bounds(g)
-    if isinstance(g, Parallelogram):
-        corners = np.array(g.corner) + np.array(
-            [[0, 0, 0], g.edge_u, g.edge_v, np.add(g.edge_u, g.edge_v)], dtype=float
-        )
-        return corners.min(axis=0), corners.max(axis=0)
-    if isinstance(g, Cylinder):
-        return np.minimum(g.p0, g.p1) - g.radius, np.maximum(g.p0, g.p1) + g.radius
-    return np.array(g.center) - g.radius, np.array(g.center) + g.radius
-
-
 def flatten(
     scene: Scene,
     on_type: Callable[[np.dtype], None] = lambda of_record: None,
@@ -137,8 +125,9 @@ def flatten(
     materials = material_table(scene)
     prim_material = np.array([s.material for s in stored.shapes], np.int32)[stored.shape_of_prim]
     center, radius = bounding_sphere(scene)
+    glows = glows_of(scene) if has_media(scene) else ()
     lit, emissions = textured_lights(with_covered_emission(scene))
-    lights = LightTable(lit, stored.vertices, stored.shape_of_prim, radius)
+    lights = LightTable(lit, stored.vertices, stored.shape_of_prim, radius, glows)
     of_shape = np.concatenate([lights.of_shape, np.full(len(stored.shapes) - len(scene.shapes), -1)])
     prim_light = of_shape.astype(np.int32)[stored.shape_of_prim]
     features = {**_features(scene, materials, lights, bool(emissions)), **dict.fromkeys(features_at_least, True)}
@@ -166,8 +155,8 @@ def flatten(
         "light_triangle_cdf": lights.triangle_cdf,
         **lights.sky_arrays(),
         **_shading_arrays(scene, features, stored, materials, lights, emissions),
-        **(_media_arrays(scene, stored) if features["media"] else {}),
-        **(grid_arrays(scene.media) if features["grids"] else {}),
+        **(_media_arrays(scene, stored, glows) if features["media"] else {}),
+        **(grid_arrays(scene.media, _more_grids(glows)) if features["grids"] else {}),
     }
     for name, array in arrays.items():
         arrays[name] = np.ascontiguousarray(array)
@@ -181,8 +170,13 @@ def flatten(
     r["center_x"], r["center_y"], r["center_z"], r["radius"] = *center, radius
     said: list[str] = []
     if features["media"]:
-        r["emits"] = any(max(medium.emission) > 0 for medium in scene.media)
-        arrays["light_media"], said = light_media(record, lights.names, scene.camera.medium)
+        r["emits"] = len(glows)
+        shares = np.ones(len(glows))
+        shares_in_media(record, lights.first_glow, PHOTONS, shares)
+        weaken(arrays["glows"], shares)
+        lights.weaken_glows(shares)
+        arrays["lights"][:], arrays["light_cdf"][:] = lights.rows, lights.cdf
+        arrays["light_media"], said = light_media(record, lights.names, scene.camera.medium, arrays["glows"])
         r["light_media"] = arrays["light_media"].ctypes.data
     n_elements = shown.n_elements if shown else len(stored.vertices) + len(stored.quadrics)
     return FlatScene(
@@ -239,9 +233,15 @@ def _features(scene: Scene, materials: MaterialTable, lights: LightTable, emits_
     }
 
 
-def _media_arrays(scene: Scene, stored: StoredGeometry) -> dict[str, NDArray]:
+def _more_grids(glows: tuple[Glow, ...]) -> tuple[Grid, ...]:
+    return tuple(glow.density for glow in glows if not glow.whole)
+
+
+def _media_arrays(scene: Scene, stored: StoredGeometry, glows: tuple[Glow, ...]) -> dict[str, NDArray]:
+    of_glows = glow_arrays(glows, numbers_of_grids(scene.media, _more_grids(glows)))
     return {
-        "media": medium_rows(scene.media),
+        **of_glows,
+        "media": medium_rows(scene.media, of_glows["glows"]),
         "prim_media": media_of_prims(stored.shapes, stored.shape_of_prim),
     }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,17 +22,23 @@ def has_grids(media: tuple[Medium, ...]) -> bool:
     return any(grid is not None for medium in media for grid in grids_of(medium))
 
 
-def grid_arrays(media: tuple[Medium, ...]) -> dict[str, NDArray]:
-    """The fields of `pmviewer.kernels.scene.GRID_FIELDS`. A grid that several media have is stored once."""
-    found: dict[int, Grid] = {id(g): g for medium in media for g in grids_of(medium) if g is not None}
-    number = {key: i for i, key in enumerate(found)}
+def numbers_of_grids(media: tuple[Medium, ...], more: Sequence[Grid] = ()) -> dict[int, int]:
+    """Numbers of all grids by their id, those of media first. One that is there several times has one number."""
+    found = dict.fromkeys(id(g) for medium in media for g in grids_of(medium) if g is not None)
+    return {key: i for i, key in enumerate([*found, *(id(g) for g in more if id(g) not in found)])}
+
+
+def grid_arrays(media: tuple[Medium, ...], more: Sequence[Grid] = ()) -> dict[str, NDArray]:
+    """The fields of `pmviewer.kernels.scene.GRID_FIELDS`, with `more` grids behind those of the media."""
+    number = numbers_of_grids(media, more)
+    found = {id(g): g for g in (*(g for medium in media for g in grids_of(medium) if g is not None), *more)}
     rows = [[-1 if g is None else number[id(g)] for g in grids_of(medium)] for medium in media]
     frames, sizes, voxels, blocks = [], [], [], []
     start = first_block = 0
     for grid in found.values():
         padded, most = _padded(grid.values), _blocks(grid.values)
         nz, ny, nx, channels = grid.values.shape
-        frames.append(_frame(grid))
+        frames.append(frame_of(grid)[:3].reshape(-1))
         sizes.append([nx, ny, nz, channels, start, first_block])
         voxels.append(padded.reshape(-1))
         blocks.append(most.reshape(-1))
@@ -63,9 +71,9 @@ def _blocks(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.ascontiguousarray(most, np.float32)
 
 
-def _frame(grid: Grid) -> NDArray[np.float64]:
-    """(12,): from world to lattice by rows, number i of an axis at i + 1."""
+def frame_of(grid: Grid) -> NDArray[np.float64]:
+    """(4, 4): from world to lattice, number i of an axis at i + 1."""
     nz, ny, nx, _ = grid.values.shape
     to_lattice = np.diag([nx, ny, nz, 1.0])
     to_lattice[:3, 3] = 0.5
-    return (to_lattice @ np.linalg.inv(grid.to_world))[:3].reshape(-1)
+    return np.asarray(to_lattice @ np.linalg.inv(grid.to_world))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
 from pmviewer.kernels import scene as K
+from pmviewer.scene.arrays.glows import Glow
 from pmviewer.scene.arrays.sky_table import sky_table
 from pmviewer.scene.description import (
     LUMINANCE,
@@ -34,7 +36,7 @@ BRIGHTEST = 1e32
 """Radiance or intensity, a factor of a million from the end of float32: squares of small distances divide it."""
 
 
-def _glows(shape: Shape) -> bool:
+def _shines(shape: Shape) -> bool:
     return shape.radiance is not None and any(c > 0 for c in shape.radiance)
 
 
@@ -46,12 +48,19 @@ def _areas(corners: Float) -> NDArray[np.float64]:
 
 
 class LightTable:
-    """Emitting shapes in order, then the scene's other lights.
+    """Emitting shapes in order, then the scene's other lights, then media that emit (`glows`).
 
     `more` tells whether there are lights of the kinds that need LIGHT_FIELDS, `sky` is the image environment.
     """
 
-    def __init__(self, scene: Scene, vertices: Float, shape_of_prim: NDArray[np.integer], radius: float) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        vertices: Float,
+        shape_of_prim: NDArray[np.integer],
+        radius: float,
+        glows: Sequence[Glow] = (),
+    ) -> None:
         self.of_shape = np.full(len(scene.shapes), -1, np.int64)
         self.environment = -1
         rows: list[list[float]] = []
@@ -62,13 +71,13 @@ class LightTable:
         listed = 0
         shape_of_triangle = shape_of_prim[: len(vertices)]  # in ascending order
         ends = np.searchsorted(shape_of_triangle, np.arange(len(scene.shapes) + 1, dtype=shape_of_prim.dtype))
-        glows = np.array([_glows(shape) for shape in scene.shapes], bool)
+        shine = np.array([_shines(shape) for shape in scene.shapes], bool)
         areas = np.zeros(len(vertices))
-        if glows.any():
-            lit = np.flatnonzero(np.repeat(glows, np.diff(ends)))
+        if shine.any():
+            lit = np.flatnonzero(np.repeat(shine, np.diff(ends)))
             areas[lit] = _areas(vertices[lit])
         for index, shape in enumerate(scene.shapes):
-            if shape.radiance is None or not glows[index]:
+            if shape.radiance is None or not shine[index]:
                 continue
             row = [0.0] * K.LIGHT_COLUMNS
             row[K.L_RADIANCE : K.L_RADIANCE + 3] = shape.radiance
@@ -97,6 +106,15 @@ class LightTable:
             rows.append(self._row(light))
             powers.append(emitted_power(light, radius))
             names.append(light.name)
+        self.first_glow = len(rows)
+        for number, glow in enumerate(glows):
+            row = [0.0] * K.LIGHT_COLUMNS
+            row[K.L_KIND], row[K.L_FIRST] = K.GLOW, number
+            row[K.L_RADIANCE : K.L_RADIANCE + 3] = (glow.power / (4 * math.pi)).tolist()
+            row[K.L_A : K.L_A + 3] = glow.center.tolist()
+            rows.append(row)
+            powers.append(glow.power)
+            names.append(glow.name)
         if not rows or not any(p.max() > 0 for p in powers):
             raise SceneError("The scene has no light.", scene.path, hint="Add an emitter, or open it with one.")
         for name, row in zip(names, rows, strict=True):
@@ -107,10 +125,20 @@ class LightTable:
         self.rows = np.array(rows, np.float32)
         self.power = np.array(powers)
         self.names = tuple(names)
-        share = np.cumsum(self.power @ LUMINANCE)
-        self.cdf = np.concatenate([[0.0], share / share[-1]]).astype(np.float32)
+        self.cdf = self._by_power()
         self.triangles = np.concatenate(triangles).astype(np.int32)
         self.triangle_cdf = np.concatenate(cdfs).astype(np.float32)
+
+    def _by_power(self) -> Float:
+        share = np.cumsum(self.power @ LUMINANCE)
+        return np.concatenate([[0.0], share / share[-1]]).astype(np.float32)
+
+    def weaken_glows(self, shares: NDArray[np.float64]) -> None:
+        """Media that emit have these shares (n,) of their power; rows and distribution change in place."""
+        own = slice(self.first_glow, None)
+        self.power[own] *= shares[:, None]
+        self.rows[own, K.L_RADIANCE : K.L_RADIANCE + 3] *= shares[:, None].astype(np.float32)
+        self.cdf[:] = self._by_power()
 
     def sky_arrays(self) -> dict[str, NDArray]:
         """The image environment's arrays by the record's field; none without one."""

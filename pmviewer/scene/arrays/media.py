@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.media.locate import UNKNOWN, media_at, media_of_lights
-from pmviewer.kernels.media.medium import MEDIUM_COLUMNS, SAME
+from pmviewer.kernels.lights.in_media import media_of_lights
+from pmviewer.kernels.media.glow import GL_MEDIUM
+from pmviewer.kernels.media.locate import UNKNOWN, media_at
+from pmviewer.kernels.media.medium import MD_GLOW, MEDIUM_COLUMNS, SAME
+from pmviewer.scene.arrays.shape_bounds import shape_bounds
 from pmviewer.scene.description import Medium, Scene, Shape
 
 _PHOTONS = 16
@@ -22,10 +25,26 @@ def has_media(scene: Scene) -> bool:
     return bool(scene.media) and (bounded or any(camera.medium >= 0 for camera in cameras))
 
 
-def medium_rows(media: tuple[Medium, ...]) -> NDArray[np.float32]:
-    """(n, MEDIUM_COLUMNS), see `pmviewer.kernels.media.medium`."""
-    rows = [[*m.sigma_t, *m.albedo, *m.emission, m.phase.g, m.phase.g_beside, m.phase.beside] for m in media]
-    return np.array(rows, np.float32).reshape(-1, MEDIUM_COLUMNS)
+def media_bounds(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest corner (3,) of the box around what bounds media; around all surfaces where nothing does."""
+    bounding = [s for s in scene.shapes if s.media is not None and max(s.media) >= 0]
+    boxes = np.array([shape_bounds(shape) for shape in bounding or scene.shapes])
+    return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+
+
+def media_emitting(scene: Scene) -> int:
+    """Media that emit light and that something bounds or a camera stands in."""
+    bounded = {number for shape in scene.all_shapes for number in shape.media or ()}
+    around = {camera.medium for camera in (scene.camera, *(named.camera for named in scene.cameras))}
+    return sum(max(m.emission) > 0 and number in bounded | around for number, m in enumerate(scene.media))
+
+
+def medium_rows(media: tuple[Medium, ...], glows: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(n, MEDIUM_COLUMNS), see `pmviewer.kernels.media.medium`; glows: rows of `pmviewer.kernels.media.glow`."""
+    listed = [[*m.sigma_t, *m.albedo, *m.emission, m.phase.g, m.phase.g_beside, m.phase.beside, -1] for m in media]
+    rows = np.array(listed, np.float32).reshape(-1, MEDIUM_COLUMNS)
+    rows[glows[:, GL_MEDIUM].astype(int), MD_GLOW] = np.arange(len(glows))
+    return rows
 
 
 def media_of_prims(shapes: tuple[Shape, ...], shape_of_prim: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -34,11 +53,16 @@ def media_of_prims(shapes: tuple[Shape, ...], shape_of_prim: NDArray[np.int32]) 
     return sides[shape_of_prim]
 
 
-def light_media(record: NDArray[np.void], names: tuple[str, ...], around: int) -> tuple[NDArray[np.int32], list[str]]:
+def light_media(
+    record: NDArray[np.void], names: tuple[str, ...], around: int, glows: NDArray[np.float64]
+) -> tuple[NDArray[np.int32], list[str]]:
     """The medium that photons of each light start in, (n_lights,), and sentences about lights that are in several;
-    `around` where nothing is met that tells. The record (1,) is complete but for this."""
+    `around` where nothing is met that tells. The last lights are media that emit, of those rows. The record (1,) is
+    complete but for this."""
     found = np.empty((len(names), _PHOTONS), np.int64)
     media_of_lights(record, found)
+    own = glows[:, GL_MEDIUM].astype(np.int64)
+    found[len(names) - len(own) :] = own[:, None]
     chosen = np.array([_most_frequent(row, around) for row in found], np.int32).reshape(-1)
     mixed = [name for name, row, own in zip(names, found, chosen) if ((row != UNKNOWN) & (row != own)).any()]
     if not mixed:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError
 from pmviewer.scene.arrays.covered_emission import without_unseen_lights
 from pmviewer.scene.arrays.instances import joint_bounds
+from pmviewer.scene.arrays.media import media_emitting
 from pmviewer.scene.clean import check_camera
 from pmviewer.scene.defaults.framing import Up
 from pmviewer.scene.defaults.light_reach import lights_enough
@@ -36,6 +37,7 @@ def completed(scene: Scene, rig: Rig = "auto") -> Scene:
     """
     scene = without_unseen_lights(scene)
     own = bool(scene.lights) or any(s.radiance and max(s.radiance) > 0 for s in scene.shapes)
+    own = own or media_emitting(scene) > 0
     if rig == "file" and not own:
         hint = "Choose another value of light.rig: auto adds light."
         raise SceneError("The file has no light, and light.rig asks for the file's alone.", scene.path, hint=hint)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.scene.arrays.flatten import shape_bounds
 from pmviewer.scene.arrays.instances import instance_bounds
+from pmviewer.scene.arrays.shape_bounds import shape_bounds
 from pmviewer.scene.description import ImageEnvironment, Light, Material, Scene, Shape
 from pmviewer.scene.editing.catalogue import Target, catalogue_of, refusal
 from pmviewer.scene.editing.recolour import dispersed, recoloured, roughened, with_emission, with_radiance

@@ -19,6 +19,9 @@ CHOOSES_LIGHTS = Need(lambda f: not f.plan.path, "The path tracer chooses lights
 MANY_LIGHTS = Need(lambda f: f.traits.n_lights > 1, "There is one light.")
 CHOICE_BY_PHOTONS = Need(lambda f: f.plan.choice != "power", "No photons choose lights: see direct.choice.")
 UNBIASED = Need(lambda f: not f.settings.direct.biased, "Lights without photons near are left out.")
+NOTHING_EMITS = Need(
+    lambda f: not f.plan.looked_for, "Media emit light in this scene: what is near to them is lit by what rays find."
+)
 SPARES_SHADOW_RAYS = Need(lambda f: not f.plan.path, "The path tracer casts every shadow ray.")
 SHADOW_PHOTONS_ON = Need(lambda f: f.settings.direct.shadow_photons, "Only with shadow photons.")
 
@@ -45,6 +48,7 @@ class Direct(Group):
         stage="image",
         scale="switch",
         title="MIS",
+        needs=(NOTHING_EMITS,),
     )
     choice: Literal["auto", "power", "photons", "Keller-Wald"] = setting(
         "auto",

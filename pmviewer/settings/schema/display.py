@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from typing import Any, Literal
 
-from pmviewer.settings.needs import BOTH_MAPS, IMPORTANCE, MEDIA, SHADOW_PHOTONS, Need, Needs
+from pmviewer.settings.needs import BOTH_MAPS, IMPORTANCE, MEDIA, SHADOW_PHOTONS, VOLUME, Need, Needs
 from pmviewer.settings.schema.base import Auto, Group, setting
 from pmviewer.settings.schema.gather import ESTIMATION, REPROJECTION
 from pmviewer.settings.schema.virtual import VIRTUAL_LIGHTS, WEIGHTED
@@ -55,9 +55,16 @@ VIEW_NEEDS: dict[str, Needs] = {
     "subdivision level": (ESTIMATION,),
     "reprojected share": (ESTIMATION, REPROJECTION),
     "noise": (MOMENTS,),
+    "optical depth": (MEDIA,),
+    "mean free path": (MEDIA,),
+    "volume radius": (MEDIA, VOLUME),
+    "volume photon count": (MEDIA, VOLUME),
+    "extinction slice": (MEDIA,),
+    "photon slice": (MEDIA, VOLUME),
 }
 """Of the views that a frame holds only while they are shown."""
 MEDIA_VIEWS = ("volume", "volume indirect")
+SLICE_VIEWS = ("extinction slice", "photon slice")
 MAP_VIEWS = (
     "look-up radius",
     "photon count",
@@ -68,6 +75,10 @@ MAP_VIEWS = (
     "storing probability",
 )
 """Views that show one of the maps."""
+VIEW_OF_A_SLICE = Need(
+    lambda f: f.settings.display.view in SLICE_VIEWS,
+    f"Only with the views {' and '.join(repr(view) for view in SLICE_VIEWS)}.",
+)
 VIEW_OF_A_MAP = Need(
     lambda f: f.settings.display.view in MAP_VIEWS,
     f"Only with the views {', '.join(repr(view) for view in MAP_VIEWS)}.",
@@ -151,6 +162,12 @@ class Display(Group):
         "subdivision level",
         "reprojected share",
         "noise",
+        "optical depth",
+        "mean free path",
+        "volume radius",
+        "volume photon count",
+        "extinction slice",
+        "photon slice",
     ] = setting(
         "beauty",
         "What the viewport shows: the image, one of its terms, a property of the first hit, the shaded geometry, the "
@@ -172,6 +189,25 @@ class Display(Group):
             VIEW_OF_A_MAP,
             BOTH_MAPS,
         ),
+    )
+    slice: float = setting(
+        0.5,
+        "Where the plane of the views 'extinction slice' and 'photon slice' cuts the box around media: 0 at its low "
+        "end, 1 at its high one.",
+        stage="display",
+        scale="linear",
+        title="place of the slice",
+        ge=0,
+        le=1,
+        needs=(VIEW_OF_A_SLICE,),
+    )
+    slice_axis: Literal["x", "y", "z"] = setting(
+        "z",
+        "The axis across the plane of these views.",
+        stage="display",
+        scale="choice",
+        title="axis of the slice",
+        needs=(VIEW_OF_A_SLICE,),
     )
     exposure: float | Auto = setting(
         "auto",
