@@ -185,7 +185,7 @@ class ViewerApp:
         self.state.autosave.begin()
         self._running = True
         self.state.session.on_update = self.wake
-        self.state.gain.on_update = self.state.film.on_update = self.wake
+        self.state.gain.on_update = self.state.film.on_update = self.state.linked.on_update = self.wake
         self.state.background.on_done = self.wake
 
     def _pre_new_frame(self) -> None:
@@ -252,6 +252,7 @@ class ViewerApp:
         self.state.appearance.keep()
         self.state.remember_opening()
         self.state.session.on_update = self.state.gain.on_update = self.state.film.on_update = None
+        self.state.linked.on_update = None
         self._release()
         if self.state.background.running(FILES):
             glfw.hide_window(glfw_window_hello_imgui())

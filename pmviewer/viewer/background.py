@@ -41,6 +41,7 @@ READING = Lane("reading", shown=True)
 MEASURING = Lane("measuring")
 COMPARING = Lane("comparing")
 DIFFERENCES = Lane("differences")
+LINKING = Lane("linking")
 CHOOSING = Lane("choosing", shown=True)
 ENGINE = Lane("engine")
 

@@ -185,6 +185,7 @@ class Menus:
             imgui.end_menu()
         self._item("Flip to the other picture", "flip_pictures")
         self._item("Swap A and B", "swap_pictures")
+        self._item("Link cameras", "link_cameras", state.settings.compare.linked)
         imgui.separator()
         self._item("With and without importance", "compare_importance", state.gain.running)
         self._item("Mark odd pixels", "toggle_marks", state.settings.display.marks)
