@@ -46,6 +46,7 @@ from pmviewer.viewer.loaded_photons import LoadedPhotons
 from pmviewer.viewer.measured import Measured
 from pmviewer.viewer.pair import Pair, ShownPair
 from pmviewer.viewer.saved_views import FILE, SavedViews
+from pmviewer.viewer.received import ReceivedByObjects
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.snapshots import Snapshots
 from pmviewer.viewer.still import StillExport
@@ -106,6 +107,7 @@ class ViewerState:
         self._paired: tuple[tuple[Any, ...], ShownPair | None] | None = None
         self.history = History()
         self.editing = Editing(session, self.change)
+        self.received = ReceivedByObjects(session, self.background, lambda: self.frame)
         self.loaded = LoadedPhotons(self.background, lambda: self.change({"overlays.file.show": True}))
         self.still = StillExport(session, self.background)
         self.film = FilmEditor(session, self.history, self.change, self.background, self.say)
