@@ -45,8 +45,8 @@ from pmviewer.viewer.linked import Linked
 from pmviewer.viewer.loaded_photons import LoadedPhotons
 from pmviewer.viewer.measured import Measured
 from pmviewer.viewer.pair import Pair, ShownPair
-from pmviewer.viewer.saved_views import FILE, SavedViews
 from pmviewer.viewer.received import ReceivedByObjects
+from pmviewer.viewer.saved_views import FILE, SavedViews
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.snapshots import Snapshots
 from pmviewer.viewer.still import StillExport

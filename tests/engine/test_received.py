@@ -14,7 +14,6 @@ from pmviewer.maps.record import unpack
 from pmviewer.scene.description import Group, Instance, Mesh, Parallelogram, PointLight, Scene, Shape, Sphere
 from tests.support.scenes import box_camera, cornell_box, cube_mesh, diffuse, settings_of
 
-
 LIGHT = PointLight("point", (0.0, 6.0, 0.0), (1.0, 1.0, 1.0))
 
 
