@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # brings OpenEXR along, which the window doesn't wait for
 
 OFF, WIPE, FLIP, BESIDE, DIFFERENCE = MODES = ("off", "wipe", "flip", "side by side", "difference")
 NO_SNAPSHOT = "There is no snapshot yet: S takes one, and EXR or PNG files open as snapshots."
-OTHER_CAMERA = "The pictures are seen by different cameras: L links them."
+OTHER_CAMERA = "The pictures are seen by different cameras: Shift+S links them."
 DISPLAY_VALUES = "One picture is of display values (PNG), which are cut at 1."
 
 

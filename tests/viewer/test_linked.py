@@ -9,7 +9,7 @@ import pmviewer
 from pmviewer.settings.access import with_values
 from pmviewer.viewer.linked import UNDER_WAY
 from pmviewer.viewer.pair import OTHER_CAMERA
-from tests.viewer.driver import app_on_engine, drive, finished, wait_until
+from tests.viewer.driver import app_on_engine, chord, drive, finished, wait_until
 
 SMALL = {"camera.width": 32, "camera.height": 24, "render.passes": 1, "photons.N": 2000}
 THERE = {"camera.origin": (0.3, 0.1, 3.4), "camera.target": (0.0, 0.0, 0.0)}
@@ -36,7 +36,7 @@ def test_a_snapshot_follows_the_live_camera_with_its_own_settings(tmp_path):
             state.change(THERE)
             wait_until(c, lambda: finished(app) and state.frame.settings == state.settings)
             assert state.shown_pair().caution == OTHER_CAMERA
-            c.key_press(imgui.Key.l)
+            c.key_press(chord(imgui.Key.s, imgui.Key.mod_shift))
             c.yield_(3)
             assert state.settings.compare.linked
             wait_until(c, lambda: state.shown_pair().caution == "" and sides(app)[1].fact("passes") == 2)
