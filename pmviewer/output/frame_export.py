@@ -300,6 +300,11 @@ def gain_sheet(pair: Pair, display: Display | None = None) -> NDArray[np.uint8]:
     return side_by_side(left, right, ("with importance", "without importance"), pair.table(), pair.sentences())
 
 
+def setting_texts(settings: Settings) -> dict[str, str]:
+    """Every setting by its full name, as the command line and files' attributes have it."""
+    return {path: _text(value) for path, value in flat(settings).items()}
+
+
 def _plain(value: Any) -> Value:
     return value if isinstance(value, str | int | float) and not isinstance(value, bool) else _text(value)
 

@@ -117,6 +117,8 @@ class ViewerState:
         self._said: deque[Message] = deque()
         """What any thread said since the last frame."""
         self._calls: deque[Callable[[], None]] = deque()
+        self.is_attachable: Callable[[], bool] | None = None
+        """Whether programs can attach to the window; None where that is not offered."""
         self.flying = False
         self.panels_hidden = False
         self.help_open = False
