@@ -225,7 +225,8 @@ class ViewerApp:
         self.commands.palette.gui(self.commands.table)
         self.commands.still_dialog.gui()
         self.restore_dialog.gui()
-        self.tour.gui()
+        if not self.restore_dialog.is_open:  # first what a crash has left, then what is new
+            self.tour.gui()
 
     def _before_swap(self) -> None:
         path, self.commands.window_shot = self.commands.window_shot, None
