@@ -1,6 +1,6 @@
 """`python docs/figures.py [NAME …]`: make the figures of the documentation by the commands that stand there.
 
-A block of commands that begins with ```sh figure=NAME columns=N gives images/NAME.png: each command writes one panel,
+A block of commands below a line <!-- figure NAME, columns N --> gives images/NAME.png: each command writes one panel,
 or an EXR file that later ones open, in order, N panels a row; NAME='…' above them stands for words that they share. The
 commands open windows: without a display, run all of it under xvfb-run -a.
 """
@@ -30,7 +30,7 @@ TEXTS = (
     "virtual.md",
     "views.md",
 )
-_BLOCK = re.compile(r"^```sh figure=(\S+) columns=(\d+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+_BLOCK = re.compile(r"^<!-- figure (\S+), columns (\d+) -->\n```sh\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _SHARED = re.compile(r"(\w+)='([^']*)'")
 _USE = re.compile(r"\$(\w+)")
 GAP = 6

@@ -6,8 +6,8 @@
         s.set(N=200_000, q=0.5)
         picture = s.render(passes=8).beauty
 
-`open` is the whole library (`docs/python.md`). Importing pmviewer loads nothing else: the command line and the window
-do so first of all.
+`open` is the library, `attach` reaches a window that is open already (`docs/python.md`). Importing pmviewer loads
+nothing else: the command line and the window do so first of all.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
+    from pmviewer.library.attaching.attached import Attached
     from pmviewer.library.rendering import Rendering
     from pmviewer.scene.description import Scene
 
-__all__ = ["__version__", "open"]
+__all__ = ["__version__", "attach", "open"]
 
 
 def open(
@@ -55,3 +56,14 @@ def open(
     return import_module("pmviewer.library.rendering").Rendering(
         scene, settings, parameters=parameters, search_paths=search_paths, threads=threads
     )
+
+
+def attach(pid: int | None = None) -> Attached:
+    """A window in another process, to change it, read it and show pictures in it: the one of the process `pid`, or the
+    one that has begun to listen last. A window listens when its user allows it, by `--listen` or in its menu File.
+
+    Raises WindowError where none listens.
+    """
+    from importlib import import_module
+
+    return import_module("pmviewer.library.attaching.attached").attach(pid)

@@ -177,7 +177,7 @@ def test_the_window_does_not_wait_for_the_compiler():
 def test_the_window_is_given_scene_settings_threads_and_parameters(monkeypatch, tmp_path):
     given = {}
 
-    def run_viewer(scene, settings, threads, parameters, snapshots, cluster):
+    def run_viewer(scene, settings, threads, parameters, snapshots, cluster, make):
         given.update(scene=scene, N=settings.photons.N, threads=threads, parameters=dict(parameters))
         given.update(snapshots=snapshots, cluster=cluster)
         return 0

@@ -38,6 +38,12 @@ def test_every_picture_is_shown_and_every_shown_picture_is_there():
         assert f"images/{picture.name})" in text, f"{picture.name} is not shown anywhere"
 
 
+def test_the_site_has_every_page_and_no_other():
+    """Links and anchors are checked by the site's generator (`.ci/run`)."""
+    listed = re.findall(r"(\w[\w-]*\.md)$", (DOCS.parent / "mkdocs.yml").read_text("utf-8"), re.MULTILINE)
+    assert sorted(listed) == sorted(path.name for path in DOCS.glob("*.md"))
+
+
 NAMED = [*DOCS.glob("*.md"), DOCS.parent / "README.md"]
 
 

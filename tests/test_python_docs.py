@@ -11,7 +11,11 @@ import pytest
 from pmviewer.settings.access import SETTINGS
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs" / "python.md").read_text("utf-8")
-BLOCKS = re.findall(r"^```(python)?\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
+BLOCKS = [
+    (language, text)
+    for language, text in re.findall(r"^```(python|py|)\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
+    if language != "py"  # what needs a window
+]
 
 
 def numbers(text: str) -> list[float]:

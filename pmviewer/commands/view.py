@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
@@ -33,6 +34,7 @@ def view(
     search_path: SearchOption = None,
     snapshot: SnapshotOption = None,
     cluster: ClusterOption = None,
+    listen: Annotated[bool, typer.Option("--listen", help="Let Python programs attach: pmviewer.attach().")] = False,
 ) -> None:
     """Open the window (the default command)."""
     from pmviewer.commands.job import load_job, with_snapshots
@@ -43,9 +45,11 @@ def view(
 
     job = with_snapshots(load_job(scene, set_ or [], define or [], edit or []), snapshot or [])
     try:
-        from pmviewer.viewer.app import run_viewer
+        from pmviewer.library.attaching.listening import attachable
+        from pmviewer.viewer.app import ViewerApp, run_viewer
 
-        code = run_viewer(job.scene, job.settings, threads, job.parameters, job.snapshots, cluster)
+        make = attachable(ViewerApp, listen)
+        code = run_viewer(job.scene, job.settings, threads, job.parameters, job.snapshots, cluster, make)
     except WindowError as error:
         typer.echo(f"{error}", err=True)
         target = Path(f"{Path(job.scene).stem}.png")

@@ -52,11 +52,11 @@ class Live:
 
         self._app.state.call(take)
         self._app.wake()
-        self._until(lambda: bool(taken))
+        self.until(lambda: bool(taken))
 
-    def wait(self, passes: int | None = None) -> bool:
+    def wait(self, passes: int | None = None, seconds: float | None = None) -> bool:
         """Until the window shows the settings as they are, with so many passes or finished. False if it was closed
-        before."""
+        before, or after so many seconds."""
 
         def shown() -> bool:
             frame = self._app.state.frame
@@ -65,7 +65,7 @@ class Live:
             enough = passes is not None and frame.statistics.passes >= passes
             return enough or self._app.state.session.status.state == "finished"
 
-        return self._until(shown)
+        return self.until(shown, seconds)
 
     def picture(self, layer: str = "beauty") -> NDArray[np.float32] | None:
         """A layer of the picture that is shown, (h, w, c) float32 in W/(m² sr), None before the first."""
@@ -76,10 +76,14 @@ class Live:
         """A line for the window's log."""
         self._app.state.say("info", text)
 
-    def _until(self, holds: Any) -> bool:
+    def until(self, holds: Callable[[], bool], seconds: float | None = None) -> bool:
+        """Until that holds. False if the window was closed before, or after so many seconds."""
+        end = None if seconds is None else time.monotonic() + seconds
         while self.open:
             if holds():
                 return True
+            if end is not None and time.monotonic() > end:
+                return False
             time.sleep(_LOOK_EVERY)
         return False
 
@@ -105,7 +109,7 @@ class Scripted:
         assert self._live is not None
         assert self._script is not None
         try:
-            if self._live._until(lambda: self._live is not None and self._live._app.state.session.scene is not None):
+            if self._live.until(lambda: self._live is not None and self._live._app.state.session.scene is not None):
                 self._script(self._live)
         except BaseException as error:
             self._error = error

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from pmviewer.engine.ahead.beside import beside
 from pmviewer.engine.auto.choose import Choice, Goal, choose
@@ -37,6 +37,9 @@ from pmviewer.scene.description import Scene
 from pmviewer.settings.access import SETTINGS, Settings, changed_stages, flat, get, with_values
 from pmviewer.settings.needs import Facts
 from pmviewer.settings.schema.display import MAP_VIEWS
+
+if TYPE_CHECKING:
+    from pmviewer.library.attaching.attached import Attached
 
 Progress = Callable[[str, float | None], None]
 """Hears what is being done, and the share of it that is done, None where that is not known."""
@@ -294,6 +297,26 @@ class Rendering:
             start_viewer(make, source, self._settings, threads, self._parameters)
             after = flat(scripted.end())
             return {path: value for path, value in after.items() if value != before[path]}
+
+    def window(self) -> Attached:
+        """Open the window in a process of its own, on the same scene with the same settings, and return at once, with
+        it attached (`pmviewer.library.attaching.attached`). Both go their own ways from then on: it renders for itself,
+        and `window.show(s.render(passes=1))` shows in it what is rendered here. Raises WindowError without a display or
+        OpenGL, SceneError for a scene that was made in Python.
+        """
+        with self._alone():
+            if self._opened.content is None:
+                raise SceneError("The window opens files, and this scene was made in Python.")
+            from pmviewer.library.attaching.attached import opened
+            from pmviewer.output.frame_export import setting_texts
+
+            texts, plain = setting_texts(self._settings), setting_texts(Settings())
+            words = [
+                word for name in texts if texts[name] != plain[name] for word in ("--set", f"{name}={texts[name]}")
+            ]
+            words += [word for name, value in self._parameters.items() for word in ("-D", f"{name}={value}")]
+            words += [word for folder in self._search_paths for word in ("--search-path", str(folder.absolute()))]
+            return opened([self._opened.source, *words, "--threads", str(self._pool.threads)])
 
     # its end ----------------------------------------------------------------------------------------------------
 

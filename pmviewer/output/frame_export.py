@@ -195,20 +195,9 @@ def frame_metadata(frame: Exportable) -> dict[str, Value]:
         "rays": counts.rays,
         "seconds": float(counts.seconds),
         "cpu_seconds": float(counts.cpu_seconds),
-        "view.origin": _text(camera.origin),
-        "view.target": _text(camera.target),
-        "view.up": _text(camera.up),
-        "view.projection": camera.projection,
         "view.exposure": exposure_of(frame, frame.settings.display),
+        **camera_metadata(camera),
     }
-    if camera.projection == "orthographic":
-        about["view.width"] = float(camera.view_width)
-    else:
-        about["view.fov"] = float(camera.fov)
-    if any(camera.shift):
-        about["view.shift"] = f"{camera.shift[0]:.9g} {camera.shift[1]:.9g}"
-    if camera.aperture > 0 and camera.focus is not None:
-        about |= {"view.aperture": float(camera.aperture), "view.focus": float(camera.focus)}
     about |= {f"photons_stored.{name}": count for name, count in counts.stored.items()}
     about |= {f"radius.{name}": float(radius) for name, radius in counts.radius.items()}
     about |= {f"dropped.{place}": count for place, count in counts.dropped.items()}
@@ -218,6 +207,25 @@ def frame_metadata(frame: Exportable) -> dict[str, Value]:
     if DENOISED in frame.diagnostics:
         about["denoiser"] = "Open Image Denoise; a guess, no estimate"
     return about | {path: _plain(value) for path, value in flat(frame.settings).items()}
+
+
+def camera_metadata(camera: Pose) -> dict[str, Value]:
+    """The camera as it was resolved, by the names of the attributes."""
+    about: dict[str, Value] = {
+        "view.origin": _text(camera.origin),
+        "view.target": _text(camera.target),
+        "view.up": _text(camera.up),
+        "view.projection": camera.projection,
+    }
+    if camera.projection == "orthographic":
+        about["view.width"] = float(camera.view_width)
+    else:
+        about["view.fov"] = float(camera.fov)
+    if any(camera.shift):
+        about["view.shift"] = f"{camera.shift[0]:.9g} {camera.shift[1]:.9g}"
+    if camera.aperture > 0 and camera.focus is not None:
+        about |= {"view.aperture": float(camera.aperture), "view.focus": float(camera.focus)}
+    return about
 
 
 def exposure_of(frame: Exportable, display: Display) -> float:
@@ -290,6 +298,11 @@ def gain_sheet(pair: Pair, display: Display | None = None) -> NDArray[np.uint8]:
         for frame in frames
     )
     return side_by_side(left, right, ("with importance", "without importance"), pair.table(), pair.sentences())
+
+
+def setting_texts(settings: Settings) -> dict[str, str]:
+    """Every setting by its full name, as the command line and files' attributes have it."""
+    return {path: _text(value) for path, value in flat(settings).items()}
 
 
 def _plain(value: Any) -> Value:

@@ -81,12 +81,14 @@ def write_session(
     parameters: Mapping[str, str] | None = None,
     snapshots: Sequence[Snapshot] = (),
     film: Sequence[FilmKey] = (),
+    written: dict[Path, Snapshot] | None = None,
 ) -> None:
     """Write a session file; settings with their default value are left out. Files of snapshots come first, and those of
-    the session file that is replaced go when nobody names them any more. Raises OutputError."""
+    the session file that is replaced go when nobody names them any more. `written` are files with the snapshots that
+    they hold since the last time, which are not written again; it is brought up to date. Raises OutputError."""
     folder = Path(os.path.realpath(path)).parent
     before = _snapshot_files(path)
-    files = _write_snapshots(Path(path), snapshots)
+    files = _write_snapshots(Path(path), snapshots, {} if written is None else written)
     tree: dict[str, Any] = {
         "format": FORMAT,
         "program": f"pmviewer {__version__}",
@@ -111,8 +113,8 @@ def write_session(
             gone.unlink()
 
 
-def _write_snapshots(path: Path, snapshots: Sequence[Snapshot]) -> list[Path]:
-    """The files of the snapshots, written into the session file's folder for them."""
+def _write_snapshots(path: Path, snapshots: Sequence[Snapshot], written: dict[Path, Snapshot]) -> list[Path]:
+    """The files of the snapshots, in the session file's folder for them; those that are `written` stay as they are."""
     folder = path.with_suffix(FOLDER)
     if not snapshots:
         return []
@@ -123,9 +125,14 @@ def _write_snapshots(path: Path, snapshots: Sequence[Snapshot]) -> list[Path]:
     from pmviewer.output.snapshot import write_snapshot
 
     files = [folder / f"{snapshot.number}.exr" for snapshot in snapshots]
+    for file in set(written) - set(files):
+        del written[file]
     for snapshot, file in zip(snapshots, files, strict=True):
         check()
-        write_snapshot(file, snapshot)
+        if written.get(file) is not snapshot or not file.is_file():
+            written.pop(file, None)
+            write_snapshot(file, snapshot)
+            written[file] = snapshot
     return files
 
 

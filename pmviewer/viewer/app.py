@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -185,7 +185,7 @@ class ViewerApp:
         self.state.autosave.begin()
         self._running = True
         self.state.session.on_update = self.wake
-        self.state.gain.on_update = self.state.film.on_update = self.wake
+        self.state.gain.on_update = self.state.film.on_update = self.state.linked.on_update = self.wake
         self.state.background.on_done = self.wake
 
     def _pre_new_frame(self) -> None:
@@ -225,7 +225,8 @@ class ViewerApp:
         self.commands.palette.gui(self.commands.table)
         self.commands.still_dialog.gui()
         self.restore_dialog.gui()
-        self.tour.gui()
+        if not self.restore_dialog.is_open:  # first what a crash has left, then what is new
+            self.tour.gui()
 
     def _before_swap(self) -> None:
         path, self.commands.window_shot = self.commands.window_shot, None
@@ -252,6 +253,7 @@ class ViewerApp:
         self.state.appearance.keep()
         self.state.remember_opening()
         self.state.session.on_update = self.state.gain.on_update = self.state.film.on_update = None
+        self.state.linked.on_update = None
         self._release()
         if self.state.background.running(FILES):
             glfw.hide_window(glfw_window_hello_imgui())
@@ -276,17 +278,16 @@ def run_viewer(
     parameters: Mapping[str, str] | None = None,
     snapshots: Sequence[tuple[int, Path]] = (),
     cluster: str | None = None,
+    make: Callable[..., ViewerApp] = ViewerApp,
 ) -> int:
     """Open the window on a scene or session file (None: the Cornell box with a mirror and a glass sphere).
 
     `parameters` are values for the scene file's `<default>` names, `threads` the session's (None: all cores),
     `snapshots` numbers and files of pictures in the strip, `cluster` whose workers render the passes (None: this
-    process).
+    process), `make` what makes the window.
     Returns 0 when the window was closed, or ends the process, if the engine is busy then: files that the user has asked
     for are written by that time. Raises WindowError when there is no display or no OpenGL.
     """
     from pmviewer.viewer.start import start_viewer
 
-    return start_viewer(
-        ViewerApp, source, settings, threads, parameters, snapshots=snapshots, cluster=cluster, leave=True
-    )
+    return start_viewer(make, source, settings, threads, parameters, snapshots=snapshots, cluster=cluster, leave=True)

@@ -13,7 +13,7 @@ import shutil
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pmviewer.errors import OutputError, PmviewerError
 from pmviewer.output.checkpoint_header import Header, read_header
@@ -22,6 +22,9 @@ from pmviewer.settings.film import FilmKey
 from pmviewer.viewer.background import READING, Background, Lane
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.snapshots import Snapshots
+
+if TYPE_CHECKING:  # brings OpenEXR along, which the window doesn't wait for
+    from pmviewer.output.snapshot import Snapshot
 
 SESSION, FILM = "session.toml", "film.checkpoint"
 AUTOSAVING = Lane("autosave")
@@ -51,6 +54,7 @@ class Autosave:
         self._lock: Lock | None = None
         self._at = time.monotonic()
         self._kept: tuple[Any, ...] | None = None
+        self._written: dict[Path, Snapshot] = {}
         self.left: Left | None = None
 
     def begin(self) -> None:
@@ -101,9 +105,11 @@ class Autosave:
         self._kept, pictures = now, tuple(snapshots.all)
 
         def work() -> str:
+            from pmviewer.engine.pool import lower_priority
             from pmviewer.output.session_file import write_session
 
-            write_session(folder / SESSION, settings, scene, passes, parameters, pictures, film)
+            lower_priority()  # nobody waits for it, and the window shall go on
+            write_session(folder / SESSION, settings, scene, passes, parameters, pictures, film, self._written)
             return ""
 
         self._background.start(AUTOSAVING, "autosave", work)

@@ -41,6 +41,8 @@ READING = Lane("reading", shown=True)
 MEASURING = Lane("measuring")
 COMPARING = Lane("comparing")
 DIFFERENCES = Lane("differences")
+COUNTING = Lane("counting")
+LINKING = Lane("linking")
 CHOOSING = Lane("choosing", shown=True)
 ENGINE = Lane("engine")
 

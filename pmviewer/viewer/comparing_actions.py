@@ -22,6 +22,7 @@ def comparing_actions(state: ViewerState, dialogs: FileDialogs) -> dict[str, Cal
         "next_difference": lambda: _next_difference(state),
         "flip_pictures": lambda: _flip(state),
         "swap_pictures": lambda: swap(state),
+        "link_cameras": lambda: state.change({"compare.linked": not state.settings.compare.linked}),
     }
 
 

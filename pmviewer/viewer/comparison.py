@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -140,6 +140,18 @@ class Comparison:
         if known is None or any(a is not b for a, b in zip(known, key, strict=True)):
             self._checked = key, _mismatch(reference, scene, frame)
         return self._checked[1]
+
+    def is_seen_like_the_reference(self, camera: Mapping[str, Any]) -> bool:
+        """Whether a picture of that camera, by the attributes of its file, shows what the reference does; one that
+        isn't known does."""
+        if self._scene is None or self.reference is None:
+            return False
+        from pmviewer.output.frame_export import camera_metadata
+        from pmviewer.viewer.sides import same_view
+
+        width, height = self.reference.size
+        settings = self._session.settings.camera.model_copy(update={"width": width, "height": height})
+        return same_view(camera, camera_metadata(resolve_camera(self._scene, size_only(settings))))
 
     # measuring --------------------------------------------------------------------------------------------------
 

@@ -26,14 +26,18 @@ class Measured:
 
     def error(self, side: Side) -> float | None:
         """relMSE of the picture against the reference: of the live one at its latest measured pass. None where there is
-        no reference of its size, or until it is known."""
+        no reference of its size and camera, or until it is known."""
         reference = self._comparison.reference
         if reference is None or side.size != reference.size:
             return None
         if side.frame is not None and side.frame is self._frame():
             point = self._comparison.latest(side.frame)
             return point.metrics.relmse_all if point is not None else None
+        if side.frame is not None and side.frame.coarse:
+            return None
         key = side.key, Same(reference.image)
+        if key not in self._known and not self._comparison.is_seen_like_the_reference(side.camera):
+            self._known[key] = None
         if key not in self._known and not self._background.running(DIFFERENCES):
             self._known = dict(list(self._known.items())[-MOST:])
             self._known[key] = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +16,16 @@ from pmviewer.settings.schema.compare import LAST, LIVE, REFERENCE
 from pmviewer.viewer.background import DIFFERENCES, Background
 from pmviewer.viewer.comparison import NO_REFERENCE, Comparison
 from pmviewer.viewer.importance_gain import GainRun
+from pmviewer.viewer.linked import Linked
 from pmviewer.viewer.sides import Side, frame_side, reference_side, same_camera, snapshot_side
 from pmviewer.viewer.snapshots import Snapshots
 
+if TYPE_CHECKING:  # brings OpenEXR along, which the window doesn't wait for
+    from pmviewer.output.snapshot import Snapshot
+
 OFF, WIPE, FLIP, BESIDE, DIFFERENCE = MODES = ("off", "wipe", "flip", "side by side", "difference")
 NO_SNAPSHOT = "There is no snapshot yet: S takes one, and EXR or PNG files open as snapshots."
-OTHER_CAMERA = "The pictures are seen by different cameras."
+OTHER_CAMERA = "The pictures are seen by different cameras: Shift+S links them."
 DISPLAY_VALUES = "One picture is of display values (PNG), which are cut at 1."
 
 
@@ -64,7 +69,9 @@ class Difference:
 class Pair:
     """Lives as long as the window, whose thread calls everything. `second` is whether flipping shows B."""
 
-    def __init__(self, background: Background, comparison: Comparison, gain: GainRun, snapshots: Snapshots) -> None:
+    def __init__(
+        self, background: Background, comparison: Comparison, gain: GainRun, snapshots: Snapshots, linked: Linked
+    ) -> None:
         self.second = False
         self.difference: Difference | None = None
         """The newest that was worked out."""
@@ -72,13 +79,15 @@ class Pair:
         self._comparison = comparison
         self._gain = gain
         self._snapshots = snapshots
+        self._linked = linked
         self._failed: tuple[Hashable, str] = None, ""
         self._of_frames: list[Side] = []
 
     # which pictures ---------------------------------------------------------------------------------------------
 
-    def side(self, name: str, frame: Frame | None) -> Side | str:
-        """The picture of that name in the settings, or why there is none."""
+    def side(self, name: str, frame: Frame | None, linked: bool = False) -> Side | str:
+        """The picture of that name in the settings, or why there is none; with `linked` of a snapshot what the live
+        camera sees, as far as that is there."""
         if name == LIVE:
             return self._of(frame, LIVE) if frame is not None else "Nothing is rendered yet."
         if name == REFERENCE:
@@ -86,7 +95,8 @@ class Pair:
             return reference_side(reference) if reference is not None else NO_REFERENCE
         snapshot = self._snapshots.get(name)
         if snapshot is not None:
-            return snapshot_side(snapshot)
+            again = self._linked.frame(snapshot, frame) if linked else None
+            return snapshot_side(snapshot) if again is None else self._of(again, f"{snapshot.name} · linked")
         return NO_SNAPSHOT if name == LAST else f"There is no snapshot '{name}': choose another picture to compare."
 
     def _of(self, frame: Frame, name: str) -> Side:
@@ -104,7 +114,8 @@ class Pair:
         gain = self._gain.frames()
         if gain is not None:
             return self._of(gain[0], "with importance"), self._of(gain[1], "without importance")
-        a, b = self.side(settings.compare.a, frame), self.side(settings.compare.b, frame)
+        compare = settings.compare
+        a, b = (self.side(name, frame, compare.linked) for name in (compare.a, compare.b))
         if isinstance(a, str):
             return a
         return b if isinstance(b, str) else (a, b)
@@ -129,8 +140,20 @@ class Pair:
         a, b = found
         refusal = refusal_of(a, b, compare.difference) if mode == DIFFERENCE else ""
         caution = "" if same_camera(a, b) else OTHER_CAMERA
+        if gain is None and compare.linked:
+            caution = next(filter(None, (self._linked.note(one, frame) for one in self._compared(settings))), caution)
         caution = caution or (DISPLAY_VALUES if a.encoded or b.encoded else "")
         return ShownPair(a, b, mode, display, compare.split, self.second, compare.difference, caution, refusal)
+
+    def _compared(self, settings: Settings) -> list[Snapshot]:
+        """The snapshots among A and B."""
+        found = (self._snapshots.get(name) for name in dict.fromkeys((settings.compare.a, settings.compare.b)))
+        return [one for one in found if one is not None]
+
+    def link(self, settings: Settings, frame: Frame | None) -> None:
+        """Once per window frame: have the compared snapshots follow the live camera, if they are to."""
+        follows = settings.compare.linked and settings.compare.mode != OFF
+        self._linked.poll(self._compared(settings) if follows else [], frame)
 
     def flip(self) -> None:
         """The other picture."""

@@ -66,6 +66,9 @@ BINDINGS: tuple[Binding, ...] = (
     Binding("Compare", "Y", "Flip to the other of the two pictures", "flip_pictures", K.y),
     Binding("Compare", "Shift+X", "Next kind of difference", "next_difference", K.x, shift=True),
     Binding("Compare", "Shift+Y", "Swap A and B", "swap_pictures", K.y, shift=True),
+    Binding(
+        "Compare", "Shift+S", "Link cameras: snapshots follow the live one, or not", "link_cameras", K.s, shift=True
+    ),
     Binding("Picture", "1 … 9, 0", "View: beauty, one of its terms, a property, geometry"),
     Binding("Picture", "E", "Exposure up by half a stop", "exposure_up", K.e, repeat=True),
     Binding("Picture", "Shift+E", "Exposure down by half a stop", "exposure_down", K.e, shift=True, repeat=True),

@@ -84,7 +84,11 @@ def reference_side(reference: Reference) -> Side:
 
 def same_camera(a: Side, b: Side) -> bool:
     """Whether both are seen by one camera, as far as that is known."""
-    one, other = a.camera, b.camera
+    return same_view(a.camera, b.camera)
+
+
+def same_view(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """The same of two cameras by their attributes; one that isn't known is any."""
     if not one or not other:
         return True
     if one.keys() != other.keys():

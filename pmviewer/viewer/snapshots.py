@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -58,8 +59,6 @@ class Snapshots:
             return None
         if not self._has_room(frame.planes.nbytes * 25 // 22):
             return None
-        from dataclasses import replace
-
         from pmviewer.output.snapshot import snapshot_of
 
         number = self._next()
@@ -93,6 +92,22 @@ class Snapshots:
             return ""
 
         self._background.start(READING, "reading snapshots", work)
+
+    def put(self, snapshot: Snapshot) -> Snapshot | None:
+        """Take it into the strip, in the place of the one of that name, or as a new one; None, with a sentence in the
+        log, where there is no room."""
+        same = next((one for one in self.all if one.name == snapshot.name), None)
+        if same is not None:
+            placed = replace(snapshot, number=same.number)
+            self.all = [placed if one is same else one for one in self.all]
+            self._thumbnails.pop(same.number, None)
+            self.version += 1
+            return placed
+        if not self._has_room(snapshot.bytes):
+            return None
+        placed = replace(snapshot, number=self._next())
+        self._add([placed])
+        return placed
 
     @property
     def arriving(self) -> bool:

@@ -41,9 +41,11 @@ from pmviewer.viewer.film import FilmEditor
 from pmviewer.viewer.history import History
 from pmviewer.viewer.importance_gain import GainRun
 from pmviewer.viewer.inspector import Inspector
+from pmviewer.viewer.linked import Linked
 from pmviewer.viewer.loaded_photons import LoadedPhotons
 from pmviewer.viewer.measured import Measured
 from pmviewer.viewer.pair import Pair, ShownPair
+from pmviewer.viewer.received import ReceivedByObjects
 from pmviewer.viewer.saved_views import FILE, SavedViews
 from pmviewer.viewer.session_link import SessionLike
 from pmviewer.viewer.snapshots import Snapshots
@@ -98,12 +100,14 @@ class ViewerState:
         self.gain = GainRun(session, self.background, self.say)
         self.automatic = AutomaticRun(session, self.background, self.say, self._change_by_itself)
         self.snapshots = Snapshots(self.background, self.say)
-        self.pair = Pair(self.background, self.comparison, self.gain, self.snapshots)
+        self.linked = Linked(session, self.background)
+        self.pair = Pair(self.background, self.comparison, self.gain, self.snapshots, self.linked)
         self.measured = Measured(self.background, self.comparison, lambda: self.frame)
         self.inspector = Inspector(session, lambda: self.frame)
         self._paired: tuple[tuple[Any, ...], ShownPair | None] | None = None
         self.history = History()
         self.editing = Editing(session, self.change)
+        self.received = ReceivedByObjects(session, self.background, lambda: self.frame)
         self.loaded = LoadedPhotons(self.background, lambda: self.change({"overlays.file.show": True}))
         self.still = StillExport(session, self.background)
         self.film = FilmEditor(session, self.history, self.change, self.background, self.say)
@@ -113,6 +117,8 @@ class ViewerState:
         self._said: deque[Message] = deque()
         """What any thread said since the last frame."""
         self._calls: deque[Callable[[], None]] = deque()
+        self.is_attachable: Callable[[], bool] | None = None
+        """Whether programs can attach to the window; None where that is not offered."""
         self.flying = False
         self.panels_hidden = False
         self.help_open = False
@@ -293,7 +299,9 @@ class ViewerState:
         none."""
         reference = self.comparison.reference
         shown = self.gain.gain if self.gain.shown else None
-        now = (self.settings, self.frame, shown, self.snapshots.version, reference, self.pair.second)
+        now = (
+            self.settings, self.frame, shown, self.snapshots.version, reference, self.pair.second, self.linked.version
+        )  # fmt: skip
         if self._paired is None or any(a is not b for a, b in zip(self._paired[0], now, strict=True)):
             display = self._exposed(self.settings.display, self.frame)
             view = display.view if display.view in LAYERS else "beauty"
@@ -451,5 +459,6 @@ class ViewerState:
         self.loaded.poll()
         passes = self.frame.statistics.passes if self.frame is not None else 0
         self.autosave.poll(self.parameters, self.snapshots, self.film.keys, passes)
+        self.pair.link(self.settings, self.frame)
         self.pair.poll(self.shown_pair())
         self.toasts = [toast for toast in self.toasts if not toast.is_over()]

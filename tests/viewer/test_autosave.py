@@ -17,10 +17,11 @@ from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.output.checkpoint_header import read_header
 from pmviewer.output.session_file import read_session, write_session
+from pmviewer.output.snapshot import read_snapshot
 from pmviewer.settings.access import Settings, with_values
 from pmviewer.viewer.autosave import FILM, KEPT, KEPT_DAYS, SESSION, Autosave
 from pmviewer.viewer.background import Background
-from pmviewer.viewer.dialogs.restore_dialog import told
+from pmviewer.viewer.dialogs.restore_dialog import TITLE, told
 from pmviewer.viewer.snapshots import Snapshots
 from tests.viewer.driver import drive, make_app, wait_until
 from tests.viewer.fake_session import FakeSession
@@ -87,6 +88,49 @@ def test_what_a_crash_has_left_is_offered_once_and_taken_over(tmp_path):
     assert not folder.exists()
 
 
+def test_snapshots_are_written_once(tmp_path):
+    window = Window(tmp_path)
+    for _ in range(2):
+        window.snapshots.take(window.session.frame, None, "")
+    window.write()
+    (folder,) = folders(tmp_path)
+    first, second = sorted((folder / "session.snapshots").iterdir())
+    before = first.stat().st_mtime_ns, first.stat().st_ino
+    window.snapshots.rename(window.snapshots.all[1], "other")
+    window.snapshots.take(window.session.frame, None, "")
+    window.write()
+    assert (first.stat().st_mtime_ns, first.stat().st_ino) == before
+    assert [read_snapshot(path).name for _, path in read_session(folder / SESSION).snapshots][1] == "other"
+    window.snapshots.remove(window.snapshots.all[0])
+    first.unlink()
+    second.unlink()
+    window.write()
+    kept = [path for _, path in read_session(folder / SESSION).snapshots]
+    assert kept == [second, folder / "session.snapshots" / "3.exr"]
+    assert read_snapshot(second).name == "other", "what somebody has removed is written again"
+
+
+def test_the_tour_waits_for_what_a_crash_has_left(tmp_path):
+    first = Window(tmp_path)
+    first.write()
+    first.crash()
+    session = FakeSession()
+    session.open("box")
+    app = make_app(session, tmp_path / "config", autosaves=tmp_path)
+
+    def script(c):
+        app.tour.begin()
+        c.yield_(4)
+        assert app.restore_dialog.is_open
+        assert app.tour.shown_at is None
+        c.item_click(f"//{TITLE}/Not now##autosave")
+        c.yield_(4)
+        assert not app.restore_dialog.is_open
+        assert app.tour.shown_at is not None
+
+    drive(app, script)
+
+
 def test_old_and_empty_ones_go(tmp_path):
     for number in range(KEPT + 2):
         folder = tmp_path / f"2026-{number}"
@@ -125,6 +169,7 @@ def test_never_means_never(tmp_path):
 PROGRAM = """
 import sys
 from pmviewer.engine.checkpoint import autosave
+from pmviewer.output.snapshot import read_snapshot
 from pmviewer.settings.access import Settings, with_values
 from pmviewer.viewer import app
 

@@ -6,6 +6,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from pmviewer.viewer.panels.received_rows import rows_of
 from pmviewer.viewer.panels.scene_panel import SCENE
 from tests.viewer.driver import app_on_engine, drag, drive, finished, wait_until
 
@@ -97,6 +98,39 @@ def test_the_tab_edits_and_resets(tmp_path):
             assert not state.settings.edit.changes, "what the file says is no edit"
 
         drive(app, script)
+
+
+def test_an_object_tells_its_area_and_the_photons_on_it(tmp_path):
+    """The green and the red wall of the Cornell box are at its sides."""
+    seen = {}
+
+    with app_on_engine(tmp_path, "cornell_caustic", {**SMALL, "photons.N": 20_000}) as app:
+
+        def script(c):
+            state, editing = app.state, app.state.editing
+            wait_until(c, lambda: finished(app))
+            assert not state.background.running(), "nobody looks: nothing is counted"
+            seen["targets"] = editing.catalogue.targets["object"]
+            editing.choose(seen["targets"][1])
+            wait_until(c, lambda: state.received.counted() is not None)
+            c.yield_(4)
+            seen["counted"], seen["cloud"] = state.received.counted(), state.frame.clouds["global"]
+            seen["rows"] = [rows_of(state, n) for n in range(len(seen["targets"]))]
+
+        drive(app, script)
+    photons, counts = seen["cloud"].photons, seen["counted"].maps["global"]
+    x = photons[:, 0]
+    middle = (x.min() + x.max()) / 2
+    for number in (1, 2):
+        at = x[np.abs(x - middle) > 0.49 * np.ptp(x)]
+        sides = [int((at < middle).sum()), int((at > middle).sum())]
+        assert min(abs(int(counts.photons[number]) - side) for side in sides) <= 0.03 * max(sides)
+        rows = {name: text for name, text, _ in seen["rows"][number]}
+        assert rows["area"] == "0.9851 units²" or float(rows["area"].split()[0]) > 0.9
+        assert rows["global"].startswith(f"{counts.photons[number]:,} (")
+        assert rows["global"].endswith("W/unit²")
+    assert {name: text for name, text, _ in seen["rows"][4]}["global"] == "0", "glass stores none"
+    assert int(counts.photons.sum()) + counts.unknown == len(photons)
 
 
 def test_another_scene_is_opened_without_the_edits(tmp_path):

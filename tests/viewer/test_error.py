@@ -16,6 +16,7 @@ from pmviewer.render.planes import PLANES
 from pmviewer.settings.access import with_values
 from pmviewer.viewer.comparison import EARLIER_RUNS, next_mark, run_of
 from pmviewer.viewer.panels.error_panel import log_limits
+from pmviewer.viewer.sides import snapshot_side
 from tests.viewer.driver import chord, drive, on_window_thread, viewport_pixels
 from tests.viewer.fake_session import SIZE
 
@@ -166,6 +167,27 @@ def test_without_a_reference_or_with_another_camera_the_views_are_refused_with_a
 
     drive(app, script)
     assert not [m for m in app.state.log if m.level == "error"]
+
+
+def test_a_picture_of_another_camera_has_no_error_against_the_reference(app, session, truth, tmp_path):
+    seen = {}
+
+    def script(c):
+        load(c, app, tmp_path / "truth.exr")
+        state = app.state
+        state.take_snapshot()
+        state.change({"camera.origin": (0.5, 0.0, 4.0)})
+        c.yield_(2)
+        state.take_snapshot()
+        own, moved = (snapshot_side(one) for one in state.snapshots.all)
+        wait(c, lambda: state.measured.error(own) is not None)
+        state.measured.error(moved)
+        wait(c, lambda: not state.background.running())
+        seen["own"], seen["moved"] = state.measured.error(own), state.measured.error(moved)
+
+    drive(app, script)
+    assert seen["own"] == pytest.approx(relmse(session.frame.image(), truth), rel=1e-5)
+    assert seen["moved"] is None
 
 
 def test_curves_of_earlier_settings_are_kept_until_cleared(app, session, truth, tmp_path):

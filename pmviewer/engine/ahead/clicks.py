@@ -25,6 +25,8 @@ from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, get, with_
 
 FIRST = ("render", "estimate", "gather", "photons", "importance", "direct")
 """Groups of settings in the order in which they are most likely clicked; the others follow."""
+PINNED = FIRST[:3]
+"""Those that decide how photons are looked up."""
 SIDE = 8
 """Pixels of the picture that a click is tried with, across and down."""
 FEW = {
@@ -39,11 +41,12 @@ FEW = {
 
 @dataclass(frozen=True, eq=False)
 class Click:
-    """Settings, or a scene, one click away; `text` says which, "" for none."""
+    """Settings, or a scene, one click away; `text` says which, "" for none. `pins`: and then a click on the picture."""
 
     text: str
     opened: OpenScene
     settings: Settings
+    pins: bool = False
 
     def run(self, pool: WorkPool) -> None:
         """Render one small picture of the scene as the window would, with what its display asks for."""
@@ -53,12 +56,13 @@ class Click:
         renderer = Renderer(self.opened, with_values(self.settings, small), pool, StageStore(0))
         renderer.coarse_frame(1)
         renderer.step()
-        pinned = None if self.text else Pinned(SIDE // 2, SIDE // 2)  # with the settings as they are
+        pinned = Pinned(SIDE // 2, SIDE // 2) if self.pins else None
         renderer.frame(2, replace(wanted_of(renderer.facts), pixel=(SIDE // 2, SIDE // 2), pinned=pinned))
 
 
 def clicks(opened: OpenScene, settings: Settings) -> list[Click]:
-    """The settings as they are, then each that is one click away and runs something that none before it runs."""
+    """The settings as they are, with a pinned pixel, then each that is one click away and runs something that none
+    before it runs; last a pixel pinned after such a click on what decides about look-ups."""
     seen: set[Hashable] = set()
     found = []
     for click in _all(opened, settings):
@@ -69,7 +73,13 @@ def clicks(opened: OpenScene, settings: Settings) -> list[Click]:
         if needs not in seen:
             seen.add(needs)
             found.append(click)
-    return found
+    pinned = [replace(click, text=f"a pinned pixel, {click.text}", pins=True) for click in found if _looks_up(click)]
+    return [*found, *pinned]
+
+
+def _looks_up(click: Click) -> bool:
+    """Whether it may change what the inspector runs."""
+    return click.text.split(".")[0] in PINNED
 
 
 def other_kinds(of_record: np.dtype, settings: Settings) -> list[Click]:
@@ -93,7 +103,7 @@ def _needs(opened: OpenScene, settings: Settings) -> Hashable:
 
 
 def _all(opened: OpenScene, settings: Settings) -> Iterator[Click]:
-    yield Click("", opened, settings)
+    yield Click("", opened, settings, pins=True)
     order = sorted(SETTINGS.values(), key=lambda info: _rank(info.path))
     for info in order:
         if info.stage in ("scene", "stop"):

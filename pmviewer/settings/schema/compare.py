@@ -50,6 +50,15 @@ class Compare(Group):
         title="picture B",
         needs=(COMPARED,),
     )
+    linked: bool = setting(
+        False,
+        "A snapshot that is compared is rendered again, by its own settings and with as many passes as it has, as the "
+        "live picture's camera sees the scene. Off, it stays the picture that it is.",
+        stage="display",
+        scale="switch",
+        title="link cameras",
+        needs=(COMPARED,),
+    )
     difference: Literal["signed", "absolute", "relative", "relMSE", "MAPE", "FLIP"] = setting(
         "relMSE",
         "What is shown of A and B, by pixel: luminance of A − B; |A − B|; (A − B)/(B + 0.1) of luminances; "

@@ -86,6 +86,12 @@ class Menus:
         self._item("Screenshot of the picture", "screenshot_picture")
         self._item("Screenshot of the window", "screenshot")
         imgui.separator()
+        if self._state.is_attachable is not None:
+            self._item("Let Python programs attach", "listen", self._state.is_attachable())
+            imgui.set_item_tooltip(
+                "pmviewer.attach() in Python changes this window, reads it and shows pictures in it."
+            )
+            imgui.separator()
         self._item("Quit", "quit")
 
     def _recent(self, entry: str) -> None:
@@ -185,6 +191,7 @@ class Menus:
             imgui.end_menu()
         self._item("Flip to the other picture", "flip_pictures")
         self._item("Swap A and B", "swap_pictures")
+        self._item("Link cameras", "link_cameras", state.settings.compare.linked)
         imgui.separator()
         self._item("With and without importance", "compare_importance", state.gain.running)
         self._item("Mark odd pixels", "toggle_marks", state.settings.display.marks)

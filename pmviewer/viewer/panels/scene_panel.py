@@ -11,6 +11,7 @@ from pmviewer.settings.edits import PROPERTIES, Property
 from pmviewer.viewer import theme
 from pmviewer.viewer.editing import OPERATIONS, Editing
 from pmviewer.viewer.overlays.legend import wrapped
+from pmviewer.viewer.panels.received_rows import draw_received
 from pmviewer.viewer.panels.widgets import icon_button, tooltip_text
 from pmviewer.viewer.state import ViewerState
 
@@ -121,6 +122,8 @@ class ScenePanel:
                     self._row(editing, target, prop, what)
             self._made_of(editing, target)
             imgui.end_table()
+        if editing.object_number(target) >= 0:
+            draw_received(self._state, editing.object_number(target))
         imgui.tree_pop()
 
     @staticmethod
@@ -148,8 +151,9 @@ class ScenePanel:
         if changed:
             editing.choose(target if wanted else None)
             self._scrolled_to = target
-        for op in possible if is_chosen else ():
-            imgui.same_line()
+        for number, op in enumerate(possible if is_chosen else ()):
+            if number:  # the first below the switch: a narrow panel has no room for all in one line
+                imgui.same_line()
             if imgui.radio_button(op, editing.operation == op):
                 editing.operation = op
 

@@ -60,6 +60,11 @@ class SnapshotsPanel:
             if icon_button(icon, f"snapshots.{action}", f"{text}  ({keys})" if keys else text):
                 self._actions[action]()
             imgui.same_line(0, 2)
+        linked = self._state.settings.compare.linked
+        text = f"Link cameras: snapshots that are compared follow the live one  ({keys_of('link_cameras')})"
+        if icon_button(fa.ICON_FA_LINK, "snapshots.link_cameras", text, on=linked):
+            self._actions["link_cameras"]()
+        imgui.same_line(0, 2)
 
     def _choices(self) -> None:
         """How A and B are compared, and which they are; in lines that fit."""
