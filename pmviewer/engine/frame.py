@@ -112,6 +112,15 @@ class PhotonCloud:
     """Do photons tell their wavelengths (`pmviewer.maps.record.bands`)?"""
 
 
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """What is shown in place of a young picture: radiance (h, w, 3) float32 in the picture's full size, and `how` it
+    was made, in words."""
+
+    image: NDArray[np.float32]
+    how: str
+
+
 @dataclass(frozen=True)
 class Frame:
     """One published picture. `planes` is (height, width, 22) float32, with media 28: see `pmviewer.render.planes`."""
@@ -141,6 +150,8 @@ class Frame:
     """What automatic settings came to, by full name (`pmviewer.engine.automatic`)."""
     light_places: NDArray[np.float64] | None = None
     """(n, 3) middles of the lights, NaN where they shine from outside; None without importance."""
+    preview: Preview | None = None
+    """What the window shows in place of the beauty, which it is not; None where it shows that."""
 
     @property
     def has_media(self) -> bool:
