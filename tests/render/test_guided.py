@@ -100,6 +100,11 @@ def test_other_surfaces_know_nothing_of_each_other():
     out, known = np.zeros((H, W, 3), np.float32), np.empty((H, W), np.float32)
     reproject(np.ones((H, W, 3), np.float32), old_guides, view_row(before), view_row(after), guides, out, known, 0, H)
     assert known.max() < 0.05
+    depths = np.linspace(3.0, 4.0, W)  # from far before the surface to it: all degrees of being another
+    old_guides[..., 3] = depths
+    reproject(np.ones((H, W, 3), np.float32), old_guides, view_row(before), view_row(after), guides, out, known, 0, H)
+    assert np.isfinite(out).all()
+    assert out.max() < 1.001
     old_guides = seen(before, lambda _: 4.0)[0]
     old_guides[..., 2], old_guides[..., 0] = 0.0, 1.0
     reproject(np.ones((H, W, 3), np.float32), old_guides, view_row(before), view_row(after), guides, out, known, 0, H)

@@ -163,7 +163,7 @@ def changes(opened: OpenScene) -> dict[str, dict[str, Any]]:
     return {
         "camera": moved,
         "light": {"edit.changes": {"light.1.power": (0.5,)}},
-        "setting": {"photons.N": 150_000},
+        "setting": {"photons.N": 250_000},
     }
 
 

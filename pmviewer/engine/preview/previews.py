@@ -103,7 +103,7 @@ class Previews:
         small, small_guides, guides = signals_of(frame.planes), guides_of(frame.planes), guides_of(planes)
         how = "a coarse picture drawn out along edges"
         if self._smooths(settings):
-            small, how = self._denoised(small, frame.planes, frame.planes), "a coarse picture, denoised and drawn out"
+            small, how = self._denoised(small, frame.planes), "a coarse picture, denoised and drawn out"
         signals = self._drawn_out(small, small_guides, camera, guides, camera.width / frame.planes.shape[1])
         known = self._reprojected(renderer, guides)
         if known is not None:
@@ -136,11 +136,11 @@ class Previews:
             signals[..., :3] = (signals[..., :3] + weight * known.light) / (1.0 + weight)
             how = f"{how} with light of the last picture"
         if smooths and renderer.scene.traits.follows(renderer.settings.photons.glossy):
-            signals = self._denoised(signals, frame.planes, frame.planes)
-            how = f"{how}, denoised"
-        elif smooths:
+            albedo = frame.planes[..., PLANES["albedo"]]
+            return Preview(self._smoothed(picture_of(signals, frame.planes), albedo, frame.planes), f"{how}, denoised")
+        if smooths:  # nothing but edges is finer than what light does
             guides, small = guides_of(frame.planes), halved(frame.planes)
-            few = self._denoised(halved(signals), small, small)
+            few = self._denoised(halved(signals), small)
             signals = self._drawn_out(few, np.ascontiguousarray(guides[1::2, 1::2]), frame.camera, guides, 2.0)
             how = f"{how}, denoised"
         return Preview(picture_of(signals, frame.planes), how)
@@ -148,19 +148,22 @@ class Previews:
     def _smooths(self, settings: Settings) -> bool:
         return settings.display.preview == "denoised" and self._denoises
 
-    def _denoised(self, signals: F4, planes: F4, surfaces: F4) -> F4:
+    def _denoised(self, signals: F4, planes: F4) -> F4:
         """Both signals (h, w, 6) without noise; as they are where the denoiser refuses to work."""
-        normal, out = np.ascontiguousarray(surfaces[..., PLANES["normal"]]), signals.copy()
-        plain = np.ones_like(normal)
+        out, albedo = signals.copy(), planes[..., PLANES["albedo"]]
+        for part, colour in ((slice(0, 3), np.ones_like(albedo)), (slice(3, 6), albedo)):
+            if np.any(signals[..., part]):
+                out[..., part] = self._smoothed(signals[..., part], colour, planes)
+        return out
+
+    def _smoothed(self, light: F4, albedo: F4, planes: F4) -> F4:
+        normal = np.ascontiguousarray(planes[..., PLANES["normal"]])
         try:
-            for part, albedo in ((slice(0, 3), plain), (slice(3, 6), planes[..., PLANES["albedo"]])):
-                if np.any(signals[..., part]):
-                    task = partial(denoised, signals[..., part], albedo, normal, self._pool.threads, fast=True)
-                    (out[..., part],) = self._pool.run([task])
+            return self._pool.run([partial(denoised, light, albedo, normal, self._pool.threads, fast=True)])[0]
         except OutputError as error:
             self._denoises = False
             self._published.say("warning", f"{error} Pictures are shown as they are (display.preview).")
-        return out
+            return light
 
     def _drawn_out(self, small: F4, small_guides: F4, camera: CameraPose, guides: F4, shrink: float) -> F4:
         out = np.empty((*guides.shape[:2], small.shape[-1]), np.float32)

@@ -27,7 +27,7 @@ _OFF_PLANE = np.float32(1.5)
 _FACING = 0.8
 """Cosine below which normals are of different surfaces."""
 _ANYHOW = np.float32(1e-4)
-"""What a tap of another surface counts: something, where there is no other."""
+"""What a tap of another surface counts where there is no other; what counts less is not known."""
 _f4 = np.float32
 
 
@@ -155,7 +155,7 @@ def reproject(old, old_guides, old_view, view, guides, out, known, first, last):
                     a0 += weight * old[y, x, 0]
                     a1 += weight * old[y, x, 1]
                     a2 += weight * old[y, x, 2]
-            if total > _f4(0.0):
+            if total > _ANYHOW:
                 share = _f4(1.0) / total
                 out[Y, X, 0], out[Y, X, 1], out[Y, X, 2] = a0 * share, a1 * share, a2 * share
                 known[Y, X] = min(total, _f4(1.0))

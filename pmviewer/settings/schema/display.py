@@ -213,6 +213,14 @@ class Display(Group):
         scale="choice",
         choice_needs={"denoised": (DENOISER,)},
     )
+    automatic: bool = setting(
+        True,
+        "A scene that is opened in the window gets the way of rendering that suits it: a short trial after the first "
+        "passes chooses it, unless somebody has. It is one change to undo; without it the trial begins when asked.",
+        stage="display",
+        scale="switch",
+        title="choose by itself",
+    )
     compile_ahead: bool = setting(
         True,
         "While nothing is asked for, compile in the background what the next click may need: other methods, look-ups, "
