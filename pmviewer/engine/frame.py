@@ -58,9 +58,6 @@ class Statistics:
     """Pixels of all passes by what the estimation of gathers made of them: safe, critical, other; of the safe ones
     gathered (sparse: on the undivided grid), interpolated, left; with reprojection, what was gathered is full or
     partial, and directions shot for both. Empty without."""
-    noise: float | None = None
-    """What noise is expected to leave of the picture's relMSE, from how the passes differ
-    (`pmviewer.render.moments`); bias is none of it. None before two passes and where passes can't tell."""
     saved_rays: int = 0
     """Shadow rays that were not cast, because shadow photons knew."""
     seconds: float = 0.0

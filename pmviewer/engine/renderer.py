@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.apart import check_apart
+from pmviewer.engine.auto.bias import way_of
 from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.automatic import automatic_values
 from pmviewer.engine.diagnose import Looked, inspected
@@ -95,6 +96,7 @@ class Renderer:
         if self.plan.moments:
             self.film.moments = Moments(len(self.film.sums), self.film.refined)
         self.error = ErrorEstimate(self.camera.width, self.camera.height, settings, self.plan)
+        self.error.bias = scene.biases.get(way_of(settings)) if scene.biases else None
         self.first_radius = (
             first_radius(scene.flat, self.render_camera, settings.estimate, self.plan.gather)
             if self.plan.photons

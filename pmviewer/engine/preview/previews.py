@@ -36,7 +36,7 @@ F4 = NDArray[np.float32]
 MOST = 8
 """Passes that the light of the last picture counts as, at most."""
 CLEAN = 1e-3
-"""relMSE by noise from which an estimate is shown as it is."""
+"""Estimated relMSE from which a picture is shown as it is."""
 LONG = 0.3
 """Seconds that the first pass must be expected to take for a coarse frame to be drawn out, which costs a third of a
 quick one."""
@@ -84,15 +84,26 @@ class Previews:
 
     def show(self, renderer: Renderer, frame: Frame, settings: Settings, last: bool, version: int) -> None:
         """Publish the frame of the film after a pass, with its preview where it has one; `last` if no other pass
-        follows. A picture that is the first since the change is not kept back for its preview. Raises Cancelled."""
-        first = self._shown is None and self._smooths(settings) and frame.statistics.passes == 1
-        if first:
-            self._published.show(frame, version)
-        preview = self._of_pass(renderer, frame, settings, last)
-        if first:
-            self._published.preview(preview)
-        else:
-            self._published.show(frame if preview is None else replace(frame, preview=preview), version)
+        follows. The first picture since a change does not wait for the denoiser. Raises Cancelled."""
+        passes, remaining = frame.statistics.passes, frame.statistics.remaining
+        off = last or settings.display.preview == "off" or settings.region.on or not can_preview(renderer.plan)
+        if passes == 1 and self._known is None and not off:
+            self._reprojected(renderer, guides_of(frame.planes))
+        self._last = _Last(frame, renderer.scene.uid)
+        if self._known is not None and (self._known.renderer is not renderer or passes >= self._known.passes):
+            self._known = None
+        smooths = not off and self._smooths(settings) and (remaining is None or remaining.relmse > CLEAN)
+        if off or (self._known is None and not smooths):
+            self._shown = None
+        elif self._shown is None and smooths:
+            quick = self._made(renderer, frame, smooths=False) if self._known is not None else None
+            self._published.show(replace(frame, preview=quick), version)
+            self._shown = self._made(renderer, frame, smooths=True)
+            self._published.preview(self._shown)
+            return
+        elif not smooths or is_due(passes):
+            self._shown = self._made(renderer, frame, smooths)
+        self._published.show(replace(frame, preview=self._shown), version)
 
     def _of_coarse(self, renderer: Renderer, seen: RenderedPass, frame: Frame, settings: Settings) -> Preview:
         camera, pool = renderer.camera, self._pool
@@ -112,24 +123,8 @@ class Previews:
             how = f"light of the last picture ({100 * float(share.mean()):.0f} %), {how}"
         return Preview(picture_of(signals, planes), how)
 
-    def _of_pass(self, renderer: Renderer, frame: Frame, settings: Settings, last: bool) -> Preview | None:
-        passes, on = frame.statistics.passes, settings.display.preview != "off" and not settings.region.on
-        on = on and can_preview(renderer.plan)
-        if passes == 1 and self._known is None and on and not last:
-            self._reprojected(renderer, guides_of(frame.planes))
-        self._last, known = _Last(frame, renderer.scene.uid), self._known
-        if known is not None and (known.renderer is not renderer or passes >= known.passes):
-            known = self._known = None
-        noise = frame.statistics.noise
-        smooths = self._smooths(settings) and (noise is None or noise > CLEAN)
-        if last or not on or (known is None and not smooths):
-            self._shown = None
-        elif self._shown is None or not smooths or is_due(passes):
-            self._shown = self._made(renderer, frame, known, smooths)
-        return self._shown
-
-    def _made(self, renderer: Renderer, frame: Frame, known: _Known | None, smooths: bool) -> Preview:
-        signals, passes = signals_of(frame.planes), frame.statistics.passes
+    def _made(self, renderer: Renderer, frame: Frame, smooths: bool) -> Preview:
+        signals, passes, known = signals_of(frame.planes), frame.statistics.passes, self._known
         how = f"{passes} pass" if passes == 1 else f"{passes} passes"
         if known is not None:
             weight = (known.share * (known.passes / passes))[..., None]
