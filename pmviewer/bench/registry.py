@@ -33,6 +33,10 @@ BENCHES: dict[str, tuple[str, str]] = {
     "lights": ("Shadow rays by choice of lights (R2)", "pmviewer.bench.measures.lights:run"),
     "shadows": ("Shadow rays saved by shadow photons (T8)", "pmviewer.bench.measures.shadows:run"),
     "latency": ("Slider to first new frame (P9)", "pmviewer.bench.measures.latency:run"),
+    "preview": (
+        "What the window shows after a change: error over time (P18)",
+        "pmviewer.bench.measures.preview:run",
+    ),
     "start": ("Start to first image, cold and warm (P10)", "pmviewer.bench.measures.start:run"),
     "unused": ("Cost of what a scene does not use (P14)", "pmviewer.bench.measures.unused:run"),
     "window": ("Frames per second while computing (P11)", "pmviewer.bench.measures.window:run"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -39,11 +40,14 @@ def view(
     """Open the window (the default command)."""
     from pmviewer.commands.job import load_job, with_snapshots
     from pmviewer.engine.cluster.address import check_address
+    from pmviewer.settings.access import with_values
 
     if cluster is not None:
         check_address(cluster)
 
     job = with_snapshots(load_job(scene, set_ or [], define or [], edit or []), snapshot or [])
+    if job.passes is not None:  # what is kept in a session file is chosen
+        job = replace(job, settings=with_values(job.settings, {"display.automatic": False}))
     try:
         from pmviewer.library.attaching.listening import attachable
         from pmviewer.viewer.app import ViewerApp, run_viewer

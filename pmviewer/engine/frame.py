@@ -58,9 +58,6 @@ class Statistics:
     """Pixels of all passes by what the estimation of gathers made of them: safe, critical, other; of the safe ones
     gathered (sparse: on the undivided grid), interpolated, left; with reprojection, what was gathered is full or
     partial, and directions shot for both. Empty without."""
-    noise: float | None = None
-    """What noise is expected to leave of the picture's relMSE, from how the passes differ
-    (`pmviewer.render.moments`); bias is none of it. None before two passes and where passes can't tell."""
     saved_rays: int = 0
     """Shadow rays that were not cast, because shadow photons knew."""
     seconds: float = 0.0
@@ -115,6 +112,15 @@ class PhotonCloud:
     object_names: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """What is shown in place of a young picture: radiance (h, w, 3) float32 in the picture's full size, and `how` it
+    was made, in words."""
+
+    image: NDArray[np.float32]
+    how: str
+
+
 @dataclass(frozen=True)
 class Frame:
     """One published picture. `planes` is (height, width, 22) float32, with media 28: see `pmviewer.render.planes`."""
@@ -144,6 +150,8 @@ class Frame:
     """What automatic settings came to, by full name (`pmviewer.engine.automatic`)."""
     light_places: NDArray[np.float64] | None = None
     """(n, 3) middles of the lights, NaN where they shine from outside; None without importance."""
+    preview: Preview | None = None
+    """What the window shows in place of the beauty, which it is not; None where it shows that."""
 
     @property
     def has_media(self) -> bool:

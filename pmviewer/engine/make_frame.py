@@ -92,7 +92,6 @@ def _statistics(looked: Looked, tally: Tally, told: Told) -> Statistics:
         energy=energy,
         skipped=plan.skipped,
         estimates=dict(tally.estimates),
-        noise=film.moments.relmse() if film.moments is not None else None,
         clamped=film.lost if isinstance(film, WeightedFilm) else 0.0,
         importons=told.importons,
         warnings=_warnings(looked, tally, energy, told),

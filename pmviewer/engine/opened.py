@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.memory import check_scene_memory
 from pmviewer.engine.stages.hidden_lights import hidden_lights
 from pmviewer.photons.projection.projection import Projection
@@ -64,6 +65,8 @@ class OpenScene:
     arrangement: Arrangement = field(default_factory=Arrangement)
     exposures: dict[str, float] = field(default_factory=dict, compare=False, repr=False)
     """In EV, by the name of the camera, as first pictures decided; empty where the scene has its own."""
+    biases: dict[Hashable, Bias] = field(default_factory=dict, compare=False, repr=False)
+    """What trials have measured, by the way of rendering (`pmviewer.engine.auto.bias.way_of`)."""
     projections: dict[tuple[str, bool], Projection | None] = field(default_factory=dict, compare=False, repr=False)
 
     def is_arranged(self, arrangement: Arrangement) -> bool:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from pmviewer.engine.frame import Frame, Level, Message, State, Status
+from pmviewer.engine.frame import Frame, Level, Message, Preview, State, Status
 from pmviewer.engine.guarded import unexpected
 
 
@@ -57,6 +57,21 @@ class Published:
                 self.frame = frame
             self.changed.notify_all()
         self.notify()
+
+    def preview(self, preview: Preview | None) -> None:
+        """The newest frame is shown by that preview."""
+        if preview is None:
+            return
+        with self.changed:
+            if self.frame is not None:
+                self.frame = replace(self.frame, preview=preview)
+            self.changed.notify_all()
+        self.notify()
+
+    def bare(self) -> None:
+        """The newest frame is shown as it is. For who holds `changed`."""
+        if self.frame is not None and self.frame.preview is not None:
+            self.frame = replace(self.frame, preview=None)
 
     def notify(self) -> None:
         """Tell the listener; one that fails is not told again, and rendering goes on."""

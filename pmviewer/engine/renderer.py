@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.apart import check_apart
+from pmviewer.engine.auto.bias import way_of
 from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.automatic import automatic_values
 from pmviewer.engine.diagnose import Looked, inspected
@@ -95,6 +96,7 @@ class Renderer:
         if self.plan.moments:
             self.film.moments = Moments(len(self.film.sums), self.film.refined)
         self.error = ErrorEstimate(self.camera.width, self.camera.height, settings, self.plan)
+        self.error.bias = scene.biases.get(way_of(settings)) if scene.biases else None
         self.first_radius = (
             first_radius(scene.flat, self.render_camera, settings.estimate, self.plan.gather)
             if self.plan.photons
@@ -111,6 +113,8 @@ class Renderer:
         self.shadows = ShadowStage(scene, settings, pool, store, self.tally)
         self.virtual = VirtualStage(scene, settings, pool, store, self.tally)
         self.latest: RenderedPass | None = None
+        self.coarse_pass: RenderedPass | None = None
+        """What made the coarse frame, until the first pass."""
         self._apart: Film | None = None
         self._told: Told | None = None
         self._outline: NDArray[np.uint8] | None = None
@@ -181,6 +185,7 @@ class Renderer:
 
     def _close_pass(self) -> None:
         self.film.passes += 1
+        self.coarse_pass = None
         if self.film.moments is not None:
             self.film.moments.close_pass()
         self.error.add(self.film, self.pool.run)
@@ -236,6 +241,7 @@ class Renderer:
         quick.settled_radius = self.first_radius
         quick.first_radius = self.first_radius * min(2.0, (self.settings.photons.N / N) ** 0.25)
         quick._pass(film, small, 0, N)
+        self.coarse_pass = quick.latest
         film.passes = 1
         if self.scene.scene.exposure is None:
             self.scene.exposures.setdefault(self.settings.camera.name, metered(film.planes()))
@@ -250,6 +256,13 @@ class Renderer:
         """What is wanted of the latest pass. The film stays as it is."""
         self.recall()
         return inspected(wanted, self._looked(self.film), self.pool)
+
+    def looked_at(self, frame: Frame, serial: int, wanted: Wanted) -> Frame:
+        """The frame of the latest pass with what is wanted of it, under that serial number."""
+        held, inspection = frame.clouds, self.inspect(wanted)
+        if wanted.points and not held:  # the pass was rendered elsewhere
+            return replace(self.frame(serial, wanted), preview=frame.preview)
+        return replace(frame, serial=serial, inspection=inspection)
 
     def gather_points(self, x: int, y: int) -> NDArray[np.float32]:
         """The gather rays of a pixel in the last pass, (n, POINT_COLUMNS), see `pmviewer.render.gather.gather_points`.

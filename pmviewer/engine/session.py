@@ -11,7 +11,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -28,6 +27,7 @@ from pmviewer.engine.opened import OpenScene, arrangement_of, is_edited, nobody,
 from pmviewer.engine.pass_maker import PassMaker
 from pmviewer.engine.pool import WorkPool, lower_priority
 from pmviewer.engine.prepare import prepare
+from pmviewer.engine.preview.previews import Previews
 from pmviewer.engine.published import Published
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
@@ -85,6 +85,7 @@ class Session:
         self._frugal = Frugal(self._store)
         self._film = KeptFilm(self._published.say)
         self._passes = PassMaker(self._published, cluster, self._pool.threads)
+        self._previews = Previews(self._pool, self._published)
         self._renderer: Renderer | None = None
         self._ahead = Ahead(self._pool.threads, self._published.notify, helper) if compiles_ahead else None
         self._worker = threading.Thread(target=self._work, name="pmviewer session", daemon=True)
@@ -214,6 +215,8 @@ class Session:
             state: State = "finished" if self._is_finished() else "paused" if self._paused else "rendering"
             progress = min(1.0, renderer.passes / self._settings.render.passes)
             self._published.status = Status(state, state, renderer.passes, progress)
+            if state != "rendering":
+                self._published.bare()
         self._changed.notify_all()
 
     def _interrupt(self) -> None:
@@ -438,8 +441,10 @@ class Session:
         if renderer.passes:
             with self._changed:
                 self._settle()
-        elif self._paused and not self._is_stale():
-            self._step(renderer)
+        elif not self._is_stale():
+            self._previews.draw_out(renderer, frame, self._settings)
+            if self._paused:
+                self._step(renderer)
 
     def _within_pass(self, stage: str, share: float | None) -> None:
         """What the pool is at. Said of passes that somebody may be waiting for."""
@@ -459,7 +464,8 @@ class Session:
         finally:
             with self._changed:
                 self._stepping = False
-        self._published.show(renderer.frame(self._published.serial + 1, self._wanted(renderer)), self._version)
+        frame = renderer.frame(self._published.serial + 1, self._wanted(renderer))
+        self._previews.show(renderer, frame, self._settings, self._is_finished(), self._version)
         if self._ahead is not None:
             self._ahead.shown(renderer.scene, self._settings)
         self._film.after_pass(renderer, self._settings.display.autosave, self._is_finished())
@@ -472,13 +478,7 @@ class Session:
         frame = self.frame
         assert frame is not None
         self._tell("rendering", "making what is shown")
-        shown, serial = frame.clouds, self._published.serial + 1
-        inspection = renderer.inspect(wanted)
-        if wanted.points and not shown:  # the pass was rendered elsewhere
-            looked_at = renderer.frame(serial, wanted)
-        else:
-            looked_at = replace(frame, serial=serial, inspection=inspection)
-        self._published.show(looked_at, self._version)
+        self._published.show(renderer.looked_at(frame, self._published.serial + 1, wanted), self._version)
         with self._changed:
             self._settle()
         self._published.notify()

@@ -107,6 +107,7 @@ def start_viewer(
     link = SessionLink(_make_session(threads, settings, cluster), settings)
     app = make_app(link, inactive_reason=_inactive_reason, autosaves=autosaves() if leave else None)
     background = app.state.background
+    app.state.automatic.at_start = leave
     app.state.open(source if source is not None else DEFAULT_SCENE, keep_camera=True, parameters=parameters)
     if snapshots:
         app.state.snapshots.open([path for _, path in snapshots], [number for number, _ in snapshots])

@@ -412,6 +412,7 @@ class ViewerState:
                 )
             self.snapshots.open([file for _, file in snapshots], [number for number, _ in snapshots])
         self._opening, self._film = (str(path if remember else source), dict(parameters or {})), film
+        self.automatic.opening(chosen=kept is not None or str(path).lower().endswith(".toml"))
         self.session.open(source, settings, parameters, kept)
 
     def restore(self) -> None:

@@ -49,7 +49,15 @@ def test_from_another_state_other_clicks_matter(box):
     """What only gathering uses is one click away from gathering alone."""
     here = {click.text for click in clicks(box, Settings())}
     there = {click.text for click in clicks(box, settings_of(render={"method": "gather"}))}
-    assert {"gather.cache = on", "render.method = progressive"} <= there - here
+    assert {"gather.directions = photon cones", "render.method = progressive"} <= there - here
+
+
+def test_what_a_trial_tries_is_compiled_after_the_methods(box):
+    """The irradiance cache is more than one click away, and automatic mode tries it."""
+    found = list(clicks(box, Settings()))
+    ways = [n for n, click in enumerate(found) if click.text.startswith("automatic mode: ")]
+    assert any(found[n].settings.gather.cache == "on" for n in ways)
+    assert all(click.text.startswith("render.") for click in found[1 : ways[0]])
 
 
 def test_after_its_clicks_nothing_is_left_to_compile(box):

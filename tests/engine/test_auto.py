@@ -81,6 +81,10 @@ def test_a_trial_picks_settings_that_alone_give_the_same_picture(cornell):
             renderer = Renderer(cornell, settings, pool, StageStore(0))
             renderer.step()
             pictures.append(renderer.film.sums.copy())
+            assert renderer.error.bias in [choice.bias for choice in found]  # both trials may have picked the same
+            assert renderer.error.bias is not None
+        other = with_values(chosen, {"estimate.k": 51})
+        assert Renderer(cornell, other, pool, StageStore(0)).error.bias is None
     finally:
         pool.close()
     assert np.array_equal(pictures[0], pictures[1])

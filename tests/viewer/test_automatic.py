@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from pmviewer.engine.auto.candidates import assignments
-from pmviewer.settings.access import SETTINGS, get
+from pmviewer.engine.frame import Status
+from pmviewer.settings.access import SETTINGS, Settings, get, with_values
+from pmviewer.viewer.automatic import AutomaticRun
 from tests.viewer.driver import app_on_engine, drive, finished, wait_until
+from tests.viewer.fake_session import FakeSession
 
 VALUES = {"camera.width": 24, "camera.height": 24, "photons.N": 3_000, "render.passes": 2}
 BUTTON = f"**/{fa.ICON_FA_GAUGE_HIGH}##choose_automatically"
@@ -41,3 +46,70 @@ def test_one_click_chooses_and_one_undo_takes_it_back(app):
     assert seen["changed"] <= set(assignments({}))
     assert len(seen["said"]) == 1
     assert seen["undone"]
+
+
+def test_a_scene_that_is_opened_is_tried_by_itself_once_it_shows_passes(app):
+    app.state.automatic.at_start = True
+    seen = {}
+
+    def script(c):
+        wait_until(c, lambda: finished(app))
+        seen["asked"] = app.state.automatic.running
+        endless = {"render.passes": 100_000, "photons.N": SETTINGS["photons.N"].default}
+        app.state.change(endless)
+        app.state.open("cornell_diffuse", keep_camera=True)
+        wait_until(c, lambda: any(m.text.startswith("automatic: ") for m in app.state.log))
+        c.yield_(2)
+        seen["settings"] = app.state.settings
+        seen["log"] = [m.text for m in app.state.log if m.text.startswith("automatic: ")]
+
+    drive(app, script)
+    assert seen["asked"] is False
+    assert len(seen["log"]) == 1
+    assert get(seen["settings"], "render.passes") == 100_000
+
+
+class Run(AutomaticRun):
+    """Notes when a trial would begin."""
+
+    def _start(self, opened, *, asked):
+        self.begun.append(asked)
+
+
+@pytest.fixture
+def waiting():
+    """A run that has seen a scene being opened, whose third pass is shown."""
+    session = FakeSession()
+    run = Run(session, None, lambda level, text: None, lambda values: None)
+    run.begun, run.at_start = [], True
+
+    def shown(chosen=False, passes=3, **settings):
+        run.opening(chosen=chosen)
+        session.settings = with_values(Settings(), settings)
+        session.opened_scene = SimpleNamespace(scene=SimpleNamespace(name="box"))
+        statistics = SimpleNamespace(passes=passes)
+        session.frame = SimpleNamespace(coarse=False, statistics=statistics, scene_name="box")
+        session.status = Status("rendering", "")
+        run.poll()
+        return run.begun
+
+    return shown
+
+
+def test_a_trial_begins_once_by_itself(waiting):
+    assert waiting() == [False]
+    assert waiting() == [False, False]  # another scene
+
+
+@pytest.mark.parametrize(
+    ("how", "settings"),
+    [
+        ({"chosen": True}, {}),
+        ({"passes": 1}, {}),
+        ({}, {"render.method": "gather"}),
+        ({}, {"photons.N": 1000}),
+        ({}, {"display.automatic": False}),
+    ],
+)
+def test_what_somebody_has_chosen_is_left_alone(waiting, how, settings):
+    assert waiting(**how, **settings) == []

@@ -3,18 +3,20 @@ picture of every other kind of scene."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from pmviewer.engine.auto.ready import ways
 from pmviewer.engine.effects import facts_of
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.inspector.report import Pinned
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare, steps_of
+from pmviewer.engine.preview.previews import prepare_previews
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.wanted import wanted_of
@@ -55,6 +57,7 @@ class Click:
         small = {"camera.width": SIDE, "camera.height": SIDE, **few}
         renderer = Renderer(self.opened, with_values(self.settings, small), pool, StageStore(0))
         renderer.coarse_frame(1)
+        prepare_previews()
         renderer.step()
         pinned = Pinned(SIDE // 2, SIDE // 2) if self.pins else None
         renderer.frame(2, replace(wanted_of(renderer.facts), pixel=(SIDE // 2, SIDE // 2), pinned=pinned))
@@ -105,6 +108,15 @@ def _needs(opened: OpenScene, settings: Settings) -> Hashable:
 def _all(opened: OpenScene, settings: Settings) -> Iterator[Click]:
     yield Click("", opened, settings, pins=True)
     order = sorted(SETTINGS.values(), key=lambda info: _rank(info.path))
+    methods = [info for info in order if _rank(info.path) == 0]
+    yield from _changed(opened, settings, methods)
+    for way in ways(opened, settings):
+        yield Click(f"automatic mode: {way.render.method}", opened, way)
+    yield from _changed(opened, settings, order[len(methods) :])
+
+
+def _changed(opened: OpenScene, settings: Settings, order: Iterable[SettingInfo]) -> Iterator[Click]:
+    """Each of those settings changed alone."""
     for info in order:
         if info.stage in ("scene", "stop"):
             continue

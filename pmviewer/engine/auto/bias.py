@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
 from pmviewer.maps.radius import progressive_radius
+from pmviewer.settings.access import SETTINGS, Settings, get
+from pmviewer.settings.presets import RESET
 
 ORDER = 1.5
 """Power of the radius that bias is taken to grow with: 2 in the open, 1 at edges."""
+_SIZE = "camera.width", "camera.height"
 
 
 @dataclass(frozen=True)
@@ -41,3 +45,9 @@ def mean_of(sums: np.ndarray, n: float, power: float) -> float:
     if n <= last:
         return float(np.interp(n, np.arange(1, last + 1), sums)) / n
     return float(sums[-1]) / last * (n / last) ** power
+
+
+def way_of(settings: Settings) -> Hashable:
+    """What bias depends on: all that automatic mode sets, and the picture's size, by which radii are chosen. Another
+    view of the scene has about the same."""
+    return tuple(str(get(settings, path)) for path in SETTINGS if path.startswith((*RESET, *_SIZE)))

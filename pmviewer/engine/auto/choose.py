@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from pmviewer.engine.auto.bias import Bias
+from pmviewer.engine.auto.bias import Bias, way_of
 from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, Candidate, assignments, candidates
 from pmviewer.engine.auto.model import FEWEST, WIDTHS, Option, bias_of, options, seconds_to
 from pmviewer.engine.auto.trial import Tell, Trial, trial
@@ -74,14 +74,17 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     (width, height), N = planned
     tried = trial(opened, with_values(base, {"photons.N": N}), found, pool, (width, height), tell)
     picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, seconds - tried.cpu_seconds)
+    values, bias = assignments(_values(picked, base)), bias_of(picked.measured, picked.width)
+    if bias is not None:  # whoever renders so knows it
+        opened.biases[way_of(with_values(base, values))] = bias
     return Choice(
         picked.name,
-        assignments(_values(picked, base)),
+        values,
         picked.error,
         picked.seconds,
         (_sentence(picked, goal), *_table(tried, picked), *said),
         tried,
-        bias_of(picked.measured, picked.width),
+        bias,
     )
 
 

@@ -239,6 +239,24 @@ class Display(Group):
         scale="switch",
         title="through surfaces",
     )
+    preview: Literal["off", "coarse", "denoised"] = setting(
+        "coarse",
+        "What the window shows of a young picture, with a caption that says so. off: the estimate as it is. coarse: "
+        "the first coarse picture drawn out along edges, and where only the camera moved, light of the last picture "
+        "until there are some passes. denoised: also smoothed by a trained network, until noise is low. Films, files "
+        "and measurements are never made of it.",
+        stage="display",
+        scale="choice",
+        choice_needs={"denoised": (DENOISER,)},
+    )
+    automatic: bool = setting(
+        True,
+        "A scene that is opened in the window gets the way of rendering that suits it: a short trial after the first "
+        "passes chooses it, unless somebody has. It is one change to undo; without it the trial begins when asked.",
+        stage="display",
+        scale="switch",
+        title="choose by itself",
+    )
     compile_ahead: bool = setting(
         True,
         "While nothing is asked for, compile in the background what the next click may need: other methods, look-ups, "

@@ -10,7 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.frame import Frame
+from pmviewer.engine.frame import Frame, Preview
 from pmviewer.output.diagnostic_views import (
     DIAGNOSTICS,
     ERROR,
@@ -109,8 +109,9 @@ class Planes:
         self.shown = None
         if view == "reference" or info is not None or (view in HELD_WHILE_SHOWN and view not in frame.diagnostics):
             view = "beauty"  # the reference is there already; the others are shown once they are there
-        key, self._coarse = (frame.serial, view), frame.coarse
-        changed = self._plane.take(key, lambda: frame.image(view))
+        preview = preview_of(frame, display) if view == "beauty" else None
+        key, self._coarse = (frame.serial, view, Same(preview)), frame.coarse and preview is None
+        changed = self._plane.take(key, lambda: frame.image(view) if preview is None else preview.image)
         if view == "depth" and changed:
             self.depth_range = depth_bounds(frame.image(view))
         image = reference if display.view == "reference" else frame.image(view) if display.marks else None
@@ -211,6 +212,11 @@ class Planes:
             colour_row=row_of(shown.table),
             class_colours=shown.look.class_colours,
         )
+
+
+def preview_of(frame: Frame, display: Display) -> Preview | None:
+    """What is shown in place of the frame's beauty, None for the beauty itself."""
+    return frame.preview if display.preview != "off" else None
 
 
 def _content(info: DiagnosticView) -> int:

@@ -83,8 +83,6 @@ def time_rows(s: Statistics) -> Rows:
     if s.saved_rays:
         share = s.saved_rays / (s.saved_rays + s.shadow_rays)
         rows.append(("Shadow rays saved by shadow photons", f"{100 * share:.0f} %"))
-    if s.noise is not None and s.remaining is None:
-        rows.append(("Expected relMSE by noise", f"{s.noise:.3e}"))
     if s.passes and s.seconds:
         rows.append(("Time of a pass", duration(s.seconds / s.passes)))
     return rows

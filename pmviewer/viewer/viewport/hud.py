@@ -10,6 +10,7 @@ from imgui_bundle import imgui
 from pmviewer.output.diagnostic_views import DENOISED, DIAGNOSTICS, ERROR
 from pmviewer.viewer import theme
 from pmviewer.viewer.format import si
+from pmviewer.viewer.gl.planes import preview_of
 from pmviewer.viewer.viewport.caption import LEGEND_EMS, caption, is_narrow
 from pmviewer.viewer.viewport.legend import draw_false_legend, draw_legend, draw_marks
 from pmviewer.viewer.viewport.pair_hud import draw_pair
@@ -60,6 +61,8 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         caption(viewport, f"{state.settings.display.view}: {refusal}", (margin, margin), colour=theme.DARK.warning)
     elif view != "beauty" and viewport.captions:
         below = caption(viewport, _title(viewport, view), (margin, margin))
+    elif state.frame is not None and (preview := preview_of(state.frame, state.settings.display)) is not None:
+        caption(viewport, f"preview, no estimate: {preview.how}", (margin, margin))
     if state.settings.free_camera.on and viewport.captions:
         _free_camera_label(viewport)
     if view == "depth" and state.frame is not None and viewport.picture is not None:

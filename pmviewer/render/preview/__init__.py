@@ -1,0 +1,1 @@
+"""Pictures that are shown before there is an estimate of the same size."""
