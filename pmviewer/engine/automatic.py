@@ -10,6 +10,7 @@ from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.radiance_photons import AUTOMATIC_CUTOFF, AUTOMATIC_CUTOFF_NEAREST
 from pmviewer.maps.search.grid import PhotonGrid
+from pmviewer.photons.bounces import most_bounces
 from pmviewer.settings.access import Settings
 
 
@@ -22,6 +23,7 @@ def automatic_values(looked: Looked, first_radius: float) -> dict[str, Any]:
     found: dict[str, Any] = {"light.rig": _rig(looked.scene)}
     if plan.photons:
         found["estimate.radius"] = first_radius / radius
+        found["photons.max_bounces"] = most_bounces(settings.photons, plan.media)
         found["photons.projection"] = "off" if looked.light.tracer.projection is None else "on"
     found["direct.choice"] = plan.choice
     if looked.latest is not None:

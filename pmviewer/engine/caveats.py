@@ -5,6 +5,7 @@ from __future__ import annotations
 from pmviewer.engine.energy import Energy
 from pmviewer.engine.method import Plan
 from pmviewer.engine.tally import Tally
+from pmviewer.photons.bounces import most_bounces
 from pmviewer.settings.access import Settings
 
 _ASKED = "(render.thin_glass, or the glass says so)"
@@ -45,8 +46,9 @@ def caveats(
     if energy is None:
         return said
     if energy.share("terminated") > CUT_OFF:
+        most = most_bounces(settings.photons, plan.media)
         said.append(
-            f"{energy.share('terminated'):.0%} of the light is still on its way after {settings.photons.max_bounces} "
+            f"{energy.share('terminated'):.0%} of the light is still on its way after {most} "
             "scatterings and left out, so the picture is too dark: raise photons.max_bounces, or lower what surfaces "
             "reflect below 1."
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from pmviewer.maps.estimate.nearest import shrunk
 from pmviewer.maps.radius import progressive_radius
 from pmviewer.render.camera import CameraPose
 from pmviewer.scene.arrays.flatten import FlatScene
+from pmviewer.scene.medium import Medium
 from pmviewer.settings.access import Estimate, needs_of
 from pmviewer.settings.needs import Facts, unmet
 
@@ -67,3 +69,14 @@ def radii_of_pixels(facts: Facts) -> bool:
 def pass_radius(first: float, index: int, estimate: Estimate, scene_radius: float) -> float:
     """Radius of pass `index` (E6), never below the floor."""
     return progressive_radius(first, index + 1, estimate.alpha, estimate.floor * scene_radius)
+
+
+def free_paths(index: int, estimate: Estimate) -> float:
+    """Largest radius of look-ups in a medium in pass `index`, in its mean free paths."""
+    return estimate.free_paths * progressive_radius(1.0, index + 1, estimate.alpha)
+
+
+def volume_radius(radius: float, index: int, estimate: Estimate, media: Sequence[Medium]) -> float:
+    """Largest radius of look-ups in media in pass `index`, whose other look-ups have `radius`, in scene units."""
+    longest = max((m.free_path for m in media if max(m.albedo) > 0), default=math.inf)
+    return min(radius * estimate.volume_radius, free_paths(index, estimate) * longest)

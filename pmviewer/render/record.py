@@ -68,6 +68,7 @@ MEDIA_FIELDS: list[tuple[str, str]] = [
     ("volume_light", "i4"),  # whether light that media scatter towards the camera is sampled
     ("phase_rays", "i4"),  # and found by the phase function, too: there are lights that rays can meet
     ("volume_radius", "f4"),  # of look-ups around rays
+    ("free_paths", "f4"),  # and the largest, in mean free paths of the medium
 ]
 """Of scenes with participating media."""
 
@@ -125,6 +126,7 @@ class Evaluation:
     phase_rays: bool = False
     looked_for: bool = False
     volume_radius: float = 0.0
+    free_paths: float = 0.0
     splits: int = 0
 
 

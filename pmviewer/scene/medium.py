@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from pmviewer.scene.grid import Grid
@@ -40,8 +41,18 @@ class Medium:
         return self.density is not None
 
     @property
+    def free_path(self) -> float:
+        """Mean free path in scene units where it is shortest, of the channel in which it is; infinite where nothing is
+        met."""
+        stops = self._stops
+        return 1.0 / stops if stops > 0.0 else math.inf
+
+    @property
+    def _stops(self) -> float:
+        return max(self.sigma_t) * (1.0 if self.density is None else self.density.most)
+
+    @property
     def acts(self) -> bool:
         """Does it change light at all?"""
-        stops = max(self.sigma_t) * (1.0 if self.density is None else self.density.most)
         emits = max(self.emission) * (1.0 if self.emission_grid is None else self.emission_grid.most)
-        return max(stops, emits) > 0
+        return max(self._stops, emits) > 0

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pmviewer.engine.method import Plan
-from pmviewer.engine.radius import pass_neighbours, pass_radius
+from pmviewer.engine.radius import pass_neighbours, pass_radius, volume_radius
 from pmviewer.engine.stages.deposition import Rules, rules_of
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.settings.access import Settings
@@ -44,7 +44,11 @@ def light_plan(
     largest radii in use by map, where they may be more than that of the pass."""
     estimate = settings.estimate
     radius = pass_radius(first_radius, index, estimate, importance.scene.flat.radius)
-    radii = {"caustic": radius * estimate.caustic_radius, "global": radius, "volume": radius * estimate.volume_radius}
+    radii = {
+        "caustic": radius * estimate.caustic_radius,
+        "global": radius,
+        "volume": volume_radius(radius, index, estimate, importance.scene.scene.media),
+    }
     reach = {name: max(r, widest.get(name, 0.0)) for name, r in radii.items()}
     rules = Rules()
     if plan.deposition != "all":

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.method import Plan, estimator_of
+from pmviewer.engine.radius import free_paths
 from pmviewer.engine.stages.estimation import Estimates, blank_estimates
 from pmviewer.engine.stages.gather_guides import gather_records
 from pmviewer.engine.stages.pass_maps import LookUpMap, PassMaps, blank_grid, blank_maps
@@ -41,10 +42,10 @@ class RenderedPass:
 
 def pass_record(camera: CameraPose, settings: Settings, plan: Plan, maps: PassMaps, index: int) -> NDArray[np.void]:
     """The eye record (1,) of pass `index`, which looks these maps up."""
-    return eye_record(camera, settings, index, _evaluation(settings, plan, maps))
+    return eye_record(camera, settings, index, _evaluation(settings, plan, maps, index))
 
 
-def _evaluation(settings: Settings, plan: Plan, maps: PassMaps) -> Evaluation:
+def _evaluation(settings: Settings, plan: Plan, maps: PassMaps, index: int) -> Evaluation:
     indirect_caustics = settings.photons.indirect_caustics
     return Evaluation(
         direct=plan.direct,
@@ -73,6 +74,7 @@ def _evaluation(settings: Settings, plan: Plan, maps: PassMaps) -> Evaluation:
         looked_for=plan.looked_for,
         splits=settings.render.splits if plan.split else 0,
         volume_radius=maps.volume.radius if maps.volume is not None else 0.0,
+        free_paths=free_paths(index, settings.estimate),
     )
 
 

@@ -25,6 +25,7 @@ from pmviewer.maps.virtual_lights import (
     V_PRIM,
     VIRTUAL_DTYPE,
 )
+from pmviewer.photons.bounces import most_bounces
 from pmviewer.photons.virtual.lights import VirtualLights, virtual_lights
 from pmviewer.photons.virtual.tree import light_tree
 from pmviewer.render.film import Film
@@ -130,7 +131,7 @@ def virtual_record(
     r["per_pixel"] = virtual.per_pixel or len(rows)
     r["estimator"] = estimator
     r["normalised"] = virtual.normalisation != "none" and estimator not in PRINTED
-    r["walks"], r["max_bounces"] = virtual.walks, settings.photons.max_bounces
+    r["walks"], r["max_bounces"] = virtual.walks, most_bounces(settings.photons, flat.has_media)
     r["clamp"] = virtual.clamp / flat.radius**2
     if tree is not None:
         r["descent"], r["tree"], r["leaves"] = 1, tree.ctypes.data, len(tree) // 2

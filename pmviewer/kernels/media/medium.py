@@ -23,11 +23,13 @@ from pmviewer.kernels.vector import dot, largest
 _f4 = np.float32
 _i8 = np.int64
 
-MEDIUM_COLUMNS = 13
-MD_SIGMA_T, MD_ALBEDO, MD_EMISSION, MD_G, MD_G_BESIDE, MD_BESIDE, MD_GLOW = np.array([0, 3, 6, 9, 10, 11, 12], np.int64)
+MEDIUM_COLUMNS = 14
+MD_SIGMA_T, MD_ALBEDO, MD_EMISSION, MD_G, MD_G_BESIDE, MD_BESIDE, MD_GLOW, MD_FREE_PATH = np.array(
+    [0, 3, 6, 9, 10, 11, 12, 13], np.int64
+)
 """Columns of a medium's row: extinction per length, albedo, radiance emitted per length, each RGB; the mean cosines of
-the two lobes of the phase function, the share of the second; and its glow (`pmviewer.kernels.media.glow`), −1 where
-nothing is emitted."""
+the two lobes of the phase function, the share of the second; its glow (`pmviewer.kernels.media.glow`), −1 where
+nothing is emitted; and the mean free path where it is shortest."""
 VACUUM = np.int64(-1)
 SAME = -2
 """Of a side of a surface that ends no medium."""
@@ -62,6 +64,12 @@ def emission_of(scene, medium):
 def scatters(scene, medium):
     """Whether light is scattered there at all."""
     return medium >= 0 and largest(scattering_albedo(scene, medium)) > _f4(0.0)
+
+
+@device
+def free_path(scene, medium):
+    """Mean free path where it is shortest, infinite where nothing is met."""
+    return load_f4(scene.media, medium * MEDIUM_COLUMNS + MD_FREE_PATH)
 
 
 @device

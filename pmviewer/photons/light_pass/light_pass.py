@@ -155,7 +155,7 @@ def testing(scene: FlatScene, settings: Photons, first_index: int, has_specular:
     """Traces batches of test photons for `pmviewer.photons.emission.tested`."""
 
     def trace(table: NDArray[np.void], seed: int, i0: int, i1: int, n: int) -> Batch:
-        record = pass_record(settings, seed, first_index, n, has_specular)
+        record = pass_record(settings, seed, first_index, n, has_specular, scene.has_media)
         record["store_probability"], record["unfound"] = settings.q, scene.delta_lights and has_specular
         return trace_batch(scene, record, table, i0, i1, NORMALS)
 
@@ -168,7 +168,7 @@ def scattered_photons(
     """Where importons arrive that are scattered on once from each of places (n, 7), see
     `pmviewer.photons.emission.scattered`: as photons (m, 6) whose power is their importance, with normals (m,)."""
     emission, n = scattered_record(places), len(places)
-    record = pass_record(settings, seed, 0, n, False)
+    record = pass_record(settings, seed, 0, n, False, scene.has_media)
 
     def batch(i0: int) -> Callable[[], Batch]:
         return lambda: trace_batch(scene, record, emission, i0, min(i0 + BATCH, n), GLOBAL_NORMALS)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
+from pmviewer.photons.bounces import most_bounces
 from pmviewer.photons.emission.guided import Guided
 from pmviewer.photons.light_pass.ledger import E_ABSORBED, E_DROPPED, E_EMITTED, E_ESCAPED, E_TERMINATED
 from pmviewer.photons.light_pass.roulette import MOST_COPIES, RULES
@@ -126,7 +127,7 @@ def plan_pass(
     direct_density = density + ((traced - filling) / caustic_power if traced > filling else 0.0)
     indirect_scale = direct_density / density if projection is not None else 1.0
     direct_scale = min(1.0, LARGEST_SCALE / indirect_scale)
-    record = pass_record(settings, seed, first_index, filling, has_specular)
+    record = pass_record(settings, seed, first_index, filling, has_specular, scene.has_media)
     record["store_probability"] = probability
     record["only_direct"] = projection is not None or not settings.indirect_caustics
     record["indirect_scale"], record["direct_scale"] = indirect_scale * direct_scale, direct_scale
@@ -142,19 +143,21 @@ def plan_pass(
         surface_power=surface_power,
         caustic_power=caustic_power,
         direct_scale=direct_scale,
-        most_stored=settings.max_bounces * (MOST_COPIES if settings.roulette == "equal" else 1),
+        most_stored=most_bounces(settings, scene.has_media) * (MOST_COPIES if settings.roulette == "equal" else 1),
         projected=projection is not None,
         guided=guided,
     )
 
 
-def pass_record(settings: Photons, seed: int, first_index: int, filling: int, has_specular: bool) -> NDArray[np.void]:
+def pass_record(
+    settings: Photons, seed: int, first_index: int, filling: int, has_specular: bool, media: bool
+) -> NDArray[np.void]:
     """LIGHT_PASS_DTYPE (1,) of a pass whose first `filling` trajectories fill the global map and store all that
     arrives."""
     record = np.zeros(1, LIGHT_PASS_DTYPE)
     record["seed"], record["first_index"] = seed & 0xFFFFFFFF, first_index
     record["sequence"] = SOBOL if settings.sequence == "sobol" else INDEPENDENT
-    record["max_bounces"], record["roulette"] = settings.max_bounces, RULES.index(settings.roulette)
+    record["max_bounces"], record["roulette"] = most_bounces(settings, media), RULES.index(settings.roulette)
     record["glossy"], record["global_trajectories"] = settings.glossy, filling
     record["caustics"], record["indirect_caustics"] = has_specular, settings.indirect_caustics
     record["store_probability"] = record["indirect_scale"] = record["direct_scale"] = 1.0

@@ -24,6 +24,7 @@ from pmviewer.maps.virtual_lights import (
     V_PHI,
     V_Q,
 )
+from pmviewer.photons.bounces import most_bounces
 from pmviewer.photons.virtual.choice import as_photons, choice_probabilities, chosen
 from pmviewer.photons.virtual.density import lit_areas
 from pmviewer.photons.virtual.trace import C_DROPPED, C_RAYS, C_STORED, N_COUNTS, TRACE_DTYPE, trace_virtual_lights
@@ -108,7 +109,8 @@ def virtual_lights(
     record = np.zeros(1, TRACE_DTYPE)
     sequence = SOBOL if photons.sequence == "sobol" else INDEPENDENT
     own = (seed ^ VIRTUAL_SALT) & 0xFFFFFFFF
-    record[0] = (own, _first_index(virtual, index), sequence, photons.max_bounces, photons.glossy, estimator)
+    most = most_bounces(photons, scene.has_media)
+    record[0] = (own, _first_index(virtual, index), sequence, most, photons.glossy, estimator)
     results = run([partial(_batch, scene, record, i0, min(i0 + BATCH, N)) for i0 in range(0, N, BATCH)])
     found = np.concatenate([r[0] for r in results])
     rows = np.concatenate([r[1] for r in results])

@@ -16,6 +16,7 @@ from pmviewer.kernels.vector import along
 from pmviewer.maps.estimate.beam import beam_radiance
 from pmviewer.render.cast import cast
 from pmviewer.render.media.through import next_boundary
+from pmviewer.render.media.volume import radius_in
 from pmviewer.render.pixel import camera_ray
 
 _f4 = np.float32
@@ -92,8 +93,8 @@ def _counted(scene, photons, medium, o, d, length, radius, marks):
 
 @kernel
 def beam_view(scenes, eyes, photon_maps, out, first, last):
-    """Radius of the beam estimate and the photons that it counts along the ray up to the first surface; −1 in both
-    where the ray meets no medium that scatters.
+    """Radius of the beam estimate, the smallest of the media met, and the photons that it counts along the ray up to
+    the first surface; −1 in both where the ray meets no medium that scatters.
 
     photon_maps: record (1,) of the volume map; out: float32 (pixels, 2); the rest as for `depth_view`.
     """
@@ -103,17 +104,19 @@ def beam_view(scenes, eyes, photon_maps, out, first, last):
         ray = camera_ray(eye, pixel, _f4(0.5), _f4(0.5))
         hit = cast(scene, ray)
         o, medium, left = ray.o, ray.medium, hit.t
-        count, met = 0, False
+        count, met, narrowest = 0, False, eye.volume_radius
         for k in range(hit.crossed + 1):
             length, beyond, next_medium = left, o, medium
             if k < hit.crossed:
                 length, beyond, next_medium = next_boundary(scene, o, ray.d, medium)
             if scatters(scene, medium):
                 met = True
-                count += _counted(scene, photon_maps[0], medium, o, ray.d, length, eye.volume_radius, marks)
+                radius = radius_in(scene, eye, medium)
+                narrowest = min(narrowest, radius)
+                count += _counted(scene, photon_maps[0], medium, o, ray.d, length, radius, marks)
             o, medium = beyond, next_medium
             left -= length
-        out[pixel, 0] = eye.volume_radius if met else _NONE
+        out[pixel, 0] = narrowest if met else _NONE
         out[pixel, 1] = _f4(count) if met else _NONE
 
 
@@ -152,7 +155,7 @@ def slice_view(scenes, eyes, photon_maps, axis, place, out, first, last):
         if medium >= 0:
             sigma = sigma_at(scene, medium, p)
             out[pixel, 0] = (sigma[0] + sigma[1] + sigma[2]) * _f4(_THIRD)
-            r = eye.volume_radius
+            r = radius_in(scene, eye, medium)
             if scatters(scene, medium) and r > _f4(0.0):
                 o = along(p, ray.d, -r)
                 count = _counted(scene, photon_maps[0], medium, o, ray.d, _f4(2.0) * r, r, marks)

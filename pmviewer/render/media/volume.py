@@ -17,7 +17,7 @@ from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.kernels.dimensions import FURTHER_LIGHT, GATHER_VOLUME, GATHER_VOLUME_PHASE, VOLUME, VOLUME_PHASE
 from pmviewer.kernels.lights.light import sample_one_light
 from pmviewer.kernels.media.column import WORDS, column_of, through_all
-from pmviewer.kernels.media.medium import has_media, phase_numbers, scatters
+from pmviewer.kernels.media.medium import free_path, has_media, phase_numbers, scatters
 from pmviewer.kernels.media.phase import phase, sample_phase
 from pmviewer.kernels.media.varying import albedo_at, sigma_at
 from pmviewer.kernels.memory import stack_i4
@@ -144,6 +144,14 @@ def _single(given, stretch, sampler, numbers, of_phase, counts):
     return total
 
 
+@device
+def radius_in(scene, eye, medium):
+    """Radius of look-ups in a medium: a wider one than its free paths misses much at boundaries, where photons are on
+    one side alone."""
+    most = eye.free_paths * free_path(scene, medium)
+    return eye.volume_radius if eye.volume_radius < most else most
+
+
 @specialised
 def _indirect(given, stretch):
     """Light on a stretch that was scattered before, from the volume map."""
@@ -153,7 +161,8 @@ def _indirect(given, stretch):
     def by_beam(given, stretch):
         o, d, length, medium, column = stretch
         lobes = phase_numbers(given.scene, medium)
-        L, _ = beam_radiance(given.scene, given.volume_map, o, d, length, given.eye.volume_radius, column, lobes)
+        radius = radius_in(given.scene, given.eye, medium)
+        L, _ = beam_radiance(given.scene, given.volume_map, o, d, length, radius, column, lobes)
         return L
 
     return by_beam

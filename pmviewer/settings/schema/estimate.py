@@ -86,6 +86,17 @@ class Estimate(Group):
         le=100.0,
         needs=(VOLUME,),
     )
+    free_paths: float = setting(
+        0.5,
+        "Largest radius of look-ups in a medium, in mean free paths of it, in the first pass: a wider one misses light "
+        "within it at boundaries, a fifth of what shines through marble.",
+        stage="maps",
+        scale="log",
+        unit="free paths",
+        ge=0.01,
+        le=1e6,
+        needs=(VOLUME,),
+    )
     radius_rule: Literal["pass", "pixel"] = setting(
         "pass",
         "One radius for all look-ups of a pass, or each pixel's own at the surfaces that it sees, shrunk by the "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from pmviewer.settings.needs import CLEAR, FOLLOWED, GLOBAL_MAP, PHOTONS, Need
-from pmviewer.settings.schema.base import Group, setting
+from pmviewer.settings.schema.base import Auto, Group, setting
 
 GLOSSY = Need(lambda f: f.traits.glossy_roughness, "No glossy surface in this scene.")
 TERMS_OF_PATHS = Need(lambda f: f.plan.path or f.plan.photons, "No surface of this scene stores photons.")
@@ -128,9 +128,10 @@ class Photons(Group):
         scale="choice",
         needs=(PHOTONS,),
     )
-    max_bounces: int = setting(
-        64,
-        "Scatterings after which a photon is dropped; Russian roulette ends nearly all of them earlier.",
+    max_bounces: int | Auto = setting(
+        "auto",
+        "Scatterings after which a photon is dropped; Russian roulette ends nearly all of them earlier. Automatic: 64, "
+        "in scenes with media 1000, since light leaves marble or milk after hundreds of them.",
         stage="photons",
         scale="integer",
         ge=1,
