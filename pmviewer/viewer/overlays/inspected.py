@@ -122,7 +122,7 @@ class Inspected(Overlay):
             self._disc.upload(disc_lines(look_up.p, look_up.n, look_up.radius))
             self._photons.upload(look_up.found.records[:, :3], levels(look_up))
         if lit is not None:
-            self._take_lights(lit, light.number if light is not None and light.index == report.index else None)
+            self._take_lights(lit, light.number if light is not None and light.of_pass == report.index else None)
         life = report.life
         if life is not None and len(life.vertices):
             self._path.upload(chain(life.vertices[:, :3]))
