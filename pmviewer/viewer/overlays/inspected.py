@@ -131,7 +131,7 @@ class Inspected(Overlay):
     def _take_lights(self, lit: LitPlace, chosen: int | None) -> None:
         self._lights.upload(lit.points, brightness(lit.adds))
         self._reach.upload(spokes(lit.p, lit.points[:MOST_REACHING]))
-        at = np.flatnonzero(lit.number == chosen)[:1] if chosen is not None else []
+        at = np.flatnonzero(lit.number == (-1 if chosen is None else chosen))[:1]
         if len(at):
             self._path.upload(spokes(lit.p, lit.points[at]))
             self._chosen.upload(lit.points[at], np.ones(1))
