@@ -13,7 +13,7 @@ from pmviewer.viewer.session_link import SessionLike
 class ChosenLight(NamedTuple):
     """A virtual light: its number in that pass."""
 
-    index: int
+    of_pass: int
     number: int
 
 

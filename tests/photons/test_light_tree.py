@@ -200,3 +200,18 @@ def test_a_pixel_may_ask_for_more_lights_than_there_are():
     renderer = rendered(diffuse_box(size=4), settings, 1)
     assert np.isfinite(renderer.frame(0).planes).all()
     assert renderer.latest.virtual.tree is not None
+
+
+def test_the_tree_gives_the_same_picture_for_any_number_of_threads():
+    how = {"number": 400, "photons": 2000, "estimator": "single step", "per_pixel": 24, "choice": "light tree"}
+    settings = settings_of(render={"method": "virtual lights"}, virtual=how)
+    one, three = (rendered(diffuse_box(size=12), settings, 2, threads) for threads in (1, 3))
+    assert (one.film.sums == three.film.sums).all()
+
+
+def test_without_the_tree_kernels_know_nothing_of_it():
+    names = virtual_dtype(Virtual(choice="even", per_pixel=5)).names or ()
+    assert not {"descent", "tree", "leaves"} & set(names)
+    assert virtual_dtype(Virtual(choice="light tree")) == virtual_dtype(Virtual(choice="light tree", per_pixel=5)), (
+        "a slider compiles nothing"
+    )

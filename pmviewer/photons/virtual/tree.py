@@ -1,9 +1,9 @@
 """A tree over the virtual lights of a pass, from which a pixel chooses few of very many (R10).
 
-As in lightcuts a node stands for all lights below it: a sphere around their points, a cone around their normals, and
-what they may bring together. Choosing goes down from the root, at each node to either child with a probability by a
-bound on what it may bring to the point (`pmviewer.render.virtual_lights.descent`); unlike a cut of clusters that are
-taken for one light each, this is unbiased.
+As in lightcuts (Walter et al. 2005) a node stands for all lights below it: a sphere around their points, a cone around
+their normals, and what they may bring together. Choosing goes down from a level of nodes, at each node to either child
+with a probability by a bound on what it may bring to the point (`pmviewer.render.virtual_lights.descent`); unlike a cut
+of clusters that are taken for one light each, this is unbiased.
 
 The tree is complete: node i has the children 2i and 2i + 1, node 1 is the root, and the leaves are the last half of the
 rows. Lights that fill the last level up bring nothing and are never chosen.
@@ -80,7 +80,7 @@ def light_tree(rows: Float, estimator: int, scene_radius: float) -> Float:
     normal *= np.where((normal * wi).sum(axis=1) < 0, -1.0, 1.0)[:, None]
     places = np.concatenate([p, 0.5 * TURN * scene_radius * normal], axis=1)
     nodes = np.zeros((2 * leaves, NODE_COLUMNS), np.float32)
-    at = np.arange(leaves)
+    at: NDArray[np.int64] = np.arange(leaves)
     for level in range(depth + 1):
         at = at.reshape(1 << level, leaves >> level)
         first, last = 1 << level, 2 << level

@@ -122,7 +122,7 @@ class Inspected(Overlay):
             self._disc.upload(disc_lines(look_up.p, look_up.n, look_up.radius))
             self._photons.upload(look_up.found.records[:, :3], levels(look_up))
         if lit is not None:
-            self._take_lights(lit, light.number if light is not None and light.index == report.index else None)
+            self._take_lights(lit, light.number if light is not None and light.of_pass == report.index else None)
         life = report.life
         if life is not None and len(life.vertices):
             self._path.upload(chain(life.vertices[:, :3]))
@@ -131,7 +131,7 @@ class Inspected(Overlay):
     def _take_lights(self, lit: LitPlace, chosen: int | None) -> None:
         self._lights.upload(lit.points, brightness(lit.adds))
         self._reach.upload(spokes(lit.p, lit.points[:MOST_REACHING]))
-        at = np.flatnonzero(lit.number == chosen)[:1] if chosen is not None else []
+        at = np.flatnonzero(lit.number == (-1 if chosen is None else chosen))[:1]
         if len(at):
             self._path.upload(spokes(lit.p, lit.points[at]))
             self._chosen.upload(lit.points[at], np.ones(1))
