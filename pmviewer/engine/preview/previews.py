@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.frame import Frame, Preview
-from pmviewer.engine.method import Plan
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.preview.first_hits import first_hits
 from pmviewer.engine.preview.signals import guides_of, halved, picture_of, signals_of
@@ -40,6 +39,8 @@ CLEAN = 1e-3
 LONG = 0.3
 """Seconds that the first pass must be expected to take for a coarse frame to be drawn out, which costs a third of a
 quick one."""
+MOST_PIXELS = 2_500_000
+"""Larger pictures are shown as they are: previews would need as much memory again."""
 ROWS = 32
 """Rows of a picture a task."""
 
@@ -76,7 +77,7 @@ class Previews:
     def draw_out(self, renderer: Renderer, frame: Frame, settings: Settings) -> None:
         """Show a coarse frame in the full size, where the first pass would be long in coming. Raises Cancelled."""
         self._known = self._shown = None
-        if settings.display.preview == "off" or not can_preview(renderer.plan) or renderer.coarse_pass is None:
+        if settings.display.preview == "off" or not can_preview(renderer) or renderer.coarse_pass is None:
             return
         more = renderer.camera.width * renderer.camera.height / (frame.planes.shape[0] * frame.planes.shape[1])
         if frame.statistics.cpu_seconds * more / self._pool.threads > LONG:
@@ -86,10 +87,10 @@ class Previews:
         """Publish the frame of the film after a pass, with its preview where it has one; `last` if no other pass
         follows. The first picture since a change does not wait for the denoiser. Raises Cancelled."""
         passes, remaining = frame.statistics.passes, frame.statistics.remaining
-        off = last or settings.display.preview == "off" or settings.region.on or not can_preview(renderer.plan)
+        off = last or settings.display.preview == "off" or settings.region.on or not can_preview(renderer)
         if passes == 1 and self._known is None and not off:
             self._reprojected(renderer, guides_of(frame.planes))
-        self._last = _Last(frame, renderer.scene.uid)
+        self._last = _Last(frame, renderer.scene.uid) if can_preview(renderer) else None
         if self._known is not None and (self._known.renderer is not renderer or passes >= self._known.passes):
             self._known = None
         smooths = not off and self._smooths(settings) and (remaining is None or remaining.relmse > CLEAN)
@@ -188,10 +189,11 @@ def prepare_previews() -> None:
     reproject(signals, guides, view, view, guides, signals[..., :3].copy(), signals[..., 0].copy(), 0, 0)
 
 
-def can_preview(plan: Plan) -> bool:
-    """Whether first hits can be had of such a pass: media have light between them, estimates are numbered by pixel, and
+def can_preview(renderer: Renderer) -> bool:
+    """Whether first hits can be had of such passes: media have light between them, estimates are numbered by pixel, and
     weighted virtual lights divide sums."""
-    return not (plan.media or plan.virtual or plan.estimation)
+    plan, camera = renderer.plan, renderer.camera
+    return not (plan.media or plan.virtual or plan.estimation) and camera.width * camera.height <= MOST_PIXELS
 
 
 def is_due(passes: int) -> bool:
