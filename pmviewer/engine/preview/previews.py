@@ -81,11 +81,13 @@ class Previews:
             return
         more = renderer.camera.width * renderer.camera.height / (frame.planes.shape[0] * frame.planes.shape[1])
         if frame.statistics.cpu_seconds * more / self._pool.threads > LONG:
-            self._published.preview(self._of_coarse(renderer, renderer.coarse_pass, frame, settings))
+            self._shown = self._of_coarse(renderer, renderer.coarse_pass, frame, settings)
+            self._published.preview(self._shown)
 
     def show(self, renderer: Renderer, frame: Frame, settings: Settings, last: bool, version: int) -> None:
         """Publish the frame of the film after a pass, with its preview where it has one; `last` if no other pass
-        follows. The first picture since a change does not wait for the denoiser. Raises Cancelled."""
+        follows. The first picture since a change does not wait for the denoiser, unless a coarse one was denoised for
+        it. Raises Cancelled."""
         passes, remaining = frame.statistics.passes, frame.statistics.remaining
         off = last or settings.display.preview == "off" or settings.region.on or not can_preview(renderer)
         if passes == 1 and self._known is None and not off:
