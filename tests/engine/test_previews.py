@@ -41,16 +41,23 @@ def shown(session, change):
     return [frame for frame in found if frame.version == session.frame.version]
 
 
-def test_coarse_frames_are_drawn_out_and_films_are_as_without(session, monkeypatch):
+@pytest.mark.parametrize("method", ["progressive", "gather", "path"])
+def test_coarse_frames_are_drawn_out_and_films_are_as_without(session, monkeypatch, method):
     monkeypatch.setattr(previews, "LONG", 0.0)
-    frames = shown(session, lambda: session.open(cornell_box()))
+    settings = with_values(SMALL, {"render.method": method})
+    frames = shown(session, lambda: session.open(cornell_box(), settings))
     found = [frame.preview for frame in frames if frame.coarse and frame.preview is not None]
     assert len(found) == 1
     assert found[0].image.shape == (48, 48, 3)
     assert np.isfinite(found[0].image).all()
     assert "coarse" in found[0].how
     assert all(frame.preview is None for frame in frames if not frame.coarse)
-    assert np.array_equal(session.frame.planes, rendered(cornell_box(), SMALL, 12).frame(1).planes)
+    truth = rendered(cornell_box(), settings, 12).frame(1)
+    assert np.array_equal(session.frame.planes, truth.planes)
+    emission = truth.image("emission")[..., 0]
+    lamp = emission > 0.999 * emission.max()  # pixels that the lamp fills in every pass show it and nothing else
+    assert lamp.any()
+    assert np.allclose(found[0].image[lamp], truth.beauty[lamp], rtol=0.1)
 
 
 @pytest.mark.parametrize("drawn_out", [False, True])
@@ -108,6 +115,14 @@ def test_denoised_previews_are_nearer_to_the_truth_and_end_with_the_picture(sess
     assert "denoised" in by_passes[1].preview.how
     assert relmse(by_passes[1].preview.image, truth) < 0.7 * relmse(by_passes[1].beauty, truth)
     assert session.frame.preview is None
+
+
+def test_pictures_too_large_for_it_have_none(session, monkeypatch):
+    monkeypatch.setattr(previews, "LONG", 0.0)
+    monkeypatch.setattr(previews, "MOST_PIXELS", 1000)
+    frames = shown(session, lambda: session.open(cornell_box()))
+    frames += shown(session, lambda: session.set(with_values(SMALL, MOVED)))
+    assert all(frame.preview is None for frame in frames)
 
 
 def test_methods_without_first_hits_have_none(session):

@@ -53,7 +53,13 @@ BEFORE = 4
 """Passes that the picture has when it is changed."""
 ASIDE = 0.06
 """How far the camera is moved, relative to its distance from its target."""
-MODES = (("defaults", "off"), ("defaults", "coarse"), ("defaults", "denoised"), ("automatic", "denoised"))
+MODES = (
+    ("defaults", "off"),
+    ("defaults", "coarse"),
+    ("defaults", "denoised"),
+    ("automatic", "off"),
+    ("automatic", "denoised"),
+)
 """Settings, and `display.preview`."""
 WORKER = "pmviewer session"
 F4 = NDArray[np.float32]

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.frame import Frame, Preview
-from pmviewer.engine.method import Plan
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.preview.first_hits import first_hits
 from pmviewer.engine.preview.signals import guides_of, halved, picture_of, signals_of
@@ -29,7 +28,7 @@ from pmviewer.errors import OutputError
 from pmviewer.output.denoise import denoised
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.planes import PLANES
-from pmviewer.render.preview.guided import GUIDES, reproject, upsample, view_row
+from pmviewer.render.preview.guided import GUIDES, SIGNALS, VIEW, reproject, upsample, view_row
 from pmviewer.settings.access import SETTINGS, Settings, get
 
 F4 = NDArray[np.float32]
@@ -40,6 +39,8 @@ CLEAN = 1e-3
 LONG = 0.3
 """Seconds that the first pass must be expected to take for a coarse frame to be drawn out, which costs a third of a
 quick one."""
+MOST_PIXELS = 2_500_000
+"""Larger pictures are shown as they are: previews would need as much memory again."""
 ROWS = 32
 """Rows of a picture a task."""
 
@@ -76,20 +77,22 @@ class Previews:
     def draw_out(self, renderer: Renderer, frame: Frame, settings: Settings) -> None:
         """Show a coarse frame in the full size, where the first pass would be long in coming. Raises Cancelled."""
         self._known = self._shown = None
-        if settings.display.preview == "off" or not can_preview(renderer.plan) or renderer.coarse_pass is None:
+        if settings.display.preview == "off" or not can_preview(renderer) or renderer.coarse_pass is None:
             return
         more = renderer.camera.width * renderer.camera.height / (frame.planes.shape[0] * frame.planes.shape[1])
         if frame.statistics.cpu_seconds * more / self._pool.threads > LONG:
-            self._published.preview(self._of_coarse(renderer, renderer.coarse_pass, frame, settings))
+            self._shown = self._of_coarse(renderer, renderer.coarse_pass, frame, settings)
+            self._published.preview(self._shown)
 
     def show(self, renderer: Renderer, frame: Frame, settings: Settings, last: bool, version: int) -> None:
         """Publish the frame of the film after a pass, with its preview where it has one; `last` if no other pass
-        follows. The first picture since a change does not wait for the denoiser. Raises Cancelled."""
+        follows. The first picture since a change does not wait for the denoiser, unless a coarse one was denoised for
+        it. Raises Cancelled."""
         passes, remaining = frame.statistics.passes, frame.statistics.remaining
-        off = last or settings.display.preview == "off" or settings.region.on or not can_preview(renderer.plan)
+        off = last or settings.display.preview == "off" or settings.region.on or not can_preview(renderer)
         if passes == 1 and self._known is None and not off:
-            self._reprojected(renderer, guides_of(frame.planes))
-        self._last = _Last(frame, renderer.scene.uid)
+            self._reprojected(renderer, self._banded(guides_of, GUIDES, frame.planes))
+        self._last = _Last(frame, renderer.scene.uid) if can_preview(renderer) else None
         if self._known is not None and (self._known.renderer is not renderer or passes >= self._known.passes):
             self._known = None
         smooths = not off and self._smooths(settings) and (remaining is None or remaining.relmse > CLEAN)
@@ -111,7 +114,8 @@ class Previews:
         if not renderer.plan.path:
             outline = outline_of(renderer.scene, camera, renderer.film, renderer.settings, renderer.store)
         planes = first_hits(seen.given, seen.maps, camera, renderer.settings, renderer.plan, outline, pool)
-        small, small_guides, guides = signals_of(frame.planes), guides_of(frame.planes), guides_of(planes)
+        small, small_guides = signals_of(frame.planes), guides_of(frame.planes)
+        guides = self._banded(guides_of, GUIDES, planes)
         how = "a coarse picture drawn out along edges"
         if self._smooths(settings):
             small, how = self._denoised(small, frame.planes), "a coarse picture, denoised and drawn out"
@@ -121,10 +125,10 @@ class Previews:
             share = known.share[..., None]
             signals[..., :3] += share * (known.light - signals[..., :3])
             how = f"light of the last picture ({100 * float(share.mean()):.0f} %), {how}"
-        return Preview(picture_of(signals, planes), how)
+        return Preview(self._banded(picture_of, 3, signals, planes), how)
 
     def _made(self, renderer: Renderer, frame: Frame, smooths: bool) -> Preview:
-        signals, passes, known = signals_of(frame.planes), frame.statistics.passes, self._known
+        signals, passes, known = self._banded(signals_of, SIGNALS, frame.planes), frame.statistics.passes, self._known
         how = f"{passes} pass" if passes == 1 else f"{passes} passes"
         if known is not None:
             weight = (known.share * (known.passes / passes))[..., None]
@@ -132,13 +136,14 @@ class Previews:
             how = f"{how} with light of the last picture"
         if smooths and renderer.scene.traits.follows(renderer.settings.photons.glossy):
             albedo = frame.planes[..., PLANES["albedo"]]
-            return Preview(self._smoothed(picture_of(signals, frame.planes), albedo, frame.planes), f"{how}, denoised")
+            picture = self._banded(picture_of, 3, signals, frame.planes)
+            return Preview(self._smoothed(picture, albedo, frame.planes), f"{how}, denoised")
         if smooths:  # nothing but edges is finer than what light does
-            guides, small = guides_of(frame.planes), halved(frame.planes)
+            guides, small = self._banded(guides_of, GUIDES, frame.planes), halved(frame.planes)
             few = self._denoised(halved(signals), small)
             signals = self._drawn_out(few, np.ascontiguousarray(guides[1::2, 1::2]), frame.camera, guides, 2.0)
             how = f"{how}, denoised"
-        return Preview(picture_of(signals, frame.planes), how)
+        return Preview(self._banded(picture_of, 3, signals, frame.planes), how)
 
     def _smooths(self, settings: Settings) -> bool:
         return settings.display.preview == "denoised" and self._denoises
@@ -169,12 +174,23 @@ class Previews:
         last = self._last
         if last is None or last.scene != renderer.scene.uid or not is_move(last.frame, renderer):
             return None
-        before, before_guides = signals_of(last.frame.planes), guides_of(last.frame.planes)
+        seen = last.frame.planes
+        before, before_guides = self._banded(signals_of, SIGNALS, seen), self._banded(guides_of, GUIDES, seen)
         light, share = np.zeros((*guides.shape[:2], 3), np.float32), np.zeros(guides.shape[:2], np.float32)
         views = view_row(last.frame.camera), view_row(renderer.camera)
         self._by_rows(partial(reproject, before, before_guides, *views, guides, light, share), light)
         self._known = _Known(renderer, light, share, min(last.frame.statistics.passes, MOST))
         return self._known
+
+    def _banded(self, make: Callable[..., F4], channels: int, *images: F4) -> F4:
+        """What `make` makes of images (h, w, …), band by band: (h, w, channels)."""
+        out = np.empty((*images[0].shape[:2], channels), np.float32)
+
+        def band(first: int, last: int) -> None:
+            out[first:last] = make(*(image[first:last] for image in images))
+
+        self._by_rows(band, out)
+        return out
 
     def _by_rows(self, kernel: Callable[[int, int], None], out: F4) -> None:
         rows = range(0, len(out), ROWS)
@@ -183,15 +199,20 @@ class Previews:
 
 def prepare_previews() -> None:
     """Compile the kernels, or load them."""
-    signals, guides, view = np.zeros((1, 1, 6), np.float32), np.zeros((1, 1, GUIDES), np.float32), np.zeros(20, "f4")
-    upsample(signals, guides, view, guides, np.float32(1.0), signals, 0, 0)
+    signals, guides, view = (
+        np.zeros((1, 1, SIGNALS), np.float32),
+        np.zeros((1, 1, GUIDES), np.float32),
+        np.zeros(VIEW, "f4"),
+    )
+    upsample(signals, guides, view, guides, 1.0, signals, 0, 0)
     reproject(signals, guides, view, view, guides, signals[..., :3].copy(), signals[..., 0].copy(), 0, 0)
 
 
-def can_preview(plan: Plan) -> bool:
-    """Whether first hits can be had of such a pass: media have light between them, estimates are numbered by pixel, and
+def can_preview(renderer: Renderer) -> bool:
+    """Whether first hits can be had of such passes: media have light between them, estimates are numbered by pixel, and
     weighted virtual lights divide sums."""
-    return not (plan.media or plan.virtual or plan.estimation)
+    plan, camera = renderer.plan, renderer.camera
+    return not (plan.media or plan.virtual or plan.estimation) and camera.width * camera.height <= MOST_PIXELS
 
 
 def is_due(passes: int) -> bool:

@@ -215,8 +215,8 @@ class Planes:
 
 
 def preview_of(frame: Frame, display: Display) -> Preview | None:
-    """What is shown in place of the frame's beauty, None for the beauty itself."""
-    return frame.preview if display.preview != "off" else None
+    """What is shown in place of the frame's beauty, None for the beauty itself, whose pixels alone are marked."""
+    return frame.preview if display.preview != "off" and not display.marks else None
 
 
 def _content(info: DiagnosticView) -> int:
