@@ -86,7 +86,14 @@ def test_views_are_made_on_demand_in_the_legends_colours(app, tmp_path):
 
     drive(app, script)
     estimation = ["estimation mask", "gathered points", "subdivision level", "reprojected share"]
-    media = ["optical depth", "mean free path", "volume radius", "volume photon count", "extinction slice", "photon slice"]
+    media = [
+        "optical depth",
+        "mean free path",
+        "volume radius",
+        "volume photon count",
+        "extinction slice",
+        "photon slice",
+    ]
     unlike = ["storing probability", "virtual light error", "sum of weights", "normalisation"]
     assert refused == [*unlike, *estimation, *media]
     for frame, (view, pixels) in zip(frames[1:], seen.items(), strict=True):
