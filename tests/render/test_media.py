@@ -160,6 +160,22 @@ def test_extremes_make_finite_pictures(method, sigma, g, z):
         assert image.mean() <= 1.01
 
 
+@pytest.mark.parametrize("method", ["path", "progressive"])
+def test_a_lamp_close_above_a_boundary_shines_in_whatever_the_unit_of_length(method):
+    """Single scattering under a lamp 0.03 above a medium 1 high: the same picture in a hundredth and a hundredfold of
+    the size. (Mitsuba's volpath brings 0.69 and 1.14 of what it does at 1.)"""
+    means = []
+    for scale in (0.01, 1.0, 100.0):
+        lamp = Parallelogram((-0.16 * scale, 0.53 * scale, -0.14 * scale), (0.32 * scale, 0, 0), (0, 0, 0.28 * scale))
+        shape = Shape("lamp", lamp, 1, (10.0,) * 3)
+        camera = replace(CAMERA, origin=(0.0, 0.0, 2.4 * scale), fov=39.3)
+        medium = Medium("fog", (3.0 / scale,) * 3, (0.96,) * 3)
+        scene = cube_of(medium, (), (shape,), (diffuse(albedo=(0.0,) * 3),), 0.5 * scale, camera)
+        means.append(picture(scene, method, 64, "volume", photons={"N": 500}).mean())
+    assert means[1] > 0.005
+    assert means == pytest.approx([means[1]] * 3, rel=2e-3)
+
+
 def test_clear_scenes_know_nothing_of_media():
     """Neither scene nor film nor camera have a field of them."""
     clear = replace(

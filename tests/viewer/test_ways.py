@@ -86,7 +86,16 @@ def test_views_are_made_on_demand_in_the_legends_colours(app, tmp_path):
 
     drive(app, script)
     estimation = ["estimation mask", "gathered points", "subdivision level", "reprojected share"]
-    assert refused == ["storing probability", "virtual light error", "sum of weights", "normalisation", *estimation]
+    media = [
+        "optical depth",
+        "mean free path",
+        "volume radius",
+        "volume photon count",
+        "extinction slice",
+        "photon slice",
+    ]
+    unlike = ["storing probability", "virtual light error", "sum of weights", "normalisation"]
+    assert refused == [*unlike, *estimation, *media]
     for frame, (view, pixels) in zip(frames[1:], seen.items(), strict=True):
         assert frame.planes is frames[0].planes
         expected = to_uint8(coloured(view, frame.image(view)))

@@ -215,7 +215,8 @@ def run(quick: bool = False) -> BenchResult:
         rows += more
         targets.append(speed)
     notes = [
-        "cornell_smoke: the reference is our path tracer's, Mitsuba's pictures are 5 to 7 % darker (see docs/media.md)",
+        "cornell_smoke: the reference is our path tracer's; Mitsuba's pictures are 5 to 7 % darker, how much depends "
+        "on the unit of length (see docs/media.md)",
         f"Mitsuba 3, {variant}, volpath",
         "the beam estimate alone looks the volume map up",
     ]
