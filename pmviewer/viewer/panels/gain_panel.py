@@ -27,7 +27,7 @@ class GainPanel:
         run = self._state.gain
         if imgui.begin_child("##how", (min(20 * imgui.get_font_size(), 0.42 * imgui.get_content_region_avail().x), 0)):
             self._button()
-            if self._rows.begin_rows("compare", name_em=5.5):
+            if self._rows.begin_rows("compare", name_em=7.5):
                 for name in ("equal", "passes", "limit"):
                     self._rows.row(SETTINGS[f"compare.{name}"])
                 imgui.end_table()
