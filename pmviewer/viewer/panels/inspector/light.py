@@ -38,7 +38,9 @@ _ROOMY = 11.0
 
 def draw_terms(report: PixelReport) -> None:
     """A bar for each term, as long as its share, and the sum below."""
-    digits = 4 if imgui.get_content_region_avail().x > _ROOMY * imgui.get_font_size() else 3
+    roomy = imgui.get_content_region_avail().x > _ROOMY * imgui.get_font_size()
+    digits, padding = 4 if roomy else 3, imgui.get_style().cell_padding
+    imgui.push_style_var(imgui.StyleVar_.cell_padding, (padding.x if roomy else 1.0, padding.y))
     if imgui.begin_table("##terms", 3):
         imgui.table_setup_column("name", imgui.TableColumnFlags_.width_fixed)
         imgui.table_setup_column("bar", imgui.TableColumnFlags_.width_stretch)
@@ -59,6 +61,9 @@ def draw_terms(report: PixelReport) -> None:
         imgui.table_next_column()
         _right(f"{float(luminance(rgb)):.{digits}g}")
         imgui.end_table()
+    imgui.pop_style_var()
+    if report.terms.size:
+        rgb = report.terms.sum(axis=0)
         wrapped("RGB  " + "  ".join(f"{v:.4g}" for v in rgb))
         imgui.set_item_tooltip("Red, green, blue in W/(m² sr); the figures above are luminances")
 
