@@ -11,7 +11,7 @@ out vec3 end_hue;
 #include "photon.glsl"
 
 void main() {
-    end_hue = photon_hue(direction_and_flags & 255u, power_and_light);
+    end_hue = photon_hue(direction_and_flags, power_and_light);
     gl_Position = projection * view * vec4(position, 1.0);
     gl_Position.z -= 2e-4 * gl_Position.w;
 }

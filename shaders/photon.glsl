@@ -1,6 +1,6 @@
 // The colour of a photon as it is stored (pmviewer/maps/record.py).
 uniform int colour_by;      // 0 power, 1 bounces, 2 light, 3 lit or in shadow, 4 a channel in false colours, 5 fate,
-                            // 6 wavelength
+                            // 6 wavelength, 7 direction
 uniform int channel;        // of 4: red, green, blue, or (3) the mean of green and blue
 uniform int colour_row;     // of 4: small to large, or (1) around a middle
 uniform vec3 false_colours[32]; // sixteen of either table
@@ -24,7 +24,16 @@ vec3 false_hue(float level) {
     return mix(false_colours[16 * colour_row + first], false_colours[16 * colour_row + first + 1], at - float(first));
 }
 
-vec3 photon_hue(uint flags, uvec2 power_and_light) {
+vec3 came_from(uint direction_and_flags) {
+    float u = (float(direction_and_flags >> 20u) - 2047.0) / 2047.0;
+    float v = (float(direction_and_flags >> 8u & 0xFFFu) - 2047.0) / 2047.0;
+    float z = 1.0 - abs(u) - abs(v), t = max(-z, 0.0);
+    return normalize(vec3(u - (u >= 0.0 ? t : -t), v - (v >= 0.0 ? t : -t), z));
+}
+
+vec3 photon_hue(uint direction_and_flags, uvec2 power_and_light) {
+    uint flags = direction_and_flags & 255u;
+    if (colour_by == 7) return 0.5 + 0.5 * came_from(direction_and_flags);
     if (colour_by == 1) return bounce_palette[min(int(flags & 63u), 7)];
     if (colour_by == 2) return light_palette[int((power_and_light.y >> 16u) % 8u)];
     if (colour_by == 5) return fate_palette[int((power_and_light.y >> 16u) & 3u)];

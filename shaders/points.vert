@@ -14,7 +14,7 @@ flat out vec3 hue;
 #include "photon.glsl"
 
 void main() {
-    hue = photon_hue(direction_and_flags & 255u, power_and_light);
+    hue = photon_hue(direction_and_flags, power_and_light);
     gl_Position = projection * view * vec4(position, 1.0);
     // Photons lie on surfaces: draw them a hair in front, or the tessellation of round shapes hides half of them.
     gl_Position.z -= 2e-4 * gl_Position.w;

@@ -6,6 +6,7 @@ import threading
 from typing import TYPE_CHECKING
 
 from pmviewer.engine.apart import bound_passes
+from pmviewer.engine.cluster.address import check_address
 from pmviewer.engine.published import Published
 from pmviewer.engine.renderer import Renderer
 from pmviewer.errors import ClusterError, PmviewerError
@@ -21,23 +22,40 @@ class PassMaker:
 
     def __init__(self, published: Published, cluster: str | None, threads: int) -> None:
         """cluster: where it is (`pmviewer.engine.cluster`), None for this process alone."""
-        self._published, self._where, self._threads = published, cluster, threads
+        self._published, self._threads = published, threads
+        self.where: str | None = None
+        """The cluster that is borrowed, or is being asked; None for none. From any thread."""
         self._cluster: Cluster | None = None
         self._elsewhere: Elsewhere | None = None
         self._lock, self._closed = threading.Lock(), False
+        self._busy = threading.RLock()
+        """Held while a pass is rendered."""
+        self._at: str | None = None
+        """Where the cluster is that passes are rendered on."""
         if cluster is not None:
-            threading.Thread(target=self._connect, name="pmviewer borrowing", daemon=True).start()
+            self.borrow(cluster)
+
+    def borrow(self, where: str | None) -> None:
+        """Use that cluster from the next pass on, with None none, and give back the one before. Returns at once; from
+        any thread. Raises SettingError for what can't be the address of a cluster, ClusterError without Dask."""
+        if where is not None:
+            check_address(where)
+        with self._lock:
+            self.where = where
+        threading.Thread(target=self._swap, args=(where,), name="pmviewer borrowing", daemon=True).start()
 
     def step(self, renderer: Renderer, most: int) -> None:
         """Have the next pass in the renderer's film; `most` will be wanted in all. Raises Cancelled."""
-        if not self._stepped(renderer, most):
-            renderer.step()
+        with self._busy:
+            if not self._stepped(renderer, most):
+                renderer.step()
 
     def drop(self) -> None:
         """What is on its way is out of date."""
-        if self._elsewhere is not None:
-            self._elsewhere.close()
-            self._elsewhere = None
+        with self._busy:
+            if self._elsewhere is not None:
+                self._elsewhere.close()
+                self._elsewhere = None
 
     def close(self) -> None:
         """Leave the cluster."""
@@ -67,7 +85,9 @@ class PassMaker:
             return False
         except ClusterError as error:
             self.drop()
-            self._cluster = None
+            with self._lock:
+                self._cluster = None
+                self.where = None if self.where == self._at else self.where
             self._published.say("error", f"{error} Passes are rendered here from now on.")
             cluster.close()
             return False
@@ -75,20 +95,38 @@ class PassMaker:
             for sentence in cluster.take_messages():
                 self._published.say("warning", sentence)
 
-    def _connect(self) -> None:
-        assert self._where is not None
+    def _swap(self, where: str | None) -> None:
+        """Between two passes: leave the cluster, then enter the other one."""
+        with self._busy:
+            with self._lock:
+                before, self._cluster = self._cluster, None
+            if before is not None:
+                self.drop()
+        if before is not None:
+            before.close()
+            self._published.say("info", "The cluster is given back: passes are rendered here.")
+        if where is not None and self._is_wanted(where):
+            self._connect(where)
+
+    def _is_wanted(self, where: str) -> bool:
+        """Whether nobody has decided otherwise meanwhile."""
+        return not self._closed and self.where == where
+
+    def _connect(self, where: str) -> None:
         try:
             from pmviewer.engine.cluster.cluster import Cluster
 
-            cluster = Cluster(self._where, self._threads)
+            cluster = Cluster(where, self._threads)
         except PmviewerError as error:
             self._published.say("error", f"{error} Passes are rendered here.")
+            with self._lock:
+                self.where = None if self.where == where else self.where
             return
         with self._lock:
-            unwanted = self._closed
+            unwanted = not self._is_wanted(where) or self._cluster is not None
             if not unwanted:
-                self._cluster = cluster
+                self._cluster, self._at = cluster, where
         if unwanted:
             cluster.close()
         else:
-            self._published.say("info", f"cluster {self._where}: its workers render the passes as soon as they are up")
+            self._published.say("info", f"cluster {where}: its workers render the passes as soon as they are up")

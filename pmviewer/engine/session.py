@@ -84,7 +84,7 @@ class Session:
         self._store = StageStore()
         self._frugal = Frugal(self._store)
         self._film = KeptFilm(self._published.say)
-        self._passes = PassMaker(self._published, cluster, self._pool.threads)
+        self.workers = PassMaker(self._published, cluster, self._pool.threads)
         self._previews = Previews(self._pool, self._published)
         self._renderer: Renderer | None = None
         self._ahead = Ahead(self._pool.threads, self._published.notify, helper) if compiles_ahead else None
@@ -197,7 +197,7 @@ class Session:
         if self._ahead is not None:
             self._ahead.close()
         self._worker.join()
-        self._passes.close()
+        self.workers.close()
         self._pool.close()
 
     def _outdate(self) -> None:
@@ -361,7 +361,7 @@ class Session:
     def _drop(self) -> None:
         """What was being rendered is out of date, or unwanted."""
         self._renderer = None
-        self._passes.drop()
+        self.workers.drop()
         if self._stopped:
             self._tell("paused", "stopped within a pass; going on begins anew")
 
@@ -457,7 +457,7 @@ class Session:
         with self._changed:
             self._pass_began, self._stepping = time.monotonic(), True
         try:
-            self._passes.step(renderer, self._settings.render.passes)
+            self.workers.step(renderer, self._settings.render.passes)
             with self._changed:
                 self._stopped = False  # too late
             self._frugal.after_pass(renderer.passes)

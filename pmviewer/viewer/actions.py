@@ -16,6 +16,7 @@ from pmviewer.render.free_camera import as_perspective, plan_pose
 from pmviewer.settings.access import SETTINGS, get
 from pmviewer.viewer import layout
 from pmviewer.viewer.comparing_actions import comparing_actions
+from pmviewer.viewer.dialogs.cluster_dialog import ClusterDialog
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.exports import Exports, default_path, fresh_path
 from pmviewer.viewer.dialogs.still_dialog import StillDialog
@@ -46,6 +47,7 @@ class Commands:
         """Where the next frame of the whole window goes."""
         self.palette = Palette(state)
         self.still_dialog = StillDialog(state, dialogs)
+        self.cluster_dialog = ClusterDialog(state)
         self._hidden: list[str] = []
         self._layout = layout.Layout()
         self.table: dict[str, Callable[[], None]] = {
@@ -60,6 +62,7 @@ class Commands:
             "export_exr": lambda: self._save(".exr", self.exports.exr),
             "export_exr_half": lambda: self._save(".exr", lambda path: self.exports.exr(path, half=True)),
             "export_still": self.still_dialog.open,
+            "borrow_cluster": self.cluster_dialog.open,
             "export_png": lambda: self._save(".png", lambda path: self.exports.png(path, overlays=False)),
             "export_png_overlays": lambda: self._save(".png", lambda path: self.exports.png(path, overlays=True)),
             "screenshot": self._screenshot,

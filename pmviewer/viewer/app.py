@@ -215,7 +215,8 @@ class ViewerApp:
             self._title = title
 
     def _over_everything(self) -> None:
-        asking = self.restore_dialog.is_open or self.commands.still_dialog.is_open
+        commands = self.commands
+        asking = self.restore_dialog.is_open or commands.still_dialog.is_open or commands.cluster_dialog.is_open
         if not (asking or self.dialogs.is_open or self.commands.palette.is_open):
             run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying, self.state.history)
         self.state.flipped = not self.dialogs.is_open and is_held(FLIP_KEY)
@@ -224,6 +225,7 @@ class ViewerApp:
         draw_help(self.state)
         self.commands.palette.gui(self.commands.table)
         self.commands.still_dialog.gui()
+        self.commands.cluster_dialog.gui()
         self.restore_dialog.gui()
         if not self.restore_dialog.is_open:  # first what a crash has left, then what is new
             self.tour.gui()

@@ -88,6 +88,10 @@ class SessionLike(Protocol):
         """Open a scene in the background, with other settings if given; `parameters` replace the file's defaults, and
         `film` is a checkpoint to go on with. A failure becomes a message."""
 
+    @property
+    def workers(self) -> Any:
+        """Who renders the passes (`pmviewer.engine.pass_maker.PassMaker`), None while the engine is being imported."""
+
     def autosave(self, path: Path | None) -> None:
         """Keep the film in that file now and then, nowhere with None."""
 
@@ -289,6 +293,10 @@ class SessionLink(SessionLike):
     @property
     def threads(self) -> int | None:
         return self._session.threads if self._session else None
+
+    @property
+    def workers(self) -> Any:
+        return self._session.workers if self._session else None
 
     @property
     def opened_scene(self) -> Any:

@@ -155,6 +155,8 @@ class ViewerState:
                     parsed[path] = value
             if list(parsed) == ["camera.name"]:  # another camera as it is, not where this one was moved to
                 parsed |= dict.fromkeys(("camera.origin", "camera.target", "camera.up", "camera.fov"), "auto")
+            if parsed.get("light.rig", self.settings.light.rig) != self.settings.light.rig:
+                parsed = self._without_light_edits(parsed)
             settings = with_values(self.settings, parsed)
         except PmviewerError as error:
             self.say("error", str(error))
@@ -162,6 +164,15 @@ class ViewerState:
         if settings != self.settings:
             self.history.changed(self.settings, settings)
             self.session.set(settings)
+
+    def _without_light_edits(self, values: dict[str, Any]) -> dict[str, Any]:
+        """Another rig has other lights: edits of those before would name what is not there, and the scene could not be
+        lit anew. Undoing brings them back with their lights."""
+        edits = values.get("edit.changes", self.settings.edit.changes)
+        kept = {name: numbers for name, numbers in edits.items() if not name.startswith("light.")}
+        if len(kept) < len(edits):
+            self.say("info", "The edits of lights went with the lights: undo brings them back.")
+        return {**values, "edit.changes": kept}
 
     def _change_by_itself(self, values: dict[str, Any]) -> None:
         """Change settings as a step of its own to undo, when the mouse does something else."""

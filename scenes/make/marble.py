@@ -1,4 +1,4 @@
-"""A knot of polished marble: light that enters a dense medium through its surface (Jensen et al. 2001 for the colour)."""
+"""A knot of polished marble: light that enters a dense medium through its surface."""
 
 from __future__ import annotations
 

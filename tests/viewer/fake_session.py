@@ -99,7 +99,7 @@ class FakeSession:
         self.loading = ""
         self.ahead = ""
         self.stops_ahead = 0
-        self.threads = None
+        self.threads = self.workers = None
         self.paused = False
         self.restarts = 0
         self.stops = 0

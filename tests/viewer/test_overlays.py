@@ -19,6 +19,7 @@ from pmviewer.viewer.overlays.overlay import Overlay, Source
 from pmviewer.viewer.overlays.points import Points
 from pmviewer.viewer.overlays.registry import OVERLAYS, SWITCHED
 from pmviewer.viewer.shortcuts import BINDINGS, keys_of
+from tests.viewer.driver import drive, viewport_pixels
 from tests.viewer.fake_session import FakeSession, photons_at
 
 
@@ -165,3 +166,27 @@ def test_ends_of_the_scale_of_colours():
     share = ends_of_scale(records, Colouring(By.QUANTITY, 0, scale="share"))
     assert share == pytest.approx((1.0, 100.0), rel=2e-3)
     assert ends_of_scale(photons_at(np.zeros((3, 3)), (0, 0, 0))) == (1.0, 1.0)
+
+
+def test_photons_are_coloured_by_where_they_came_from(app, session):
+    """+x, −y and +z, as the record has them: octahedral, twelve bits each, a half is none."""
+    photons = session.frame.clouds["caustic"].photons.copy()
+    words = photons.view(np.uint32)
+    codes = {(255, 128, 128): (4094, 2047), (128, 0, 128): (2047, 0), (128, 128, 255): (2047, 2047)}
+    for third, (u, v) in enumerate(codes.values()):
+        words[third::3, 3] = (u << 20) | (v << 8) | 5
+    seen = {}
+
+    def script(c):
+        app.state.change({"display.view": "geometry", "overlays.caustic.show": True, "overlays.caustic.size": 6.0})
+        app.state.change({"overlays.caustic.colour": "direction"})
+        frame = session.frame
+        clouds = {**frame.clouds, "caustic": PhotonCloud(photons, 1e-3)}
+        session.frame = replace(frame, serial=frame.serial + 1, clouds=clouds)
+        c.yield_(6)
+        seen["pixels"] = viewport_pixels(c, app).reshape(-1, 3).astype(int)
+
+    drive(app, script)
+    for colour in codes:
+        near = np.abs(seen["pixels"] - colour).max(axis=1) <= 2
+        assert near.sum() > 100, f"nothing is drawn in {colour}"

@@ -64,9 +64,10 @@ class PointOverlay(Group):
 class PhotonOverlay(PointOverlay):
     """The photons of a map drawn as points"""
 
-    colour: Literal["power", "bounce", "light", "wavelength"] = setting(  # type: ignore[assignment]
+    colour: Literal["power", "bounce", "light", "wavelength", "direction"] = setting(  # type: ignore[assignment]
         "power",
-        "Colour by power, by number of bounces, by light, or by wavelength where glass splits light into colours.",
+        "Colour by power, by number of bounces, by light, by wavelength where glass splits light into colours, or by "
+        "the direction that the photon came from: x, y and z of it as red, green and blue.",
         stage="display",
         scale="choice",
     )

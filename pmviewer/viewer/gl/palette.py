@@ -61,6 +61,7 @@ class By(IntEnum):
     QUANTITY = 4
     FATE = 5
     WAVELENGTH = 6
+    DIRECTION = 7
 
 
 MEAN_OF_GREEN_AND_BLUE = 3
@@ -90,6 +91,18 @@ POWER = Colouring(By.POWER)
 BOUNCES = Colouring(By.BOUNCES)
 LIGHTS = Colouring(By.LIGHT)
 WAVELENGTHS = Colouring(By.WAVELENGTH)
+DIRECTIONS = Colouring(By.DIRECTION)
+
+
+DIRECTION_PALETTE: tuple[tuple[str, RGB], ...] = (
+    ("+x", (1.0, 0.5, 0.5)),
+    ("+y", (0.5, 1.0, 0.5)),
+    ("+z", (0.5, 0.5, 1.0)),
+    ("−x", (0.0, 0.5, 0.5)),
+    ("−y", (0.5, 0.0, 0.5)),
+    ("−z", (0.5, 0.5, 0.0)),
+)
+"""Half of a unit vector's x, y and z around a half, as normals are shown."""
 
 
 def palettes() -> dict[str, Any]:

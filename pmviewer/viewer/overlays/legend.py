@@ -13,6 +13,7 @@ from pmviewer.viewer import theme
 from pmviewer.viewer.format import grouped, si
 from pmviewer.viewer.gl.palette import (
     BOUNCE_PALETTE,
+    DIRECTION_PALETTE,
     LIGHT_PALETTE,
     LIT_COLOUR,
     RGB,
@@ -65,6 +66,8 @@ def colour_legend(colouring: Colouring, cloud: CloudSummary, unit: str, look: Lo
     elif colouring.by == By.WAVELENGTH:
         wrapped("Wavelength; grey: all of them still, as no glass has split the light")
         colour_bar(np.repeat(shown_colours(), 15, axis=0), f"{SHORTEST:.0f} nm", f"{LONGEST:.0f} nm")
+    elif colouring.by == By.DIRECTION:
+        swatches("Where a photon came from, along the axes of the scene", list(DIRECTION_PALETTE))
     elif colouring.by == By.LIGHT:
         swatches("", [(f"light {i + 1}", light_colour(i)) for i in cloud.lights[:MOST_SWATCHES]])
         if len(cloud.lights) > MOST_SWATCHES:

@@ -9,7 +9,7 @@ import numpy as np
 from imgui_bundle import imgui
 from numpy.typing import NDArray
 
-from pmviewer.viewer.gl.palette import BOUNCES, LIGHTS, POWER, WAVELENGTHS, Colouring
+from pmviewer.viewer.gl.palette import BOUNCES, DIRECTIONS, LIGHTS, POWER, WAVELENGTHS, Colouring
 from pmviewer.viewer.gl.program import Shaders
 from pmviewer.viewer.overlays.legend import wrapped
 from pmviewer.viewer.overlays.overlay import Needs, Source, Switch
@@ -24,6 +24,7 @@ class MapPhotons(MapPoints):
         "bounce": BOUNCES,
         "light": LIGHTS,
         "wavelength": WAVELENGTHS,
+        "direction": DIRECTIONS,
     }
 
     def __init__(self, shaders: Shaders) -> None:

@@ -27,7 +27,7 @@ class GainPanel:
         run = self._state.gain
         if imgui.begin_child("##how", (min(20 * imgui.get_font_size(), 0.42 * imgui.get_content_region_avail().x), 0)):
             self._button()
-            if self._rows.begin_rows("compare", name_em=5.5):
+            if self._rows.begin_rows("compare", name_em=7.5):
                 for name in ("equal", "passes", "limit"):
                     self._rows.row(SETTINGS[f"compare.{name}"])
                 imgui.end_table()
@@ -54,7 +54,10 @@ class GainPanel:
             return
         why = run.refusal()
         imgui.begin_disabled(why is not None)
-        if imgui.button(f"{fa.ICON_FA_SCALE_BALANCED}  With and without importance"):
+        label = f"{fa.ICON_FA_SCALE_BALANCED}  With and without importance"
+        if imgui.calc_text_size(label).x + imgui.get_font_size() > imgui.get_content_region_avail().x:
+            label = f"{fa.ICON_FA_SCALE_BALANCED}  Compare"
+        if imgui.button(f"{label}###gain.start"):
             self._actions["compare_importance"]()
         imgui.end_disabled()
         if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):

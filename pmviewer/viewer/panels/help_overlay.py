@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import groupby
-
 from imgui_bundle import imgui
 
 from pmviewer.viewer import theme
@@ -27,7 +25,9 @@ def draw_help(state: ViewerState) -> None:
     shown, still_open = imgui.begin("Keys and mouse", True, flags)
     state.help_open = bool(still_open)
     if shown:
-        groups = [(name, list(bindings)) for name, bindings in groupby(BINDINGS, key=lambda b: b.group)]
+        groups: dict[str, list[Binding]] = {}
+        for binding in BINDINGS:
+            groups.setdefault(binding.group, []).append(binding)
         if imgui.begin_table("##help", 2, imgui.TableFlags_.sizing_fixed_fit):
             for side in (0, 1):
                 imgui.table_setup_column(
@@ -35,7 +35,7 @@ def draw_help(state: ViewerState) -> None:
                 )
             for side in (0, 1):
                 imgui.table_next_column()
-                for name, bindings in groups:
+                for name, bindings in groups.items():
                     if (name in _LEFT) == (side == 0):
                         _group(name, bindings)
             imgui.end_table()

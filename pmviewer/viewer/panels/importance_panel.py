@@ -15,7 +15,7 @@ from pmviewer.viewer import theme
 from pmviewer.viewer.format import data_size, grouped
 from pmviewer.viewer.gl.palette import LIGHT_PALETTE
 from pmviewer.viewer.panels.light_list import light_rows
-from pmviewer.viewer.panels.statistics_panel import table
+from pmviewer.viewer.panels.statistics_panel import BESIDE, table
 from pmviewer.viewer.state import ViewerState
 
 MAP_COLOURS = {"caustic": LIGHT_PALETTE[0], "global": LIGHT_PALETTE[1]}
@@ -90,9 +90,11 @@ class ImportancePanel:
             imgui.text_disabled(theme.drawable(reason or "Importance is off."))
             return
         flags = imgui.TableFlags_.borders_inner_v
-        if not imgui.begin_table("##columns", 3, flags):
+        parts = (("figures", 1.2), ("weights", 1.0), ("lights", 0.85))
+        roomy = imgui.get_content_region_avail().x > BESIDE * imgui.get_font_size()
+        if not imgui.begin_table("##columns", len(parts) if roomy else 1, flags):
             return
-        for name, weight in (("figures", 1.2), ("weights", 1.0), ("lights", 0.85)):
+        for name, weight in parts if roomy else ():
             imgui.table_setup_column(name, imgui.TableColumnFlags_.width_stretch, weight)
         imgui.table_next_column()
         self._figures(s)

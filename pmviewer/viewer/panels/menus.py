@@ -205,6 +205,8 @@ class Menus:
         if imgui.menu_item("Compile ahead", "", ahead)[0]:
             self._state.change({"display.compile_ahead": not ahead})
         self._item("Compare with and without importance", "compare_importance", self._state.gain.running)
+        workers = self._state.session.workers
+        self._item("Borrow a cluster …", "borrow_cluster", workers is not None and workers.where is not None)
         if imgui.begin_menu("Light rig"):
             rig = self._state.settings.light.rig
             for choice in SETTINGS["light.rig"].choices:

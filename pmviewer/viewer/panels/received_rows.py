@@ -15,6 +15,8 @@ from pmviewer.viewer.state import ViewerState
 if TYPE_CHECKING:
     from pmviewer.engine.inspector.received import Received
 
+STACKED = 14.0
+"""Room in font sizes below which names have a line of their own, above their figures."""
 Row = tuple[str, str, str]
 """Name, figures, and what they are."""
 
@@ -23,10 +25,10 @@ def draw_received(state: ViewerState, number: int) -> None:
     """Rows of the object of that number, shapes before instances; counts come when they are there."""
     em = imgui.get_font_size()
     for name, text, tip in rows_of(state, number):
-        imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.grey(theme.look.name), name)
         hovered = imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip)
-        imgui.same_line(imgui.get_cursor_pos_x() + 6.1 * em)
+        if imgui.get_content_region_avail().x > STACKED * em:
+            imgui.same_line(imgui.get_cursor_pos_x() + 6.1 * em)
         imgui.push_text_wrap_pos(0)
         imgui.text_unformatted(theme.drawable(text))
         imgui.pop_text_wrap_pos()
@@ -37,8 +39,8 @@ def draw_received(state: ViewerState, number: int) -> None:
 def rows_of(state: ViewerState, number: int) -> list[Row]:
     """What there is to tell of the object."""
     area, counted = state.received.area(number), state.received.counted()
-    size = f"{area:.4g} units²" if area is not None else "not known: stretched round parts"
-    rows = [("area", size, "Of its surface as it is now, in squared units of the scene.")]
+    size = f"{area:.4g} m²" if area is not None else "not known: stretched round parts"
+    rows = [("area", size, "Of its surface as it is now, a unit of length being 1 m.")]
     if counted is None:
         return [*rows, ("photons", "being counted" if state.frame is not None else "none yet", "Of the latest pass.")]
     for name, found in counted.maps.items():
@@ -61,7 +63,7 @@ def _row(name: str, found: Received, number: int, area: float | None, passes: in
     text = f"{grouped(count)}{share}"
     if count:
         text += f", {si(power, 'W')}"
-        text += f", {si(power / area, 'W')}/unit²" if area else ""
+        text += f", {si(power / area, 'W')}/m²" if area else ""
     tip = (
         f"Photons of the {name} map that lie on it, of all of that map in {of_pass}; their power (luminance), and that "
         "over its area. Mirrors and clear glass store none. "

@@ -11,7 +11,7 @@ from pmviewer.settings.edits import PROPERTIES, Property
 from pmviewer.viewer import theme
 from pmviewer.viewer.editing import OPERATIONS, Editing
 from pmviewer.viewer.overlays.legend import wrapped
-from pmviewer.viewer.panels.received_rows import draw_received
+from pmviewer.viewer.panels.received_rows import STACKED, draw_received
 from pmviewer.viewer.panels.widgets import icon_button, tooltip_text
 from pmviewer.viewer.state import ViewerState
 
@@ -112,9 +112,11 @@ class ScenePanel:
             return
         if target.kind != "material":
             self._handles(editing, target, is_chosen)
-        if imgui.begin_table(f"##{target.kind}.{number}", 3, 0, (imgui.get_content_region_avail().x, 0)):
-            em = imgui.get_font_size()
-            imgui.table_setup_column("name", imgui.TableColumnFlags_.width_fixed, 5.4 * em)
+        em, room = imgui.get_font_size(), imgui.get_content_region_avail().x
+        stacked = room < STACKED * em
+        if imgui.begin_table(f"##{target.kind}.{number}", 2 if stacked else 3, 0, (room, 0)):
+            if not stacked:
+                imgui.table_setup_column("name", imgui.TableColumnFlags_.width_fixed, 5.4 * em)
             imgui.table_setup_column("value", imgui.TableColumnFlags_.width_stretch)
             imgui.table_setup_column("reset", imgui.TableColumnFlags_.width_fixed, 1.75 * em)
             for prop, what in PROPERTIES[target.kind].items():
@@ -136,7 +138,7 @@ class ScenePanel:
         imgui.table_next_column()
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.grey(theme.look.name), "material")
-        imgui.table_next_column()
+        _to_value()
         if imgui.button(f"{theme.drawable(material.name or material.key)}##of.{editing.number(target)}", (-1, 0)):
             editing.choose(material)
         imgui.set_item_tooltip("Show it in this tab")
@@ -152,8 +154,8 @@ class ScenePanel:
             editing.choose(target if wanted else None)
             self._scrolled_to = target
         for number, op in enumerate(possible if is_chosen else ()):
-            if number:  # the first below the switch: a narrow panel has no room for all in one line
-                imgui.same_line()
+            if number:  # the first stands below the switch
+                _same_line_if_it_fits(op)
             if imgui.radio_button(op, editing.operation == op):
                 editing.operation = op
 
@@ -169,7 +171,7 @@ class ScenePanel:
         name = editing.name_of(target, prop)
         if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
             tooltip_text([(name, theme.ACCENT), (f"{what.text[:1].upper()}{what.text[1:]}.", theme.TEXT)])
-        imgui.table_next_column()
+        _to_value()
         imgui.set_next_item_width(-1)
         new = _widget(f"##{target.kind}.{editing.number(target)}.{prop}", prop, what, value, self._radius())
         if new is not None:
@@ -181,6 +183,21 @@ class ScenePanel:
     def _radius(self) -> float:
         geometry = self._state.session.geometry
         return float(geometry.radius) if geometry is not None else 1.0
+
+
+def _to_value() -> None:
+    """From a row's name to its value: beside it, or in a narrow panel below."""
+    if imgui.table_get_column_count() > 2:
+        imgui.table_next_column()
+
+
+def _same_line_if_it_fits(label: str) -> None:
+    """Go on beside the item before where a radio button of that label has room there."""
+    style = imgui.get_style()
+    wide = imgui.get_frame_height() + style.item_inner_spacing.x + imgui.calc_text_size(label).x
+    right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
+    if imgui.get_item_rect_max().x + style.item_spacing.x + wide < right:
+        imgui.same_line()
 
 
 def _widget(label: str, prop: str, what: Property, value: tuple[float, ...], radius: float) -> tuple[float, ...] | None:

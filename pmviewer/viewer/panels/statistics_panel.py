@@ -18,6 +18,8 @@ Rows = list[tuple[str, str]]
 
 MOST_WORKERS = 12
 """That are listed."""
+BESIDE = 36.0
+"""Room in font sizes from which the parts stand beside each other, not below."""
 LEDGER = {
     "absorbed": "Absorbed",
     "escaped": "Escaped from the scene",
@@ -143,9 +145,9 @@ class StatisticsPanel:
             imgui.text_disabled("Nothing rendered yet.")
             return
         s = frame.statistics
-        if not imgui.begin_table(
-            "##columns", 3, imgui.TableFlags_.sizing_stretch_same | imgui.TableFlags_.borders_inner_v
-        ):
+        columns = 3 if imgui.get_content_region_avail().x > BESIDE * imgui.get_font_size() else 1
+        flags = imgui.TableFlags_.sizing_stretch_same | imgui.TableFlags_.borders_inner_v
+        if not imgui.begin_table("##columns", columns, flags):
             return
         imgui.table_next_column()
         table("Photons", photon_rows(s))

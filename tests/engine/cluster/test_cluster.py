@@ -22,7 +22,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.session import Session
 from pmviewer.engine.store import StageStore
-from pmviewer.errors import ClusterError
+from pmviewer.errors import ClusterError, SettingError
 from pmviewer.progress import Cancelled
 from pmviewer.resources import data_folder
 from pmviewer.settings.access import Settings, with_values
@@ -145,6 +145,40 @@ def test_nobody_answers():
         Cluster("tcp://127.0.0.1:9")
 
 
+def test_a_cluster_is_borrowed_and_given_back_in_an_open_session(borrowed):
+    expected, session = alone().frame(0).planes, Session(1, with_values(Settings(), SMALL))
+
+    def all_come_from_workers():
+        """On a busy machine they are not heard at once, and passes are rendered here."""
+        session.restart()
+        assert session.wait(timeout=100)
+        return sum(passes for _, passes in session.frame.statistics.workers.values()) == 6
+
+    try:
+        with pytest.raises(SettingError, match="is no cluster"):
+            session.workers.borrow("somewhere")
+        assert session.workers.where is None
+        session.workers.borrow(borrowed[0].scheduler_address)
+        until(lambda: session.workers._cluster is not None and session.workers._cluster.members.ready)
+        session.open("cornell_caustic")
+        assert session.wait(timeout=100)
+        until(all_come_from_workers)
+        session.workers.borrow(None)
+        said = []
+        until(lambda: said.extend(session.take_messages()) or any("given back" in message.text for message in said))
+        session.restart()
+        assert session.wait(timeout=100)
+        assert not session.frame.statistics.workers
+        np.testing.assert_array_equal(session.frame.planes, expected)
+        session.workers.borrow("tcp://127.0.0.1:9")
+        assert session.workers.where == "tcp://127.0.0.1:9"
+        until(lambda: said.extend(session.take_messages()) or session.workers.where is None)
+        said.extend(session.take_messages())
+        assert any("No Dask scheduler" in message.text for message in said)
+    finally:
+        session.close()
+
+
 def test_the_window_borrows_workers_and_goes_on_without_them(monkeypatch):
     """The session: the same picture, photons of passes from elsewhere when they are looked at, and when the scheduler
     has gone a sentence, and the picture goes on."""
@@ -153,7 +187,7 @@ def test_the_window_borrows_workers_and_goes_on_without_them(monkeypatch):
     with workers(1) as (local, _):
         session = Session(1, shown, cluster=local.scheduler_address)
         try:
-            until(lambda: session._passes._cluster is not None and session._passes._cluster.members.ready)
+            until(lambda: session.workers._cluster is not None and session.workers._cluster.members.ready)
             session.open("cornell_caustic")
             assert session.wait(timeout=100)
             frame = session.frame
@@ -170,11 +204,12 @@ def test_the_window_borrows_workers_and_goes_on_without_them(monkeypatch):
             session.set(with_values(shown, {"render.seed": 1}))
             assert session.wait(timeout=100)
             np.testing.assert_array_equal(session.frame.planes, alone(**{"render.seed": 1}).frame(0).planes)
-            gone = session._passes._cluster
+            gone = session.workers._cluster
             until(lambda: gone.lost)
             session.restart()
-            until(lambda: session._passes._cluster is None)
+            until(lambda: session.workers._cluster is None)
             said = [message.text for message in session.take_messages()]
             assert any("has gone" in text and "rendered here" in text for text in said)
+            assert session.workers.where is None
         finally:
             session.close()

@@ -32,8 +32,15 @@ def shares(report: PixelReport) -> list[tuple[str, float, float]]:
     return [(name, float(v), float(v) / total if total > 0 else 0.0) for name, v in zip(names, values, strict=True)]
 
 
+_ROOMY = 11.0
+"""Room in font sizes for bars beside figures of four digits."""
+
+
 def draw_terms(report: PixelReport) -> None:
     """A bar for each term, as long as its share, and the sum below."""
+    roomy = imgui.get_content_region_avail().x > _ROOMY * imgui.get_font_size()
+    digits, padding = 4 if roomy else 3, imgui.get_style().cell_padding
+    imgui.push_style_var(imgui.StyleVar_.cell_padding, (padding.x if roomy else 1.0, padding.y))
     if imgui.begin_table("##terms", 3):
         imgui.table_setup_column("name", imgui.TableColumnFlags_.width_fixed)
         imgui.table_setup_column("bar", imgui.TableColumnFlags_.width_stretch)
@@ -45,16 +52,19 @@ def draw_terms(report: PixelReport) -> None:
             imgui.table_next_column()
             _bar(share, colour)
             imgui.table_next_column()
-            _right(f"{value:.4g}")
+            _right(f"{value:.{digits}g}")
         imgui.table_next_row()
         imgui.table_next_column()
         imgui.text_unformatted("sum")
         imgui.table_next_column()
         rgb = report.terms.sum(axis=0)
         imgui.table_next_column()
-        _right(f"{float(luminance(rgb)):.4g}")
+        _right(f"{float(luminance(rgb)):.{digits}g}")
         imgui.end_table()
-        imgui.text_disabled("RGB  " + "  ".join(f"{v:.4g}" for v in rgb))
+    imgui.pop_style_var()
+    if report.terms.size:
+        rgb = report.terms.sum(axis=0)
+        wrapped("RGB  " + "  ".join(f"{v:.4g}" for v in rgb))
         imgui.set_item_tooltip("Red, green, blue in W/(m² sr); the figures above are luminances")
 
 

@@ -16,7 +16,6 @@ from pmviewer.viewer.panels.inspector.fisheye import FisheyeDiscs
 from pmviewer.viewer.panels.inspector.light import draw_history, draw_terms
 from pmviewer.viewer.panels.inspector.photons import PhotonTable, draw_life
 from pmviewer.viewer.panels.inspector.plots import draw_curves, draw_directions
-from pmviewer.viewer.panels.inspector.sorted_table import NARROW
 from pmviewer.viewer.panels.inspector.virtual_lights import LightTable, place_name, place_rows
 from pmviewer.viewer.panels.statistics_panel import table
 from pmviewer.viewer.state import ViewerState
@@ -90,7 +89,10 @@ class InspectorPanel:
         assert inspector.pinned is not None
         imgui.align_text_to_frame_padding()
         imgui.text_unformatted(f"Pixel {inspector.pinned[0]}, {inspector.pinned[1]}")
+        wide = imgui.calc_text_size("Unpin").x + 2 * imgui.get_style().frame_padding.x
         imgui.same_line()
+        if imgui.get_content_region_avail().x < wide:
+            imgui.new_line()
         if imgui.small_button("Unpin"):
             inspector.unpin()
         imgui.set_item_tooltip("Or Esc, or click the pixel again")
@@ -204,7 +206,8 @@ def measure_rows(report: PixelReport) -> list[tuple[str, str]]:
 
 def _facts(rows: list[tuple[str, str]]) -> None:
     """Names and values; one below the other where there is no room for both."""
-    if imgui.get_content_region_avail().x >= NARROW * imgui.get_font_size():
+    names, values = (max(imgui.calc_text_size(row[i]).x for row in rows) for i in (0, 1))
+    if names + values + imgui.get_font_size() < imgui.get_content_region_avail().x:
         table("", rows)
         return
     imgui.push_text_wrap_pos(0)

@@ -125,9 +125,16 @@ class SnapshotsPanel:
             _wrapped(found, theme.DIM if state.settings.compare.mode == "off" else theme.WARNING)
             return
         figures, settings = self._worked_out(*found)
-        flags = imgui.TableFlags_.borders_inner_h | imgui.TableFlags_.sizing_stretch_prop
+        flags = imgui.TableFlags_.borders_inner_h | imgui.TableFlags_.sizing_stretch_same
         imgui.push_style_var(imgui.StyleVar_.cell_padding, (imgui.get_style().cell_padding.x, 1))
         if imgui.begin_table("##figures", 4, flags):
+            for label, share in (
+                ("of", 1.4),
+                ("A", 1.0),
+                ("B", 1.0),
+                ("ratio", 0.7),
+            ):  # long names leave room for figures
+                imgui.table_setup_column(label, imgui.TableColumnFlags_.width_stretch, share)
             names = [theme.drawable(side.name) for side in found]
             _row(("", f"A  {names[0]}", f"B  {names[1]}", "A / B"), theme.DIM)
             for row in figures:
