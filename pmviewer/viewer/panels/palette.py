@@ -22,6 +22,7 @@ _WIDTH = 36.0
 _UNBOUND = {
     "open_snapshot": "Open an EXR or PNG file as a snapshot",
     "export_still": "Export at another size, with the legend",
+    "borrow_cluster": "Borrow a cluster, or give it back",
     "begin_tour": "The tour: five steps through the window",
     "open_photons": "Photons of a PLY file over the picture",
     "export_film": "Export the film",
