@@ -47,7 +47,7 @@ def _knot() -> Mesh:
 
 def marble() -> MadeScene:
     """The knot stands on edge before a dark wall, one lamp behind it and one before it."""
-    height = SIZE * (3 + THICKNESS) - 0.03
+    height = SIZE * (3 + THICKNESS) + 0.002
     stone = (
         '<shape type="ply"><string name="filename" value="meshes/knot.ply"/>'
         f'<transform name="to_world"><rotate z="1" angle="60"/><translate y="{height:g}"/></transform>'
@@ -70,7 +70,7 @@ def marble() -> MadeScene:
             panel((0, 0, 0), (2.5, 0, 0), (0, 0, -2.5), "floor"),
             panel((0, 1.5, -1.6), (2.5, 0, 0), (0, 1.5, 0), "wall"),
             stone,
-            lamp((-1.1, 1.5, -1.0), (0.0, 0.65, 0.0), (0.35, 0.35), (19, 15, 10)),
+            lamp((-1.9, 2.0, -0.9), (0.0, 0.65, 0.0), (0.5, 0.5), (24, 19, 12.5)),
             lamp((1.6, 1.9, 1.6), (0.0, 0.6, 0.0), (0.5, 0.5), (2.2, 2.6, 3.2)),
         ],
         {"knot": _knot()},
