@@ -45,6 +45,8 @@ def prepare(scene, settings, pool, tell):
 
 def close_while_it_compiles():
     compiling.wait()
+    while not made:  # scenes are opened while the window is being made
+        time.sleep(0.02)
     made[0].commands.window_shot = Path("window.png")
     while made[0].commands.window_shot is not None:
         made[0].wake()
@@ -54,9 +56,9 @@ def close_while_it_compiles():
     made[0].wake()
 
 session.prepare = prepare
-viewer.ViewerApp = App
 threading.Thread(target=close_while_it_compiles, daemon=True).start()
-sys.exit(viewer.run_viewer("cornell_diffuse", with_values(Settings(), {"photons.N": 1000}), threads=1))
+settings = with_values(Settings(), {"photons.N": 1000})
+sys.exit(viewer.run_viewer("cornell_diffuse", settings, threads=1, make=App))
 """
 
 
