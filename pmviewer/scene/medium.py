@@ -42,9 +42,9 @@ class Medium:
 
     @property
     def free_path(self) -> float:
-        """Mean free path in scene units where it is shortest, of the channel in which it is; infinite where nothing is
-        met."""
-        stops = self._stops
+        """Mean free path in scene units of the channel in which it is shortest; infinite where nothing is met, and on
+        lattices, where it varies."""
+        stops = 0.0 if self.varies else max(self.sigma_t)
         return 1.0 / stops if stops > 0.0 else math.inf
 
     @property

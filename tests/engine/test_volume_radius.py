@@ -39,9 +39,7 @@ def test_it_shrinks_with_the_passes():
     assert volume_radius(0.3, 2, estimate, [MARBLE]) == pytest.approx(expected / 50)
 
 
-def test_a_lattice_counts_where_it_is_densest():
-    values = np.zeros((2, 2, 2, 1), np.float32)
-    values[1, 0, 1] = 4.0
-    smoke = Medium("smoke", (3.0, 5.0, 1.0), (0.5,) * 3, density=Grid(values, np.eye(4)))
-    assert smoke.free_path == pytest.approx(1 / 20)
+def test_lattices_have_no_free_path_of_their_own():
+    smoke = Medium("smoke", (3.0, 5.0, 1.0), (0.5,) * 3, density=Grid(np.ones((2, 2, 2, 1), np.float32)))
+    assert volume_radius(0.3, 0, Estimate(), [smoke, MARBLE]) == pytest.approx(0.3)
     assert Medium("nothing", (0.0,) * 3).free_path == math.inf

@@ -29,7 +29,9 @@ MD_SIGMA_T, MD_ALBEDO, MD_EMISSION, MD_G, MD_G_BESIDE, MD_BESIDE, MD_GLOW, MD_FR
 )
 """Columns of a medium's row: extinction per length, albedo, radiance emitted per length, each RGB; the mean cosines of
 the two lobes of the phase function, the share of the second; its glow (`pmviewer.kernels.media.glow`), −1 where
-nothing is emitted; and the mean free path where it is shortest."""
+nothing is emitted; and the shortest channel's mean free path, infinite on lattices."""
+_DEEPEST = _f4(24.0)
+"""Optical depth that nothing shows through: exp(−24) = 4e-11."""
 VACUUM = np.int64(-1)
 SAME = -2
 """Of a side of a surface that ends no medium."""
@@ -68,8 +70,18 @@ def scatters(scene, medium):
 
 @device
 def free_path(scene, medium):
-    """Mean free path where it is shortest, infinite where nothing is met."""
+    """Mean free path of the channel in which it is shortest, infinite where nothing is met and on lattices."""
     return load_f4(scene.media, medium * MEDIUM_COLUMNS + MD_FREE_PATH)
+
+
+@device
+def way_seen(scene, medium):
+    """Length of a homogeneous medium behind which no channel shows anything, infinite on lattices."""
+    sigma = extinction(scene, medium)
+    least = min(sigma[0], min(sigma[1], sigma[2]))
+    if least > _f4(0.0) and free_path(scene, medium) < _f4(math.inf):
+        return _DEEPEST / least
+    return _f4(math.inf)
 
 
 @device

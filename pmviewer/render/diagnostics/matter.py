@@ -9,7 +9,7 @@ from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.compile.specialise import absent, specialised
 from pmviewer.kernels.media.column import WORDS, column_of
 from pmviewer.kernels.media.lattice import line_of, walk
-from pmviewer.kernels.media.medium import extinction, phase_numbers, scatters
+from pmviewer.kernels.media.medium import extinction, phase_numbers, scatters, way_seen
 from pmviewer.kernels.media.varying import OF_EXTINCTION, grid_of, has_grids, sigma_at
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.vector import along
@@ -85,6 +85,7 @@ def _counted(scene, photons, medium, o, d, length, radius, marks):
 
     def by_beam(scene, photons, medium, o, d, length, radius, marks):
         column = column_of(scene, medium, o, d, length, marks)
+        length = min(length, way_seen(scene, medium))
         _, count = beam_radiance(scene, photons, o, d, length, radius, column, phase_numbers(scene, medium))
         return count
 

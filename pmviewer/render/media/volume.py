@@ -17,7 +17,7 @@ from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.kernels.dimensions import FURTHER_LIGHT, GATHER_VOLUME, GATHER_VOLUME_PHASE, VOLUME, VOLUME_PHASE
 from pmviewer.kernels.lights.light import sample_one_light
 from pmviewer.kernels.media.column import WORDS, column_of, through_all
-from pmviewer.kernels.media.medium import free_path, has_media, phase_numbers, scatters
+from pmviewer.kernels.media.medium import free_path, has_media, phase_numbers, scatters, way_seen
 from pmviewer.kernels.media.phase import phase, sample_phase
 from pmviewer.kernels.media.varying import albedo_at, sigma_at
 from pmviewer.kernels.memory import stack_i4
@@ -162,6 +162,7 @@ def _indirect(given, stretch):
         o, d, length, medium, column = stretch
         lobes = phase_numbers(given.scene, medium)
         radius = radius_in(given.scene, given.eye, medium)
+        length = min(length, way_seen(given.scene, medium))  # or it would walk through millions of small cells
         L, _ = beam_radiance(given.scene, given.volume_map, o, d, length, radius, column, lobes)
         return L
 
