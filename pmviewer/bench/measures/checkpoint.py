@@ -156,6 +156,8 @@ def _killed(output: Path, moment: float, began: float) -> _Kill | None:
         output.unlink(missing_ok=True)
         return None
     file = output.with_suffix(".checkpoint")
+    if not file.exists() and output.exists():
+        return _Kill(moment, PASSES, 0.0, False)  # it was about to end: the picture is written, and needs none any more
     if not file.exists():
         return _Kill(moment, None, max(moment - began, 0.0), False)
     head = read_header(file)
