@@ -130,10 +130,11 @@ class SettingWidgets:
             current = math.sqrt(info.lower * info.upper) if info.scale == "log" else info.lower  # type: ignore[operator]
             text = "auto"
         else:
-            text = f"auto · {current:.3g}" if automatic else value_text(info, current)
+            number = grouped(int(current)) if info.kind is int else f"{current:.3g}"
+            text = f"auto · {number}" if automatic else value_text(info, current)
             room = (imgui.get_content_region_avail().x if width < 0 else width) - imgui.get_font_size() * 0.5
             if imgui.calc_text_size(text).x > room:
-                text = f"{current:.3g}" if automatic else text.removesuffix(info.unit).rstrip()
+                text = number if automatic else text.removesuffix(info.unit).rstrip()
         new = self._slide(info, current, theme.drawable(text).replace("%", "%%"), width)
         if imgui.is_item_activated() and not imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
             self._before[info.path] = value
