@@ -114,11 +114,11 @@ class PhotonCloud:
 
 @dataclass(frozen=True, eq=False)
 class Preview:
-    """What is shown in place of a young picture: radiance (h, w, 3) float32 in the picture's full size, and `how` it
-    was made, in words."""
+    """What is shown in place of a young picture: radiance (h, w, 3) float32 in the picture's full size, and a
+    `caption` that says how it was made."""
 
     image: NDArray[np.float32]
-    how: str
+    caption: str
 
 
 @dataclass(frozen=True)

@@ -82,7 +82,7 @@ TREE_FIELDS: list[tuple[str, Any]] = [("tree", "i8"), ("leaves", "i8")]
 lights: the address of the nodes and how many leaves there are."""
 NODE_COLUMNS = 11
 N_CENTRE, N_AXIS = _columns[[0, 3]]
-N_RADIUS, N_COS, N_SIN, N_WORTH, N_LIGHT = _columns[6:11]
+N_RADIUS, N_COS, N_SIN, N_INTENSITY, N_LIGHT = _columns[6:11]
 """Columns of a node of the tree over virtual lights, float32: the sphere around its lights, the axis of the cone around
 their normals, the sphere's radius, the cone's cosine and sine, what its lights may bring together, of a leaf the number
 of its light."""

@@ -48,6 +48,7 @@ class Commands:
         self.palette = Palette(state)
         self.still_dialog = StillDialog(state, dialogs)
         self.cluster_dialog = ClusterDialog(state)
+        self.modals = self.still_dialog, self.cluster_dialog
         self._hidden: list[str] = []
         self._layout = layout.Layout()
         self.table: dict[str, Callable[[], None]] = {

@@ -215,8 +215,8 @@ class ViewerApp:
             self._title = title
 
     def _over_everything(self) -> None:
-        commands = self.commands
-        asking = self.restore_dialog.is_open or commands.still_dialog.is_open or commands.cluster_dialog.is_open
+        modals = self.commands.modals
+        asking = self.restore_dialog.is_open or any(modal.is_open for modal in modals)
         if not (asking or self.dialogs.is_open or self.commands.palette.is_open):
             run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying, self.state.history)
         self.state.flipped = not self.dialogs.is_open and is_held(FLIP_KEY)
@@ -224,8 +224,8 @@ class ViewerApp:
         self.dialogs.poll()
         draw_help(self.state)
         self.commands.palette.gui(self.commands.table)
-        self.commands.still_dialog.gui()
-        self.commands.cluster_dialog.gui()
+        for modal in modals:
+            modal.gui()
         self.restore_dialog.gui()
         if not self.restore_dialog.is_open:  # first what a crash has left, then what is new
             self.tour.gui()

@@ -50,7 +50,7 @@ def test_coarse_frames_are_drawn_out_and_films_are_as_without(session, monkeypat
     assert len(found) == 1
     assert found[0].image.shape == (48, 48, 3)
     assert np.isfinite(found[0].image).all()
-    assert "coarse" in found[0].how
+    assert "coarse" in found[0].caption
     assert all(frame.preview is None for frame in frames if not frame.coarse)
     truth = rendered(cornell_box(), settings, 12).frame(1)
     assert np.array_equal(session.frame.planes, truth.planes)
@@ -73,13 +73,13 @@ def test_a_moved_camera_shows_the_light_of_the_last_picture_for_some_passes(sess
     else:
         coarse = next(frame for frame in frames if frame.preview is not None)
         assert coarse.coarse
-        assert "last picture" in coarse.preview.how
+        assert "last picture" in coarse.preview.caption
         assert coarse.preview.image.shape == (48, 48, 3)
         plain = ~by_passes[1].image("specular").any(axis=-1)  # one row of all pixels that show no mirror
         ours, first, true = (picture[plain][None] for picture in (coarse.preview.image, by_passes[1].beauty, truth))
         assert relmse(ours, true) < relmse(first, true)
     first = by_passes[1]
-    assert "last picture" in first.preview.how
+    assert "last picture" in first.preview.caption
     assert relmse(first.preview.image, truth) < 0.6 * relmse(first.beauty, truth)
     assert all(f.preview is None for passes, f in by_passes.items() if passes >= 8)
     assert session.frame.preview is None
@@ -92,9 +92,9 @@ def test_other_changes_forget_the_last_picture(session, monkeypatch):
     session.open(cornell_box())
     assert session.wait(timeout=PATIENCE)
     frames = shown(session, lambda: session.set(with_values(SMALL, {"photons.N": 5000})))
-    hows = [frame.preview.how for frame in frames if frame.preview is not None]
-    assert hows
-    assert not any("last picture" in how for how in hows)
+    captions = [frame.preview.caption for frame in frames if frame.preview is not None]
+    assert captions
+    assert not any("last picture" in how for how in captions)
 
 
 def test_off_is_off_and_a_pause_shows_the_estimate(session):
@@ -112,7 +112,7 @@ def test_denoised_previews_are_nearer_to_the_truth_and_end_with_the_picture(sess
     frames = shown(session, lambda: session.open(cornell_box(), settings))
     truth = rendered(cornell_box(), with_values(SMALL, {"render.seed": 5}), 200).frame(1).beauty
     by_passes = {f.statistics.passes: f for f in frames if not f.coarse and f.preview is not None}
-    assert "denoised" in by_passes[1].preview.how
+    assert "denoised" in by_passes[1].preview.caption
     assert relmse(by_passes[1].preview.image, truth) < 0.7 * relmse(by_passes[1].beauty, truth)
     assert session.frame.preview is None
 

@@ -10,7 +10,7 @@ from pmviewer.engine.stages.virtual_lights import virtual_dtype
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.maps.virtual_lights import COLUMNS, V_F, V_FIRST, V_LAMBERTIAN, V_N, V_P, V_PHI, V_Q, V_WI, W_F, W_G
-from pmviewer.photons.virtual.tree import light_tree, worths
+from pmviewer.photons.virtual.tree import intensities, light_tree
 from pmviewer.render.planes import CHANNELS, PLANES
 from pmviewer.render.virtual_lights.descent import ALIKE, CUT, CUT_WORDS, LEAST, SMALL, ask_cut, descend
 from pmviewer.settings.access import Virtual
@@ -55,7 +55,7 @@ def way(records, p, n, u):
     return descend(records[0], p, n, cut, u)
 
 
-def probabilities(rows, tree, worth, p, n):
+def probabilities(rows, tree, intensity, p, n):
     """Of each light by going down all ways, with angles. A node's sphere and cone are those of the tree, checked here
     to hold its lights."""
     leaves, out = len(tree) // 2, np.zeros(len(rows))
@@ -69,7 +69,7 @@ def probabilities(rows, tree, worth, p, n):
             return tree[first : last + 1, 10].astype(int)
         return tree[node : node + 1, 10].astype(int)
 
-    def promise(node):
+    def bound(node):
         row = tree[node].astype(np.float64)
         centre, axis, r, cone = row[0:3], row[3:6], row[6], np.arccos(np.clip(row[7], -1, 1))
         here = below(node)
@@ -96,13 +96,13 @@ def probabilities(rows, tree, worth, p, n):
         if alike:
             pair = [(tree[child, 9], True) for child in (2 * node, 2 * node + 1)]
         else:
-            pair = [promise(2 * node), promise(2 * node + 1)]
+            pair = [bound(2 * node), bound(2 * node + 1)]
         for child, (one, here) in enumerate(pair):
             if one > 0:
                 go(2 * node + child, probability * one / (pair[0][0] + pair[1][0]), here)
 
     first = min(CUT, leaves)  # all ways begin at the nodes of one level, by what they promise
-    begin = [promise(node) for node in range(first, 2 * first)]
+    begin = [bound(node) for node in range(first, 2 * first)]
     for k, (one, alike) in enumerate(begin):
         if one > 0:
             go(first + k, one / sum(other for other, _ in begin), alike)
@@ -112,11 +112,11 @@ def probabilities(rows, tree, worth, p, n):
 @pytest.mark.parametrize("n", [1, 5, 64, 200])
 def test_ways_end_at_lights_with_the_probability_that_they_are_told(n):
     rows = lights(n)
-    tree, worth = light_tree(rows, UNWEIGHTED, 1.7), worths(rows, UNWEIGHTED)
+    tree, intensity = light_tree(rows, UNWEIGHTED, 1.7), intensities(rows, UNWEIGHTED)
     record = record_of(rows, tree, 8)
     normal = np.array([0.0, 0.0, 1.0])
     for p in (np.array([0.1, -0.2, -1.2]), np.array([0.3, 0.3, 0.2])):
-        expected = probabilities(rows, tree, worth, p, normal)
+        expected = probabilities(rows, tree, intensity, p, normal)
         counted, told = np.zeros(n), np.zeros(n)
         ways = 2000
         for u in (np.arange(ways) + 0.5) / ways:
@@ -134,12 +134,12 @@ def test_ways_end_at_lights_with_the_probability_that_they_are_told(n):
 def test_lights_are_worth_what_they_scatter_and_what_they_weigh():
     rows = lights(50)
     brings = (rows[:, V_F : V_F + 3] * rows[:, V_PHI : V_PHI + 3]).astype(float) @ LUMINANCE
-    assert worths(rows, UNWEIGHTED) == pytest.approx(brings / brings.sum(), rel=1e-5)
+    assert intensities(rows, UNWEIGHTED) == pytest.approx(brings / brings.sum(), rel=1e-5)
     q = rows[:, V_Q].astype(float)
-    assert worths(rows, SINGLE) == pytest.approx(0.5 * brings / brings.sum() + 0.5 * q / q.sum(), rel=1e-5)
+    assert intensities(rows, SINGLE) == pytest.approx(0.5 * brings / brings.sum() + 0.5 * q / q.sum(), rel=1e-5)
     rows[:25, V_FIRST] = 1.0
     q = np.where(rows[:, V_FIRST] != 0, q, q * (rows[:, V_F : V_F + 3].astype(float) @ LUMINANCE))
-    assert worths(rows, EVERY) == pytest.approx(0.5 * brings / brings.sum() + 0.5 * q / q.sum(), rel=1e-5)
+    assert intensities(rows, EVERY) == pytest.approx(0.5 * brings / brings.sum() + 0.5 * q / q.sum(), rel=1e-5)
 
 
 def test_every_light_is_one_leaf_that_can_be_chosen():

@@ -212,7 +212,7 @@ def _at(
     there = [(then, frame) for then, frame in seen if then <= when]
     then, frame = there[-1] if there else (0.0, replace(before, preview=None))
     what = "the picture before" if not there else "coarse" if frame.coarse else f"pass {frame.statistics.passes}"
-    return truth.error(shown(frame, (size, size))), then, what if frame.preview is None else frame.preview.how
+    return truth.error(shown(frame, (size, size))), then, what if frame.preview is None else frame.preview.caption
 
 
 def run(quick: bool = False, scenes: int | None = None, keep: Path | None = None) -> BenchResult:

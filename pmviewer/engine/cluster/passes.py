@@ -26,7 +26,7 @@ from typing import Any
 from pmviewer.engine.apart import check_apart
 from pmviewer.engine.cluster.cluster import Cluster
 from pmviewer.engine.cluster.members import Member
-from pmviewer.engine.cluster.nearby import Piece, Pieces, Written
+from pmviewer.engine.cluster.shared_memory import Segment, Segments, Written
 from pmviewer.engine.cluster.worker import Asked, Failed, Rendered, hold_scene, packed_settings, render_pass, stop
 from pmviewer.engine.renderer import Renderer
 from pmviewer.errors import ClusterError
@@ -61,7 +61,7 @@ class Order:
     since: float = field(default_factory=time.monotonic)
     doubted: bool = False
     """Whether another was asked for the same pass."""
-    piece: Piece | None = None
+    segment: Segment | None = None
     """Memory for what the pass adds, which its worker sees."""
 
 
@@ -85,7 +85,7 @@ class Elsewhere:
         self._numbers = itertools.count()
         self._arrived: queue.SimpleQueue[tuple[str, Rendered | Failed | str | None]] = queue.SimpleQueue()
         self._fetchers = ThreadPoolExecutor(4, "pmviewer fetch")
-        self._pieces = Pieces(renderer.film)
+        self._segments = Segments(renderer.film)
 
     def step(
         self, most: int | None = None, tell: Callable[[str], None] = lambda text: None, patient: bool = True
@@ -113,7 +113,7 @@ class Elsewhere:
                 self._ask(most)
         rendered, order = self._done.pop(renderer.passes)
         renderer.add(_increment(rendered, order), rendered.told)
-        self._pieces.give_back(order.piece)
+        self._segments.give_back(order.segment)
         renderer.tally.merge(rendered.tally)
         member = order.member
         share = renderer.tally.workers.get(member.address, (member.threads, 0))
@@ -133,10 +133,10 @@ class Elsewhere:
                 for order in (*self._orders.values(), *self._brought.values()):
                     order.future.release()
         for order in self._orders.values():
-            self._pieces.lose(order.piece)
+            self._segments.lose(order.segment)
         for _, order in self._done.values():
-            self._pieces.give_back(order.piece)
-        self._pieces.close()
+            self._segments.give_back(order.segment)
+        self._segments.close()
         self._orders.clear()
         self._brought.clear()
         self._done.clear()
@@ -185,11 +185,11 @@ class Elsewhere:
         return None
 
     def _order(self, index: int, member: Member) -> None:
-        piece = self._pieces.take() if member.is_near else None
-        place = None if piece is None else piece.place
-        asked = Asked(self.run, self._scene.digest, self._settings, index, member.threads, place)
+        segment = self._segments.take() if member.is_near else None
+        handle = None if segment is None else segment.handle
+        asked = Asked(self.run, self._scene.digest, self._settings, index, member.threads, handle)
         key = f"pmviewer-pass-{self.run}-{index}-{next(self._numbers)}"
-        self._submit(self._orders, Order(index, member, piece=piece), key, render_pass, asked)
+        self._submit(self._orders, Order(index, member, segment=segment), key, render_pass, asked)
 
     def _has_scene(self, member: Member) -> bool:
         """Whether the worker has it; it is brought if not."""
@@ -249,13 +249,13 @@ class Elsewhere:
         if isinstance(found, Rendered):
             self._took = [*self._took[1 - RECENT :], time.monotonic() - order.since]
             if not self._is_wanted(order.index):
-                self._pieces.give_back(order.piece)
+                self._segments.give_back(order.segment)
                 return
             self._done[order.index] = found, order
             for other in [k for k, o in self._orders.items() if o.index == order.index]:
                 self._drop(other)
             return
-        self._pieces.lose(order.piece)
+        self._segments.lose(order.segment)
         if isinstance(found, Failed) and found.final:
             raise ClusterError(f"Pass {order.index} failed on worker {order.member.address}: {found.text}")
         said, lacks = (found.text, found.lacks_scene) if isinstance(found, Failed) else ("", False)
@@ -306,7 +306,7 @@ class Elsewhere:
         """An order whose worker is not waited for any more."""
         order = self._orders.pop(key)
         order.future.release()
-        self._pieces.lose(order.piece)
+        self._segments.lose(order.segment)
 
     def _is_wanted(self, index: int) -> bool:
         return index >= self.renderer.passes and index not in self._done
@@ -316,8 +316,8 @@ def _increment(rendered: Rendered, order: Order) -> Addable:
     """What the pass adds, from wherever it is."""
     if not isinstance(rendered.increment, Written):
         return rendered.increment
-    assert order.piece is not None, "written to no place"
-    return order.piece.increment(rendered.increment)
+    assert order.segment is not None, "written to no segment"
+    return order.segment.increment(rendered.increment)
 
 
 def _text(error: BaseException | None) -> str:

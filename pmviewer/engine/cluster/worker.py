@@ -15,8 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from pmviewer.engine.cluster.nearby import Place, Writer, Written
 from pmviewer.engine.cluster.packed import PackedIncrement, pack
+from pmviewer.engine.cluster.shared_memory import Handle, Writer, Written
 from pmviewer.engine.memory import give_back
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
@@ -41,7 +41,7 @@ T = TypeVar("T")
 @dataclass(frozen=True)
 class Asked:
     """Pass `index` of the scene with that digest and these settings (`packed_settings`), in the course of `run`. What
-    it adds goes to `place` where the worker is on the same machine. Small: the scheduler remembers the last thousands
+    it adds goes to `handle` where the worker is on the same machine. Small: the scheduler remembers the last thousands
     of what it was asked."""
 
     run: str
@@ -49,12 +49,12 @@ class Asked:
     settings: bytes
     index: int
     threads: int
-    place: Place | None = None
+    handle: Handle | None = None
 
 
 @dataclass(frozen=True)
 class Rendered:
-    """A pass: what it adds (or that it has been written to its place), what was counted and what is told of it, and
+    """A pass: what it adds (or that it has been written to its handle), what was counted and what is told of it, and
     the seconds it took."""
 
     increment: PackedIncrement | Written
@@ -199,8 +199,8 @@ def _rendered(asked: Asked, pool: WorkPool) -> Rendered:
     spans = renderer.film.spans(asked.index)
     tally, told = renderer.tally.take(asked.index), renderer.told()
     written = None
-    if asked.place is not None and spans == [(0, len(increment.sums))]:
-        written = _bench.writer.write(asked.run, asked.place, increment)
+    if asked.handle is not None and spans == [(0, len(increment.sums))]:
+        written = _bench.writer.write(asked.run, asked.handle, increment)
     return Rendered(written or pack(increment, spans), tally, told, time.perf_counter() - start)
 
 

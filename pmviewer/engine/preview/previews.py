@@ -116,34 +116,34 @@ class Previews:
         planes = first_hits(seen.given, seen.maps, camera, renderer.settings, renderer.plan, outline, pool)
         small, small_guides = signals_of(frame.planes), guides_of(frame.planes)
         guides = self._banded(guides_of, GUIDES, planes)
-        how = "a coarse picture drawn out along edges"
+        caption = "a coarse picture drawn out along edges"
         if self._smooths(settings):
-            small, how = self._denoised(small, frame.planes), "a coarse picture, denoised and drawn out"
+            small, caption = self._denoised(small, frame.planes), "a coarse picture, denoised and drawn out"
         signals = self._drawn_out(small, small_guides, camera, guides, camera.width / frame.planes.shape[1])
         known = self._reprojected(renderer, guides)
         if known is not None:
             share = known.share[..., None]
             signals[..., :3] += share * (known.light - signals[..., :3])
-            how = f"light of the last picture ({100 * float(share.mean()):.0f} %), {how}"
-        return Preview(self._banded(picture_of, 3, signals, planes), how)
+            caption = f"light of the last picture ({100 * float(share.mean()):.0f} %), {caption}"
+        return Preview(self._banded(picture_of, 3, signals, planes), caption)
 
     def _made(self, renderer: Renderer, frame: Frame, smooths: bool) -> Preview:
         signals, passes, known = self._banded(signals_of, SIGNALS, frame.planes), frame.statistics.passes, self._known
-        how = f"{passes} pass" if passes == 1 else f"{passes} passes"
+        caption = f"{passes} pass" if passes == 1 else f"{passes} passes"
         if known is not None:
             weight = (known.share * (known.passes / passes))[..., None]
             signals[..., :3] = (signals[..., :3] + weight * known.light) / (1.0 + weight)
-            how = f"{how} with light of the last picture"
+            caption = f"{caption} with light of the last picture"
         if smooths and renderer.scene.traits.follows(renderer.settings.photons.glossy):
             albedo = frame.planes[..., PLANES["albedo"]]
             picture = self._banded(picture_of, 3, signals, frame.planes)
-            return Preview(self._smoothed(picture, albedo, frame.planes), f"{how}, denoised")
+            return Preview(self._smoothed(picture, albedo, frame.planes), f"{caption}, denoised")
         if smooths:  # nothing but edges is finer than what light does
             guides, small = self._banded(guides_of, GUIDES, frame.planes), halved(frame.planes)
             few = self._denoised(halved(signals), small)
             signals = self._drawn_out(few, np.ascontiguousarray(guides[1::2, 1::2]), frame.camera, guides, 2.0)
-            how = f"{how}, denoised"
-        return Preview(self._banded(picture_of, 3, signals, frame.planes), how)
+            caption = f"{caption}, denoised"
+        return Preview(self._banded(picture_of, 3, signals, frame.planes), caption)
 
     def _smooths(self, settings: Settings) -> bool:
         return settings.display.preview == "denoised" and self._denoises

@@ -39,22 +39,24 @@ def choice_probabilities(rows: Float, estimator: int, scene_radius: float | None
     """Probabilities (n,) of the candidates (n, COLUMNS), which sum to 1; `scene_radius` where the density of their map
     weighs them."""
     power = rows[:, V_PHI : V_PHI + 3].astype(np.float64) @ LUMINANCE
-    probabilities = _normalised(power)
+    probabilities = normalised(power)
     if estimator in OF_PATHS:
         q = rows[:, V_Q].astype(np.float64)
         beyond = rows[:, V_F : V_F + 3].astype(np.float64) @ LUMINANCE
         weights = np.where(rows[:, V_FIRST] != 0, q, q * beyond)
-        return _mixed(probabilities, weights)
+        return mixed(probabilities, weights)
     if scene_radius is not None and len(rows):
-        return _mixed(probabilities, 1.0 / _neighbours(rows, scene_radius))
+        return mixed(probabilities, 1.0 / _neighbours(rows, scene_radius))
     return probabilities
 
 
-def _mixed(power: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    return 0.5 * power + 0.5 * _normalised(weights) if weights.sum() > 0 else power
+def mixed(power: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Probabilities (n,), one half by those of `power`, the other by weights, where there are any."""
+    return 0.5 * power + 0.5 * normalised(weights) if weights.sum() > 0 else power
 
 
-def _normalised(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def normalised(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values (n,) with the sum 1; all alike where they are nothing."""
     total = values.sum()
     return values / total if total > 0 else np.full(len(values), 1.0 / max(len(values), 1))
 

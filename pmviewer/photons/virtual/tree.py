@@ -18,10 +18,10 @@ from pmviewer.maps.virtual_lights import (
     N_AXIS,
     N_CENTRE,
     N_COS,
+    N_INTENSITY,
     N_LIGHT,
     N_RADIUS,
     N_SIN,
-    N_WORTH,
     NODE_COLUMNS,
     OF_DENSITY,
     OF_PATHS,
@@ -34,6 +34,7 @@ from pmviewer.maps.virtual_lights import (
     V_Q,
     V_WI,
 )
+from pmviewer.photons.virtual.choice import mixed, normalised
 from pmviewer.scene.description import LUMINANCE
 
 Float = NDArray[np.float32]
@@ -44,24 +45,18 @@ _LEAST = 1e-6
 """Lights that bring next to nothing are still chosen sometimes, relative to the mean."""
 
 
-def worths(rows: Float, estimator: int) -> NDArray[np.float64]:
+def intensities(rows: Float, estimator: int) -> NDArray[np.float64]:
     """What each of the lights (n, COLUMNS) may bring, (n,), with sum 1: one half by what it scatters on, the other,
     where sums are weighted, by its weight."""
     scattered = np.where(rows[:, V_LAMBERTIAN, None] != 0, rows[:, V_F : V_F + 3], np.float32(1 / np.pi))
     brings = (scattered * rows[:, V_PHI : V_PHI + 3]).astype(np.float64) @ LUMINANCE
-    parts = [_shares(brings)]
+    found = normalised(brings)
     if estimator in OF_DENSITY or estimator in OF_PATHS:
         q = rows[:, V_Q].astype(np.float64)
         if estimator in OF_PATHS:
             q = np.where(rows[:, V_FIRST] != 0, q, q * (scattered.astype(np.float64) @ LUMINANCE))
-        parts.append(_shares(q))
-    shares = np.mean(parts, axis=0)
-    return np.maximum(shares, _LEAST / max(len(rows), 1))
-
-
-def _shares(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    total = values.sum()
-    return values / total if total > 0 else np.full(len(values), 1.0 / max(len(values), 1))
+        found = mixed(found, q)
+    return np.maximum(found, _LEAST / max(len(rows), 1))
 
 
 def light_tree(rows: Float, estimator: int, scene_radius: float) -> Float:
@@ -74,7 +69,7 @@ def light_tree(rows: Float, estimator: int, scene_radius: float) -> Float:
     depth = max(int(np.ceil(np.log2(n))), 0)
     leaves = 1 << depth
     order = np.concatenate([np.arange(n), np.arange(leaves - n) % n])
-    worth = np.concatenate([worths(rows, estimator), np.zeros(leaves - n)])
+    intensity = np.concatenate([intensities(rows, estimator), np.zeros(leaves - n)])
     p, wi = rows[order, V_P : V_P + 3].astype(np.float64), rows[order, V_WI : V_WI + 3]
     normal = rows[order, V_N : V_N + 3].astype(np.float64)
     normal *= np.where((normal * wi).sum(axis=1) < 0, -1.0, 1.0)[:, None]
@@ -84,7 +79,7 @@ def light_tree(rows: Float, estimator: int, scene_radius: float) -> Float:
     for level in range(depth + 1):
         at = at.reshape(1 << level, leaves >> level)
         first, last = 1 << level, 2 << level
-        nodes[first:last] = _nodes(p[at], normal[at], worth[at])
+        nodes[first:last] = _nodes(p[at], normal[at], intensity[at])
         if level < depth:
             box = places[at]
             axis = (box.max(axis=1) - box.min(axis=1)).argmax(axis=1)
@@ -94,7 +89,7 @@ def light_tree(rows: Float, estimator: int, scene_radius: float) -> Float:
     return nodes
 
 
-def _nodes(p: NDArray[np.float64], normal: NDArray[np.float64], worth: NDArray[np.float64]) -> Float:
+def _nodes(p: NDArray[np.float64], normal: NDArray[np.float64], intensity: NDArray[np.float64]) -> Float:
     """Of lights (m nodes, k lights, …) the nodes (m, NODE_COLUMNS)."""
     made = np.zeros((len(p), NODE_COLUMNS), np.float32)
     centre = 0.5 * (p.max(axis=1) + p.min(axis=1)).astype(np.float32).astype(np.float64)
@@ -108,5 +103,5 @@ def _nodes(p: NDArray[np.float64], normal: NDArray[np.float64], worth: NDArray[n
     made[:, N_CENTRE : N_CENTRE + 3], made[:, N_AXIS : N_AXIS + 3] = centre, axis
     made[:, N_RADIUS] = radius * (1 + 1e-5) if many else 0.0
     made[:, N_COS], made[:, N_SIN] = cos, np.sqrt(1 - cos * cos)
-    made[:, N_WORTH] = worth.sum(axis=1)
+    made[:, N_INTENSITY] = intensity.sum(axis=1)
     return made

@@ -15,7 +15,7 @@ from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.vector import along
 from pmviewer.maps.estimate.beam import beam_radiance
 from pmviewer.render.cast import cast
-from pmviewer.render.media.through import next_boundary
+from pmviewer.render.media.through import next_boundary, next_stretch
 from pmviewer.render.media.volume import radius_in
 from pmviewer.render.pixel import camera_ray
 
@@ -64,9 +64,7 @@ def depth_view(scenes, eyes, out, first, last):
         o, medium, left = ray.o, ray.medium, hit.t
         depth, way, met = 0.0, 0.0, False
         for k in range(hit.crossed + 1):
-            length, beyond, next_medium = left, o, medium
-            if k < hit.crossed:
-                length, beyond, next_medium = next_boundary(scene, o, ray.d, medium)
+            length, beyond, next_medium = next_stretch(scene, hit.crossed - k, o, ray.d, medium, left)
             if medium >= 0:
                 met = True
                 way += min(_f8(length), MOST)
@@ -107,9 +105,7 @@ def beam_view(scenes, eyes, photon_maps, out, first, last):
         o, medium, left = ray.o, ray.medium, hit.t
         count, met, narrowest = 0, False, eye.volume_radius
         for k in range(hit.crossed + 1):
-            length, beyond, next_medium = left, o, medium
-            if k < hit.crossed:
-                length, beyond, next_medium = next_boundary(scene, o, ray.d, medium)
+            length, beyond, next_medium = next_stretch(scene, hit.crossed - k, o, ray.d, medium, left)
             if scatters(scene, medium):
                 met = True
                 radius = radius_in(scene, eye, medium)

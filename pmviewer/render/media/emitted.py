@@ -15,7 +15,7 @@ from pmviewer.kernels.media.medium import emission_of, emitted_along, has_media
 from pmviewer.kernels.media.varying import OF_EMISSION, OF_EXTINCTION, emission_at, grid_of, has_grids, thinned
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.vector import add, along, largest, mul, scale
-from pmviewer.render.media.through import next_boundary
+from pmviewer.render.media.through import next_stretch
 
 _f4 = np.float32
 _f8 = np.float64
@@ -98,9 +98,7 @@ def emitted_on_the_way(scene, ray, hit, x, everything):
     o, medium, left = ray.o, ray.medium, hit.t
     marks = stack_i4(WORDS)
     for k in range(hit.crossed + 1):
-        length, beyond, next_medium = left, o, medium
-        if k < hit.crossed:
-            length, beyond, next_medium = next_boundary(scene, o, ray.d, medium)
+        length, beyond, next_medium = next_stretch(scene, hit.crossed - k, o, ray.d, medium, left)
         if medium >= 0:
             column = column_of(scene, medium, o, ray.d, length, marks)
             if everything or near_glow(scene, medium, x):

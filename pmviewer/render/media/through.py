@@ -67,6 +67,15 @@ def next_boundary(scene, o, d, medium):
 
 
 @device
+def next_stretch(scene, crossings, o, d, medium, left):
+    """The stretch of a way that begins at o in a medium: up to the next boundary while there are `crossings`, else all
+    that is `left`. Its length, where the way goes on, and in which medium."""
+    if crossings > 0:
+        return next_boundary(scene, o, d, medium)
+    return left, o, medium
+
+
+@device
 def way_through(scene, ray, hit):
     """The share (red, green, blue) of light that comes from what the ray met (`pmviewer.render.cast.Hit`)."""
     T = (_f4(1.0), _f4(1.0), _f4(1.0))

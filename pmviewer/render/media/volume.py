@@ -32,7 +32,7 @@ from pmviewer.render.given import Sampler
 from pmviewer.render.media.distance import distance_in, distance_pdf, equiangular_distance, equiangular_pdf
 from pmviewer.render.media.emitted import emitted_in, emitted_nearby
 from pmviewer.render.media.phase_light import one_light_sample
-from pmviewer.render.media.through import next_boundary, way_through
+from pmviewer.render.media.through import next_stretch, way_through
 from pmviewer.render.pixel import EMISSION, SPECULAR, VOLUME_INDIRECT, deposit
 from pmviewer.render.pixel import VOLUME as SINGLE
 from pmviewer.render.record import C_RAYS, C_SHADOW_RAYS
@@ -179,9 +179,7 @@ def from_media(given, ray, hit, sampler, numbers, of_phase, counts, looks):
     o, medium, left = ray.o, ray.medium, hit.t
     marks = stack_i4(WORDS)
     for k in range(hit.crossed + 1):
-        length, beyond, next_medium = left, o, medium
-        if k < hit.crossed:
-            length, beyond, next_medium = next_boundary(scene, o, ray.d, medium)
+        length, beyond, next_medium = next_stretch(scene, hit.crossed - k, o, ray.d, medium, left)
         if medium >= 0:
             column = column_of(scene, medium, o, ray.d, length, marks)
             if looks and scene.emits != 0:

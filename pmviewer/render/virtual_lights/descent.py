@@ -2,12 +2,12 @@
 
 At each node one child is chosen, by
 
-    worth · cos⁺(θ_y − θ_o − θ_u) · max(cos⁺(θ_x − θ_u), LEAST) / max(d², r²)
+    intensity · cos⁺(θ_y − θ_o − θ_u) · max(cos⁺(θ_x − θ_u), LEAST) / max(d², r²)
 
 d from the point to the centre of the node's sphere of radius r, θ_u the angle that the sphere covers, θ_o that of its
 cone: a bound on both cosines, so that no light that may bring something has the probability 0. All ways of a point
 begin at the same CUT nodes, which are asked once. Below a node that is small from where the point is, and whose lights
-look one way, children are chosen by their worth alone: what they bring differs by little else. (Each way by all its
+look one way, children are chosen by their intensity alone: what they bring differs by little else. (Each way by all its
 nodes took six times as long as the shadow rays of a small room.) What the i-th of m ways goes by is (i + u)/m, one
 number for all levels: neighbours among the ways end at different lights.
 """
@@ -26,10 +26,10 @@ from pmviewer.maps.virtual_lights import (
     N_AXIS,
     N_CENTRE,
     N_COS,
+    N_INTENSITY,
     N_LIGHT,
     N_RADIUS,
     N_SIN,
-    N_WORTH,
     NODE_COLUMNS,
 )
 
@@ -57,17 +57,17 @@ def less(cos, cos_a, sin_a):
 
 
 @device
-def promise(virtual, node, p, n):
+def bound(virtual, node, p, n):
     """What the lights of a node may bring to the point p with the normal n, up to a factor, and whether they are
     alike."""
     row = node * NODE_COLUMNS
-    worth = load_f4(virtual.tree, row + N_WORTH)
-    if not worth > _f4(0.0):
+    intensity = load_f4(virtual.tree, row + N_INTENSITY)
+    if not intensity > _f4(0.0):
         return _f4(0.0), False
     to = sub(load3(virtual.tree, row + N_CENTRE), p)
     d2, r = dot(to, to), load_f4(virtual.tree, row + N_RADIUS)
     if not d2 > r * r:
-        return worth / max(r * r, _NEVER), False
+        return intensity / max(r * r, _NEVER), False
     over_d = _f4(1.0) / _f4(math.sqrt(d2))
     sin_u = r * over_d
     cos_u = _f4(math.sqrt(max(_f4(1.0) - sin_u * sin_u, _f4(0.0))))
@@ -77,22 +77,22 @@ def promise(virtual, node, p, n):
     if not cos_y > _f4(0.0):
         return _f4(0.0), False
     cos_x = less(max(min(dot(to, n) * over_d, _f4(1.0)), _f4(-1.0)), cos_u, sin_u)
-    return worth * cos_y * max(cos_x, LEAST) / d2, sin_u < SMALL and cone > ALIKE
+    return intensity * cos_y * max(cos_x, LEAST) / d2, sin_u < SMALL and cone > ALIKE
 
 
 @device
-def by_worth(virtual, node):
+def intensity_of(virtual, node):
     """What the lights of a node may bring anywhere."""
-    return load_f4(virtual.tree, node * NODE_COLUMNS + N_WORTH)
+    return load_f4(virtual.tree, node * NODE_COLUMNS + N_INTENSITY)
 
 
 @device
 def ask_cut(virtual, p, n, cut):
-    """What the nodes of the cut promise to the point p with the normal n, summed up one after the other, and whether
+    """The bounds of the nodes of the cut for the point p with the normal n, summed up one after the other, and whether
     the lights of each are alike, into `cut`, a pointer to CUT_WORDS words."""
     nodes, total = min(_i8(CUT), virtual.leaves), _f4(0.0)
     for k in range(nodes):
-        one, alike = promise(virtual, nodes + k, p, n)
+        one, alike = bound(virtual, nodes + k, p, n)
         total += one
         stack_put_f4(cut, _i8(k), total)
         stack_put_f4(cut, _i8(CUT + k), _f4(1.0) if alike else _f4(0.0))
@@ -137,10 +137,10 @@ def below(virtual, node, alike, p, n, u, probability):
         node *= 2
         alike_left, alike_right = alike, alike
         if alike:
-            left, right = by_worth(virtual, node), by_worth(virtual, node + 1)
+            left, right = intensity_of(virtual, node), intensity_of(virtual, node + 1)
         else:
-            left, alike_left = promise(virtual, node, p, n)
-            right, alike_right = promise(virtual, node + 1, p, n)
+            left, alike_left = bound(virtual, node, p, n)
+            right, alike_right = bound(virtual, node + 1, p, n)
         total = _f8(left) + _f8(right)
         if not total > 0.0:
             return _i8(-1), _f8(0.0)

@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 from pmviewer.engine.cluster.address import MOST_LOCAL
 from pmviewer.errors import PmviewerError
 from pmviewer.viewer import theme
+from pmviewer.viewer.dialogs.modal import Modal
 from pmviewer.viewer.state import ViewerState
 
 TITLE = "Borrow a cluster"
@@ -17,41 +18,26 @@ _WHAT = (
 _WIDE = 26
 
 
-class ClusterDialog:
-    """A modal window; `open` shows it. What was typed stays until the window is closed."""
+class ClusterDialog(Modal):
+    """What was typed stays until the program ends."""
+
+    title = TITLE
 
     def __init__(self, state: ViewerState) -> None:
+        super().__init__()
         self._state = state
-        self._asked = False
         self._local, self._count, self._address = True, 2, ""
         self._problem = ""
-        self.is_open = False
 
     def open(self) -> None:
         """With the next window frame."""
-        self._asked = self.is_open = True
+        super().open()
         self._problem = ""
 
     @property
     def where(self) -> str:
         """The cluster that is chosen, as `--cluster` has it."""
         return f"local:{self._count}" if self._local else self._address.strip()
-
-    def gui(self) -> None:
-        """Draw it while it is open."""
-        if self._asked:
-            imgui.open_popup(TITLE)
-            self._asked = False
-        if not self.is_open:
-            return
-        area = imgui.get_main_viewport()
-        imgui.set_next_window_pos(area.get_center(), imgui.Cond_.appearing, (0.5, 0.5))
-        shown, _ = imgui.begin_popup_modal(TITLE, None, imgui.WindowFlags_.always_auto_resize)
-        if not shown:
-            self.is_open = False
-            return
-        self._contents()
-        imgui.end_popup()
 
     def _contents(self) -> None:
         em, workers = imgui.get_font_size(), self._state.session.workers
@@ -95,10 +81,6 @@ class ClusterDialog:
             self._problem = str(error)
         else:
             self._close()
-
-    def _close(self) -> None:
-        self.is_open = False
-        imgui.close_current_popup()
 
 
 def _wrapped(text: str, colour: theme.Colour) -> None:

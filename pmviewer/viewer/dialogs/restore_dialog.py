@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 
 from pmviewer.viewer import theme
 from pmviewer.viewer.autosave import Autosave, Left
+from pmviewer.viewer.dialogs.modal import begin_modal
 from pmviewer.viewer.format import duration, grouped
 
 TITLE = "pmviewer was not closed properly"
@@ -31,17 +32,10 @@ class RestoreDialog:
         left = self._autosave.left
         if left is None:
             return
-        if not self._asked:
-            imgui.open_popup(TITLE)
-            self._asked = True
-        area = imgui.get_main_viewport()
-        imgui.set_next_window_pos(area.get_center(), imgui.Cond_.appearing, (0.5, 0.5))
-        shown, _ = imgui.begin_popup_modal(TITLE, None, imgui.WindowFlags_.always_auto_resize)
-        if not shown:
-            self._asked = False
-            return
-        self._contents(left)
-        imgui.end_popup()
+        self._asked = begin_modal(TITLE, not self._asked)
+        if self._asked:
+            self._contents(left)
+            imgui.end_popup()
 
     def _contents(self, left: Left) -> None:
         imgui.push_text_wrap_pos(26 * imgui.get_font_size())

@@ -11,6 +11,7 @@ from pmviewer.output.diagnostic_views import DIAGNOSTICS, HELD_WHILE_SHOWN
 from pmviewer.viewer import theme
 from pmviewer.viewer.dialogs.dialogs import FileDialogs
 from pmviewer.viewer.dialogs.exports import default_path
+from pmviewer.viewer.dialogs.modal import Modal
 from pmviewer.viewer.state import LAYERS, ViewerState
 from pmviewer.viewer.still import LARGEST
 
@@ -18,34 +19,15 @@ TITLE = "Export at another size"
 _SIZES = (1280, 1920, 2560, 3840)
 
 
-class StillDialog:
-    """A modal window; `open` shows it."""
+class StillDialog(Modal):
+    """Asks how large and how well, then for the file."""
+
+    title = TITLE
 
     def __init__(self, state: ViewerState, dialogs: FileDialogs) -> None:
+        super().__init__()
         self._state = state
         self._dialogs = dialogs
-        self._asked = False
-        self.is_open = False
-
-    def open(self) -> None:
-        """With the next window frame."""
-        self._asked = self.is_open = True
-
-    def gui(self) -> None:
-        """Draw it while it is open."""
-        if self._asked:
-            imgui.open_popup(TITLE)
-            self._asked = False
-        if not self.is_open:
-            return
-        area = imgui.get_main_viewport()
-        imgui.set_next_window_pos(area.get_center(), imgui.Cond_.appearing, (0.5, 0.5))
-        shown, _ = imgui.begin_popup_modal(TITLE, None, imgui.WindowFlags_.always_auto_resize)
-        if not shown:
-            self.is_open = False
-            return
-        self._contents()
-        imgui.end_popup()
 
     def _contents(self) -> None:
         em, still = imgui.get_font_size(), self._state.still.still
@@ -93,7 +75,3 @@ class StillDialog:
         name = f"{view.replace(' ', '_')}-{state.still.still.width}"
         path = default_path(state, suffix, name)
         self._dialogs.save(TITLE, path, chosen)
-
-    def _close(self) -> None:
-        self.is_open = False
-        imgui.close_current_popup()

@@ -62,7 +62,7 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
     elif view != "beauty" and viewport.captions:
         below = caption(viewport, _title(viewport, view), (margin, margin))
     elif state.frame is not None and (preview := preview_of(state.frame, state.settings.display)) is not None:
-        caption(viewport, f"preview, no estimate: {preview.how}", (margin, margin))
+        caption(viewport, f"preview, no estimate: {preview.caption}", (margin, margin))
     if state.settings.free_camera.on and viewport.captions:
         _free_camera_label(viewport)
     if view == "depth" and state.frame is not None and viewport.picture is not None:

@@ -15,8 +15,8 @@ import pytest
 from pmviewer.bench.measures.cluster import until, workers
 from pmviewer.engine.cluster import cluster as module
 from pmviewer.engine.cluster.cluster import Cluster
-from pmviewer.engine.cluster.nearby import Piece
 from pmviewer.engine.cluster.passes import Elsewhere
+from pmviewer.engine.cluster.shared_memory import Segment
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
@@ -67,8 +67,8 @@ def alone(**values):
     ids=["as it comes", "region, signed filter"],
 )
 def test_the_picture_is_that_of_one_process(borrowed, values, monkeypatch):
-    seen, whole = [], Piece.increment
-    monkeypatch.setattr(Piece, "increment", lambda piece, written: seen.append(written) or whole(piece, written))
+    seen, whole = [], Segment.increment
+    monkeypatch.setattr(Segment, "increment", lambda segment, written: seen.append(written) or whole(segment, written))
     one, many = alone(**values), rendered(borrowed[1], renderer(**values))
     near = (1 if values else many.passes) if sys.platform == "linux" else 0
     assert len(seen) == near, "whole films come through memory that both see; the first pass of a region is one"

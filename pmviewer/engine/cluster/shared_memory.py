@@ -1,10 +1,10 @@
-"""Passes of workers on this machine come back through memory that both processes see, where the system has it (Linux).
+"""Shared memory, through which the passes of workers on this machine come back, where the system has it (Linux).
 
 Through a socket the sums of a pass are turned, compressed, sent, and turned back, which takes a sixth as long as
 rendering them. Here they are written once and added from there. The memory has no name in any folder, so that nothing
 is left behind however the processes end; a worker opens it through its owner's descriptor.
 
-Only who gave a piece away takes it back: a worker that is thought lost may still write to its own.
+Only who gave a segment away takes it back: a worker that is thought lost may still write to its own.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 from pmviewer.render.film import Film, Increment
 
 MOST_BYTES = 1 << 29
-"""Of all pieces together; passes without a piece travel."""
+"""Of all segments together; passes without a segment travel."""
 KEPT_OPEN = 16
-"""Pieces that a worker keeps open."""
+"""Segments that a worker keeps open."""
 
 
 @dataclass(frozen=True)
-class Place:
-    """A piece of memory of another process: its id, the descriptor there, the name that shows that it is the one."""
+class Handle:
+    """A segment of memory of another process: its id, the descriptor there, the name that shows that it is the one."""
 
     process: int
     descriptor: int
@@ -39,15 +39,15 @@ class Place:
 
 @dataclass(frozen=True)
 class Written:
-    """What a worker has written there: `sums` (pixels, columns) float64 and behind them `weighed`, the weights' shape,
-    or nothing."""
+    """What a worker has written there: sums (pixels, columns) float64 and behind them, if `weighed`, weights
+    (pixels, 2)."""
 
     pixels: int
     columns: int
     weighed: bool
 
 
-class Piece:
+class Segment:
     """Memory for one increment, on the side that owns it."""
 
     def __init__(self, size: int) -> None:
@@ -60,10 +60,10 @@ class Piece:
         except BaseException:
             os.close(self._descriptor)
             raise
-        self.place = Place(os.getpid(), self._descriptor, name, size)
+        self.handle = Handle(os.getpid(), self._descriptor, name, size)
 
     def increment(self, written: Written) -> Increment:
-        """What is there; it is that of the next one once the piece has been given away again."""
+        """What is there; it is that of the next one once the segment has been given away again."""
         return _increment(self._memory, written)
 
     def close(self) -> None:
@@ -72,39 +72,39 @@ class Piece:
         self._memory.close()
 
 
-class Pieces:
-    """Pieces for the increments of one film, no more than MOST_BYTES hold."""
+class Segments:
+    """Segments for the increments of one film, no more than MOST_BYTES hold."""
 
     def __init__(self, film: Film) -> None:
         pixels, columns = film.sums.shape
         self._size = pixels * (columns + 2) * 8
         self._most = MOST_BYTES // self._size if sys.platform == "linux" else 0
-        self._free: list[Piece] = []
+        self._free: list[Segment] = []
         self._given = 0
 
-    def take(self) -> Piece | None:
-        """A piece that nobody else has, None where there are no more."""
+    def take(self) -> Segment | None:
+        """A segment that nobody else has, None where there are no more."""
         if self._given >= self._most:
             return None
         try:
-            piece = self._free.pop() if self._free else Piece(self._size)
+            segment = self._free.pop() if self._free else Segment(self._size)
         except (OSError, ValueError):  # no memory of the kind
             self._most = self._given
             return None
         self._given += 1
-        return piece
+        return segment
 
-    def give_back(self, piece: Piece | None) -> None:
+    def give_back(self, segment: Segment | None) -> None:
         """Whoever had it has said what is in it, and that has been used."""
-        if piece is not None:
+        if segment is not None:
             self._given -= 1
-            self._free.append(piece)
+            self._free.append(segment)
 
-    def lose(self, piece: Piece | None) -> None:
+    def lose(self, segment: Segment | None) -> None:
         """Whoever had it may still write there: nobody gets it again."""
-        if piece is not None:
+        if segment is not None:
             self._given -= 1
-            piece.close()
+            segment.close()
 
     def close(self) -> None:
         """Those that are free go."""
@@ -113,13 +113,13 @@ class Pieces:
 
 
 class Writer:
-    """The worker's side. Pieces of the present run stay open, the latest few."""
+    """The worker's side. Segments of the present run stay open, the latest few."""
 
     def __init__(self) -> None:
         self._run = ""
         self._open: OrderedDict[str, mmap.mmap] = OrderedDict()
 
-    def write(self, run: str, place: Place, increment: Increment) -> Written | None:
+    def write(self, run: str, handle: Handle, increment: Increment) -> Written | None:
         """Write an increment of a whole film there, in the course of `run`; None where that can't be done."""
         if run != self._run:
             self._run = run
@@ -127,7 +127,7 @@ class Writer:
         pixels, columns = increment.sums.shape
         written = Written(pixels, columns, increment.weights is not None)
         try:
-            memory = self._opened(place)
+            memory = self._opened(handle)
         except OSError:
             return None
         if memory is None or pixels * (columns + (2 if written.weighed else 0)) * 8 > len(memory):
@@ -138,21 +138,21 @@ class Writer:
             there.weights[:] = increment.weights
         return written
 
-    def _opened(self, place: Place) -> mmap.mmap | None:
+    def _opened(self, handle: Handle) -> mmap.mmap | None:
         """Raises OSError when it can't be opened. None when it is something else by now: its owner has closed it."""
-        memory = self._open.get(place.name)
+        memory = self._open.get(handle.name)
         if memory is None:
-            descriptor = os.open(f"/proc/{place.process}/fd/{place.descriptor}", os.O_RDWR)
+            descriptor = os.open(f"/proc/{handle.process}/fd/{handle.descriptor}", os.O_RDWR)
             try:
-                if place.name not in os.readlink(f"/proc/self/fd/{descriptor}"):
+                if handle.name not in os.readlink(f"/proc/self/fd/{descriptor}"):
                     return None
-                memory = mmap.mmap(descriptor, place.bytes)
+                memory = mmap.mmap(descriptor, handle.bytes)
             finally:
                 os.close(descriptor)
             while len(self._open) >= KEPT_OPEN:
                 self._open.popitem(last=False)
-            self._open[place.name] = memory
-        self._open.move_to_end(place.name)
+            self._open[handle.name] = memory
+        self._open.move_to_end(handle.name)
         return memory
 
 
