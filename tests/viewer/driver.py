@@ -41,8 +41,9 @@ def make_app(session: Any, folder: Path, **options: Any) -> ViewerApp:
 
 @contextmanager
 def app_on_engine(folder: Path, scene: str, values: Mapping[str, Any]) -> Iterator[ViewerApp]:
-    """A window on the real engine, with a bundled scene opened by these settings."""
-    session = Session(settings=with_values(Settings(), values))
+    """A window on the real engine, with a bundled scene opened by these settings. Nothing that no test clicks is
+    compiled ahead."""
+    session = Session(settings=with_values(Settings(), {"display.compile_ahead": False, **values}))
     app = make_app(session, folder, inactive_reason=inactive_reason)
     app.state.open(scene, keep_camera=True)
     yield app

@@ -86,14 +86,15 @@ def test_what_the_collector_finds_on_another_thread_is_freed_on_the_windows(app)
 
 
 def test_everything_is_freed_before_the_window_closes(app):
-    alive = []
+    alive, context = [], []  # windows of other tests may wait for the collector
 
     def script(c):
+        context.append(app.context)
         alive.append(len(living()))
 
     def living():
         # By the type: isinstance asks a weak proxy for what it stood for, which may be gone.
-        made = [o for o in gc.get_objects() if issubclass(type(o), CLASSES) and o.glo != SCREEN]
+        made = [o for o in gc.get_objects() if issubclass(type(o), CLASSES) and o.ctx is context[0] and o.glo != SCREEN]
         return [o for o in made if not isinstance(o.mglo, moderngl.InvalidObject)]
 
     before = app.params.callbacks.before_exit
