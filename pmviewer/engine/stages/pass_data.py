@@ -120,10 +120,10 @@ def _volume_record(settings: Settings, maps: PassMaps) -> NDArray[np.void]:
     if settings.estimate.in_media == "beam":
         return structure.record
     k, share = volume_neighbours(maps.index, settings.estimate)
-    return march_record(structure.record, maps.volume.step, k, share, _box_of(structure))
+    return march_record(structure.record, maps.volume.step, k, share, box_of(structure))
 
 
-def _box_of(structure: Structure) -> NDArray[np.float64]:
+def box_of(structure: Structure) -> NDArray[np.float64]:
     """Box (2, 3) around the photons of a grid or kd-tree, of nothing where there are none."""
     if structure.n == 0:
         return np.zeros((2, 3))

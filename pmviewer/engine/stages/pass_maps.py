@@ -26,8 +26,8 @@ Structure = PhotonGrid | PhotonKdTree | PhotonParts
 
 @dataclass(frozen=True, eq=False)
 class LookUpMap:
-    """Photons in a structure, and the `radius` of their look-ups in scene units: with k nearest the largest one; `step`,
-    that of ray marching through it, 0 without."""
+    """Photons in a structure, and the `radius` of their look-ups in scene units: with k nearest the largest one; the
+    `step` of ray marching through it, 0 without."""
 
     structure: Structure
     radius: float

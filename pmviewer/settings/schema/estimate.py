@@ -103,9 +103,9 @@ class Estimate(Group):
     )
     in_media: Literal["beam", "point", "nearest"] = setting(
         "beam",
-        "How photons in media are looked up. beam: all around the ray at once (Jarosz, Zwicker and Jensen 2008). point: "
-        "ray marching, with the photons in a ball of the radius at every step (Jensen & Christensen 1998). nearest: "
-        "the same with the k nearest photons. Steps add noise, and each counts its photons anew.",
+        "How photons in media are looked up. beam: all around the ray at once (Jarosz, Zwicker and Jensen 2008). "
+        "point: ray marching, with the photons in a ball of the radius at every step (Jensen & Christensen 1998). "
+        "nearest: the same with the k nearest photons. Steps add noise, and each counts its photons anew.",
         stage="maps",
         scale="choice",
         title="look-up in media",
@@ -123,8 +123,8 @@ class Estimate(Group):
     )
     volume_k: int = setting(
         50,
-        "Photons in a k-nearest estimate in media of the first pass; later ones take fewer, see alpha. The k-th sets the "
-        "radius and does not count.",
+        "Photons in a k-nearest estimate in media of the first pass; later ones take fewer, see alpha. The k-th sets "
+        "the radius and does not count.",
         stage="maps",
         scale="log",
         unit="photons",
