@@ -70,7 +70,7 @@ def _within(photons, o, d, length, radius):
             a, b = a / _f8(d[k]), b / _f8(d[k])
             near, far = max(near, min(a, b)), min(far, max(a, b))
         elif a > 0.0 or b < 0.0:
-            far = -1.0
+            far = _f8(-1.0)
     return near, far
 
 
