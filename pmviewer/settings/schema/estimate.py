@@ -12,8 +12,16 @@ FIXED_RADIUS = Need(
     lambda f: f.settings.estimate.lookup != "nearest",
     "Not with look-up 'nearest': the k nearest photons set the radius.",
 )
+RADIUS_OR_MEDIA = Need(
+    lambda f: f.settings.estimate.lookup != "nearest" or f.plan.volume,
+    "Not with look-up 'nearest': the k nearest photons set the radius.",
+)
 AUTOMATIC_MAX_RADIUS = Need(
-    lambda f: f.settings.estimate.max_radius == "auto", "Only with an automatic maximum radius."
+    lambda f: (
+        (f.settings.estimate.lookup == "nearest" and f.settings.estimate.max_radius == "auto")
+        or (f.plan.volume and f.settings.estimate.in_media == "nearest")
+    ),
+    "Only with an automatic maximum radius of the k nearest photons.",
 )
 MARCHING = Need(lambda f: f.settings.estimate.in_media != "beam", "Only with ray marching (estimate.in_media).")
 NEAREST_IN_MEDIA = Need(
@@ -65,7 +73,7 @@ class Estimate(Group):
         unit="× scene",
         ge=1e-7,
         le=10.0,
-        needs=(FIXED_RADIUS,),
+        needs=(RADIUS_OR_MEDIA,),
     )
     caustic_radius: float = setting(
         0.5,
@@ -226,10 +234,7 @@ class Estimate(Group):
         unit="W/(m² sr)",
         ge=1e-6,
         le=10.0,
-        needs=(
-            NEAREST,
-            AUTOMATIC_MAX_RADIUS,
-        ),
+        needs=(AUTOMATIC_MAX_RADIUS,),
     )
     filter: Literal["constant", "cone", "gaussian", "simpson", "epanechnikov"] = setting(
         "constant",
