@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.radius import volume_neighbours, widest_in_media
-from pmviewer.engine.stages.pass_data import box_of
+from pmviewer.engine.stages.pass_data import blank_pass, box_of
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.radius import automatic_volume_radius
 from pmviewer.maps.search.grid import build_grid
@@ -84,11 +84,14 @@ def test_white_medium_under_a_white_sky_vanishes_as_balls_shrink(how):
 
 
 def test_only_a_scene_that_asks_for_it_marches():
-    """The record of the beam estimate is that of a plain grid, for which kernels are compiled without marching."""
+    """The record of the beam estimate is that of a plain grid, for which kernels are compiled without marching; what is
+    compiled ahead has the records' types."""
     for how in ("beam", "point", "nearest"):
         renderer = rendered(cube_of(MILK, SKY), settings_of(estimate={"in_media": how}, photons={"N": 100}), 1)
         record = renderer.latest.given.volume_map
         assert marches(record) == (how != "beam")
+        blank = blank_pass(renderer.scene.flat.record, renderer.settings, renderer.plan)
+        assert blank.volume_map.dtype == record.dtype
 
 
 def test_largest_radius_in_media():
