@@ -5,7 +5,7 @@ white medium under a white sky, which vanishes. Mitsuba renders the same files; 
 `pmviewer.bench.measures.mitsuba`. On the scenes fog_sphere and cornell_smoke every method's error against the scene's
 reference is measured over its CPU time, Mitsuba's too: `progressive` by the beam estimate, by ray marching (point) and
 by the k nearest photons. On cornell_smoke Mitsuba's picture converges to another one (a length that it does not scale
-with the scene, docs/media.md), so that its error is measured against the mean of further pictures of its own.
+with the scene, docs/media.md), so that its error is measured against a further picture of its own.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ METHODS: dict[str, dict[str, object]] = {
     "gather": {},
     "path": {},
 }
-OWN_RUNS, OWN_SPP = 16, 256
-"""Pictures whose mean is Mitsuba's converged one, and their samples per pixel."""
+OWN_SPP, QUICK_OWN_SPP, OWN_SEED = 512, 128, 100_000
+"""Samples per pixel of the picture of Mitsuba's that its error is measured against, and the first of its seeds."""
 BUDGET, QUICK_BUDGET, PEER_BUDGET = 60.0, 12.0, 2.5
 GRID = "uneven.vol"
 COLUMNS = ("what", "method", "passes or runs", "CPU s", "measured or ratio", "expected", "error %, relMSE or p")
@@ -192,13 +192,14 @@ def against_mitsuba(quick: bool, pool: WorkPool) -> Iterator[tuple[list[Cell], T
 
 
 def against_itself(scene: str, budget: float, quick: bool) -> Curve:
-    """Mitsuba's curve against the mean of independent pictures of its own, whose noise is a few percent of the error
-    to reach."""
-    runs = OWN_RUNS // 4 if quick else OWN_RUNS
-    converged = peer.independent_images(scene, {}, runs, OWN_SPP).astype(np.float64).mean(axis=0)
+    """Mitsuba's curve against an independent picture of its own of N samples. Of n samples the difference has the
+    variance V/n + V/N, so that N/(N + n) of it is the error."""
+    N = QUICK_OWN_SPP if quick else OWN_SPP
+    converged = peer.independent_images(scene, {}, 1, N, OWN_SEED).astype(np.float64)[0]
     spp, cpu, images = peer.error_images(scene, budget)
     found = [metrics(image.astype(np.float64), converged) for image in images]
-    return Curve(scene, PEER, spp, cpu, [m.relmse_all for m in found], [m.mean_ratio for m in found])
+    error = [m.relmse_all * N / (N + n) for m, n in zip(found, spp, strict=True)]
+    return Curve(scene, PEER, spp, cpu, error, [m.mean_ratio for m in found])
 
 
 def over_time(scene: str, goal: float, share: float, own: bool, quick: bool) -> tuple[list[list[Cell]], Target]:
@@ -243,8 +244,8 @@ def run(quick: bool = False) -> BenchResult:
         targets.append(speed)
     notes = [
         "cornell_smoke: the reference is our path tracer's; Mitsuba's pictures are 5 to 7 % darker, how much depends "
-        f"on the unit of length (see docs/media.md), and measured against the mean of {OWN_RUNS} pictures of its own "
-        f"of {OWN_SPP} samples ({OWN_RUNS // 4} if quick)",
+        f"on the unit of length (see docs/media.md), and measured against a picture of its own of {OWN_SPP} "
+        f"samples ({QUICK_OWN_SPP} if quick), less that one's noise",
         f"Mitsuba 3, {variant}, volpath",
     ]
     return BenchResult("Participating media (T9, E7)", COLUMNS, rows, targets, notes)
