@@ -60,7 +60,7 @@ METHODS: dict[str, dict[str, object]] = {
     "gather": {},
     "path": {},
 }
-OWN_SPP, QUICK_OWN_SPP, OWN_SEED = 512, 128, 100_000
+OWN_SPP, QUICK_OWN_SPP, OWN_SEED = 256, 64, 100_000
 """Samples per pixel of the picture of Mitsuba's that its error is measured against, and the first of its seeds."""
 BUDGET, QUICK_BUDGET, PEER_BUDGET = 60.0, 12.0, 2.5
 GRID = "uneven.vol"
