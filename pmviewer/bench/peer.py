@@ -82,6 +82,9 @@ def error_images(scene: str, budget: float) -> tuple[list[int], list[float], NDA
     return arrays["spp"].tolist(), arrays["cpu"].tolist(), arrays["images"]
 
 
-def independent_images(scene: str | Path, parameters: Mapping[str, str], runs: int, spp: int) -> NDArray[np.float32]:
-    """(runs, h, w, 3) images of a bundled scene or a file with different seeds. Raises PmviewerError as above."""
-    return _run(scene, parameters, mode="runs", runs=runs, spp=spp)["images"]
+def independent_images(
+    scene: str | Path, parameters: Mapping[str, str], runs: int, spp: int, first: int = 1
+) -> NDArray[np.float32]:
+    """(runs, h, w, 3) images of a bundled scene or a file with different seeds, from `first` on; those of
+    `error_images` are small. Raises PmviewerError as above."""
+    return _run(scene, parameters, mode="runs", runs=runs, spp=spp, first=first)["images"]

@@ -32,6 +32,7 @@ from pmviewer.maps.importance.importance_map import NO_IMPORTANCE
 from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import neighbourhood
 from pmviewer.maps.search.grid import PhotonGrid, build_grid
+from pmviewer.maps.search.kdtree import PhotonKdTree
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.output.denoise import denoised
 from pmviewer.output.diagnostic_views import DENOISED, Family
@@ -224,10 +225,8 @@ def _kernel(wanted: Wanted, looked: Looked, out: NDArray[np.float32]) -> Callabl
         return lambda first, last: (draw(first, last), cells)  # the grid lives as long as its record is used
     if wanted.family == "depth in media":
         return partial(depth_view, scene, eye, out)
-    if wanted.family == "beams":
-        return partial(beam_view, scene, eye, given.volume_map, out)
-    if wanted.family == "slice":
-        return partial(slice_view, scene, eye, given.volume_map, *_plane_of_slice(wanted, looked), out)
+    if wanted.family in ("beams", "slice"):
+        return _volume_kernel(wanted, looked, out)
     latest, asked = looked.importance.latest, looked.settings.importance
     if wanted.family == "importance":
         importance = NO_IMPORTANCE if latest is None else latest.record(wanted.map)
@@ -243,6 +242,22 @@ def _kernel(wanted: Wanted, looked: Looked, out: NDArray[np.float32]) -> Callabl
         draw = partial(density_view, scene, counting_eye(eye), tree.record, widest, out)
         return lambda first, last: (draw(first, last), tree)  # the tree lives as long as its record is used
     return _lookup_kernel(wanted.map, looked, out)
+
+
+def _volume_kernel(wanted: Wanted, looked: Looked, out: NDArray[np.float32]) -> Callable[[int, int], Any]:
+    """Counts volume photons around rays; of a kd-tree in a grid of its own, which lives as long as its record."""
+    given, volume = looked.rendered.given, looked.rendered.maps.volume
+    photons, grid = given.volume_map, None
+    if volume is not None and isinstance(volume.structure, PhotonKdTree):
+        traced = looked.rendered.maps.photons
+        assert traced is not None
+        grid = build_grid(traced.volume, volume.radius, traced.volume_unit)
+        photons = grid.record
+    if wanted.family == "beams":
+        draw = partial(beam_view, given.scene, given.eye, photons, out)
+    else:
+        draw = partial(slice_view, given.scene, given.eye, photons, *_plane_of_slice(wanted, looked), out)
+    return lambda first, last: (draw(first, last), grid)
 
 
 def _plane_of_slice(wanted: Wanted, looked: Looked) -> tuple[np.int64, np.float32]:

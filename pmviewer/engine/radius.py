@@ -9,7 +9,7 @@ import numpy as np
 
 from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.maps.estimate.nearest import shrunk
-from pmviewer.maps.radius import progressive_radius
+from pmviewer.maps.radius import automatic_volume_radius, progressive_radius
 from pmviewer.render.camera import CameraPose
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.scene.medium import Medium
@@ -60,6 +60,12 @@ def pass_neighbours(index: int, estimate: Estimate, maps: int = 1) -> tuple[int,
     return in_each, s * k / (in_each * maps)
 
 
+def volume_neighbours(index: int, estimate: Estimate) -> tuple[int, float]:
+    """Neighbours in media in pass `index`, and the share of their ball's volume that they count in: the bias goes with
+    r², so that their volume shrinks with (r²ᵢ/r²₁)^1.5."""
+    return shrunk(estimate.volume_k, progressive_radius(1.0, index + 1, estimate.alpha) ** 3)
+
+
 def radii_of_pixels(facts: Facts) -> bool:
     """Whether each pixel has radii of its own (`pmviewer.render.pixel_radius`)."""
     asked = facts.settings.estimate.radius_rule == "pixel"
@@ -80,3 +86,13 @@ def volume_radius(radius: float, index: int, estimate: Estimate, media: Sequence
     """Largest radius of look-ups in media in pass `index`, whose other look-ups have `radius`, in scene units."""
     longest = max((m.free_path for m in media if max(m.albedo) > 0), default=math.inf)
     return min(radius * estimate.volume_radius, free_paths(index, estimate) * longest)
+
+
+def widest_in_media(
+    brightest: float, k: int, estimate: Estimate, media: Sequence[Medium], scene_radius: float
+) -> float:
+    """Largest radius of a search for k photons in media whose `brightest` has that luminance in watts (M3), in scene
+    units; in each medium its free paths may set a smaller one."""
+    thinnest = min((m.most_scattering for m in media if m.most_scattering > 0), default=math.inf)
+    automatic = automatic_volume_radius(k, brightest, thinnest, estimate.black_level)
+    return min(max(automatic, estimate.floor * scene_radius), 2 * scene_radius)

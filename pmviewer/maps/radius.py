@@ -41,6 +41,16 @@ def automatic_radius(k: int, phi_max: float, threshold: float) -> float:
     return math.sqrt(k * phi_max / threshold) / math.pi
 
 
+def automatic_volume_radius(k: int, phi_max: float, sigma_s: float, threshold: float) -> float:
+    """Largest radius that a look-up of k photons in a medium needs: r_m = ∛(3·k·Φ_max / (16·π²·σ_s·L_t)).
+
+    Where k photons of the largest power Φ_max fill a ball of this radius, a medium that scatters alike in all
+    directions sends on k·Φ_max / (4π·(4/3)·π·r³) per length, of in-scattered radiance L_t times σ_s (the source's form
+    for volumes). Infinite where nothing scatters.
+    """
+    return math.cbrt(3 * k * phi_max / (16 * math.pi**2 * sigma_s * threshold)) if sigma_s > 0 else math.inf
+
+
 def neighbourhood(positions: np.ndarray, neighbours: int = 64) -> float:
     """A radius within which about that many photons lie, where they are sparse rather than where they crowd: three
     quarters of them have more. positions: (n, 3). 0 for fewer than two photons.

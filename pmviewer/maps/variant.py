@@ -21,6 +21,7 @@ field            record of
 `descent`        virtual lights that pixels choose from by a tree (`pmviewer.photons.virtual.tree`)
 `modes`          projection maps (`pmviewer.photons.projection`)
 `strata`         strata of guided emission (`pmviewer.photons.emission.strata`)
+`march`          a grid or kd-tree of photons in media, looked up by ray marching (`pmviewer.render.media.march`)
 `scattered`      importons that are scattered on (`pmviewer.photons.emission.scattered`)
 ===============  ===================================================================================
 
@@ -38,7 +39,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels.compile.specialise import has
 
 Estimator = Literal["disc", "hull", "differential"]
-Mark = Literal["hull", "differential", "importons", "fewest", "cones", "cells", "paths", "descent"]
+Mark = Literal["hull", "differential", "importons", "fewest", "cones", "cells", "paths", "descent", "march"]
 
 ABSENT = np.zeros(1, np.dtype([("absent", np.int32)]))
 """Stands for what is not there: `pmviewer.kernels.compile.specialise.absent` tells it from all else."""

@@ -52,6 +52,13 @@ class Medium:
         return max(self.sigma_t) * (1.0 if self.density is None else self.density.most)
 
     @property
+    def most_scattering(self) -> float:
+        """σs where it is largest, per scene unit, of the channel that scatters most; an albedo's grid counts as 1."""
+        return max(s * a for s, a in zip(self.sigma_t, self.albedo, strict=True)) * (
+            1.0 if self.density is None else self.density.most
+        )
+
+    @property
     def acts(self) -> bool:
         """Does it change light at all?"""
         emits = max(self.emission) * (1.0 if self.emission_grid is None else self.emission_grid.most)

@@ -14,7 +14,7 @@ import pytest
 
 from pmviewer.bench.agree.features import features
 from pmviewer.bench.agree.files import make_mesh
-from pmviewer.bench.agree.generate import MEDIA, PROFILES, needs_particles, scene_of
+from pmviewer.bench.agree.generate import GLOWING_FROM, MEDIA, PROFILES, needs_particles, scene_of
 from pmviewer.bench.agree.tree import from_json, to_json, written_out
 from pmviewer.bench.agree.trial import HARMLESS
 from pmviewer.bench.agree.xml import number, scene_text, write_scene
@@ -142,3 +142,17 @@ def test_numbers_are_written_as_every_reader_takes_them(tmp_path):
 def test_some_scenes_need_particles_and_most_do_not():
     share = sum(needs_particles(scene_of(1, i)) for i in range(300)) / 300
     assert 0.05 < share < 0.5
+
+
+def test_media_emit_from_a_number_on_and_the_scenes_before_are_as_they_were(tmp_path):
+    """The digest is that of the generator before media could emit."""
+    before = hashlib.sha256("".join(to_json(scene_of(3, i)) for i in range(60)).encode()).hexdigest()
+    assert before == "cbc71cdf210f6dbebd202251e23920951d5ee37dc3f085c719528b05a0b07876"
+    count = Counter(name for i in range(GLOWING_FROM, GLOWING_FROM + 60) for name in features(scene_of(3, i)))
+    assert count["medium: emission"] >= 5
+    assert count["medium: emission in a lattice"] >= 5
+    for i in range(GLOWING_FROM, GLOWING_FROM + 12):
+        path, _ = write_scene(scene_of(3, i), tmp_path, f"scene{i}")
+        scene = load_scene(path)
+        assert [w for w in scene.warnings if not any(h in w for h in HARMLESS)] == [], i
+        assert flatten(scene).record[0]["emits"] != 0

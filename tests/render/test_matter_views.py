@@ -21,8 +21,8 @@ HALF = np.tan(np.radians(10.0))
 """Of the picture at distance 1."""
 
 
-def looked_at(pool, medium, camera=CAMERA, photons=2000):
-    settings = settings_of(render={"method": "progressive"}, photons={"N": photons})
+def looked_at(pool, medium, camera=CAMERA, photons=2000, **estimate):
+    settings = settings_of(render={"method": "progressive"}, photons={"N": photons}, estimate=estimate)
     scene = open_scene(cube_of(medium, SKY, camera=camera, size=SIZE))
     renderer = Renderer(scene, settings, pool, StageStore(0))
     renderer.step()
@@ -87,9 +87,11 @@ def test_depth_and_slices_of_a_ramp(pool):
     np.testing.assert_allclose(across[inside], sigma * (p[inside][:, 2] + 1) / 2, rtol=2e-3)
 
 
-def test_beams_count_the_photons_around_them(pool):
-    """Against all distances between rays and the photons of the volume map."""
-    made = looked_at(pool, Medium("fog", (1.0,) * 3, (0.9,) * 3), photons=20_000)
+@pytest.mark.parametrize("how", ["beam", "nearest"])
+def test_beams_count_the_photons_around_them(pool, how):
+    """Against all distances between rays and the photons of the volume map, whatever they are looked up in."""
+    fog = Medium("fog", (1.0,) * 3, (0.9,) * 3)
+    made = looked_at(pool, fog, photons=20_000, in_media=how, volume_k=8, black_level=2.0)
     planes = made.inspect(Wanted("beams")).planes
     radius, counts = planes["volume radius"][..., 0], planes["volume photon count"][..., 0]
     d = rays()

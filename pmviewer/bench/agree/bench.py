@@ -6,13 +6,14 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from pmviewer.bench import peer
 from pmviewer.bench.agree.features import GROUPS, features
-from pmviewer.bench.agree.generate import scene_of
+from pmviewer.bench.agree.generate import GLOWING_FROM, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH
 from pmviewer.bench.agree.statistics import LEVEL, rejected
@@ -25,6 +26,8 @@ from pmviewer.bench.report import BenchResult, Cell, Target
 from pmviewer.errors import PmviewerError, SettingError
 
 SCENES, QUICK_SCENES, SEED = 500, 24, 1
+GLOWING = 12
+"""Scenes with media that emit, after all others of a whole run."""
 SHRINK_TRIES, MOST_SHRUNK = 120, 20
 
 
@@ -45,7 +48,7 @@ def run(
     quick: bool = False, scenes: int | None = None, seed: int = SEED, first: int = 0, keep: Path | None = None
 ) -> BenchResult:
     """Try the scenes `first` … `first` + `scenes` − 1 of `seed` and save what disagrees into `keep`, a temporary folder
-    if not given.
+    if not given. Where `scenes` is not given and `quick` is not asked for, scenes with media that emit come on top.
 
     Raises PmviewerError without Mitsuba.
     """
@@ -58,9 +61,11 @@ def run(
     folder = keep or Path(tempfile.mkdtemp(prefix=f"agree-{seed}-"))
     folder.mkdir(parents=True, exist_ok=True)
     verdicts: dict[int, Verdict] = {}
-    for index, verdict in try_scenes(seed, count, first=first):
+    glowing = GLOWING if scenes is None and not quick else 0
+    tries = chain(try_scenes(seed, count, first=first), try_scenes(seed, glowing, first=GLOWING_FROM))
+    for index, verdict in tries:
         verdicts[index] = verdict
-        _tell(seed, index, verdict, len(verdicts), count, time.perf_counter() - started)
+        _tell(seed, index, verdict, len(verdicts), count + glowing, time.perf_counter() - started)
     found = judged(seed, verdicts, folder)
     return report(seed, verdicts, found, folder, time.perf_counter() - started)
 

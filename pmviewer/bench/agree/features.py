@@ -109,6 +109,8 @@ def _media(scene: Node) -> Iterator[str]:
             yield "medium: lattice of albedo"
         if "phase" in medium:
             yield "medium: hg"
+        if "emission" in medium:
+            yield f"medium: emission{' in a lattice' if isinstance(medium['emission'], dict) else ''}"
 
 
 def _whole(scene: Node) -> Iterator[str]:

@@ -65,6 +65,8 @@ DISPERSING, DISPERSION_SEED = "nested glass", 0xD15
 MEDIA = Profile("media", materials.PLAIN, rich=False, ground=("diffuse",), lights=("constant",), medium=True)
 EVERY = 13
 """One in so many scenes has a medium."""
+GLOWING_FROM, GLOW_SEED = 10_000, 0x610
+"""From this number on all scenes have media that emit; the scenes before it are as they were without any."""
 SCALES = (1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3)
 HALF = 2.0
 """Half the edge of the ground, and of a room."""
@@ -72,7 +74,7 @@ HALF = 2.0
 
 def scene_of(seed: int, index: int) -> Node:
     """Scene `index` of `seed`."""
-    profile = MEDIA if index % EVERY == EVERY - 1 else PROFILES[index % len(PROFILES)]
+    profile = MEDIA if index % EVERY == EVERY - 1 or index >= GLOWING_FROM else PROFILES[index % len(PROFILES)]
     draw = Draw(seed, index)
     closed = draw.chance(profile.room)
     profile = _choose(draw, profile, closed)
@@ -87,6 +89,8 @@ def scene_of(seed: int, index: int) -> Node:
     if profile.medium:
         scene["scale"] = 1.0
         media.fill(draw, scene)
+        if index >= GLOWING_FROM:
+            media.ignite(Draw(seed + GLOW_SEED, index), scene)
     scene["camera"] = _camera(draw, closed, scene)
     for deviation in DEVIATIONS:
         if deviation.rare and profile.name != "tilted normals" and draw.chance(0.85):

@@ -16,6 +16,23 @@ def has_media(scene: Node) -> bool:
     return any("medium" in shape for shape in shapes_of(scene))
 
 
+def emits(scene: Node) -> bool:
+    """Does a medium emit light?"""
+    return any("emission" in shape.get("medium", {}) for shape in shapes_of(scene))
+
+
+def ignite(draw: Draw, scene: Node) -> None:
+    """Let all media emit: the same everywhere, or in a lattice, which may be another than that of the extinction."""
+    for shape in shapes_of(scene):
+        if "medium" in shape:
+            medium = shape["medium"]
+            brightness = draw.log(0.3, 8.0)
+            medium["emission"] = [round(brightness * c, 4) for c in draw.colour(0.1, 1.0)]
+            if medium["type"] == "heterogeneous" and draw.chance(0.7):
+                same = medium["sigma_t"] if isinstance(medium["sigma_t"], dict) else None
+                medium["emission"] = same if same and draw.chance(0.5) else _grid(draw, shape["to_world"])
+
+
 def fill(draw: Draw, scene: Node) -> None:
     """Add a shape with smoke in it, which crosses what stands there, and lift the lights above it."""
     for shape in scene["shapes"]:

@@ -7,6 +7,8 @@
   which Mitsuba's particles show wrong, or where these bring less than its own paths.
 * Of scenes whose glass disperses, which Mitsuba's RGB variants don't know, the photon methods with our `path` alone, in
   the terms of the first surface: what is seen through glass mixes channels by photons, wavelengths by paths.
+* Of scenes with media that emit, which Mitsuba 3 does not know (3.9.1 refuses the property), the photon methods with
+  our `path` alone, the picture and all terms.
 * With thin glass, `gather` with panes that light passes straight (`render.thin_glass`), as the photon methods.
 * The photon methods with our `path`, term by term: with such caustics only what the camera sees without them.
 
@@ -29,7 +31,7 @@ from numpy.typing import NDArray
 
 from pmviewer.bench.agree.generate import disperses, has_distant_lights, needs_particles
 from pmviewer.bench.agree.materials import is_mapped
-from pmviewer.bench.agree.media import has_media
+from pmviewer.bench.agree.media import emits, has_media
 from pmviewer.bench.agree.mitsuba_client import Mitsuba, MitsubaError
 from pmviewer.bench.agree.ours import METHODS, PHOTON_METHODS, THIN_GLASS, Effort, our_runs, picture, term
 from pmviewer.bench.agree.statistics import Outcome, compared, negligible, summaries
@@ -198,7 +200,8 @@ def questions(runs: Runs) -> Iterator[Question]:
     def one_scattering(stage: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return summaries(picture(runs.ours("path", stage, 1))), summaries(runs.theirs("path", stage, 2))
 
-    particles, alone = needs_particles(runs.scene), disperses(runs.scene)
+    glows = emits(runs.scene)
+    particles, alone = needs_particles(runs.scene), disperses(runs.scene) or glows
     if not alone:
         yield Question("path", "Mitsuba path", "picture", lambda s: (whole("path", s), paths(s)))
         yield Question("path", "Mitsuba path", "one scattering", one_scattering)
@@ -214,7 +217,12 @@ def questions(runs: Runs) -> Iterator[Question]:
         def by_other(stage: int, method: str = method) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
             return whole(method, stage), whole("progressive", stage)
 
-        if alone:
+        def by_our_paths(stage: int, method: str = method) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            return whole(method, stage), whole("path", stage)
+
+        if glows:
+            yield Question(method, "our path", "picture", by_our_paths)
+        elif alone:
             pass
         elif not particles:
             yield Question(method, "Mitsuba path", "picture", by_paths)
@@ -224,7 +232,7 @@ def questions(runs: Runs) -> Iterator[Question]:
             yield Question(method, "progressive", "picture", by_other)
         if method in THIN_GLASS:
             continue
-        for name in SAFE_TERMS if particles else OF_FIRST_SURFACE if alone else TERMS:
+        for name in SAFE_TERMS if particles else OF_FIRST_SURFACE if alone and not glows else TERMS:
 
             def by_term(
                 stage: int, method: str = method, name: str = name
@@ -249,7 +257,7 @@ def tried(
         for warning in runs.opened.scene.warnings:
             if not any(harmless in warning for harmless in HARMLESS):
                 return Verdict(refused=f"pmviewer warns: {warning}")
-        alone = disperses(scene)
+        alone = disperses(scene) or emits(scene)
         shown = (picture(runs.ours("path", 0)) if alone else runs.theirs("path", 0)).mean(axis=0)
         if shown.mean() < LEAST_LIGHT:
             return Verdict()

@@ -42,7 +42,11 @@ def main() -> None:
     def render(spp: int, seed: int) -> Any:
         return np.array(mi.render(scene, spp=spp, seed=seed), np.float64)[..., :3]
 
-    arrays = curve(render, job["budget"]) if job["mode"] == "curve" else runs(render, job["runs"], job["spp"])
+    arrays = (
+        curve(render, job["budget"])
+        if job["mode"] == "curve"
+        else runs(render, job["runs"], job["spp"], job.get("first", 1))
+    )
     np.savez(job["out"], **arrays)
 
 
@@ -70,12 +74,12 @@ def curve(render: Any, budget: float) -> dict[str, Any]:
     return {"spp": np.array(samples), "cpu": np.array(seconds), "images": np.array(images)}
 
 
-def runs(render: Any, count: int, spp: int) -> dict[str, Any]:
-    """`count` independent images of `spp` samples per pixel."""
+def runs(render: Any, count: int, spp: int, first: int) -> dict[str, Any]:
+    """`count` independent images of `spp` samples per pixel, with seeds from `first` on."""
     images = []
     for run in range(count):
         parts = [min(CHUNK, spp - done) for done in range(0, spp, CHUNK)]
-        images.append(sum(n * render(n, 1 + run * len(parts) + i) for i, n in enumerate(parts)) / spp)
+        images.append(sum(n * render(n, first + run * len(parts) + i) for i, n in enumerate(parts)) / spp)
     return {"images": np.array(images, np.float32)}
 
 

@@ -24,8 +24,8 @@ KNOWN_UP_TO = 10.0
 
 
 def media() -> list[Case]:
-    """The same everywhere and on a lattice, by every method. Paths find radiance 1 wherever they get out; the photon
-    methods' look-ups lose light at boundaries, so that of them it is only asked to be finite."""
+    """The same everywhere and on a lattice, by every method, and by ray marching. Paths find radiance 1 wherever they
+    get out; the photon methods' look-ups lose light at boundaries, so that of them it is only asked to be finite."""
     cases = []
     kinds: list[tuple[str, dict[str, Any]]] = [(f"extinction {s:g}", {"sigma": s}) for s in (1e-6, 1.0, 1e6)]
     kinds += [(f"g = {g:g}", {"g": g}) for g in (0.999, -0.999)]
@@ -34,11 +34,13 @@ def media() -> list[Case]:
         for name, values in kinds:
             if values.get("empty") and not lattice:
                 continue
-            for method in METHODS:
+            ways = [*(("beam", method) for method in METHODS), *((by, "progressive") for by in ("point", "nearest"))]
+            for look_up, method in ways:
                 known = method == "path" and values.get("sigma", 1.0) <= KNOWN_UP_TO
-                run = partial(_measured, known=known, lattice=lattice, method=method, **values)
+                run = partial(_measured, known=known, lattice=lattice, method=method, look_up=look_up, **values)
                 where = "on a lattice" if lattice else "the same everywhere"
-                cases.append(Case("media", f"{name}, {where}, {method}", FURNACE if known else "", run))
+                how = method if look_up == "beam" else f"{method} by {look_up}"
+                cases.append(Case("media", f"{name}, {where}, {how}", FURNACE if known else "", run))
     return cases
 
 
@@ -65,6 +67,7 @@ def _measured(
     g: float = 0.0,
     empty: bool = False,
     z: float = 0.2,
+    look_up: str = "beam",
 ) -> Outcome:
     density = None
     if lattice:
@@ -76,5 +79,5 @@ def _measured(
     medium = Medium("milk", (sigma,) * 3, (1.0,) * 3, phase=Phase(g), density=density)
     values_: dict[str, Any] = {"render__method": method, "render__max_depth": 1000, "passes": 4}
     if method != "path":
-        values_ |= {"estimate__radius": 0.03, "passes": 1}
+        values_ |= {"estimate__radius": 0.03, "estimate__in_media": look_up, "passes": 1}
     return lab.measure(in_furnace(medium, z), 1.0 if known else None, **values_)

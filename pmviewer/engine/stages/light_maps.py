@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.radius import volume_neighbours, widest_in_media
 from pmviewer.engine.stages.gather_guides import GUIDING_PHOTONS, guide_grid, guide_radius
 from pmviewer.engine.stages.light_plan import LightPlan
 from pmviewer.engine.stages.light_trace import TracedPass
@@ -24,7 +25,7 @@ from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import automatic_radius, largest_power, neighbourhood
 from pmviewer.maps.record import DIRECT, in_classes
 from pmviewer.maps.search.grid import PhotonGrid, build_grid
-from pmviewer.maps.search.kdtree import build_kdtree
+from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
 from pmviewer.maps.search.parts import parts_of
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Settings
@@ -167,9 +168,16 @@ class MapBuilder:
 
     def _volume(self, light: LightPlan, traced: TracedPass) -> LookUpMap:
         """The pass's photons in media."""
-        photons, radius = traced.photons, light.radii["volume"]
+        photons, radius, estimate = traced.photons, light.radii["volume"], self.settings.estimate
+        step = 0.0 if estimate.in_media == "beam" else estimate.march_step * radius
+        if estimate.in_media == "nearest":
+            k, _ = volume_neighbours(light.index, estimate)
+            brightest = largest_power(photons.volume, photons.volume_unit)
+            widest = widest_in_media(brightest, k, estimate, self.scene.scene.media, self.scene.flat.radius)
+            tree = partial(build_kdtree, photons.volume, photons.volume_unit)
+            return LookUpMap(self._kept(light, ("volume tree", traced.key), tree, _bytes), widest, step)
         make = partial(build_grid, photons.volume, radius, photons.volume_unit)
-        return LookUpMap(self._kept(light, ("volume", traced.key, radius), make, _bytes), radius)
+        return LookUpMap(self._kept(light, ("volume", traced.key, radius), make, _bytes), radius, step)
 
     # beside them -----------------------------------------------------------------------------------------------------
 
@@ -211,7 +219,7 @@ class MapBuilder:
         return self._kept(light, ("light choice", traced.key, asked, radius), build, _bytes)
 
 
-def _bytes(grid: PhotonGrid) -> int:
+def _bytes(grid: PhotonGrid | PhotonKdTree) -> int:
     return grid.bytes
 
 

@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.method import Plan, estimator_of
-from pmviewer.engine.radius import free_paths
+from pmviewer.engine.radius import free_paths, volume_neighbours
 from pmviewer.engine.stages.estimation import Estimates, blank_estimates
 from pmviewer.engine.stages.gather_guides import gather_records
-from pmviewer.engine.stages.pass_maps import LookUpMap, PassMaps, blank_grid, blank_maps
+from pmviewer.engine.stages.pass_maps import LookUpMap, PassMaps, Structure, blank_grid, blank_maps
 from pmviewer.engine.stages.shadow_photons import ShadowMap
 from pmviewer.engine.stages.virtual_lights import VirtualMap, virtual_dtype
 from pmviewer.maps.irradiance_cache import NO_CACHE, IrradianceCache
 from pmviewer.maps.irradiance_cache import RECORD as CACHE_RECORD
+from pmviewer.maps.search.kdtree import PhotonKdTree
 from pmviewer.maps.search.parts import PhotonParts
 from pmviewer.maps.shadow import shadow_record
 from pmviewer.maps.variant import looked_up_by
@@ -24,6 +25,7 @@ from pmviewer.render.direct.choice import CHOICES
 from pmviewer.render.direct.shadow import NO_SHADOWS
 from pmviewer.render.given import NO_VOLUME, PassData
 from pmviewer.render.lookup import NO_RADIANCE_PHOTONS
+from pmviewer.render.media.march import march_record
 from pmviewer.render.record import Evaluation, eye_dtype, eye_record
 from pmviewer.settings.access import Settings
 
@@ -107,8 +109,32 @@ def pass_data(
         shadows=shadows if shadows is not None else NO_SHADOWS,
         guides=guides,
         corner=corner,
-        volume_map=maps.volume.structure.record if maps.volume is not None else NO_VOLUME,
+        volume_map=_volume_record(settings, maps),
     )
+
+
+def _volume_record(settings: Settings, maps: PassMaps) -> NDArray[np.void]:
+    if maps.volume is None:
+        return NO_VOLUME
+    structure = maps.volume.structure
+    if settings.estimate.in_media == "beam":
+        return structure.record
+    k, share = volume_neighbours(maps.index, settings.estimate)
+    return march_record(structure.record, maps.volume.step, k, share, box_of(structure))
+
+
+def box_of(structure: Structure) -> NDArray[np.float64]:
+    """Box (2, 3) around the photons of a grid or kd-tree, of nothing where there are none."""
+    if structure.n == 0:
+        return np.zeros((2, 3))
+    if isinstance(structure, PhotonKdTree):
+        return np.array(
+            [[part(along) for along in (structure.x, structure.y, structure.z)] for part in (np.min, np.max)]
+        )
+    record = structure.record[0]
+    low = np.array([float(record[f"origin_{axis}"]) for axis in "xyz"])
+    sides = np.array([float(record[f"n{axis}"]) for axis in "xyz"])
+    return np.array([low, low + sides / float(record["cells_per_length"])])
 
 
 def blank_eye(settings: Settings, plan: Plan) -> NDArray[np.void]:

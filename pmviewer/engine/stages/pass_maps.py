@@ -26,10 +26,12 @@ Structure = PhotonGrid | PhotonKdTree | PhotonParts
 
 @dataclass(frozen=True, eq=False)
 class LookUpMap:
-    """Photons in a structure, and the `radius` of their look-ups in scene units: with k nearest the largest one."""
+    """Photons in a structure, and the `radius` of their look-ups in scene units: with k nearest the largest one; the
+    `step` of ray marching through it, 0 without."""
 
     structure: Structure
     radius: float
+    step: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,5 +161,7 @@ def blank_maps(settings: Settings, plan: Plan) -> PassMaps:
         radiance=RadianceMap(grid) if plan.radiance else None,
         guides=grid if plan.guided_rays else None,
         chooser=grid if plan.choice != "power" else None,
-        volume=LookUpMap(grid, 0.0) if plan.volume else None,
+        volume=LookUpMap(blank_tree() if settings.estimate.in_media == "nearest" else grid, 0.0)
+        if plan.volume
+        else None,
     )

@@ -3,7 +3,7 @@
 What lights send straight into the medium is sampled: a distance on the ray, by the transmittance or around the light
 (equiangular), and a light there; and a distance with a direction by the phase function. All three are weighted against
 each other by multiple importance sampling. Light that was scattered before, over surfaces or media, comes from the
-volume map (`pmviewer.maps.estimate.beam`).
+volume map, by the beam estimate (`pmviewer.maps.estimate.beam`) or by ray marching (`pmviewer.render.media.march`).
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from pmviewer.render.direct.direct import found_light
 from pmviewer.render.given import Sampler
 from pmviewer.render.media.distance import distance_in, distance_pdf, equiangular_distance, equiangular_pdf
 from pmviewer.render.media.emitted import emitted_in, emitted_nearby
+from pmviewer.render.media.march import marched_radiance, marches
 from pmviewer.render.media.phase_light import one_light_sample
 from pmviewer.render.media.through import next_stretch, way_through
 from pmviewer.render.pixel import EMISSION, SPECULAR, VOLUME_INDIRECT, deposit
@@ -153,12 +154,22 @@ def radius_in(scene, eye, medium):
 
 
 @specialised
-def _indirect(given, stretch):
-    """Light on a stretch that was scattered before, from the volume map."""
+def _indirect(given, stretch, u):
+    """Light on a stretch that was scattered before, from the volume map; u: a random number."""
     if absent(part(given, "volume_map")):
-        return lambda given, stretch: _BLACK
+        return lambda given, stretch, u: _BLACK
+    if marches(part(given, "volume_map")):
 
-    def by_beam(given, stretch):
+        def by_marching(given, stretch, u):
+            o, d, length, medium, column = stretch
+            lobes = phase_numbers(given.scene, medium)
+            radius = radius_in(given.scene, given.eye, medium)
+            length = min(length, way_seen(given.scene, medium))
+            return marched_radiance(given.scene, given.volume_map, o, d, length, radius, column, lobes, u)
+
+        return by_marching
+
+    def by_beam(given, stretch, u):
         o, d, length, medium, column = stretch
         lobes = phase_numbers(given.scene, medium)
         radius = radius_in(given.scene, given.eye, medium)
@@ -187,7 +198,7 @@ def from_media(given, ray, hit, sampler, numbers, of_phase, counts, looks):
             if scatters(scene, medium) and eye.volume_light != 0:
                 stretch = Stretch(o, ray.d, length, medium, column)
                 single = add(single, mul(T, _single(given, stretch, sampler, numbers, of_phase, counts)))
-                indirect = add(indirect, mul(T, _indirect(given, stretch)))
+                indirect = add(indirect, mul(T, _indirect(given, stretch, numbers[3])))
             T = mul(T, through_all(scene, medium, column, length))
         o, medium = beyond, next_medium
         left -= length

@@ -12,8 +12,20 @@ FIXED_RADIUS = Need(
     lambda f: f.settings.estimate.lookup != "nearest",
     "Not with look-up 'nearest': the k nearest photons set the radius.",
 )
+RADIUS_OR_MEDIA = Need(
+    lambda f: f.settings.estimate.lookup != "nearest" or f.plan.volume,
+    "Not with look-up 'nearest': the k nearest photons set the radius.",
+)
 AUTOMATIC_MAX_RADIUS = Need(
-    lambda f: f.settings.estimate.max_radius == "auto", "Only with an automatic maximum radius."
+    lambda f: (
+        (f.settings.estimate.lookup == "nearest" and f.settings.estimate.max_radius == "auto")
+        or (f.plan.volume and f.settings.estimate.in_media == "nearest")
+    ),
+    "Only with an automatic maximum radius of the k nearest photons.",
+)
+MARCHING = Need(lambda f: f.settings.estimate.in_media != "beam", "Only with ray marching (estimate.in_media).")
+NEAREST_IN_MEDIA = Need(
+    lambda f: f.settings.estimate.in_media == "nearest", "Only with the k nearest photons in media (estimate.in_media)."
 )
 NEW_MAPS = Need(
     lambda f: f.settings.photons.renew == "each pass",
@@ -61,7 +73,7 @@ class Estimate(Group):
         unit="× scene",
         ge=1e-7,
         le=10.0,
-        needs=(FIXED_RADIUS,),
+        needs=(RADIUS_OR_MEDIA,),
     )
     caustic_radius: float = setting(
         0.5,
@@ -96,6 +108,37 @@ class Estimate(Group):
         ge=0.01,
         le=1e6,
         needs=(VOLUME,),
+    )
+    in_media: Literal["beam", "point", "nearest"] = setting(
+        "beam",
+        "How photons in media are looked up. beam: all around the ray at once (Jarosz, Zwicker and Jensen 2008). "
+        "point: ray marching, with the photons in a ball of the radius at every step (Jensen & Christensen 1998). "
+        "nearest: the same with the k nearest photons. Steps add noise, and each counts its photons anew.",
+        stage="maps",
+        scale="choice",
+        title="look-up in media",
+        needs=(VOLUME,),
+    )
+    march_step: float = setting(
+        2.0,
+        "Distance of the places along a ray at which photons in media are looked up, relative to the volume's radius.",
+        stage="maps",
+        scale="log",
+        unit="× radius",
+        ge=0.05,
+        le=100.0,
+        needs=(VOLUME, MARCHING),
+    )
+    volume_k: int = setting(
+        50,
+        "Photons in a k-nearest estimate in media of the first pass; later ones take fewer, see alpha. The k-th sets "
+        "the radius and does not count.",
+        stage="maps",
+        scale="log",
+        unit="photons",
+        ge=2,
+        le=1000,
+        needs=(VOLUME, NEAREST_IN_MEDIA),
     )
     radius_rule: Literal["pass", "pixel"] = setting(
         "pass",
@@ -191,10 +234,7 @@ class Estimate(Group):
         unit="W/(m² sr)",
         ge=1e-6,
         le=10.0,
-        needs=(
-            NEAREST,
-            AUTOMATIC_MAX_RADIUS,
-        ),
+        needs=(AUTOMATIC_MAX_RADIUS,),
     )
     filter: Literal["constant", "cone", "gaussian", "simpson", "epanechnikov"] = setting(
         "constant",
