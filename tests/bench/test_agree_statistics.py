@@ -107,3 +107,14 @@ def test_holm_rejects_in_order():
     assert rejected([0.5, 1e-6, 0.004, 0.0049], 0.01) == [False, True, False, False]
     assert rejected([0.001, 0.004, 0.009], 0.01) == [True, True, True]
     assert rejected([], 0.01) == []
+
+
+def test_light_of_no_account_is_none():
+    """Scene 268 of seed 31: at 1e-21 of the picture's brightness, and black for the other."""
+    rng = np.random.default_rng(5)
+    ours, theirs = rng.uniform(0.9, 1.1, (2, 16, *PIXELS))
+    theirs[:, :8] = 0.0
+    ours[:, :8] *= 1e-21
+    assert p_of(ours, theirs) > 0.5
+    ours[:, :8] *= 1e13
+    assert p_of(ours, theirs) < 1e-6

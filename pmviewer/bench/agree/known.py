@@ -13,6 +13,8 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from pmviewer.bench.agree.tree import MAPS, Node, nodes
 
 GREY = [0.5, 0.5, 0.5]
@@ -49,6 +51,21 @@ def _even_lights(scene: Node) -> None:
     for shape in _lights(scene, ("sphere", "cylinder", "cube", "obj", "ply")):
         if isinstance(shape["emitter"]["radiance"], dict):
             shape["emitter"]["radiance"] = GREY
+
+
+def _outward_lights(scene: Node) -> None:
+    for shape in _lights(scene, ("sphere", "cube", "obj", "ply")):
+        if _shines_inward(shape):
+            shape["flip_normals"] = not shape.get("flip_normals", False)
+
+
+def _shines_inward(shape: Node) -> bool:
+    """Whether a closed shape's front is inside: Mitsuba turns mirrored meshes without vertex normals inside out."""
+    flat = "mesh" in shape and (shape.get("face_normals", False) or not shape["mesh"]["normals"])
+    sizes = [math.prod(step[1]) for step in shape["to_world"] if step[0] == "scale"]
+    matrices = [np.reshape(step[1], (4, 4)) for step in shape["to_world"] if step[0] == "matrix"]
+    mirrored = math.prod(sizes) * math.prod(float(np.linalg.det(m[:3, :3])) for m in matrices) < 0
+    return bool(shape.get("flip_normals", False)) != (flat and mirrored)
 
 
 def _flat_lights(scene: Node) -> None:
@@ -100,6 +117,13 @@ DEVIATIONS = (
         "mirrored cylinder light",
         "Mitsuba's light samples of a mirrored cylinder shine from the other side than its BSDF samples",
         _changed(_unmirrored_lights),
+    ),
+    Deviation(
+        "light turned inwards",
+        "Mitsuba's rays to a light sample end 9e-4 of their length before it, so that closed shapes which shine "
+        "inwards light what is outside along their edges: a mean of 1.3e-5 and 2.6e-6 in two scenes with lights of "
+        "0.5, where its BSDF samples bring 1.5e-8 and 0 (direct with emitter_samples 0)",
+        _changed(_outward_lights),
     ),
     Deviation(
         "vertex normals",
