@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pmviewer.bench.agree.statistics import compared, negligible, rejected, summaries
+from pmviewer.bench.agree.trial import LEAST_LIGHT, unseen_in
 
 PIXELS = (16, 16, 3)
 
@@ -118,3 +119,10 @@ def test_light_of_no_account_is_none():
     assert p_of(ours, theirs) > 0.5
     ours[:, :8] *= 1e13
     assert p_of(ours, theirs) < 1e-6
+
+
+def test_terms_of_black_pictures_are_not_compared():
+    lit, black = np.full((4, *PIXELS), 2 * LEAST_LIGHT), np.full((4, *PIXELS), LEAST_LIGHT / 2)
+    none, all_of_it = np.zeros_like(lit), summaries(lit + runs(3, 4, 8, LEAST_LIGHT / 100))
+    assert compared(summaries(none), all_of_it, floor=unseen_in(summaries(lit))).p < 1e-3
+    assert compared(summaries(none), all_of_it, floor=unseen_in(summaries(black))).p == 1

@@ -124,6 +124,7 @@ DEVIATIONS = (
         "inwards light what is outside along their edges: a mean of 1.3e-5 and 2.6e-6 in two scenes with lights of "
         "0.5, where its BSDF samples bring 1.5e-8 and 0 (direct with emitter_samples 0)",
         _changed(_outward_lights),
+        rare=False,
     ),
     Deviation(
         "vertex normals",
