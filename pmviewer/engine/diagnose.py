@@ -25,12 +25,14 @@ from pmviewer.engine.stages.eye import gather_rays_of
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.light import LightStage
 from pmviewer.engine.stages.pass_data import RenderedPass
+from pmviewer.engine.stages.pass_maps import PassMaps
 from pmviewer.engine.stages.retrace import contributions_of, fates_of, paths_of
 from pmviewer.importance.view import CHANNELS as IMPORTANCE_CHANNELS
 from pmviewer.importance.view import importance_view, probability_view
 from pmviewer.maps.importance.importance_map import NO_IMPORTANCE
 from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import neighbourhood
+from pmviewer.maps.search.cells import MapCells, cells_of_map
 from pmviewer.maps.search.grid import PhotonGrid, build_grid
 from pmviewer.maps.search.kdtree import PhotonKdTree
 from pmviewer.maps.search.stored import ALL_CLASSES
@@ -102,7 +104,15 @@ def inspected(wanted: Wanted, looked: Looked, pool: WorkPool) -> Inspection:
         fates=fates_of(tracer, maps, importance, wanted.fates) if wanted.fates else None,
         lights=contributions_of(tracer, maps, importance) if wanted.lights else None,
         pixel=pixel_report(looked, wanted.pinned, partial(measures_at, looked, pool), pool) if wanted.pinned else None,
+        cells=_cells(wanted.cells, maps) if wanted.cells else None,
     )
+
+
+def _cells(asked: tuple[str, int, int], maps: PassMaps) -> MapCells | None:
+    """Of the map that is asked for, in the latest pass."""
+    name, levels, limit = asked
+    made = maps.by_name.get(name)
+    return None if made is None else cells_of_map(name, made.structure, levels, limit)
 
 
 def measures_at(looked: Looked, pool: WorkPool, map_: str, pixel: int) -> dict[str, float]:

@@ -16,6 +16,7 @@ from pmviewer.engine.inspector.report import Pinned, PixelReport
 from pmviewer.output.diagnostic_views import Family
 
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
+    from pmviewer.maps.search.cells import MapCells
     from pmviewer.photons.emission.light_importance import LightImportance
     from pmviewer.photons.light_pass.paths import PhotonPaths
 
@@ -25,7 +26,8 @@ class Wanted:
     """What the display asks for: a family of diagnostic planes (of which map, for look-ups, or of which `slice`: axis
     and place from 0 to 1), so many photon paths, the
     gather rays of a pixel (x, y), the fates of the photons of so many trajectories, the importance of the lights, the
-    picture without its noise, what made a pixel, and the photons and other points of the latest pass, which a pass that
+    picture without its noise, what made a pixel, the `cells` of a map (its name, levels of a tree, most boxes), and the
+    photons and other points of the latest pass, which a pass that
     was rendered here has anyway."""
 
     family: Family | None = None
@@ -38,6 +40,7 @@ class Wanted:
     pinned: Pinned | None = None
     points: bool = False
     slice: tuple[int, float] = (2, 0.5)
+    cells: tuple[str, int, int] | None = None
 
     @property
     def of_pass(self) -> bool:
@@ -60,6 +63,8 @@ class Wanted:
             return True
         if self.pinned is not None and self.pinned != held.pinned:
             return True
+        if self.cells is not None and self.cells != held.cells:
+            return True
         return self.paths > 0 and self.paths != held.paths
 
 
@@ -69,7 +74,7 @@ class Inspection:
     among them; `gathered`: the gather rays
     of the pixel, (n, 10) float32, see `pmviewer.render.gather.gather_points`; `fates`: photons (n, 6) float32, see
     `pmviewer.photons.deposition.fates`; `lights`: importance of the lights as photons tell it; `pixel`: what made the
-    pixel that is pinned."""
+    pixel that is pinned; `cells`: those of a photon map, None where it has no photon."""
 
     wanted: Wanted = Wanted()
     planes: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
@@ -78,3 +83,4 @@ class Inspection:
     fates: NDArray[np.float32] | None = None
     lights: LightImportance | None = None
     pixel: PixelReport | None = None
+    cells: MapCells | None = None

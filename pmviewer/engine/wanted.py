@@ -40,6 +40,9 @@ def wanted_of(facts: Facts, pixel: tuple[int, int] | None = None, pinned: Pinned
         wanted = replace(wanted, fates=overlays.fates.count)
     if shown("lights"):
         wanted = replace(wanted, lights=True)
+    if shown("cells"):
+        cells = overlays.cells
+        wanted = replace(wanted, cells=(divided_map(cells.map, facts.plan), cells.levels, cells.limit))
     if shown("gather"):
         wanted = replace(wanted, pixel=pixel)
     return wanted
@@ -50,3 +53,9 @@ def looked_map(settings: Settings, plan: Plan) -> str:
     if settings.display.map == "caustic" and plan.caustic_classes:
         return "caustic"
     return "global" if plan.global_classes else "caustic"
+
+
+def divided_map(asked: str, plan: Plan) -> str:
+    """The map whose cells are shown: the one asked for, or the first that there is."""
+    there = {"global": plan.global_classes, "caustic": plan.caustic_classes, "volume": plan.volume}
+    return asked if there[asked] else next((name for name, made in there.items() if made), asked)

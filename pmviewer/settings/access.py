@@ -15,6 +15,7 @@ from pmviewer.settings.needs import Needs
 from pmviewer.settings.schema import (
     CacheOverlay,
     CameraSettings,
+    CellOverlay,
     Direct,
     Display,
     Edit,
@@ -44,6 +45,7 @@ __all__ = [
     "SETTINGS",
     "CacheOverlay",
     "CameraSettings",
+    "CellOverlay",
     "Direct",
     "Display",
     "Edit",

@@ -100,7 +100,7 @@ def _needs(opened: OpenScene, settings: Settings) -> Hashable:
     """What decides about the kernels that run."""
     facts = facts_of(settings, opened.traits)
     wanted = wanted_of(facts)
-    shown = replace(wanted, paths=min(wanted.paths, 1), fates=min(wanted.fates, 1))
+    shown = replace(wanted, paths=min(wanted.paths, 1), fates=min(wanted.fates, 1), cells=None)
     keys = frozenset(step.key for step in steps_of(opened, settings))
     return replace(facts.plan, skipped=(), warnings=()), keys, shown if shown != Wanted() else None
 

@@ -23,6 +23,7 @@ from pmviewer.settings.schema.light import Light
 from pmviewer.settings.schema.light_pass import Photons
 from pmviewer.settings.schema.overlays import (
     CacheOverlay,
+    CellOverlay,
     Colour,
     FateOverlay,
     FocusOverlay,
@@ -43,6 +44,7 @@ __all__ = [
     "Auto",
     "CacheOverlay",
     "CameraSettings",
+    "CellOverlay",
     "Colour",
     "Compare",
     "Direct",

@@ -35,6 +35,14 @@ CAUSTIC_TRAJECTORIES = Need(
     "All trajectories fill the global map, and leave for any surface (photons.q).",
 )
 
+SEVERAL_MAPS = Need(
+    lambda f: sum(map(bool, (f.plan.caustic_classes, f.plan.global_classes, f.plan.volume))) > 1, "There is one map."
+)
+TREE = Need(
+    lambda f: f.settings.estimate.lookup == "nearest",
+    "The map is a grid, whose cells are all of one size: only nearest look-ups have a kd-tree (estimate.lookup).",
+)
+
 Colour = Literal["power", "bounce", "light"]
 
 
@@ -288,6 +296,52 @@ class ProjectionOverlay(Group):
     depth: bool = setting(True, "Hide cells behind surfaces.", stage="display", scale="switch", title="depth test")
 
 
+class CellOverlay(Group):
+    """Cells of a photon map"""
+
+    show: bool = setting(
+        False,
+        "Draw how a photon map of the latest pass divides space: the nodes of its kd-tree, or the cells of its grid "
+        "that hold photons.",
+        stage="display",
+        scale="switch",
+    )
+    map: Literal["global", "caustic", "volume"] = setting(
+        "global",
+        "Cells of which map are drawn.",
+        stage="display",
+        scale="choice",
+        needs=(SEVERAL_MAPS,),
+    )
+    colour: Literal["photons", "level"] = setting(
+        "photons",
+        "Colour by the photons in a cell, or by its level in the tree.",
+        stage="display",
+        scale="choice",
+        needs=(TREE,),
+    )
+    levels: int = setting(
+        6,
+        "The deepest level of the tree that is drawn, from the root, 0, to the leaves.",
+        stage="display",
+        scale="integer",
+        ge=0,
+        le=24,
+        needs=(TREE,),
+    )
+    limit: int = setting(
+        2_000,
+        "At most this many boxes are drawn: of a tree whole levels, of a grid cells that are evenly thinned.",
+        stage="display",
+        scale="log",
+        unit="boxes",
+        ge=100,
+        le=50_000,
+    )
+    size: float = setting(1.0, "Line width.", stage="display", scale="linear", title="width", unit="px", ge=1, le=8)
+    depth: bool = setting(True, "Hide edges behind surfaces.", stage="display", scale="switch", title="depth test")
+
+
 class FocusOverlay(Group):
     """Focal plane of the lens"""
 
@@ -317,6 +371,7 @@ class Overlays(Group):
     paths: PathOverlay = subgroup(PathOverlay, "photon paths", TRACED)
     gather: GatherOverlay = subgroup(GatherOverlay, "gather rays", TRACED, GATHER_RAYS)
     projection: ProjectionOverlay = subgroup(ProjectionOverlay, "projection maps", TRACED, PLAIN_EMISSION, PROJECTED)
+    cells: CellOverlay = subgroup(CellOverlay, "cells of a map", TRACED)
     file: PointOverlay = subgroup(PointOverlay, "photons of a file")
     focal: FocusOverlay = subgroup(FocusOverlay, "focal plane", LENS)
 

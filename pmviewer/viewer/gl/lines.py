@@ -10,7 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.viewer.gl.palette import Colouring, look_uniforms, palettes
+from pmviewer.viewer.gl.palette import POWER, Colouring, look_uniforms, palettes
 from pmviewer.viewer.gl.program import Drawing, Shaders, set_uniforms
 from pmviewer.viewer.gl.records import ATTRIBUTES, EMPTY, LAYOUT, CloudSummary, log_range, summary_of
 
@@ -28,8 +28,8 @@ class LineCloud:
         self._log_range = (0.0, 1.0)
         self._summary = EMPTY
 
-    def upload(self, ends: NDArray[np.float32], power_unit: float = 1.0) -> None:
-        """Take lines (2n, 6) in place of those before."""
+    def upload(self, ends: NDArray[np.float32], power_unit: float = 1.0, colouring: Colouring = POWER) -> None:
+        """Take lines (2n, 6) in place of those before; scales are those of the `colouring`."""
         self.release()
         if not len(ends):
             return
@@ -37,9 +37,9 @@ class LineCloud:
         self._buffer = self._shaders.context.buffer(np.ascontiguousarray(ends, np.float32))
         names = [n for n in ATTRIBUTES if n in program]
         self._array = self._shaders.context.vertex_array(program, [(self._buffer, LAYOUT, *names)])
-        self._log_range = log_range(ends[::2])
+        self._log_range = log_range(ends[::2], colouring)
         count = len(ends) // 2
-        self._summary = summary_of(ends[::2], power_unit, count, count)
+        self._summary = summary_of(ends[::2], power_unit, count, count, colouring)
 
     def release(self) -> None:
         """Free what lies on the GPU."""
@@ -71,6 +71,8 @@ class LineCloud:
             size=size * drawing.pixel_ratio,
             start_level=_DIM_START if flow else 1.0,
             colour_by=int(colouring.by),
+            channel=colouring.channel,
+            colour_row=int(colouring.scale == "around one"),
             power_range=self._log_range,
         )
         self._array.render(moderngl.LINES)

@@ -72,14 +72,14 @@ MEAN_OF_GREEN_AND_BLUE = 3
 class Colouring:
     """How records become colours. A quantity is a channel of the stored power, in false colours.
 
-    scale: of a quantity, between its percentiles; as far above 1 as below; or down from the largest value, to a
-    thousandth of it, as a share
+    scale: of a quantity, between its percentiles; over all its range; as far above 1 as below; or down from the largest
+    value, to a thousandth of it, as a share
     text: of a quantity, for the legend
     """
 
     by: By
     channel: int = 0
-    scale: Literal["percentiles", "around one", "share"] = "percentiles"
+    scale: Literal["percentiles", "range", "around one", "share"] = "percentiles"
     text: str = ""
 
     def table(self, look: Look) -> NDArray[np.floating]:

@@ -95,6 +95,8 @@ def ends_of_scale(records: NDArray[np.float32], colouring: Colouring = POWER) ->
     low, high = np.percentile(some, [1, 99]) if len(some) else (1.0, 1.0)
     if colouring.by != By.QUANTITY:
         return float(low), float(high)
+    if colouring.scale == "range":
+        low, high = (float(some.min()), float(some.max())) if len(some) else (1.0, 1.0)
     if colouring.scale == "around one":
         reach = max(2.0, 1.0 / low, high)
         return 1.0 / reach, reach

@@ -11,6 +11,7 @@ from pmviewer.viewer.overlays.importons import Importons
 from pmviewer.viewer.overlays.inspected import Inspected
 from pmviewer.viewer.overlays.irradiance_cache import IrradianceCache
 from pmviewer.viewer.overlays.light_importance import Lights
+from pmviewer.viewer.overlays.map_cells import Cells
 from pmviewer.viewer.overlays.overlay import Overlay
 from pmviewer.viewer.overlays.photon_maps import CausticPhotons, GlobalPhotons, VolumePhotons
 from pmviewer.viewer.overlays.photon_paths import Paths
@@ -33,6 +34,7 @@ OVERLAYS: tuple[type[Overlay], ...] = (
     Paths,
     GatherRays,
     ProjectionMaps,
+    Cells,
     FilePhotons,
     FocalPlane,
     Frustum,
