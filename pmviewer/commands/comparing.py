@@ -58,7 +58,7 @@ def _reference(opened: OpenScene, settings: Settings, source: str) -> Reference 
         return reference
     path = reference_of(opened.scene)
     own = camera.sees_like(resolve_camera(opened.scene, size_only(settings.camera)))
-    if path is None or settings.free_camera.on or not own:
+    if path is None or settings.free_camera.on or settings.camera.clip != "off" or not own:
         return None
     reference = load_reference(path)
     return reference if reference.size == (camera.width, camera.height) else None

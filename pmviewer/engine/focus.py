@@ -44,9 +44,7 @@ def surface_at(scene: FlatScene, camera: CameraPose, x: float, y: float) -> NDAr
 
     origin, direction = (np.ascontiguousarray(part, np.float32) for part in camera.rays(np.array([x]), np.array([y])))
     forward = camera.axes()[2]
-    facing = forward if camera.near_normal is None else np.asarray(camera.near_normal, float)
-    towards = float(direction[0] @ facing)
-    near = np.array([max(camera.near / towards, 0.0) if towards > 0 else 0.0], np.float32)
+    near = np.array([camera.seen_from(origin[0], direction[0])], np.float32)
     far = np.array([camera.far / float(direction[0] @ forward)], np.float32)
     t, prim, uv = np.empty(1, np.float32), np.empty(1, np.int32), np.empty((1, 2), np.float32)
     cast_closest(scene.record[0], origin, direction, near, far, t, prim, uv)

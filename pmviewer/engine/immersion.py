@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from pmviewer.render.camera import CameraPose
 
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
@@ -14,10 +12,11 @@ if TYPE_CHECKING:  # numba, which the window doesn't wait for
 
 
 def immersed(scene: FlatScene, camera: CameraPose) -> CameraPose:
-    """The camera with the medium around its eye: what the boundaries say that rays from there meet or, where they meet
-    none, what the file says of its own camera. The camera itself in scenes without media."""
+    """The camera with the medium around its eye, or around the middle of its near plane: what the boundaries say that
+    rays from there meet or, where they meet none, what the file says of its own camera. The camera itself in scenes
+    without media."""
     if not scene.has_media:
         return camera
     from pmviewer.scene.arrays.media import medium_at
 
-    return replace(camera, medium=medium_at(scene.record, np.asarray(camera.origin, float), scene.owner.camera.medium))
+    return replace(camera, medium=medium_at(scene.record, camera.start(), scene.owner.camera.medium))

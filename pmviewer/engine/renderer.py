@@ -45,6 +45,7 @@ from pmviewer.engine.told import Told, told_of
 from pmviewer.engine.wanted import wanted_of
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.camera import CameraPose, resolve_camera
+from pmviewer.render.clip import clipped
 from pmviewer.render.film import Addable, Film, Increment
 from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.gather.gather_points import POINT_COLUMNS
@@ -85,8 +86,10 @@ class Renderer:
         """plan: what runs, where that is not what settings and scene ask for. Raises SettingError when the camera is
         impossible or the image can't fit into memory."""
         self.scene, self.settings, self.pool, self.store, self.version = scene, settings, pool, store, version
-        self.render_camera = _settled(scene, resolve_camera(scene.scene, settings.camera))
-        self.camera = _settled(scene, resolve_view(scene.scene, settings, scene.flat.center, scene.flat.radius))
+        render_camera = resolve_camera(scene.scene, settings.camera)
+        bounds = scene.flat.center, scene.flat.radius
+        self.render_camera = _settled(scene, clipped(render_camera, settings.camera, *bounds))
+        self.camera = _settled(scene, resolve_view(scene.scene, settings, *bounds))
         check_memory(self.camera.width, self.camera.height, settings.photons.N)
         self.plan: Plan = plan or plan_of(settings, scene.traits)
         self.facts = Facts(settings, self.plan, scene.traits)

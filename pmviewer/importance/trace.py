@@ -44,7 +44,7 @@ from pmviewer.kernels.random import SOBOL, draw4
 from pmviewer.kernels.surface import face
 from pmviewer.kernels.vector import add, along, dot, luminance, mul, scale
 from pmviewer.maps.photon_words import encode_direction
-from pmviewer.render.cast import Ray, leaving
+from pmviewer.render.cast import Ray, leaving, span_of
 from pmviewer.render.chain import WHITE, arrive, scatter
 from pmviewer.render.lens import through_lens
 from pmviewer.render.straight import cast_on, way
@@ -121,13 +121,15 @@ def _ray_of_pinhole(eye, x, y):
     zero = (_f4(0.0), _f4(0.0), _f4(0.0))
     if eye.orthographic != 0:
         P, D = start(right, down, zero, zero)
-        return Ray(add(o, raw), (eye.x_forward, eye.y_forward, eye.z_forward), eye.near, eye.far, None, None), P, D
+        forward = (eye.x_forward, eye.y_forward, eye.z_forward)
+        near, far = span_of(eye, raw, forward)
+        return Ray(add(o, raw), forward, near, far, None, None), P, D
     inv = _f4(1.0) / _f4(math.sqrt(dot(raw, raw)))
     d = scale(raw, inv)
     dx, dy = scale(along(right, d, -dot(right, d)), inv), scale(along(down, d, -dot(down, d)), inv)
-    per_depth = _f4(1.0) / dot(d, (eye.x_forward, eye.y_forward, eye.z_forward))
     P, D = start(zero, zero, dx, dy)
-    return Ray(o, d, eye.near * per_depth, eye.far * per_depth, None, None), P, D
+    near, far = span_of(eye, zero, d)
+    return Ray(o, d, near, far, None, None), P, D
 
 
 @device

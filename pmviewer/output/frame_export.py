@@ -106,6 +106,14 @@ class Pose(Protocol):
         """Horizontal angle of view in degrees, of perspective alone."""
 
     @property
+    def near(self) -> float:
+        """Distance of the near plane from the eye."""
+
+    @property
+    def near_normal(self) -> tuple[float, float, float] | None:
+        """Unit normal of a near plane that clips the picture, away from the eye; None where there is none."""
+
+    @property
     def projection(self) -> str:
         """ "perspective" or "orthographic"."""
 
@@ -223,6 +231,8 @@ def camera_metadata(camera: Pose) -> dict[str, Value]:
         about["view.fov"] = float(camera.fov)
     if any(camera.shift):
         about["view.shift"] = f"{camera.shift[0]:.9g} {camera.shift[1]:.9g}"
+    if camera.near_normal is not None:
+        about["view.clip"] = f"{_text(camera.near_normal)} {camera.near:.9g}"
     if camera.aperture > 0 and camera.focus is not None:
         about |= {"view.aperture": float(camera.aperture), "view.focus": float(camera.focus)}
     return about

@@ -124,10 +124,28 @@ class CameraPose:
             return eye + places, np.broadcast_to(self.axes()[2], places.shape).copy()
         return np.broadcast_to(eye, places.shape).copy(), places / np.linalg.norm(places, axis=1, keepdims=True)
 
+    def seen_from(self, origin: NDArray[np.floating], direction: NDArray[np.floating]) -> float:
+        """From which distance on a ray of the camera from `origin` (3,) in the unit `direction` (3,) sees: the near
+        plane; infinity if it never passes it."""
+        normal = self.axes()[2] if self.near_normal is None else np.asarray(self.near_normal, float)
+        before = self.near - float(np.subtract(origin, self.origin) @ normal) if self.near > 0 else 0.0
+        towards = float(direction @ normal)
+        if before <= 0:
+            return 0.0
+        return before / towards if towards > 0 else math.inf
+
+    def start(self) -> NDArray[np.float64]:
+        """Where (3,) the view along the axis begins: the eye, or the near plane before it."""
+        forward, origin = self.axes()[2], np.asarray(self.origin, float)
+        near = self.seen_from(origin, forward)
+        return origin + near * forward if near < math.inf else origin
+
     def sees_like(self, other: CameraPose) -> bool:
         """Whether every pixel looks at the same point as the other's, through the same lens. A target farther away
         changes nothing."""
         if (self.width, self.height, self.projection) != (other.width, other.height, other.projection):
+            return False
+        if (self.near, self.near_normal) != (other.near, other.near_normal):
             return False
         if self.aperture != other.aperture or (self.aperture > 0 and self.focus != other.focus):
             return False

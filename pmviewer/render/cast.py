@@ -12,7 +12,7 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.media.medium import MOST_BOUNDARIES, has_media, is_boundary, medium_beyond
 from pmviewer.kernels.surface import leave, surface_at
-from pmviewer.kernels.vector import along, dot
+from pmviewer.kernels.vector import add, along, dot
 
 _f4 = np.float32
 _i8 = np.int64
@@ -33,11 +33,45 @@ class Ray(NamedTuple):
 
 
 @specialised
-def ray_of_camera(eye, o, d, near, far):
-    """A camera ray, in the medium that the eye record says the camera is in, if it says so."""
+def ray_of_camera(eye, place, d):
+    """The camera ray from `place`, counted from the eye, in the unit direction d, in the medium that the eye record
+    says the camera is in, if it says so."""
     if not has(eye, "medium"):
-        return lambda eye, o, d, near, far: Ray(o, d, near, far, None, None)
-    return lambda eye, o, d, near, far: Ray(along(o, d, near), d, _f4(0.0), far - near, _i8(eye.medium), None)
+
+        def plain(eye, place, d):
+            near, far = span_of(eye, place, d)
+            return Ray(_placed(eye, place), d, near, far, None, None)
+
+        return plain
+
+    def within(eye, place, d):
+        near, far = span_of(eye, place, d)
+        if not near < _INF:  # all of it is before the near plane
+            near = far = _f4(0.0)
+        return Ray(along(_placed(eye, place), d, near), d, _f4(0.0), far - near, _i8(eye.medium), None)
+
+    return within
+
+
+@device
+def _placed(eye, place):
+    return add((eye.x_eye, eye.y_eye, eye.z_eye), place)
+
+
+@device
+def span_of(eye, place, d):
+    """From which distance to which a ray from `place`, counted from the eye, in the unit direction d is beyond the near
+    plane and before the far one; from infinity if it never is."""
+    far = eye.far / dot(d, (eye.x_forward, eye.y_forward, eye.z_forward))
+    if not eye.near > _f4(0.0):
+        return _f4(0.0), far
+    normal = (eye.x_near, eye.y_near, eye.z_near)
+    before, towards = eye.near - dot(place, normal), dot(d, normal)
+    if before > _f4(0.0):
+        return before / towards if towards > _f4(0.0) else _INF, far
+    if towards < _f4(0.0):  # of parallel rays some begin beyond the plane, and pass it the other way
+        far = min(far, before / towards)
+    return _f4(0.0), far
 
 
 @specialised

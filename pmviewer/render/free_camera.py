@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.render.camera import CameraPose, resolve_camera
+from pmviewer.render.clip import clipped
 from pmviewer.scene.description import Scene, Vec3
 from pmviewer.settings.access import FreeCamera, Settings
 
@@ -31,7 +32,9 @@ def resolve_view(scene: Scene, settings: Settings, center: NDArray[np.floating],
     """The camera whose picture is shown: the free one while it is on, else the render camera. `center` (3,) and
     `radius` bound the scene."""
     render = resolve_camera(scene, settings.camera)
-    return free_pose(render, settings.free_camera, center, radius) if settings.free_camera.on else render
+    if settings.free_camera.on:
+        return free_pose(render, settings.free_camera, center, radius)
+    return clipped(render, settings.camera, center, radius)
 
 
 def free_pose(render: CameraPose, free: FreeCamera, center: NDArray[np.floating], radius: float) -> CameraPose:

@@ -61,11 +61,9 @@ def through_lens(eye, raw, a, b):
     """
     forward = (eye.x_forward, eye.y_forward, eye.z_forward)
     point = lens_point(eye, a, b)
-    o = add((eye.x_eye, eye.y_eye, eye.z_eye), point)
-    towards = raw
+    place, towards = point, raw
     if eye.orthographic != 0:
-        o, towards = add(o, raw), forward
+        place, towards = add(point, raw), forward
     towards = along(towards, point, -eye.inverse_focus)
     d = scale(towards, _f4(1.0) / _f4(math.sqrt(dot(towards, towards))))
-    per_depth = _f4(1.0) / dot(d, forward)
-    return ray_of_camera(eye, o, d, eye.near * per_depth, eye.far * per_depth), towards
+    return ray_of_camera(eye, place, d), towards

@@ -13,7 +13,7 @@ from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.dimensions import PIXEL, PIXEL_SALT, WAVE
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.surface import face
-from pmviewer.kernels.vector import add, dot, is_good, normalize
+from pmviewer.kernels.vector import is_good, normalize
 from pmviewer.render.cast import of_wave, ray_of_camera
 from pmviewer.render.filter import place_in_filter
 from pmviewer.render.lens import lens_numbers, through_lens
@@ -23,7 +23,7 @@ from pmviewer.render.record import C_DROPPED
 _f4 = np.float32
 _f8 = np.float64
 _u4 = np.uint32
-_INF = _f4(np.inf)
+_EYE = (_f4(0.0), _f4(0.0), _f4(0.0))
 
 EMISSION, DIRECT, SPECULAR, CAUSTIC, INDIRECT, ALBEDO, NORMAL, DEPTH = (
     PLANES[name].start
@@ -69,17 +69,10 @@ def _raw_direction(eye, pixel, u, v):
 def camera_ray(eye, pixel, u, v):
     """The pinhole's ray through the pixel at (u, v), which is the pixel's own for [0, 1)², from the near to the far
     plane."""
-    o = (eye.x_eye, eye.y_eye, eye.z_eye)
-    d = _raw_direction(eye, pixel, u, v)
+    raw = _raw_direction(eye, pixel, u, v)
     if eye.orthographic != 0:
-        return ray_of_camera(eye, add(o, d), (eye.x_forward, eye.y_forward, eye.z_forward), eye.near, eye.far)
-    d = normalize(d)
-    far = eye.far / dot(d, (eye.x_forward, eye.y_forward, eye.z_forward))
-    near = _f4(0.0)
-    if eye.near > near:
-        towards = dot(d, (eye.x_near, eye.y_near, eye.z_near))
-        near = eye.near / towards if towards > near else _INF
-    return ray_of_camera(eye, o, d, near, far)
+        return ray_of_camera(eye, raw, (eye.x_forward, eye.y_forward, eye.z_forward))
+    return ray_of_camera(eye, _EYE, normalize(raw))
 
 
 @specialised

@@ -231,6 +231,8 @@ def _mismatch(reference: Reference, scene: Scene, frame: Frame) -> str | None:
     if not frame.camera.sees_like(own):
         if frame.settings.free_camera.on:
             return "The free camera is on: the reference is seen by the scene's own camera."
+        if frame.settings.camera.clip != "off":
+            return "The picture is clipped: the reference is not. Set camera.clip to off."
         if replace(frame.camera, aperture=own.aperture, focus=own.focus).sees_like(own):
             return (
                 "The lens was changed: the reference is seen through the scene's own. Press Backspace to return to it."

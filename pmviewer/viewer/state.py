@@ -14,6 +14,7 @@ from pmviewer.engine.frame import Frame, Level, Message
 from pmviewer.errors import PmviewerError, SettingError
 from pmviewer.output.diagnostic_views import HELD_WHILE_SHOWN
 from pmviewer.render.camera import CameraPose, resolve_camera
+from pmviewer.render.clip import clipped
 from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.planes import AOVS, TERMS, VOLUME_TERMS
 from pmviewer.scene.description import Scene
@@ -285,7 +286,9 @@ class ViewerState:
         except SettingError:
             pose = resolve_camera(scene, self.settings.camera.model_copy(update={"name": "auto"}))
         opened = self.session.opened_scene
-        return pose if opened is None or opened.scene is not scene else focused(opened.flat, pose)
+        if opened is None or opened.scene is not scene:
+            return pose
+        return focused(opened.flat, clipped(pose, self.settings.camera, opened.flat.center, opened.flat.radius))
 
     def focus_at(self, shown: CameraPose, x: float, y: float) -> None:
         """Focus the render camera's lens on the surface at a place of the picture of the camera `shown`, in pixels."""

@@ -27,7 +27,8 @@ def reference_for(source: str | Path | None, scene: Scene, settings: Settings) -
     path = reference_of(scene) if source is None else Path(source)
     if path is None:
         raise SceneError(f"The scene '{scene.name}' has no reference of its own.", hint="Name an EXR file.")
-    if source is None and not camera.sees_like(resolve_camera(scene, size_only(settings.camera))):
+    own = settings.camera.clip == "off" and camera.sees_like(resolve_camera(scene, size_only(settings.camera)))
+    if source is None and not own:
         raise SceneError(
             "The scene's reference is seen by the scene's own camera: leave out the camera settings.", path
         )

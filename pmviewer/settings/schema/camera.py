@@ -22,6 +22,7 @@ OWN_ORTHOGRAPHIC = Need(
     lambda f: f.settings.camera.projection != "auto" or f.traits.orthographic,
     "The scene's camera is perspective (camera.projection).",
 )
+CLIPPED = Need(lambda f: f.settings.camera.clip != "off", "Nothing is clipped (camera.clip).")
 
 
 class CameraSettings(Group):
@@ -115,6 +116,25 @@ class CameraSettings(Group):
         le=1e15,
         title="focus distance",
         needs=(LENS,),
+    )
+    clip: Literal["off", "view", "x", "y", "z"] = setting(
+        "off",
+        "Leaves out what lies on the camera's side of a plane, so that one looks into closed rooms from outside: "
+        "across the view or across an axis. Light is that of the whole scene.",
+        stage="image",
+        scale="choice",
+        title="clipping plane",
+    )
+    clip_at: float = setting(
+        0.0,
+        "Place of the clipping plane, from the scene's centre along the axis or the view.",
+        stage="image",
+        scale="linear",
+        unit="× scene",
+        ge=-1.0,
+        le=1.0,
+        title="place of the plane",
+        needs=(CLIPPED,),
     )
     width: int | Auto = setting(
         "auto", "Image width; auto is the scene file's.", stage="image", scale="integer", unit="px", ge=1, le=16384

@@ -65,6 +65,8 @@ def draw_hud(viewport: Viewport, hovered: bool) -> None:
         caption(viewport, f"preview, no estimate: {preview.caption}", (margin, margin))
     if state.settings.free_camera.on and viewport.captions:
         _free_camera_label(viewport)
+    elif viewport.captions:
+        _clip_label(viewport)
     if view == "depth" and state.frame is not None and viewport.picture is not None:
         _depth_legend(viewport, *viewport.picture.planes.depth_range)
     draw_false_legend(viewport, below if is_narrow(viewport) else 0.0)
@@ -93,6 +95,17 @@ def _title(viewport: Viewport, view: str) -> str:
     frame = viewport.state.frame
     of = frame.inspection.wanted.map if view in DIAGNOSTICS and frame is not None else ""
     return f"{of} map, {_TITLES[view]}" if of else _TITLES.get(view, view)
+
+
+def _clip_label(viewport: Viewport) -> None:
+    """What the picture leaves out, above the line of the value under the mouse."""
+    camera = viewport.state.settings.camera
+    if camera.clip == "off":
+        return
+    across = "the view" if camera.clip == "view" else camera.clip
+    line = imgui.get_text_line_height()
+    text = f"clipped across {across}: what is on the camera's side of the plane is left out"
+    caption(viewport, text, (0.6 * line, viewport.size[1] - 3.4 * line), colour=theme.DARK.free)
 
 
 def _free_camera_label(viewport: Viewport) -> None:

@@ -20,7 +20,10 @@ GAP = 0.005
 AT_ONCE = 50_000
 """Triangles that a window frame can wait for."""
 BOXING = Lane("boxing")
-OUTSIDE = "The camera is outside the room that the scene's own camera is in: Backspace returns to it."
+OUTSIDE = (
+    "The camera is outside the room that the scene's own camera is in: Backspace returns to it, and "
+    "camera.clip looks in through its walls."
+)
 NOTHING = "The camera sees no surface: Home shows the whole scene, Backspace is the scene's own camera."
 UNLIT = "Nothing that the camera sees is lit: it may be behind a wall or inside an object. Backspace returns."
 STOPPED = "A surface is in the camera's way (View > Move through surfaces)."
@@ -67,14 +70,16 @@ class Surroundings:
     def under(self, pose: CameraPose, pixel: tuple[float, float]) -> Vector | None:
         """The surface point (3,) that the camera sees at that place of the image, in pixels; None without one."""
         origin, direction = _ray(pose, pixel)
-        hit = self._rays.nearest(origin, direction, _start(pose, direction)) if self._rays is not None else None
+        hit = (
+            self._rays.nearest(origin, direction, pose.seen_from(origin, direction)) if self._rays is not None else None
+        )
         return origin + direction * hit[0] if hit is not None else None
 
     def object_under(self, pose: CameraPose, pixel: tuple[float, float]) -> int:
         """The number of the object there, shapes before instances; −1 where there is none."""
         origin, direction = _ray(pose, pixel)
         rays, geometry = self._rays, self._geometry
-        hit = rays.nearest_triangle(origin, direction, _start(pose, direction)) if rays is not None else None
+        hit = rays.nearest_triangle(origin, direction, pose.seen_from(origin, direction)) if rays is not None else None
         return geometry.object_at(3 * hit[2]) if hit is not None else -1
 
     def depth_ahead(self, pose: CameraPose) -> float:
@@ -129,7 +134,8 @@ class Surroundings:
     def advice(self, pose: CameraPose, own: CameraPose, frame: Frame | None) -> str:
         """One sentence where the camera shows nothing of use: it is outside the closed room of the scene's own camera,
         or the frame shows no surface, or no light. Else an empty one."""
-        if self._rays is not None and pose.origin != own.origin and not pose.orthographic:
+        meant = pose.orthographic or pose.near_normal is not None  # who clips looks in from outside
+        if self._rays is not None and pose.origin != own.origin and not meant:
             if self._is_closed_in(own) and not self._encloses(np.asarray(pose.origin, float)):
                 return OUTSIDE
         return self._of_frame(frame) if frame is not None and not frame.coarse else ""
@@ -158,10 +164,3 @@ def _ray(pose: CameraPose, pixel: tuple[float, float]) -> tuple[Vector, Vector]:
     """Origin and direction (3,) of the camera's ray through that place of the image."""
     origins, directions = pose.rays(np.array([pixel[0]]), np.array([pixel[1]]))
     return origins[0], directions[0]
-
-
-def _start(pose: CameraPose, direction: Vector) -> float:
-    """From which distance on a ray of the camera sees: the near plane."""
-    normal = pose.axes()[2] if pose.near_normal is None else np.asarray(pose.near_normal, float)
-    slope = float(direction @ normal)
-    return pose.near / slope if pose.near > 0 and slope > 1e-6 else 0.0
