@@ -20,8 +20,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 MOST_PROCESSES = 4
 """For tests: each grows to some two gigabytes."""
-EVERYTHING = ["-m", ""]
-"""Pytest's option for slow tests too; a later -m counts instead."""
+USUAL, EVERYTHING = ["-m", "not extensive"], ["-m", ""]
+"""Pytest's options for the tests that every change passes, and for all of them; a later -m counts instead."""
+ALL = "--all"
 ENVIRONMENT = Path(os.environ.get("PMVIEWER_VENV", ROOT / ".venv"))
 SCENE = "cornell_caustic"
 WITHOUT_KERNELS = "--without-kernels"
@@ -121,7 +122,7 @@ def with_bytecode(environment: dict[str, str]) -> dict[str, str]:
 
 
 def main(arguments: list[str]) -> int:
-    """`[SCENE and options]`, `test [pytest options]` or `setup [--without-kernels]`."""
+    """`[SCENE and options]`, `test [--all] [pytest options]` or `setup [--without-kernels]`."""
     if tuple(sys.version_info) < (3, 11):
         sys.exit(f"pmviewer needs Python 3.11 or newer; this is {sys.version.split()[0]}.")
     testing = arguments[:1] in (["test"], ["setup"])
@@ -134,7 +135,9 @@ def main(arguments: list[str]) -> int:
         print("compiling what the window's first clicks need (about a minute the first time)", flush=True)
         return subprocess.run([str(python), "-m", "pmviewer", "compile"], check=False, cwd=ROOT).returncode
     if testing:
-        command = [str(python), "-m", "pytest", *EVERYTHING, *side_by_side(arguments[1:]), *arguments[1:]]
+        options = [argument for argument in arguments[1:] if argument != ALL]
+        which = EVERYTHING if ALL in arguments else USUAL
+        command = [str(python), "-m", "pytest", *which, *side_by_side(options), *options]
         return subprocess.run(command, check=False, cwd=ROOT, env=with_bytecode(dict(os.environ))).returncode
     return subprocess.run([str(python), "-m", "pmviewer", *(arguments or [SCENE])], check=False, cwd=ROOT).returncode
 

@@ -28,6 +28,7 @@ def pictures(path: Path) -> dict[str, bytes]:
     return {name: plane.tobytes() for name, plane in read_exr(path)[0].items()}
 
 
+@pytest.mark.extensive
 @pytest.mark.slow
 def test_a_cluster_that_is_lost_leaves_all_that_there_is(tmp_path, monkeypatch, capsys):
     assert call(tmp_path / "alone.exr") == 0

@@ -36,11 +36,14 @@ def test_setup_compiles_ahead_unless_it_is_told_not_to(ran):
 def test_test_runs_slow_tests_too_and_passes_options_on(ran):
     launch.main(["test", "-m", "window", "tests/viewer"])
     command = ran[0]
-    assert command[:5] == ["python", "-m", "pytest", "-m", ""]
+    assert command[:5] == ["python", "-m", "pytest", "-m", "not extensive"]
     assert command[-3:] == ["-m", "window", "tests/viewer"]
     assert "-n" in command
     launch.main(["test", "--pdb"])
     assert "-n" not in ran[1]
+    launch.main(["test", "--all", "tests/maps"])
+    assert ran[2][:5] == ["python", "-m", "pytest", "-m", ""]
+    assert "--all" not in ran[2]
 
 
 def test_tests_translate_sources_once_where_no_bytecode_is_wanted_beside_them():

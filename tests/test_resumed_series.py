@@ -105,6 +105,7 @@ def test_a_folder_that_is_a_file(tmp_path, capsys):
     assert (tmp_path / "p.pictures").read_text() == "mine"
 
 
+@pytest.mark.extensive
 @pytest.mark.slow
 def test_killed_in_mid_picture_it_goes_on(tmp_path):
     """SIGKILL at three moments: no half file, at most one picture lost, and in the end those of a run undisturbed."""

@@ -55,6 +55,7 @@ def test_what_is_no_cluster(tmp_path, capsys, command):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.extensive
 @pytest.mark.slow
 def test_pictures_from_workers_are_those_of_this_process(tmp_path):
     pytest.importorskip("distributed")

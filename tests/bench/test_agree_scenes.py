@@ -67,6 +67,7 @@ def test_a_scene_depends_on_seed_and_number_alone():
     assert scene_of(3, 7) != scene_of(4, 7) != scene_of(4, 19)
 
 
+@pytest.mark.extensive
 def test_every_scene_is_read_without_a_warning_and_few_variants_of_kernels_are_needed(tmp_path):
     kinds = set()
     for i in range(72):

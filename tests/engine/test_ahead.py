@@ -83,6 +83,7 @@ def jit_misses() -> int:
     return sum(sum(each.stats.cache_misses.values()) for each in kernels)
 
 
+@pytest.mark.extensive
 def test_other_kinds_of_scenes_have_other_records(box):
     kinds = [click.opened.flat.record.dtype for click in other_kinds(box.flat.record.dtype, Settings())]
     assert len({str(kind) for kind in kinds}) == len(kinds) >= 2

@@ -105,6 +105,7 @@ def case(request):
     return request.param, open_scene(make()), blind
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("rule", RULES)
 def test_degenerate_scenes(case, rule, method):

@@ -20,6 +20,7 @@ def renderer(settings: Settings, threads: int) -> Renderer:
     return Renderer(open_scene("cornell_caustic"), settings, WorkPool(threads), StageStore())
 
 
+@pytest.mark.extensive
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "values",

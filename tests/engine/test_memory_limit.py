@@ -33,6 +33,7 @@ def test_this_system_tells():
     assert memory.available_memory() > 1 << 20
 
 
+@pytest.mark.extensive
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
 @pytest.mark.slow
 def test_memory_of_many_photons_comes_back():

@@ -55,6 +55,7 @@ def settings_of(variant: str) -> Settings:
     return with_values(Settings(), {"photons.N": 3000, "importance.N": 500, **VARIANTS[variant]})
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_blank_records_have_the_types_of_a_pass(variant, box, pool):
     settings = settings_of(variant)

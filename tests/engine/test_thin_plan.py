@@ -113,6 +113,7 @@ def test_the_record_of_the_kernels_is_that_of_the_scene_and_the_rule():
     assert "thin" not in opened.flat.record.dtype.names
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("rule", RULES)
 def test_the_picture_says_what_is_wrong_with_it(rule):
     box = box_with(PANE)

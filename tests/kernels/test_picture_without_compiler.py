@@ -77,6 +77,7 @@ def both(tmp_path_factory):
     return pictures(folder, "0"), pictures(folder, "1")
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("index", range(len(SETTINGS)), ids=SETTINGS)
 def test_the_same_picture(both, index):
     compiled, interpreted = (all_[index] for all_ in both)

@@ -196,6 +196,7 @@ def test_photons_carry_the_textures_power(name):
     assert spread_of < 1.2 * uniform
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("name", LIGHTS)
 def test_samples_agree_with_looking_around(name):
     flat = lit(name)

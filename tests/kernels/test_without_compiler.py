@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 
 PROGRAM = """
 import json, warnings
@@ -62,6 +63,7 @@ def numbers(disabled: str) -> list[list[float]]:
     return json.loads(run.stdout)
 
 
+@pytest.mark.extensive
 def test_same_numbers_without_compiler():
     compiled, interpreted = numbers("0"), numbers("1")
     assert interpreted[0] == compiled[0]

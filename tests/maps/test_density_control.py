@@ -95,6 +95,7 @@ def test_nearest_is_the_sources_method_photon_by_photon(rule):
     assert powers.max() > 4
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("rule", [STEP, COSINE])
 def test_density_settles_as_by_the_plain_method(rule):
     """By the step at 1.3, by the cosine at 2.2 times what is required, as the settings say."""

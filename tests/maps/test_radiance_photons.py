@@ -152,6 +152,7 @@ def test_share_of_photons_that_become_radiance_photons(share):
 
 
 # Photons and passes as in the test of the plain gather.
+@pytest.mark.extensive
 @pytest.mark.parametrize("lookup", ["radius", "nearest"])
 @pytest.mark.parametrize("share", SHARE_NAMES)
 def test_radiance_of_the_closed_sphere_is_one(share, lookup):

@@ -59,6 +59,7 @@ def test_error_falls_below_a_thousandth(scene, method, pool):
     assert renderer.tally.dropped == {"photons": 0, "samples": 0}
 
 
+@pytest.mark.extensive
 def test_radiance_photons_keep_the_mean(pool):
     """With shrinking radius and few photons in a disc, against the reference and against the plain gather."""
     target = reference("cornell_diffuse")

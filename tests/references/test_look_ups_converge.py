@@ -61,6 +61,7 @@ def floor_errors(pool, **estimate):
     return found, slope
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize(
     "estimate",
     [
@@ -93,6 +94,7 @@ def test_without_shrinking_they_would_not(pool):
     assert found[-1].relmse_all > 5e-3
 
 
+@pytest.mark.extensive
 def test_in_the_box_as_look_ups_of_their_size_do(pool):
     """The rest of the error is the dark rim along edges, whose width falls with the radius: nearest look-ups have it as
     look-ups of a fixed radius that holds as many photons."""

@@ -83,6 +83,7 @@ WAYS = {
 }
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("way", WAYS)
 def test_two_colours_are_the_mixed_colour(way):
     """Of the whole box, term by term; look-ups and caches take the part that counts at each hit."""

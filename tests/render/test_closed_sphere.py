@@ -36,6 +36,7 @@ def test_radiance_of_the_closed_sphere_is_one(case):
     assert renderer.tally.dropped == {"photons": 0, "samples": 0}
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("smooth", [False, True])
 @pytest.mark.parametrize("method", ["progressive", "gather", "path"])
 def test_radiance_of_a_closed_ball_of_triangles_is_one(method, smooth):

@@ -94,6 +94,7 @@ def test_the_radius_of_the_nearest_follows_the_density(box, pool, alpha, k, shar
             assert counts[pixel] == pytest.approx((distances <= expected).sum(), abs=0 if share == 1 else 1)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("values", [{"estimate.area": "convex hull"}, {"estimate.differential": True}])
 def test_other_estimates_have_their_radius_and_count(box, pool, values):
     plain = stepped(box, pool, {"render.method": "global map"}).frame(1, Wanted("look-up", "global"))

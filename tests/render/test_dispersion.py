@@ -36,6 +36,7 @@ def differ_by(a, b):
     return (a.mean(axis=0) - b.mean(axis=0)) / error, np.abs(a.mean(axis=0) / b.mean(axis=0) - 1)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize(("method", "passes"), [("path", 48), ("progressive", 24)])
 def test_an_index_that_is_the_same_for_all_light_gives_the_undispersed_picture(method, passes):
     """White in, white out: every channel, not only their sum."""

@@ -102,6 +102,7 @@ def test_an_unseen_object_changes_no_mirror(tmp_path, method):
     assert plain.mean() == pytest.approx(rich.mean(), rel=2e-3)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("lookup", ["radius", "nearest"])
 def test_caustics_of_a_point_light_on_smooth_gloss(tmp_path, lookup):
     """A mirror ball over metal of roughness 0.15: below `photons.glossy` the lobe is followed, and only photons know
@@ -113,6 +114,7 @@ def test_caustics_of_a_point_light_on_smooth_gloss(tmp_path, lookup):
     assert followed.mean() > 1.2 * means(source, "path", 5).mean()
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("height", [1.2, -1.2], ids=["above", "below"])
 def test_caustics_of_a_point_light_on_rough_glass(tmp_path, height):
     """The same on a pane of rough glass seen from either side; truth is a path tracer with a small ball for the light,

@@ -164,6 +164,7 @@ def by_bsdf(wall):
     return indirect(wall, rays=8)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("roulette", [0.0, 0.5])
 @pytest.mark.parametrize("directions", GUIDED)
 def test_guided_pictures_have_the_same_mean_and_less_noise(directions, roulette, wall, by_bsdf):

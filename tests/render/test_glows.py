@@ -111,6 +111,7 @@ def everything(channels=3):
     return replace(scene, lights=(PointLight("lamp", (-2.5, 2.0, 1.0), (2.0, 2.0, 3.0)),))
 
 
+@pytest.mark.extensive
 @pytest.mark.slow
 def test_all_methods_agree_on_flame_smoke_and_glass():
     """Means of the picture and of its terms: nothing is counted twice, nothing is left out."""

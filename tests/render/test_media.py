@@ -76,6 +76,7 @@ def test_single_scattering_of_a_slab(method, mu0, tau):
     assert image.mean() == pytest.approx(expected, rel=0.01)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("method", ["path", "progressive"])
 @pytest.mark.parametrize("g", [0.0, 0.7])
 def test_white_medium_under_a_white_sky_vanishes(method, g):
@@ -119,6 +120,7 @@ def mixed_scene():
     return cube_of(medium, (), (floor, ball, glass, light), (diffuse(), GLASS), camera=camera, size=24)
 
 
+@pytest.mark.extensive
 def test_photons_and_paths_agree_on_a_scene_with_everything():
     """Means of the picture, within 1.5 %; emission, direct and volume, which both sample, within 1 %."""
     path = rendered(mixed_scene(), settings_of(render={"method": "path", "max_depth": 100}), 600).frame(0)

@@ -75,6 +75,7 @@ def test_path_tracer_shows_mitsubas_picture(name):
     assert p_value(block_runs(name, "path", 64), expected["mean"], expected["error"], EXPECTED["runs"]) > SIGNIFICANCE
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("method", ["progressive", "gather"])
 @pytest.mark.parametrize("name", ["bumpmap_on_metal", "smooth_mesh_light"])
 def test_photon_methods_show_it_too(name, method):

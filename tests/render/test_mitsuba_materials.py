@@ -105,6 +105,7 @@ def test_path_tracer_shows_mitsubas_picture(name):
     check(name, "path", 64)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize(
     ("name", "method"),
     [("principled 0, area", "progressive"), ("principled 1, constant", "gather"), ("principled 6, area", "progressive"),

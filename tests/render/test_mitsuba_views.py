@@ -65,6 +65,7 @@ def test_path_tracer(name):
     check(name, "path", 64, 0.0)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize(
     ("name", "method"), [("veils_area", "progressive"), ("veils_sky", "gather"), ("orthographic", "progressive")]
 )

@@ -123,6 +123,7 @@ def test_light_inside_glass_is_weakened_by_its_way_though_it_passes_a_veil():
     assert image.mean(axis=(0, 1)) == pytest.approx(np.exp(-0.4 * np.array([2.0, 0.5, 0.0])), rel=2e-3)
 
 
+@pytest.mark.extensive
 def test_colours_at_vertices_multiply_the_reflectance_of_copies_and_textures():
     """A copied sheet under a white sky: its radiance is reflectance · texture · colour, linear between corners."""
     corners = np.array([[-1, 0, -1], [-1, 0, 1], [1, 0, 1], [1, 0, -1]], float)

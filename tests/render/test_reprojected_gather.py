@@ -246,6 +246,7 @@ def test_later_passes_reproject_less():
     assert shares[2] < 0.05
 
 
+@pytest.mark.extensive
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", [diffuse_box(size=32), cornell_box(size=32)], ids=["diffuse box", "mirror and glass"])
 def test_the_mean_is_that_of_the_plain_gather(scene):

@@ -82,6 +82,7 @@ SMOOTH = {
 }
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("name", SMOOTH)
 def test_photons_agree_with_path_tracing_on_smooth_coarse_meshes(name):
     """In the whole picture, and on the diffuse ball itself, where photons without correction show the triangles."""

@@ -107,6 +107,7 @@ def test_place_of_the_scene_changes_nothing():
         assert b.mean() == pytest.approx(a.mean(), rel=0.01)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("method", ["path", "progressive", "gather"])
 def test_what_else_kernels_know_changes_no_picture(method, request):
     """Kernels for scenes like this alone, and those for any material, texture and light."""

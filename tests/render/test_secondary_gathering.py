@@ -33,6 +33,7 @@ def test_closed_sphere_keeps_its_terms():
     assert found["indirect"] == pytest.approx(0.25, rel=0.01)
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("indirect_caustics", [True, False])
 @pytest.mark.parametrize("mis", [True, False])
 def test_every_class_of_paths_is_counted_once(mis, indirect_caustics):

@@ -182,6 +182,7 @@ def test_the_picture_is_the_same_for_any_number_of_threads():
         assert (one.frame(0).planes == three.frame(0).planes).all()
 
 
+@pytest.mark.extensive
 def test_behind_mirrors_and_glass_the_light_is_that_of_the_path_tracer():
     """Lights in caustics weigh nothing and are summed unweighted; the caustic map brings the light of caustics."""
     scene = cornell_box(size=12)

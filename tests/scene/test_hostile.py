@@ -10,6 +10,7 @@ from pmviewer.bench.hostile.bench import QUICK_FILES, tried
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux tells CPU time and memory")
 
 
+@pytest.mark.extensive
 @pytest.mark.timeout(600)
 def test_hostile_files_are_opened_or_refused_in_words():
     """No traceback, none above 10 CPU seconds or 1 GiB beyond an honest file, no Python in the sentences. Of the

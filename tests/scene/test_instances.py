@@ -277,6 +277,7 @@ def test_more_elements_than_ids_are_refused():
         flatten(replace(diffuse_box(), instances=many))
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("method", ["progressive", "path"])
 def test_same_picture_as_the_scene_written_out(method):
     """Copies in a closed box under a lamp: the means of the pictures agree within their noise, and all energy stays."""

@@ -46,6 +46,7 @@ def lab():
     pool.close()
 
 
+@pytest.mark.extensive
 @pytest.mark.parametrize("case", QUICK, ids=lambda case: f"{case.group}: {case.name}")
 def test_case(lab, case):
     row = run_case(lab, case)

@@ -7,6 +7,7 @@ import pytest
 from pmviewer.viewer.random_user import let_loose
 
 
+@pytest.mark.extensive
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [7])
 def test_random_actions_break_nothing_and_are_undone_to_the_same_picture(tmp_path, monkeypatch, seed):

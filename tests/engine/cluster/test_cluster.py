@@ -179,6 +179,7 @@ def test_a_cluster_is_borrowed_and_given_back_in_an_open_session(borrowed):
         session.close()
 
 
+@pytest.mark.extensive
 def test_the_window_borrows_workers_and_goes_on_without_them(monkeypatch):
     """The session: the same picture, photons of passes from elsewhere when they are looked at, and when the scheduler
     has gone a sentence, and the picture goes on."""
