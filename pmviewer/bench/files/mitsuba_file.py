@@ -148,11 +148,23 @@ def _adapt(mi: Any, state: Any, longest: int, lenient: bool) -> dict[str, Any]:
 
 
 def _resized(mi: Any, node: Any, longest: int) -> dict[str, Any]:
-    width, height = (int(node.props[key]) if key in node.props else default for key, default in
-                     (("width", 768), ("height", 576)))  # fmt: skip
+    """A film of that many pixels for the same picture, which may be a piece of a larger one."""
+
+    def number(default: int, *names: str) -> int:
+        return next((int(node.props[name]) for name in names if name in node.props), default)
+
+    whole = number(768, "width"), number(576, "height")
+    left, top = number(0, "crop_offset_x", "cropOffsetX"), number(0, "crop_offset_y", "cropOffsetY")
+    width = number(whole[0] - left, "crop_width", "cropWidth")
+    height = number(whole[1] - top, "crop_height", "cropHeight")
     size = small_size(width, height, longest)
     film = mi.Properties("hdrfilm")
-    film["width"], film["height"] = size
+    if (width, height) == whole:
+        film["width"], film["height"] = size
+    else:
+        film["width"], film["height"] = round(whole[0] * size[0] / width), round(whole[1] * size[1] / height)
+        film["crop_offset_x"], film["crop_offset_y"] = round(left * size[0] / width), round(top * size[1] / height)
+        film["crop_width"], film["crop_height"] = size
     # The filter stays: it is the node's child, which the new properties have to name again.
     node.props = film
     return {"size": list(size), "file_size": [width, height]}
