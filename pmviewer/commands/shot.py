@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -30,6 +30,9 @@ def shot(
     passes: Annotated[int | None, typer.Option(min=1, help="Passes to render before.")] = None,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Image size, for example 1280x720.")] = None,
     window: Annotated[bool, typer.Option("--window", help="The whole window instead of the picture.")] = False,
+    window_size: Annotated[
+        str | None, typer.Option(metavar="WxH[@SCALE]", help="Of the window and its interface, with --window.")
+    ] = None,
     panel: Annotated[str | None, typer.Option(metavar="NAME", help="Panel in front, with --window: Snapshots.")] = None,
     pixel: Annotated[
         str | None, typer.Option(metavar="X,Y", help="Pixel whose gather rays overlays.gather.show draws.")
@@ -51,7 +54,7 @@ def shot(
     from pmviewer.commands.job import load_job, with_snapshots
 
     job = with_snapshots(load_job(scene, set_ or [], define or [], edit or []), snapshot or [])
-    take_shot(job, output, passes, size, window, (pixel, pin, hold), captions, threads, panel or "")
+    take_shot(job, output, passes, size, window, (pixel, pin, hold), captions, threads, panel or "", window_size)
 
 
 def take_shot(
@@ -64,6 +67,7 @@ def take_shot(
     captions: bool,
     threads: int | None,
     panel: str = "",
+    window_size: str | None = None,
 ) -> None:
     """Open the window, take its picture (`pmviewer.viewer.shot`), close it. `shown`: of --pixel, --pin and --hold.
     Raises PmviewerError; WindowError without a display."""
@@ -81,13 +85,31 @@ def take_shot(
     camera = resolve_camera(load_scene(job.scene, job.parameters, rig=settings.light.rig), settings.camera)
     shot = Shot(output, chosen, pinned, shown[2], panel)
     picture_size = None if window else (camera.width, camera.height)
-    make = partial(ViewerApp, remember=False, shot=shot, picture_size=picture_size, captions=captions)
+    look: dict[str, Any] = {}
+    if window and window_size is not None:
+        look["window_size"], look["scale"] = _window_size(window_size)
+    make = partial(ViewerApp, remember=False, shot=shot, picture_size=picture_size, captions=captions, **look)
     start_viewer(make, job.scene, settings, threads, job.parameters, snapshots=job.snapshots)
     if not shot.done:
         raise shot.error or WindowError("The window was closed before the picture was taken.")
     if shot.error is not None:
         raise shot.error
     print(f"wrote {output.absolute()}{shot.stored}")
+
+
+def _window_size(text: str) -> tuple[tuple[int, int], float]:
+    """Pixels of the window and scale of its interface. Raises SettingError."""
+    from pmviewer.viewer.appearance import SCALES
+
+    match = re.fullmatch(r"\s*(\d{3,5})\s*x\s*(\d{3,5})\s*(?:@\s*(\d(?:\.\d+)?))?\s*", text)
+    scale = float(match[3] or 1) if match else 0.0
+    if not match or scale not in SCALES:
+        scales = ", ".join(f"{one:g}" for one in SCALES)
+        raise SettingError(
+            f"--window-size {text} is no size of a window: write WxH or WxH@SCALE, for example 2560x1440@2; scales are "
+            f"{scales}."
+        )
+    return (int(match[1]), int(match[2])), scale
 
 
 def _pixel(option: str, text: str | None) -> tuple[int, int] | None:

@@ -78,6 +78,8 @@ class ViewerApp:
         picture_size: tuple[int, int] | None = None,
         captions: bool = True,
         autosaves: Path | None = None,
+        window_size: tuple[int, int] | None = None,
+        scale: float | None = None,
     ) -> None:
         self.state = ViewerState(
             session, inactive_reason, recent or RecentFiles(), remember=remember, autosaves=autosaves
@@ -95,6 +97,9 @@ class ViewerApp:
         self._shares = layout.Shares()
         self.viewport.draw_toasts = lambda: draw_toasts(self.state, *self.viewport.origin, self.viewport.size[0])
         self.params = layout.runner_params(self._callbacks(), remember=remember, alone=picture_size)
+        if window_size is not None:
+            self.params.app_window_params.window_geometry.size = window_size
+        self.state.appearance.choose(scale=scale)
         self._shot, self.viewport.alone, self.viewport.captions = shot, picture_size is not None, captions
         self.add_ons = immapp.AddOnsParams(with_implot=True)
 
