@@ -34,8 +34,19 @@ def test_commands_of_figures_name_scenes_and_settings_that_there_are(figure):
 
 def test_every_picture_is_shown_and_every_shown_picture_is_there():
     text = "\n".join(path.read_text("utf-8") for path in [*DOCS.glob("*.md"), DOCS.parent / "README.md"])
-    for picture in sorted((DOCS / "images").iterdir()):
-        assert f"images/{picture.name})" in text, f"{picture.name} is not shown anywhere"
+    for picture in sorted((DOCS / "images").rglob("*.png")):
+        assert f"{picture.relative_to(DOCS).as_posix()})" in text, f"{picture.name} is not shown anywhere"
+
+
+def test_every_panel_is_shown_at_every_size():
+    """Those of the window, not of the list that made the pictures."""
+    from pmviewer.viewer.layout import PANELS
+
+    text = (DOCS / "panels.md").read_text("utf-8")
+    for panel in PANELS:
+        for size in ("small", "usual", "large"):
+            assert f"(images/panels/{panel.lower()}-{size}.png)" in text
+            assert (DOCS / "images" / "panels" / f"{panel.lower()}-{size}.png").is_file()
 
 
 def test_the_site_has_every_page_and_no_other():

@@ -121,6 +121,13 @@ def test_light_of_no_account_is_none():
     assert p_of(ours, theirs) < 1e-6
 
 
+def test_a_picture_that_sees_next_to_nothing_is_black():
+    """A sheet of Beckmann metal, seen where its microfacets have a probability of 1e-29: black for Mitsuba."""
+    faint, black = runs(1, 12, 16) * 1e-30, np.zeros((12, *PIXELS))
+    assert p_of(faint, black) == 1
+    assert p_of(runs(1, 12, 16) * 1e-6, black) < 1e-6
+
+
 def test_terms_of_black_pictures_are_not_compared():
     lit, black = np.full((4, *PIXELS), 2 * LEAST_LIGHT), np.full((4, *PIXELS), LEAST_LIGHT / 2)
     none, all_of_it = np.zeros_like(lit), summaries(lit + runs(3, 4, 8, LEAST_LIGHT / 100))

@@ -27,9 +27,10 @@ BLOCK = 8
 CHANNELS = 3
 ROUNDING = 1e-5
 """Relative difference that is no error: single precision, some additions and products deep."""
-NO_LIGHT = 1e-12
-"""Of the brightest block: as good as black. Microfacets whose probability is below 1e-20 are none for Mitsuba, here
-they are; a block that sees a lamp in such alone is black in one picture and at 1e-24 in the other."""
+NO_LIGHT, BLACK = 1e-12, 1e-18
+"""Of the brightest block, and of a scene's lights, which are some one W/(m² sr) bright: as good as black. Microfacets whose probability is below 1e-20 are none for Mitsuba, here
+they are; a block that sees a lamp in such alone is black in one picture and at 1e-24 in the other,
+and so is a whole picture that sees nothing else."""
 TAIL = 2.0
 NEGLIGIBLE = 1e-4
 """Share of the picture's light that one of its terms may be off by. Photons that bring less come so rarely, and count
@@ -99,7 +100,7 @@ def compared(
     variance = np.maximum(var_a + var_b, 1e-60)
     freedom = variance**2 / np.maximum(var_a**2 / (n - 1) + var_b**2 / (m - 1), variance**2 / (n + m - 2))
     sizes = np.abs(mean_a) + np.abs(mean_b)
-    rounding = ROUNDING * sizes + NO_LIGHT * sizes.max(initial=0.0)
+    rounding = ROUNDING * sizes + NO_LIGHT * sizes.max(initial=0.0) + BLACK
     unseen = np.where(mean_a < mean_b, _unseen(ours), _unseen(theirs)) * np.maximum(mean_a, mean_b)
     error = np.sqrt(variance + rounding**2 + (unseen / TAIL) ** 2)
     beyond = np.maximum(np.abs(mean_a - mean_b) - unseen - tolerance * np.abs(mean_b) - rounding - small, 0.0)

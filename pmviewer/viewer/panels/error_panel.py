@@ -27,6 +27,8 @@ if TYPE_CHECKING:  # brings OpenEXR along, which the window doesn't wait for
 CURRENT, EARLIER, KEPT = "current", "earlier", "snapshot"
 AXES = {"seconds": "rendering time (s)", "CPU": "CPU time (s)", "passes": "passes"}
 """What curves are plotted against."""
+NARROW, LOW = 26.0, 8.0
+"""Ems of a plot below which it has no legend beside it, or no titles of axes: its curves would have no room left."""
 _SNAPSHOTS: tuple[theme.Colour, ...] = (
     (0.35, 0.71, 0.91, 1.0),
     (0.10, 0.70, 0.50, 1.0),
@@ -146,10 +148,17 @@ class ErrorPanel:
         implot.push_style_color(implot.Col_.plot_bg, theme.ground("plot"))
         implot.push_style_color(implot.Col_.axis_grid, theme.grey(theme.look.lighter, 0.12))
         flags = implot.Flags_.no_inputs | implot.Flags_.no_menus | implot.Flags_.no_mouse_text
-        if implot.begin_plot("##curves", imgui.get_content_region_avail(), flags):
-            _axis(implot.ImAxis_.x1, AXES[self.axis], x_limits)
-            _axis(implot.ImAxis_.y1, "relMSE", y_limits)
-            implot.setup_legend(implot.Location_.east, implot.LegendFlags_.outside)
+        size, em = imgui.get_content_region_avail(), imgui.get_font_size()
+        narrow, low = size.x < NARROW * em, size.y < LOW * em
+        if narrow and len(drawn) == 1:
+            flags |= implot.Flags_.no_legend
+        if implot.begin_plot("##curves", size, flags):
+            _axis(implot.ImAxis_.x1, "" if low else AXES[self.axis], x_limits)
+            _axis(implot.ImAxis_.y1, "" if low else "relMSE", y_limits)
+            if narrow:
+                implot.setup_legend(implot.Location_.north_east, implot.LegendFlags_.none)
+            else:
+                implot.setup_legend(implot.Location_.east, implot.LegendFlags_.outside)
             for number, (curve, xs, ys) in enumerate(drawn):
                 current = curve.kind == CURRENT
                 palette = _SNAPSHOTS if curve.kind == KEPT else _EARLIER
