@@ -66,8 +66,9 @@ class Estimate(Group):
 
     radius: float | Auto = setting(
         "auto",
-        "Look-up radius of the first pass, relative to the scene's bounding-sphere radius. Automatic: a few pixel "
-        "footprints at the typical distance of what the camera sees.",
+        "Look-up radius of the first pass, relative to the scene's bounding-sphere radius. Automatic: four pixel "
+        "footprints at the typical distance of what the camera sees, three below gather rays: the least error after a "
+        "few passes. So small pictures lack light near edges and on small things, until the radius has shrunk.",
         stage="maps",
         scale="log",
         unit="× scene",

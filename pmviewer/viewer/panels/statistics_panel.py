@@ -205,6 +205,7 @@ def _maps(s: Statistics) -> None:
         for text in (grouped(count), grouped(s.stored_in_pass.get(name, 0)), si(radius, "m") if radius else "–"):
             imgui.table_next_column()
             _right(text)
+        imgui.set_item_tooltip("Light near edges and on what is smaller is missing until the radius has shrunk.")
     imgui.end_table()
 
 
