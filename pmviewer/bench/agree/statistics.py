@@ -28,9 +28,9 @@ CHANNELS = 3
 ROUNDING = 1e-5
 """Relative difference that is no error: single precision, some additions and products deep."""
 NO_LIGHT, BLACK = 1e-12, 1e-18
-"""Of the brightest block, and of a scene's lights, which are some one W/(m² sr) bright: as good as black. Microfacets whose probability is below 1e-20 are none for Mitsuba, here
-they are; a block that sees a lamp in such alone is black in one picture and at 1e-24 in the other,
-and so is a whole picture that sees nothing else."""
+"""Of the brightest block, and of a scene's lights, which are some one W/(m² sr) bright: as good as black. Microfacets
+whose probability is below 1e-20 are none for Mitsuba, here they are; a block that sees a lamp in such alone is black in
+one picture and at 1e-24 in the other, and so is a whole picture that sees nothing else."""
 TAIL = 2.0
 NEGLIGIBLE = 1e-4
 """Share of the picture's light that one of its terms may be off by. Photons that bring less come so rarely, and count
