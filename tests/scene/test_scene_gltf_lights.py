@@ -115,3 +115,10 @@ def test_surroundings_divide_by_alpha_and_damaged_ones_are_left_out(tmp_path: Pa
     assert sky.pixels == pytest.approx(5)
     scene = surroundings(tmp_path, [face] * 5)
     assert any("EXT_lights_image_based) can't be read" in w for w in scene.warnings)
+
+
+@pytest.mark.parametrize("lights", [1e308, "lamps", {"0": {}}, None, [3.0]])
+def test_lights_that_are_no_list_are_missing_lights(tmp_path: Path, lights: object) -> None:
+    """Found by files that were changed at random: it was "object of type 'float' has no len()"."""
+    scene = lit(tmp_path, lights, [{"light": 0}])
+    assert any("refers to a light that is not in the file" in text for text in scene.warnings)

@@ -10,6 +10,7 @@ from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.mitsuba.expand import Expansion
 from pmviewer.scene.formats.mitsuba.folders import Folders
 from pmviewer.scene.formats.mitsuba.xml import Element, parse_xml
+from pmviewer.scene.load import read_scene
 from tests.scene.helpers import load
 
 
@@ -135,3 +136,14 @@ def test_merged_shapes_are_shapes_of_the_scene(tmp_path: Path) -> None:
     assert scene.warnings == ()
     with pytest.raises(SceneError, match="contains itself"):
         load(tmp_path, '<shape type="merge" id="m"><ref id="m"/></shape>')
+
+
+def test_endless_names_of_types_are_shortened(tmp_path: Path) -> None:
+    path = tmp_path / "scene.xml"
+    path.write_text(
+        '<scene version="3.0.0"><sensor type="perspective"><film type="' + "x" * 5000 + '"/></sensor>'
+        '<emitter type="constant"/><shape type="sphere"/></scene>'
+    )
+    warnings = read_scene(path).warnings
+    assert any("is read as an hdrfilm" in text for text in warnings)
+    assert all(len(text) < 400 for text in warnings)

@@ -120,10 +120,9 @@ def _guarded(read: Callable[[], T], path: Path) -> T:
     except OSError as error:
         raise SceneError(f"The file can't be read: {error.strerror or error}.", path) from None
     except Exception as error:  # the decoders raise anything from KeyError to AssertionError on damaged files
-        reason = f"{type(error).__name__}: {error}".splitlines()[0].rstrip(": ")[:120]
         kind = path.suffix.lstrip(".").upper()
-        hint = "It may be damaged, or not be what its ending says."
-        raise SceneError(f"The {kind} file can't be decoded ({reason}).", path, hint=hint) from None
+        hint = "It is damaged, or is not what its ending says: export it again."
+        raise SceneError(f"The {kind} file can't be decoded.", path, hint=hint) from error
 
 
 def _read(path: Path, ending: str, diagnostics: Diagnostics, choices: Mapping[str, str]) -> MeshFile:

@@ -260,10 +260,11 @@ class _Reader:
         if number is None:
             return
         lights = self._document.extension(_LIGHTS).get("lights", [])
-        if not is_index(number) or number >= len(lights) or not isinstance(lights[number], dict):
+        known = lights if isinstance(lights, list) else []
+        if not is_index(number) or number >= len(known) or not isinstance(known[number], dict):
             self._document.warn(f"{place.name} refers to a light that is not in the file.")
             return
-        light = punctual(lights[number], place.matrix, self._document.diagnostics)
+        light = punctual(known[number], place.matrix, self._document.diagnostics)
         self._result.lights += [] if light is None else [light]
 
 

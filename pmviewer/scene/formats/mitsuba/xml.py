@@ -11,6 +11,7 @@ from typing import NoReturn
 from xml.parsers import expat
 
 from pmviewer.errors import SceneError
+from pmviewer.scene.diagnostics import shortened
 
 MAX_FILE_BYTES = 64 << 20
 MAX_DEPTH = 64
@@ -31,7 +32,8 @@ class Element:
 
     def __str__(self) -> str:
         kind = self.attributes.get("type")
-        return f'<{self.tag} type="{kind}">' if kind else f"<{self.tag}>"
+        tag = shortened(self.tag)
+        return f'<{tag} type="{shortened(kind)}">' if kind else f"<{tag}>"
 
 
 def read_xml(path: Path, included: Path | None = None) -> Element:
