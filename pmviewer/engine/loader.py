@@ -49,17 +49,21 @@ class Loader:
         arrangement: Callable[[], Arrangement],
         has_scene: Callable[[], bool],
         on_loaded: Callable[[bool], None],
+        on_given_up: Callable[[], None],
     ) -> None:
         """arrangement: what is asked for now; has_scene: whether there is an open scene; on_loaded is called under
-        `published.changed`, and told whether it is the open scene, arranged anew."""
+        `published.changed`, and told whether it is the open scene, arranged anew; on_given_up is called under it when
+        nothing will come of the last request and the open scene may lack what was asked for meanwhile."""
         self.text = ""
         self.loaded: Loaded | None = None
         self.asked = self.done = self._cancelled = 0
         self._closed = self._rearranging = False
         self._began = 0.0
         self._drawn: tuple[Scene, DrawGeometry] | None = None
+        self._refused: Arrangement | None = None
         self._published, self._changed = published, published.changed
         self._arrangement, self._has_scene, self._on_loaded = arrangement, has_scene, on_loaded
+        self._on_given_up = on_given_up
 
     @property
     def pending(self) -> bool:
@@ -149,6 +153,7 @@ class Loader:
                 return rearranged(opened, arrangement)
             except SceneError:
                 if self._arrangement() == arrangement:
+                    self._refused = arrangement
                     raise
 
     def _hand_over(self, ticket: int, loaded: Loaded) -> bool:
@@ -184,6 +189,8 @@ class Loader:
     def _dropped(self, ticket: int, name: str) -> None:
         with self._changed:
             asked_for = ticket == self.asked and not self._closed
+            if asked_for and self._rearranging:
+                self._refused = self._arrangement()
         if asked_for:
             self._failed(ticket, "info", f"{name}: loading was cancelled.")
 
@@ -193,6 +200,8 @@ class Loader:
             self.done = max(self.done, ticket)
             if ticket == self.asked:
                 self.text = ""
+                if not self._closed and self._arrangement() != self._refused:
+                    self._on_given_up()  # other edits arrived while this was failing
             if not self._has_scene():
                 self._published.status = Status("failed", text)
             self._changed.notify_all()

@@ -69,6 +69,7 @@ class Session:
             lambda: arrangement_of(self._settings),
             lambda: self._opened is not None,
             self._loaded_scene,
+            self._rearrange,
         )
         self._version = 0
         self._restart = self._paused = self._closed = self._first_picture = False

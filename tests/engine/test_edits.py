@@ -96,6 +96,33 @@ def test_what_can_not_be_is_said_once_and_the_picture_stays(session):
     assert np.allclose(shown(session), 2 * plain, rtol=2e-4, atol=1e-6)
 
 
+def test_an_edit_that_arrives_while_another_one_fails_is_not_lost(session, monkeypatch):
+    plain, say = shown(session), session._published.say
+
+    def meanwhile(level, text):
+        say(level, text)
+        if "light '9'" in text:
+            session.set(with_edits(light_1_power=2.0))
+
+    monkeypatch.setattr(session._published, "say", meanwhile)
+    session.set(with_edits(light_9_power=2.0))
+    until(lambda: errors(session) and not session.loading)
+    assert np.allclose(shown(session), 2 * plain, rtol=2e-4, atol=1e-6)
+
+
+def test_an_edit_that_arrives_while_another_scene_fails_to_open_is_not_lost(session, monkeypatch):
+    plain, say = shown(session), session._published.say
+
+    def meanwhile(level, text):
+        say(level, text)
+        session.set(with_edits(light_1_power=2.0))
+
+    monkeypatch.setattr(session._published, "say", meanwhile)
+    session.open("/no/such/scene.toml")
+    until(lambda: errors(session) and not session.loading)
+    assert np.allclose(shown(session), 2 * plain, rtol=2e-4, atol=1e-6)
+
+
 def test_the_scenes_reference_is_not_of_an_edited_scene():
     from pmviewer.engine.comparison.reference import reference_for
     from pmviewer.errors import SceneError
