@@ -28,16 +28,34 @@ SPECS = st.builds(
 )
 
 
+PLAIN_KERNELS = {
+    "render.filter": "box",
+    "render.filter_radius": "auto",
+    "estimate.radius_rule": SETTINGS["estimate.radius_rule"].default,
+    "photons.maps": 1,
+}
+VARIANTS = {
+    "progressive": {"render.filter": "Gaussian", "estimate.radius_rule": "pixel"},
+    "nearest": {"photons.maps": 3},
+    "gather": {},
+    "path": {"render.filter": "Lanczos"},
+    "global map": {},
+    "caustic map": {},
+}
+"""Of the settings that kernels are compiled for: one value a structure. `bench stress` draws from all."""
+
+
 @pytest.mark.parametrize("structure", PLAIN)
 @settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 @given(values=VALUES, spec=SPECS)
 def test_anything_the_schema_allows(structure, values, spec):
-    assert check(scene_of(spec), drawn.settings_of(PLAIN[structure], values, spec), views=structure != "nearest") == ""
+    chosen = PLAIN[structure] | PLAIN_KERNELS | VARIANTS[structure]
+    assert check(scene_of(spec), drawn.settings_of(chosen, values, spec), views=structure != "nearest") == ""
 
 
 def test_structures_are_settings():
     """A setting that is renamed is noticed here, not left out in silence."""
-    assert set(SETTINGS) >= STRUCTURAL
+    assert set(SETTINGS) >= STRUCTURAL | set(PLAIN_KERNELS)
     assert {path for values in STRUCTURES.values() for path in values} <= set(SETTINGS)
     for name in STRUCTURES:
         drawn.settings_of(STRUCTURES[name], {}, Spec())
