@@ -105,8 +105,8 @@ def install(python: Path, extras: str) -> None:
 
 def side_by_side(options: list[str]) -> list[str]:
     """pytest's options for several processes, each with files of its own, in the order of `tests/conftest.py`: most of
-    the time is single-threaded. One more than processors, since they wait: for windows, for each other's kernels. One process where the user asks for what has none: output, the debugger, a number of
-    their own."""
+    the time is single-threaded. One more than processors, since they wait: for windows, for each other's kernels. One
+    process where the user asks for what has none: output, the debugger, a number of their own."""
     single = ("-s", "-n", "--pdb", "--capture", "--trace")
     if any(option.startswith(single) for option in options):
         return []
