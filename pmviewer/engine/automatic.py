@@ -20,7 +20,7 @@ def automatic_values(looked: Looked, first_radius: float) -> dict[str, Any]:
     first_radius: of look-ups in the first pass, in scene units; it stays the same from pass to pass.
     """
     plan, settings, radius = looked.plan, looked.settings, looked.scene.flat.radius
-    found: dict[str, Any] = {"light.rig": _rig(looked.scene)}
+    found: dict[str, Any] = {"light.rig": _rig(looked.scene), "render.lights": "hidden" if plan.hides else "shown"}
     if plan.photons:
         found["estimate.radius"] = first_radius / radius
         found["photons.max_bounces"] = most_bounces(settings.photons, plan.media)

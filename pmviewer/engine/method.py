@@ -9,6 +9,7 @@ from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, THIN, in_media
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
 from pmviewer.render.filter import BOX, filter_of, is_signed
+from pmviewer.render.hidden_lights import are_hidden
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.scene.description import PixelFilter
 from pmviewer.settings.access import Settings, with_values
@@ -25,6 +26,7 @@ UNFOUND_BY_PATHS = (
     "The path tracer finds no light that comes from a point, spot or directional light over a mirror or through glass: "
     "no ray can meet such a light. The photon methods show it."
 )
+SHOWN = "Lights and the sky are shown, which the file or render.lights hides: not in scenes with media."
 ALL = 1 << DIRECT | 1 << CAUSTIC | 1 << INDIRECT | 1 << INDIRECT_CAUSTIC
 
 
@@ -46,10 +48,10 @@ class Plan:
     whether rays by phase functions can meet a light, `looked_for` whether direct light is looked for by rays whatever
     `direct.mis` says; `dispersion` whether glass splits light into colours; `lens`
     whether the render camera has one, `filtered` whether the film has another reconstruction filter than the plain box,
-    `moments` whether the film keeps what passes tell of its noise, `split` whether camera paths go both ways at glass;
-    `thin_glass` are the rules by which light passes panes of glass, () where all of it is exact; `maps` is how many
-    parts of the light pass have photon maps of their own; `warnings` are sentences for the log about what was asked for
-    and can't be."""
+    `moments` whether the film keeps what passes tell of its noise, `split` whether camera paths go both ways at glass,
+    `hides` whether the picture shows no lights; `thin_glass` are the rules by which light passes panes of glass, ()
+    where all of it is exact; `maps` is how many parts of the light pass have photon maps of their own; `warnings` are
+    sentences for the log about what was asked for and can't be."""
 
     path: bool = False
     direct: bool = False
@@ -75,6 +77,7 @@ class Plan:
     filtered: bool = False
     moments: bool = True
     split: bool = False
+    hides: bool = False
     media: bool = False
     volume: bool = False
     phase_rays: bool = False
@@ -151,6 +154,8 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         "by setting" in traits.thin_glass and asked.render.thin_glass != "exact"
     ):
         said = (*said, THIN)
+    if hides_lights(asked, traits):
+        said = (*said, SHOWN)
     looked_for = traits.media_emit and not plan.path
     return replace(plan, media=True, looked_for=looked_for, warnings=(*plan.warnings, *said))
 
@@ -170,6 +175,7 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         lens=_has_lens(settings, traits),
         filtered=_filtered(settings, traits),
         split=_splits(settings, traits, plan),
+        hides=hides_lights(settings, traits) and not traits.has_media,
         moments=not (_divided(settings, plan) or is_signed(_filter(settings, traits))),
         thin_glass=thin_rules(settings, traits),
         dispersion=traits.has_dispersion,
@@ -226,6 +232,11 @@ def _splits(settings: Settings, traits: SceneTraits, plan: Plan) -> bool:
     """Whether camera paths go both ways at glass."""
     glass = traits.has_smooth_glass and not traits.has_dispersion
     return settings.render.splits > 0 and glass and not (plan.path or plan.virtual)
+
+
+def hides_lights(settings: Settings, traits: SceneTraits) -> bool:
+    """Whether the picture is asked to show no lights."""
+    return are_hidden(settings.camera.name in traits.hiding, settings.render)
 
 
 def _filtered(settings: Settings, traits: SceneTraits) -> bool:

@@ -46,6 +46,7 @@ from pmviewer.kernels.vector import add, along, dot, luminance, mul, scale
 from pmviewer.maps.photon_words import encode_direction
 from pmviewer.render.cast import Ray, leaving, span_of
 from pmviewer.render.chain import WHITE, arrive, scatter
+from pmviewer.render.hidden_lights import past_lights
 from pmviewer.render.lens import through_lens
 from pmviewer.render.straight import cast_on, way
 
@@ -254,5 +255,5 @@ def trace_importons(scenes, eyes, passes, i0, i1, caustic_out, global_out, count
             return i
         x, y, a, b = draw4(SOBOL, pass_.seed, _u4(i), IMAGE_PLACE)
         ray, P, D = image_ray(eye, pass_.left + x * pass_.across, pass_.top + y * pass_.down, a, b)
-        _trace(scene, pass_, i, ray, P, D, (caustic_out, global_out), counts)
+        _trace(scene, pass_, i, past_lights(scene, eye, ray), P, D, (caustic_out, global_out), counts)
     return i1

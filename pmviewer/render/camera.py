@@ -61,6 +61,8 @@ class CameraPose:
     picture, which `pmviewer.engine.focus` finds."""
     filter: PixelFilter | None = None
     """Reconstruction filter of the file's film, None where it names none."""
+    hides_lights: bool = False
+    """Whether the file says that the camera does not see lights and the sky (`pmviewer.render.hidden_lights`)."""
     medium: int | None = None
     """Number of the medium around the eye, −1 for none, as `pmviewer.engine.immersion` finds it; None in scenes without
     media."""
@@ -282,6 +284,7 @@ def resolve_camera(scene: Scene, settings: CameraSettings) -> CameraPose:
         aperture=camera.aperture if settings.aperture == "auto" else float(settings.aperture),
         focus=camera.focus if settings.focus == "auto" else float(settings.focus),
         filter=camera.filter,
+        hides_lights=camera.hides_lights,
     )
 
 

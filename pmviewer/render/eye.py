@@ -30,6 +30,7 @@ from pmviewer.render.filter import place_in_filter
 from pmviewer.render.gather.cached import cached, surface_rays
 from pmviewer.render.gather.guide import AIM_WORDS, aim
 from pmviewer.render.given import Aim, GatherRays, Sampler, opened
+from pmviewer.render.hidden_lights import hides_lights
 from pmviewer.render.media.volume import deposit_media
 from pmviewer.render.pixel import (
     CAUSTIC,
@@ -197,7 +198,8 @@ def eye_pass(given, outline, radii, film, counts, first, last):
     for number in range(first, last):
         seed, ray, place, weight = sampled_ray(scene, eye, number)
         pixel = Pixel(number, seed, film, radii, counts, weight)
-        outlined = len(outline) > 0 and outline[number] != 0
+        hidden = hides_lights(eye)
+        outlined = not hidden and len(outline) > 0 and outline[number] != 0
         if outlined:
             outline_emission(scene, eye, pixel)
             counts[C_RAYS] += eye.outline_rays
@@ -213,14 +215,14 @@ def eye_pass(given, outline, radii, film, counts, first, last):
                 whole = depth == 0
                 seen = EMISSION if whole else SPECULAR
                 if hit.prim < 0:
-                    if met_light(scene, hit) >= 0 and not (whole and outlined):
+                    if met_light(scene, hit) >= 0 and not (whole and (outlined or hidden)):
                         deposit(pixel, seen, mul(beta, _emission(given, left, pdf, choice, hit, ray.d)))
                     break
                 si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
                 if whole:
                     properties(eye, pixel, si)
                     note_object(given, hit.prim, pixel)
-                if met_light(scene, hit) >= 0 and not (whole and outlined):
+                if met_light(scene, hit) >= 0 and not (whole and (outlined or hidden)):
                     deposit(pixel, seen, mul(beta, _emission(given, left, pdf, choice, hit, ray.d)))
                 groups = si.bsdf.groups
                 beta, u_way = thinned(eye, beta, u_way), CERTAIN

@@ -53,7 +53,8 @@ def free_pose(render: CameraPose, free: FreeCamera, center: NDArray[np.floating]
     if origin == target and free.target == "auto":  # where a given eye point is the automatic target
         target = _vec3(np.asarray(target) - np.asarray(_behind(render)) * radius)
     up = _vec3(_level(render)[1]) if free.up == "auto" else free.up
-    pose = CameraPose(origin, target, up, fov, render.width, render.height, filter=render.filter)
+    width, height, hides = render.width, render.height, render.hides_lights
+    pose = CameraPose(origin, target, up, fov, width, height, filter=render.filter, hides_lights=hides)
     return with_cut(pose, render, free, radius)
 
 

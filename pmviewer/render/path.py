@@ -22,6 +22,7 @@ from pmviewer.render.chain import WHITE, arrive, scatter
 from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power
 from pmviewer.render.direct.direct import light_samples, met_light, power_heuristic, radiance_of
 from pmviewer.render.given import Sampler
+from pmviewer.render.hidden_lights import hides_lights
 from pmviewer.render.media.path_flight import arrive_by_flight, scatter_in_medium
 from pmviewer.render.pixel import (
     CAUSTIC,
@@ -115,7 +116,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
             if hit.prim >= 0:
                 si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
             light = met_light(scene, hit)
-            if light >= 0:
+            if light >= 0 and not (depth == 0 and hides_lights(eye)):
                 L = radiance_of(scene, light, hit, ray.d)
                 weight = _f4(1.0)
                 if pdf > _f4(0.0):

@@ -16,6 +16,7 @@ from pmviewer.kernels.surface import face
 from pmviewer.kernels.vector import is_good, normalize
 from pmviewer.render.cast import of_wave, ray_of_camera
 from pmviewer.render.filter import place_in_filter
+from pmviewer.render.hidden_lights import past_lights
 from pmviewer.render.lens import lens_numbers, through_lens
 from pmviewer.render.planes import PLANES
 from pmviewer.render.record import C_DROPPED
@@ -96,7 +97,8 @@ def sampled_ray(scene, eye, pixel):
     ux, uy, u_light, v_light = draw4(eye.sequence, seed, eye.index, PIXEL)
     x, y, weight = place_in_filter(eye, ux, uy)
     a, b = lens_numbers(eye, seed)
-    ray = of_wave(lens_ray(eye, pixel, x, y, a, b), new_wave(scene, eye.sequence, seed, eye.index, WAVE))
+    ray = past_lights(scene, eye, lens_ray(eye, pixel, x, y, a, b))
+    ray = of_wave(ray, new_wave(scene, eye.sequence, seed, eye.index, WAVE))
     return seed, ray, (u_light, v_light), weight
 
 

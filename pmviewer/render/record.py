@@ -11,6 +11,7 @@ from pmviewer.kernels.random import SOBOL
 from pmviewer.maps.estimate.filters import FILTERS
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.filter import BOX, FILTER_FIELDS, filter_of, set_filter
+from pmviewer.render.hidden_lights import HIDDEN_FIELDS, hidden_from
 from pmviewer.render.lens import LENS_FIELDS
 from pmviewer.render.split import SPLIT_FIELDS
 from pmviewer.settings.access import Settings
@@ -73,13 +74,15 @@ MEDIA_FIELDS: list[tuple[str, str]] = [
 """Of scenes with participating media."""
 
 
-def eye_dtype(lens: bool = False, filtered: bool = False, media: bool = False, split: bool = False) -> np.dtype:
+def eye_dtype(
+    lens: bool = False, filtered: bool = False, media: bool = False, split: bool = False, hides: bool = False
+) -> np.dtype:
     """The record of a camera with a lens or without, a reconstruction filter other than the plain box or not, of a
-    scene with media or without, and of paths that split at glass or choose: kernels are compiled for the record's type,
-    so that what is not there costs nothing."""
+    scene with media or without, of paths that split at glass or choose, and that hides lights or not: kernels are
+    compiled for the record's type, so that what is not there costs nothing."""
     # In front, since numba warns where one record begins like another.
     extra = [*(LENS_FIELDS if lens else []), *(FILTER_FIELDS if filtered else []), *(MEDIA_FIELDS if media else [])]
-    extra += SPLIT_FIELDS if split else []
+    extra += [*(SPLIT_FIELDS if split else []), *(HIDDEN_FIELDS if hides else [])]
     return np.dtype([*extra, *_FIELDS], align=True)
 
 
@@ -139,9 +142,9 @@ def eye_record(
     """The record (1,) of an `eye_dtype` of pass `index`, complete: nobody writes to it afterwards. A lens must have
     been focused (`pmviewer.engine.focus`)."""
     chosen = filter_of(camera.filter, settings.render)
-    record = np.zeros(
-        1, eye_dtype(camera.aperture > 0, chosen != BOX, camera.medium is not None, evaluation.splits > 0)
-    )
+    in_media = camera.medium is not None
+    hides = hidden_from(camera, settings.render)
+    record = np.zeros(1, eye_dtype(camera.aperture > 0, chosen != BOX, in_media, evaluation.splits > 0, hides))
     r = record[0]
     if camera.medium is not None:
         r["medium"] = camera.medium
@@ -150,6 +153,8 @@ def eye_record(
         _set_lens(r, camera)
     if chosen != BOX:
         set_filter(r, chosen)
+    if hides:
+        r["hides"] = 1
     r["sequence"], r["seed"], r["index"] = SOBOL, settings.render.seed & 0xFFFFFFFF, index & 0xFFFFFFFF
     r["max_depth"] = settings.render.max_depth
     r["outline_rays"] = settings.render.outline_rays

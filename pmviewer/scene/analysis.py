@@ -55,6 +55,8 @@ class SceneTraits:
     orthographic: bool = False
     lenses: frozenset[str] = frozenset()
     filters: tuple[tuple[str, PixelFilter], ...] = ()
+    hiding: frozenset[str] = frozenset()
+    """The names of cameras that do not see lights, as `camera.name` takes them."""
     thin_glass: tuple[str, ...] = ()
     has_other_specular: bool = False
     has_media: bool = False
@@ -124,6 +126,7 @@ def analyse(scene: Scene) -> SceneTraits:
         has_delta_lights=any(isinstance(light, PointLight | SpotLight | DirectionalLight) for light in scene.lights),
         orthographic=scene.camera.projection == "orthographic",
         lenses=frozenset(name for name, camera in _cameras(scene) if camera.aperture > 0),
+        hiding=frozenset(name for name, camera in _cameras(scene) if camera.hides_lights),
         filters=tuple((name, camera.filter) for name, camera in _cameras(scene) if camera.filter is not None),
         thin_glass=tuple(sorted({m.thin_rule for m in panes})),
         has_other_specular=any(always_followed(m) and not any(m is pane for pane in panes) for m in used),

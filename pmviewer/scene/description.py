@@ -339,6 +339,8 @@ class Camera:
     """Of the film; None: the file does not say."""
     medium: int = -1
     """The medium that the file says the camera is in, −1 for none."""
+    hides_lights: bool = False
+    """Whether the file says that the picture shows no lights, nor the sky."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Surfaces that rays pass, colours at vertices, orthographic and shifted cameras: Mitsuba 3's pictures are ours.
+"""What rays pass, colours at vertices, other views, lights that are not seen: Mitsuba 3's pictures are ours.
 
 The expectation was rendered by Mitsuba 3 (tests/render/mitsuba_views/record.py): means over blocks of pixels and their
 standard errors; each picture is tested against it by Welch's t-test.
@@ -72,3 +72,8 @@ def test_path_tracer(name):
 def test_photon_methods(name, method):
     """Within two percent of a block, for what look-ups blur along edges. Each pair compiles kernels of its own."""
     check(name, method, 24, 0.02)
+
+
+@pytest.mark.parametrize("method", ["progressive", "gather"])
+def test_photon_methods_hide_lights(method):
+    check("hidden_lights", method, 24, 0.02)

@@ -32,13 +32,14 @@ PLAIN_KERNELS = {
     "render.filter": "box",
     "render.filter_radius": "auto",
     "estimate.radius_rule": SETTINGS["estimate.radius_rule"].default,
+    "render.lights": "shown",
     "photons.maps": 1,
 }
 VARIANTS = {
     "progressive": {"render.filter": "Gaussian", "estimate.radius_rule": "pixel"},
     "nearest": {"photons.maps": 3},
     "gather": {},
-    "path": {"render.filter": "Lanczos"},
+    "path": {"render.filter": "Lanczos", "render.lights": "hidden"},
     "global map": {},
     "caustic map": {},
 }

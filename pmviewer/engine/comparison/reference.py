@@ -8,6 +8,7 @@ from pmviewer.errors import SceneError, SettingError
 from pmviewer.output.compare import Reference, load_reference
 from pmviewer.render.camera import resolve_camera, size_only
 from pmviewer.render.filter import is_own
+from pmviewer.render.hidden_lights import are_hidden
 from pmviewer.scene.description import Scene
 from pmviewer.scene.load import reference_of
 from pmviewer.settings.access import Settings
@@ -36,6 +37,8 @@ def reference_for(source: str | Path | None, scene: Scene, settings: Settings) -
         raise SceneError(
             "The scene's reference has the scene's own reconstruction filter: leave out render.filter.", path
         )
+    if source is None and are_hidden(camera.hides_lights, settings.render) != camera.hides_lights:
+        raise SceneError("The scene's reference shows lights as its file says: leave out render.lights.", path)
     reference = load_reference(path)
     reference.check_size((camera.width, camera.height))
     return reference

@@ -21,6 +21,7 @@ from pmviewer.render.film import Film
 from pmviewer.render.filter import BOX, add_weights, filter_of, has_signs
 from pmviewer.render.gather.gather_points import POINT_COLUMNS, gather_points
 from pmviewer.render.given import PassData
+from pmviewer.render.hidden_lights import hidden_from
 from pmviewer.render.path import path_pass
 from pmviewer.render.record import N_COUNTS
 from pmviewer.settings.access import Settings
@@ -88,7 +89,7 @@ def tile_size(pixels: int, eye: np.void, threads: int, virtual_lights: int = 0) 
 def outline_of(scene: OpenScene, camera: CameraPose, film: Film, settings: Settings, store: StageStore) -> NDArray:
     """Pixels on the outline of a light, where the eye pass looks for emission with rays of its own: uint8, empty where
     it does not. The film may be smaller than the camera's picture."""
-    if settings.render.outline_rays == 0:
+    if settings.render.outline_rays == 0 or hidden_from(camera, settings.render):
         return np.zeros(0, np.uint8)
     if (film.width, film.height) != (camera.width, camera.height):
         camera = replace(camera, width=film.width, height=film.height)

@@ -139,7 +139,8 @@ def box_of(structure: Structure) -> NDArray[np.float64]:
 
 def blank_eye(settings: Settings, plan: Plan) -> NDArray[np.void]:
     """An eye record (1,) without contents. The free camera is a pinhole."""
-    return np.zeros(1, eye_dtype(plan.lens and not settings.free_camera.on, plan.filtered, plan.media, plan.split))
+    lens = plan.lens and not settings.free_camera.on
+    return np.zeros(1, eye_dtype(lens, plan.filtered, plan.media, plan.split, plan.hides))
 
 
 def blank_pass(scene: NDArray[np.void], settings: Settings, plan: Plan) -> PassData:

@@ -23,6 +23,7 @@ from pmviewer.render.cast import Hit, cast
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow
 from pmviewer.render.direct.choice import LIST_WORDS, choose, chosen_light
 from pmviewer.render.direct.shadow import UNKNOWN, known_visibility
+from pmviewer.render.hidden_lights import past_lights
 from pmviewer.render.lookup import irradiance, looked_up
 from pmviewer.render.pixel import camera_ray, pixel_seed
 from pmviewer.render.pixel_radius import own_radius
@@ -47,7 +48,7 @@ def stored_hit(scene, eye, pixel):
     """The first surface seen through the pixel's middle that stores photons: a Hit (of primitive −1 where there is
     none), its geometric normal on the viewer's side, and the direction in which it is seen."""
     half = _f4(0.5)
-    ray = camera_ray(eye, pixel, half, half)
+    ray = past_lights(scene, eye, camera_ray(eye, pixel, half, half))
     hit = cast(scene, ray)
     beta = WHITE
     for _ in range(eye.max_depth + 1):

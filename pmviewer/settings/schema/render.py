@@ -116,6 +116,16 @@ class Render(Group):
         ge=0.1,
         le=8.0,
     )
+    lights: Literal["auto", "shown", "hidden"] = setting(
+        "auto",
+        "Whether the picture shows lights and the sky themselves. hidden: the camera's rays pass what shines and find "
+        "the sky black; what lights shine on stays lit, and mirrors and glass show them. Automatic: as the scene file "
+        "says (hide_emitters of Mitsuba's files), or shown.",
+        stage="image",
+        scale="choice",
+        title="lights in the picture",
+        needs=(CLEAR,),
+    )
     seed: int = setting(1, "Seed of every random stream.", stage="photons", scale="integer", ge=0, le=2**31 - 1)
     passes: int = setting(
         1024, "Refinement stops after this many passes.", stage="stop", scale="log", unit="passes", ge=1, le=1_000_000

@@ -30,6 +30,7 @@ CAMERAS = {
     "perspective": Camera(ORIGIN, TARGET, UP, 42.0),
     "orthographic": Camera(ORIGIN, TARGET, UP, 42.0, projection="orthographic", width=3.4),
     "shifted": Camera(ORIGIN, TARGET, UP, 42.0, shift=(0.17, -0.12)),
+    "hiding": Camera(ORIGIN, TARGET, UP, 42.0, hides_lights=True),
 }
 VIEWS = {
     "veils_area": "perspective",
@@ -37,6 +38,7 @@ VIEWS = {
     "vertex_colours": "perspective",
     "orthographic": "orthographic",
     "shifted": "shifted",
+    "hidden_lights": "hiding",
 }
 
 
@@ -69,6 +71,13 @@ PARTS: dict[str, tuple[Any, Material]] = {
 SOLIDS = {"floor": "floor", "veil": "floor", "ball": "floor", "screen": "floor"}
 LIGHT = rectangle((0.2, -0.3, 3.0), (1.2, 0, 0), (0, -1.2, 0))
 RADIANCE = (3.0, 2.7, 2.2)
+LAMPS = {
+    "lamp": Sphere((-0.1, -3.4, 2.2), 0.1),
+    "panel": rectangle((0.35, -3.4, 2.15), (0.12, 0, 0), (0, -0.05, -0.12)),
+}
+"""Before all else that the camera sees; Mitsuba's has a near plane behind them, for what it finds behind emitters that
+it hides is not where it is (3.9.1)."""
+LAMP_RADIANCE, NEAR = (150.0, 135.0, 110.0), 1.6
 
 
 def description(name: str) -> Scene:
@@ -87,6 +96,9 @@ def description(name: str) -> Scene:
     shapes = tuple(Shape(part, geometry, i) for i, (part, (geometry, _)) in enumerate(PARTS.items()))
     if name == "veils_area":
         shapes, sky = (*shapes, Shape("light", LIGHT, 0, RADIANCE)), ()
+    if name == "hidden_lights":
+        shapes = (*shapes, *(Shape(lamp, geometry, 0, LAMP_RADIANCE) for lamp, geometry in LAMPS.items()))
+        sky = ()
     return Scene(name, None, shapes, materials, sky, camera, *SIZE)
 
 
@@ -104,6 +116,8 @@ def for_mitsuba(name: str, mi: Any) -> dict[str, Any]:
         sensor |= {"principal_point_offset_x": camera.shift[0], "principal_point_offset_y": camera.shift[1]}
     # Mitsuba's `path` multiplies light samples on masked surfaces by the opacity twice (3.9.1); its `volpath` does not.
     integrator = {"type": "volpath", "max_depth": -1, "rr_depth": 12}
+    if camera.hides_lights:
+        sensor["near_clip"] = NEAR
     found: dict[str, Any] = {"type": "scene", "integrator": integrator, "sensor": sensor}
 
     def matte_of(material: Material) -> dict[str, Any]:
@@ -137,7 +151,11 @@ def for_mitsuba(name: str, mi: Any) -> dict[str, Any]:
     for part in parts:
         geometry, material = PARTS[part]
         found[part] = {**shape_of(geometry), "bsdf": matte_of(material)}
-    if name == "veils_area":
+    if name == "hidden_lights":
+        shining = {"type": "area", "radiance": {"type": "rgb", "value": list(LAMP_RADIANCE)}}
+        for lamp, geometry in LAMPS.items():
+            found[lamp] = {**shape_of(geometry), "emitter": shining, "bsdf": matte_of(PARTS["floor"][1])}
+    elif name == "veils_area":
         light = {"type": "area", "radiance": {"type": "rgb", "value": list(RADIANCE)}}
         found["light"] = {**shape_of(LIGHT), "emitter": light, "bsdf": matte_of(PARTS["floor"][1])}
     else:

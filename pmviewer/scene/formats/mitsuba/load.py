@@ -7,6 +7,7 @@ which nothing can be shown, is an error.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +54,8 @@ def load_mitsuba(path: Path, parameters: Mapping[str, str], search_paths: Sequen
         raise diagnostics.error("The scene has no surface.", hint=hint)
     low, high = box = joint_bounds(shapes, instances)
     cameras, size = read_cameras(scene.sensors, document, box, scene.media)
-    seen = cameras[0] if cameras else NamedCamera("framed", framed((), box=box), *size)
+    cameras = [_hiding(named, scene.hides_lights) for named in cameras]
+    seen = cameras[0] if cameras else _hiding(NamedCamera("framed", framed((), box=box), *size), scene.hides_lights)
     touched = on_a_surface(seen.camera.origin, shapes, float(np.linalg.norm(high - low)))
     if touched is not None:
         diagnostics.warn(f"The camera stands on the surface of '{touched}' and may see nothing.")
@@ -72,3 +74,8 @@ def load_mitsuba(path: Path, parameters: Mapping[str, str], search_paths: Sequen
         cameras=tuple(cameras),
         media=tuple(scene.media.list),
     )
+
+
+def _hiding(named: NamedCamera, lights: bool) -> NamedCamera:
+    """The camera, which does not see lights if the file says so."""
+    return replace(named, camera=replace(named.camera, hides_lights=lights))

@@ -37,6 +37,7 @@ class Reader:
         self.groups = Groups(document, self._shape)
         self.lights: list[Light] = []
         self.sensors: list[Element] = []
+        self.hides_lights = False
         self.failures: list[SceneError] = []
         self._grey: set[int] = set()
         self._merges = 0
@@ -59,11 +60,10 @@ class Reader:
             self.document.ignore(element)
 
     def _integrator(self, element: Element) -> None:
-        """The program has its own; what the file's would leave out of the picture is said."""
+        """The program has its own; what the file's leaves out of the picture is."""
         hidden = (c for c in element.children if c.attributes.get("name") in ("hide_emitters", "hideEmitters"))
         if any(c.attributes.get("value", "").strip().lower() == "true" for c in hidden):
-            what = f"{element} hides lights and the sky from the camera: they are shown here."
-            self.document.warn(what, element)
+            self.hides_lights = True
 
     def _failed(self, element: Element, error: SceneError, instead: str) -> None:
         """Say what was left out and why."""
