@@ -239,9 +239,12 @@ def _mismatch(reference: Reference, scene: Scene, frame: Frame) -> str | None:
             )
         return "The camera was moved: the reference is seen by the scene's own. Press Backspace to return to it."
     from pmviewer.render.filter import is_own  # numba, which the window doesn't wait for
+    from pmviewer.render.hidden_lights import are_hidden
 
     if not is_own(own.filter, frame.settings.render):
         return "The reconstruction filter was changed: the reference has the scene's own (render.filter = auto)."
+    if are_hidden(own.hides_lights, frame.settings.render) != own.hides_lights:
+        return "The reference shows lights as the scene's file says (render.lights = auto)."
     return None
 
 

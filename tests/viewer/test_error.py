@@ -164,6 +164,14 @@ def test_without_a_reference_or_with_another_camera_the_views_are_refused_with_a
         c.yield_(3)
         assert "64×64" in app.state.refused_view("error")
         assert app.state.refused_view("beauty") is None
+        for path, value, told in (
+            ("render.filter", "Gaussian", "reconstruction filter was changed"),
+            ("render.lights", "hidden", "shows lights as the scene's file says"),
+        ):
+            app.state.change({"camera.width": "auto", path: value})
+            c.yield_(3)
+            assert told in app.state.refused_view("error")
+            app.state.change({path: "auto"})
 
     drive(app, script)
     assert not [m for m in app.state.log if m.level == "error"]
