@@ -41,7 +41,7 @@ RADIUS_SHARE = 0.25
 class Case:
     """A scene at a size: samples per run of both path tracers, passes per run of photon methods, pixels of a block
     (larger for caustics, whose few bright paths are far from Gaussian), and the share by which photon methods may
-    differ. `file` is a scene that is not bundled."""
+    differ; the path tracer by `path_tolerance`. `file` is a scene that is not bundled."""
 
     scene: str
     parameters: Mapping[str, str]
@@ -50,6 +50,7 @@ class Case:
     block: int
     tolerance: float = 0.03
     file: Path | None = None
+    path_tolerance: float = 0.0
 
     @property
     def source(self) -> str | Path:
@@ -116,7 +117,7 @@ def compare(
     opened = open_scene(str(case.source), case.parameters)
     theirs = peer.independent_images(case.source, case.parameters, runs, case.spp)
     for method in methods:
-        tolerance = 0.0 if method == "path" else case.tolerance
+        tolerance = case.path_tolerance if method == "path" else case.tolerance
         # A path tracer's pass is one sample per pixel.
         passes = case.spp if method == "path" else case.passes
         found = agreement(our_runs(opened, method, passes, runs, pool), theirs, case.block, tolerance)
