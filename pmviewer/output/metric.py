@@ -39,6 +39,14 @@ def relmse(image: NDArray[Any], reference: NDArray[Any]) -> float:
     return float(squared_error(image, reference).mean())
 
 
+def crossed_relmse(image: NDArray[Any], one: NDArray[Any], other: NDArray[Any]) -> float:
+    """`relmse` against what two references with independent noise both converge to: the mean of (I−A)(I−B)/(I²+0.01).
+    Their noise cancels in it, where it would add to the error against either; in the denominator it would not, so that
+    the image stands there, which should be near."""
+    (i, a), (_, b) = _pair(image, one), _pair(image, other)
+    return float(((i - a) * (i - b) / (i**2 + EPSILON)).mean())
+
+
 def relmse_drop(image: NDArray[Any], reference: NDArray[Any], drop: float = DROP) -> float:
     """`relmse` without the worst pixels, a share `drop` of all: what remains when fireflies don't count."""
     errors = np.sort(squared_error(image, reference), axis=None)

@@ -10,6 +10,7 @@ import pytest
 from pmviewer.output.metric import (
     block_error,
     block_means,
+    crossed_relmse,
     loglog_slope,
     mean_ratio,
     metrics,
@@ -167,3 +168,16 @@ def test_z_test_fails_on_what_is_no_number(truth, bad):
     mean, variance = estimate(truth, 64, 1)
     mean[5, 5, 0] = bad
     assert not z_test(mean, variance, truth).passes()
+
+
+def test_crossed_error_knows_nothing_of_the_noise_of_its_references():
+    rng = np.random.default_rng(4)
+    truth = np.broadcast_to(np.linspace(0.5, 2.0, 128)[:, None], (128, 128, 3))
+    one, other = (truth + rng.normal(0, 0.3, truth.shape) for _ in range(2))
+    for error in (0.0, 0.05):
+        image = truth + error
+        exact = float((error**2 / (truth**2 + 0.01)).mean())
+        found = crossed_relmse(image, one, other)
+        print(error, found, exact, relmse(image, one))
+        assert found == pytest.approx(exact, rel=0.2, abs=1e-3)
+        assert relmse(image, one) > exact + 0.05

@@ -23,7 +23,7 @@ from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.output.exr import read_exr
-from pmviewer.output.metric import loglog_slope, metrics
+from pmviewer.output.metric import crossed_relmse, loglog_slope, metrics
 from pmviewer.resources import data_folder
 from pmviewer.settings.access import Settings, with_values
 
@@ -92,9 +92,11 @@ def measure(
     limit: int = 4096,
     values: dict[str, Any] | None = None,
     show: Callable[[Renderer], tuple[NDArray[np.float32], float]] | None = None,
+    other: NDArray[np.float64] | None = None,
 ) -> Curve:
     """Render until `budget` CPU seconds are spent; the error is taken at passes 1, 2, 4, … and at the end. `values` are
-    further settings; `show` makes another picture of the renderer's than the image, in so many CPU seconds."""
+    further settings; `show` makes another picture of the renderer's than the image, in so many CPU seconds. With an
+    `other` reference, independent of the scene's, their noise is no part of the error."""
     settings = with_values(Settings(), {"render.method": method, "render.passes": limit, **(values or {})})
     pool = WorkPool(threads)
     target = reference(opened.scene.name)
@@ -112,7 +114,7 @@ def measure(
                 measured = metrics(image.astype(np.float64), target)
                 curve.passes.append(renderer.passes)
                 curve.cpu.append(spent + more)
-                curve.error.append(measured.relmse_all)
+                curve.error.append(measured.relmse_all if other is None else crossed_relmse(image, target, other))
                 curve.ratio.append(measured.mean_ratio)
             if last:
                 break
