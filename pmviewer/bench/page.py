@@ -36,10 +36,14 @@ def write_page(folder: Path, kept: list[Kept]) -> str:
 
 def _head(kept: list[Kept]) -> list[str]:
     measured = sorted({one.revision for one in kept if one.revision})
-    quick = sorted({"quick" if one.quick else "full" for one in kept})
-    lines = ["# Benchmarks", "", f"As `pmviewer bench all` ran, {' and '.join(quick)}; nothing is edited by hand.", ""]
+    lines = ["# Benchmarks", "", "As `pmviewer bench all` ran; nothing is edited by hand.", ""]
     lines += [f"- {line}" for line in machine()]
     lines.append(f"- measured at revision {', '.join(measured) or 'unknown'}, {sum(o.seconds for o in kept):.0f} s")
+    whole = [one.name for one in kept if not one.quick]
+    quick = [one.name for one in kept if one.quick]
+    lines.append(f"- whole: {', '.join(whole) or 'none'}")
+    lines.append(f"- quick, with fewer photons, cases and seconds than a target asks for: {', '.join(quick) or 'none'}")
+    lines += [f"- not measured: {one.name}, {one.failed}" for one in kept if one.result is None]
     return lines
 
 
@@ -50,10 +54,14 @@ def _targets(kept: list[Kept]) -> list[str]:
             relation, verdict = ("≥" if t.larger_is_better else "≤"), ("held" if t.ok else "**short**")
             note = t.note.replace("|", "\\|")
             lines.append(
-                f"| {one.name} | {t.id} | {format_number(t.value)} {t.unit} | {relation} {t.bound:g} | {verdict} "
+                f"| {_name(one)} | {t.id} | {format_number(t.value)} {t.unit} | {relation} {t.bound:g} | {verdict} "
                 f"| {note} |"
             )
     return lines
+
+
+def _name(one: Kept) -> str:
+    return f"{one.name} (quick)" if one.quick else one.name
 
 
 def _short(result: BenchResult) -> BenchResult:

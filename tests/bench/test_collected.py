@@ -41,7 +41,7 @@ def test_the_report_says_what_held_and_what_failed(tmp_path):
         ["photons", 9.0, 0, 0, "it took too long"],
     ]
     page = (tmp_path / "benchmarks.md").read_text("utf-8")
-    assert "| rays | P9 | 87 ms | ≤ 100 | held | a \\| b |" in page
+    assert "| rays (quick) | P9 | 87 ms | ≤ 100 | held | a \\| b |" in page
     assert "it took too long" in page
     assert "revision abc" in page
     assert "P9,87,ms,100,False,True,a | b" in (tmp_path / "targets.csv").read_text("utf-8")
@@ -62,6 +62,25 @@ def test_a_bench_that_fails_or_hangs_is_a_line_and_no_end(tmp_path, monkeypatch)
     monkeypatch.setattr(everything, "LEAST", 0.01)
     everything._one("rays", tmp_path, True, 0.05)
     assert "took too long" in load(tmp_path, ["rays"])[0].failed
+
+
+def test_long_benches_run_quick_and_so_do_those_that_take_too_long(tmp_path, monkeypatch):
+    asked: list[tuple[str, bool]] = []
+
+    def stand_in(name: str, folder: object, quick: bool, seconds: float) -> bool:
+        asked.append((name, quick))
+        return name != "slow" or quick
+
+    monkeypatch.setattr(everything, "BENCHES", {name: ("", "") for name in ("rays", "slow", "media", "files")})
+    monkeypatch.setattr(everything, "_one", stand_in)
+    save(tmp_path, Kept("rays", CURVES, "", 3.5, False, "abc"))
+    save(tmp_path, Kept("media", CURVES, "", 3.5, True, "abc"))
+    everything.run(False, tmp_path)
+    assert asked == [("rays", False), ("slow", False), ("slow", True), ("media", True)]
+    page = (tmp_path / "benchmarks.md").read_text("utf-8")
+    assert "| rays | P9 |" in page
+    assert "| media (quick) | P9 |" in page
+    assert "- whole: rays\n" in page
 
 
 def test_makespan_and_serial_share_are_those_of_small_examples():
