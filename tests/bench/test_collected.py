@@ -71,7 +71,7 @@ def test_long_benches_run_quick_and_so_do_those_that_take_too_long(tmp_path, mon
         asked.append((name, quick))
         return name != "slow" or quick
 
-    monkeypatch.setattr(everything, "BENCHES", {name: ("", "") for name in ("rays", "slow", "media", "files")})
+    monkeypatch.setattr(everything, "BENCHES", dict.fromkeys(("rays", "slow", "media", "files"), ("", "")))
     monkeypatch.setattr(everything, "_one", stand_in)
     save(tmp_path, Kept("rays", CURVES, "", 3.5, False, "abc"))
     save(tmp_path, Kept("media", CURVES, "", 3.5, True, "abc"))
