@@ -166,15 +166,26 @@ class _KernelCache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Compiled code, or None when it is this process's turn to compile it: until `give_back`."""
-        loaded = super().load_overload(sig, target_context)
+        loaded = self._loaded(sig, target_context)
         if loaded is not None:
             return loaded
         key = self._index_key(sig, target_context.codegen())
         number = _number(f"{self._cache_path}{self._cache_file._name(key)}")
         if _turns.take(number):
             self._held.append(number)
-            loaded = super().load_overload(sig, target_context)
+            loaded = self._loaded(sig, target_context)
         return loaded
+
+    def _loaded(self, sig: Any, target_context: Any) -> Any:
+        loaded = super().load_overload(sig, target_context)
+        if loaded is not None and isinstance(loaded.library, library.KernelLibrary):
+            key = self._index_key(sig, target_context.codegen())
+            loaded.library.read_again = functools.partial(self._bitcode, key)
+        return loaded
+
+    def _bitcode(self, key: Any) -> bytes | None:
+        saved = self._cache_file.load(key)
+        return None if saved is None else library.bitcode_of(saved[0])
 
     def give_back(self, count: int) -> None:
         """End all turns but the first `count`."""

@@ -9,7 +9,7 @@ equal bit for bit), in two thirds of the time.
 
 from __future__ import annotations
 
-import zlib
+from collections.abc import Callable
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -26,7 +26,8 @@ class KernelLibrary(JITCodeLibrary):
     names one of its own functions."""
 
     _native = False
-    _packed: bytes | None = None
+    read_again: Callable[[], bytes | None] | None = None
+    """Of code that came from disk: its bitcode, None where the file is gone."""
 
     def finalize(self) -> None:
         """Link in what it calls. After this nothing can be added."""
@@ -87,17 +88,26 @@ class KernelLibrary(JITCodeLibrary):
             module = llvm.parse_bitcode(bitcode, llvm.create_context())
             codegen._engine._load_defined_symbols(module)
             module.close()
-            library._packed = zlib.compress(bitcode, 1)
             library._native = library._disable_inspection = True
         return library
 
     def _get_module_for_linking(self) -> Any:
-        """What others link in. For code that came from disk it is parsed when somebody asks: that is rare, and a parsed
-        module takes several times the memory of the machine code."""
-        if self._packed is not None:
-            self._shared_module = llvm.parse_bitcode(zlib.decompress(self._packed))
-            self._packed = None
+        """What others link in. Of code that came from disk as machine code nobody asks for it but a kernel that calls a
+        kernel: it is read again then, for it takes more memory than the machine code, even packed. Raises RuntimeError
+        where the file is gone."""
+        if self._shared_module is None and self.read_again is not None:
+            bitcode = self.read_again()
+            if bitcode is None:
+                raise RuntimeError(f"The compiled code of {self.name} is gone from the disk.")
+            self._shared_module = llvm.parse_bitcode(bitcode)
         return super()._get_module_for_linking()
+
+
+def bitcode_of(state: tuple[str, str, Any]) -> bytes:
+    """Of what `serialize_using_object_code` has kept."""
+    _, kind, data = state
+    bitcode: bytes = data if kind == "linkable" else data[1]
+    return bitcode
 
 
 class _KernelCodegen(JITCPUCodegen):
