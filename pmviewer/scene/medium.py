@@ -48,6 +48,11 @@ class Medium:
         return 1.0 / stops if stops > 0.0 else math.inf
 
     @property
+    def shortest_path(self) -> float:
+        """The mean free path where it is shortest, in scene units; infinite where nothing is met."""
+        return 1.0 / self._stops if self._stops > 0.0 else math.inf
+
+    @property
     def _stops(self) -> float:
         return max(self.sigma_t) * (1.0 if self.density is None else self.density.most)
 

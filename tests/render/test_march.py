@@ -33,7 +33,7 @@ def along_rays(scenes, maps, rays, radius, out):
     sigma, lobes = (f4(SIGMA), f4(SIGMA), f4(SIGMA)), (zero, zero, zero)
     for i in range(len(rays)):
         o, d = (f4(START), rays[i, 0], rays[i, 1]), (f4(1.0), zero, zero)
-        L = marched_radiance(scenes[0], maps[0], o, d, f4(LENGTH), radius, sigma, lobes, rays[i, 2])
+        L = marched_radiance(scenes[0], maps[0], o, d, f4(LENGTH), radius, f4(np.inf), sigma, lobes, rays[i, 2])
         out[i] = L[0]
 
 

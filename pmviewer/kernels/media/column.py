@@ -16,7 +16,7 @@ import numpy as np
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import is_a, specialised
 from pmviewer.kernels.media.lattice import Line, inside_box, line_of, walk
-from pmviewer.kernels.media.medium import depth_of, extinction, transmittance
+from pmviewer.kernels.media.medium import depth_of, extinction, shortest_path, transmittance
 from pmviewer.kernels.media.varying import OF_EXTINCTION, grid_of, has_grids, thinned
 from pmviewer.kernels.memory import stack_get_f4, stack_put_f4
 
@@ -29,12 +29,14 @@ WORDS = 195
 
 
 class Column(NamedTuple):
-    """Of a scene with lattices: the medium, its lattice (−1: none) and extinction, the ray's line there, the part
-    `near` … `far` in the box, the way from mark to mark, and the `marks` (red, green, blue) on the stack."""
+    """Of a scene with lattices: the medium, its lattice (−1: none), extinction and `shortest` mean free path, the ray's
+    line there, the part `near` … `far` in the box, the way from mark to mark, and the `marks` (red, green, blue) on the
+    stack."""
 
     medium: Any
     grid: Any
     sigma: Any
+    shortest: Any
     line: Any
     near: Any
     far: Any
@@ -50,9 +52,10 @@ def column_of(scene, medium, o, d, length, marks):
 
     def marked(scene, medium, o, d, length, marks):
         grid, sigma = grid_of(scene, medium, OF_EXTINCTION), extinction(scene, medium)
+        shortest = shortest_path(scene, medium)
         nothing = (_f8(0.0), _f8(0.0), _f8(0.0))
         if grid < 0:
-            return Column(medium, grid, sigma, Line(nothing, nothing), 0.0, _f8(length), 0.0, marks)
+            return Column(medium, grid, sigma, shortest, Line(nothing, nothing), 0.0, _f8(length), 0.0, marks)
         line = line_of(scene, grid, o, d)
         near, far = inside_box(scene, grid, line, _f8(0.0), _f8(length))
         far = max(near, far)
@@ -64,7 +67,7 @@ def column_of(scene, medium, o, d, length, marks):
             if step > 0.0:
                 more = walk(scene, grid, line, near + k * step, near + (k + 1) * step, 0, np.inf).depth
                 depth = (depth[0] + more[0], depth[1] + more[1], depth[2] + more[2])
-        return Column(medium, grid, sigma, line, near, far, step, marks)
+        return Column(medium, grid, sigma, shortest, line, near, far, step, marks)
 
     return marked
 

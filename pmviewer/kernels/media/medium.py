@@ -23,13 +23,13 @@ from pmviewer.kernels.vector import dot, largest
 _f4 = np.float32
 _i8 = np.int64
 
-MEDIUM_COLUMNS = 14
-MD_SIGMA_T, MD_ALBEDO, MD_EMISSION, MD_G, MD_G_BESIDE, MD_BESIDE, MD_GLOW, MD_FREE_PATH = np.array(
-    [0, 3, 6, 9, 10, 11, 12, 13], np.int64
+MEDIUM_COLUMNS = 15
+MD_SIGMA_T, MD_ALBEDO, MD_EMISSION, MD_G, MD_G_BESIDE, MD_BESIDE, MD_GLOW, MD_FREE_PATH, MD_SHORTEST = np.array(
+    [0, 3, 6, 9, 10, 11, 12, 13, 14], np.int64
 )
 """Columns of a medium's row: extinction per length, albedo, radiance emitted per length, each RGB; the mean cosines of
 the two lobes of the phase function, the share of the second; its glow (`pmviewer.kernels.media.glow`), −1 where
-nothing is emitted; and the shortest channel's mean free path, infinite on lattices."""
+nothing is emitted; the shortest channel's mean free path, infinite on lattices; and what it is where it is shortest."""
 _DEEPEST = _f4(24.0)
 """Optical depth that nothing shows through: exp(−24) = 4e-11."""
 VACUUM = np.int64(-1)
@@ -72,6 +72,12 @@ def scatters(scene, medium):
 def free_path(scene, medium):
     """Mean free path of the channel in which it is shortest, infinite where nothing is met and on lattices."""
     return load_f4(scene.media, medium * MEDIUM_COLUMNS + MD_FREE_PATH)
+
+
+@device
+def shortest_path(scene, medium):
+    """Mean free path of the channel and at the place in which it is shortest, infinite where nothing is met."""
+    return load_f4(scene.media, medium * MEDIUM_COLUMNS + MD_SHORTEST)
 
 
 @device

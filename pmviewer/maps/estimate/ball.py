@@ -20,11 +20,12 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.media.phase import phase
 from pmviewer.kernels.memory import float_of_bits, load_u4, stack_get_i8
 from pmviewer.kernels.vector import dot, normalize, sub
+from pmviewer.maps.estimate.reach import more_in_ball, reach2_of
 from pmviewer.maps.photon_words import decode_direction, decode_powers
 from pmviewer.maps.search.along_ray import is_in_cell, photon_place, photons_of_row
 from pmviewer.maps.search.k_nearest import nearest
 from pmviewer.maps.search.simd import ROW_BYTES
-from pmviewer.maps.search.stored import stored_power
+from pmviewer.maps.search.stored import stored_place, stored_power
 
 _f4 = np.float32
 _f8 = np.float64
@@ -54,10 +55,11 @@ def _cells(grid, origin, x, radius, sides):
 
 
 @device
-def ball_radiance(grid, p, d, radius, lobes):
+def ball_radiance(scene, grid, p, d, radius, paths, column, lobes):
     """Radiance per length (red, green, blue) that photons within the radius of p scatter against the unit direction d
-    of a ray, by the phase function `lobes`, and how many they are. grid: record of a PhotonGrid; a radius above the
-    grid's own is lowered to it."""
+    of a ray in a medium of that column, by the phase function `lobes`, and how many they are. grid: record of a
+    PhotonGrid; a radius above the grid's own is lowered to it; paths: the most it is on lattices, in free paths at a
+    photon."""
     radius = min(radius, grid.radius)
     r2 = radius * radius
     red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
@@ -74,9 +76,14 @@ def ball_radiance(grid, p, d, radius, lobes):
                 for i in range(first, end):
                     block, lane, at = photon_place(grid, i)
                     apart = sub(at, p)
-                    if not dot(apart, apart) < r2 or (hashed and not is_in_cell(grid, at, x, y, z)):
+                    apart2 = dot(apart, apart)
+                    if not apart2 < r2 or (hashed and not is_in_cell(grid, at, x, y, z)):
+                        continue
+                    reach2 = reach2_of(scene, column, at, r2, paths)
+                    if not apart2 < reach2:
                         continue
                     f = _f8(phase(lobes, d, normalize(decode_direction(load_u4(block + 3 * ROW_BYTES, lane)))))
+                    f *= _f8(more_in_ball(column, r2, reach2))
                     power = decode_powers(load_u4(block + 4 * ROW_BYTES, lane), load_u4(block + 5 * ROW_BYTES, lane))
                     red += f * _f8(power[0])
                     green += f * _f8(power[1])
@@ -86,7 +93,7 @@ def ball_radiance(grid, p, d, radius, lobes):
 
 
 @device
-def nearest_ball_radiance(tree, p, d, radius, k, share, lobes, keys):
+def nearest_ball_radiance(scene, tree, p, d, radius, paths, k, share, column, lobes, keys):
     """The same of the k nearest photons, no farther than the radius, counted in the `share` of their ball's volume.
 
     tree: record of a PhotonKdTree; k: int32, 2 … MAX_K; keys: `pmviewer.maps.search.k_nearest.KEYS` int32 of scratch.
@@ -107,7 +114,12 @@ def nearest_ball_radiance(tree, p, d, radius, k, share, lobes, keys):
         if key >= farthest or not float_of_bits(_u4(key >> 32)) < part:
             continue
         i = key & _i8(0xFFFFFFFF)
-        f = _f8(phase(lobes, d, normalize(decode_direction(load_u4(tree.payload, 3 * i)))))
+        reach2 = reach2_of(scene, column, stored_place(tree, i), part, paths)
+        if not float_of_bits(_u4(key >> 32)) < reach2:
+            continue
+        f = _f8(more_in_ball(column, part, reach2)) * _f8(
+            phase(lobes, d, normalize(decode_direction(load_u4(tree.payload, 3 * i))))
+        )
         power = stored_power(tree, i)
         red += f * _f8(power[0])
         green += f * _f8(power[1])

@@ -43,9 +43,15 @@ def arrives(photons, i, n, class_mask):
 
 
 @device
+def stored_place(photons, i):
+    """Where photon i is."""
+    return load_f4(photons.x, i), load_f4(photons.y, i), load_f4(photons.z, i)
+
+
+@device
 def height_above(photons, i, p, n):
     """Signed distance of photon i from the plane through p with normal n."""
-    return dot(n, sub((load_f4(photons.x, i), load_f4(photons.y, i), load_f4(photons.z, i)), p))
+    return dot(n, sub(stored_place(photons, i), p))
 
 
 @device

@@ -76,15 +76,15 @@ def depth_view(scenes, eyes, out, first, last):
 
 
 @specialised
-def _counted(scene, photons, medium, o, d, length, radius, marks):
+def _counted(scene, photons, medium, o, d, length, radius, paths, marks):
     """Photons of the volume map within the radius of a stretch."""
     if absent(photons):
-        return lambda scene, photons, medium, o, d, length, radius, marks: 0
+        return lambda scene, photons, medium, o, d, length, radius, paths, marks: 0
 
-    def by_beam(scene, photons, medium, o, d, length, radius, marks):
+    def by_beam(scene, photons, medium, o, d, length, radius, paths, marks):
         column = column_of(scene, medium, o, d, length, marks)
         length = min(length, way_seen(scene, medium))
-        _, count = beam_radiance(scene, photons, o, d, length, radius, column, phase_numbers(scene, medium))
+        _, count = beam_radiance(scene, photons, o, d, length, radius, paths, column, phase_numbers(scene, medium))
         return count
 
     return by_beam
@@ -110,7 +110,7 @@ def beam_view(scenes, eyes, photon_maps, out, first, last):
                 met = True
                 radius = radius_in(scene, eye, medium)
                 narrowest = min(narrowest, radius)
-                count += _counted(scene, photon_maps[0], medium, o, ray.d, length, radius, marks)
+                count += _counted(scene, photon_maps[0], medium, o, ray.d, length, radius, eye.free_paths, marks)
             o, medium = beyond, next_medium
             left -= length
         out[pixel, 0] = narrowest if met else _NONE
@@ -155,5 +155,5 @@ def slice_view(scenes, eyes, photon_maps, axis, place, out, first, last):
             r = radius_in(scene, eye, medium)
             if scatters(scene, medium) and r > _f4(0.0):
                 o = along(p, ray.d, -r)
-                count = _counted(scene, photon_maps[0], medium, o, ray.d, _f4(2.0) * r, r, marks)
+                count = _counted(scene, photon_maps[0], medium, o, ray.d, _f4(2.0) * r, r, _f4(np.inf), marks)
                 out[pixel, 1] = _f4(count / (2.0 * np.pi * _f8(r) ** 3))

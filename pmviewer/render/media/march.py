@@ -75,19 +75,19 @@ def _within(photons, o, d, length, radius):
 
 
 @specialised
-def _looked_up(photons, p, d, radius, lobes, keys):
+def _looked_up(scene, photons, p, d, radius, paths, column, lobes, keys):
     """Radiance per length that photons around p scatter along the ray."""
     if is_kdtree(photons):
 
-        def by_nearest(photons, p, d, radius, lobes, keys):
+        def by_nearest(scene, photons, p, d, radius, paths, column, lobes, keys):
             k, share = photons.volume_k, photons.volume_share
-            L, _ = nearest_ball_radiance(photons, p, d, radius, k, share, lobes, keys)
+            L, _ = nearest_ball_radiance(scene, photons, p, d, radius, paths, k, share, column, lobes, keys)
             return L
 
         return by_nearest
 
-    def by_radius(photons, p, d, radius, lobes, keys):
-        L, _ = ball_radiance(photons, p, d, radius, lobes)
+    def by_radius(scene, photons, p, d, radius, paths, column, lobes, keys):
+        L, _ = ball_radiance(scene, photons, p, d, radius, paths, column, lobes)
         return L
 
     return by_radius
@@ -102,10 +102,11 @@ def _scratch(photons):
 
 
 @device
-def marched_radiance(scene, photons, o, d, length, radius, column, lobes, u):
+def marched_radiance(scene, photons, o, d, length, radius, paths, column, lobes, u):
     """Radiance (red, green, blue) at o that photons scatter back along a ray of that length, unit direction d, through
     a medium of that column (`pmviewer.kernels.media.column`) and phase function `lobes`. photons: a `march_record`;
-    u: in [0, 1), where in its step each place is."""
+    paths: the most that the radius is on lattices, in free paths at a photon; u: in [0, 1), where in its step each
+    place is."""
     near, far = _within(photons, o, d, length, radius)
     if photons.n == 0 or not near < far or not photons.march_step > _f4(0.0):
         return _BLACK
@@ -115,7 +116,7 @@ def marched_radiance(scene, photons, o, d, length, radius, column, lobes, u):
     red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
     for j in range(n):
         t = _f4(near + (_f8(j) + _f8(u)) * step)
-        L = _looked_up(photons, along(o, d, t), d, radius, lobes, keys)
+        L = _looked_up(scene, photons, along(o, d, t), d, radius, paths, column, lobes, keys)
         if L[0] > _f4(0.0) or L[1] > _f4(0.0) or L[2] > _f4(0.0):
             T = through(scene, column, t)
             red += _f8(L[0]) * _f8(T[0])

@@ -165,7 +165,9 @@ def _indirect(given, stretch, u):
             lobes = phase_numbers(given.scene, medium)
             radius = radius_in(given.scene, given.eye, medium)
             length = min(length, way_seen(given.scene, medium))
-            return marched_radiance(given.scene, given.volume_map, o, d, length, radius, column, lobes, u)
+            return marched_radiance(
+                given.scene, given.volume_map, o, d, length, radius, given.eye.free_paths, column, lobes, u
+            )
 
         return by_marching
 
@@ -174,7 +176,7 @@ def _indirect(given, stretch, u):
         lobes = phase_numbers(given.scene, medium)
         radius = radius_in(given.scene, given.eye, medium)
         length = min(length, way_seen(given.scene, medium))  # or it would walk through millions of small cells
-        L, _ = beam_radiance(given.scene, given.volume_map, o, d, length, radius, column, lobes)
+        L, _ = beam_radiance(given.scene, given.volume_map, o, d, length, radius, given.eye.free_paths, column, lobes)
         return L
 
     return by_beam

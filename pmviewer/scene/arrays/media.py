@@ -42,7 +42,17 @@ def media_emitting(scene: Scene) -> int:
 def medium_rows(media: tuple[Medium, ...], glows: NDArray[np.float64]) -> NDArray[np.float32]:
     """(n, MEDIUM_COLUMNS), see `pmviewer.kernels.media.medium`; glows: rows of `pmviewer.kernels.media.glow`."""
     listed = [
-        [*m.sigma_t, *m.albedo, *m.emission, m.phase.g, m.phase.g_beside, m.phase.beside, -1, m.free_path]
+        [
+            *m.sigma_t,
+            *m.albedo,
+            *m.emission,
+            m.phase.g,
+            m.phase.g_beside,
+            m.phase.beside,
+            -1,
+            m.free_path,
+            m.shortest_path,
+        ]
         for m in media
     ]
     rows = np.array(listed, np.float32).reshape(-1, MEDIUM_COLUMNS)

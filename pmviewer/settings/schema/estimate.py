@@ -102,7 +102,7 @@ class Estimate(Group):
     free_paths: float = setting(
         0.5,
         "Largest radius of look-ups in a medium, in mean free paths of it, in the first pass: a wider one misses light "
-        "within it at boundaries, a fifth of what shines through marble.",
+        "within it at boundaries, a fifth of what shines through marble. On lattices it is each photon's own.",
         stage="maps",
         scale="log",
         unit="free paths",
