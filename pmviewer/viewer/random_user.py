@@ -24,6 +24,7 @@ from imgui_bundle import ImVec2, hello_imgui, imgui
 from imgui_bundle.immapp import testing
 
 from pmviewer.engine.memory import few_arenas, give_back
+from pmviewer.kernels.compile.jit import loaded
 from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, get, with_values
 from pmviewer.settings.edits import PROPERTIES
 from pmviewer.settings.presets import PRESETS
@@ -62,11 +63,13 @@ _WEIGHTS = {
 @dataclass
 class Report:
     """What became of it. `resident` is memory in MiB after each round, at rest, without what the session keeps for a
-    return to settings of before, which has its own limit; `wrong` has sentences."""
+    return to settings of before, which has its own limit; `kernels` how many are loaded, a MiB each; `wrong`
+    has sentences."""
 
     actions: int = 0
     rounds: int = 0
     resident: list[float] = field(default_factory=list)
+    kernels: list[int] = field(default_factory=list)
     wrong: list[str] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
     frames: int = 0
@@ -219,6 +222,7 @@ class RandomUser:
         give_back()
         kept: int = self.app.state.session.kept_bytes  # type: ignore[attr-defined]
         self.report.resident.append(resident() - kept / 2**20)
+        self.report.kernels.append(loaded())
 
     def _settle(self, context: Any) -> None:
         """Wait until the picture of the newest settings is finished and shown."""
