@@ -75,9 +75,9 @@ def test_curve_doubles_its_samples(fake):
 
 def test_targets_against_the_peer():
     ours = [error.Curve(s, "gather", [1, 2], [1.0, 2.0], [1e-1, 1e-4], [1, 1]) for s in error.SCENES]
-    slow = [error.Curve(s, error.PEER, [1, 2], [4.0, 8.0], [1e-1, 1e-4], [1, 1]) for s in error.SCENES]
+    slow = [error.Curve(s, error.PEER, [1, 2], [40.0, 80.0], [1e-1, 1e-4], [1, 1]) for s in error.SCENES]
     never = [error.Curve(s, error.PEER, [1], [9.0], [1e-1], [1]) for s in error.SCENES]
-    assert all(t.value == pytest.approx(0.25) and t.ok for t in error.against_peer(ours, slow))
+    assert all(t.value == pytest.approx(0.025) and t.ok for t in error.against_peer(ours, slow))
     bounds = error.against_peer(ours, never)
     assert all(t.value == pytest.approx(ours[0].time_to(e[2]) / 9) for t, e in zip(bounds, error.TARGETS, strict=True))
     assert "did not reach" in bounds[0].line()

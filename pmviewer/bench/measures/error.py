@@ -1,6 +1,8 @@
 """Error against time: every method on every bundled scene against its reference (P1–P5).
 
-relMSE over all pixels; CPU seconds of rendering alone, summed over threads, scene loaded and kernels compiled.
+relMSE over all pixels; CPU seconds of rendering alone, summed over threads, scene loaded and kernels compiled. Methods
+run with their default settings, and for each target once more with what automatic mode chooses for that error, whose
+trial is not counted: its seconds stand in the notes.
 """
 
 from __future__ import annotations
@@ -8,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 
 from pmviewer.bench import peer
 from pmviewer.bench.report import BenchResult, Target
+from pmviewer.engine.auto.choose import Goal, choose
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
@@ -30,22 +33,22 @@ from pmviewer.settings.access import Settings, with_values
 SCENES = ("cornell_diffuse", "cornell_caustic", "ring_caustic", "rooms_10x10")
 METHODS = ("progressive", "gather", "path")
 TARGETS = (
-    ("P1", "cornell_caustic", 1e-2, 0.4),
-    ("P2", "cornell_caustic", 1e-3, 20.0),
-    ("P3", "cornell_diffuse", 1e-2, 0.25),
-    ("P4", "cornell_diffuse", 1e-3, 2.8),
-    ("P5a", "ring_caustic", 5e-3, 1.5),
-    ("P5b", "rooms_10x10", 1e-2, 10.0),
+    ("P1", "cornell_caustic", 1e-2, 0.15, 0.04),
+    ("P2", "cornell_caustic", 1e-3, 1.2, 0.03),
+    ("P3", "cornell_diffuse", 1e-2, 0.05, 0.075),
+    ("P4", "cornell_diffuse", 1e-3, 0.25, 0.04),
+    ("P5a", "ring_caustic", 5e-3, 0.4, 0.5),
+    ("P5b", "rooms_10x10", 1e-2, 2.5, 0.5),
 )
+"""Scene, relMSE, CPU seconds, and our time over Mitsuba's to the same error in the same run."""
 BUDGETS = {"cornell_diffuse": 8.0, "cornell_caustic": 24.0, "ring_caustic": 8.0, "rooms_10x10": 16.0}
 """CPU seconds a curve: somewhat more than the slowest target of the scene."""
 QUICK_SHARE = 0.1
 PEER_BUDGET = 2.5
 """Mitsuba's budget over ours: its time to a target must be found where it is twice ours."""
 PEER = "Mitsuba 3 path"
-PEER_SHARE = 0.5
-"""Our time over Mitsuba's to the same error, in the same run."""
-FIRST_STEP = ("progressive", "cornell_caustic", 1e-2, 1.0)
+AUTOMATIC_BUDGET = 8.0
+"""Of the curves by what automatic mode chooses, over their target's seconds."""
 
 
 @dataclass(frozen=True)
@@ -130,17 +133,31 @@ def measure_peer(scene: str, budget: float) -> Curve:
     return Curve(scene, PEER, spp, cpu, [m.relmse_all for m in found], [m.mean_ratio for m in found])
 
 
+def automatic(scene: str, error: float, budget: float) -> tuple[Curve, str]:
+    """The curve of what automatic mode chooses for that error, and a sentence about its choice."""
+    opened, pool = open_scene(scene), WorkPool()
+    try:
+        choice = choose(opened, Settings(), Goal(error=error), pool, lambda text, share: None)
+    finally:
+        pool.close()
+    changed = ", ".join(f"{path} = {value}" for path, value in choice.changed.items()) or "the defaults"
+    said = f"automatic mode for {error:g} on {scene}: {changed}; {choice.trial.cpu_seconds:.2g} CPU s of trial besides"
+    values = dict(choice.values)
+    curve = measure(opened, values["render.method"], budget, values=values)
+    return replace(curve, method=f"automatic for {error:g}"), said
+
+
 def against_peer(curves: list[Curve], peers: list[Curve]) -> list[Target]:
     """Our best time over Mitsuba's for each target; where its budget ran out first, an upper bound of the ratio."""
     targets = []
-    for target, scene, error, _ in TARGETS:
+    for target, scene, error, _, share in TARGETS:
         ours = min(c.time_to(error) for c in curves if c.scene == scene)
         curve = next(c for c in peers if c.scene == scene)
         theirs = curve.time_to(error)
         note = f"of Mitsuba 3's time to relMSE {error:g} on {scene}"
         if not math.isfinite(theirs):
             theirs, note = curve.cpu[-1], note + f", which it did not reach within {curve.cpu[-1]:.3g} CPU s"
-        targets.append(Target(f"{target} peer", ours / theirs, PEER_SHARE, "", False, note))
+        targets.append(Target(f"{target} peer", ours / theirs, share, "", False, note))
     return targets
 
 
@@ -151,6 +168,10 @@ def run(quick: bool = False) -> BenchResult:
     started = time.perf_counter()
     curves = [measure(open_scene(scene), method, budgets[scene]) for scene in SCENES for method in METHODS]
     notes = ["CPU s a curve: " + ", ".join(f"{scene} {budgets[scene]:.3g}" for scene in SCENES)]
+    for _, scene, error, bound, _ in TARGETS:
+        curve, said = automatic(scene, error, min(budgets[scene], AUTOMATIC_BUDGET * bound))
+        curves.append(curve)
+        notes.append(said)
     peers: list[Curve] = []
     if peer.installed():
         peers = [measure_peer(scene, PEER_BUDGET * budgets[scene]) for scene in SCENES]
@@ -163,13 +184,10 @@ def run(quick: bool = False) -> BenchResult:
             slope = curve.slope if n == curve.passes[-1] else ""
             rows.append([curve.scene, curve.method, n, cpu, error, f"{ratio:.4f}", slope])
     targets = []
-    for target, scene, error, bound in TARGETS:
+    for target, scene, error, bound, _ in TARGETS:
         best = min((c for c in curves if c.scene == scene), key=lambda c: c.time_to(error))
-        note = f"{scene} to relMSE {error:g}, best method: {best.method}"
+        note = f"{scene} to relMSE {error:g}, best: {best.method}"
         targets.append(Target(target, best.time_to(error), bound, "CPU s", False, note))
-    method, scene, error, bound = FIRST_STEP
-    curve = next(c for c in curves if (c.method, c.scene) == (method, scene))
-    targets.append(Target("P1", curve.time_to(error), bound, "CPU s", False, f"first step: {method} on {scene}"))
     if peers:
         targets += against_peer(curves, peers)
     notes.append(f"{time.perf_counter() - started:.0f} s in all")
@@ -194,7 +212,7 @@ def plot(curves: list[Curve], path: Path) -> str:
                 axis.loglog(
                     curve.cpu, curve.error, marker="o", markersize=3, label=f"{curve.method} ({curve.slope:.2f})"
                 )
-        for target, of_scene, error, bound in TARGETS:
+        for target, of_scene, error, bound, _ in TARGETS:
             if of_scene == scene:
                 axis.plot(bound, error, "x", color="black")
                 axis.annotate(target, (bound, error), textcoords="offset points", xytext=(5, 5))
