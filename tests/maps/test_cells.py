@@ -73,20 +73,23 @@ def test_cells_of_a_grid_hold_its_photons(radius, hashed):
     slack = 1e-6
     assert (inside(cells, records[:, :3], slack) >= cells.photons).all()
     assert (inside(cells, records[:, :3], -1e-5) <= cells.photons).all()
-    if not hashed:
-        assert cells.total == len(cells.low)
+    assert cells.total == len(cells.low)
 
 
-@pytest.mark.parametrize("radius", [0.2, 0.004])
-def test_cells_beyond_the_limit_are_thinned_evenly(radius):
-    grid = build_grid(photons(1000), radius)
+@pytest.mark.parametrize("radius", [0.05, 0.004])
+def test_cells_beyond_the_limit_are_put_together(radius):
+    """Blocks of cells side by side, which hold all photons and are the smallest that keep within the limit."""
+    records = photons(1000)
+    grid = build_grid(records, radius)
     every = cells_of_map("global", grid, levels=3, limit=100_000)
     some = cells_of_map("global", grid, levels=3, limit=40)
-    assert some.total == every.total > 40
-    known = {tuple(low): count for low, count in zip(every.low, every.photons, strict=True)}
-    assert all(known[tuple(low)] == count for low, count in zip(some.low, some.photons, strict=True))
-    if not grid.hashed:
-        assert 20 < len(some.low) <= 40
+    assert some.total == every.total > 40 >= len(some.low)
+    assert some.photons.sum() == 1000
+    assert some.side > every.side == 1
+    np.testing.assert_allclose(some.high - some.low, some.side * 2 * radius, rtol=1e-2)
+    assert len(np.unique(some.low, axis=0)) == len(some.low)
+    np.testing.assert_allclose(inside(some, records[:, :3], 1e-6), some.photons, atol=1)
+    assert len(cells_of_map("global", grid, levels=3, limit=len(some.low) - 1).low) < len(some.low)
 
 
 def test_a_map_without_photons_has_no_cells():

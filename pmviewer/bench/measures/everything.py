@@ -24,8 +24,10 @@ LEAST = 20.0
 THEMSELVES = ("all", "report")
 NEED_MORE = ("files",)
 """Benches of files that somebody has to name."""
-LONG = ("actions", "agree", "auto", "checkpoint", "cluster", "estimation", "hostile", "lens", "load", "media", "stress",
-        "thin-glass", "virtual", "virtual-many")  # fmt: skip
+LONG = (
+    "actions", "agree", "auto", "checkpoint", "cluster", "estimation", "hostile", "lens", "load", "media", "mitsuba",
+    "stress", "thin-glass", "virtual", "virtual-many",
+)  # fmt: skip
 """Benches that take many minutes whole: all of them together are run quick, and the page says so."""
 FOLDER = Path("bench-results")
 

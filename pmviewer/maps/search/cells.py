@@ -1,7 +1,7 @@
 """The cells that a photon map's structure divides space into, as boxes to be drawn (M1, M2).
 
 Of a kd-tree these are the nodes from the root down to a level; of a grid, dense or hashed, the cells with photons in
-them. NumPy alone: nothing is compiled, and of a hashed grid only those buckets are read that are drawn.
+them, or blocks of 2³, 4³ … cells where there are too many. NumPy alone: nothing is compiled.
 """
 
 from __future__ import annotations
@@ -31,10 +31,11 @@ class MapCells:
     low, high: (n, 3) float32 corners.
     photons: (n,) int64 photons in each.
     level: (n,) int64 of the nodes of a tree, 0 the root; of grids all 0.
-    total: nodes of the tree on the levels asked for, cells of the grid with photons, or such buckets of its hash: what
-        the boxes are some of, where there are more of them than were asked for.
+    total: nodes of the tree on the levels asked for, which the boxes are some of where there are more than were asked
+        for; or cells of the grid with photons.
     depth: level of the tree's leaves; 0 for grids.
     parts: parts that the map is in; the cells are those of the first one's tree.
+    side: cells of the grid along a box.
     """
 
     map: str
@@ -46,14 +47,14 @@ class MapCells:
     total: int
     depth: int = 0
     parts: int = 1
+    side: int = 1
 
 
 def cells_of_map(
     name: str, structure: PhotonGrid | PhotonKdTree | PhotonParts, levels: int, limit: int
 ) -> MapCells | None:
     """Boxes of the map `name`: of a tree the nodes on levels 0 … `levels`, as far as whole levels fit in `limit`
-    boxes; of a grid at most `limit` cells (of a hashed one the cells of so many buckets), evenly thinned. None without
-    a photon."""
+    boxes; of a grid its cells, put together until they are `limit` boxes at most. None without a photon."""
     if structure.n == 0:
         return None
     if isinstance(structure, PhotonParts):
@@ -93,30 +94,40 @@ def _tree_cells(name: str, tree: PhotonKdTree, levels: int, limit: int, parts: i
 
 def _grid_cells(name: str, grid: PhotonGrid, limit: int) -> MapCells:
     record = grid.record[0]
-    occupied = np.flatnonzero(np.diff(grid.starts))
-    chosen = occupied[:: -(-len(occupied) // limit)]
     origin = np.array([record["origin_x"], record["origin_y"], record["origin_z"]])
     shape = np.array([record["nx"], record["ny"], record["nz"]], np.int64)
-    if grid.hashed:
-        cells, photons = _cells_in(grid, chosen, origin, shape)
-    else:
-        cells = np.stack([chosen % shape[0], chosen // shape[0] % shape[1], chosen // (shape[0] * shape[1])], axis=1)
-        photons = (grid.starts[chosen + 1] - grid.starts[chosen]).astype(np.int64)
-    size = 1.0 / float(record["cells_per_length"])
+    cells, photons = _hashed(grid, origin, shape) if grid.hashed else _dense(grid, shape)
+    total, side = len(cells), 1
+    while len(cells) > limit:
+        side *= 2
+        cells, photons = _together(cells // 2, photons)
+    size = side / float(record["cells_per_length"])
     low, high = ((origin + (cells + corner) * size).astype(np.float32) for corner in (0, 1))
     kind: Kind = "hashed grid" if grid.hashed else "grid"
-    return MapCells(name, kind, low, high, photons, np.zeros(len(cells), np.int64), len(occupied))
+    return MapCells(name, kind, low, high, photons, np.zeros(len(cells), np.int64), total, side=side)
 
 
-def _cells_in(
-    grid: PhotonGrid, buckets: NDArray[np.int64], origin: NDArray[np.float64], shape: NDArray[np.int64]
+def _dense(grid: PhotonGrid, shape: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(cells (m, 3), photons (m,)) of those that hold any."""
+    held = np.diff(grid.starts)
+    occupied = np.flatnonzero(held)
+    x, y, z = occupied % shape[0], occupied // shape[0] % shape[1], occupied // (shape[0] * shape[1])
+    return np.stack([x, y, z], axis=1), held[occupied].astype(np.int64)
+
+
+def _hashed(
+    grid: PhotonGrid, origin: NDArray[np.float64], shape: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(cells (m, 3), photons (m,)): the cells whose photons are in these buckets. All photons of a cell are in one
-    bucket, which may hold those of others."""
-    first = grid.starts[buckets].astype(np.int64)
-    sizes = grid.starts[buckets + 1] - first
-    photon = np.repeat(first - np.cumsum(sizes) + sizes, sizes) + np.arange(sizes.sum())
+    """The same from the photons: which cell a bucket's are in is not kept."""
+    photon = np.arange(grid.n)
     places = grid.blocks[photon // WIDTH, :3, photon % WIDTH].view(np.float32).astype(np.float64)
     cells = ((places - origin) * float(grid.record["cells_per_length"][0])).astype(np.int64)
-    found, photons = np.unique(np.clip(cells, 0, shape - 1), axis=0, return_counts=True)
-    return found, photons.astype(np.int64)
+    return _together(np.clip(cells, 0, shape - 1), np.ones(grid.n, np.int64))
+
+
+def _together(cells: NDArray[np.int64], photons: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Each cell once, with all of its photons."""
+    order = np.lexsort(cells.T)
+    cells = cells[order]
+    first = np.flatnonzero(np.r_[True, (np.diff(cells, axis=0) != 0).any(axis=1)])
+    return cells[first], np.add.reduceat(photons[order], first)

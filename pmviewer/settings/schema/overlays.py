@@ -331,7 +331,7 @@ class CellOverlay(Group):
     )
     limit: int = setting(
         2_000,
-        "At most this many boxes are drawn: of a tree whole levels, of a grid cells that are evenly thinned.",
+        "At most this many boxes are drawn: of a tree whole levels, of a grid cells put together, 2³, 4³ … a box.",
         stage="display",
         scale="log",
         unit="boxes",

@@ -1,4 +1,4 @@
-"""Cells of a photon map as boxes: nodes of its kd-tree, or cells of its grid that hold photons."""
+"""Cells of a photon map as boxes: nodes of its kd-tree, or cells of its grid that hold photons, or blocks of those."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 UNIT = 1024.0
 """Photons a unit of the stored power, whose codes end at 2¹⁷."""
-PHOTONS = Colouring(By.QUANTITY, 0, scale="range", text="Photons in a cell")
+PHOTONS = Colouring(By.QUANTITY, 0, scale="range", text="Photons in a box")
 LEVELS = Colouring(By.QUANTITY, 1, scale="range", text="Level in the tree, from the root")
 _CORNERS = np.array([(i & 1, i >> 1 & 1, i >> 2) for i in range(8)])
 _EDGES = np.array([(i, i | bit) for bit in (1, 2, 4) for i in range(8) if not i & bit])
@@ -100,8 +100,7 @@ def drawn_text(cells: MapCells) -> str:
         if drawn < cells.total:
             text += f": the next one is beyond the limit ({grouped(drawn)} of {grouped(cells.total)} boxes)"
         return f"{text}. Part 1 of {cells.parts}." if cells.parts > 1 else f"{text}."
-    if cells.kind == "grid":
-        text = f"Grid of the {cells.map} map: {grouped(drawn)} of {grouped(cells.total)} cells that hold photons"
-    else:
-        text = f"Hashed grid of the {cells.map} map: {grouped(drawn)} cells, of {grouped(cells.total)} occupied buckets"
-    return f"{text}. Empty cells are not drawn; a cell is two look-up radii wide."
+    text = f"{cells.kind.capitalize()} of the {cells.map} map: {grouped(cells.total)} cells hold photons"
+    if cells.side > 1:
+        text += f", drawn as {grouped(drawn)} boxes of {cells.side} × {cells.side} × {cells.side} cells"
+    return f"{text}. Empty ones are not drawn; a cell is two look-up radii wide."
