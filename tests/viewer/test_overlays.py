@@ -11,10 +11,13 @@ import pytest
 
 from pmviewer.engine.frame import PhotonCloud
 from pmviewer.maps.record import unpack
+from pmviewer.maps.search.cells import MapCells
+from pmviewer.output.false_look import look_of
 from pmviewer.settings.access import SETTINGS, Settings, with_values
 from pmviewer.viewer.gl.palette import POWER, By, Colouring
 from pmviewer.viewer.gl.records import ends_of_scale, log_range, quantity
 from pmviewer.viewer.overlays.layers import Layers, any_shown
+from pmviewer.viewer.overlays.map_cells import PHOTONS
 from pmviewer.viewer.overlays.overlay import Overlay, Source
 from pmviewer.viewer.overlays.points import Points
 from pmviewer.viewer.overlays.registry import OVERLAYS, SWITCHED
@@ -190,3 +193,31 @@ def test_photons_are_coloured_by_where_they_came_from(app, session):
     for colour in codes:
         near = np.abs(seen["pixels"] - colour).max(axis=1) <= 2
         assert near.sum() > 100, f"nothing is drawn in {colour}"
+
+
+def test_cells_of_a_map_are_boxes_in_the_colours_of_their_photons(app, session):
+    """The one with fewest photons in the first colour of the scale, that with most in the last, each where it is."""
+    low = np.array([[-0.8, -0.5, -0.3], [0.2, -0.5, -0.3]], np.float32)
+    cells = MapCells("global", "grid", low, low + np.float32(0.6), np.array([1, 1000]), np.zeros(2, np.int64), 2)
+    seen = {}
+
+    def script(c):
+        app.state.change({"display.view": "geometry", "overlays.cells.show": True, "overlays.cells.size": 4.0})
+        app.state.change({"overlays.cells.depth": False})
+        frame = session.frame
+        session.frame = replace(frame, serial=frame.serial + 1, inspection=replace(frame.inspection, cells=cells))
+        c.yield_(6)
+        seen["shown"] = viewport_pixels(c, app).astype(int)
+        app.state.change({"overlays.cells.show": False})
+        c.yield_(6)
+        seen["hidden"] = viewport_pixels(c, app).astype(int)
+
+    drive(app, script)
+    table = PHOTONS.table(look_of(Settings().display))
+    middles = []
+    for end in (table[0], table[-1]):
+        colour = 255 * end
+        near = [np.abs(picture - colour).max(axis=2) <= 6 for picture in (seen["shown"], seen["hidden"])]
+        assert near[0].sum() > 100 + near[1].sum(), f"nothing is drawn in {colour}"
+        middles.append(np.nonzero(near[0] & ~near[1])[1].mean())
+    assert abs(middles[0] - middles[1]) > 20, "both boxes are in one place"
