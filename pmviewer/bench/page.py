@@ -11,7 +11,8 @@ from pmviewer.bench.collected import Kept, machine
 from pmviewer.bench.report import BenchResult, format_number, to_markdown
 from pmviewer.output.files import write_file
 
-PAGE, TARGETS, PLOT = "benchmarks.md", "targets.csv", "error.png"
+PAGE, TARGETS, PLOT = "benchmarks.md", "benchmarks.csv", "images/benchmarks-error.png"
+"""As they lie in `docs`."""
 MOST_ROWS = 40
 """Of a table on the page; the JSON has all."""
 
@@ -36,7 +37,7 @@ def write_page(folder: Path, kept: list[Kept]) -> str:
 
 def _head(kept: list[Kept]) -> list[str]:
     measured = sorted({one.revision for one in kept if one.revision})
-    lines = ["# Benchmarks", "", "As `pmviewer bench all` ran; nothing is edited by hand.", ""]
+    lines = ["# Benchmarks", "", "As the benches ran (`pmviewer bench all`); nothing is edited by hand.", ""]
     lines += [f"- {line}" for line in machine()]
     lines.append(f"- measured at revision {', '.join(measured) or 'unknown'}, {sum(o.seconds for o in kept):.0f} s")
     whole = [one.name for one in kept if not one.quick]
@@ -113,6 +114,7 @@ def write_plot(path: Path, kept: list[Kept]) -> bool:
         axis.set(title=scene, xlabel="CPU seconds", ylabel="relMSE")
         axis.grid(alpha=0.3)
         axis.legend()
+    path.parent.mkdir(exist_ok=True)
     figure.savefig(path, dpi=90)
     pyplot.close(figure)
     return True

@@ -44,7 +44,7 @@ def test_the_report_says_what_held_and_what_failed(tmp_path):
     assert "| rays (quick) | P9 | 87 ms | ≤ 100 | held | a \\| b |" in page
     assert "it took too long" in page
     assert "revision abc" in page
-    assert "P9,87,ms,100,False,True,a | b" in (tmp_path / "targets.csv").read_text("utf-8")
+    assert "P9,87,ms,100,False,True,a | b" in (tmp_path / "benchmarks.csv").read_text("utf-8")
 
 
 def test_a_folder_without_results_and_a_file_that_is_none_are_said(tmp_path):

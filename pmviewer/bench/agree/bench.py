@@ -25,7 +25,7 @@ from pmviewer.bench.agree.xml import MAX_DEPTH, SIZE
 from pmviewer.bench.report import BenchResult, Cell, Target
 from pmviewer.errors import PmviewerError, SettingError
 
-SCENES, QUICK_SCENES, SEED = 500, 24, 1
+SCENES, QUICK_SCENES, SEED = 500, 12, 1
 GLOWING = 12
 """Scenes with media that emit, after all others of a whole run."""
 SHRINK_TRIES, MOST_SHRUNK = 120, 20
