@@ -220,7 +220,7 @@ DIAGNOSTICS: Mapping[str, DiagnosticView] = {
     ),
     "volume radius": DiagnosticView(
         "beams",
-        "radius of the beam estimate around the camera ray, latest pass",
+        "radius of the beam estimate around the camera ray, latest pass; on lattices the widest of its photons",
         "m",
         "no medium that scatters before the first surface",
     ),
