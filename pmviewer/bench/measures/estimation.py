@@ -66,6 +66,8 @@ COMPARED = (
 """Whose CPU time is compared with whose."""
 FULL, DIFFERENCE = 4.0, 2.0
 """Per cent of the safe pixels that gather in full, and of the difference."""
+LEAST = 0.01
+"""Per cent that two references can tell at best: their noise may well make less of it, or nothing."""
 FULL_REPROJECTED, RAYS_A_PIXEL = 2.0, 19.0
 """Per cent of the safe pixels that gather in full with reprojection, and gather rays per safe pixel."""
 ADAPTIVE, WHOLE = 1024, 4096
@@ -97,8 +99,9 @@ def difference(image: F8, first: F8, second: F8) -> float:
 
 
 def time_to(points: list[Point], bound: float, by_blocks: bool = False) -> tuple[float, bool]:
-    """CPU seconds to a difference, between points by a power law; and whether it was measured, not carried on."""
-    known = [(p.cpu, p.blocks if by_blocks else p.pixels) for p in points]
+    """CPU seconds to a difference, between points by a power law; and whether it was measured, not carried on.
+    Differences below what the references can tell count as `LEAST`."""
+    known = [(p.cpu, max(p.blocks if by_blocks else p.pixels, LEAST)) for p in points]
     for (t0, d0), (t1, d1) in pairwise(known):
         if d1 <= bound < d0:
             return t0 * (t1 / t0) ** (math.log(d0 / bound) / math.log(d0 / d1)), True

@@ -26,7 +26,7 @@ NEED_MORE = ("files",)
 """Benches of files that somebody has to name."""
 LONG = (
     "actions", "agree", "auto", "checkpoint", "cluster", "estimation", "hostile", "lens", "load", "media", "mitsuba",
-    "preview", "stress", "thin-glass", "virtual", "virtual-many",
+    "preview", "stress", "thin-glass", "unused", "virtual", "virtual-many",
 )  # fmt: skip
 """Benches that take many minutes whole: all of them together are run quick, and the page says so."""
 FOLDER = Path("bench-results")
