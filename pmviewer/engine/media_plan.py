@@ -16,8 +16,6 @@ class Lacking(NamedTuple):
 
 
 LACKING = (
-    Lacking("importance.map", "off", "Importance does not know of media: photons are stored and emitted without it."),
-    Lacking("importance.deposition", "all", "Deposition rules do not know of media: all photons are stored."),
     Lacking("importance.emission", "off", "Guided emission does not know of media: photons leave the lights by power."),
     Lacking("gather.cache", "off", "The irradiance cache does not know of media: every surface point gathers itself."),
     Lacking("gather.estimation", "off", "Estimated gathers do not know of media: every pixel gathers itself."),

@@ -17,6 +17,9 @@ Weights are those of eye paths, so that ΣΨL over importons is the sum of the p
 by (n_i/n_t)², which a photon's power is not. Roulette goes by luminance without that factor: it cancels where a path
 leaves the glass again, and paths inside must not die of it.
 
+Media weaken importons on their straight way from surface to surface, as they weaken what is seen through them. What
+media scatter towards the camera comes from the volume map, which has no importance: all of its photons are stored.
+
 Random numbers of an importon are keyed by (seed, index, dimension), see `pmviewer.kernels.dimensions`.
 """
 
@@ -42,9 +45,9 @@ from pmviewer.kernels.dimensions import IMAGE_PLACE, IMPORTON_SCATTER
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import SOBOL, draw4
 from pmviewer.kernels.surface import face
-from pmviewer.kernels.vector import add, along, dot, luminance, mul, scale
+from pmviewer.kernels.vector import along, dot, luminance, mul, scale
 from pmviewer.maps.photon_words import encode_direction
-from pmviewer.render.cast import Ray, leaving, span_of
+from pmviewer.render.cast import leaving, ray_of_camera
 from pmviewer.render.chain import WHITE, arrive, scatter
 from pmviewer.render.hidden_lights import past_lights
 from pmviewer.render.lens import through_lens
@@ -115,7 +118,6 @@ def _turned(change, d, inv):
 
 @device
 def _ray_of_pinhole(eye, x, y):
-    o = (eye.x_eye, eye.y_eye, eye.z_eye)
     right = (eye.x_right, eye.y_right, eye.z_right)
     down = (eye.x_down, eye.y_down, eye.z_down)
     raw = along(along((eye.x_corner, eye.y_corner, eye.z_corner), right, x), down, y)
@@ -123,14 +125,12 @@ def _ray_of_pinhole(eye, x, y):
     if eye.orthographic != 0:
         P, D = start(right, down, zero, zero)
         forward = (eye.x_forward, eye.y_forward, eye.z_forward)
-        near, far = span_of(eye, raw, forward)
-        return Ray(add(o, raw), forward, near, far, None, None), P, D
+        return ray_of_camera(eye, raw, forward), P, D
     inv = _f4(1.0) / _f4(math.sqrt(dot(raw, raw)))
     d = scale(raw, inv)
     dx, dy = scale(along(right, d, -dot(right, d)), inv), scale(along(down, d, -dot(down, d)), inv)
     P, D = start(zero, zero, dx, dy)
-    near, far = span_of(eye, zero, d)
-    return Ray(o, d, near, far, None, None), P, D
+    return ray_of_camera(eye, zero, d), P, D
 
 
 @device

@@ -129,8 +129,7 @@ def test_the_camera_is_where_boundaries_say(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"importance.map": "average"}, "Importance does not know of media"),
-        ({"importance.deposition": "density control"}, "Deposition rules do not know of media"),
+        ({"importance.emission": "Peter-Pietrek"}, "Guided emission does not know of media"),
         ({"gather.cache": "on", "render.method": "gather"}, "irradiance cache does not know of media"),
         ({"direct.shadow_photons": True}, "Shadow photons do not know of media"),
         ({"render.method": "virtual lights"}, "Virtual lights do not know of media"),

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pmviewer.engine.immersion import immersed
 from pmviewer.engine.opened import open_scene
 from pmviewer.importance.importons import Rule, joined, trace
 from pmviewer.maps.importance.build import build_importance
@@ -28,7 +29,8 @@ def traced(scene, rule, N, run=in_turn, seed=1, first=0):
     if not scene.lights:  # importons don't care, but a scene has to have one
         scene = replace(scene, lights=(PointLight("lamp", (0.3, 0.9, 0.2), (1.0, 1.0, 1.0)),))
     opened = open_scene(scene)
-    eye = eye_record(resolve_camera(opened.scene, Settings().camera), Settings(), 0)
+    camera = immersed(opened.flat, resolve_camera(opened.scene, Settings().camera))
+    eye = eye_record(camera, Settings(), 0)
     return trace(opened.flat, eye, rule, seed, first, N, run), eye, opened
 
 

@@ -26,11 +26,13 @@ SAMPLED = 64 * BATCH
 
 @dataclass(frozen=True, eq=False)
 class JudgedBatch:
-    """A batch as the rules of both maps judge it, its photons that go into the sample, its counts and ledgers."""
+    """A batch as the rules of both maps judge it, its photons that go into the sample and those in media, its counts
+    and ledgers."""
 
     caustic: Judged
     global_: Judged
     sample: Float
+    volume: Float
     counts: NDArray[np.int64]
     ledgers: NDArray[np.float64]
 
@@ -53,6 +55,7 @@ def deposit(
     caustic, global_ = depositors
     convergence = _Convergence(plan, deposition, last)
     sampled: list[Float] = []
+    volume: list[Float] = []
     counts, ledgers = np.zeros(N_COUNTS, np.int64), empty_ledger()
 
     def judge(place: int) -> Callable[[], JudgedBatch]:
@@ -63,6 +66,7 @@ def deposit(
         caustic.take([r.caustic for r in results], run)
         global_.take([r.global_ for r in results], run)
         sampled += [r.sample for r in results]
+        volume += [r.volume for r in results]
         counts += sum((r.counts for r in results), np.zeros(N_COUNTS, np.int64))
         ledgers += sum((r.ledgers for r in results), empty_ledger())
         if convergence.ends_pass(min(some.stop * BATCH, last), caustic, sampled, run):
@@ -86,6 +90,8 @@ def deposit(
         caustic_normals=in_caustic[1],
         sample=joined(sampled),
         sample_unit=sample_unit,
+        volume=joined(volume),
+        volume_unit=plan.global_unit * plan.store_probability,
         deposited={"caustic": replace(in_caustic[3], converged=convergence.latest), "global": in_global[3]},
     )
 
@@ -109,7 +115,12 @@ def _judged(
     of_global = _chosen(batch.global_, batch.global_normals, deposition.global_classes)
     index = first_index + i0
     return JudgedBatch(
-        caustic.judge(*of_caustic, index), global_.judge(*of_global, index), sample, batch.counts, batch.ledgers
+        caustic.judge(*of_caustic, index),
+        global_.judge(*of_global, index),
+        sample,
+        batch.volume,
+        batch.counts,
+        batch.ledgers,
     )
 
 
@@ -128,7 +139,7 @@ class _Convergence:
         # Those for the caustic map alone can be left out where all photons of that map have one weight.
         alike = not plan.projected or not plan.record[0]["indirect_caustics"]
         spare = self.criterion is not None and plan.guided is None and alike
-        self.must = min(last if not spare else plan.filling if deposition.global_classes else 0, last)
+        self.must = min(last if not spare else plan.filling if deposition.global_classes or plan.media else 0, last)
         """Trajectories that are traced in any case."""
         self.latest: Converged | None = None
         self._others: PhotonKdTree | None = None

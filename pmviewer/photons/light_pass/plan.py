@@ -29,7 +29,8 @@ class PassPlan:
     Of its `traced` trajectories the first `filling` fill the global map, in `global_unit` watts a unit of power; the
     first has the number `first_index` over all passes. `unit` watts of luminance are emitted; projection maps cover
     `surface_power` of them for the first, `caustic_power` for the other trajectories, and direct caustics count
-    `direct_scale` in the caustic map. `most_stored`: photons that a trajectory stores at most.
+    `direct_scale` in the caustic map. `most_stored`: photons that a trajectory stores at most; `media`: the first
+    trajectories also fill the volume map.
     """
 
     record: NDArray[np.void]
@@ -45,6 +46,7 @@ class PassPlan:
     most_stored: int
     projected: bool
     guided: Guided | None
+    media: bool
 
     @property
     def global_photons(self) -> int:
@@ -146,6 +148,7 @@ def plan_pass(
         most_stored=most_bounces(settings, scene.has_media) * (MOST_COPIES if settings.roulette == "equal" else 1),
         projected=projection is not None,
         guided=guided,
+        media=scene.has_media,
     )
 
 

@@ -36,7 +36,7 @@ CHRISTENSEN_DISCARD = Need(
 class Importance(Group):
     """Importance"""
 
-    needs: ClassVar[Needs] = (PHOTONS, CLEAR)
+    needs: ClassVar[Needs] = (PHOTONS,)
 
     map: Literal["off", "screen", "footprint", "average"] = setting(
         "off",
@@ -261,7 +261,7 @@ class Importance(Group):
         stage="photons",
         scale="choice",
         title="guided emission",
-        needs=(EMISSION,),
+        needs=(CLEAR, EMISSION),
     )
     tests: int = setting(
         2,
