@@ -33,7 +33,7 @@ def test_media_weaken_importance(z, inside, way):
 
 
 def test_gather_rays_are_weakened_on_their_way_too():
-    """Fog between two walls: as many importons arrive as rays of a cosine lobe do, each with exp(−σ s) of it, by numpy's
+    """Fog between walls: as many importons arrive as rays of a cosine lobe do, each with exp(−σ s) of it, by numpy's
     own rays."""
     sigma = 0.7
     walls = [
