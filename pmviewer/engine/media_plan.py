@@ -22,9 +22,14 @@ LACKING = (
     Lacking("gather.secondary", 0.0, "Secondary gathering does not know of media: gather rays look the map up."),
     Lacking("direct.shadow_photons", False, "Shadow photons do not know of media: all shadow rays are cast."),
 )
-VIRTUAL = "Virtual lights do not know of media: the method progressive shows the scene."
+VIRTUAL = (
+    "Virtual lights weighed by whole paths, or chosen by a tree, do not know of media: the method progressive shows "
+    "the scene. virtual.estimator = single step and virtual.choice = even do."
+)
 THIN = "Light passes thin glass as through all glass: simplified panes do not know of media."
 MAP_ALONE = "A map alone shows no light that media scatter: choose progressive, gather or path."
+WHOLE = ("full path", "every vertex", "modified", "printed full path")
+"""Estimators of virtual lights that follow whole paths."""
 LOOKED_FOR = Lacking("direct.mis", True, "Direct light is looked for by rays, too: media that emit light need it.")
 """Where media emit: what is near to them is lit by what rays find."""
 BLURRED_FROM = 0.99
@@ -41,7 +46,8 @@ def in_media(settings: Settings, emit: bool) -> tuple[Settings, tuple[str, ...]]
         if getattr(getattr(settings, group), name) != lacking.instead:
             changes[lacking.name] = lacking.instead
             said.append(lacking.sentence)
-    if settings.render.method == "virtual lights":
+    chosen = settings.virtual
+    if settings.render.method == "virtual lights" and (chosen.estimator in WHOLE or chosen.choice != "even"):
         changes["render.method"] = "progressive"
         said.append(VIRTUAL)
     if settings.render.method in ("global map", "caustic map"):

@@ -162,7 +162,7 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
 
 def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     plan = _photon_plan(settings, traits)
-    if traits.has_scattering and settings.render.method in ("progressive", "gather"):
+    if traits.has_scattering and settings.render.method in ("progressive", "gather", "virtual lights"):
         plan = replace(
             plan,
             volume=True,

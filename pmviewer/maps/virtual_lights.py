@@ -57,7 +57,11 @@ V_GAP, V_Q, V_FIRST, V_BLOCKED, V_LAMBERTIAN, V_U, V_V, V_PRIM, V_OPACITY = _col
 """Columns of a virtual light, float32: point, geometric and shading normal as the surface has them, direction that the
 photon came from, power in watts, BRDF where it is Lambertian; how far rays start off the surface, what q is made of
 without Y(f_y), whether y is the path's first hit, whether its light sample was blocked, whether it is Lambertian, its
-place on the primitive, the primitive's number as the bits of an int32, the surface's opacity."""
+place on the primitive, the primitive's number as the bits of an int32 (or OF_MEDIUM), the surface's opacity."""
+
+OF_MEDIUM = np.uint32(0xFFFFFFFF)
+"""In place of the primitive's number: the light has no surface, it is a collision in the medium whose number stands in
+V_U. Normals are the direction that the photon came from, the power is what is scattered, and q is 0."""
 
 VIRTUAL_DTYPE = np.dtype(
     [

@@ -24,7 +24,7 @@ from pmviewer.kernels.surface import leave
 from pmviewer.kernels.vector import dot, largest, mul, sub
 from pmviewer.render.cast import Ray, cast, leaving, medium_towards
 from pmviewer.render.chain import BLACK, WHITE
-from pmviewer.render.media.through import BEFORE_LIGHT, light_through, place_of, way_through
+from pmviewer.render.media.through import ANYWHERE, BEFORE_LIGHT, light_through, place_of, way_through
 
 MOST_PANES = 256
 """A ray is stopped by the pane after so many."""
@@ -38,6 +38,20 @@ def visible(scene, p, ng, gap, wi, end):
     o = leave(p, ng, gap, wi[0], wi[1], wi[2])
     d = sub(end, o)
     return not occluded(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), BEFORE_LIGHT)
+
+
+@specialised
+def let_through(scene, si, wi, end):
+    """The share (red, green, blue) of light from the point `end`, in direction wi, that reaches a SurfaceInteraction:
+    all, none, or what media let through."""
+    if not has_media(scene):
+        return lambda scene, si, wi, end: WHITE if visible(scene, si.p, si.ng, si.gap, wi, end) else BLACK
+
+    def through_media(scene, si, wi, end):
+        o = leave(si.p, si.ng, si.gap, wi[0], wi[1], wi[2])
+        return light_through(scene, o, end, medium_towards(si, wi), ANYWHERE)
+
+    return through_media
 
 
 @specialised

@@ -132,7 +132,11 @@ def test_the_camera_is_where_boundaries_say(tmp_path):
         ({"importance.emission": "Peter-Pietrek"}, "Guided emission does not know of media"),
         ({"gather.cache": "on", "render.method": "gather"}, "irradiance cache does not know of media"),
         ({"direct.shadow_photons": True}, "Shadow photons do not know of media"),
-        ({"render.method": "virtual lights"}, "Virtual lights do not know of media"),
+        (
+            {"render.method": "virtual lights", "virtual.estimator": "full path"},
+            "Virtual lights weighed by whole paths",
+        ),
+        ({"render.method": "virtual lights", "virtual.choice": "light tree"}, "chosen by a tree, do not know of media"),
         ({"render.method": "global map"}, "A map alone shows no light that media scatter"),
     ],
 )

@@ -141,13 +141,14 @@ def virtual_record(
 
 def objects_of(flat: FlatScene, rows: NDArray[np.float32]) -> tuple[NDArray[np.int64], tuple[str, ...]]:
     """The objects (n,) that virtual lights (n, COLUMNS) lie on, and their names: the scene's shapes in their order, and
-    behind them one for all instances."""
+    behind them one for all instances and one for media."""
     shapes = flat.owner.shapes
     prims = np.ascontiguousarray(rows[:, V_PRIM]).view(np.int32).astype(np.int64)
-    stored = prims < len(flat.shape_of_prim)
+    stored = (prims >= 0) & (prims < len(flat.shape_of_prim))
     numbers = np.full(len(rows), len(shapes), np.int64)
     numbers[stored] = np.minimum(flat.shape_of_prim[prims[stored]], len(shapes))
-    return numbers, (*(shape.name for shape in shapes), "instances")
+    numbers[prims < 0] = len(shapes) + 1
+    return numbers, (*(shape.name for shape in shapes), "instances", "media")
 
 
 def lights_asked(record: NDArray[np.void]) -> int:
@@ -157,9 +158,10 @@ def lights_asked(record: NDArray[np.void]) -> int:
 
 def film_of(settings: Settings, plan: Plan, width: int, height: int) -> Film:
     """An empty film for the method."""
+    channels = MEDIA_CHANNELS if plan.media else CHANNELS
     if plan.virtual:
-        return WeightedFilm(width, height, settings.virtual)
-    return Film(width, height, channels=MEDIA_CHANNELS if plan.media else CHANNELS)
+        return WeightedFilm(width, height, settings.virtual, channels)
+    return Film(width, height, channels=channels)
 
 
 def bias_of(settings: Settings) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ a weighted sum is no better than its ΣG. So one half of the choice goes by powe
 weigh, and each chosen one counts as often as its probability says. That is unbiased for any probabilities.
 
 Of a single step the weight is guessed: by how many candidates lie in the same cell of space that face the same way.
+Candidates in media weigh nothing.
 Of whole paths it is known. Estimates that are not weighted, and lights that tell their density themselves, choose by
 power alone.
 """
@@ -19,12 +20,14 @@ from numpy.typing import NDArray
 
 from pmviewer.maps.record import EXPONENT_BASE
 from pmviewer.maps.virtual_lights import (
+    OF_MEDIUM,
     OF_PATHS,
     V_F,
     V_FIRST,
     V_N,
     V_P,
     V_PHI,
+    V_PRIM,
     V_Q,
     V_WI,
 )
@@ -46,8 +49,13 @@ def choice_probabilities(rows: Float, estimator: int, scene_radius: float | None
         weights = np.where(rows[:, V_FIRST] != 0, q, q * beyond)
         return mixed(probabilities, weights)
     if scene_radius is not None and len(rows):
-        return mixed(probabilities, 1.0 / _neighbours(rows, scene_radius))
+        return mixed(probabilities, np.where(in_media(rows), 0.0, 1.0 / _neighbours(rows, scene_radius)))
     return probabilities
+
+
+def in_media(rows: Float) -> NDArray[np.bool_]:
+    """Which of the candidates (n, COLUMNS) are collisions in media."""
+    return np.asarray(np.ascontiguousarray(rows[:, V_PRIM]).view(np.uint32) == OF_MEDIUM)
 
 
 def mixed(power: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -25,9 +25,10 @@ from pmviewer.maps.virtual_lights import (
     V_Q,
 )
 from pmviewer.photons.bounces import most_bounces
-from pmviewer.photons.virtual.choice import as_photons, choice_probabilities, chosen
+from pmviewer.photons.virtual.choice import as_photons, choice_probabilities, chosen, in_media
 from pmviewer.photons.virtual.density import lit_areas
-from pmviewer.photons.virtual.trace import C_DROPPED, C_RAYS, C_STORED, N_COUNTS, TRACE_DTYPE, trace_virtual_lights
+from pmviewer.photons.virtual.flight import C_DROPPED, C_RAYS, C_STORED, N_COUNTS
+from pmviewer.photons.virtual.trace import TRACE_DTYPE, trace_virtual_lights
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import Photons, Virtual
 
@@ -123,13 +124,14 @@ def virtual_lights(
     lights[:, V_PHI : V_PHI + 3] *= (unit * share)[:, None]
     if estimator in OF_PATHS:
         lights[:, V_Q] *= share / np.float32(N)
-    elif estimator in OF_DENSITY and len(kept):
-        thinned = np.ascontiguousarray(found[kept])
-        whole = estimator == PRINTED_SINGLE
-        areas = areas_of(scene, found if of_map else thinned, lights, neighbours(virtual, index), whole, run)
-        lights[:, V_Q] = areas * (share if of_map else np.float32(1.0))
-        if not whole:
-            lights[:, V_Q] *= lights[:, V_OPACITY]
+    elif estimator in OF_DENSITY and not in_media(lights).all():
+        lie = ~in_media(lights)
+        whole, some = estimator == PRINTED_SINGLE, np.ascontiguousarray(lights[lie])
+        among = found[~in_media(rows)] if of_map else np.ascontiguousarray(found[kept][lie])
+        q = areas_of(scene, among, some, neighbours(virtual, index), whole, run)
+        if of_map:
+            q *= share[lie]
+        lights[lie, V_Q] = q if whole else q * some[:, V_OPACITY]
     return VirtualLights(
         rows=lights,
         photons=as_photons(found[kept], share),

@@ -20,7 +20,6 @@ import numpy as np
 
 from pmviewer.kernels.accel.occlusion import occluded
 from pmviewer.kernels.accel.opacity import over_opacity
-from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.bsdf.albedo import stored_albedo
 from pmviewer.kernels.bsdf.dispersion import beyond, colour_of_split, met_by, new_wave
 from pmviewer.kernels.bsdf.plain import INV_PI
@@ -49,12 +48,12 @@ from pmviewer.kernels.dimensions import (
 )
 from pmviewer.kernels.lights.light import emit_from, pick_light
 from pmviewer.kernels.lights.start import seen_from, spread_over
+from pmviewer.kernels.media.medium import light_medium
 from pmviewer.kernels.memory import float_of_bits
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import STRAIGHT, adjoint_cosines, face, leave, surface_at
 from pmviewer.kernels.vector import dot, is_good, luminance, mul, scale, sub
-from pmviewer.maps.photon_words import encode_direction, encode_power
 from pmviewer.maps.record import BOUNCES, HAD_DIFFUSE, LAST_SPECULAR
 from pmviewer.maps.virtual_lights import (
     FULL,
@@ -76,12 +75,13 @@ from pmviewer.maps.virtual_lights import (
     V_V,
     V_WI,
 )
+from pmviewer.photons.light_pass.flight import medium_after
+from pmviewer.photons.virtual.flight import C_DROPPED, C_RAYS, C_STORED, Walker, photon, put, to_surface
 
 _f4 = np.float32
 _f8 = np.float64
 _u4 = np.uint32
 _i8 = np.int64
-_INF = _f4(np.inf)
 _BEFORE = _f4(1.0 - 2.0**-13)
 LEAST_COSINE = _f4(1e-4)
 
@@ -96,23 +96,6 @@ TRACE_DTYPE = np.dtype(
     ],
     align=True,
 )
-N_COUNTS = 3
-C_STORED, C_RAYS, C_DROPPED = range(N_COUNTS)
-
-
-@device
-def _put(row, column, value):
-    row[column], row[column + 1], row[column + 2] = value
-
-
-@device
-def _photon(out, p, wi, beta, flags, light):
-    """A candidate as a photon record (`pmviewer.maps.record`)."""
-    out[0], out[1], out[2] = p
-    r, g, b = encode_power(beta[0]), encode_power(beta[1]), encode_power(beta[2])
-    out[3] = float_of_bits(_u4(encode_direction(wi[0], wi[1], wi[2]) | _u4(flags)))
-    out[4] = float_of_bits(_u4(r | _u4(g << _u4(16))))
-    out[5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
 
 
 @device
@@ -139,15 +122,15 @@ def is_blocked(scene, pass_, seed, index, bounces, p, ng, gap):
 
 @device
 def _surface(row, b, p, ng, ns, gap, prim, u, v, wi):
-    _put(row, V_P, p)
-    _put(row, V_N, ng)
-    _put(row, V_NS, ns)
-    _put(row, V_WI, wi)
+    put(row, V_P, p)
+    put(row, V_N, ng)
+    put(row, V_NS, ns)
+    put(row, V_WI, wi)
     row[V_GAP], row[V_U], row[V_V] = gap, u, v
     row[V_PRIM] = float_of_bits(_u4(np.int32(prim)))
     plain = is_lambertian(b) and abs(dot(shading_normal(b), ng)) >= STRAIGHT
     row[V_LAMBERTIAN] = _f4(1.0) if plain else _f4(0.0)
-    _put(row, V_F, scale(b.albedo, INV_PI))
+    put(row, V_F, scale(b.albedo, INV_PI))
 
 
 @kernel
@@ -161,6 +144,7 @@ def trace_virtual_lights(scenes, passes, i0, i1, photons_out, lights_out, counts
     Returns the next trajectory: less than i1 when a buffer may not hold another one's candidates.
     """
     scene, pass_ = scenes[0], passes[0]
+    out = (photons_out, lights_out, counts)
     paths = pass_.estimator in OF_PATHS
     stops = pass_.estimator in (FULL, MODIFIED)
     for i in range(i0, i1):
@@ -177,12 +161,15 @@ def trace_virtual_lights(scenes, passes, i0, i1, photons_out, lights_out, counts
             counts[C_DROPPED] += 1
             continue
         wave = new_wave(scene, pass_.sequence, seed, index, WAVE)
-        o, q, flags, first = z0, _f4(0.0), _u4(0), True
-        for bounces in range(pass_.max_bounces):
-            t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), _INF)
-            counts[C_RAYS] += 1
-            if prim < 0:
+        q, first = _f4(0.0), True
+        walker = Walker(z0, d, light_medium(scene, light), beta, _u4(0), 0)
+        while walker.bounces < pass_.max_bounces:
+            alive, flown, prim, u, v, t = to_surface(scene, pass_, walker, (seed, index, light), out)
+            if not alive or prim < 0:
                 break
+            if flown.bounces > walker.bounces:  # collisions on the way, which no gathering walk makes
+                q, first = _f4(0.0), False
+            o, d, medium, beta, flags, bounces = flown
             p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
             material = material_of(scene, prim)
             beta = attenuation(scene, material, ng, d, t, beta)
@@ -202,7 +189,7 @@ def trace_virtual_lights(scenes, passes, i0, i1, photons_out, lights_out, counts
                 row = lights_out[counts[C_STORED]]
                 _surface(row, b, p, ng, ns, gap, prim, u, v, wi)
                 lean = leaning(b, ng, wi)
-                _put(row, V_PHI, scale(beta, lean))
+                put(row, V_PHI, scale(beta, lean))
                 if pass_.estimator == MODIFIED and not first:
                     counts[C_RAYS] += 1
                     blocked = is_blocked(scene, pass_, seed, index, bounces, p, facing, gap)
@@ -211,7 +198,7 @@ def trace_virtual_lights(scenes, passes, i0, i1, photons_out, lights_out, counts
                 row[V_Q] = q if first else q * lean
                 row[V_OPACITY] = _f4(1.0) / over_opacity(scene, prim, u, v, p, (_f4(1.0), _f4(1.0), _f4(1.0)))[0]
                 word = _u4(flags | _u4(min(bounces, BOUNCES)))
-                _photon(photons_out[counts[C_STORED]], p, wi, beta, word, light)
+                photon(photons_out[counts[C_STORED]], p, wi, beta, word, light)
                 counts[C_STORED] += 1
             s0, s1, s2, u_lobe = draw4(pass_.sequence, seed, index, PHOTON_SCATTER + bounces)
             group, share, u_lobe = pick_group(b, wi, u_lobe)
@@ -243,5 +230,6 @@ def trace_virtual_lights(scenes, passes, i0, i1, photons_out, lights_out, counts
                         q /= max(stored_albedo(scene, b, d), LEAST_COSINE)
             if group != FOLLOWED:
                 first, flags = False, _u4(HAD_DIFFUSE)
-            o = leave(p, ng, gap, d[0], d[1], d[2])
+            medium = medium_after(scene, prim, ng, wi, d, medium)
+            walker = Walker(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces + 1)
     return i1

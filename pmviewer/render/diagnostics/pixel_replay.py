@@ -22,7 +22,7 @@ from pmviewer.render.pixel import sampled_ray
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, own_radius
 from pmviewer.render.reflect import reflected, unfound
 from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
-from pmviewer.render.straight import visible
+from pmviewer.render.straight import let_through
 from pmviewer.render.virtual_lights.descent import CUT_WORDS
 from pmviewer.render.virtual_lights.lit import asked_for, asked_light, one_light
 
@@ -133,13 +133,15 @@ def _each_light(given, si, beta, seed, numbers, lights, n):
         F, G, geometry, wi, end = one_light(given, si, j)
         if not (F[0] + F[1] + F[2] > _f4(0.0) or _f4(0.0) < G):
             continue
-        F = scale(mul(beta, F), each)
+        T = let_through(given.scene, si, wi, end)
+        seen = largest(T) > _f4(0.0)
+        F = scale(mul(beta, mul(F, T) if seen else F), each)
         if virtual.estimator == CLAMPED and geometry > virtual.clamp:
             F = scale(F, virtual.clamp / geometry)
         for k in range(3):
             lights[n, k], lights[n, 3 + k], lights[n, 6 + k] = si.p[k], si.ng[k], F[k]
         lights[n, 9] = luminance(beta) * each * G
-        lights[n, 10] = _f4(1.0) if visible(given.scene, si.p, si.ng, si.gap, wi, end) else _f4(0.0)
+        lights[n, 10] = _f4(1.0) if seen else _f4(0.0)
         lights[n, 11], lights[n, 12], lights[n, 13], lights[n, 14] = (
             _f4(j),
             _f4(numbers[0]),

@@ -54,12 +54,13 @@ _NORMAL, _DEPTH = PLANES["normal"].start, PLANES["depth"].start
 
 
 @kernel
-def shared_sums(sums, width, height, radius, base, rows, out):
+def shared_sums(sums, width, height, radius, columns, rows, out):
     """ΣA and ΣC over the pixels within `radius` of each pixel that show the same surface, out (n, 2).
 
-    sums: float64 (n, CHANNELS + SUMS); base: first column of the term's sums; rows: the first pixel of `out` and the
-    one after the last.
+    sums: float64 (n, planes + SUMS); columns: the first of the term's sums, and that of the object; rows: the first
+    pixel of `out` and the one after the last.
     """
+    base, object_ = columns
     step = max(1, math.ceil(radius / TAPS))
     reach = int(radius) // step
     for here in range(rows[0], rows[1]):
@@ -74,7 +75,7 @@ def shared_sums(sums, width, height, radius, base, rows, out):
                     continue
                 there = v * width + u
                 if there != here:
-                    if sums[there, CHANNELS + W_OBJECT] != sums[here, CHANNELS + W_OBJECT]:
+                    if sums[there, object_] != sums[here, object_]:
                         continue
                     mx, my, mz = sums[there, _NORMAL], sums[there, _NORMAL + 1], sums[there, _NORMAL + 2]
                     other = math.sqrt(mx * mx + my * my + mz * mz)
@@ -96,10 +97,9 @@ def ratio(numerator: NDArray[Any], denominator: NDArray[Any]) -> F8:
 class WeightedFilm(Film):
     """The film of the method "virtual lights": SUMS columns beyond the planes, see `pmviewer.maps.virtual_lights`."""
 
-    numbered = CHANNELS + W_OBJECT
-
-    def __init__(self, width: int, height: int, virtual: Virtual) -> None:
-        super().__init__(width, height, SUMS)
+    def __init__(self, width: int, height: int, virtual: Virtual, channels: int = CHANNELS) -> None:
+        super().__init__(width, height, SUMS, channels)
+        self.numbered = channels + W_OBJECT
         self.sums[:] = self.blank
         self.virtual = virtual
         self.estimator = ESTIMATORS.index(virtual.estimator)
@@ -110,12 +110,12 @@ class WeightedFilm(Film):
         return self.estimator not in (UNWEIGHTED, CLAMPED)
 
     def planes(self) -> NDArray[np.float32]:
-        """Means (height, width, CHANNELS) float32, weighted light included."""
+        """Means (height, width, channels) float32, weighted light included."""
         planes = super().planes()
         if self.weighted:
             for term, base in (("indirect", W_INDIRECT), ("specular", W_SPECULAR)):
                 light = np.zeros_like(planes)
-                light[..., PLANES[term]] = self._light(CHANNELS + base).reshape(self.height, self.width, 3)
+                light[..., PLANES[term]] = self._light(self.channels + base).reshape(self.height, self.width, 3)
                 planes += self.weighed(light)
         return planes
 
@@ -133,7 +133,7 @@ class WeightedFilm(Film):
 
     def quotient(self, pixel: int, term: str) -> float:
         """ΣA·c/ΣG of one pixel, which weighted light of that term ("indirect", "specular") is multiplied by."""
-        base = CHANNELS + {"indirect": W_INDIRECT, "specular": W_SPECULAR}[term]
+        base = self.channels + {"indirect": W_INDIRECT, "specular": W_SPECULAR}[term]
         return float(self._quotient(base, (pixel, pixel + 1))[0])
 
     def normalisation(self, base: int, rows: tuple[int, int] | None = None) -> F8:
@@ -145,34 +145,36 @@ class WeightedFilm(Film):
         if self.estimator in PRINTED or normalisation == "none":
             return np.ones(last - first)
         if normalisation == "per object":
-            numbers = sums[:, CHANNELS + W_OBJECT].astype(np.int64) + 1
+            numbers = sums[:, self.channels + W_OBJECT].astype(np.int64) + 1
             return ratio(np.bincount(numbers, C), np.bincount(numbers, A))[numbers[first:last]]
         if normalisation == "interpolated":
             radius = self.virtual.window / max(self.passes, 1) ** 0.25
             shared = np.empty((last - first, 2))
-            shared_sums(sums, self.width, self.height, radius, base, (first, last), shared)
+            shared_sums(sums, self.width, self.height, radius, (base, self.channels + W_OBJECT), (first, last), shared)
             return ratio(shared[:, 1], shared[:, 0])
         return ratio(C[first:last], A[first:last])
 
     @property
     def lost(self) -> float:
         """Share of the light from virtual lights that clamping took."""
-        total = float(self.sums[:, CHANNELS + W_SUM].sum())
-        return float(self.sums[:, CHANNELS + W_LOST].sum()) / total if total > 0 else 0.0
+        total = float(self.sums[:, self.channels + W_SUM].sum())
+        return float(self.sums[:, self.channels + W_LOST].sum()) / total if total > 0 else 0.0
 
     def views(self) -> dict[str, NDArray[np.float32]]:
         """Planes (h, w, 1) of the diagnostic views; negative where there is nothing."""
         sums = self.sums
-        total, n = sums[:, CHANNELS + W_SUM], sums[:, CHANNELS + W_LIGHTS]
-        variance = np.maximum(sums[:, CHANNELS + W_SQUARES] - ratio(total * total, n), 0.0)
+        total, n = sums[:, self.channels + W_SUM], sums[:, self.channels + W_LIGHTS]
+        variance = np.maximum(sums[:, self.channels + W_SQUARES] - ratio(total * total, n), 0.0)
         made = {"virtual light error": np.where(total > 0, 100 * ratio(np.sqrt(variance), total), -1.0)}
         if self.weighted:
-            base = np.where(sums[:, CHANNELS + W_INDIRECT + W_A] > 0, W_INDIRECT, W_SPECULAR)
+            base = np.where(sums[:, self.channels + W_INDIRECT + W_A] > 0, W_INDIRECT, W_SPECULAR)
             picked = {
-                "sum of weights": [ratio(sums[:, CHANNELS + b + W_G], sums[:, CHANNELS + b + W_A]) for b in _TERMS],
-                "normalisation": [self.normalisation(CHANNELS + b) for b in _TERMS],
+                "sum of weights": [
+                    ratio(sums[:, self.channels + b + W_G], sums[:, self.channels + b + W_A]) for b in _TERMS
+                ],
+                "normalisation": [self.normalisation(self.channels + b) for b in _TERMS],
             }
-            lit = (sums[:, CHANNELS + W_INDIRECT + W_A] > 0) | (sums[:, CHANNELS + W_SPECULAR + W_A] > 0)
+            lit = (sums[:, self.channels + W_INDIRECT + W_A] > 0) | (sums[:, self.channels + W_SPECULAR + W_A] > 0)
             for view, (whole, chained) in picked.items():
                 made[view] = np.where(lit, np.where(base == W_INDIRECT, whole, chained), -1.0)
         return {name: view.reshape(self.height, self.width, 1).astype(np.float32) for name, view in made.items()}

@@ -10,6 +10,8 @@ from pmviewer.kernels.bsdf.albedo import stored_albedo
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_at, bsdf_f
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import has, specialised
+from pmviewer.kernels.media.medium import has_media, phase_numbers
+from pmviewer.kernels.media.phase import phase
 from pmviewer.kernels.memory import load_f4, load_i4
 from pmviewer.kernels.scene import load3, material_of
 from pmviewer.kernels.surface import face
@@ -62,6 +64,35 @@ def bsdf_of(scene, virtual, row, glossy):
     y, wi = load3(virtual.lights, row + V_P), load3(virtual.lights, row + V_WI)
     ng, ns = load3(virtual.lights, row + V_N), load3(virtual.lights, row + V_NS)
     return bsdf_at(scene, prim, material_of(scene, prim), u, v, y, ng, ns, wi, glossy, None), wi
+
+
+@specialised
+def facing_of(scene, virtual, row, ny, wi):
+    """Cosine at the light, whose normal on its lit side is ny, of the direction −wi; 1 where it has no surface."""
+    if not has_media(scene):
+        return lambda scene, virtual, row, ny, wi: -dot(ny, wi)
+
+    def perhaps_in_media(scene, virtual, row, ny, wi):
+        return _f4(1.0) if load_i4(virtual.lights, row + V_PRIM) < 0 else -dot(ny, wi)
+
+    return perhaps_in_media
+
+
+@specialised
+def sent(scene, virtual, row, glossy, wo):
+    """`scattered` of a light of any kind: of a collision in a medium by its phase function."""
+    if not has_media(scene):
+        return lambda scene, virtual, row, glossy, wo: scattered(scene, virtual, row, glossy, wo)
+
+    def perhaps_in_media(scene, virtual, row, glossy, wo):
+        if load_i4(virtual.lights, row + V_PRIM) < 0:
+            wi = load3(virtual.lights, row + V_WI)
+            medium = _i8(load_f4(virtual.lights, row + V_U))
+            p = phase(phase_numbers(scene, medium), (-wi[0], -wi[1], -wi[2]), wo)
+            return (p, p, p), _f4(0.0)
+        return scattered(scene, virtual, row, glossy, wo)
+
+    return perhaps_in_media
 
 
 @specialised

@@ -13,11 +13,12 @@ from pmviewer.kernels.bsdf.scattering import STORED, bsdf_f, same_side, shading_
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.dimensions import VIRTUAL_SUBSET
+from pmviewer.kernels.media.medium import has_media
 from pmviewer.kernels.memory import load_i4, stack_i4
 from pmviewer.kernels.random import draw1
 from pmviewer.kernels.scene import load3
 from pmviewer.kernels.surface import leave
-from pmviewer.kernels.vector import dot, is_good, luminance, mul, scale
+from pmviewer.kernels.vector import dot, is_good, largest, luminance, mul, scale
 from pmviewer.maps.virtual_lights import (
     CLAMPED,
     PRINTED_FULL,
@@ -36,11 +37,11 @@ from pmviewer.maps.virtual_lights import (
     W_SUM,
 )
 from pmviewer.render.pixel import INDIRECT, SPECULAR, weighed
-from pmviewer.render.planes import CHANNELS
+from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS
 from pmviewer.render.record import C_DROPPED, C_RAYS, C_SHADOW_RAYS
-from pmviewer.render.straight import visible
+from pmviewer.render.straight import let_through
 from pmviewer.render.virtual_lights.descent import CUT_WORDS, ask_cut, descend
-from pmviewer.render.virtual_lights.light import scattered, towards, weight_of
+from pmviewer.render.virtual_lights.light import facing_of, sent, towards, weight_of
 from pmviewer.render.virtual_lights.walk import normalisation
 
 _f4 = np.float32
@@ -119,7 +120,7 @@ def one_light(given, si, j):
     direction and the end of the shadow ray. F is black where nothing can arrive."""
     scene, virtual, b = given.scene, given.virtual, si.bsdf
     row, y, ny, gap, wi, distance2 = towards(virtual, j, si.p)
-    facing = -dot(ny, wi)
+    facing = facing_of(scene, virtual, row, ny, wi)
     nothing = (_BLACK, _f4(0.0), _f4(0.0), wi, y)
     if not (distance2 > _f4(0.0) and facing > _f4(0.0)) or same_side(b, STORED, si.ng, si.wo, wi) == 0:
         return nothing
@@ -129,7 +130,7 @@ def one_light(given, si, j):
         return nothing
     wo = (-wi[0], -wi[1], -wi[2])
     geometry = cos * facing / distance2
-    f_y, albedo = scattered(scene, virtual, row, given.eye.glossy, wo)
+    f_y, albedo = sent(scene, virtual, row, given.eye.glossy, wo)
     F = scale(mul(mul(f, f_y), load3(virtual.lights, row + V_PHI)), geometry)
     G = luminance(f) * geometry * weight_of(virtual, row, f_y, albedo)
     return F, G, geometry, wi, leave(y, ny, gap, wo[0], wo[1], wo[2])
@@ -142,7 +143,8 @@ def from_virtual_lights(given, si, beta, pixel, whole):
     weighted = virtual.estimator != UNWEIGHTED and virtual.estimator != CLAMPED
     cut = stack_i4(CUT_WORDS)
     asked = asked_for(given, si, pixel.seed, cut)
-    base = CHANNELS + (W_INDIRECT if whole else W_SPECULAR)
+    sums = sums_at(scene)
+    base = sums + (W_INDIRECT if whole else W_SPECULAR)
     plane = _i8(INDIRECT if whole else SPECULAR)
     throughput = luminance(beta)
     for i in range(asked[0]):
@@ -154,18 +156,19 @@ def from_virtual_lights(given, si, beta, pixel, whole):
             continue
         counts[C_RAYS] += 1
         counts[C_SHADOW_RAYS] += 1
-        if not visible(scene, si.p, si.ng, si.gap, wi, end):
+        T = let_through(scene, si, wi, end)
+        if not largest(T) > _f4(0.0):
             continue
-        F = scale(mul(beta, F), each)
+        F = scale(mul(mul(beta, F), T), each)
         if not (is_good(F) and _f4(np.inf) > G):
             counts[C_DROPPED] += 1
             continue
         Y = _f8(luminance(F))
-        film[pixel.number, CHANNELS + W_SUM] += Y
-        film[pixel.number, CHANNELS + W_SQUARES] += Y * Y
+        film[pixel.number, sums + W_SUM] += Y
+        film[pixel.number, sums + W_SQUARES] += Y * Y
         if virtual.estimator == CLAMPED and geometry > virtual.clamp:
             F = scale(F, virtual.clamp / geometry)
-            film[pixel.number, CHANNELS + W_LOST] += Y - _f8(luminance(F))
+            film[pixel.number, sums + W_LOST] += Y - _f8(luminance(F))
         target = _i8(plane)
         if weighted and _f4(0.0) < G:
             target = _i8(base + W_F)
@@ -173,13 +176,21 @@ def from_virtual_lights(given, si, beta, pixel, whole):
         film[pixel.number, target] += weighed(pixel, _f8(F[0]))
         film[pixel.number, target + 1] += weighed(pixel, _f8(F[1]))
         film[pixel.number, target + 2] += weighed(pixel, _f8(F[2]))
-    film[pixel.number, CHANNELS + W_LIGHTS] += _f8(asked[0])
+    film[pixel.number, sums + W_LIGHTS] += _f8(asked[0])
     if weighted:
         albedo, counted = normalisation(given, si, pixel)
         if virtual.estimator == PRINTED_FULL:
             albedo = _f4(1.0)
         film[pixel.number, base + W_A] += _f8(throughput * albedo)
         film[pixel.number, base + W_C] += _f8(throughput * counted)
+
+
+@specialised
+def sums_at(scene):
+    """Column of the film at which the sums begin: behind its planes."""
+    if has_media(scene):
+        return lambda scene: MEDIA_CHANNELS
+    return lambda scene: CHANNELS
 
 
 @specialised
@@ -195,11 +206,11 @@ def note_object(given, prim, pixel):
                 number = _i8(load_i4(given.virtual.objects, prim))
             else:
                 number = given.virtual.n_objects + find_instance(given.scene, prim)
-            pixel.film[pixel.number, CHANNELS + W_OBJECT] = _f8(number)
+            pixel.film[pixel.number, sums_at(given.scene) + W_OBJECT] = _f8(number)
 
         return instanced
 
     def stored(given, prim, pixel):
-        pixel.film[pixel.number, CHANNELS + W_OBJECT] = _f8(load_i4(given.virtual.objects, prim))
+        pixel.film[pixel.number, sums_at(given.scene) + W_OBJECT] = _f8(load_i4(given.virtual.objects, prim))
 
     return stored
