@@ -40,8 +40,9 @@ def _head(kept: list[Kept]) -> list[str]:
     lines = ["# Benchmarks", "", "As the benches ran (`pmviewer bench all`); nothing is edited by hand.", ""]
     lines += [f"- {line}" for line in machine()]
     lines.append(f"- measured at revision {', '.join(measured) or 'unknown'}, {sum(o.seconds for o in kept):.0f} s")
-    whole = [one.name for one in kept if not one.quick]
-    quick = [one.name for one in kept if one.quick]
+    found = [one for one in kept if one.result is not None]
+    whole = [one.name for one in found if not one.quick]
+    quick = [one.name for one in found if one.quick]
     lines.append(f"- whole: {', '.join(whole) or 'none'}")
     lines.append(f"- quick, with fewer photons, cases and seconds than a target asks for: {', '.join(quick) or 'none'}")
     lines += [f"- not measured: {one.name}, {one.failed}" for one in kept if one.result is None]

@@ -18,14 +18,14 @@ from pmviewer.errors import SceneError
 
 LIMIT, QUICK_LIMIT = 40 * 60.0, 15 * 60.0
 """Seconds for all."""
-SHARE = 4.0
+SHARE = 6.0
 """How much more than an equal part of what is left one bench may take."""
 LEAST = 20.0
 THEMSELVES = ("all", "report")
 NEED_MORE = ("files",)
 """Benches of files that somebody has to name."""
 LONG = (
-    "actions", "agree", "auto", "checkpoint", "cluster", "estimation", "hostile", "lens", "load", "media", "mitsuba",
+    "actions", "agree", "auto", "checkpoint", "cluster", "estimation", "gather", "hostile", "importance", "lens", "load", "media", "mitsuba",
     "preview", "stress", "thin-glass", "unused", "virtual", "virtual-many",
 )  # fmt: skip
 """Benches that take many minutes whole: all of them together are run quick, and the page says so."""
