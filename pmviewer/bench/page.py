@@ -13,6 +13,8 @@ from pmviewer.output.files import write_file
 
 PAGE, TARGETS, PLOT = "benchmarks.md", "benchmarks.csv", "images/benchmarks-error.png"
 """As they lie in `docs`."""
+OF_ALL = "error"
+"""The bench whose curves go by their method alone: others measure the same methods in their own ways."""
 MOST_ROWS = 40
 """Of a table on the page; the JSON has all."""
 
@@ -96,7 +98,8 @@ def write_plot(path: Path, kept: list[Kept]) -> bool:
             scene, method, seconds, error = (row[i] for i in at)
             if isinstance(seconds, str) or isinstance(error, str) or seconds <= 0 or error <= 0:
                 continue
-            curves[str(scene)][str(method)].append((float(seconds), float(error)))
+            name = str(method) if one.name == OF_ALL else f"{method} ({one.name})"
+            curves[str(scene)][name].append((float(seconds), float(error)))
     if not curves:
         return False
     try:
@@ -114,7 +117,7 @@ def write_plot(path: Path, kept: list[Kept]) -> bool:
             axis.loglog(*zip(*sorted(points), strict=True), marker="o", markersize=3, label=method)
         axis.set(title=scene, xlabel="CPU seconds", ylabel="relMSE")
         axis.grid(alpha=0.3)
-        axis.legend()
+        axis.legend(fontsize="small")
     path.parent.mkdir(exist_ok=True)
     figure.savefig(path, dpi=90)
     pyplot.close(figure)

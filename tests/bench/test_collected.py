@@ -10,6 +10,7 @@ import pytest
 from pmviewer.bench.collected import Kept, load, save
 from pmviewer.bench.measures import everything
 from pmviewer.bench.measures.threads import WatchedPool, makespan, serial_share
+from pmviewer.bench.page import write_plot
 from pmviewer.bench.report import BenchResult, Target
 from pmviewer.errors import SceneError
 
@@ -45,6 +46,21 @@ def test_the_report_says_what_held_and_what_failed(tmp_path):
     assert "it took too long" in page
     assert "revision abc" in page
     assert "P9,87,ms,100,False,True,a | b" in (tmp_path / "benchmarks.csv").read_text("utf-8")
+
+
+def test_the_same_method_of_two_benches_is_two_curves(tmp_path, monkeypatch):
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    drawn: list[str] = []
+    draw = pyplot.Axes.loglog
+
+    def noted(self: object, *xy: object, label: str, **how: object) -> object:
+        drawn.append(label)
+        return draw(self, *xy, label=label, **how)
+
+    monkeypatch.setattr(pyplot.Axes, "loglog", noted)
+    kept = [Kept(name, CURVES, "", 1.0, True, "") for name in ("error", "denoise")]
+    assert write_plot(tmp_path / "images" / "curves.png", kept)
+    assert drawn == ["path", "path (denoise)"]
 
 
 def test_a_folder_without_results_and_a_file_that_is_none_are_said(tmp_path):
