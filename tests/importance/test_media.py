@@ -7,6 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.prepare import prepare
+from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
+from pmviewer.kernels.compile.jit import loaded
 from pmviewer.scene.description import Camera, Medium, Parallelogram, PointLight, Shape
 from tests.render.test_media import CAMERA, cube_of, picture
 from tests.support.importon_paths import GATHER, SHOWN, traced
@@ -48,6 +53,18 @@ def test_gather_rays_are_weakened_on_their_way_too():
     on_ceiling = found.global_.positions[:, 2] > 0.9
     expected = GREY * np.exp(-sigma * (0.99 + way)).mean()
     assert found.global_.weights[on_ceiling].sum() / found.N == pytest.approx(expected, rel=0.02)
+
+
+def test_all_of_it_is_compiled_ahead(pool):
+    """With the very records that passes have: another one would be an error, or a second compilation."""
+    opened = open_scene(fog((0.8,) * 3, (0.9,) * 3))
+    importance = {"map": "average", "N": 200, "deposition": "density control"}
+    for method in ("progressive", "gather", "virtual lights"):
+        settings = settings_of(render={"method": method}, photons={"N": 500}, importance=importance)
+        prepare(opened, settings, pool, lambda text, share: None)
+        before = loaded()
+        Renderer(opened, settings, pool, StageStore(0)).step()
+        assert loaded() == before
 
 
 @pytest.mark.parametrize("rule", ["density control", "Keller-Wald"])

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.focus import focused
 from pmviewer.engine.frame import PhotonCloud
+from pmviewer.engine.immersion import immersed
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
@@ -200,7 +201,7 @@ def prepare_importance(scene: OpenScene, settings: Settings) -> None:
     pool = WorkPool(1)
     try:
         few = settings.model_copy(update={"importance": settings.importance.model_copy(update={"N": 4})})
-        camera = focused(scene.flat, resolve_camera(scene.scene, settings.camera))
+        camera = immersed(scene.flat, focused(scene.flat, resolve_camera(scene.scene, settings.camera)))
         plan = plan_of(settings, scene.traits)
         stage = ImportanceStage(scene, few, plan, camera, 0.0, pool, StageStore(0), Tally())
         stage.run(0)
