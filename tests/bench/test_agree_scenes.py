@@ -14,7 +14,7 @@ import pytest
 
 from pmviewer.bench.agree.features import features
 from pmviewer.bench.agree.files import make_mesh
-from pmviewer.bench.agree.generate import GLOWING_FROM, MEDIA, PROFILES, needs_particles, scene_of
+from pmviewer.bench.agree.generate import DENSE_FROM, GLOWING_FROM, MEDIA, PROFILES, needs_particles, scene_of
 from pmviewer.bench.agree.tree import from_json, to_json, written_out
 from pmviewer.bench.agree.trial import HARMLESS
 from pmviewer.bench.agree.xml import number, scene_text, write_scene
@@ -157,3 +157,17 @@ def test_media_emit_from_a_number_on_and_the_scenes_before_are_as_they_were(tmp_
         scene = load_scene(path)
         assert [w for w in scene.warnings if not any(h in w for h in HARMLESS)] == [], i
         assert flatten(scene).record[0]["emits"] != 0
+
+
+def test_media_are_dense_from_a_number_on(tmp_path):
+    thick = 0
+    for i in range(DENSE_FROM, DENSE_FROM + 40):
+        made = scene_of(3, i)
+        for medium in (shape["medium"] for shape in made["shapes"] if "medium" in shape):
+            assert medium["scale"] >= 10, i
+            assert max(medium["albedo"]) <= 0.95, i
+            assert "emission" not in medium, i
+            thick += medium["type"] == "heterogeneous"
+    assert thick >= 25
+    path, _ = write_scene(scene_of(3, DENSE_FROM), tmp_path, "dense")
+    assert [w for w in load_scene(path).warnings if not any(h in w for h in HARMLESS)] == []

@@ -13,7 +13,7 @@ import numpy as np
 
 from pmviewer.bench import peer
 from pmviewer.bench.agree.features import GROUPS, features
-from pmviewer.bench.agree.generate import GLOWING_FROM, scene_of
+from pmviewer.bench.agree.generate import DENSE_FROM, GLOWING_FROM, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH
 from pmviewer.bench.agree.statistics import LEVEL, rejected
@@ -26,8 +26,8 @@ from pmviewer.bench.report import BenchResult, Cell, Target
 from pmviewer.errors import PmviewerError, SettingError
 
 SCENES, QUICK_SCENES, SEED = 500, 12, 1
-GLOWING = 12
-"""Scenes with media that emit, after all others of a whole run."""
+GLOWING = DENSE = 12
+"""Scenes with media that emit, and such with dense ones, after all others of a whole run."""
 SHRINK_TRIES, MOST_SHRUNK = 120, 20
 
 
@@ -48,7 +48,8 @@ def run(
     quick: bool = False, scenes: int | None = None, seed: int = SEED, first: int = 0, keep: Path | None = None
 ) -> BenchResult:
     """Try the scenes `first` … `first` + `scenes` − 1 of `seed` and save what disagrees into `keep`, a temporary folder
-    if not given. Where `scenes` is not given and `quick` is not asked for, scenes with media that emit come on top.
+    if not given. Where `scenes` is not given and `quick` is not asked for, scenes with media that emit and such with dense
+    ones come on top.
 
     Raises PmviewerError without Mitsuba.
     """
@@ -61,11 +62,14 @@ def run(
     folder = keep or Path(tempfile.mkdtemp(prefix=f"agree-{seed}-"))
     folder.mkdir(parents=True, exist_ok=True)
     verdicts: dict[int, Verdict] = {}
-    glowing = GLOWING if scenes is None and not quick else 0
-    tries = chain(try_scenes(seed, count, first=first), try_scenes(seed, glowing, first=GLOWING_FROM))
+    parts = [(count, first)]
+    if scenes is None and not quick:
+        parts += [(GLOWING, GLOWING_FROM), (DENSE, DENSE_FROM)]
+    tries = chain.from_iterable(try_scenes(seed, n, first=begin) for n, begin in parts)
+    total = sum(n for n, _ in parts)
     for index, verdict in tries:
         verdicts[index] = verdict
-        _tell(seed, index, verdict, len(verdicts), count + glowing, time.perf_counter() - started)
+        _tell(seed, index, verdict, len(verdicts), total, time.perf_counter() - started)
     found = judged(seed, verdicts, folder)
     return report(seed, verdicts, found, folder, time.perf_counter() - started)
 

@@ -67,6 +67,8 @@ EVERY = 13
 """One in so many scenes has a medium."""
 GLOWING_FROM, GLOW_SEED = 10_000, 0x610
 """From this number on all scenes have media that emit; the scenes before it are as they were without any."""
+DENSE_FROM, DENSE_SEED = 20_000, 0xDE5
+"""From this number on all scenes have dense media, which don't emit."""
 SCALES = (1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3)
 HALF = 2.0
 """Half the edge of the ground, and of a room."""
@@ -89,7 +91,9 @@ def scene_of(seed: int, index: int) -> Node:
     if profile.medium:
         scene["scale"] = 1.0
         media.fill(draw, scene)
-        if index >= GLOWING_FROM:
+        if index >= DENSE_FROM:
+            media.thicken(Draw(seed + DENSE_SEED, index), scene)
+        elif index >= GLOWING_FROM:
             media.ignite(Draw(seed + GLOW_SEED, index), scene)
     scene["camera"] = _camera(draw, closed, scene)
     for deviation in DEVIATIONS:

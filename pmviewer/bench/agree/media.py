@@ -33,6 +33,19 @@ def ignite(draw: Draw, scene: Node) -> None:
                 medium["emission"] = same if same and draw.chance(0.5) else _grid(draw, shape["to_world"])
 
 
+def thicken(draw: Draw, scene: Node) -> None:
+    """Make all smoke so dense that light seldom gets through, on lattices for the most part; some of it is absorbed
+    at every collision, so that paths end before their longest length."""
+    for shape in shapes_of(scene):
+        if "medium" in shape:
+            medium = shape["medium"]
+            medium["scale"] = draw.log(10.0, 300.0)
+            medium["albedo"] = draw.colour(0.3, 0.95)
+            if draw.chance(0.8):
+                medium["type"] = "heterogeneous"
+                medium["sigma_t"] = _grid(draw, shape["to_world"])
+
+
 def fill(draw: Draw, scene: Node) -> None:
     """Add a shape with smoke in it, which crosses what stands there, and lift the lights above it."""
     for shape in scene["shapes"]:
