@@ -48,8 +48,8 @@ def run(
     quick: bool = False, scenes: int | None = None, seed: int = SEED, first: int = 0, keep: Path | None = None
 ) -> BenchResult:
     """Try the scenes `first` … `first` + `scenes` − 1 of `seed` and save what disagrees into `keep`, a temporary folder
-    if not given. Where `scenes` is not given and `quick` is not asked for, scenes with media that emit and such with dense
-    ones come on top.
+    if not given. Where `scenes` is not given and `quick` is not asked for, scenes with media that emit and with
+    dense ones come on top.
 
     Raises PmviewerError without Mitsuba.
     """
