@@ -4,11 +4,12 @@ import os
 import shutil
 import subprocess
 import sys
+import weakref
 
 import pytest
 
 from pmviewer.kernels.compile import sources
-from pmviewer.kernels.compile.jit import CACHE_FOLDER, _OneFileEach, user_cache_root
+from pmviewer.kernels.compile.jit import CACHE_FOLDER, _OneFileEach, loaded, user_cache_root
 from pmviewer.kernels.vector import dot
 
 
@@ -91,3 +92,16 @@ def test_two_signatures_saved_at_the_same_time_keep_their_own_code(tmp_path):
     other.save("second", 2)
     reader = _OneFileEach(str(tmp_path), "name", "stamp")
     assert (reader.load("first"), reader.load("second"), reader.load("third")) == (1, 2, None)
+
+
+def test_counting_what_is_loaded_passes_over_references_to_what_has_gone():
+    class Gone:
+        pass
+
+    gone = Gone()
+    proxy = weakref.proxy(gone)
+    before = loaded()
+    del gone
+    assert loaded() == before
+    with pytest.raises(ReferenceError):
+        isinstance(proxy, Gone)

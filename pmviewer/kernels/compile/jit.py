@@ -238,7 +238,8 @@ class _DeviceDispatcher(_KernelDispatcher):
 
 def loaded() -> int:
     """Functions whose code this process holds, each set of argument types by itself."""
-    return sum(len(one.overloads) for one in gc.get_objects() if isinstance(one, _KernelDispatcher))
+    # by type(one): isinstance asks the object itself, which a weak reference to what has gone answers with an error
+    return sum(len(one.overloads) for one in gc.get_objects() if issubclass(type(one), _KernelDispatcher))
 
 
 def device(function: Callable[..., Any]) -> Any:
