@@ -163,6 +163,7 @@ def test_media_are_dense_from_a_number_on(tmp_path):
     thick = 0
     for i in range(DENSE_FROM, DENSE_FROM + 40):
         made = scene_of(3, i)
+        assert "medium: dense" in features(made), i
         for medium in (shape["medium"] for shape in made["shapes"] if "medium" in shape):
             assert medium["scale"] >= 10, i
             assert max(medium["albedo"]) <= 0.95, i

@@ -26,8 +26,8 @@ from pmviewer.bench.report import BenchResult, Cell, Target
 from pmviewer.errors import PmviewerError, SettingError
 
 SCENES, QUICK_SCENES, SEED = 500, 12, 1
-GLOWING = DENSE = 12
-"""Scenes with media that emit, and such with dense ones, after all others of a whole run."""
+EXTRA = ((12, GLOWING_FROM), (12, DENSE_FROM))
+"""How many scenes from which number on a whole run adds: media that emit, and dense ones."""
 SHRINK_TRIES, MOST_SHRUNK = 120, 20
 
 
@@ -62,9 +62,7 @@ def run(
     folder = keep or Path(tempfile.mkdtemp(prefix=f"agree-{seed}-"))
     folder.mkdir(parents=True, exist_ok=True)
     verdicts: dict[int, Verdict] = {}
-    parts = [(count, first)]
-    if scenes is None and not quick:
-        parts += [(GLOWING, GLOWING_FROM), (DENSE, DENSE_FROM)]
+    parts = ((count, first), *(EXTRA if scenes is None and not quick else ()))
     tries = chain.from_iterable(try_scenes(seed, n, first=begin) for n, begin in parts)
     total = sum(n for n, _ in parts)
     for index, verdict in tries:

@@ -9,6 +9,7 @@ import numpy as np
 from pmviewer.bench.agree.generate import needs_particles
 from pmviewer.bench.agree.lights import DELTA
 from pmviewer.bench.agree.materials import METALLIC, TRANSPARENT
+from pmviewer.bench.agree.media import DENSE
 from pmviewer.bench.agree.tree import MAPS, TEXTURES, Node, bsdfs_of, emitters_of, nodes, shapes_of
 
 GROUPS = ("shape", "transform", "bsdf", "texture", "light", "medium", "scene", "camera", "profile")
@@ -103,6 +104,8 @@ def _lights(scene: Node) -> Iterator[str]:
 def _media(scene: Node) -> Iterator[str]:
     for medium in (shape["medium"] for shape in shapes_of(scene) if "medium" in shape):
         yield f"medium: {medium['type']}"
+        if medium["scale"] >= DENSE:
+            yield "medium: dense"
         if isinstance(medium["sigma_t"], dict) and medium["sigma_t"]["grid"]["channels"] == 3:
             yield "medium: coloured lattice"
         if isinstance(medium["albedo"], dict):

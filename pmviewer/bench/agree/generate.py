@@ -66,7 +66,7 @@ MEDIA = Profile("media", materials.PLAIN, rich=False, ground=("diffuse",), light
 EVERY = 13
 """One in so many scenes has a medium."""
 GLOWING_FROM, GLOW_SEED = 10_000, 0x610
-"""From this number on all scenes have media that emit; the scenes before it are as they were without any."""
+"""From this number on to the next all scenes have media that emit; those before it are as they were without any."""
 DENSE_FROM, DENSE_SEED = 20_000, 0xDE5
 """From this number on all scenes have dense media, which don't emit."""
 SCALES = (1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3)

@@ -138,7 +138,7 @@ DEVIATIONS = (
         "bump and normal maps",
         "wanted: as with vertex normals; and under a bump map Mitsuba mixes coordinates of the surface and of the "
         "world when it makes the tangent. Mapped normals that face away lean towards whoever looks, as in Mitsuba; its "
-        "particle tracer brings up to twice what its path tracer does on such a floor seen from near the plane",
+        "particle tracer brought 2.2 times what its path tracer does in a scene whose floor has a normal map",
         _changed(_unmapped),
         among_ours=True,
     ),

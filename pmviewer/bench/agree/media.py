@@ -9,6 +9,8 @@ from pmviewer.bench.agree.tree import Node, shapes_of
 
 ABOVE = 1.9
 """Height from which on lights stand over the smoke: those that shine into several media are not right."""
+DENSE = 10.0
+"""Least factor of the extinction of dense media; others have at most 8."""
 
 
 def has_media(scene: Node) -> bool:
@@ -39,7 +41,7 @@ def thicken(draw: Draw, scene: Node) -> None:
     for shape in shapes_of(scene):
         if "medium" in shape:
             medium = shape["medium"]
-            medium["scale"] = draw.log(10.0, 300.0)
+            medium["scale"] = draw.log(DENSE, 300.0)
             medium["albedo"] = draw.colour(0.3, 0.95)
             if draw.chance(0.8):
                 medium["type"] = "heterogeneous"
