@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +41,7 @@ RADIUS_SHARE = 0.25
 class Case:
     """A scene at a size: samples per run of both path tracers, passes per run of photon methods, pixels of a block
     (larger for caustics, whose few bright paths are far from Gaussian), and the share by which photon methods may
-    differ; the path tracer by `path_tolerance`. `file` is a scene that is not bundled."""
+    differ; the path tracer by `path_tolerance`. `file` is a scene that is not bundled, `settings` are ours for it."""
 
     scene: str
     parameters: Mapping[str, str]
@@ -51,6 +51,7 @@ class Case:
     tolerance: float = 0.03
     file: Path | None = None
     path_tolerance: float = 0.0
+    settings: Mapping[str, object] = field(default_factory=dict)
 
     @property
     def source(self) -> str | Path:
@@ -92,11 +93,14 @@ def feature_cases(folder: Path) -> list[Case]:
     return [Case(name, {}, 64, 8, 8, 0.02, file) for name, file in write_scenes(folder).items()]
 
 
-def our_runs(opened: OpenScene, method: str, passes: int, runs: int, pool: WorkPool) -> NDArray[np.float64]:
-    """(runs, h, w, 3) images with different seeds."""
+def our_runs(
+    opened: OpenScene, method: str, passes: int, runs: int, pool: WorkPool, more: Mapping[str, object] | None = None
+) -> NDArray[np.float64]:
+    """(runs, h, w, 3) images with different seeds. `more` settings may tell the radius, which is a share of the
+    automatic one otherwise."""
     images = []
-    values: dict[str, object] = {"render.method": method}
-    if method != "path":
+    values: dict[str, object] = {"render.method": method, **(more or {})}
+    if method != "path" and "estimate.radius" not in values:
         automatic = Renderer(opened, with_values(Settings(), values), pool, StageStore(0)).first_radius
         values["estimate.radius"] = max(RADIUS_SHARE * automatic / opened.flat.radius, 1e-5)
     for seed in range(1, runs + 1):
@@ -120,7 +124,7 @@ def compare(
         tolerance = case.path_tolerance if method == "path" else case.tolerance
         # A path tracer's pass is one sample per pixel.
         passes = case.spp if method == "path" else case.passes
-        found = agreement(our_runs(opened, method, passes, runs, pool), theirs, case.block, tolerance)
+        found = agreement(our_runs(opened, method, passes, runs, pool, case.settings), theirs, case.block, tolerance)
         print(
             f"{case.scene}, {method}: p {found.p_value:.3g}, mean ratio {found.ratio:.4f}", file=sys.stderr, flush=True
         )
