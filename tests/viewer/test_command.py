@@ -35,15 +35,11 @@ def wait_for(found: Callable[[], object], process: subprocess.Popen[str]) -> Non
 def test_window_opens_takes_a_screenshot_and_closes_by_keys(tmp_path):
     if shutil.which("xdotool") is None:
         pytest.fail("This test presses keys: install xdotool (apt-get install xdotool).")
-    home = tmp_path / "home"
     work = tmp_path / "work"
-    home.mkdir()
     work.mkdir()
-    environment = {
-        **os.environ,
-        "XDG_CONFIG_HOME": str(home),
-        "PYTHONPATH": str(Path(__file__).resolve().parents[2]),
-    }
+    # Nothing of the user's: a killed window's session would be offered first, in a dialog that takes all keys.
+    homes = {f"XDG_{name}_HOME": str(tmp_path / name) for name in ("CONFIG", "STATE", "DATA")}
+    environment = os.environ | homes | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])}
     process = subprocess.Popen(
         [sys.executable, "-m", "pmviewer", "cornell_diffuse", *SIZE],
         cwd=work,
@@ -53,8 +49,9 @@ def test_window_opens_takes_a_screenshot_and_closes_by_keys(tmp_path):
         stderr=subprocess.PIPE,
     )
     try:
-        wait_for(lambda: xdotool("search", "--name", "cornell_diffuse · pmviewer"), process)
-        window = xdotool("search", "--name", "cornell_diffuse · pmviewer").split()[0]
+        search = ("search", "--all", "--pid", str(process.pid), "--name", "cornell_diffuse · pmviewer")
+        wait_for(lambda: xdotool(*search), process)
+        window = xdotool(*search).split()[0]
 
         def screenshot() -> list[Path]:
             xdotool("windowfocus", window)
