@@ -33,6 +33,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--costs", type=int, default=0, metavar="N", help="list the N tests of the most CPU time")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Processes side by side all read all files, each beginning at another one: a file that nobody has translated yet
+    is translated by the first that comes by, not by all of them at the same time."""
+    worker = getattr(config, "workerinput", None)
+    if worker is not None and config.args_source == pytest.Config.ArgsSource.TESTPATHS:
+        files = sorted(str(path) for path in Path(__file__).parent.rglob("test_*.py"))
+        first = len(files) * int(worker["workerid"].removeprefix("gw")) // worker["workercount"]
+        config.args = files[first:] + files[:first]
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Spread each room's files evenly over the run. Files side by side run at the same time, and those of one room wait
     for each other to compile the same kernels."""

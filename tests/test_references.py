@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import re
 import tokenize
@@ -28,6 +29,7 @@ MONTHS = {"January", "July"}
 """In dates of daylight."""
 
 
+@functools.cache
 def texts() -> list[tuple[str, str]]:
     """Comments and strings of the package, one run of comment lines or one string each, white space folded."""
     found = []
@@ -45,9 +47,6 @@ def texts() -> list[tuple[str, str]]:
     return found
 
 
-TEXTS = texts()
-
-
 def ids(text: str) -> set[str]:
     found = set()
     for first, letter, last in ID.findall(text):
@@ -62,14 +61,14 @@ def listed_ids() -> set[str]:
 
 
 def test_ids_are_listed():
-    used = {(where, name) for where, text in TEXTS for name in ids(text)}
+    used = {(where, name) for where, text in texts() for name in ids(text)}
     assert len(used) > 40
     assert not {(where, name) for where, name in used if name not in listed_ids()}
 
 
 def test_authors_and_years_are_listed():
     used = set()
-    for where, text in TEXTS:
+    for where, text in texts():
         for first, others, year in CITED.findall(text):
             if first not in MONTHS:
                 used.add((where, first.removesuffix("'s"), others, year))
@@ -80,14 +79,14 @@ def test_authors_and_years_are_listed():
 
 def test_titles_are_listed():
     listed = " ".join(LIST.lower().split())
-    used = {(where, title) for where, text in TEXTS for title, _ in TITLED.findall(text)}
+    used = {(where, title) for where, text in texts() for title, _ in TITLED.findall(text)}
     assert len(used) > 5
     assert not [(where, title) for where, title in used if title.lower() not in listed]
 
 
 def test_sections_are_of_listed_sources():
     """What stands before a § is a short name, or the end of one."""
-    used = {(where, before) for where, text in TEXTS for before in SECTION.findall(text)}
+    used = {(where, before) for where, text in texts() for before in SECTION.findall(text)}
     assert len(used) > 15
     known = {name.lower() for name in NAMES} | {re.sub(r" \d{4}.*", "", name).lower() for name in NAMES}
     for where, before in used:

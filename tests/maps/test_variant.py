@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import warnings
 
 import numpy as np
@@ -15,13 +16,19 @@ from pmviewer.maps.search.kdtree import build_kdtree
 from pmviewer.maps.variant import ABSENT, is_kdtree, looked_up_by, marked
 
 PHOTONS = np.zeros((3, 6), np.float32)
-GRID, TREE = build_grid(PHOTONS, 1.0), build_kdtree(PHOTONS)
 SHORT = np.ones(1, np.dtype([("n", np.int64)]))
 LONG = np.ones(1, np.dtype([("n", np.int64), ("more", np.int64)]))
 
 
-@pytest.mark.parametrize("record", [GRID.record, TREE.record])
-def test_a_mark_leaves_the_rest_as_it_is(record):
+@functools.cache
+def map_of(search):
+    """A map of the photons that is a grid or a tree."""
+    return build_grid(PHOTONS, 1.0) if search == "grid" else build_kdtree(PHOTONS)
+
+
+@pytest.mark.parametrize("search", ["grid", "tree"])
+def test_a_mark_leaves_the_rest_as_it_is(search):
+    record = map_of(search).record
     copy = marked(record, "fewest", 7)
     assert copy["fewest"][0] == 7
     for name in record.dtype.names:
@@ -46,17 +53,19 @@ def kind(record):
 
 
 @pytest.mark.parametrize(
-    ("record", "expected"),
+    ("search", "mark", "expected"),
     [
-        (ABSENT, 0),
-        (GRID.record, 1),
-        (TREE.record, 2),
-        (marked(GRID.record, "hull"), 11),
-        (marked(TREE.record, "hull"), 12),
-        (marked(TREE.record, "differential"), 2),
+        (None, None, 0),
+        ("grid", None, 1),
+        ("tree", None, 2),
+        ("grid", "hull", 11),
+        ("tree", "hull", 12),
+        ("tree", "differential", 2),
     ],
 )
-def test_kinds_are_told_apart_compiled_and_not(record, expected):
+def test_kinds_are_told_apart_compiled_and_not(search, mark, expected):
+    record = map_of(search).record if search else ABSENT
+    record = marked(record, mark) if mark else record
     assert compiled_kinds(record, None) == (expected, 0)
     assert (kind(record.view(np.recarray)[0]), kind(None)) == (expected, 0)
 
@@ -96,5 +105,6 @@ def test_marks_stand_where_numba_does_not_warn():
         ask(SHORT), ask(LONG)
     with warnings.catch_warnings():
         warnings.simplefilter("error", subtype)
-        for record in (GRID.record, marked(GRID.record, "hull")):
-            assert ask(record) == (record is not GRID.record,) * 2
+        grid = map_of("grid").record
+        for record in (grid, marked(grid, "hull")):
+            assert ask(record) == (record is not grid,) * 2

@@ -36,7 +36,33 @@ def make_app(session: Any, folder: Path, **options: Any) -> ViewerApp:
             app.context.screen.use()
 
     app.params.callbacks.pre_new_frame = pre_new_frame
+    _draw_only_what_is_looked_at(app)
     return app
+
+
+RASTERIZER_DISCARD = 0x8C89
+"""OpenGL's number; moderngl has no name for it."""
+_looking: list[Context] = []
+"""Scripts that look at the whole window now."""
+
+
+def _draw_only_what_is_looked_at(app: ViewerApp) -> None:
+    """The interface is laid out and sent to OpenGL in each frame, but painted into the window only where somebody
+    reads its pixels: on a software driver painting takes most of a frame. The picture in it is always painted."""
+    callbacks = app.params.callbacks
+    before_swap = callbacks.before_swap
+
+    def begin() -> None:
+        looked_at = _looking or app.commands.window_shot is not None
+        if app.context is not None and not looked_at:
+            app.context.enable_direct(RASTERIZER_DISCARD)
+
+    def end() -> None:
+        if app.context is not None:
+            app.context.disable_direct(RASTERIZER_DISCARD)
+        before_swap()
+
+    callbacks.before_imgui_render, callbacks.before_swap = begin, end
 
 
 @contextmanager
@@ -127,7 +153,12 @@ def window_pixels(app: ViewerApp, context: Context, path: Path) -> Pixels:
     """(h, w, 3) uint8 of the whole window, through the test engine's screenshot."""
     from PIL import Image
 
-    testing.capture(context, str(path))
+    _looking.append(context)
+    try:
+        context.yield_(2)
+        testing.capture(context, str(path))
+    finally:
+        _looking.pop()
     return np.asarray(Image.open(path).convert("RGB"))
 
 
