@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.meshes.mesh import FLAT, NOT_FINITE, WHOLE, judge, number_used
+from pmviewer.kernels.meshes.mesh import FLAT, NOT_FINITE, WHOLE, judge, number_used, renumber
 from pmviewer.progress import parallel
 from pmviewer.scene.description import (
     Camera,
@@ -166,7 +166,9 @@ def _without_unused(
         normals = _mended(Mesh(whole, faces, normals))[used]
     uv = None if mesh.uv is None else _finite(mesh.uv[used])
     colours = None if mesh.colours is None else _colours(mesh.colours[used])
-    return Mesh(vertices[used], place[faces], normals, uv, colours)
+    renumbered = np.empty_like(faces)
+    renumber(faces, place, renumbered)
+    return Mesh(np.take(vertices, used, axis=0), renumbered, normals, uv, colours)
 
 
 def _finite(uv: NDArray[np.float64] | None) -> NDArray[np.float64] | None:

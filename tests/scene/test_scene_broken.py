@@ -141,3 +141,31 @@ def test_every_cut_of_a_binary_mesh_opens_or_raises(tmp_path: Path) -> None:
             load_scene(path)
     path.write_bytes(whole)
     assert [shape.name for shape in load_scene(path).shapes[1:]] == ["light above", "floor"]
+
+
+POINTER = b"version https://git-lfs.github.com/spec/v1\noid sha256:5e07\nsize 16471\n"
+
+
+@pytest.mark.parametrize("name", ["a.obj", "a.ply", "a.stl", "a.gltf", "a.glb"])
+def test_files_that_git_lfs_has_not_fetched(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(POINTER)
+    with pytest.raises(SceneError, match=r"was not downloaded.*Git LFS.*git lfs pull"):
+        load_scene(tmp_path / name)
+
+
+def test_what_a_scene_names_and_git_lfs_has_not_fetched(tmp_path: Path) -> None:
+    for name in ("a.obj", "a.png", "sky.exr", "sky.png"):
+        (tmp_path / name).write_bytes(POINTER)
+    scene = load_scene(
+        xml_file(
+            tmp_path,
+            '<shape type="sphere"><bsdf type="diffuse"><texture type="bitmap" name="reflectance">',
+            '<string name="filename" value="a.png"/></texture></bsdf></shape>',
+            '<shape type="obj"><string name="filename" value="a.obj"/></shape>',
+            '<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter>',
+            '<emitter type="envmap"><string name="filename" value="sky.png"/></emitter>',
+            CAMERA,
+        )
+    )
+    for name in ("a.obj", "a.png", "sky.exr", "sky.png"):
+        assert any(name in w and "Git LFS" in w for w in scene.warnings), (name, scene.warnings)

@@ -1,6 +1,8 @@
 """Compressed geometry and pictures of glTF files, by the libraries of the extra [gltf]."""
 
+import struct
 import sys
+import zlib
 from io import BytesIO
 from pathlib import Path
 
@@ -10,6 +12,7 @@ from PIL import Image
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.load import load_scene
+from pmviewer.scene.texture import Bitmap
 from tests.scene.gltf_files import Gltf, corners, meshes
 
 RNG = np.random.default_rng(5)
@@ -164,6 +167,61 @@ def test_basis_universal_pictures(tmp_path: Path) -> None:
     damaged = load_scene(textured(tmp_path, "KHR_texture_basisu", ktx2((255, 0, 0))[:200]))
     assert damaged.materials[0].reflectance == (0.5, 0.5, 0.5)
     assert any("KTX 2 data are damaged" in w and "Grey replaces it" in w for w in damaged.warnings)
+
+
+def plain_ktx2(layout: int, pixels: np.ndarray, scheme: int = 0, notes: dict[str, str] | None = None) -> bytes:
+    """Written after the KTX 2.0 specification: header, index, level index of one level, data format descriptor, notes,
+    pixels (h, w, channels)."""
+    entries = [f"{key}\0{value}\0".encode() for key, value in (notes or {}).items()]
+    noted = b"".join(struct.pack("<I", len(e)) + e + bytes(-len(e) % 4) for e in entries)
+    level = pixels.astype(np.uint8).tobytes()
+    packed = zlib.compress(level) if scheme == 3 else level
+    described = struct.pack("<I", 4)
+    at = 80 + 24 + len(described)
+    header = b"\xabKTX 20\xbb\r\n\x1a\n" + struct.pack("<9I", layout, 1, *pixels.shape[1::-1], 0, 0, 1, 1, scheme)
+    index = struct.pack("<4I2Q", 104, len(described), at, len(noted), 0, 0)
+    levels = struct.pack("<3Q", at + len(noted), len(packed), len(level))
+    return header + index + levels + described + noted + packed
+
+
+RED_OVER_BLUE = np.array([[[255, 0, 0, 255]] * 4, [[0, 0, 255, 255]] * 4])
+
+
+@pytest.mark.parametrize(
+    ("layout", "channels", "scheme"),
+    [(23, "rgb", 0), (29, "rgb", 3), (30, "bgr", 0), (36, "bgr", 0), (37, "rgba", 3), (43, "rgba", 0), (50, "bgra", 0)],
+)
+def test_plain_ktx2_pictures(tmp_path: Path, monkeypatch, layout: int, channels: str, scheme: int) -> None:
+    """Bytes in the order of their Vulkan format, the upper row first, without any library."""
+    monkeypatch.setitem(sys.modules, "alktx2", None)
+    stored = RED_OVER_BLUE[..., ["rgba".index(c) for c in channels]]
+    scene = load_scene(textured(tmp_path, "KHR_texture_basisu", plain_ktx2(layout, stored, scheme)))
+    texture = scene.materials[0].textures["reflectance"]
+    assert isinstance(texture, Bitmap)
+    assert texture.pixels[0, 0] == pytest.approx([1, 0, 0])
+    assert texture.pixels[1, 3] == pytest.approx([0, 0, 1])
+    assert not any("exture" in w for w in scene.warnings)
+
+
+def test_plain_ktx2_of_fewer_channels_and_with_notes(tmp_path: Path) -> None:
+    """What a picture lacks is 0 unless its swizzle says otherwise; its rows may go upwards."""
+    grey = np.array([[[255]] * 4, [[0]] * 4])
+    both = {"KTXorientation": "ru", "KTXswizzle": "rrr1"}
+    for notes, upper, lower in (({}, [1, 0, 0], [0, 0, 0]), (both, [0, 0, 0], [1, 1, 1])):
+        scene = load_scene(textured(tmp_path, "KHR_texture_basisu", plain_ktx2(9, grey, notes=notes)))
+        texture = scene.materials[0].textures["reflectance"]
+        assert isinstance(texture, Bitmap)
+        assert np.broadcast_to(texture.pixels[0, 0], 3) == pytest.approx(upper)
+        assert np.broadcast_to(texture.pixels[1, 0], 3) == pytest.approx(lower)
+
+
+@pytest.mark.parametrize("scheme", [0, 3])
+def test_damaged_plain_ktx2(tmp_path: Path, scheme: int) -> None:
+    whole = plain_ktx2(43, RED_OVER_BLUE, scheme)
+    for damaged in (whole[:-9], whole[:90], whole[:80] + b"\xff" * 24 + whole[104:]):
+        scene = load_scene(textured(tmp_path, "KHR_texture_basisu", damaged))
+        assert scene.materials[0].reflectance == (0.5, 0.5, 0.5)
+        assert any("KTX 2 data are damaged" in w for w in scene.warnings)
 
 
 def test_basis_universal_without_its_library(tmp_path: Path, monkeypatch) -> None:

@@ -126,6 +126,16 @@ def test_a_projector_becomes_a_spot_of_its_power(tmp_path: Path) -> None:
     assert "its picture is left out" in scene.warnings[0]
 
 
+def test_a_collimated_beam_is_the_narrowest_spot_of_its_power(tmp_path: Path) -> None:
+    words = f'<rgb name="power" value="2 1 0"/>{TURN}'
+    scene = load(tmp_path, SHAPE, f'<emitter type="collimated">{words}</emitter>', sky="", version="0.6.0")
+    (spot,) = scene.lights
+    assert isinstance(spot, SpotLight)
+    assert (spot.position, spot.axis, spot.cutoff, spot.beam) == ((0, 4, 0), (0, 0, 1), 0.01, 0.01)
+    assert emitted_power(spot, 1.0) == pytest.approx([2, 1, 0])
+    assert "as a spot of 0.01°" in scene.warnings[0]
+
+
 def test_image_environment(tmp_path: Path) -> None:
     pixels = sky_file(tmp_path)
     turn = '<transform name="to_world"><rotate y="1" angle="90"/><scale value="3"/></transform>'

@@ -126,10 +126,10 @@ def test_colours_at_vertices(tmp_path: Path) -> None:
     old = '<texture name="reflectance" type="scale"><float name="scale" value="0.5"/><texture type="vertexcolors"/>'
     found, warnings = material(tmp_path, f"{old}</texture>", "diffuse")
     assert (found.vertex_colours, found.reflectance, warnings) == (True, (0.5, 0.5, 0.5), ())
-    other = attribute.replace("vertex_color", "face_weight").replace("base_color", "reflectance")
+    other = attribute.replace("vertex_color", "corner_weight").replace("base_color", "reflectance")
     found, warnings = material(tmp_path, other, "diffuse")
     assert (found.vertex_colours, found.reflectance) == (False, (0.5, 0.5, 0.5))
-    assert "'face_weight'" in warnings[0]
+    assert "'corner_weight'" in warnings[0]
     coat = attribute.replace("base_color", "specular_reflectance")
     found, warnings = material(tmp_path, coat, "plastic")
     assert (found.vertex_colours, found.specular) == (False, (1, 1, 1))
@@ -168,3 +168,85 @@ def test_colours_of_faces_where_vertices_have_some_too(tmp_path: Path, attribute
     assert mesh.colours is not None
     assert mesh.colours[:, 1].tolist() == [green] * 3
     assert scene.materials[scene.shapes[0].material].vertex_colours
+
+
+ATTRIBUTES = (
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    "property float heat_r\nproperty float heat_g\nproperty float heat_b\nproperty uchar bits_0\nelement face 2\n"
+    "property list uchar int vertex_indices\nproperty float color_0\nproperty float color_1\nproperty float color_2\n"
+    "property float weight_0\nproperty float tint_x\nproperty float tint_y\nproperty float tint_z\n"
+    "property float odd_0\nproperty float odd_1\nend_header\n"
+    "0 0 0 0.1 0.2 0.3 1\n1 0 0 0.1 0.2 0.3 1\n1 1 0 0.1 0.2 0.3 1\n"
+    "0 1 0 0.4 0.5 0.6 0\n"
+    "3 0 1 2 1 0 0 0.25 0.5 0.6 0.7 0 0\n3 0 2 3 0 1 0 0.75 0.8 0.9 1 0 0\n"
+)
+"""Columns as `Mesh.write_ply` of Mitsuba 3.9.1 names them, and with the other endings that its reader knows."""
+
+
+@pytest.mark.parametrize(
+    ("attribute", "first", "last"),
+    [
+        ("face_color", [1, 0, 0], [0, 1, 0]),
+        ("face_weight", [0.25] * 3, [0.75] * 3),
+        ("face_tint", [0.5, 0.6, 0.7], [0.8, 0.9, 1]),
+        ("vertex_heat_color", [0.1, 0.2, 0.3], [0.4, 0.5, 0.6]),
+        ("vertex_bits", [1] * 3, [0] * 3),
+        ("face_odd", None, None),
+        ("vertex_weight", None, None),
+        ("face_heat_color", None, None),
+    ],
+)
+def test_attributes_of_vertices_and_faces(
+    tmp_path: Path, attribute: str, first: list | None, last: list | None
+) -> None:
+    """At the first corner of the first face and the last of the last, one number or three; those that are not there,
+    or of two numbers, which Mitsuba refuses too, are said."""
+    (tmp_path / "a.ply").write_text(ATTRIBUTES)
+    texture = f'<texture type="mesh_attribute" name="reflectance"><string name="name" value="{attribute}"/></texture>'
+    shape = f'<string name="filename" value="a.ply"/><bsdf type="diffuse">{texture}</bsdf>'
+    scene = load(tmp_path, f'<shape type="ply">{shape}</shape>')
+    mesh = scene.shapes[0].geometry
+    assert isinstance(mesh, Mesh)
+    if first is None:
+        assert mesh.colours is None
+        assert any(f"no attribute '{attribute}'" in w for w in scene.warnings)
+        return
+    assert mesh.colours is not None
+    assert mesh.colours[mesh.faces[0, 0]] == pytest.approx(first)
+    assert mesh.colours[mesh.faces[-1, -1]] == pytest.approx(last)
+    assert not any("attribute" in w for w in scene.warnings)
+
+
+def test_several_attributes_of_one_mesh(tmp_path: Path) -> None:
+    """The first is read, which is said; two shapes may read one each."""
+    (tmp_path / "a.ply").write_text(ATTRIBUTES)
+    name = '<string name="filename" value="a.ply"/>'
+    halves = [
+        '<bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance">'
+        f'<string name="name" value="{attribute}"/></texture></bsdf>'
+        for attribute in ("face_weight", "face_tint")
+    ]
+    both = f'<shape type="ply">{name}<bsdf type="blendbsdf"><float name="weight" value="0.5"/>{"".join(halves)}</bsdf>'
+    scene = load(tmp_path, f"{both}</shape>")
+    assert any("several attributes" in w and "'face_weight'" in w for w in scene.warnings)
+    scene = load(tmp_path, "".join(f'<shape type="ply">{name}{half}</shape>' for half in halves))
+    colours = [shape.geometry.colours[0, 0] for shape in scene.shapes]
+    assert colours == pytest.approx([0.25, 0.5])
+    assert not any("attribute" in w for w in scene.warnings)
+
+
+def test_the_colour_comes_before_other_attributes(tmp_path: Path) -> None:
+    """As programs write them that give each property of `principled` an attribute."""
+    (tmp_path / "a.ply").write_text(ATTRIBUTES)
+    textures = "".join(
+        f'<texture type="mesh_attribute" name="{name}"><string name="name" value="{attribute}"/></texture>'
+        for name, attribute in (("roughness", "face_weight"), ("base_color", "face_tint"))
+    )
+    shape = f'<string name="filename" value="a.ply"/><bsdf type="principled">{textures}</bsdf>'
+    scene = load(tmp_path, f'<shape type="ply">{shape}</shape>')
+    assert scene.shapes[0].geometry.colours[0] == pytest.approx([0.5, 0.6, 0.7])
+    material = scene.materials[scene.shapes[0].material]
+    assert material.vertex_colours
+    assert any("several attributes" in w and "'face_tint'" in w for w in scene.warnings)
+    assert material.alpha == (0.25, 0.25)  # of Mitsuba's default, 0.5
+    assert any("'roughness' can't vary" in w for w in scene.warnings)

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from pmviewer.kernels.meshes.cells import cell_means, spanning
-from pmviewer.scene.meshes.welding import Welder
+from pmviewer.scene.meshes.welding import FACET, Welder
 
 
 def welded(corners: np.ndarray, pieces: int) -> tuple[np.ndarray, np.ndarray]:
     welder = Welder(len(corners))
     for piece in np.array_split(corners, pieces):
-        welder.add(piece)
+        facets = np.empty(len(piece), FACET)
+        facets["corners"] = piece
+        welder.add(facets)
     mesh = welder.mesh()
     return mesh.vertices, mesh.faces
 

@@ -1,8 +1,9 @@
 """Building the 8-wide bounding volume hierarchy that `raycast` traverses.
 
 First a binary tree by binned surface-area heuristic (`bvh_binary`), then a collapse of up to eight descendants into one
-node, planned by dynamic programming (Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through
-compressed wide BVHs", 2017, section 3.3). Triangles sit in blocks of up to eight; quadrics are leaves of their own.
+node (`bvh_wide`), planned by dynamic programming (Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs
+through compressed wide BVHs", 2017, section 3.3). Triangles sit in blocks of up to eight; quadrics are leaves of their
+own.
 
 A child index c of a wide node is a node if c >= 0; otherwise ~c is a block, or, from `n_blocks` on, quadric
 ~c - n_blocks, or, beyond the quadrics, an instance. Memory layouts are in `simd`.
@@ -18,10 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.accel.bvh_binary import build_binary
-from pmviewer.kernels.accel.bvh_pack import COLLAPSE_BYTES, collapse, triangle_boxes
+from pmviewer.kernels.accel.bvh_pack import collapse, triangle_boxes
 from pmviewer.kernels.accel.bvh_split import plan_range, subtree
+from pmviewer.kernels.accel.bvh_wide import pack
 from pmviewer.kernels.accel.quadric import QUADRIC_FLOATS, quadric_bounds
-from pmviewer.kernels.accel.simd import BLOCK_ROWS, LANES, NODE_ROWS
+from pmviewer.kernels.accel.simd import LANES
 from pmviewer.kernels.memory import aligned_empty
 from pmviewer.progress import parallel
 
@@ -114,18 +116,8 @@ def build(triangles: F4, quadrics: F4, boxed: tuple[F4, F4] | None = None) -> Bv
     others.view(np.int32)[:, 3] = kept
 
     binary = build_binary(boxes, n_kept, around[0], around[1])
-    nodes = aligned_empty((len(binary.nodes) // 2 + 1, NODE_ROWS, LANES), np.float32)
-    # An unused lane refers to block 0, which therefore always exists.
-    blocks = aligned_empty((max(binary.n_blocks, 1), BLOCK_ROWS, LANES), np.float32)
-    blocks[0] = 0.0
-    scratch = aligned_empty((COLLAPSE_BYTES,), np.uint8)
-    n_nodes = collapse(
-        triangles.ctypes.data, boxes.ctypes.data, n_kept, len(boxes), binary.nodes.ctypes.data, nodes.ctypes.data,
-        blocks.ctypes.data, len(blocks), scratch.ctypes.data,
-    )  # fmt: skip
-    own_nodes = aligned_empty((n_nodes, NODE_ROWS, LANES), np.float32)
-    own_nodes[:] = nodes[:n_nodes]
-    return Bvh(own_nodes, blocks, own_quadrics, len(triangles))
+    nodes, blocks = pack(triangles, boxes, n_kept, binary)
+    return Bvh(nodes, blocks, own_quadrics, len(triangles))
 
 
 def _joined(rows: F4) -> F4:
@@ -161,7 +153,7 @@ def builder_kernels() -> list[Callable[[], object]]:
     rows[:] = 0.0
     at, apart = rows.ctypes.data, rows[1024:].ctypes.data
     return [
-        partial(_with_memory, rows, collapse, at, at, 0, 0, at, at, at, 1, apart),
+        partial(_with_memory, rows, collapse, at, at, 0, 0, at, 0, 0, at, 1, at, apart),
         partial(_with_memory, rows, plan_range, at, at, 0, 0),
         partial(_with_memory, rows, subtree, at, 0, at, at, 0, apart, 0),
         partial(_with_memory, rows, triangle_boxes, at, at, apart, 0, 0),

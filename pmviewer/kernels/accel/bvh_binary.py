@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels.accel.bvh_split import CENTERS, FIRST, HELD, SCRATCH_BYTES, plan_range, subtree
 from pmviewer.kernels.accel.simd import LANES, ROW_BYTES
 from pmviewer.kernels.memory import aligned_empty
-from pmviewer.progress import check, grown
+from pmviewer.progress import check, grown, parallel
 
 ALONE = 1 << 16
 """Boxes up to which a subtree is one thread's work."""
@@ -24,10 +24,12 @@ F4 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Binary:
-    """`nodes` (k, 8) float32 as `bvh_split` has them, how to collapse them included (`plan_range`); node 0 is the root.
-    `n_blocks` leaves hold triangles."""
+    """`nodes` (k, 8) float32 as `bvh_split` has them, how to collapse them included (`plan_range`); node 0 is the root,
+    and the first `n_upper` are those of which each subtree below is one thread's work. `n_blocks` leaves hold
+    triangles."""
 
     nodes: F4
+    n_upper: int
     n_blocks: int
 
 
@@ -108,18 +110,28 @@ def _joined(root: _Part) -> Binary:
     nodes, costs = aligned_empty((size, LANES), np.float32), np.empty((len(upper), LANES), np.float32)
     ints = nodes.view(np.int32)
     end = len(upper)
+    copies = []
     for i, part in enumerate(upper):
         if part.nodes is None or part.costs is None:
             nodes[i] = part.box
             ints[i, FIRST], ints[i, HELD] = place[id(part.children[0])], 0
             continue
-        below = slice(end, end + len(part.nodes) - 1)
-        nodes[i], nodes[below], costs[i] = part.nodes[0], part.nodes[1:], part.costs[0]
-        for rows in (slice(i, i + 1), below):
-            ints[rows, FIRST] += np.where(ints[rows, HELD] <= 0, np.int32(end - 1), np.int32(0))
-        end = below.stop
-        part.nodes = None
+        copies.append(partial(_place, part, nodes, i, end))
+        costs[i] = part.costs[0]
+        end += len(part.nodes) - 1
+    parallel(copies)
     for i in reversed(range(len(upper))):
         if upper[i].children:
             plan_range(nodes.ctypes.data, costs.ctypes.data, i, i + 1)
-    return Binary(nodes, sum(part.n_blocks for part in upper))
+    return Binary(nodes, len(upper), sum(part.n_blocks for part in upper))
+
+
+def _place(part: _Part, nodes: F4, root: int, start: int) -> None:
+    """Copy a whole subtree to its place: its root to the row `root`, what is below to those from `start` on."""
+    assert part.nodes is not None
+    below = slice(start, start + len(part.nodes) - 1)
+    nodes[root], nodes[below] = part.nodes[0], part.nodes[1:]
+    ints = nodes.view(np.int32)
+    for rows in (slice(root, root + 1), below):
+        ints[rows, FIRST] += np.where(ints[rows, HELD] <= 0, np.int32(start - 1), np.int32(0))
+    part.nodes = None

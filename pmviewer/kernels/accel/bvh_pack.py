@@ -22,6 +22,9 @@ _TRIANGLE_BYTES = 36
 _DEEPEST = 1024
 """Wide nodes that can wait to be filled: the build keeps trees below 72 levels, and a level adds at most seven."""
 
+JOB_SOURCE, JOB_TARGET, JOB_NODES, JOB_BLOCKS, JOB_LEFT = range(5)
+"""Numbers of a job of `collapse`; those of what it leaves to others are from JOB_LEFT on."""
+
 _STACK = ROW_BYTES * 3
 COLLAPSE_BYTES = _STACK + 8 * _DEEPEST
 """Scratch memory of `collapse`: the box around nothing, pairs of int32 for the children of a node, and for nodes."""
@@ -108,12 +111,18 @@ def _put_pair(pairs, i, first, second):
 
 
 @kernel
-def collapse(triangles, boxes, n_triangles, n_boxes, binary, nodes, blocks, n_blocks_total, scratch):
-    """Turn the binary tree over so many boxes into wide nodes and blocks; returns the number of wide nodes."""
-    n_nodes, n_blocks = np.int64(1), np.int64(0)
-    pending, stack = scratch + ROW_BYTES, scratch + _STACK
+def collapse(triangles, boxes, n_triangles, n_boxes, binary, whole, nodes, blocks, n_blocks_total, job, scratch):
+    """Turn what is below a node of the binary tree over so many boxes into wide nodes and blocks.
+
+    `job` has int32 numbers (JOB_SOURCE …): the binary node, the wide node that it becomes, and the next free wide node
+    and block, which are those after the last used at the end. Binary nodes from `whole` on that become wide nodes are
+    left to others: they get their number, and both numbers go to the end of `job`. Where `nodes` is 0 nothing is
+    written but `job`.
+    """
+    n_nodes, n_blocks = np.int64(load_i4(job, JOB_NODES)), np.int64(load_i4(job, JOB_BLOCKS))
+    pending, stack, left = scratch + ROW_BYTES, scratch + _STACK, np.int64(0)
     put_row(nothing(), scratch)
-    _put_pair(stack, 0, 0, 0)
+    _put_pair(stack, 0, load_i4(job, JOB_SOURCE), load_i4(job, JOB_TARGET))
     size = np.int64(1)
     while size > 0:
         size -= 1
@@ -136,17 +145,26 @@ def collapse(triangles, boxes, n_triangles, n_boxes, binary, nodes, blocks, n_bl
                 continue
             if held <= 0:
                 child = n_nodes
-                _put_pair(stack, size, c, n_nodes)
-                size += 1
+                if c < whole:
+                    _put_pair(stack, size, c, n_nodes)
+                    size += 1
+                else:
+                    _put_pair(job + 4 * JOB_LEFT, left, c, n_nodes)
+                    left += 1
                 n_nodes += 1
             elif begin < n_triangles:
-                _fill_block(triangles, boxes + ROW_BYTES * begin, held, blocks + BLOCK_BYTES * n_blocks)
+                if nodes != 0:
+                    _fill_block(triangles, boxes + ROW_BYTES * begin, held, blocks + BLOCK_BYTES * n_blocks)
                 child = ~n_blocks
                 n_blocks += 1
             else:
                 child = ~(n_blocks_total + load_i4(boxes + ROW_BYTES * begin, FIRST))
-            _set_lane(target, lane, box, np.int32(child))
+            if nodes != 0:
+                _set_lane(target, lane, box, np.int32(child))
             lane += 1
-        for i in range(lane, LANES):
-            _set_lane(target, i, scratch, np.int32(~0))
-    return n_nodes
+        if nodes != 0:
+            for i in range(lane, LANES):
+                _set_lane(target, i, scratch, np.int32(~0))
+    store_i4(job, JOB_NODES, np.int32(n_nodes))
+    store_i4(job, JOB_BLOCKS, np.int32(n_blocks))
+    return left

@@ -80,6 +80,24 @@ def number_used(vertices, faces, number, low, high):
 
 
 @kernel
+def renumber(faces, number, out):
+    """out (F, 3) int32 = number (V,) at the corners of the faces."""
+    for f in range(len(faces)):
+        for k in range(3):
+            out[f, k] = number[faces[f, k]]
+
+
+@kernel
+def at_corners(values, faces, begin, end, out):
+    """out (F, 3, 3) float32 = values (V, 3) float64 at the corners of the faces [begin, end)."""
+    for f in range(begin, end):
+        for k in range(3):
+            i = faces[f, k]
+            for axis in range(3):
+                out[f, k, axis] = values[i, axis]
+
+
+@kernel
 def face_normals(vertices, faces, out):
     """The unit normal of each face three times over, (F, 3, 3) float32; zero where the face has no area."""
     for f in range(len(faces)):

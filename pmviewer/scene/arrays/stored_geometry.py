@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.meshes.mesh import face_normals
+from pmviewer.kernels.meshes.mesh import at_corners, face_normals
+from pmviewer.progress import parallel
 from pmviewer.scene.arrays.instances import Normal, normalised
 from pmviewer.scene.arrays.light_table import axis_of, side_of
 from pmviewer.scene.description import Cylinder, Disk, Mesh, Parallelogram, Scene, Shape, Sphere
 
 Float = NDArray[np.float32]
+_AT_ONCE = 1 << 17
+"""Triangles that one thread looks at at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +104,10 @@ def _corner_normals(meshes: list[Mesh], n: int) -> Float | None:
 
 
 def _take(values: NDArray[np.float64], faces: NDArray[np.int32], out: Float) -> None:
-    """out (F, 3, 3) = values (V, 3) at the corners of the faces."""
-    np.take(values.astype(np.float32), faces, axis=0, out=out, mode="clip")  # checked before; "raise" would copy
+    """out (F, 3, 3) = values (V, 3) at the corners of the faces, whose indices were checked before."""
+    values, faces = np.ascontiguousarray(values, np.float64), np.ascontiguousarray(faces, np.int32)
+    starts = range(0, len(faces), _AT_ONCE)
+    parallel([partial(at_corners, values, faces, i, min(i + _AT_ONCE, len(faces)), out) for i in starts])
 
 
 def _quadric_row(shape: Shape) -> list[float]:

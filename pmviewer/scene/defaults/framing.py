@@ -19,6 +19,8 @@ MARGIN = 1.06
 """Width of the picture over that of what is in it."""
 AZIMUTH, ELEVATION = 36.0, 23.0
 """Degrees, of the view that is taken where nothing else matters: to the right of the front, slightly above."""
+_MOST_GUESSES = 48
+"""Some four are enough."""
 
 
 def bounds(shapes: Sequence[Shape]) -> tuple[Float, Float]:
@@ -84,13 +86,22 @@ def fitted(points: Float, towards: Float, up: Up, fov: float = FOV) -> Camera:
 
 def _middle(across: Float, depth: Float) -> float:
     """Where an eye must stand for points at these places and depths to reach as far to one side of it as to the
-    other."""
+    other: (a − x)/z is the largest for one point, the least for another, and their sum is 0.
+
+    Each guess is the answer for the two points that reach farthest from the guess before."""
     low, high = float(across.min()), float(across.max())
-    for _ in range(48):
-        middle = (low + high) / 2
+    middle = (low + high) / 2
+    for _ in range(_MOST_GUESSES):
         seen = (across - middle) / depth
-        low, high = (middle, high) if seen.max() + seen.min() > 0 else (low, middle)
-    return (low + high) / 2
+        most, least = int(seen.argmax()), int(seen.argmin())
+        reach = float(seen[most] + seen[least])
+        low, high = (middle, high) if reach > 0 else (low, middle)
+        a, b, p, q = across[most], across[least], depth[most], depth[least]
+        guess = float((a * q + b * p) / (p + q))
+        if abs(guess - middle) <= 1e-12 * (high - low):
+            return guess
+        middle = guess if low < guess < high else (low + high) / 2
+    return middle
 
 
 def looking(eye: Float, target: Float, up: Up, fov: float) -> Camera:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,20 +31,29 @@ class Rated:
 
 def picture_rays(camera: Camera, side: int = SIDE) -> Float:
     """Unit directions (side², 3) through the middles of a square picture's pixels."""
-    forward = np.subtract(camera.target, camera.origin, dtype=np.float64)
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, camera.up)
-    right /= np.linalg.norm(right)
+    return _rays_of([camera], side)[0]
+
+
+def _rays_of(cameras: list[Camera], side: int) -> Float:
+    """The same of several cameras, (n, side², 3)."""
+    origin, target, up = (np.array([getattr(c, name) for c in cameras], float) for name in ("origin", "target", "up"))
+    forward = target - origin
+    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
+    right = np.cross(forward, up)
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
     top = np.cross(right, forward)
-    at = ((np.arange(side) + 0.5) / side * 2 - 1) * math.tan(math.radians(camera.fov) / 2)
-    x, y = np.meshgrid(at, -at)
-    rays = forward + x.reshape(-1, 1) * right + y.reshape(-1, 1) * top
-    return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    reach = np.tan(np.radians([camera.fov for camera in cameras]) / 2)[:, None]
+    at = (np.arange(side) + 0.5) / side * 2 - 1
+    x, y = (grid.reshape(-1) for grid in np.meshgrid(at, -at))
+    rays = np.empty((len(cameras), side * side, 3))
+    for k in range(3):
+        rays[..., k] = forward[:, k, None] + reach * (x * right[:, k, None] + y * top[:, k, None])
+    return rays / np.sqrt(np.einsum("nrk,nrk->nr", rays, rays))[..., None]
 
 
 def rated_pictures(proxy: Proxy, cameras: list[Camera], close: float, *, inside: bool) -> list[Rated]:
     """How much there is to see in each camera's picture; see the module. What is nearer than `close` is in the way."""
-    rays = np.concatenate([picture_rays(camera) for camera in cameras])
+    rays = _rays_of(cameras, SIDE).reshape(-1, 3)
     eyes = np.repeat(np.array([camera.origin for camera in cameras]), SIDE * SIDE, axis=0)
     hits = proxy.closest(eyes, rays)
     found = []

@@ -53,9 +53,11 @@ class Hits:
 @dataclass(frozen=True)
 class Proxy:
     """`corners` (n, 3, 3), unit `normals` (n, 3) towards the front, `areas` (n,), and for each triangle the number of
-    its `shape` in `Scene.all_shapes`. `radius` is half the diagonal of everything."""
+    its `shape` in `Scene.all_shapes`. `points` (m, 3) are the places of all corners, most of them once. `radius` is
+    half the diagonal of everything."""
 
     corners: Float
+    points: Float
     normals: Float
     areas: Float
     shape: NDArray[np.int32]
@@ -104,8 +106,8 @@ def proxy_of(scene: Scene, keep: Bools | None = None) -> Proxy | None:
     parts = _parts(scene, np.ones(len(scene.all_shapes), bool) if keep is None else keep)
     if not parts:
         return None
-    corners, normals, shape = (np.concatenate(column) for column in zip(*parts))
-    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    corners, normals, shape, points = (np.concatenate(column) for column in zip(*parts))
+    low, high = points.min(axis=0), points.max(axis=0)
     radius = float(np.linalg.norm(high - low)) / 2
     if not 0 < radius < np.inf:
         return None
@@ -114,17 +116,19 @@ def proxy_of(scene: Scene, keep: Bools | None = None) -> Proxy | None:
     used = length > 1e-12 * radius**2
     if not used.any():
         return None
-    corners, cross, length, shape, normals = (x[used] for x in (corners, cross, length, shape, normals))
+    if not used.all():
+        corners, cross, length, shape, normals = (x[used] for x in (corners, cross, length, shape, normals))
+        points = corners.reshape(-1, 3)
     facing = np.where((cross * normals).sum(axis=1) < 0, -1.0, 1.0)
     bvh = build(np.ascontiguousarray(corners, np.float32), np.zeros((0, 12), np.float32))
     record = np.zeros(1, K.SCENE_DTYPE)
     bvh.store(record[0])
     unit = cross * (facing / length)[:, None]
-    return Proxy(corners, unit, length / 2, shape.astype(np.int32), radius, bvh, record)
+    return Proxy(corners, points, unit, length / 2, shape.astype(np.int32), radius, bvh, record)
 
 
-Part = tuple[Float, Float, NDArray[np.int64]]
-"""Corners (n, 3, 3), a vector to the front of each (n, 3), shape (n,)."""
+Part = tuple[Float, Float, NDArray[np.int64], Float]
+"""Corners (n, 3, 3), a vector to the front of each (n, 3), shape (n,), and the places of the corners (m, 3)."""
 Fronts = Callable[[NDArray[np.int64]], Float]
 
 
@@ -147,7 +151,7 @@ def _parts(scene: Scene, keep: Bools) -> list[Part]:
         if inside:
             parts += _copied(np.stack(shown[::step]), inside)
     if sum(len(part[0]) for part in parts) > 2 * MOST_EXACT and scene.instances:
-        corners, normals, shape = (np.concatenate(column) for column in zip(*parts))
+        corners, normals, shape, _ = (np.concatenate(column) for column in zip(*parts))
         faces = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
         return [_merged(corners.reshape(-1, 3), faces, shape, lambda kept: normals[kept])]
     return parts
@@ -159,10 +163,12 @@ def _copied(to_world: Float, inside: list[Part]) -> list[Part]:
     sign = np.where(np.linalg.det(linear) < 0, -1.0, 1.0)[:, None, None]
     turned = np.linalg.inv(linear) * sign
     parts = []
-    for corners, normals, shape in inside:
+    for corners, normals, shape, points in inside:
         placed = np.einsum("kij,ncj->knci", linear, corners) + moved
         facing = np.einsum("nj,kji->kni", normals, turned)
-        parts.append((placed.reshape(-1, 3, 3), facing.reshape(-1, 3), np.tile(shape, len(to_world))))
+        places = np.einsum("kij,nj->kni", linear, points) + moved[:, 0]
+        shapes = np.tile(shape, len(to_world))
+        parts.append((placed.reshape(-1, 3, 3), facing.reshape(-1, 3), shapes, places.reshape(-1, 3)))
     return parts
 
 
@@ -172,7 +178,7 @@ def _reduced(shapes: list[tuple[int, Shape]]) -> list[Part]:
     for i, shape in shapes:
         if not isinstance(shape.geometry, Mesh):
             corners, normals = triangles_of(shape.geometry, SEGMENTS)
-            parts.append((corners, normals.mean(axis=1), np.full(len(corners), i)))
+            parts.append((corners, normals.mean(axis=1), np.full(len(corners), i), corners.reshape(-1, 3)))
     if not meshes:
         return parts
     counts = [len(mesh.faces) for _, mesh in meshes]
@@ -200,7 +206,7 @@ def _reduced(shapes: list[tuple[int, Shape]]) -> list[Part]:
         return found
 
     if len(faces) <= MOST_EXACT:
-        parts.append((vertices[faces], fronts(np.arange(len(faces))), shape_of))
+        parts.append((vertices[faces], fronts(np.arange(len(faces))), shape_of, vertices))
     else:
         parts.append(_merged(vertices, faces, shape_of, fronts))
     return parts
@@ -232,4 +238,6 @@ def _merged(vertices: Float, faces: NDArray, shape_of: NDArray, fronts: Fronts, 
     finer = min(MOST_CELLS, int(cells * math.sqrt(MOST_EXACT / 2 / max(len(k), 1))))
     if cells == CELLS and finer > 1.3 * CELLS:
         return _merged(vertices, faces, shape_of, fronts, finer)
-    return mean[k], fronts(kept), shape_of[kept]
+    met = np.zeros(len(mean), bool)
+    met[k] = True
+    return mean[k], fronts(kept), shape_of[kept], mean[met]

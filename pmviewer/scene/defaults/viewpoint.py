@@ -36,8 +36,8 @@ _A_LINE = 0.06
 _MOST_SEEN = 0.9
 """Share of what the best view shows of the surface that is as good."""
 _DETAIL, _MOST_DETAIL, _DETAIL_SIZE = 0.75, 0.9, 0.25
-"""What a view of the detail alone counts, the share of the triangles' corners that it must hold, and its largest size,
-relative to everything."""
+"""What a view of the detail alone counts, the share of the points that it must hold, and its largest size, relative to
+everything."""
 _FACING, _FACING_AWAY = 0.8, 0.6
 """Share of fronts in the picture, from where surfaces face inwards on; and up to where they do, from outside."""
 _WALLS = 0.35
@@ -108,14 +108,14 @@ def _walls(proxy: Proxy) -> float:
 
 
 def _subjects(proxy: Proxy) -> list[Float]:
-    """Points (n, 3) that a picture shall hold: the corners of all triangles, but for what lies far outside; and, where
-    that is much smaller, those where the detail is, as on a wide ground."""
+    """Points (n, 3) that a picture shall hold: those where triangles have corners, but for what lies far outside; and,
+    where that is much smaller, those where the detail is, as on a wide ground."""
     by_area, _ = proxy.sampled(1000)
     by_count, _ = proxy.sampled(2000, np.ones(len(proxy.areas)))
     whole = _within(proxy, np.concatenate([by_area, by_count]), 0.5, 0.4)
     detail = _within(proxy, by_count, 2.0, 0.1)
     smaller = np.linalg.norm(np.ptp(detail, axis=0)) < _DETAIL_SIZE * np.linalg.norm(np.ptp(whole, axis=0))
-    detailed = smaller and len(detail) >= _MOST_DETAIL * 3 * len(proxy.areas)
+    detailed = smaller and len(detail) >= _MOST_DETAIL * len(proxy.points)
     return [_outermost(whole), _outermost(detail)] if detailed else [_outermost(whole)]
 
 
@@ -130,12 +130,11 @@ def _outermost(points: Float) -> Float:
 
 
 def _within(proxy: Proxy, samples: Float, percent: float, beyond: float) -> Float:
-    """The corners in the box that holds the samples but for so many percent at each end, and of its size beyond."""
+    """The points in the box that holds the samples but for so many percent at each end, and of its size beyond."""
     low, high = np.percentile(samples, (percent, 100 - percent), axis=0)
     reach = beyond * float((high - low).max())
-    corners = proxy.corners.reshape(-1, 3)
-    inside = ((corners >= low - reach) & (corners <= high + reach)).all(axis=1)
-    return corners[inside] if inside.any() else corners
+    inside = ((proxy.points >= low - reach) & (proxy.points <= high + reach)).all(axis=1)
+    return proxy.points[inside] if inside.any() else proxy.points
 
 
 # outside --------------------------------------------------------------------------------------------------------------
@@ -257,19 +256,18 @@ def _hidden(proxy: Proxy, camera: Camera) -> float:
 
 def _views_from(proxy: Proxy, place: Float, scale: float, up: Up) -> list[Rated]:
     """Views over a place, from as far behind it as there is room."""
-    cameras = []
     top = axes_of(up)[1]
-    for k in range(_HEADINGS):
-        forward = -direction(AZIMUTH + 360.0 / _HEADINGS * k, 6.0, up)
-        level = forward - top * float(forward @ top)
-        level /= np.linalg.norm(level)
-        side = np.cross(level, top)
-        behind = np.stack([-level, -level + 0.25 * side, -level - 0.25 * side, -level + 0.2 * top, -level - 0.2 * top])
-        behind /= np.linalg.norm(behind, axis=1, keepdims=True)
-        distance, met = _around(proxy, place[None], behind)
-        back = 0.85 * float(distance[0].min()) if met.any() else 0.0
-        eye = place - level * min(back, 1.5 * proxy.radius)
-        ahead = proxy.closest(eye[None], forward[None]).distance[0]
-        target = eye + forward * (ahead if math.isfinite(ahead) else proxy.radius)
-        cameras.append(looking(eye, target, up, INSIDE_FOV))
+    forward = -np.stack([direction(AZIMUTH + 360.0 / _HEADINGS * k, 6.0, up) for k in range(_HEADINGS)])
+    level = forward - (forward @ top)[:, None] * top
+    level /= np.linalg.norm(level, axis=1, keepdims=True)
+    side = np.cross(level, top)
+    behind = np.stack([-level, -level + 0.25 * side, -level - 0.25 * side, -level + 0.2 * top, -level - 0.2 * top], 1)
+    behind /= np.linalg.norm(behind, axis=2, keepdims=True)
+    distance, _ = _around(proxy, place[None], behind.reshape(-1, 3))
+    room = distance.reshape(_HEADINGS, -1).min(axis=1)
+    back = np.minimum(np.where(np.isfinite(room), 0.85 * room, 0.0), 1.5 * proxy.radius)
+    eyes = place - level * back[:, None]
+    ahead = proxy.closest(eyes, forward).distance
+    targets = eyes + forward * np.where(np.isfinite(ahead), ahead, proxy.radius)[:, None]
+    cameras = [looking(eye, target, up, INSIDE_FOV) for eye, target in zip(eyes, targets)]
     return rated_pictures(proxy, cameras, 0.25 * scale, inside=True)

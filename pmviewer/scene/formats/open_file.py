@@ -9,6 +9,10 @@ from typing import BinaryIO
 
 from pmviewer.errors import SceneError
 
+_POINTER, _LONGEST_POINTER = b"version https://git-lfs.github.com/spec/", 1024
+"""What stands in a large file's place where a repository was cloned without Git LFS: its first bytes, and its longest
+length, by the specification."""
+
 
 def open_regular(path: Path, what: str = "The file") -> tuple[BinaryIO, int]:
     """A regular file, opened, and its size in bytes.
@@ -24,7 +28,14 @@ def open_regular(path: Path, what: str = "The file") -> tuple[BinaryIO, int]:
     if not stat.S_ISREG(about.st_mode):
         os.close(descriptor)
         raise SceneError(f"{what} is not a regular file.", path)
-    return os.fdopen(descriptor, "rb"), about.st_size
+    file = os.fdopen(descriptor, "rb")
+    if about.st_size <= _LONGEST_POINTER:
+        if file.read(len(_POINTER)) == _POINTER:
+            file.close()
+            hint = "Fetch it with 'git lfs pull'."
+            raise SceneError(f"{what} was not downloaded: this is Git LFS's note of where it is.", path, hint=hint)
+        file.seek(0)
+    return file, about.st_size
 
 
 def read_regular(path: Path, what: str = "The file") -> bytes:

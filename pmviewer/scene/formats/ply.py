@@ -24,6 +24,7 @@ _COLOURS = (
     ("diffuse_red", "diffuse_green", "diffuse_blue"),
     ("color_0", "color_1", "color_2"),  # as Mitsuba 3 writes them
 )
+_RGB = ("r", "g", "b")
 _FACE_LISTS = ("vertex_indices", "vertex_index")
 _FACE_ELEMENTS = ("face", "faces", "polygon", "triangle")
 
@@ -38,17 +39,18 @@ class PlyFile:
     notes: tuple[str, ...] = ()
 
 
-def read_ply(path: Path, face_colours: bool = False) -> Mesh:
+def read_ply(path: Path, attribute: str = "") -> Mesh:
     """The file's triangles (polygons are cut), with its normals, texture coordinates and colours if it has them.
 
     Colours of one byte are decoded from sRGB, others are taken as linear. Where vertices and faces have some, those of
-    the vertices count, with `face_colours` the faces'. Raises SceneError for anything unreadable; indices are checked
+    the vertices count. With an `attribute` in Mitsuba's words ("face_color", "vertex_temperature" …) its values are the
+    colours, and there are none where the file lacks it. Raises SceneError for anything unreadable; indices are checked
     by `clean`.
     """
-    return read_ply_file(path, face_colours).mesh
+    return read_ply_file(path, attribute).mesh
 
 
-def read_ply_file(path: Path, face_colours: bool = False) -> PlyFile:
+def read_ply_file(path: Path, attribute: str = "") -> PlyFile:
     """`read_ply` with what the file says besides. Raises SceneError."""
     data = read_regular(path, "The mesh")
     if not data:
@@ -70,13 +72,13 @@ def read_ply_file(path: Path, face_colours: bool = False) -> PlyFile:
         faces,
         _stack(vertex, ("nx", "ny", "nz")) if has_normals else None,
         None if pair is None else _stack(vertex, pair),
-        _colours(vertex),
+        _values(vertex, attribute, "vertex_"),
     )
     wedges = face.get("texcoord")
     if isinstance(wedges, ListColumn) and mesh.uv is None and owner is None and len(wedges.items) == 6 * len(faces):
         mesh = replace(_apart(mesh), uv=wedges.items.reshape(-1, 2).astype(np.float64))
-    of_faces = _colours({name: c for name, c in face.items() if not isinstance(c, ListColumn)})
-    if of_faces is not None and (face_colours or mesh.colours is None):
+    of_faces = _values({name: c for name, c in face.items() if not isinstance(c, ListColumn)}, attribute, "face_")
+    if of_faces is not None and mesh.colours is None:
         each = of_faces if owner is None else of_faces[owner]
         mesh = replace(_apart(mesh), colours=np.repeat(each, 3, axis=0))
     alpha = vertex.get("alpha")
@@ -109,6 +111,26 @@ def _colours(columns: dict[str, NDArray]) -> Float | None:
     from pmviewer.scene.formats.texture_file import linear
 
     return linear(np.clip(values / whole, 0, 1).astype(np.float32)).astype(np.float64)
+
+
+def _values(columns: dict[str, NDArray], attribute: str, of: str) -> Float | None:
+    """(n, 3) values of an attribute of vertices or faces, which `of` ("vertex_", "face_") says; their colours where no
+    attribute is asked for. None if there are none.
+
+    As Mitsuba 3 names them: the columns of `face_w` are w_0, w_1, w_2 or w_x …, one or three of them; w_r, w_g, w_b are
+    `face_w_color`."""
+    if not attribute:
+        return _colours(columns)
+    if not attribute.startswith(of):
+        return None
+    name = attribute.removeprefix(of)
+    colours = _colours(columns) if name == "color" else None
+    if colours is not None:
+        return colours
+    own = [c for c in columns if "_" in c and c.rpartition("_")[0] == name and c.rpartition("_")[2] not in _RGB]
+    if name.endswith("_color"):
+        own += [c for c in columns if c in [f"{name.removesuffix('_color')}_{k}" for k in _RGB]]
+    return np.repeat(_stack(columns, tuple(own)), 3 // len(own), axis=1) if len(own) in (1, 3) else None
 
 
 def _apart(mesh: Mesh) -> Mesh:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError
 from pmviewer.output.exr import BEAUTY, read_exr
 from pmviewer.scene.formats.hdr import read_hdr
+from pmviewer.scene.formats.open_file import open_regular
 from pmviewer.scene.formats.pfm import decode_pfm
 
 LEAST_WIDTH, LEAST_HEIGHT = 2, 3
@@ -23,6 +24,7 @@ def read_sky(path: Path) -> tuple[NDArray[np.float32], int]:
     8-bit pictures are decoded from sRGB, those of less than 2 × 3 pixels continued. Raises SceneError for what is no
     such picture.
     """
+    open_regular(path, "It")[0].close()
     ending = path.suffix.lower()
     if ending == ".exr":
         pixels = _exr(path)

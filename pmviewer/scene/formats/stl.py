@@ -15,12 +15,11 @@ from pmviewer.progress import stage
 from pmviewer.scene.description import Mesh
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.open_file import open_regular
-from pmviewer.scene.meshes.welding import Welder
+from pmviewer.scene.meshes.welding import FACET, Welder
 
 _HEADER, _RECORD = 84, 50
 _AT_ONCE = 20_000
 """Triangles of a binary file that are in memory as they were read."""
-_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def read_stl(path: Path, diagnostics: Diagnostics) -> list[tuple[str, Mesh]]:
@@ -56,7 +55,7 @@ def _plausible(data: bytes, claimed: int, whole: int) -> bool:
     """Do the first records look like triangles of a file with a wrong number in its header?"""
     if not (claimed in (0, 2**32 - 1) or 0 < claimed <= 4 * whole + 1000):
         return False
-    facets = np.frombuffer(data, _FACET, min(whole, 100), _HEADER)
+    facets = np.frombuffer(data, FACET, min(whole, 100), _HEADER)
     with np.errstate(invalid="ignore", over="ignore"):
         return bool((np.abs(facets["corners"]) < 1e10).all() and (np.abs(facets["normal"]) < 1.001).all())
 
@@ -68,10 +67,10 @@ def _binary(header: bytes, records: BinaryIO, n: int, path: Path, diagnostics: D
     welder, coloured, left = Welder(n), b"COLOR=" in header, n
     while left:
         data = records.read(_RECORD * min(left, _AT_ONCE))
-        facets = np.frombuffer(data, _FACET, len(data) // _RECORD)
+        facets = np.frombuffer(data, FACET, len(data) // _RECORD)
         if not len(facets):
             raise SceneError("The STL file ended while it was read.", path, hint="Open it again.")
-        welder.add(facets["corners"])
+        welder.add(facets)
         coloured = coloured or bool(facets["attribute"].any())
         left -= len(facets)
     if coloured:
@@ -104,5 +103,7 @@ def _welded(corners: NDArray[np.float32]) -> Mesh:
     """The triangles of corners (3 n, 3) with each vertex once."""
     stage(f"joining the corners of {len(corners) // 3:,} triangles")
     welder = Welder(len(corners) // 3)
-    welder.add(corners.reshape(-1, 3, 3))
+    facets = np.empty(len(corners) // 3, FACET)
+    facets["corners"] = corners.reshape(-1, 3, 3)
+    welder.add(facets)
     return welder.mesh()

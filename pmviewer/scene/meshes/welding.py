@@ -8,8 +8,12 @@ from numpy.typing import NDArray
 from pmviewer.kernels.meshes.weld import rehash, weld
 from pmviewer.scene.description import Mesh
 
+FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+"""A triangle as binary STL files have it."""
 _FULLEST = 0.6
 """Share of the table in use up to which collisions are rare."""
+_LEAST = 8
+"""Slots, of which three corners must find room."""
 
 
 class Welder:
@@ -23,23 +27,22 @@ class Welder:
     def __init__(self, count: int) -> None:
         self._index = np.empty(3 * count, np.int32)
         self._filled = self._used = 0
-        self._allocate(1 << count.bit_length())
+        self._allocate(max(1 << count.bit_length(), _LEAST))
 
     def _allocate(self, slots: int) -> None:
         self._table = np.full(slots, -1, np.int32)
-        self._vertices = np.empty((max(int(_FULLEST * slots), 1), 3), np.uint32)
+        self._vertices = np.empty((int(_FULLEST * slots), 3), np.uint32)
 
-    def add(self, corners: NDArray[np.float32]) -> None:
-        """Triangles (n, 3, 3)."""
-        with np.errstate(invalid="ignore"):
-            bits = np.add(corners, np.float32(0), dtype=np.float32).reshape(-1, 3).view(np.uint32)  # −0 becomes 0
-        while len(bits):
-            index = self._index[self._filled : self._filled + len(bits)]
-            done, self._used = weld(bits, self._table, self._vertices, self._used, index)
+    def add(self, facets: NDArray[np.void]) -> None:
+        """Triangles (n,) as FACETs."""
+        corners = facets["corners"].view(np.uint32)
+        while len(corners):
+            index = self._index[3 * self._filled :]
+            done, self._used = weld(corners, self._table, self._vertices, self._used, index)
             self._filled += done
-            bits = bits[done:]
-            if len(bits):
-                known = self._vertices
+            corners = corners[done:]
+            if len(corners):
+                known = self._vertices[: self._used]
                 self._allocate(2 * len(self._table))
                 self._vertices[: len(known)] = known
                 rehash(known, self._table)
@@ -48,4 +51,4 @@ class Welder:
         """The triangles so far."""
         vertices = self._vertices[: self._used].view(np.float32)
         with np.errstate(invalid="ignore"):  # NaN, which is left out later
-            return Mesh(vertices.astype(np.float64), self._index[: self._filled].reshape(-1, 3))
+            return Mesh(vertices.astype(np.float64), self._index[: 3 * self._filled].reshape(-1, 3))

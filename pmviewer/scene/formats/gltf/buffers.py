@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError
 from pmviewer.scene.formats.gltf.compression import decode_meshopt
 from pmviewer.scene.formats.gltf.document import Document, Json, extension, is_index
+from pmviewer.scene.formats.open_file import read_regular
 
 Bytes = NDArray[np.uint8]
 _MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
@@ -37,9 +38,7 @@ def content(document: Document, uri: Any, what: str) -> bytes:
         file = document.path.parent / name.replace("\\", "/")
         try:
             if file.is_file():
-                return file.read_bytes()
-        except OSError as error:
-            raise document.error(f"{what} {uri[:200]!r} can't be read: {error.strerror or error}.", hint) from None
+                return read_regular(file, f"{what} {uri[:200]!r}")
         except ValueError:  # a name with a zero byte
             raise missing from None
     raise missing

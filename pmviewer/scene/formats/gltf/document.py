@@ -10,6 +10,7 @@ from typing import Any, TypeGuard
 
 from pmviewer.errors import SceneError
 from pmviewer.scene.diagnostics import Diagnostics
+from pmviewer.scene.formats.open_file import read_regular
 
 Json = dict[str, Any]
 DAMAGED = "The file is damaged: export it again."
@@ -82,7 +83,7 @@ def name_of(row: Json, otherwise: str) -> str:
 
 def read_document(path: Path, diagnostics: Diagnostics) -> Document:
     """Open a .gltf or .glb file, whatever its ending says. Raises SceneError."""
-    text, binary = _chunks(path.read_bytes(), diagnostics)
+    text, binary = _chunks(read_regular(path), diagnostics)
     try:
         header = json.loads(text)
     except (ValueError, RecursionError):

@@ -143,6 +143,17 @@ def _projector(p: Properties, name: str) -> list[Light]:
     return [SpotLight(name, (x, y, z), direction, _times(irradiance, (factor, factor, factor)), cone, cone)]
 
 
+def _collimated(p: Properties, name: str) -> list[Light]:
+    """A beam without width has no place in a picture's pixels: a spot of the least width with its power."""
+    p.document.warn(f"{p.element} is shown as a spot of {_LEAST_CUTOFF}° with its power.", p.element)
+    m, power = p.transform(), p.bounded_colour("power", 1.0, None)
+    direction = _unit(m[:3, 2], p)
+    solid = 4 * math.pi * math.sin(math.radians(_LEAST_CUTOFF) / 2) ** 2
+    x, y, z = (float(c) for c in m[:3, 3])
+    intensity = _times(power, (1 / solid,) * 3)
+    return [] if direction is None else [SpotLight(name, (x, y, z), direction, intensity, _LEAST_CUTOFF, _LEAST_CUTOFF)]
+
+
 def _constant(p: Properties, name: str) -> list[Light]:
     return [ConstantEnvironment(name, p.bounded_colour("radiance", 1.0, None))]
 
@@ -200,6 +211,7 @@ _READERS: dict[str, Callable[[Properties, str], list[Light]]] = {
     "spot": _spot,
     "directional": _directional,
     "projector": _projector,
+    "collimated": _collimated,
     "constant": _constant,
     "envmap": _image,
     **dict.fromkeys(DAYLIGHT, _daylight),

@@ -10,7 +10,7 @@ from pmviewer.scene.arrays import primitives
 from pmviewer.scene.clean import check_faces
 from pmviewer.scene.description import Mesh
 from pmviewer.scene.formats.mitsuba.document import Properties
-from pmviewer.scene.formats.mitsuba.texture import reads_face_colours
+from pmviewer.scene.formats.mitsuba.texture import attributes_read
 from pmviewer.scene.formats.mitsuba.transform import Matrix, mirrors
 from pmviewer.scene.formats.ply import read_ply
 from pmviewer.scene.formats.serialized import read_serialized
@@ -19,6 +19,10 @@ from pmviewer.scene.meshes.smoothing import smoothed
 MESH_FILES = ("obj", "ply", "serialized")
 _KEPT_FACES = 20_000
 """Meshes up to this size are kept while the scene is read, since many shapes may show one file."""
+
+
+_COLOURS = "vertex_color"
+"""The attribute that is read anyhow; a file that has none may have colours of faces."""
 
 
 class BrokenMesh(SceneError):
@@ -55,16 +59,20 @@ def _stored(p: Properties) -> Mesh:
     if not name:
         raise document.error(f"{p.element} needs a 'filename'.", p.element)
     path = document.file(name, p.element)
-    of_faces = p.type == "ply" and reads_face_colours(p.element, document)
-    key = (str(path), "ply with colours of faces" if of_faces else p.type, index)
+    wanted = _attribute(p) if p.type == "ply" else ""
+    attribute = "" if wanted == _COLOURS else wanted
+    key = (str(path), f"{p.type} {attribute}", index)
     if key in document.broken_meshes:
         raise document.broken_meshes[key]
     mesh = document.meshes.get(key)
     if mesh is not None:
         return mesh
     try:
-        mesh = read_ply(path, of_faces) if p.type == "ply" else _read(path, p.type, index)
+        mesh = read_ply(path, attribute) if p.type == "ply" else _read(path, p.type, index)
         check_faces(mesh, path)
+        if wanted and mesh.colours is None:
+            what = f"{path.name} has no attribute '{wanted[:40]}': what it would colour is white."
+            document.warn(what, p.element, kind=f"attribute {path} {wanted}")
     except SceneError as error:
         at = p.element.file or document.diagnostics.path
         document.broken_meshes[key] = BrokenMesh(path.name, error, at, p.element.line)
@@ -72,6 +80,17 @@ def _stored(p: Properties) -> Mesh:
     if len(mesh.faces) <= _KEPT_FACES:
         document.meshes[key] = mesh
     return mesh
+
+
+def _attribute(p: Properties) -> str:
+    """The attribute of the mesh that is read as its colours, "" for what its file has."""
+    names = attributes_read(p.element, p.document)
+    if len(names) > 1:
+        what = (
+            f"The BSDFs of {p.element} read several attributes of the mesh: '{names[0][:40]}' stands for all of them."
+        )
+        p.document.warn(what, p.element)
+    return names[0] if names else ""
 
 
 def _read(path: Path, kind: str, index: int) -> Mesh:

@@ -20,7 +20,12 @@ if TYPE_CHECKING:
 _SPECTRA = frozenset(("rgb", "srgb", "uniform", "d65", "regular", "irregular", "blackbody", "spectrum", "rawconstant"))
 _BITMAPS = frozenset(("bitmap", "ldrtexture", "exrtexture", "hdrtexture"))
 _VERTEX_COLOURS = frozenset(("mesh_attribute", "vertexcolors"))
-_ATTRIBUTE, _FACE_ATTRIBUTE = "vertex_color", "face_color"
+_ATTRIBUTE, _ATTRIBUTES = "vertex_color", ("vertex_", "face_")
+_NUMBERS = frozenset((
+    "alpha", "alpha_u", "alpha_v", "roughness", "metallic", "anisotropic", "specular", "spec_trans", "spec_tint",
+    "sheen", "sheen_tint", "flatness", "clearcoat", "clearcoat_gloss", "diff_trans", "eta", "weight", "opacity",
+))  # fmt: skip
+"""Properties that are no colours: attributes of meshes are read as colours alone."""
 _DEEPEST = 8
 _MOST_GRID = 1024
 WHITE: RGB = (1.0, 1.0, 1.0)
@@ -30,6 +35,10 @@ def read_texture(p: Properties) -> Texture | None:
     """The texture of a <texture> element, read once however many refer to it; None, with a warning, where only the
     property's default is left. What has the same colour everywhere is a bitmap of one pixel. Raises SceneError naming
     its line."""
+    if p.type in _VERTEX_COLOURS and p.element.attributes.get("name") in _NUMBERS:
+        name = p.element.attributes["name"]
+        p.document.warn(f"'{name}' can't vary as {p.element} says: it keeps its default.", p.element)
+        return None
     key = id(p.element.children)  # a reference makes an element of its own with the same children
     if key not in p.document.textures:
         p.document.textures[key] = _read(p), p.element.children
@@ -88,7 +97,7 @@ def has_vertex_colours(p: Properties, name: str) -> bool:
 def _from_mesh(element: Element, document: Document, depth: int) -> bool:
     kind = element.attributes.get("type")
     if kind in _VERTEX_COLOURS:
-        return _attribute_of(element) in (_ATTRIBUTE, _FACE_ATTRIBUTE)
+        return _attribute_of(element).startswith(_ATTRIBUTES)
     if kind != "scale" or depth > _DEEPEST:
         return False
     first = next((c for c in _inside(element, document) if c.tag == "texture"), None)
@@ -101,14 +110,22 @@ def _inside(element: Element, document: Document) -> list[Element]:
     return [c for c in found if c is not None]
 
 
-def reads_face_colours(shape: Element, document: Document) -> bool:
-    """Does a BSDF of the shape take its colours from the mesh's faces?"""
-    level = [c for c in _inside(shape, document) if c.tag == "bsdf"]
+def attributes_read(shape: Element, document: Document) -> list[str]:
+    """Names of the attributes of the mesh ("vertex_color", "face_weight" …) that BSDFs of the shape read, first those
+    for colours."""
+    level, found = [(c, False) for c in _inside(shape, document) if c.tag == "bsdf"], []
     for _ in range(_DEEPEST):
-        level = [c for e in level for c in _inside(e, document) if c.tag in ("bsdf", "texture")]
-        if any(c.attributes.get("type") in _VERTEX_COLOURS and _attribute_of(c) == _FACE_ATTRIBUTE for c in level):
-            return True
-    return False
+        below = [(c, of or _colours(c, e)) for e, of in level for c in _inside(e, document)]
+        level = [(c, of) for c, of in below if c.tag in ("bsdf", "texture")]
+        found += [(not of, _attribute_of(c)) for c, of in level if c.attributes.get("type") in _VERTEX_COLOURS]
+    found.sort(key=lambda pair: pair[0])
+    return [name for name in dict.fromkeys(name for _, name in found) if name.startswith(_ATTRIBUTES)]
+
+
+def _colours(texture: Element, of: Element) -> bool:
+    """Is the texture what a BSDF shows as its colour?"""
+    names = ("reflectance", "base_color", "diffuse_reflectance", "diffuseReflectance")
+    return of.tag == "bsdf" and texture.tag != "bsdf" and texture.attributes.get("name") in names
 
 
 def _attribute_of(element: Element) -> str:
@@ -168,7 +185,7 @@ def _vertex_colours(p: Properties) -> Texture | None:
     p.known("name")
     factor = p.number("scale", 1.0)
     p.warn_unused()
-    if attribute in (_ATTRIBUTE, _FACE_ATTRIBUTE):
+    if attribute.startswith(_ATTRIBUTES):
         return constant((factor, factor, factor))
     what = f"The attribute '{attribute[:40]}' of {p.element} is not read: what it would colour keeps its default."
     p.document.warn(what, p.element)
