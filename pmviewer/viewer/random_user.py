@@ -63,8 +63,8 @@ _WEIGHTS = {
 @dataclass
 class Report:
     """What became of it. `resident` is memory in MiB after each round, at rest, without what the session keeps for a
-    return to settings of before, which has its own limit; `kernels` how many are loaded, a MiB each; `wrong`
-    has sentences."""
+    return to settings of before, which has its own limit; `kernels` how many are loaded; `wrong` has
+    sentences."""
 
     actions: int = 0
     rounds: int = 0

@@ -6,6 +6,7 @@ import sys
 
 MODULE = """
 import sys
+import llvmlite.binding as llvm
 import numpy as np
 from numba.core import event
 from pmviewer.kernels.compile.jit import device, kernel
@@ -31,6 +32,8 @@ def twice(vectors, out):
     for i in range(len(out)):
         out[i] = squared(out[i])
 
+parse, parsed = llvm.parse_bitcode, []
+llvm.parse_bitcode = lambda *of: (parsed.append(of), parse(*of))[1]
 names = []
 
 class Count(event.Listener):
@@ -43,7 +46,7 @@ event.register("numba:compile", Count())
 v, out = np.array([[3.0, 4.0], [6.0, 8.0]]), np.zeros(2)
 for function in sys.argv[1:]:
     globals()[function](v, out)
-    print(*out)
+    print(*out, "by bitcode" if parsed else "as it is")
 try:
     lengths(v, np.zeros(3))
 except ValueError as error:
@@ -64,7 +67,7 @@ def run(folder, *functions):
 
 def test_machine_code_is_made_for_what_python_calls_alone(tmp_path):
     assert run(tmp_path, "lengths") == [
-        "5.0 10.0",
+        "5.0 10.0 as it is",
         "another length",
         "lengths length squared",
         "squared False",
@@ -76,12 +79,12 @@ def test_machine_code_is_made_for_what_python_calls_alone(tmp_path):
 def test_what_was_saved_is_linked_into_what_is_compiled_later(tmp_path):
     run(tmp_path, "lengths")
     assert run(tmp_path, "lengths", "twice") == [
-        "5.0 10.0",
-        "25.0 100.0",
+        "5.0 10.0 as it is",
+        "25.0 100.0 by bitcode",
         "another length",
         "twice",
         "squared False",
         "lengths True",
         "twice True",
     ]
-    assert run(tmp_path, "twice")[:2] == ["25.0 100.0", "another length"]
+    assert run(tmp_path, "twice")[:2] == ["25.0 100.0 as it is", "another length"]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from llvmlite import ir as llvm
 from numba import float32, float64, int64, njit, types
-from numba.core import base, event, ir, transforms
+from numba.core import base, event, funcdesc, ir, itanium_mangler, transforms
 from numba.core.compiler import Flags, run_frontend
 from numba.core.lowering import Lower
 from numba.core.postproc import PostProcessor
@@ -28,9 +28,41 @@ def test_it_is_installed():
     assert not jit.numba.config.DISABLE_JIT, "or nothing is compiled"
     spared = (base.BaseContext.get_abi_sizeof, npydecl.ufunc_find_matching_loop, ir.Inst._rec_list_vars,
               NRTContext.get_meminfos, Lower.storevar, Lower.delvar, PostProcessor.run, transforms.canonicalize_cfg,
-              types.BaseFunction.get_call_type)  # fmt: skip
+              types.BaseFunction.get_call_type, funcdesc.default_mangler)  # fmt: skip
     for function in spared:
         assert function.__module__ == quicker.__name__, function
+
+
+class Pair(NamedTuple):
+    """Of something that is counted by references, and something that is not."""
+
+    array: np.ndarray
+    number: float
+
+
+class Triple(NamedTuple):
+    """Of pairs, whose written type is long."""
+
+    first: Pair
+    second: Pair
+    third: Pair
+
+
+def test_names_are_short_and_tell_types_apart():
+    mangled = cpu_target.target_context.mangler
+    assert mangled("a.f", (float32, int64)) == itanium_mangler.mangle("a.f", (float32, int64))
+    names = set()
+    for number in (float32, float64):
+        pair = types.NamedTuple((types.Array(number, 1, "C"), number), Pair)
+        nested = types.NamedTuple((types.NamedTuple((pair,) * 3, Triple),) * 3, Triple)
+        for arguments in ((nested,), (nested, nested)):
+            for name, tags, uid in (("a.f", (), None), ("a.f", ("t",), None), ("a.f", (), 1), ("a.g", (), None)):
+                assert len(itanium_mangler.mangle(name, arguments)) > 500
+                names.add(mangled(name, arguments, abi_tags=tags, uid=uid))
+                assert mangled(name, arguments, abi_tags=tags, uid=uid) in names
+                assert itanium_mangler.prepend_namespace(mangled(name, arguments), ns="cpython")
+    assert len(names) == 2 * 2 * 4
+    assert max(map(len, names)) < 100
 
 
 def test_sizes_are_those_of_llvm():
@@ -109,13 +141,6 @@ def test_calls_of_llvm_are_no_events():
     with event.install_recorder("numba:llvm_lock") as heard:
         cpu_target.target_context.get_abi_sizeof(llvm.ArrayType(llvm.IntType(8), 12345))
     assert heard.buffer == []
-
-
-class Pair(NamedTuple):
-    """Of something that is counted by references, and something that is not."""
-
-    array: np.ndarray
-    number: float
 
 
 def test_what_is_counted_by_references_is_counted_and_freed():

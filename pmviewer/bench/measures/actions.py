@@ -2,7 +2,7 @@
 
 Every hundred actions everything is undone; settings and picture must then be those of the beginning, bit for bit. The
 first rounds compile what the actions ask for, and the code stays: memory counts from round to round of the second half,
-beside which stands how many kernels were loaded, about a MiB each.
+beside which stands how many kernels were loaded.
 """
 
 from __future__ import annotations

@@ -64,12 +64,21 @@ class KernelLibrary(JITCodeLibrary):
                     self._codegen.set_env(variable.name, environment)
 
     def serialize_using_object_code(self) -> tuple[str, str, Any]:
-        """What is kept on disk: machine code and bitcode of what is native, bitcode alone of the rest."""
+        """What is kept on disk: of what is native machine code, bitcode, and the names that are asked for; of the rest
+        bitcode alone."""
         self._ensure_finalized()
         if self._native:
-            state: tuple[str, str, Any] = super().serialize_using_object_code()
-            return state
+            name, kind, (machine_code, bitcode) = super().serialize_using_object_code()
+            return name, kind, (machine_code, bitcode, self._own_names())
         return self.name, "linkable", self._get_module_for_linking().as_bitcode()
+
+    def _own_names(self) -> tuple[str, ...]:
+        """Of the functions that are this library's own, and of the places of Python constants: the code of what it
+        calls is asked for in other libraries."""
+        module = self._final_module
+        functions = (f.name for f in module.functions if not f.is_declaration and f.linkage == llvm.Linkage.external)
+        places = (v.name for v in module.global_variables if not v.is_declaration and v.name.startswith(ENVIRONMENT))
+        return (*functions, *places)
 
     @classmethod
     def _unserialize(cls, codegen: Any, state: tuple[str, str, Any]) -> KernelLibrary:
@@ -79,15 +88,12 @@ class KernelLibrary(JITCodeLibrary):
             library._final_module = library._shared_module = llvm.parse_bitcode(data)
             library._finalized = library._disable_inspection = True
         else:
-            machine_code, bitcode = data
+            machine_code, _, names = data
             library = codegen.create_library(name)
             library.enable_object_caching()
             library._set_compiled_object(machine_code)
             library._finalize_final_module()
-            # Constants and types of a module stay in its context when it is gone, so that this one has its own.
-            module = llvm.parse_bitcode(bitcode, llvm.create_context())
-            codegen._engine._load_defined_symbols(module)
-            module.close()
+            codegen._engine._defined_symbols.update(names)  # read from the bitcode by numba, which took megabytes
             library._native = library._disable_inspection = True
         return library
 

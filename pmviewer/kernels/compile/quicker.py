@@ -12,21 +12,25 @@ each function that is saved. Whatever a version of numba does not have stays as 
 from __future__ import annotations
 
 import functools
+import hashlib
 from typing import Any
 
 from llvmlite.binding import ffi
-from numba.core import base, ir, postproc, targetconfig, transforms, types
+from numba.core import base, funcdesc, ir, itanium_mangler, postproc, targetconfig, transforms, types
 from numba.core.annotations import type_annotations
 from numba.core.lowering import Lower
 from numba.core.runtime.context import NRTContext
 from numba.core.typing import npydecl
 from numba.np import npyimpl
 
+LONG_NAME = 64
+"""Letters of argument types that are kept as they are."""
+
 
 def install() -> None:
     """From now on, in this process."""
     _without_lock_events()
-    for step in (_sizes, _loops, _options, _variables, _references, _places, _lifetimes, _calls, _listings):
+    for step in (_names, _sizes, _loops, _options, _variables, _references, _places, _lifetimes, _calls, _listings):
         step()
 
 
@@ -34,6 +38,21 @@ def _without_lock_events() -> None:
     """Numba times how long LLVM is at work and shows it nowhere but in a function's metadata."""
     callbacks = getattr(getattr(ffi.lib, "_lock", None), "_cblist", [])
     callbacks[:] = [pair for pair in callbacks if getattr(pair[0], "__module__", "") != base.__name__]
+
+
+def _names() -> None:
+    """A name has the argument types written out, and nested tuples write out theirs: two thirds of a kernel's object
+    file were names, which LLVM, Python and the disk each keep. Long ones give way to their hash."""
+    original = funcdesc.default_mangler
+
+    def default_mangler(name: str, argtypes: Any, *, abi_tags: Any = (), uid: Any = None) -> str:
+        written = itanium_mangler.mangle_args(argtypes)
+        if len(written) <= LONG_NAME:
+            return original(name, argtypes, abi_tags=abi_tags, uid=uid)
+        hashed = hashlib.sha256(written.encode()).hexdigest()[:32]
+        return original(name, (), abi_tags=(*abi_tags, hashed), uid=uid)
+
+    funcdesc.default_mangler = default_mangler
 
 
 def _sizes() -> None:
