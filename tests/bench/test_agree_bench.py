@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 from pmviewer.bench import peer
-from pmviewer.bench.agree import bench, triage, trial
+from pmviewer.bench.agree import bench, results, triage, trial
 from pmviewer.bench.agree.generate import needs_particles, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.statistics import Outcome
@@ -23,7 +24,7 @@ from pmviewer.bench.agree.trial import STAGES, Question, has_panes, methods_of, 
 from pmviewer.bench.agree.verdict import Comparison, Verdict
 from pmviewer.bench.agree.workers import try_scenes
 from pmviewer.bench.registry import run_bench
-from pmviewer.errors import PmviewerError, SettingError
+from pmviewer.errors import OutputError, PmviewerError, SettingError
 from pmviewer.scene.load import load_scene
 
 
@@ -152,7 +153,7 @@ def test_a_disagreement_is_saved_and_reported_and_chance_is_not(tmp_path, monkey
     saved = json.loads((tmp_path / "scene_7_1.json").read_text())
     assert saved["shows"]["method"] == "path"
     assert from_json(json.dumps(saved["scene"])) == triage.without_all(scene_of(7, 1))
-    result = bench.report(7, verdicts, found, tmp_path, 12.0)
+    result = bench.report(7, verdicts, found, "abc (4)", 12.0)
     target = result.targets[0]
     assert (target.value, target.ok) == (2, False)
     rows = {row[0]: row for row in result.rows}
@@ -160,7 +161,7 @@ def test_a_disagreement_is_saved_and_reported_and_chance_is_not(tmp_path, monkey
     assert rows["all"][3:8] == [2, 1, 1, 2, 1]
     assert any(file in note for note in result.notes)
     assert all(any(d.name in note for note in result.notes) for d in DEVIATIONS)
-    agreed = bench.report(7, {0: verdicts[0]}, [], tmp_path, 1.0)
+    agreed = bench.report(7, {0: verdicts[0]}, [], "abc (1)", 1.0)
     assert agreed.targets[0].ok
 
 
@@ -191,31 +192,112 @@ def test_known_deviations_explain_only_what_agrees_without_them(monkeypatch):
         s for i in range(300) if len([d for d in DEVIATIONS if d.without(s := scene_of(1, i)) is not None]) >= 2
     )
     names = [d.name for d in DEVIATIONS if d.without(scene) is not None]
-    found = comparison("path", 1e-9)
+    found, asked = comparison("path", 1e-9), []
+
+    def explanation(comparison):
+        return triage.explanation(scene, comparison, (1,), shared_kernels=True)
 
     def answers(agreeing: set[str]):
         """A scene agrees when it lacks all that is named."""
 
-        def outcome_of(simpler, like, stage, salt):
+        def outcome_of(simpler, like, stage, salt, shared_kernels):
+            asked.append(simpler)
+            assert (stage, shared_kernels) == (len(STAGES) - 1, True)
             lacks = {d.name for d in DEVIATIONS if d.without(simpler) is None}
             return Outcome(0.5 if agreeing <= lacks else 1e-12, 1.0, 0.01, 51)
 
         return outcome_of
 
     monkeypatch.setattr(triage, "outcome_of", answers({names[1]}))
-    assert triage.explanation(scene, found, 1e-5, (1,)) == names[1]
+    assert explanation(found) == names[1]
     monkeypatch.setattr(triage, "outcome_of", answers(set(names[:2])))
-    assert triage.explanation(scene, found, 1e-5, (1,)) == " + ".join(names)
+    assert explanation(found) == " + ".join(names)
     monkeypatch.setattr(triage, "outcome_of", lambda *a: Outcome(1e-12, 1.3, 0.01, 51))
-    assert triage.explanation(scene, found, 1e-5, (1,)) == ""
+    assert explanation(found) == ""
     own = comparison("gather", 1e-9, peer_name="our path")
     monkeypatch.setattr(triage, "outcome_of", answers(set()))
     among_ours = [d.name for d in DEVIATIONS if d.among_ours and d.name in names]
-    assert triage.explanation(scene, own, 1e-5, (1,)) in ("", *among_ours)
-    assert bool(triage.explanation(scene, own, 1e-5, (1,))) == bool(among_ours)
+    assert explanation(own) in ("", *among_ours)
+    assert bool(explanation(own)) == bool(among_ours)
     monkeypatch.setattr(triage, "outcome_of", answers({names[1]}))
-    assert triage.explained(scene, found, (1,)).known == names[1]
-    assert triage.explained(scene, comparison("path", 1e-3), (1,)).known == ""
+    asked.clear()
+    all_ = triage.all_explained(scene, [found, comparison("path", 1e-3), found], (1,), shared_kernels=True)
+    assert [c.known for c in all_] == [names[1], "", names[1]]
+    assert asked[-1] == DEVIATIONS[[d.name for d in DEVIATIONS].index(names[1])].without(scene)
+    assert len(asked) == 3, "what explained the first is tried first"
+
+
+def test_a_disagreement_is_shrunk_by_kernels_for_all_where_they_show_it_too(monkeypatch):
+    asked = []
+
+    def by(shows):
+        def outcome_of(scene, like, stage, salt, shared_kernels):
+            asked.append((stage, shared_kernels))
+            return Outcome(1e-9 if shows(stage, shared_kernels) else 0.5, 1.2, 0.01, 51)
+
+        return outcome_of
+
+    monkeypatch.setattr(triage, "shrunk", lambda scene, still, most: still(scene) and scene)
+    for shows, used in (
+        (lambda stage, shared: stage > 0, (1, True)),
+        (lambda stage, shared: not shared, (0, False)),
+    ):
+        monkeypatch.setattr(triage, "outcome_of", by(shows))
+        assert triage.smallest({"shapes": []}, comparison("path", 1e-9), (1,), 5)
+        assert asked[-1] == used
+
+
+def test_verdicts_are_kept_and_a_run_goes_on_from_them(tmp_path, monkeypatch):
+    """Pieces at two revisions; what was not finished, another effort or another seed does not count."""
+    path, ran = tmp_path / "kept.json", []
+
+    def tries(seed, indices):
+        for index in indices:
+            ran.append(index)
+            yield index, Verdict([comparison("path", 1e-9 if index == 1 else 0.5, float(index))], lit=0.5)
+
+    def run(scenes, seed=7, **more):
+        ran.clear()
+        return bench.run(scenes=scenes, seed=seed, json=path, **more)
+
+    monkeypatch.setattr(peer, "installed", lambda: True)
+    monkeypatch.setattr(bench, "try_scenes", tries)
+    monkeypatch.setattr(bench, "smallest", lambda scene, found, salt, most: scene)
+    monkeypatch.setattr(results, "revision", lambda: "aaa")
+    first = run(2)
+    assert ran == [0, 1]
+    assert first.targets[0].value == 1
+    path.open("a").write('{"seed": 7, "scene": 3, "verdi')
+    monkeypatch.setattr(results, "revision", lambda: "bbb-dirty")
+    monkeypatch.setattr(results, "sources_stamp", lambda: "0123456789")
+    whole = run(4)
+    assert ran == [2, 3]
+    assert whole.rows[0][1] == 4
+    assert whole.targets[0].value == 1
+    assert "scenes by revision: aaa (2), bbb-dirty 01234567 (2)" in whole.notes
+    monkeypatch.setattr(bench, "smallest", lambda *_: pytest.fail("it has been shrunk before"))
+    assert run(4).rows == whole.rows
+    assert ran == []
+    monkeypatch.setattr(bench, "smallest", lambda scene, found, salt, most: scene)
+    assert "scenes by revision: bbb-dirty 01234567 (4)" in run(4, again=True).notes
+    assert ran == [0, 1]
+    run(1, seed=8)
+    assert ran == [0]
+    monkeypatch.setattr(results, "STAGES", STAGES[:2])
+    run(1)
+    assert ran == [0]
+
+
+def test_a_verdict_whose_reason_is_no_longer_known_is_not_kept(tmp_path):
+    path = tmp_path / "kept.json"
+    kept = results.Results(path, 7)
+    kept.keep(1, Verdict([comparison("path", 1e-9, known="a deviation of the past")]))
+    kept.keep(2, Verdict([comparison("path", 0.0, math.nan, known="textured light + vertex normals")], lit=0.25))
+    again = results.Results(path, 7).kept({1, 2, 3})
+    assert list(again) == [2]
+    assert repr(again[2]) == repr(kept.kept({2})[2])  # NaN equals nothing
+    with pytest.raises(OutputError, match="results can't be kept"):
+        results.Results(tmp_path, 7)
 
 
 WORK = """
@@ -235,7 +317,7 @@ def test_a_scene_that_kills_its_process_is_named_and_the_others_are_done(tmp_pat
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *(p for p in sys.path if p)]))
     from agree_work_for_tests import work
 
-    found = dict(try_scenes(10, 4, work, processes=2, first=1))
+    found = dict(try_scenes(10, range(1, 5), work, processes=2))
     assert sorted(found) == [1, 2, 3, 4]
     assert found[2].refused == "the process died"
     assert [found[i].lit for i in (1, 3, 4)] == [11, 13, 14]

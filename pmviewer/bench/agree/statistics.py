@@ -23,7 +23,7 @@ from scipy.stats import t as student
 
 from pmviewer.output.metric import block_means
 
-BLOCK = 8
+BLOCK = 16
 CHANNELS = 3
 ROUNDING = 1e-5
 """Relative difference that is no error: single precision, some additions and products deep."""
