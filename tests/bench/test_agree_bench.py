@@ -20,7 +20,7 @@ from pmviewer.bench.agree.generate import needs_particles, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.statistics import Outcome
 from pmviewer.bench.agree.tree import from_json
-from pmviewer.bench.agree.trial import STAGES, Question, has_panes, methods_of, questions
+from pmviewer.bench.agree.trial import FIRST, STAGES, Question, has_panes, methods_of, questions
 from pmviewer.bench.agree.verdict import Comparison, Verdict
 from pmviewer.bench.agree.workers import try_scenes
 from pmviewer.bench.registry import run_bench
@@ -44,30 +44,53 @@ def question(ratios: list[float], asked: list[int], method: str = "path") -> Que
 
 
 def test_more_is_rendered_only_while_there_is_doubt():
-    for ratios, stages in (([1.0, 1.0, 1.0], 1), ([1.3, 1.0, 1.0], 2), ([1.3, 1.3, 1.0], 3), ([1.3, 1.3, 1.3], 3)):
+    for ratios, stages in (
+        ([1.0, 1.0, 1.0, 1.0], 1),
+        ([1.3, 1.0, 1.0, 1.0], 2),
+        ([1.3, 1.3, 1.0, 1.0], 3),
+        ([1.3, 1.3, 1.3, 1.0], 4),
+        ([1.3, 1.3, 1.3, 1.3], 4),
+    ):
         asked: list[int] = []
         found = question(ratios, asked, "gather").asked(len(STAGES))
         assert list(dict.fromkeys(asked)) == list(range(stages))
-        assert found.final == (stages == 3)
-        assert (found.p < 1e-6) == (ratios == [1.3] * 3)
+        assert found.final == (stages == 4)
+        assert (found.p < 1e-6) == (ratios == [1.3] * 4)
 
 
-def test_path_tracers_that_differ_beyond_doubt_are_not_asked_a_third_time():
-    found = question([1.3] * 3, []).asked(3)
-    assert found.stage == 2
+def test_path_tracers_that_differ_beyond_doubt_are_not_asked_a_last_time():
+    found = question([1.3] * 4, []).asked(len(STAGES))
+    assert found.stage == FIRST + 2, "the first stage of fresh seeds"
     assert found.final
     assert found.p < 1e-10
-    slight = question([1.01, 1.01, 1.01], []).asked(3)
-    assert slight.stage == 3
+    slight = question([1.01] * 4, []).asked(len(STAGES))
+    assert slight.stage == 4
+
+
+def test_stages_that_add_look_at_the_runs_of_the_one_before_and_others_have_seeds_of_their_own(monkeypatch, tmp_path):
+    """Only so does the p of the last one mean what it says."""
+    drawn: list[int] = []
+
+    def our_runs(opened, method, effort, seeds, pool, **more):
+        drawn.extend(seeds)
+        return np.reshape(np.array(seeds, np.float32), (-1, 1, 1, 1))
+
+    monkeypatch.setattr(trial, "our_runs", our_runs)
+    runs = trial.Runs(scene_of(1, 0), tmp_path, None, None, (1, 0))
+    found = [runs.ours("path", stage) for stage in range(len(STAGES))]
+    assert len(drawn) == len(set(drawn)) == sum(effort.runs for effort in STAGES)
+    assert [len(f) for f in found] == [12, 24, 16, 24]
+    assert np.array_equal(found[1][:12], found[0])
+    assert [effort.adds for effort in STAGES] == [False, *([True] * FIRST), *([False] * (len(STAGES) - FIRST - 1))]
 
 
 def test_photon_methods_are_forgiven_what_goes_with_the_radius():
     least = [stage.radius for stage in STAGES]
     assert least == sorted(least, reverse=True)
     off = 1 + 0.8 * trial.FORGIVEN * least[0]
-    assert question([off] * 3, [], "gather").asked(3).stage == 1
-    assert question([off] * 3, [], "path").asked(3).final
-    assert question([1.3] * 3, [], "gather").asked(3).p < 1e-6
+    assert question([off] * 4, [], "gather").asked(len(STAGES)).stage == 1
+    assert question([off] * 4, [], "path").asked(len(STAGES)).final
+    assert question([1.3] * 4, [], "gather").asked(len(STAGES)).p < 1e-6
 
 
 class FakeRuns:
@@ -92,7 +115,7 @@ def test_thin_glass_is_compared_where_rays_straight_through_see_all_of_it():
     assert panes
     assert not all(has_panes(scene_of(5, i)) for i in range(60))
     for scene in panes[:3]:
-        wrong = [q.asked(3) for q in questions(FakeRuns(scene, "thin glass"))]
+        wrong = [q.asked(len(STAGES)) for q in questions(FakeRuns(scene, "thin glass"))]
         found = {c.method for c in wrong if c.p == pytest.approx(0)}
         assert found == {"thin glass"}
 
@@ -102,13 +125,13 @@ def test_thin_glass_is_compared_where_rays_straight_through_see_all_of_it():
 def test_every_method_is_compared_in_every_scene_and_a_wrong_one_is_found(particles, plain):
     scene = next(s for i in range(100) if needs_particles(s := scene_of(1, i)) == particles)
     runs = FakeRuns(scene, plain=plain)
-    found = [q.asked(3) for q in questions(runs)]
+    found = [q.asked(len(STAGES)) for q in questions(runs)]
     everywhere = {"path", "gather", "progressive", "nearest"}
     assert methods_of(Verdict(found)) == everywhere | ({"thin glass"} if has_panes(scene) else set())
     assert all(c.outcome.p > 0.5 for c in found)
     assert ("ptracer" in runs.modes) == (particles and plain > 0)
     for wrong in ("path", "gather", "progressive", "nearest"):
-        found = [q.asked(3) for q in questions(FakeRuns(scene, wrong, plain))]
+        found = [q.asked(len(STAGES)) for q in questions(FakeRuns(scene, wrong, plain))]
         assert any(c.p == pytest.approx(0) and wrong in (c.method, c.peer) for c in found)
 
 
@@ -122,10 +145,9 @@ def test_what_goes_with_the_radius_is_no_disagreement():
 
         return Question("progressive", "our path", "direct", pair)
 
-    assert question((0.2, 0.1, 0.05)).asked(3).p > 0.01
-    for wrong in ((0.05, 0.05, 0.05), (0.0, 0.05, 0.05), (-0.05, -0.05, -0.05)):
-        found = question(wrong).asked(3)
-        assert found.outcome.p < 1e-9 or found.stage < 3
+    assert question((0.2, 0.2, 0.1, 0.05)).asked(len(STAGES)).p > 0.01
+    for wrong in ((0.05, 0.05, 0.05, 0.05), (-0.05, -0.05, -0.05, -0.05)):
+        assert question(wrong).asked(len(STAGES)).p < 1e-9
 
 
 def comparison(

@@ -18,7 +18,7 @@ from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH
 from pmviewer.bench.agree.results import Results
 from pmviewer.bench.agree.statistics import LEVEL, rejected
 from pmviewer.bench.agree.triage import save, saved, smallest, without_all
-from pmviewer.bench.agree.trial import FORGIVEN, STAGES
+from pmviewer.bench.agree.trial import FIRST, FORGIVEN, STAGES
 from pmviewer.bench.agree.verdict import Comparison, Verdict
 from pmviewer.bench.agree.workers import OWN_KERNELS, try_scenes
 from pmviewer.bench.agree.xml import MAX_DEPTH, SIZE
@@ -168,11 +168,11 @@ COLUMNS = ("feature", "scenes", "lit", *(f"{m} differs" for m in METHODS), "by k
 
 def _row(name: str, indices: set[int], verdicts: dict[int, Verdict], found: list[Disagreement]) -> list[Cell]:
     """Scenes with the feature, how many of them show light, those that disagree by method, the median standard error of
-    a test, and the share of comparisons that needed another stage."""
+    a test, and the share of comparisons that needed a stage of fresh seeds."""
     mine = [d for d in found if d.index in indices]
     comparisons = [c for i in indices for c in verdicts[i].comparisons]
     noise = float(np.median([c.outcome.noise for c in comparisons])) if comparisons else 0.0
-    doubt = sum(c.stage > 1 for c in comparisons) / max(len(comparisons), 1)
+    doubt = sum(c.stage > FIRST + 1 for c in comparisons) / max(len(comparisons), 1)
     by_method = [sum(m in d.methods for d in mine if not d.known) for m in METHODS]
     lit = sum(verdicts[i].lit > 0 for i in indices)
     return [name, len(indices), lit, *by_method, sum(bool(d.known) for d in mine), noise, doubt]
@@ -180,11 +180,12 @@ def _row(name: str, indices: set[int], verdicts: dict[int, Verdict], found: list
 
 def _settings_notes() -> list[str]:
     stages = "; ".join(
-        f"{e.runs} runs of {e.spp} samples a pixel, photons {e.passes} passes of {e.photons:,} at radius {e.radius:g}"
+        f"{e.runs} runs{' more' * e.adds} of {e.spp} samples a pixel, photons {e.passes} passes of {e.photons:,} "
+        f"at radius {e.radius:g}"
         for e in STAGES
     )
     return [
-        f"{SIZE}² pixels; stages, each with fresh seeds, as long as there is doubt: {stages}",
+        f"{SIZE}² pixels; stages, with fresh seeds where not said otherwise, as long as there is doubt: {stages}",
         f"photon methods may be off by {FORGIVEN:g} × this radius, {FORGIVEN * STAGES[-1].radius:.0%} of a block in "
         "the last stage: look-ups lose light at edges, in proportion to the radius",
         f"each scene whose number {OWN_KERNELS} divides runs kernels for what is in it alone, the others those for all "
