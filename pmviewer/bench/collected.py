@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import platform
 import subprocess
@@ -15,6 +16,7 @@ from pmviewer.bench.report import BenchResult, Target
 from pmviewer.errors import OutputError, SceneError
 from pmviewer.output.files import read_file, write_file
 from pmviewer.progress import available_threads
+from pmviewer.resources import PACKAGE
 from pmviewer.version import __version__
 
 PACKAGES = ("numpy", "numba", "llvmlite", "scipy", "mitsuba", "embreex", "pyoidn", "moderngl", "imgui-bundle")
@@ -86,6 +88,14 @@ def revision() -> str:
     except (OSError, subprocess.SubprocessError):
         return ""
     return done.stdout.strip() if done.returncode == 0 else ""
+
+
+def sources_stamp() -> str:
+    """Changes with any source file of the package."""
+    digest = hashlib.sha256()
+    for path in sorted(PACKAGE.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def _processor() -> str:

@@ -18,16 +18,18 @@ def bench(
         int | None, typer.Option(min=1, help="Of agree, files and hostile: how many scenes or files.")
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Of agree, files and hostile: which ones.")] = None,
-    first: Annotated[
-        int | None, typer.Option(min=0, help="Of agree: the number to begin with, to go on with a run of before.")
-    ] = None,
+    first: Annotated[int | None, typer.Option(min=0, help="Of agree: the number to begin with.")] = None,
     keep: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Of agree and hostile: where failing scenes go; of all: results."),
     ] = None,
     json: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Of files: keep results here, and go on with those kept.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Of agree and files: keep results here, and go on with those kept."),
     ] = None,
+    again: Annotated[
+        bool, typer.Option("--again", help="Of agree with --json: run again what other sources found.")
+    ] = False,
     sheet: Annotated[Path | None, typer.Option(metavar="FILE", help="Of files: all pictures as one PNG.")] = None,
 ) -> None:
     """Measure: a table, then a line for each target."""
@@ -38,5 +40,5 @@ def bench(
             typer.echo(f"{key:10s} {description}")
         return
     options = {"folder": folder, "scenes": scenes, "seed": seed, "first": first, "keep": keep, "json": json}
-    options |= {"sheet": sheet}
+    options |= {"sheet": sheet, "again": again or None}
     run_bench(name, quick, csv, markdown, options)

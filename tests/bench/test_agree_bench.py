@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -14,16 +15,16 @@ import numpy as np
 import pytest
 
 from pmviewer.bench import peer
-from pmviewer.bench.agree import bench, triage, trial
+from pmviewer.bench.agree import bench, results, triage, trial
 from pmviewer.bench.agree.generate import needs_particles, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.statistics import Outcome
 from pmviewer.bench.agree.tree import from_json
-from pmviewer.bench.agree.trial import STAGES, Question, has_panes, methods_of, questions
+from pmviewer.bench.agree.trial import FIRST, STAGES, Question, has_panes, methods_of, questions
 from pmviewer.bench.agree.verdict import Comparison, Verdict
 from pmviewer.bench.agree.workers import try_scenes
 from pmviewer.bench.registry import run_bench
-from pmviewer.errors import PmviewerError, SettingError
+from pmviewer.errors import OutputError, PmviewerError, SettingError
 from pmviewer.scene.load import load_scene
 
 
@@ -43,30 +44,53 @@ def question(ratios: list[float], asked: list[int], method: str = "path") -> Que
 
 
 def test_more_is_rendered_only_while_there_is_doubt():
-    for ratios, stages in (([1.0, 1.0, 1.0], 1), ([1.3, 1.0, 1.0], 2), ([1.3, 1.3, 1.0], 3), ([1.3, 1.3, 1.3], 3)):
+    for ratios, stages in (
+        ([1.0, 1.0, 1.0, 1.0], 1),
+        ([1.3, 1.0, 1.0, 1.0], 2),
+        ([1.3, 1.3, 1.0, 1.0], 3),
+        ([1.3, 1.3, 1.3, 1.0], 4),
+        ([1.3, 1.3, 1.3, 1.3], 4),
+    ):
         asked: list[int] = []
         found = question(ratios, asked, "gather").asked(len(STAGES))
         assert list(dict.fromkeys(asked)) == list(range(stages))
-        assert found.final == (stages == 3)
-        assert (found.p < 1e-6) == (ratios == [1.3] * 3)
+        assert found.final == (stages == 4)
+        assert (found.p < 1e-6) == (ratios == [1.3] * 4)
 
 
-def test_path_tracers_that_differ_beyond_doubt_are_not_asked_a_third_time():
-    found = question([1.3] * 3, []).asked(3)
-    assert found.stage == 2
+def test_path_tracers_that_differ_beyond_doubt_are_not_asked_a_last_time():
+    found = question([1.3] * 4, []).asked(len(STAGES))
+    assert found.stage == FIRST + 2, "the first stage of fresh seeds"
     assert found.final
     assert found.p < 1e-10
-    slight = question([1.01, 1.01, 1.01], []).asked(3)
-    assert slight.stage == 3
+    slight = question([1.01] * 4, []).asked(len(STAGES))
+    assert slight.stage == 4
+
+
+def test_stages_that_add_look_at_the_runs_of_the_one_before_and_others_have_seeds_of_their_own(monkeypatch, tmp_path):
+    """Only so does the p of the last one mean what it says."""
+    drawn: list[int] = []
+
+    def our_runs(opened, method, effort, seeds, pool, **more):
+        drawn.extend(seeds)
+        return np.reshape(np.array(seeds, np.float32), (-1, 1, 1, 1))
+
+    monkeypatch.setattr(trial, "our_runs", our_runs)
+    runs = trial.Runs(scene_of(1, 0), tmp_path, None, None, (1, 0))
+    found = [runs.ours("path", stage) for stage in range(len(STAGES))]
+    assert len(drawn) == len(set(drawn)) == sum(effort.runs for effort in STAGES)
+    assert [len(f) for f in found] == [12, 24, 16, 24]
+    assert np.array_equal(found[1][:12], found[0])
+    assert [effort.adds for effort in STAGES] == [False, *([True] * FIRST), *([False] * (len(STAGES) - FIRST - 1))]
 
 
 def test_photon_methods_are_forgiven_what_goes_with_the_radius():
     least = [stage.radius for stage in STAGES]
     assert least == sorted(least, reverse=True)
     off = 1 + 0.8 * trial.FORGIVEN * least[0]
-    assert question([off] * 3, [], "gather").asked(3).stage == 1
-    assert question([off] * 3, [], "path").asked(3).final
-    assert question([1.3] * 3, [], "gather").asked(3).p < 1e-6
+    assert question([off] * 4, [], "gather").asked(len(STAGES)).stage == 1
+    assert question([off] * 4, [], "path").asked(len(STAGES)).final
+    assert question([1.3] * 4, [], "gather").asked(len(STAGES)).p < 1e-6
 
 
 class FakeRuns:
@@ -91,7 +115,7 @@ def test_thin_glass_is_compared_where_rays_straight_through_see_all_of_it():
     assert panes
     assert not all(has_panes(scene_of(5, i)) for i in range(60))
     for scene in panes[:3]:
-        wrong = [q.asked(3) for q in questions(FakeRuns(scene, "thin glass"))]
+        wrong = [q.asked(len(STAGES)) for q in questions(FakeRuns(scene, "thin glass"))]
         found = {c.method for c in wrong if c.p == pytest.approx(0)}
         assert found == {"thin glass"}
 
@@ -101,13 +125,13 @@ def test_thin_glass_is_compared_where_rays_straight_through_see_all_of_it():
 def test_every_method_is_compared_in_every_scene_and_a_wrong_one_is_found(particles, plain):
     scene = next(s for i in range(100) if needs_particles(s := scene_of(1, i)) == particles)
     runs = FakeRuns(scene, plain=plain)
-    found = [q.asked(3) for q in questions(runs)]
+    found = [q.asked(len(STAGES)) for q in questions(runs)]
     everywhere = {"path", "gather", "progressive", "nearest"}
     assert methods_of(Verdict(found)) == everywhere | ({"thin glass"} if has_panes(scene) else set())
     assert all(c.outcome.p > 0.5 for c in found)
     assert ("ptracer" in runs.modes) == (particles and plain > 0)
     for wrong in ("path", "gather", "progressive", "nearest"):
-        found = [q.asked(3) for q in questions(FakeRuns(scene, wrong, plain))]
+        found = [q.asked(len(STAGES)) for q in questions(FakeRuns(scene, wrong, plain))]
         assert any(c.p == pytest.approx(0) and wrong in (c.method, c.peer) for c in found)
 
 
@@ -121,10 +145,9 @@ def test_what_goes_with_the_radius_is_no_disagreement():
 
         return Question("progressive", "our path", "direct", pair)
 
-    assert question((0.2, 0.1, 0.05)).asked(3).p > 0.01
-    for wrong in ((0.05, 0.05, 0.05), (0.0, 0.05, 0.05), (-0.05, -0.05, -0.05)):
-        found = question(wrong).asked(3)
-        assert found.outcome.p < 1e-9 or found.stage < 3
+    assert question((0.2, 0.2, 0.1, 0.05)).asked(len(STAGES)).p > 0.01
+    for wrong in ((0.05, 0.05, 0.05, 0.05), (-0.05, -0.05, -0.05, -0.05)):
+        assert question(wrong).asked(len(STAGES)).p < 1e-9
 
 
 def comparison(
@@ -152,7 +175,7 @@ def test_a_disagreement_is_saved_and_reported_and_chance_is_not(tmp_path, monkey
     saved = json.loads((tmp_path / "scene_7_1.json").read_text())
     assert saved["shows"]["method"] == "path"
     assert from_json(json.dumps(saved["scene"])) == triage.without_all(scene_of(7, 1))
-    result = bench.report(7, verdicts, found, tmp_path, 12.0)
+    result = bench.report(7, verdicts, found, "abc (4)", 12.0)
     target = result.targets[0]
     assert (target.value, target.ok) == (2, False)
     rows = {row[0]: row for row in result.rows}
@@ -160,7 +183,7 @@ def test_a_disagreement_is_saved_and_reported_and_chance_is_not(tmp_path, monkey
     assert rows["all"][3:8] == [2, 1, 1, 2, 1]
     assert any(file in note for note in result.notes)
     assert all(any(d.name in note for note in result.notes) for d in DEVIATIONS)
-    agreed = bench.report(7, {0: verdicts[0]}, [], tmp_path, 1.0)
+    agreed = bench.report(7, {0: verdicts[0]}, [], "abc (1)", 1.0)
     assert agreed.targets[0].ok
 
 
@@ -191,31 +214,112 @@ def test_known_deviations_explain_only_what_agrees_without_them(monkeypatch):
         s for i in range(300) if len([d for d in DEVIATIONS if d.without(s := scene_of(1, i)) is not None]) >= 2
     )
     names = [d.name for d in DEVIATIONS if d.without(scene) is not None]
-    found = comparison("path", 1e-9)
+    found, asked = comparison("path", 1e-9), []
+
+    def explanation(comparison):
+        return triage.explanation(scene, comparison, (1,), shared_kernels=True)
 
     def answers(agreeing: set[str]):
         """A scene agrees when it lacks all that is named."""
 
-        def outcome_of(simpler, like, stage, salt):
+        def outcome_of(simpler, like, stage, salt, shared_kernels):
+            asked.append(simpler)
+            assert (stage, shared_kernels) == (len(STAGES) - 1, True)
             lacks = {d.name for d in DEVIATIONS if d.without(simpler) is None}
             return Outcome(0.5 if agreeing <= lacks else 1e-12, 1.0, 0.01, 51)
 
         return outcome_of
 
     monkeypatch.setattr(triage, "outcome_of", answers({names[1]}))
-    assert triage.explanation(scene, found, 1e-5, (1,)) == names[1]
+    assert explanation(found) == names[1]
     monkeypatch.setattr(triage, "outcome_of", answers(set(names[:2])))
-    assert triage.explanation(scene, found, 1e-5, (1,)) == " + ".join(names)
+    assert explanation(found) == " + ".join(names)
     monkeypatch.setattr(triage, "outcome_of", lambda *a: Outcome(1e-12, 1.3, 0.01, 51))
-    assert triage.explanation(scene, found, 1e-5, (1,)) == ""
+    assert explanation(found) == ""
     own = comparison("gather", 1e-9, peer_name="our path")
     monkeypatch.setattr(triage, "outcome_of", answers(set()))
     among_ours = [d.name for d in DEVIATIONS if d.among_ours and d.name in names]
-    assert triage.explanation(scene, own, 1e-5, (1,)) in ("", *among_ours)
-    assert bool(triage.explanation(scene, own, 1e-5, (1,))) == bool(among_ours)
+    assert explanation(own) in ("", *among_ours)
+    assert bool(explanation(own)) == bool(among_ours)
     monkeypatch.setattr(triage, "outcome_of", answers({names[1]}))
-    assert triage.explained(scene, found, (1,)).known == names[1]
-    assert triage.explained(scene, comparison("path", 1e-3), (1,)).known == ""
+    asked.clear()
+    all_ = triage.all_explained(scene, [found, comparison("path", 1e-3), found], (1,), shared_kernels=True)
+    assert [c.known for c in all_] == [names[1], "", names[1]]
+    assert asked[-1] == DEVIATIONS[[d.name for d in DEVIATIONS].index(names[1])].without(scene)
+    assert len(asked) == 3, "what explained the first is tried first"
+
+
+def test_a_disagreement_is_shrunk_by_kernels_for_all_where_they_show_it_too(monkeypatch):
+    asked = []
+
+    def by(shows):
+        def outcome_of(scene, like, stage, salt, shared_kernels):
+            asked.append((stage, shared_kernels))
+            return Outcome(1e-9 if shows(stage, shared_kernels) else 0.5, 1.2, 0.01, 51)
+
+        return outcome_of
+
+    monkeypatch.setattr(triage, "shrunk", lambda scene, still, most: still(scene) and scene)
+    for shows, used in (
+        (lambda stage, shared: stage > 0, (1, True)),
+        (lambda stage, shared: not shared, (0, False)),
+    ):
+        monkeypatch.setattr(triage, "outcome_of", by(shows))
+        assert triage.smallest({"shapes": []}, comparison("path", 1e-9), (1,), 5)
+        assert asked[-1] == used
+
+
+def test_verdicts_are_kept_and_a_run_goes_on_from_them(tmp_path, monkeypatch):
+    """Pieces at two revisions; what was not finished, another effort or another seed does not count."""
+    path, ran = tmp_path / "kept.json", []
+
+    def tries(seed, indices):
+        for index in indices:
+            ran.append(index)
+            yield index, Verdict([comparison("path", 1e-9 if index == 1 else 0.5, float(index))], lit=0.5)
+
+    def run(scenes, seed=7, **more):
+        ran.clear()
+        return bench.run(scenes=scenes, seed=seed, json=path, **more)
+
+    monkeypatch.setattr(peer, "installed", lambda: True)
+    monkeypatch.setattr(bench, "try_scenes", tries)
+    monkeypatch.setattr(bench, "smallest", lambda scene, found, salt, most: scene)
+    monkeypatch.setattr(results, "revision", lambda: "aaa")
+    first = run(2)
+    assert ran == [0, 1]
+    assert first.targets[0].value == 1
+    path.open("a").write('{"seed": 7, "scene": 3, "verdi')
+    monkeypatch.setattr(results, "revision", lambda: "bbb-dirty")
+    monkeypatch.setattr(results, "sources_stamp", lambda: "0123456789")
+    whole = run(4)
+    assert ran == [2, 3]
+    assert whole.rows[0][1] == 4
+    assert whole.targets[0].value == 1
+    assert "scenes by revision: aaa (2), bbb-dirty 01234567 (2)" in whole.notes
+    monkeypatch.setattr(bench, "smallest", lambda *_: pytest.fail("it has been shrunk before"))
+    assert run(4).rows == whole.rows
+    assert ran == []
+    monkeypatch.setattr(bench, "smallest", lambda scene, found, salt, most: scene)
+    assert "scenes by revision: bbb-dirty 01234567 (4)" in run(4, again=True).notes
+    assert ran == [0, 1]
+    run(1, seed=8)
+    assert ran == [0]
+    monkeypatch.setattr(results, "STAGES", STAGES[:2])
+    run(1)
+    assert ran == [0]
+
+
+def test_a_verdict_whose_reason_is_no_longer_known_is_not_kept(tmp_path):
+    path = tmp_path / "kept.json"
+    kept = results.Results(path, 7)
+    kept.keep(1, Verdict([comparison("path", 1e-9, known="a deviation of the past")]))
+    kept.keep(2, Verdict([comparison("path", 0.0, math.nan, known="textured light + vertex normals")], lit=0.25))
+    again = results.Results(path, 7).kept({1, 2, 3})
+    assert list(again) == [2]
+    assert repr(again[2]) == repr(kept.kept({2})[2])  # NaN equals nothing
+    with pytest.raises(OutputError, match="results can't be kept"):
+        results.Results(tmp_path, 7)
 
 
 WORK = """
@@ -235,7 +339,7 @@ def test_a_scene_that_kills_its_process_is_named_and_the_others_are_done(tmp_pat
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *(p for p in sys.path if p)]))
     from agree_work_for_tests import work
 
-    found = dict(try_scenes(10, 4, work, processes=2, first=1))
+    found = dict(try_scenes(10, range(1, 5), work, processes=2))
     assert sorted(found) == [1, 2, 3, 4]
     assert found[2].refused == "the process died"
     assert [found[i].lit for i in (1, 3, 4)] == [11, 13, 14]

@@ -8,11 +8,11 @@ import pytest
 from pmviewer.bench.agree.statistics import compared, negligible, rejected, summaries
 from pmviewer.bench.agree.trial import LEAST_LIGHT, unseen_in
 
-PIXELS = (16, 16, 3)
+PIXELS = (32, 32, 3)
 
 
 def runs(seed: int, count: int, samples: int, mean: float = 1.0, tail: float = 0.0) -> np.ndarray:
-    """(count, 16, 16, 3) means of `samples` exponential samples of a pixel; with `tail`, every one in so many of them
+    """(count, 32, 32, 3) means of `samples` exponential samples of a pixel; with `tail`, every one in so many of them
     is drawn from a Pareto distribution of index 2.2 instead, of the same mean."""
     rng = np.random.default_rng(seed)
     drawn = rng.exponential(1, (samples, count, *PIXELS))
@@ -62,7 +62,7 @@ def test_black_against_light_is_found_and_black_agrees_with_black():
 
 def test_blocks_that_no_photon_met_say_nothing_where_light_is_sparse():
     theirs = np.zeros((12, *PIXELS))
-    theirs[:, 8:, 8:] = runs(1, 12, 16)[:, 8:, 8:]
+    theirs[:, 16:, 16:] = runs(1, 12, 16)[:, 16:, 16:]
     ours = theirs + 0.01 * runs(2, 12, 16)
     assert compared(summaries(ours), summaries(theirs)).tests == 3 + 12
     assert compared(summaries(ours), summaries(theirs), sparse=True).tests == 3 + 3
@@ -72,7 +72,7 @@ def test_a_term_may_lack_what_is_nothing_beside_the_picture():
     """A ten-thousandth of the picture, wherever it lies; a thousandth is found, even in one block of four."""
     picture = summaries(runs(1, 12, 16))
     faint, black = np.zeros((12, *PIXELS)), np.zeros((12, *PIXELS))
-    faint[:, 8:, 8:] = 1e-4 * runs(2, 12, 16)[:, 8:, 8:]
+    faint[:, 16:, 16:] = 1e-4 * runs(2, 12, 16)[:, 16:, 16:]
     lacking = summaries(black), summaries(faint)
     assert compared(*lacking, sparse=True).p < 1e-6
     assert compared(*lacking, sparse=True, floor=negligible(picture)).p == 1
@@ -81,9 +81,9 @@ def test_a_term_may_lack_what_is_nothing_beside_the_picture():
 
 def test_pixels_that_are_not_seen_do_not_count():
     ours, theirs = runs(1, 24, 64), runs(2, 24, 64)
-    ours[:, :8] *= 2
-    seen = np.zeros((16, 16), bool)
-    seen[8:] = True
+    ours[:, :16] *= 2
+    seen = np.zeros((32, 32), bool)
+    seen[16:] = True
     assert p_of(ours, theirs) < 1e-6
     lower = compared(summaries(ours, seen), summaries(theirs, seen))
     assert lower.p > 1e-3
@@ -98,7 +98,7 @@ def test_not_a_number_never_agrees():
 
 def test_outcome_says_what_differs_most():
     ours, theirs = runs(1, 24, 64), runs(2, 24, 64)
-    ours[:, :8, :8, 0] *= 1.5
+    ours[:, :16, :16, 0] *= 1.5
     found = compared(summaries(ours), summaries(theirs))
     assert found.ratio == pytest.approx(1.5, abs=0.02)
     assert 0 < found.noise < 0.02
@@ -114,10 +114,10 @@ def test_light_of_no_account_is_none():
     """Scene 268 of seed 31: at 1e-21 of the picture's brightness, and black for the other."""
     rng = np.random.default_rng(5)
     ours, theirs = rng.uniform(0.9, 1.1, (2, 16, *PIXELS))
-    theirs[:, :8] = 0.0
-    ours[:, :8] *= 1e-21
+    theirs[:, :16] = 0.0
+    ours[:, :16] *= 1e-21
     assert p_of(ours, theirs) > 0.5
-    ours[:, :8] *= 1e13
+    ours[:, :16] *= 1e13
     assert p_of(ours, theirs) < 1e-6
 
 

@@ -6,7 +6,6 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +15,10 @@ from pmviewer.bench.agree.features import GROUPS, features
 from pmviewer.bench.agree.generate import DENSE_FROM, GLOWING_FROM, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH
+from pmviewer.bench.agree.results import Results
 from pmviewer.bench.agree.statistics import LEVEL, rejected
-from pmviewer.bench.agree.triage import save, smallest, without_all
-from pmviewer.bench.agree.trial import FORGIVEN, STAGES
+from pmviewer.bench.agree.triage import save, saved, smallest, without_all
+from pmviewer.bench.agree.trial import FIRST, FORGIVEN, STAGES
 from pmviewer.bench.agree.verdict import Comparison, Verdict
 from pmviewer.bench.agree.workers import OWN_KERNELS, try_scenes
 from pmviewer.bench.agree.xml import MAX_DEPTH, SIZE
@@ -45,13 +45,22 @@ class Disagreement:
 
 
 def run(
-    quick: bool = False, scenes: int | None = None, seed: int = SEED, first: int = 0, keep: Path | None = None
+    quick: bool = False,
+    scenes: int | None = None,
+    seed: int = SEED,
+    first: int = 0,
+    keep: Path | None = None,
+    json: Path | None = None,
+    again: bool = False,
 ) -> BenchResult:
-    """Try the scenes `first` … `first` + `scenes` − 1 of `seed` and save what disagrees into `keep`, a temporary folder
-    if not given. Where `scenes` is not given and `quick` is not asked for, scenes with media that emit and with
-    dense ones come on top.
+    """Try the scenes `first` … `first` + `scenes` − 1 of `seed` and save what disagrees into `keep`, a folder beside
+    `json` or a temporary one if not given. Where `scenes` is not given and `quick` is not asked for, scenes with media
+    that emit and with dense ones come on top.
 
-    Raises PmviewerError without Mitsuba.
+    `json` takes each verdict as soon as it is there, and scenes whose verdicts are in it are not run; with `again`,
+    those that other sources gave are.
+
+    Raises PmviewerError without Mitsuba, OutputError where `json` can't be written.
     """
     count = (QUICK_SCENES if quick else SCENES) if scenes is None else scenes
     if count < 1 or seed < 0:
@@ -59,17 +68,21 @@ def run(
     if not peer.installed():
         raise PmviewerError(peer.MISSING)
     started = time.perf_counter()
-    folder = keep or Path(tempfile.mkdtemp(prefix=f"agree-{seed}-"))
+    results = Results(json, seed)
+    beside = json.parent / f"{json.stem}-scenes" if json is not None else None
+    folder = keep or beside or Path(tempfile.mkdtemp(prefix=f"agree-{seed}-"))
     folder.mkdir(parents=True, exist_ok=True)
-    verdicts: dict[int, Verdict] = {}
     parts = ((count, first), *(EXTRA if scenes is None and not quick else ()))
-    tries = chain.from_iterable(try_scenes(seed, n, first=begin) for n, begin in parts)
-    total = sum(n for n, _ in parts)
-    for index, verdict in tries:
+    wanted = {index for n, begin in parts for index in range(begin, begin + n)}
+    verdicts = results.kept(wanted, again)
+    if verdicts:
+        print(f"{len(verdicts)} of {len(wanted)} scenes are in {json}", file=sys.stderr, flush=True)
+    for index, verdict in try_scenes(seed, sorted(wanted - verdicts.keys())):
         verdicts[index] = verdict
-        _tell(seed, index, verdict, len(verdicts), total, time.perf_counter() - started)
+        results.keep(index, verdict)
+        _tell(seed, index, verdict, len(verdicts), len(wanted), time.perf_counter() - started)
     found = judged(seed, verdicts, folder)
-    return report(seed, verdicts, found, folder, time.perf_counter() - started)
+    return report(seed, verdicts, found, results.revisions(wanted), time.perf_counter() - started)
 
 
 def _tell(seed: int, index: int, verdict: Verdict, done: int, count: int, seconds: float) -> None:
@@ -107,18 +120,21 @@ def _judged(seed: int, index: int, comparisons: list[Comparison], folder: Path, 
     )
     if not unknown:
         return Disagreement(index, worst, methods, text, known[0])
+    name = f"scene_{seed}_{index}"
+    if (path := saved(worst, folder, name)) is not None:  # by the run that this one goes on with
+        return Disagreement(index, worst, methods, text, file=str(path))
     print(f"scene {index} disagrees: {text}; shrinking", file=sys.stderr, flush=True)
     if shrunk_before < MOST_SHRUNK:
         if worst.peer.startswith("Mitsuba"):
             scene = without_all(scene)  # or a known deviation might be what is left in the end
         scene = smallest(scene, worst, salt, SHRINK_TRIES)
-    return Disagreement(index, worst, methods, text, file=str(save(scene, worst, folder, f"scene_{seed}_{index}")))
+    return Disagreement(index, worst, methods, text, file=str(save(scene, worst, folder, name)))
 
 
 def report(
-    seed: int, verdicts: dict[int, Verdict], found: list[Disagreement], folder: Path, seconds: float
+    seed: int, verdicts: dict[int, Verdict], found: list[Disagreement], revisions: str, seconds: float
 ) -> BenchResult:
-    """The table by feature and method, disagreements, known deviations, targets."""
+    """The table by feature and method, disagreements, known deviations, the revisions at which scenes ran, targets."""
     open_ = [d for d in found if not d.known]
     by_feature: dict[str, set[int]] = {}
     for index in verdicts:
@@ -133,8 +149,10 @@ def report(
     notes += [f"known deviation, {d.name}: {d.reason}" for d in DEVIATIONS]
     notes += _settings_notes()
     notes.append(
-        f"{len(comparisons)} comparisons of {sum(c.outcome.tests for c in comparisons)} tests in {seconds:.0f} s"
+        f"{len(comparisons)} comparisons of {sum(c.outcome.tests for c in comparisons)} tests; this run took "
+        f"{seconds:.0f} s"
     )
+    notes.append(f"scenes by revision: {revisions}")
     target = Target(
         "agreement", len(open_), 0, "scenes", False,
         f"scenes of seed {seed} that disagree, of {len(verdicts)} from {min(verdicts)} on; "
@@ -150,11 +168,11 @@ COLUMNS = ("feature", "scenes", "lit", *(f"{m} differs" for m in METHODS), "by k
 
 def _row(name: str, indices: set[int], verdicts: dict[int, Verdict], found: list[Disagreement]) -> list[Cell]:
     """Scenes with the feature, how many of them show light, those that disagree by method, the median standard error of
-    a test, and the share of comparisons that needed another stage."""
+    a test, and the share of comparisons that needed a stage of fresh seeds."""
     mine = [d for d in found if d.index in indices]
     comparisons = [c for i in indices for c in verdicts[i].comparisons]
     noise = float(np.median([c.outcome.noise for c in comparisons])) if comparisons else 0.0
-    doubt = sum(c.stage > 1 for c in comparisons) / max(len(comparisons), 1)
+    doubt = sum(c.stage > FIRST + 1 for c in comparisons) / max(len(comparisons), 1)
     by_method = [sum(m in d.methods for d in mine if not d.known) for m in METHODS]
     lit = sum(verdicts[i].lit > 0 for i in indices)
     return [name, len(indices), lit, *by_method, sum(bool(d.known) for d in mine), noise, doubt]
@@ -162,11 +180,12 @@ def _row(name: str, indices: set[int], verdicts: dict[int, Verdict], found: list
 
 def _settings_notes() -> list[str]:
     stages = "; ".join(
-        f"{e.runs} runs of {e.spp} samples a pixel, photons {e.passes} passes of {e.photons:,} at radius {e.radius:g}"
+        f"{e.runs} runs{' more' * e.adds} of {e.spp} samples a pixel, photons {e.passes} passes of {e.photons:,} "
+        f"at radius {e.radius:g}"
         for e in STAGES
     )
     return [
-        f"{SIZE}² pixels; stages, each with fresh seeds, as long as there is doubt: {stages}",
+        f"{SIZE}² pixels; stages, with fresh seeds where not said otherwise, as long as there is doubt: {stages}",
         f"photon methods may be off by {FORGIVEN:g} × this radius, {FORGIVEN * STAGES[-1].radius:.0%} of a block in "
         "the last stage: look-ups lose light at edges, in proportion to the radius",
         f"each scene whose number {OWN_KERNELS} divides runs kernels for what is in it alone, the others those for all "

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 RR_DEPTH = 8
-GRID = 4
+GRID = 2
 """Rays along a pixel's edge that look for smooth mirrors and glass."""
 
 

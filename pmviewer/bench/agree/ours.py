@@ -36,13 +36,15 @@ DEPTH = {"render.max_depth": MAX_DEPTH, "photons.max_bounces": 1000}
 
 @dataclass(frozen=True)
 class Effort:
-    """Samples a pixel of a run of the path tracers; passes, photons a pass and first radius (× scene) of the others."""
+    """Samples a pixel of a run of the path tracers; passes, photons a pass and first radius (× scene) of the others.
+    Where it `adds`, its runs are looked at with those of the stage before."""
 
     runs: int
     spp: int
     passes: int
     photons: int
     radius: float
+    adds: bool = False
 
 
 def our_runs(

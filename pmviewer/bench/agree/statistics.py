@@ -7,8 +7,9 @@ brightest, m, of n is then at most twice the share of that one in the mean (in t
 ∫ₘ x·2m²x⁻³ dx / n = 2m/n). The darker side is granted this much, measured on the brightest run, and one such path more
 or less is added to its standard error. Both fall as 1/n, faster than the noise.
 
-A difference counts when it shows again and again: `STAGES` of fresh seeds and more samples, and the last test alone
-gives the p-value, which is corrected for the number of comparisons of the whole run (Holm).
+A difference counts when it shows again and again: in `STAGES` of more samples, from the third on with fresh seeds; and
+the last test alone gives the p-value, so that how often was looked before does not change its meaning. It is corrected
+for the number of comparisons of the whole run (Holm).
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from scipy.stats import t as student
 
 from pmviewer.output.metric import block_means
 
-BLOCK = 8
+BLOCK = 16
 CHANNELS = 3
 ROUNDING = 1e-5
 """Relative difference that is no error: single precision, some additions and products deep."""

@@ -10,7 +10,7 @@ from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.process import tools
 from pmviewer.bench.agree.shrink import shrunk
 from pmviewer.bench.agree.statistics import Outcome
-from pmviewer.bench.agree.tree import Node, to_json
+from pmviewer.bench.agree.tree import Node, from_json, to_json
 from pmviewer.bench.agree.trial import STAGES, Comparison, Question, Runs, questions
 from pmviewer.bench.agree.xml import write_scene
 from pmviewer.errors import PmviewerError
@@ -34,57 +34,69 @@ def _question(runs: Runs, like: Comparison) -> Question | None:
     return next((q for q in questions(runs) if (q.method, q.peer, q.what) == (like.method, like.peer, like.what)), None)
 
 
-_recent: dict[tuple[str, tuple[int, ...]], tuple[Runs, tempfile.TemporaryDirectory[str]]] = {}
+_recent: dict[tuple[str, tuple[int, ...], bool], tuple[Runs, tempfile.TemporaryDirectory[str]]] = {}
 """Scenes looked at last: several comparisons of one scene ask for the same pictures."""
 
 
-def _runs(scene: Node, salt: tuple[int, ...]) -> Runs:
+def _runs(scene: Node, salt: tuple[int, ...], shared_kernels: bool) -> Runs:
     """Raises PmviewerError when our loader refuses the scene."""
-    key = (to_json(scene), salt)
+    key = (to_json(scene), salt, shared_kernels)
     if key not in _recent:
         while len(_recent) >= MOST_KEPT:
             _recent.pop(next(iter(_recent)))[1].cleanup()
         folder, mitsuba, pool = tools()
         place = tempfile.TemporaryDirectory(dir=folder)
-        _recent[key] = Runs(scene, Path(place.name), mitsuba, pool, salt), place
+        _recent[key] = Runs(scene, Path(place.name), mitsuba, pool, salt, shared_kernels), place
     return _recent[key][0]
 
 
-def outcome_of(scene: Node, like: Comparison, stage: int, salt: tuple[int, ...]) -> Outcome | None:
+def outcome_of(
+    scene: Node, like: Comparison, stage: int, salt: tuple[int, ...], shared_kernels: bool = False
+) -> Outcome | None:
     """The same comparison of another scene at a stage; None where it makes no sense or a program refuses the scene."""
     try:
-        question = _question(_runs(scene, salt), like)
+        question = _question(_runs(scene, salt, shared_kernels), like)
         return None if question is None else question.answer(stage)
     except PmviewerError:
         return None
 
 
-def explained(scene: Node, found: Comparison, salt: tuple[int, ...]) -> Comparison:
-    """The comparison with the known deviation that it comes from, if it may be a disagreement and does."""
-    if found.p > DOUBTFUL:
-        return found
-    return replace(found, known=explanation(scene, found, AGREES, salt))
+def all_explained(
+    scene: Node, comparisons: list[Comparison], salt: tuple[int, ...], shared_kernels: bool = False
+) -> list[Comparison]:
+    """The comparisons with the known deviation that each comes from, if it may be a disagreement and does."""
+    found: list[Comparison] = []
+    for comparison in comparisons:
+        if comparison.p <= DOUBTFUL:
+            before = tuple(dict.fromkeys(c.known for c in found if c.known))
+            comparison = replace(comparison, known=explanation(scene, comparison, salt, shared_kernels, before))
+        found.append(comparison)
+    return found
 
 
-def explanation(scene: Node, found: Comparison, level: float, salt: tuple[int, ...]) -> str:
+def explanation(
+    scene: Node, found: Comparison, salt: tuple[int, ...], shared_kernels: bool = False, first: tuple[str, ...] = ()
+) -> str:
     """The known deviations that a disagreement comes from: without what they take, there is none.
 
-    One alone if that is enough, else all that the scene has; empty if it disagrees without all of them too.
+    One alone if that is enough, those that are named `first` before others; else all that the scene has; empty if it
+    disagrees without all of them too.
     """
+
+    def agrees(simpler: Node) -> bool:
+        # With what was enough to find the disagreement, and other seeds.
+        outcome = outcome_of(simpler, found, found.stage - 1, (*salt, 1), shared_kernels)
+        return outcome is not None and outcome.p > AGREES
+
     may = [d for d in DEVIATIONS if d.among_ours or found.peer.startswith("Mitsuba")]
-    has = [(d.name, without) for d in may if (without := d.without(scene)) is not None]
-    if not has:
-        return ""
+    has = {d.name: without for d in may if (without := d.without(scene)) is not None}
+    for name in sorted(has, key=lambda name: name not in first):
+        if agrees(has[name]):
+            return name
     bare = scene
     for deviation in may:
         bare = deviation.without(bare) or bare
-    if not _agrees(bare, found, level, salt):
-        return ""
-    if len(has) > 1:
-        for name, without in has:
-            if _agrees(without, found, level, salt):
-                return name
-    return " + ".join(name for name, _ in has)
+    return " + ".join(has) if len(has) > 1 and agrees(bare) else ""
 
 
 def without_all(scene: Node) -> Node:
@@ -94,20 +106,17 @@ def without_all(scene: Node) -> Node:
     return scene
 
 
-def _agrees(scene: Node, like: Comparison, level: float, salt: tuple[int, ...]) -> bool:
-    outcome = outcome_of(scene, like, len(STAGES) - 1, (*salt, 1))
-    return outcome is not None and outcome.p > level
-
-
 def smallest(scene: Node, found: Comparison, salt: tuple[int, ...], most: int) -> Node:
-    """The smallest scene that shows the same disagreement."""
+    """The smallest scene that shows the same disagreement, by the kernels for all kinds of surfaces where these show it
+    too: others would be compiled for each simpler scene."""
     brighter, size = found.outcome.ratio > 1, abs(found.outcome.ratio - 1)
-    stage = 0  # the cheapest that shows it
-    while stage < len(STAGES) - 1 and not _shows(outcome_of(scene, found, stage, (*salt, 3))):
-        stage += 1
+    last = len(STAGES) - 1
+    ways = [(stage, True) for stage in range(last + 1)] + [(stage, False) for stage in range(last + 1)]
+    shown = (way for way in ways if _shows(outcome_of(scene, found, way[0], (*salt, 3), way[1])))
+    stage, shared = next(shown, (last, True))  # the cheapest that shows it
 
     def still(simpler: Node) -> bool:
-        outcome = outcome_of(simpler, found, stage, (*salt, 2))
+        outcome = outcome_of(simpler, found, stage, (*salt, 2), shared)
         if outcome is None or not _shows(outcome):
             return False
         return (outcome.ratio > 1) == brighter and abs(outcome.ratio - 1) >= LIKE * size
@@ -118,7 +127,21 @@ def smallest(scene: Node, found: Comparison, salt: tuple[int, ...], most: int) -
 def save(scene: Node, found: Comparison, folder: Path, name: str) -> Path:
     """Write the scene as XML and as the tree that it is, with what disagrees in it."""
     path, _ = write_scene(scene, folder, name)
-    said = {"method": found.method, "peer": found.peer, "what": found.what, "p": found.outcome.p,
-            "ratio": found.outcome.ratio}  # fmt: skip
-    (folder / f"{name}.json").write_text(to_json({"scene": scene, "shows": said}) + "\n", encoding="utf-8")
+    text = to_json({"scene": scene, "shows": _said(found)})
+    (folder / f"{name}.json").write_text(text + "\n", encoding="utf-8")
     return path
+
+
+def saved(found: Comparison, folder: Path, name: str) -> Path | None:
+    """The XML file that `save` has made of the very same comparison, if there is one."""
+    try:
+        said = from_json((folder / f"{name}.json").read_text("utf-8"))["shows"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    path = folder / f"{name}.xml"
+    return path if said == _said(found) and path.is_file() else None
+
+
+def _said(found: Comparison) -> Node:
+    outcome = found.outcome
+    return {"method": found.method, "peer": found.peer, "what": found.what, "p": outcome.p, "ratio": outcome.ratio}

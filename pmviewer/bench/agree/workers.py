@@ -9,7 +9,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import tempfile
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -17,7 +17,7 @@ from pathlib import Path
 
 from pmviewer.bench.agree.generate import scene_of
 from pmviewer.bench.agree.process import end_with, tools
-from pmviewer.bench.agree.triage import explained
+from pmviewer.bench.agree.triage import all_explained
 from pmviewer.bench.agree.trial import tried
 from pmviewer.bench.agree.verdict import Verdict
 from pmviewer.engine.pool import available_threads
@@ -30,21 +30,20 @@ them takes longer than rendering, so that the others share those for all kinds o
 def try_scene(seed: int, index: int) -> Verdict:
     """All comparisons of a scene, in this process, and what those that may be disagreements come from."""
     folder, mitsuba, pool = tools()
-    scene, salt = scene_of(seed, index), (seed, index)
+    scene, salt, shared = scene_of(seed, index), (seed, index), index % OWN_KERNELS > 0
     with tempfile.TemporaryDirectory(dir=folder) as place:
-        verdict = tried(scene, Path(place), mitsuba, pool, salt, shared_kernels=index % OWN_KERNELS > 0)
-    return replace(verdict, comparisons=[explained(scene, c, salt) for c in verdict.comparisons])
+        verdict = tried(scene, Path(place), mitsuba, pool, salt, shared_kernels=shared)
+    return replace(verdict, comparisons=all_explained(scene, verdict.comparisons, salt, shared))
 
 
 def try_scenes(
     seed: int,
-    count: int,
+    indices: Sequence[int],
     work: Callable[[int, int], Verdict] = try_scene,
     processes: int | None = None,
-    first: int = 0,
 ) -> Iterator[tuple[int, Verdict]]:
-    """(index, verdict) of `count` scenes of `seed` from `first` on, in the order in which they end."""
-    waiting = list(range(first, first + count))
+    """(index, verdict) of these scenes of `seed`, in the order in which they end."""
+    waiting = list(indices)
     processes = processes or available_threads()
     while waiting:
         suspects = yield from _side_by_side(seed, waiting, work, processes)

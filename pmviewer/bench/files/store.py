@@ -5,23 +5,14 @@ What Mitsuba said about a file holds as long as the file is the same; what we sa
 
 from __future__ import annotations
 
-import hashlib
 import json
 from pathlib import Path
 from typing import Any
 
+from pmviewer.bench.collected import sources_stamp
 from pmviewer.bench.files.judge import Row
-from pmviewer.resources import PACKAGE
 
 THEIRS = ("theirs", "refused", "adapted")
-
-
-def sources_stamp() -> str:
-    """Changes with any source file of the package."""
-    digest = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def file_stamp(path: Path) -> str:
