@@ -11,6 +11,7 @@ from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.radiance_photons import AUTOMATIC_CUTOFF, AUTOMATIC_CUTOFF_NEAREST
 from pmviewer.maps.search.grid import PhotonGrid
 from pmviewer.photons.bounces import most_bounces
+from pmviewer.render.direct.samples import samples_at_surface
 from pmviewer.settings.access import Settings
 
 
@@ -26,6 +27,7 @@ def automatic_values(looked: Looked, first_radius: float) -> dict[str, Any]:
         found["photons.max_bounces"] = most_bounces(settings.photons, plan.media)
         found["photons.projection"] = "off" if looked.light.tracer.projection is None else "on"
     found["direct.choice"] = plan.choice
+    found["direct.samples"] = samples_at_surface(settings.direct, plan.path, plan.media)
     if looked.latest is not None:
         found |= _of_maps(looked.latest, settings, radius)
     return found

@@ -57,25 +57,26 @@ def _salt(number: int, meaning: str) -> int:
 
 
 # Pixels: seed of the pixel (PIXEL_SALT), index of the pass.
-PIXEL = _dimension((EYE, PATH), 0, "place in the pixel; in the eye pass also on the light of the first light sample")
-BSDF = _dimension((EYE,), 1, "choice of the first light, and the BSDF sample that no gather ray is")
+PIXEL = _dimension((EYE, PATH), 0, "place in the pixel")
+BSDF = _dimension((EYE,), 1, "BSDF sample that no gather ray is")
 CHAIN = _dimension((EYE,), 2, "lobe followed", DEPTH)
 PATH_STRIDE = 2
 """A path takes two dimensions a surface."""
 PATH_SCATTER = _dimension((PATH,), 2, "scattering and roulette", DEPTH, PATH_STRIDE)
-PATH_LIGHT = _dimension((PATH,), 3, "first light sample", DEPTH, PATH_STRIDE)
+PATH_LIGHT = _dimension((PATH,), 3, "light samples", DEPTH, PATH_STRIDE)
 PATH_FLIGHT = _dimension((PATH,), 3000, "flight through media to a surface or collision", DEPTH)
 GATHER = _dimension((EYE,), 2000, "gather ray by the BSDF, where all are")
 GATHER_BESIDE = _dimension((EYE,), 2001, "gather ray by the BSDF, beside guided ones")
 GATHER_GUIDED = _dimension((EYE,), 2002, "gather ray guided by photons")
 GATHER_FORK = _dimension((EYE, CACHE_RECORD), 2999, "which chain of a gather ray goes on, after a secondary gather")
 GATHER_CHAIN = _dimension((EYE, CACHE_RECORD), 3000, "lobe that a gather ray follows", DEPTH)
-CHAIN_LIGHT = _dimension((EYE,), 4000, "first light sample at followed lobes", DEPTH)
+CHAIN_LIGHT = _dimension((EYE,), 4000, "light samples at followed lobes", DEPTH)
 OUTLINE = _dimension((EYE,), 5000, "camera ray for emission alone, and its place on the lens")
 WAVE = _dimension((EYE, PATH, PHOTON, VIRTUAL_LIGHT), 0xE81A, "wavelength, in scenes with dispersive glass")
 GATHER_WAVE = _dimension((EYE, CACHE_RECORD), 0xE81B, "wavelength of a gather ray")
 LENS = _dimension((EYE, PATH), 5001, "place on the lens")
-FURTHER_LIGHT = _dimension((EYE, PATH, SECOND_GATHER), 6000, "light sample after a surface's first", LIGHT_SAMPLE)
+LIGHT = _dimension((EYE,), 5002, "light samples where photons are stored")
+FURTHER_LIGHT = _dimension((EYE, PATH), 6000, "light sample after the first in media", LIGHT_SAMPLE)
 VOLUME = _dimension((EYE,), 0x50000, "distance and lights of single scattering on a camera ray", DEPTH)
 VOLUME_PHASE = _dimension((EYE,), 0x60000, "direction and distance by the phase function on a camera ray", DEPTH)
 GATHER_VOLUME = _dimension((EYE,), 0x70000, "the same on a gather ray", DEPTH)
@@ -90,7 +91,7 @@ WALK_EMITTER = _dimension((EYE,), 0x40000, "gathering walk's choice of light", B
 HEMISPHERE = _dimension((CACHE_RECORD,), 5000, "direction within a stratum of the hemisphere")
 
 # Secondary gathers: seed of the gather (SECOND_GATHER_SALT), index of its ray.
-SECOND_LIGHT = _dimension((SECOND_GATHER,), 0, "first light sample")
+SECOND_LIGHT = _dimension((SECOND_GATHER,), 0, "light samples")
 SECOND_RAY = _dimension((SECOND_GATHER,), 1, "ray")
 
 # Photons: seed of the render, index of the photon over all passes.

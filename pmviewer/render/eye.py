@@ -17,7 +17,7 @@ import numpy as np
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
-from pmviewer.kernels.dimensions import BSDF, CHAIN_LIGHT, OUTLINE
+from pmviewer.kernels.dimensions import BSDF, CHAIN_LIGHT, LIGHT, OUTLINE
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import add, largest, mul, scale
@@ -119,11 +119,11 @@ def _from_maps(given, si, beta, pixel, whole):
 
 
 @device
-def _stored(given, si, beta, pixel, place, scratch, whole):
-    """Light by the STORED lobes of a surface: direct light, what the maps show, gather rays. `place`: the pixel's two
-    numbers for the first light sample; scratch: lists of lights and of photons. Returns the choice of lights."""
+def _stored(given, si, beta, pixel, scratch, whole):
+    """Light by the STORED lobes of a surface: direct light, what the maps show, gather rays. scratch: lists of lights
+    and of photons. Returns the choice of lights."""
     eye = given.eye
-    u_pick, bu, bv, u_lobe = draw4(eye.sequence, pixel.seed, eye.index, BSDF)
+    bu, bv, u_lobe, _ = draw4(eye.sequence, pixel.seed, eye.index, BSDF)
     known, gather = cached(given, si, pixel, whole)
     aimed = Aim(scratch[1], _i8(0), _i8(0))
     if gather > 0:
@@ -134,8 +134,8 @@ def _stored(given, si, beta, pixel, place, scratch, whole):
     choice = choose_by_power(scratch[0], eye.light_samples)
     if eye.direct != 0:
         choice = choose(given.scene, eye, given.choice_map, si.p, si.ng, scratch[0])
-        sampler, numbers = Sampler(eye.sequence, pixel.seed, eye.index), (u_pick, place[0], place[1])
-        L = direct_light(given, si, STORED, choice, n_bsdf, sampler, numbers, pixel.counts)
+        sampler = Sampler(eye.sequence, pixel.seed, eye.index, LIGHT)
+        L = direct_light(given, si, STORED, choice, n_bsdf, sampler, pixel.counts)
         deposit(pixel, DIRECT if whole else SPECULAR, mul(beta, L))
     _from_maps(given, si, beta, pixel, whole)
     virtual_light(given, si, beta, pixel, whole)
@@ -166,9 +166,8 @@ def _followed(given, si, beta, pixel, depth, choice, lights):
         deposit(pixel, SPECULAR, mul(beta, L))
     if eye.followed_direct != 0:
         choice = choose_by_power(lights, eye.light_samples)
-        u_pick, u, v, _ = draw4(eye.sequence, pixel.seed, eye.index, CHAIN_LIGHT + depth)
-        sampler = Sampler(eye.sequence, pixel.seed, eye.index)
-        L = direct_light(given, si, FOLLOWED, choice, eye.mis, sampler, (u_pick, u, v), pixel.counts)
+        sampler = Sampler(eye.sequence, pixel.seed, eye.index, CHAIN_LIGHT + depth)
+        L = direct_light(given, si, FOLLOWED, choice, eye.mis, sampler, pixel.counts)
         deposit(pixel, SPECULAR, mul(beta, L))
     return choice
 
@@ -196,7 +195,7 @@ def eye_pass(given, outline, radii, film, counts, first, last):
     scene, eye = given.scene, given.eye
     lights, found = stack_i4(LIST_WORDS), stack_i4(AIM_WORDS)
     for number in range(first, last):
-        seed, ray, place, weight = sampled_ray(scene, eye, number)
+        seed, ray, weight = sampled_ray(scene, eye, number)
         pixel = Pixel(number, seed, film, radii, counts, weight)
         hidden = hides_lights(eye)
         outlined = not hidden and len(outline) > 0 and outline[number] != 0
@@ -229,7 +228,7 @@ def eye_pass(given, outline, radii, film, counts, first, last):
                 if groups == NOTHING or not largest(beta) > _f4(0.0):
                     break
                 if groups & STORED != 0:
-                    choice = _stored(given, si, beta, pixel, place, (lights, found), whole)
+                    choice = _stored(given, si, beta, pixel, (lights, found), whole)
                 if groups & FOLLOWED == 0:
                     break
                 if depth == eye.max_depth:

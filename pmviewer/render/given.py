@@ -52,11 +52,13 @@ class SurfaceInteraction(NamedTuple):
 
 
 class Sampler(NamedTuple):
-    """Where a pixel's random numbers come from: sequence, seed and the sample's index in it."""
+    """Where the random numbers of light samples come from: sequence, seed, the pass or ray as index in it, and the
+    (first) dimension."""
 
     sequence: Any
     seed: Any
     index: Any
+    dimension: Any
 
 
 class Aim(NamedTuple):

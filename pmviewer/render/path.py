@@ -12,7 +12,7 @@ import numpy as np
 
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, pick_group
 from pmviewer.kernels.compile.jit import device, kernel
-from pmviewer.kernels.dimensions import PATH_LIGHT, PATH_SCATTER, PATH_STRIDE
+from pmviewer.kernels.dimensions import FURTHER_LIGHT, PATH_LIGHT, PATH_SCATTER, PATH_STRIDE
 from pmviewer.kernels.lights.light import light_pdf
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4
@@ -69,8 +69,8 @@ def path_pass(scenes, eyes, film, counts, first, last):
     scene, eye = scenes[0], eyes[0]
     choice = choose_by_power(stack_i4(LIST_WORDS), eye.light_samples)
     for number in range(first, last):
-        seed, ray, _, weight = sampled_ray(scene, eye, number)
-        pixel, sampler = Pixel(number, seed, film, None, counts, weight), Sampler(eye.sequence, seed, eye.index)
+        seed, ray, weight = sampled_ray(scene, eye, number)
+        pixel = Pixel(number, seed, film, None, counts, weight)
         beta = WHITE
         stored = 0  # how often the path took lobes that photons are stored for
         mirrored = False  # whether it took a followed lobe before the first of these
@@ -103,6 +103,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 in_medium = in_medium or stored == 1
                 u, v, u_lobe, u_end = draw4(eye.sequence, seed, eye.index, PATH_SCATTER + PATH_STRIDE * depth)
                 u_pick, lu, lv, _ = draw4(eye.sequence, seed, eye.index, PATH_LIGHT + PATH_STRIDE * depth)
+                sampler = Sampler(eye.sequence, seed, eye.index, FURTHER_LIGHT)
                 after = scatter_in_medium(scene, eye, ray, arrival, choice, sampler, (u_lobe, u, v), (u_pick, lu, lv))
                 counts[C_RAYS] += after.rays
                 counts[C_SHADOW_RAYS] += after.rays
@@ -144,8 +145,8 @@ def path_pass(scenes, eyes, film, counts, first, last):
             else:
                 stored += 1
             if group == STORED or not is_delta(si.bsdf):
-                u_pick, lu, lv, _ = draw4(eye.sequence, seed, eye.index, PATH_LIGHT + PATH_STRIDE * depth)
-                L, rays, _ = light_samples(scene, None, si, group, choice, eye.mis, sampler, (u_pick, lu, lv))
+                sampler = Sampler(eye.sequence, seed, eye.index, PATH_LIGHT + PATH_STRIDE * depth)
+                L, rays, _ = light_samples(scene, None, si, group, choice, eye.mis, sampler)
                 counts[C_RAYS] += rays
                 counts[C_SHADOW_RAYS] += rays
                 deposit(pixel, term_of(eye, mirrored, stored, by_chain, in_medium), mul(beta, L))

@@ -91,15 +91,14 @@ def lens_ray(eye, pixel, u, v, a, b):
 
 @device
 def sampled_ray(scene, eye, pixel):
-    """The pixel's seed, its camera ray in the pass of the eye record, two numbers for its first light sample, and what
-    the sample counts (`Pixel.weight`)."""
+    """The pixel's seed, its camera ray in the pass of the eye record, and what the sample counts (`Pixel.weight`)."""
     seed = pixel_seed(eye, pixel)
-    ux, uy, u_light, v_light = draw4(eye.sequence, seed, eye.index, PIXEL)
+    ux, uy, _, _ = draw4(eye.sequence, seed, eye.index, PIXEL)
     x, y, weight = place_in_filter(eye, ux, uy)
     a, b = lens_numbers(eye, seed)
     ray = past_lights(scene, eye, lens_ray(eye, pixel, x, y, a, b))
     ray = of_wave(ray, new_wave(scene, eye.sequence, seed, eye.index, WAVE))
-    return seed, ray, (u_light, v_light), weight
+    return seed, ray, weight
 
 
 @specialised

@@ -31,7 +31,7 @@ _FIELDS: list[tuple] = [
     ("outline_rays", "i4"),  # camera rays for emission in pixels on a light's outline
     ("direct", "i4"),  # whether direct light is sampled at lobes that photons are stored for
     ("followed_direct", "i4"),  # and at those that are followed
-    ("light_samples", "i4"),
+    ("light_samples", "i4"),  # at a surface
     ("mis", "i4"),
     ("choice", "i4"),  # of lights: index into `pmviewer.render.direct.choice.CHOICES`
     ("con_samples", "i4"),
@@ -118,6 +118,7 @@ class Evaluation:
     guide_mask: int = 0
     corner: float = 0.0
     choice: int = 0
+    light_samples: int = 1
     biased: bool = False
     choice_radius: float = 0.0
     k: int = 0
@@ -160,7 +161,7 @@ def eye_record(
     r["outline_rays"] = settings.render.outline_rays
     r["glossy"] = settings.photons.glossy
     direct = settings.direct
-    r["light_samples"], r["mis"] = direct.samples, direct.mis or evaluation.looked_for
+    r["mis"] = direct.mis or evaluation.looked_for
     r["con_samples"], r["noncon_samples"] = direct.con_samples, direct.noncon_samples
     estimate = settings.estimate
     r["filter"], r["rim"] = FILTERS.index(estimate.filter), RIMS.index(estimate.rim)

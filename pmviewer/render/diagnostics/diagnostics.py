@@ -11,7 +11,7 @@ import numpy as np
 
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, bsdf_f, same_side, shading_normal
 from pmviewer.kernels.compile.jit import device, kernel
-from pmviewer.kernels.dimensions import BSDF, PIXEL
+from pmviewer.kernels.dimensions import LIGHT
 from pmviewer.kernels.lights.light import sample_one_light
 from pmviewer.kernels.memory import bits_of_float, stack_i4
 from pmviewer.kernels.random import draw4, hash3
@@ -143,8 +143,7 @@ def known_share(scene, eye, choice_map, shadows, si, pixel, lights):
     counted, known = _i8(0), _i8(0)
     rounds = (FEWEST_SAMPLES + samples - 1) // samples if samples > 0 else 0
     for i in range(rounds * samples):
-        _, _, u, v = draw4(eye.sequence, seed, _u4(i), PIXEL)
-        u_pick, _, _, _ = draw4(eye.sequence, seed, _u4(i), BSDF)
+        u, v, u_pick, _ = draw4(eye.sequence, seed, _u4(i), LIGHT)
         light, m = chosen_light(scene, choice, i % samples, u_pick)
         wi, _, _, pdf, _ = sample_one_light(scene, light, si.p, u, v)
         if not m * pdf > _f4(0.0) or same_side(si.bsdf, STORED, si.ng, si.wo, wi) == 0:

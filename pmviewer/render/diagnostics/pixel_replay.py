@@ -187,7 +187,7 @@ def replay_pixel(given, radii, pixel, asked, wi, shares, rows, vertices, prims, 
     """
     given = opened(given)
     scene, eye = given.scene, given.eye
-    seed, ray, _, _ = sampled_ray(scene, eye, pixel)
+    seed, ray, _ = sampled_ray(scene, eye, pixel)
     way, ways = first_way(ray)
     main, surface = True, _i8(-1)
     row, points = _i8(0), _i8(1)

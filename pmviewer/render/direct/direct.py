@@ -10,10 +10,9 @@ import numpy as np
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, bsdf_f, bsdf_pdf, compressed, same_side, shading_normal
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
-from pmviewer.kernels.dimensions import FURTHER_LIGHT
 from pmviewer.kernels.lights.light import emitted, environment_radiance, one_light_pdf, sample_one_light
 from pmviewer.kernels.media.medium import has_media
-from pmviewer.kernels.random import draw4
+from pmviewer.kernels.random import SOBOL, draw4
 from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.vector import add, dot, largest, mul, scale
 from pmviewer.render.chain import BLACK, WHITE
@@ -25,6 +24,7 @@ from pmviewer.render.straight import transmission
 
 _f4 = np.float32
 _u4 = np.uint32
+_i8 = np.int64
 
 
 @device
@@ -56,21 +56,36 @@ def left_to_rays(scene, light, group):
 
 
 @device
-def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, numbers):
+def _drawn_light(scene, choice, s, sampler):
+    """Light of sample s, its m (`chosen_light`), and two numbers for a place on it.
+
+    Samples of a pass follow one another in the sequence as passes do, so that they complement each other: n samples
+    each in the first m passes are its first n·m points. Of these the first two coordinates are spread best, and a
+    block of 2ⁱ falls into as many parts of the third.
+    """
+    n = choice[4]
+    index = _u4(_u4(sampler.index) * _u4(n) + _u4(s))
+    u, v, u_pick, _ = draw4(sampler.sequence, sampler.seed, index, sampler.dimension)
+    if sampler.sequence == SOBOL and n & (n - 1) == 0:
+        place = _f4(n) * u_pick
+        s = _i8(place)
+        u_pick = place - _f4(s)
+    light, m = chosen_light(scene, choice, s, u_pick)
+    return light, m, u, v
+
+
+@device
+def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler):
     """Radiance towards wo from the light samples of the choice, reflected by a group of the BSDF's lobes.
 
-    Each is weighted against n_bsdf BSDF samples of the group (0: no MIS). `numbers`, three, are for the first sample:
-    choice of light and place; the sampler draws further ones. `shadows` is for `known_visibility`. Returns L, the
-    shadow rays cast and those that shadow photons saved.
+    Each is weighted against n_bsdf BSDF samples of the group (0: no MIS). `shadows` is for `known_visibility`. Returns
+    L, the shadow rays cast and those that shadow photons saved.
     """
     p, ng, b, wo = si.p, si.ng, si.bsdf, si.wo
     total = BLACK
     rays, saved = 0, 0
-    u_pick, u, v = numbers
     for s in range(choice[4]):
-        if s > 0:
-            u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, FURTHER_LIGHT + s)
-        light, m = chosen_light(scene, choice, s, u_pick)
+        light, m, u, v = _drawn_light(scene, choice, s, sampler)
         wi, end, L, pdf, findable = sample_one_light(scene, light, p, u, v)
         if not m * pdf > _f4(0.0) or same_side(b, group, ng, wo, wi) == 0 or left_to_rays(scene, light, group):
             continue
@@ -94,9 +109,9 @@ def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler, numbers):
 
 
 @device
-def direct_light(given, si, group, choice, n_bsdf, sampler, numbers, counts):
+def direct_light(given, si, group, choice, n_bsdf, sampler, counts):
     """L of `light_samples` in a pass (PassData), its rays counted."""
-    L, rays, saved = light_samples(given.scene, given.shadows, si, group, choice, n_bsdf, sampler, numbers)
+    L, rays, saved = light_samples(given.scene, given.shadows, si, group, choice, n_bsdf, sampler)
     counts[C_RAYS] += rays
     counts[C_SHADOW_RAYS] += rays
     counts[C_SAVED] += saved

@@ -57,10 +57,9 @@ def gather_again(given, si, seed, index, counts, hit):
 
 def _again(given, si, seed, index, counts, hit):
     scene, eye = given.scene, given.eye
-    sampler = Sampler(eye.sequence, hash3(seed, _u4(SECOND_GATHER_SALT), _u4(0)), index)
-    u_pick, u, v, _ = draw4(eye.sequence, sampler.seed, index, SECOND_LIGHT)
+    sampler = Sampler(eye.sequence, hash3(seed, _u4(SECOND_GATHER_SALT), _u4(0)), index, SECOND_LIGHT)
     choice = choose(scene, eye, given.choice_map, si.p, si.ng, stack_i4(LIST_WORDS))
-    L = direct_light(given, si, STORED, choice, eye.mis, sampler, (u_pick, u, v), counts)
+    L = direct_light(given, si, STORED, choice, eye.mis, sampler, counts)
     if eye.caustic_mask != 0:
         L = add(L, reflected(given.caustic_map, eye, eye.caustic_radius, si, eye.caustic_mask))
     u, v, u_lobe, _ = draw4(eye.sequence, sampler.seed, index, SECOND_RAY)

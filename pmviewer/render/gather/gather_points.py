@@ -58,7 +58,7 @@ def gather_points(given, pixel, counts, rows):
     """
     given = opened(given)
     scene, eye = given.scene, given.eye
-    seed, ray, _, _ = sampled_ray(scene, eye, pixel)
+    seed, ray, _ = sampled_ray(scene, eye, pixel)
     way, ways = first_way(ray)
     row = _i8(0)
     while True:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.dimensions import FURTHER_LIGHT
 from pmviewer.kernels.lights.light import sample_one_light
 from pmviewer.kernels.media.phase import phase
 from pmviewer.kernels.random import draw4
@@ -46,7 +45,7 @@ def phase_light(scene, p, d, medium, numbers, choice, n_phase, sampler, places):
     u_pick, u, v = places
     for s in range(choice[4]):
         if s > 0:
-            u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, FURTHER_LIGHT + s)
+            u_pick, u, v, _ = draw4(sampler.sequence, sampler.seed, sampler.index, sampler.dimension + s)
         light, m = chosen_light(scene, choice, s, u_pick)
         L, cast = one_light_sample(scene, p, d, medium, numbers, light, m, n_phase, u, v)
         total = add(total, L)

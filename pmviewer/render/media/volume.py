@@ -133,7 +133,7 @@ def _single(given, stretch, sampler, numbers, of_phase, counts):
     u_pick, u, v, u_t = numbers
     for s in range(choice[4]):
         if s > 0:
-            u_pick, u, v, u_t = draw4(sampler.sequence, sampler.seed, sampler.index, FURTHER_LIGHT + s)
+            u_pick, u, v, u_t = draw4(sampler.sequence, sampler.seed, sampler.index, sampler.dimension + s)
         light, m = chosen_light(scene, choice, s, u_pick)
         L, rays = _by_light(scene, stretch, light, m, n_phase, u_t, u, v)
         total = add(total, L)
@@ -215,7 +215,7 @@ def deposit_media(given, ray, hit, beta, pixel, depth):
 
     def deposited(given, ray, hit, beta, pixel, depth):
         eye = given.eye
-        sampler = Sampler(eye.sequence, pixel.seed, eye.index)
+        sampler = Sampler(eye.sequence, pixel.seed, eye.index, FURTHER_LIGHT)
         numbers = draw4(eye.sequence, pixel.seed, eye.index, VOLUME + depth)
         of_phase = draw4(eye.sequence, pixel.seed, eye.index, VOLUME_PHASE + depth)
         L = from_media(given, ray, hit, sampler, numbers, of_phase, pixel.counts, True)
@@ -239,7 +239,8 @@ def gathered_from_media(given, ray, hit, seed, index, depth, counts):
         eye = given.eye
         numbers = draw4(eye.sequence, seed, index, GATHER_VOLUME + depth)
         of_phase = draw4(eye.sequence, seed, index, GATHER_VOLUME_PHASE + depth)
-        L = from_media(given, ray, hit, Sampler(eye.sequence, seed, index), numbers, of_phase, counts, False)
+        sampler = Sampler(eye.sequence, seed, index, FURTHER_LIGHT)
+        L = from_media(given, ray, hit, sampler, numbers, of_phase, counts, False)
         return add(L.single, L.indirect), L.T
 
     return gathered

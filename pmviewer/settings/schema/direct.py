@@ -31,9 +31,9 @@ class Direct(Group):
 
     needs: ClassVar[Needs] = (LIGHT_SAMPLES,)
 
-    samples: int = setting(
-        1,
-        "Light samples per pixel and pass.",
+    samples: int | Auto = setting(
+        "auto",
+        "Light samples per surface and pass. Automatic: 2; by the path tracer and in scenes with media 1.",
         stage="image",
         scale="integer",
         unit="samples",
