@@ -13,8 +13,9 @@ from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from tests.support.light_probe import axes_of, emit, look, p_uniform, sample, turn, uniform_sphere
 from tests.support.scenes import LIGHTS, light_scene
 
-MANY = 1_000_000
-"""Samples of the chi-square tests."""
+MANY = 250_000
+"""Samples of the chi-square tests: over 256 cells they find densities that are wrong by 2 % (2 %² · MANY = 100, five
+times the standard deviation 23 of χ²)."""
 RADIANCE = np.array([2.0, 1.5, 1.0])
 AREA_LIGHTS = [name for name in LIGHTS if name not in ("point", "environment")]
 
@@ -211,7 +212,7 @@ def test_density_is_the_samplers(name):
 
 @pytest.mark.parametrize("name", AREA_LIGHTS)
 def test_directions_to_a_light_have_the_density_of_light_pdf(name):
-    """Chi-square of a million directions in 16 × 16 cells of the cone that holds the light. A cell expects the integral
+    """Chi-square of many directions in 16 × 16 cells of the cone that holds the light. A cell expects the integral
     of `light_pdf` over the directions in it that find the light; samples of parts that other parts of the light hide,
     that face away or are seen edge-on are a cell of their own."""
     flat = flatten(light_scene(name, floor=False))
@@ -223,7 +224,7 @@ def test_directions_to_a_light_have_the_density_of_light_pdf(name):
     axis = np.array([0.0, 0.0, 1.0]) if name.endswith("inside") else wi.mean(0) / np.linalg.norm(wi.mean(0))
     s, t = (a[0] for a in axes_of(axis[None]))
     lowest = float((wi @ axis).min()) - 1e-4
-    n, fine = 16, 100
+    n, fine = 16, 50
     cos = lowest + (1 - lowest) * (np.arange(n * fine) + 0.5) / (n * fine)
     phi = 2 * math.pi * (np.arange(n * fine) + 0.5) / (n * fine)
     expected = np.zeros((n, n))

@@ -14,6 +14,8 @@ from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.settings.access import Settings, with_values
 
+pytestmark = pytest.mark.usefixtures("every_surface")
+
 HEAD = """<scene version="3.0.0"><sensor type="perspective"><float name="fov" value="{fov}"/><transform name="to_world">
 <lookat origin="{origin}" target="{target}" up="0,0,1"/></transform><film type="hdrfilm">
 <integer name="width" value="48"/><integer name="height" value="48"/><rfilter type="box"/></film></sensor>"""

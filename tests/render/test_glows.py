@@ -18,6 +18,8 @@ from tests.render.test_grids import TO_CUBE, cloud
 from tests.render.test_media import METHODS, cube_of, picture
 from tests.support.scenes import GLASS, diffuse, rendered, settings_of
 
+pytestmark = pytest.mark.usefixtures("any_light_in_media")
+
 ABOVE = Camera((0, 6, 0.01), (0, -1.3, 0), (0, 0, -1), 70.0)
 FLOOR = Shape("floor", Parallelogram((-8, -1.3, 8), (16, 0, 0), (0, 0, -16)), 1)
 """Partly near the cube (`pmviewer.kernels.media.glow.MARGIN`), partly not."""

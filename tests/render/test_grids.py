@@ -16,6 +16,8 @@ from pmviewer.scene.load import read_scene
 from pmviewer.scene.medium import Phase
 from tests.render.test_media import CAMERA, METHODS, SKY, cube_of, picture
 
+pytestmark = pytest.mark.usefixtures("any_light_in_media")
+
 TO_CUBE = np.array([[2.0, 0, 0, -1], [0, 2, 0, -1], [0, 0, 2, -1], [0, 0, 0, 1]])
 """The unit cube to [−1, 1]³."""
 BARELY = (1e-6,) * 3

@@ -21,6 +21,8 @@ from tests.render.test_media import SKY, cube_of, picture
 from tests.support import naive_maps as naive
 from tests.support.scenes import rendered, settings_of
 
+pytestmark = pytest.mark.usefixtures("any_light_in_media")
+
 f4 = np.float32
 SIGMA, START, LENGTH, N = 0.8, -0.7, 1.4, 40_000
 MILK = Medium("milk", (1.0, 2.0, 1.5), (1, 1, 1))

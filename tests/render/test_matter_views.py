@@ -16,6 +16,8 @@ from tests.render.test_grids import BARELY, ramp
 from tests.render.test_media import CAMERA, SKY, cube_of
 from tests.support.scenes import settings_of
 
+pytestmark = pytest.mark.usefixtures("any_light_in_media")
+
 SIZE = 16
 HALF = np.tan(np.radians(10.0))
 """Of the picture at distance 1."""

@@ -22,6 +22,8 @@ from pmviewer.scene.description import (
 from pmviewer.scene.medium import Phase
 from tests.support.scenes import GLASS, cube_mesh, diffuse, rendered, settings_of
 
+pytestmark = pytest.mark.usefixtures("any_light_in_media")
+
 NULL = Material("boundary", "null", (0.0, 0.0, 0.0))
 CAMERA = Camera((0, 0, 4), (0, 0, 0), (0, 1, 0), 20.0)
 METHODS = ("path", "progressive", "gather")

@@ -15,6 +15,7 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
+from pmviewer.kernels.compile.jit import user_cache_root
 from pmviewer.output.checkpoint_header import read_header
 from pmviewer.output.session_file import read_session, write_session
 from pmviewer.output.snapshot import read_snapshot
@@ -175,6 +176,7 @@ from pmviewer.viewer import app
 
 autosave.WORTH = autosave.SHARE = 0.0
 values = {"camera.width": 24, "camera.height": 16, "photons.N": 2000, "display.autosave": 0.05}
+values["display.compile_ahead"] = False
 app.run_viewer("cornell_diffuse", with_values(Settings(), values), 1)
 """
 
@@ -186,7 +188,8 @@ def test_a_killed_window_goes_on_in_the_next_one(tmp_path):
     from pmviewer.engine.session import Session
 
     homes = {f"XDG_{name}_HOME": str(tmp_path / name) for name in ("STATE", "CONFIG")}
-    environment = os.environ | homes | {"PYTHONPATH": os.pathsep.join(sys.path), "HOME": str(tmp_path)}
+    homes |= {"HOME": str(tmp_path), "PMVIEWER_CACHE": str(user_cache_root())}  # with the kernels that there are
+    environment = os.environ | homes | {"PYTHONPATH": os.pathsep.join(sys.path)}
     process = subprocess.Popen([sys.executable, "-c", PROGRAM], env=environment, cwd=tmp_path)
     root, end = tmp_path / "STATE" / "pmviewer" / "autosave", time.monotonic() + 240
     while not (list(root.glob(f"*/{FILM}")) and list(root.glob(f"*/{SESSION}"))):
