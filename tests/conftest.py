@@ -49,7 +49,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     rooms: dict[Path, dict[Path, None]] = defaultdict(dict)
     for item in items:
         rooms[item.path.parent][item.path] = None
-    place = {path: ((i + 0.5) / len(files), str(path)) for files in rooms.values() for i, path in enumerate(files)}
+    # By name: each process side by side has begun at another file.
+    place = {p: ((i + 0.5) / len(files), str(p)) for files in rooms.values() for i, p in enumerate(sorted(files))}
     items.sort(key=lambda item: place[item.path])
 
 
