@@ -53,11 +53,15 @@ PRINTED = (PRINTED_SINGLE, PRINTED_FULL)
 _columns = np.arange(32, dtype=np.int64)
 COLUMNS = 30
 V_P, V_N, V_NS, V_WI, V_PHI, V_F = _columns[[0, 3, 6, 9, 12, 15]]
-V_GAP, V_Q, V_FIRST, V_BLOCKED, V_LAMBERTIAN, V_U, V_V, V_PRIM, V_OPACITY = _columns[18:27]
+V_GAP, V_Q, V_FIRST, V_BLOCKED, V_LAMBERTIAN, V_U, V_V, V_PRIM, V_OPACITY, V_BEAMS = _columns[18:28]
 """Columns of a virtual light, float32: point, geometric and shading normal as the surface has them, direction that the
 photon came from, power in watts, BRDF where it is Lambertian; how far rays start off the surface, what q is made of
 without Y(f_y), whether y is the path's first hit, whether its light sample was blocked, whether it is Lambertian, its
-place on the primitive, the primitive's number as the bits of an int32 (or OF_MEDIUM), the surface's opacity."""
+place on the primitive, the primitive's number as the bits of an int32 (or OF_MEDIUM), the surface's opacity, and how
+many photons it stands for where it scatters them as beams (0: itself alone)."""
+
+BEAM = 6
+"""Floats of such a photon: the direction that it came from, and its share of the light's power in watts."""
 
 OF_MEDIUM = np.uint32(0xFFFFFFFF)
 """In place of the primitive's number: the light has no surface, it is a collision in the medium whose number stands in
@@ -68,6 +72,8 @@ VIRTUAL_DTYPE = np.dtype(
         ("virtual", "i4"),  # tells the record from NO_VIRTUAL
         ("lights", "i8"),  # float32 (n, COLUMNS)
         ("n", "i8"),
+        ("beams", "i8"),  # float32 (n, each, BEAM)
+        ("each", "i8"),
         ("per_pixel", "i8"),  # lights that a pixel asks for
         ("estimator", "i4"),
         ("normalised", "i4"),  # whether walks are made

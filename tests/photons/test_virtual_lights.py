@@ -10,7 +10,7 @@ import pytest
 from pmviewer.engine.opened import open_scene
 from pmviewer.kernels.lights.start import spread_over
 from pmviewer.maps.record import unpack
-from pmviewer.maps.virtual_lights import V_P, V_PHI, V_Q
+from pmviewer.maps.virtual_lights import V_BEAMS, V_LAMBERTIAN, V_P, V_PHI, V_Q, V_WI
 from pmviewer.photons.virtual.choice import as_photons, chosen
 from pmviewer.photons.virtual.lights import neighbours, trajectories, virtual_lights
 from pmviewer.scene.description import SpotLight
@@ -47,6 +47,35 @@ def test_power_of_the_lights_is_what_arrives_on_surfaces(estimator):
     opened = open_scene(diffuse_box())
     total = [made(diffuse_box(), i, number=300, estimator=estimator).rows[:, V_PHI].sum() for i in range(8)]
     assert np.mean(total) == pytest.approx(2 * opened.flat.light_power[0, 0], rel=0.05)
+
+
+def test_a_glossy_light_stands_for_the_photons_around_it_and_for_itself():
+    flat = open_scene("glossy_room").flat
+    lights = virtual_lights(flat, Virtual(photons=4000), Photons(), 1, 0, serial)
+    rows, beams = lights.rows, lights.beams
+    glossy = rows[:, V_LAMBERTIAN] == 0
+    assert 10 < glossy.sum() < len(rows)
+    assert set(rows[glossy, V_BEAMS]) == {9}  # k and itself
+    assert not rows[~glossy, V_BEAMS].any()
+    assert beams[glossy][..., :3] == pytest.approx(beams[glossy][..., :3] / norms(beams[glossy][..., :3]), abs=1e-6)
+    own = norms(beams[glossy][..., :3] - rows[glossy, None, V_WI : V_WI + 3])
+    assert not own.min(axis=1).any()
+    assert (np.sort(own[..., 0], axis=1)[:, 1] > 0).all()
+    # Photons that wait their turn with roulette all bring about the same.
+    power, kept = rows[glossy, V_PHI : V_PHI + 3].sum(), beams[glossy][..., 3:].sum()
+    assert kept == pytest.approx(power, rel=0.03)
+
+
+def norms(vectors):
+    """Their lengths, the last axis kept."""
+    return np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+@pytest.mark.parametrize("values", [{"estimator": "every vertex"}, {"density": "virtual lights"}])
+def test_where_the_map_does_not_weigh_them_lights_stand_for_themselves(values):
+    lights = virtual_lights(open_scene("glossy_room").flat, Virtual(photons=4000, **values), Photons(), 1, 0, serial)
+    assert not lights.rows[:, V_BEAMS].any()
+    assert lights.beams.shape[1] == 0
 
 
 def test_every_candidate_is_chosen_as_often_as_its_probability_says():

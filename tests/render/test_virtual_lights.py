@@ -7,6 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
 from pmviewer.maps.virtual_lights import W_A, W_C, W_F, W_G
 from pmviewer.render.planes import CHANNELS
 from pmviewer.scene.description import Camera, Scene
@@ -140,6 +144,24 @@ def test_passes_reach_the_path_tracer_in_an_open_scene(estimator, normalisation,
     inside = np.s_[2:-2, 2:-2]
     print(f"{estimator}, {normalisation}: {image[inside].mean() / reference[inside].mean():.4f}")
     assert image[inside].mean() == pytest.approx(reference[inside].mean(), rel=0.03)
+
+
+def test_passes_reach_the_path_tracer_where_virtual_lights_are_glossy():
+    """They stand for photons around them, which blurs less from pass to pass."""
+    opened = open_scene("glossy_room")
+    size = {"width": 24, "height": 24}
+
+    def mean(passes, **groups):
+        settings = settings_of(camera=size, **groups)
+        renderer = Renderer(opened, settings, WorkPool(1), StageStore(0))
+        for _ in range(passes):
+            renderer.step()
+        return (renderer.frame(0).image("indirect") @ LUMINANCE).mean()
+
+    truth = mean(1500, render={"method": "path"})
+    found = mean(60, render={"method": "virtual lights"}, virtual={"number": 200})
+    print(f"glossy room: {found / truth:.4f}")
+    assert found == pytest.approx(truth, rel=0.02)
 
 
 def test_without_c_an_open_scene_stays_too_bright_and_the_log_says_so(reference):

@@ -104,7 +104,7 @@ class VirtualStage:
             tree = self.pool.run([lambda: light_tree(lights.rows, ESTIMATORS.index(s.virtual.estimator), flat.radius)])[
                 0
             ]
-        return VirtualMap(lights, virtual_record(flat, s, lights.rows, tree), tree)
+        return VirtualMap(lights, virtual_record(flat, s, lights.rows, tree, lights.beams), tree)
 
 
 def virtual_dtype(virtual: Virtual) -> np.dtype:
@@ -120,7 +120,11 @@ def by_tree(virtual: Virtual) -> bool:
 
 
 def virtual_record(
-    flat: FlatScene, settings: Settings, rows: NDArray[np.float32], tree: NDArray[np.float32] | None = None
+    flat: FlatScene,
+    settings: Settings,
+    rows: NDArray[np.float32],
+    tree: NDArray[np.float32] | None = None,
+    beams: NDArray[np.float32] | None = None,
 ) -> NDArray[np.void]:
     """The record (1,) for kernels of virtual lights (n, COLUMNS), and of the tree over them by which pixels choose."""
     virtual = settings.virtual
@@ -128,6 +132,8 @@ def virtual_record(
     record = np.zeros(1, virtual_dtype(virtual))
     r = record[0]
     r["virtual"], r["lights"], r["n"] = 1, rows.ctypes.data, len(rows)
+    if beams is not None:
+        r["beams"], r["each"] = beams.ctypes.data, beams.shape[1]
     r["per_pixel"] = virtual.per_pixel or len(rows)
     r["estimator"] = estimator
     r["normalised"] = virtual.normalisation != "none" and estimator not in PRINTED

@@ -12,19 +12,22 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.dimensions import VIRTUAL_SALT
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
-from pmviewer.maps.search.kdtree import build_kdtree
+from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
 from pmviewer.maps.virtual_lights import (
+    BEAM,
     COLUMNS,
     ESTIMATORS,
     OF_DENSITY,
     OF_PATHS,
     PRINTED_SINGLE,
     SINGLE,
+    V_BEAMS,
     V_OPACITY,
     V_PHI,
     V_Q,
 )
 from pmviewer.photons.bounces import most_bounces
+from pmviewer.photons.virtual.beams import beams_at
 from pmviewer.photons.virtual.choice import as_photons, choice_probabilities, chosen, in_media
 from pmviewer.photons.virtual.density import lit_areas
 from pmviewer.photons.virtual.flight import C_DROPPED, C_RAYS, C_STORED, N_COUNTS
@@ -51,10 +54,12 @@ FEWEST = 2
 class VirtualLights:
     """`rows` (n, COLUMNS) float32, see `pmviewer.maps.virtual_lights`, with power in watts and q complete but for what
     depends on the point that is lit; `photons` (n, 6) float32 the same as photon records in units of `power_unit`;
+    `beams` (n, k, BEAM) of those that stand for photons around them (`pmviewer.photons.virtual.beams`), k may be 0;
     `candidates` that they were chosen from, of `emitted` trajectories; `rays` cast, candidates `dropped`."""
 
     rows: Float
     photons: Float
+    beams: Float
     power_unit: float
     candidates: int
     emitted: int
@@ -69,7 +74,7 @@ class VirtualLights:
     @property
     def bytes(self) -> int:
         """For the stage store."""
-        return self.rows.nbytes + self.photons.nbytes
+        return self.rows.nbytes + self.photons.nbytes + self.beams.nbytes
 
 
 def trajectories(virtual: Virtual, index: int) -> int:
@@ -122,19 +127,26 @@ def virtual_lights(
     lights = np.ascontiguousarray(rows[kept])
     unit = scene.total_luminance / N
     lights[:, V_PHI : V_PHI + 3] *= (unit * share)[:, None]
+    beams = np.empty((len(lights), 0, BEAM), np.float32)
     if estimator in OF_PATHS:
         lights[:, V_Q] *= share / np.float32(N)
     elif estimator in OF_DENSITY and not in_media(lights).all():
         lie = ~in_media(lights)
         whole, some = estimator == PRINTED_SINGLE, np.ascontiguousarray(lights[lie])
         among = found[~in_media(rows)] if of_map else np.ascontiguousarray(found[kept][lie])
-        q = areas_of(scene, among, some, neighbours(virtual, index), whole, run)
+        tree = run([lambda: build_kdtree(among)])[0]
+        k = neighbours(virtual, index)
+        q = areas_of(scene, tree, some, k, whole, run)
         if of_map:
             q *= share[lie]
+            candidates = rows[~in_media(rows)]
+            beams = np.zeros((len(lights), k + 1, BEAM), np.float32)
+            beams[lie], lights[lie, V_BEAMS] = beams_of(scene, tree, candidates, some, unit * share[lie], k + 1, run)
         lights[lie, V_Q] = q if whole else q * some[:, V_OPACITY]
     return VirtualLights(
         rows=lights,
         photons=as_photons(found[kept], share),
+        beams=beams,
         power_unit=unit,
         candidates=len(rows),
         emitted=N,
@@ -143,13 +155,12 @@ def virtual_lights(
     )
 
 
-def areas_of(scene: FlatScene, photons: Float, lights: Float, k: int, whole: bool, run: Runner) -> Float:
-    """Area (n,) that each of the lights stands for among the photons (m, 6), which hold the lights themselves
+def areas_of(scene: FlatScene, tree: PhotonKdTree, lights: Float, k: int, whole: bool, run: Runner) -> Float:
+    """Area (n,) that each of the lights stands for among the photons of a tree, which hold the lights themselves
     (`pmviewer.photons.virtual.density`)."""
-    tree = run([lambda: build_kdtree(photons)])[0]
     areas = np.empty(len(lights), np.float32)
     reach = np.float32(2 * scene.radius)
-    most = max(1, min(k, len(photons) - 1))
+    most = max(1, min(k, tree.n - 1))
 
     def some(first: int) -> None:
         last = min(first + AREAS, len(lights))
@@ -157,6 +168,22 @@ def areas_of(scene: FlatScene, photons: Float, lights: Float, k: int, whole: boo
 
     run([partial(some, first) for first in range(0, len(lights), AREAS)])
     return areas
+
+
+def beams_of(
+    scene: FlatScene, tree: PhotonKdTree, candidates: Float, lights: Float, share: Float, k: int, run: Runner
+) -> tuple[Float, Float]:
+    """Up to k photons (n, k, BEAM) that each of the lights stands for among the candidates, and how many (n,)."""
+    lights, beams = lights.copy(), np.zeros((len(lights), k, BEAM), np.float32)
+    if "bsdfs" not in (scene.record.dtype.names or ()):  # all scatter evenly
+        return beams, lights[:, V_BEAMS]
+    share, reach = share.astype(np.float32), np.float32(2 * scene.radius)
+
+    def some(first: int) -> None:
+        beams_at(tree.record, candidates, lights, reach, share, beams, first, min(first + AREAS, len(lights)))
+
+    run([partial(some, first) for first in range(0, len(lights), AREAS)])
+    return beams, lights[:, V_BEAMS]
 
 
 def _batch(scene: FlatScene, record: NDArray[np.void], i0: int, i1: int) -> tuple[Float, Float, NDArray[np.int64]]:

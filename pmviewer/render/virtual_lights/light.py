@@ -15,11 +15,13 @@ from pmviewer.kernels.media.phase import phase
 from pmviewer.kernels.memory import load_f4, load_i4
 from pmviewer.kernels.scene import load3, material_of
 from pmviewer.kernels.surface import face
-from pmviewer.kernels.vector import dot, luminance, scale, sub
+from pmviewer.kernels.vector import add, dot, luminance, mul, scale, sub
 from pmviewer.maps.virtual_lights import (
+    BEAM,
     COLUMNS,
     FULL,
     MODIFIED,
+    V_BEAMS,
     V_BLOCKED,
     V_F,
     V_FIRST,
@@ -28,6 +30,7 @@ from pmviewer.maps.virtual_lights import (
     V_N,
     V_NS,
     V_P,
+    V_PHI,
     V_PRIM,
     V_Q,
     V_U,
@@ -80,7 +83,7 @@ def facing_of(scene, virtual, row, ny, wi):
 
 @specialised
 def sent(scene, virtual, row, glossy, wo):
-    """`scattered` of a light of any kind: of a collision in a medium by its phase function."""
+    """`scattered` by a light of any kind: by a collision in a medium with its phase function."""
     if not has_media(scene):
         return lambda scene, virtual, row, glossy, wo: scattered(scene, virtual, row, glossy, wo)
 
@@ -89,7 +92,7 @@ def sent(scene, virtual, row, glossy, wo):
             wi = load3(virtual.lights, row + V_WI)
             medium = _i8(load_f4(virtual.lights, row + V_U))
             p = phase(phase_numbers(scene, medium), (-wi[0], -wi[1], -wi[2]), wo)
-            return (p, p, p), _f4(0.0)
+            return scale(load3(virtual.lights, row + V_PHI), p), (p, p, p), _f4(0.0)
         return scattered(scene, virtual, row, glossy, wo)
 
     return perhaps_in_media
@@ -97,25 +100,44 @@ def sent(scene, virtual, row, glossy, wo):
 
 @specialised
 def scattered(scene, virtual, row, glossy, wo):
-    """BRDF of the light towards wo (red, green, blue), which is on its lit side, and its albedo seen from there, 0
-    where its weight does not ask for it."""
+    """What the light sends towards wo, which is on its lit side: f_y·Φ, f_y, each red, green, blue, and its albedo seen
+    from there; these two are nothing where its weight does not ask for them."""
     if not has(scene, "bsdfs"):
 
         def plain(scene, virtual, row, glossy, wo):
-            f = load3(virtual.lights, row + V_F)
-            return f, _f4(math.pi) * luminance(f)
+            return _evenly(virtual, row)
 
         return plain
 
     def any_bsdf(scene, virtual, row, glossy, wo):
         if load_f4(virtual.lights, row + V_LAMBERTIAN) != _f4(0.0):
-            f = load3(virtual.lights, row + V_F)
-            return f, _f4(math.pi) * luminance(f)
+            return _evenly(virtual, row)
         b, wi = bsdf_of(scene, virtual, row, glossy)
+        beams = _i8(load_f4(virtual.lights, row + V_BEAMS))
+        if beams > 0:
+            return _by_beams(virtual, row, beams, b, wo), _BLACK, _f4(0.0)
         f = bsdf_f(b, STORED, wi, wo)
-        return f, albedo_seen(scene, virtual, row, b, wo)
+        return mul(f, load3(virtual.lights, row + V_PHI)), f, albedo_seen(scene, virtual, row, b, wo)
 
     return any_bsdf
+
+
+@device
+def _evenly(virtual, row):
+    f = load3(virtual.lights, row + V_F)
+    return mul(f, load3(virtual.lights, row + V_PHI)), f, _f4(math.pi) * luminance(f)
+
+
+@device
+def _by_beams(virtual, row, beams, b, wo):
+    """What the light sends of the photons that it stands for (`pmviewer.photons.virtual.beams`)."""
+    at = row // COLUMNS * virtual.each * BEAM
+    total = _BLACK
+    for _ in range(beams):
+        f = bsdf_f(b, STORED, load3(virtual.beams, at), wo)
+        total = add(total, mul(f, load3(virtual.beams, at + 3)))
+        at += BEAM
+    return total
 
 
 @specialised

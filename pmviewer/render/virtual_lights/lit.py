@@ -16,14 +16,12 @@ from pmviewer.kernels.dimensions import VIRTUAL_SUBSET
 from pmviewer.kernels.media.medium import has_media
 from pmviewer.kernels.memory import load_i4, stack_i4
 from pmviewer.kernels.random import draw1
-from pmviewer.kernels.scene import load3
 from pmviewer.kernels.surface import leave
 from pmviewer.kernels.vector import dot, is_good, largest, luminance, mul, scale
 from pmviewer.maps.virtual_lights import (
     CLAMPED,
     PRINTED_FULL,
     UNWEIGHTED,
-    V_PHI,
     W_A,
     W_C,
     W_F,
@@ -130,8 +128,8 @@ def one_light(given, si, j):
         return nothing
     wo = (-wi[0], -wi[1], -wi[2])
     geometry = cos * facing / distance2
-    f_y, albedo = sent(scene, virtual, row, given.eye.glossy, wo)
-    F = scale(mul(mul(f, f_y), load3(virtual.lights, row + V_PHI)), geometry)
+    light, f_y, albedo = sent(scene, virtual, row, given.eye.glossy, wo)
+    F = scale(mul(f, light), geometry)
     G = luminance(f) * geometry * weight_of(virtual, row, f_y, albedo)
     return F, G, geometry, wi, leave(y, ny, gap, wo[0], wo[1], wo[2])
 
