@@ -21,7 +21,7 @@ from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.statistics import Outcome
 from pmviewer.bench.agree.tree import from_json
 from pmviewer.bench.agree.trial import FIRST, STAGES, Question, has_panes, methods_of, questions
-from pmviewer.bench.agree.verdict import Comparison, Verdict
+from pmviewer.bench.agree.verdict import DIED, Comparison, Verdict
 from pmviewer.bench.agree.workers import try_scenes
 from pmviewer.bench.registry import run_bench
 from pmviewer.errors import OutputError, PmviewerError, SettingError
@@ -310,11 +310,12 @@ def test_verdicts_are_kept_and_a_run_goes_on_from_them(tmp_path, monkeypatch):
     assert ran == [0]
 
 
-def test_a_verdict_whose_reason_is_no_longer_known_is_not_kept(tmp_path):
+def test_verdicts_whose_reason_is_no_longer_known_and_processes_that_died_are_not_kept(tmp_path):
     path = tmp_path / "kept.json"
     kept = results.Results(path, 7)
     kept.keep(1, Verdict([comparison("path", 1e-9, known="a deviation of the past")]))
     kept.keep(2, Verdict([comparison("path", 0.0, math.nan, known="textured light + vertex normals")], lit=0.25))
+    kept.keep(3, Verdict(refused=DIED))
     again = results.Results(path, 7).kept({1, 2, 3})
     assert list(again) == [2]
     assert repr(again[2]) == repr(kept.kept({2})[2])  # NaN equals nothing

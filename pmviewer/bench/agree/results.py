@@ -20,7 +20,7 @@ from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.statistics import BLOCK, Outcome
 from pmviewer.bench.agree.tree import to_json
 from pmviewer.bench.agree.trial import FORGIVEN, STAGES, SUSPICIOUS
-from pmviewer.bench.agree.verdict import Comparison, Verdict
+from pmviewer.bench.agree.verdict import DIED, Comparison, Verdict
 from pmviewer.bench.agree.xml import MAX_DEPTH, SIZE
 from pmviewer.bench.collected import revision, sources_stamp
 from pmviewer.errors import OutputError
@@ -77,8 +77,9 @@ class Results:
             self._entries[line["scene"]] = entry
 
     def kept(self, wanted: Collection[int], again: bool = False) -> dict[int, Verdict]:
-        """Those of the wanted scenes that need not be run. With `again`, those of the present sources alone."""
-        found = {index: entry for index, entry in self._entries.items() if index in wanted}
+        """Those of the wanted scenes that need not be run; with `again`, those of the present sources alone. Scenes
+        whose process died are run again: it may have been ended from outside."""
+        found = {i: entry for i, entry in self._entries.items() if i in wanted and entry.verdict.refused != DIED}
         return {index: e.verdict for index, e in found.items() if not again or e.sources == self.sources}
 
     def keep(self, index: int, verdict: Verdict) -> None:

@@ -9,6 +9,10 @@ if TYPE_CHECKING:
     from pmviewer.bench.agree.statistics import Outcome
 
 
+DIED = "the process died"
+"""Why a scene was refused that ended the process which tried it."""
+
+
 @dataclass(frozen=True)
 class Comparison:
     """`method` against `peer` in `what`; the outcome of the last stage that was needed, counted from 1. `final`:

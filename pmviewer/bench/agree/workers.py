@@ -19,7 +19,7 @@ from pmviewer.bench.agree.generate import scene_of
 from pmviewer.bench.agree.process import end_with, tools
 from pmviewer.bench.agree.triage import all_explained
 from pmviewer.bench.agree.trial import tried
-from pmviewer.bench.agree.verdict import Verdict
+from pmviewer.bench.agree.verdict import DIED, Verdict
 from pmviewer.engine.pool import available_threads
 
 OWN_KERNELS = 8
@@ -50,7 +50,7 @@ def try_scenes(
         for index in suspects:
             alone = yield from _side_by_side(seed, [index], work, 1)
             if alone:
-                yield index, Verdict(refused="the process died")
+                yield index, Verdict(refused=DIED)
                 waiting.remove(index)
             else:
                 waiting = [i for i in waiting if i != index]
