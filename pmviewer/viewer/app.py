@@ -222,6 +222,7 @@ class ViewerApp:
     def _over_everything(self) -> None:
         modals = self.commands.modals
         asking = self.restore_dialog.is_open or any(modal.is_open for modal in modals)
+        covered = asking or self.dialogs.is_open or self.commands.palette.is_open or self.state.help_open
         if not (asking or self.dialogs.is_open or self.commands.palette.is_open):
             run_shortcuts(self.commands.table, self.commands.choose_view, self.state.flying, self.state.history)
         self.state.flipped = not self.dialogs.is_open and is_held(FLIP_KEY)
@@ -232,7 +233,7 @@ class ViewerApp:
         for modal in modals:
             modal.gui()
         self.restore_dialog.gui()
-        if not self.restore_dialog.is_open:  # first what a crash has left, then what is new
+        if not (covered or self.restore_dialog.is_open):  # the tour waits for what the user, or a crash, has left open
             self.tour.gui()
 
     def _before_swap(self) -> None:

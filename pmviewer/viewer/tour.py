@@ -1,4 +1,8 @@
-"""The first tour: five steps with the window's own controls highlighted; shown once, and again from the Help menu."""
+"""The first tour: five steps with the window's own controls highlighted; shown once, and again from the Help menu.
+
+What is highlighted can be used; what is dark takes neither clicks nor the wheel, or the second click of a double click
+on "Next", when the card is elsewhere already, would land in the picture.
+"""
 
 from __future__ import annotations
 
@@ -103,8 +107,12 @@ class Tour:
                 window.is_visible = window.focus_window_at_next_frame = True
 
     def gui(self) -> None:
-        """Draw the step that is shown, over everything."""
+        """Draw the step that is shown, over everything. Esc ends it."""
         if self.number is None:
+            return
+        popup = imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+        if not popup and imgui.is_key_pressed(imgui.Key.escape, False):
+            self.end()
             return
         step, area = STEPS[self.number], imgui.get_main_viewport()
         whole = area.pos.x, area.pos.y, area.pos.x + area.size.x, area.pos.y + area.size.y
@@ -128,6 +136,8 @@ class Tour:
         imgui.pop_style_color()
         if shown:
             if found is not None:
+                if not popup:  # of what is highlighted: it may reach into the dark
+                    _shield(found, whole)
                 corner, size = imgui.get_window_pos(), imgui.get_window_size()
                 _highlight(found, whole, (corner.x, corner.y, corner.x + size.x, corner.y + size.y))
             self._card(step, wide)
@@ -188,6 +198,23 @@ def without(rectangle: Rectangle, hole: Rectangle) -> list[Rectangle]:
     y0, y1 = (min(max(y, top), bottom) for y in (hole[1], hole[3]))
     parts = [(left, top, right, y0), (left, y1, right, bottom), (left, y0, x0, y1), (x1, y0, right, y1)]
     return [part for part in parts if part[0] < part[2] and part[1] < part[3]]
+
+
+def _shield(target: Rectangle, whole: Rectangle) -> None:
+    """Windows that nobody sees take the mouse where it is dark, below the card, which is the current window."""
+    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
+    flags |= imgui.WindowFlags_.no_background | imgui.WindowFlags_.no_nav | imgui.WindowFlags_.no_move
+    flags |= imgui.WindowFlags_.no_focus_on_appearing
+    card = imgui.internal.get_current_window()
+    for number, (left, top, right, bottom) in enumerate(without(whole, target)):
+        imgui.set_next_window_pos((left, top))
+        imgui.set_next_window_size((right - left, bottom - top))
+        imgui.push_style_var(imgui.StyleVar_.window_min_size, (1, 1))
+        imgui.begin(f"##dark{number}", None, flags)
+        imgui.pop_style_var()
+        imgui.internal.bring_window_to_display_front(imgui.internal.get_current_window())
+        imgui.end()
+    imgui.internal.bring_window_to_display_front(card)
 
 
 def _highlight(target: Rectangle, whole: Rectangle, card: Rectangle) -> None:

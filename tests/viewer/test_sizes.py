@@ -6,7 +6,7 @@ import glfw
 import pytest
 from imgui_bundle.glfw_utils import glfw_window_hello_imgui
 
-from pmviewer.viewer.panels.toolbar import Item, _how_many
+from pmviewer.viewer.panels.widgets import how_many
 from tests.viewer.driver import drive, on_window_thread
 
 
@@ -43,8 +43,8 @@ def test_what_has_no_room_in_the_toolbar_is_behind_its_last_button(app, session)
 
 
 def test_as_many_items_as_fit_with_the_button_for_the_rest():
-    items = [Item(width, lambda: None) for width in (10.0, 20.0, 30.0)]
-    assert _how_many(items, 60.0, 5.0) == 3
-    assert _how_many(items, 59.0, 5.0) == 2
-    assert _how_many(items, 34.0, 5.0) == 1
-    assert _how_many(items, 12.0, 5.0) == 0
+    widths = (10.0, 20.0, 30.0)
+    assert how_many(widths, 60.0, 5.0) == 3
+    assert how_many(widths, 59.0, 5.0) == 2
+    assert how_many(widths, 34.0, 5.0) == 1
+    assert how_many(widths, 12.0, 5.0) == 0

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from imgui_bundle import ImVec2, imgui
 
 from pmviewer.viewer.tour import STEPS, beside, without
-from tests.viewer.driver import drive, make_app
+from tests.viewer.driver import drag_picture, drive, make_app
 from tests.viewer.fake_session import FakeSession
 
 
@@ -35,6 +36,75 @@ def test_all_steps_point_at_something_and_the_card_is_in_the_window(tmp_path, mo
         c.item_click("//Tour/Skip the tour##tour")
         c.yield_(2)
         assert tour.number is None
+
+    drive(app, script)
+
+
+def test_what_is_dark_takes_no_clicks_and_what_is_lit_is_live(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    session = FakeSession()
+    session.open("box")
+    app = make_app(session, tmp_path)
+
+    def script(c):
+        tour, state = app.tour, app.state
+        poses = [state.live_camera()]
+
+        def moved_by_a_drag():
+            drag_picture(c, app, 60, 30)
+            c.yield_(2)
+            poses.append(state.live_camera())
+            return poses[-1] != poses[-2]
+
+        tour.begin()
+        c.yield_(6)
+        x, y = app.viewport.origin
+        c.mouse_move_to_pos(ImVec2(x + app.viewport.size[0] / 2, y + 0.85 * app.viewport.size[1]))
+        c.mouse_down(0)
+        c.mouse_move_to_pos(ImVec2(x + app.viewport.size[0] / 2 + 60, y + 0.85 * app.viewport.size[1] + 20))
+        c.mouse_up(0)
+        c.yield_(3)
+        assert state.live_camera() != poses[0], "the picture is lit: it turns"
+        c.item_click("//Tour/Next##tour")
+        c.mouse_click(0)  # at once, as a double click does
+        c.yield_(4)
+        assert tour.number == 1
+        assert state.inspector.pinned is None
+        poses.append(state.live_camera())
+        assert not moved_by_a_drag(), "the picture is dark"
+        c.mouse_wheel_y(3.0)
+        c.yield_(3)
+        assert state.live_camera() == poses[-1]
+        c.item_click("//Tour/Next##tour")
+        assert tour.number == 2, "the card lies above"
+        c.key_press(imgui.Key.escape)
+        c.yield_(4)
+        assert tour.number is None
+        assert moved_by_a_drag()
+
+    drive(app, script)
+
+
+def test_it_waits_for_what_was_opened(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    session = FakeSession()
+    session.open("box")
+    app = make_app(session, tmp_path)
+
+    def script(c):
+        def shown():
+            return c.item_exists("//Tour/Next##tour")
+
+        app.tour.begin()
+        c.yield_(4)
+        assert shown()
+        app.state.help_open = True
+        c.yield_(4)
+        assert not shown()
+        c.key_press(imgui.Key.escape)
+        c.yield_(4)
+        assert app.tour.number == 0, "Esc closed what lay above"
+        assert shown()
 
     drive(app, script)
 

@@ -6,11 +6,14 @@ from imgui_bundle import imgui
 
 from pmviewer.engine.frame import Status
 from pmviewer.viewer import theme
+from pmviewer.viewer.background import Work
 from pmviewer.viewer.format import duration, grouped, si
+from pmviewer.viewer.panels.widgets import how_many
 from pmviewer.viewer.state import ViewerState
 
 _COLOURS = {"rendering": "accent", "finished": "good", "failed": "error", "paused": "warning"}
 """Of states, as looks name them."""
+_MORE, _CANCEL = "…", "Cancel"
 
 
 def status_parts(state: ViewerState) -> list[str]:
@@ -96,21 +99,53 @@ def draw_status_bar(state: ViewerState) -> None:
         imgui.same_line()
         if imgui.small_button("Stop##ahead"):
             state.session.stop_compiling_ahead()
-    for part in status_parts(state):
-        imgui.same_line()
-        imgui.text_disabled("·")
-        imgui.same_line()
-        imgui.text_unformatted(theme.drawable(part))
-    for work in state.background.running():
-        if not work.lane.shown:
-            continue
-        imgui.same_line()
-        imgui.text_disabled("·")
-        imgui.same_line()
-        waited = f" {duration(work.seconds)}" if work.seconds > 0.5 else ""
-        far = "" if work.share is None else f" {work.share:.0%}"
-        imgui.text_colored(imgui.ImVec4(*theme.ACCENT), f"{work.title} …{far}{waited}")
-        if work.stop is not None and work.share is not None:
+    works = [(work, _work_text(work)) for work in state.background.running() if work.lane.shown]
+    _figures(status_parts(state), sum(_width(text) + _button_width(work) for work, text in works))
+    for work, text in works:
+        _dot()
+        imgui.text_colored(imgui.ImVec4(*theme.ACCENT), text)
+        if _can_be_cancelled(work):
             imgui.same_line()
-            if imgui.small_button(f"Cancel##{work.title}"):
+            if imgui.small_button(f"{_CANCEL}##{work.title}"):
                 work.cancel()
+
+
+def _figures(parts: list[str], kept: float) -> None:
+    """The first of the pieces, as many as fit, so much room being `kept` for what follows; the others under the mouse
+    at a mark."""
+    right = imgui.get_window_pos().x + imgui.get_window_size().x - imgui.get_style().window_padding.x
+    count = how_many([_width(part) for part in parts], right - imgui.get_item_rect_max().x - kept, _width(_MORE))
+    for part in parts[:count]:
+        _dot()
+        imgui.text_unformatted(theme.drawable(part))
+    if count < len(parts):
+        _dot()
+        imgui.text_unformatted(_MORE)
+        imgui.set_item_tooltip(theme.drawable(" · ".join(parts[count:])))
+
+
+def _dot() -> None:
+    imgui.same_line()
+    imgui.text_disabled("·")
+    imgui.same_line()
+
+
+def _width(text: str) -> float:
+    """Of a piece with the dot before it."""
+    return float(imgui.calc_text_size(theme.drawable(f"·{text}")).x + 2 * imgui.get_style().item_spacing.x)
+
+
+def _work_text(work: Work) -> str:
+    waited = f" {duration(work.seconds)}" if work.seconds > 0.5 else ""
+    far = "" if work.share is None else f" {work.share:.0%}"
+    return f"{work.title} …{far}{waited}"
+
+
+def _can_be_cancelled(work: Work) -> bool:
+    return work.stop is not None and work.share is not None
+
+
+def _button_width(work: Work) -> float:
+    style = imgui.get_style()
+    wide = imgui.calc_text_size(_CANCEL).x + 2 * style.frame_padding.x + style.item_spacing.x
+    return float(wide) if _can_be_cancelled(work) else 0.0

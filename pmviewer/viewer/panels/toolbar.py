@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import accumulate
 
 from imgui_bundle import icons_fontawesome_6 as fa
 from imgui_bundle import imgui
@@ -12,7 +11,7 @@ from imgui_bundle import imgui
 from pmviewer.output.diagnostic_views import DIAGNOSTICS
 from pmviewer.settings.access import SETTINGS, get
 from pmviewer.viewer import theme
-from pmviewer.viewer.panels.widgets import SettingWidgets, icon_button, tooltip_text
+from pmviewer.viewer.panels.widgets import SettingWidgets, how_many, icon_button, tooltip_text
 from pmviewer.viewer.shortcuts import keys_of
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport.viewport import is_data_view
@@ -54,7 +53,7 @@ class Toolbar:
     def gui(self) -> None:
         """What fits, from the left; the rest behind a button at the end."""
         items, room = self._items(), imgui.get_content_region_avail().x
-        fits = _how_many(items, room, _button_width())
+        fits = how_many([item.width for item in items], room, _button_width())
         corner, wide = imgui.get_cursor_screen_pos(), sum(item.width for item in items[:_CHOICES])
         for item in items[:fits]:
             item.draw()
@@ -180,11 +179,3 @@ def _gap() -> Item:
 
 def _button_width() -> float:
     return 1.15 * imgui.get_frame_height()
-
-
-def _how_many(items: list[Item], room: float, more: float) -> int:
-    """How many of the items fit into that width, with a button at the end (`more` wide) if it isn't all."""
-    if sum(item.width for item in items) <= room:
-        return len(items)
-    ends = list(accumulate(item.width for item in items))
-    return sum(end <= room - more for end in ends)

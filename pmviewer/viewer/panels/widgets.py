@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Any
 
 from imgui_bundle import icons_fontawesome_6 as fa
@@ -18,6 +19,14 @@ from pmviewer.viewer.value_text import value_text
 _FLAGS = imgui.SliderFlags_.no_input | imgui.SliderFlags_.always_clamp
 WIDE_RANGE = 1000
 """A linear range with more steps than this is dragged relatively: a slider would jump over most of its values."""
+
+
+def how_many(widths: Sequence[float], room: float, more: float) -> int:
+    """How many pieces of those widths, the first ones, fit into the room, with a mark at the end (`more` wide) if it
+    isn't all."""
+    if sum(widths) <= room:
+        return len(widths)
+    return sum(end <= room - more for end in accumulate(widths))
 
 
 def range_text(info: SettingInfo) -> str:

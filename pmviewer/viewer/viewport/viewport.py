@@ -33,6 +33,7 @@ from pmviewer.viewer.viewport.navigation import DRAG_THRESHOLD, Clicks, Navigati
 from pmviewer.viewer.viewport.picking import picked
 from pmviewer.viewer.viewport.picture import Picture
 from pmviewer.viewer.viewport.region import RegionDrag
+from pmviewer.viewer.viewport.slice_handle import SliceHandle
 from pmviewer.viewer.viewport.surroundings import STOPPED, Surroundings
 from pmviewer.viewer.viewport.target import Fit, Target
 
@@ -66,6 +67,7 @@ class Viewport:
         self.widgets = SettingWidgets(state.refused_view, state.choices)
         """Of the settings beside the legend."""
         self.gizmo = Gizmo(self)
+        self.slice = SliceHandle(self)
         self._navigation = Navigation(self)
         self._clicks = Clicks()
         self._splitting = False
@@ -204,6 +206,7 @@ class Viewport:
         if not self.alone and self._texture is not None:
             imgui.set_cursor_screen_pos(corner)
             self.gizmo.gui(self.shown_camera())
+        self.slice.gui(self.shown_camera() if self._texture is not None else None)
         imgui.set_cursor_screen_pos(corner)
         buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_middle
         if self.gizmo.wants_mouse:
@@ -230,7 +233,7 @@ class Viewport:
             self._navigation.handle(pose, hovered, active)
         if self._clicks.clicked(active) and not (drawing or self.state.flying or self.state.shown_pair() is not None):
             self._pin()
-        draw_hud(self, hovered and not self.alone)
+        draw_hud(self, (hovered or self.slice.holds_mouse) and not self.alone)
         self.draw_toasts()
 
     def split_x(self) -> float | None:

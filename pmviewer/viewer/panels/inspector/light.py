@@ -95,7 +95,7 @@ def draw_history(history: History) -> None:
     text = f"{mean[-1]:.4g}"
     if np.isfinite(error[-1]):
         text += f" ± {error[-1]:.2g}"
-    imgui.text_unformatted(f"{text} after {grouped(int(history.passes[-1]))} passes")
+    imgui.text_wrapped(f"{text} after {grouped(int(history.passes[-1]))} passes")
     imgui.set_item_tooltip(
         "Luminance in W/(m² sr) and its standard error by the spread of single passes since the pixel was pinned. "
         "Passes complement each other: the true error tends to be smaller."
