@@ -25,7 +25,8 @@ def test_targets_compare_with_the_plain_sum():
     found = dict.fromkeys(virtual.ESTIMATORS, (0.4, 6.0, 0.2, 0.1))
     found["single step"] = (0.01, 1.0, 0.01, -0.7)
     found["full path"] = (0.1, 1.0, 0.1, 0.2)
-    targets = {target.note: target for target in virtual.targets_of(found, "room")}
+    targets = {target.note.partition(";")[0]: target for target in virtual.targets_of(found, "room")}
+    assert all("render.filter_radius=0.1" in target.note for target in virtual.targets_of(found, "room"))
     assert targets["room: single step, relMSE at equal number of lights"].value == pytest.approx(0.025)
     assert targets["room: single step, relMSE at equal CPU time"].value == pytest.approx(0.05)
     assert not targets["room: full path, relMSE at equal number of lights"].ok

@@ -43,6 +43,7 @@ CONVERGING = ("unweighted", "single step", "full path", "every vertex", "modifie
 EPSILON = 0.05
 MIDDLES: Mapping[str, Any] = {"render.filter": "box", "render.filter_radius": 0.1}
 """Settings by which a pixel looks at its middle fifth."""
+AS_SEEN = ", ".join(f"{name}={value}" for name, value in MIDDLES.items())
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 F8 = NDArray[np.float64]
 
@@ -174,14 +175,17 @@ def targets_of(found: Mapping[str, tuple[float, float, float, float]], name: str
     """Of a scene, by (relMSE, percentile, relMSE at equal time, distance after many passes) of the estimators."""
     error, percentile, timed, _ = found["unweighted"]
     single, full, every = found["single step"], found["full path"], found["every vertex"]
+    equal, seen = "relMSE at equal number of lights", f"; {AS_SEEN}"
     targets = [
-        Target("R10", single[0] / error, 0.05, "", False, f"{name}: single step, relMSE at equal number of lights"),
-        Target("R10", single[2] / timed, 0.1, "", False, f"{name}: single step, relMSE at equal CPU time"),
-        Target("R10", full[0] / error, 0.1, "", False, f"{name}: full path, relMSE at equal number of lights"),
-        Target("R10", every[0] / error, 0.1, "", False, f"{name}: every vertex, relMSE at equal number of lights"),
-        Target("R10", percentile / single[1], 5.0, "×", True, f"{name}: single step, 99.9th percentile of the error"),
+        Target("R10", single[0] / error, 0.05, "", False, f"{name}: single step, {equal}{seen}"),
+        Target("R10", single[2] / timed, 0.1, "", False, f"{name}: single step, relMSE at equal CPU time{seen}"),
+        Target("R10", full[0] / error, 0.1, "", False, f"{name}: full path, {equal}{seen}"),
+        Target("R10", every[0] / error, 0.1, "", False, f"{name}: every vertex, {equal}{seen}"),
+        Target(
+            "R10", percentile / single[1], 5.0, "×", True, f"{name}: single step, 99.9th percentile of the error{seen}"
+        ),
     ]
     for estimator in CONVERGING:
-        note = f"{name}: {estimator}, mean of the picture after many passes"
+        note = f"{name}: {estimator}, mean of the picture after many passes; {AS_SEEN}"
         targets.append(Target("R10", abs(found[estimator][3]), 0.5, "%", False, note))
     return targets
