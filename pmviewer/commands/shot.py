@@ -89,7 +89,7 @@ def take_shot(
     if window and window_size is not None:
         look["window_size"], look["scale"] = _window_size(window_size)
     make = partial(ViewerApp, remember=False, shot=shot, picture_size=picture_size, captions=captions, **look)
-    start_viewer(make, job.scene, settings, threads, job.parameters, snapshots=job.snapshots)
+    start_viewer(make, job.scene, settings, threads, job.parameters, snapshots=job.snapshots, clicks=False)
     if not shot.done:
         raise shot.error or WindowError("The window was closed before the picture was taken.")
     if shot.error is not None:

@@ -54,11 +54,12 @@ class Session:
         settings: Settings | None = None,
         *,
         compiles_ahead: bool = False,
+        clicks: bool = True,
         helper: Helper | None = None,
         cluster: str | None = None,
     ) -> None:
-        """compiles_ahead: in a process beside this one, `pmviewer.engine.ahead`, first in `helper` if that waits;
-        cluster: whose workers render passes (`pmviewer.engine.pass_maker`)."""
+        """compiles_ahead: in a process beside this one, first in `helper` if that waits, the first picture and, with
+        `clicks`, what they may need; cluster: whose workers render passes (`pmviewer.engine.pass_maker`)."""
         self.geometry: DrawGeometry | None = None
         self._published = Published()
         self._changed = self._published.changed
@@ -88,7 +89,8 @@ class Session:
         self.workers = PassMaker(self._published, cluster, self._pool.threads)
         self._previews = Previews(self._pool, self._published)
         self._renderer: Renderer | None = None
-        self._ahead = Ahead(self._pool.threads, self._published.notify, helper) if compiles_ahead else None
+        notify, threads = self._published.notify, self._pool.threads
+        self._ahead = Ahead(threads, notify, helper, clicks=clicks) if compiles_ahead else None
         self._worker = threading.Thread(target=self._work, name="pmviewer session", daemon=True)
         self._worker.start()
 

@@ -57,7 +57,9 @@ def check_screen() -> None:
         glfw.set_error_callback(reporting)
 
 
-def _make_session(threads: int | None, settings: Settings | None, cluster: str | None) -> Callable[[], SessionLike]:
+def _make_session(
+    threads: int | None, settings: Settings | None, cluster: str | None, clicks: bool
+) -> Callable[[], SessionLike]:
     def make() -> SessionLike:
         from pmviewer.engine.ahead.early import early_helper
         from pmviewer.kernels.compile import elsewhere
@@ -70,7 +72,7 @@ def _make_session(threads: int | None, settings: Settings | None, cluster: str |
         from pmviewer.engine.session import Session
 
         few_arenas()
-        return Session(threads, settings, compiles_ahead=True, helper=helper, cluster=cluster)
+        return Session(threads, settings, compiles_ahead=True, clicks=clicks, helper=helper, cluster=cluster)
 
     return make
 
@@ -99,12 +101,14 @@ def start_viewer(
     snapshots: Sequence[tuple[int, Path]] = (),
     cluster: str | None = None,
     leave: bool = False,
+    clicks: bool = True,
 ) -> int:
     """See `pmviewer.viewer.app.run_viewer`. With `leave` the process ends here when the window has closed while the
     engine is busy: a kernel that is being compiled can't be interrupted, and there is nothing of it to keep. Such a
-    window, the user's own, also keeps session and film on disk for the case of a crash."""
+    window, the user's own, also keeps session and film on disk for the case of a crash. Without `clicks` nobody will
+    click, and nothing is compiled for it."""
     check_screen()
-    link = SessionLink(_make_session(threads, settings, cluster), settings)
+    link = SessionLink(_make_session(threads, settings, cluster, clicks), settings)
     app = make_app(link, inactive_reason=_inactive_reason, autosaves=autosaves() if leave else None)
     background = app.state.background
     app.state.automatic.at_start = leave

@@ -225,6 +225,12 @@ def test_the_setting_turns_it_off(box, quick):
     assert ahead._timer is None
 
 
+def test_where_nobody_clicks_nothing_is_compiled_for_it(box, quick):
+    ahead = Ahead(2, lambda: None, clicks=False)
+    ahead.shown(box, Settings())
+    assert ahead._timer is None
+
+
 def test_a_change_of_a_number_is_no_other_state(box, quick):
     ahead = Ahead(2, lambda: None)
     ahead.shown(box, Settings())

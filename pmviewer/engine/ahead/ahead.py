@@ -32,8 +32,16 @@ QUIET = 10.0
 class Ahead:
     """`text` says what is being compiled, "" when nothing is. `on_change` is called from any thread."""
 
-    def __init__(self, threads: int | None, on_change: Callable[[], None], early: Helper | None = None) -> None:
-        """early: a process that waits to be asked (`early`), ended here if it is not needed."""
+    def __init__(
+        self,
+        threads: int | None,
+        on_change: Callable[[], None],
+        early: Helper | None = None,
+        *,
+        clicks: bool = True,
+    ) -> None:
+        """early: a process that waits to be asked (`early`), ended here if it is not needed; clicks: whether there will
+        be any."""
         self._threads = threads or available_threads()
         self._on_change = on_change
         self._lock = threading.Lock()
@@ -41,6 +49,7 @@ class Ahead:
         self._helper: Helper | None = None
         self._timer: threading.Timer | None = None
         self._waiting: tuple[int, str] | None = None
+        self._clicks = clicks
         self._closed = False
 
     @property
@@ -64,7 +73,8 @@ class Ahead:
         """The picture of these settings is up: what a click would need comes next, once it is quiet."""
         state = opened.uid, _words(settings)
         with self._lock:
-            if self._closed or state == self._waiting or not settings.display.compile_ahead:
+            wanted = self._clicks and settings.display.compile_ahead
+            if self._closed or state == self._waiting or not wanted:
                 return
             self._forget()
             self._waiting = state
