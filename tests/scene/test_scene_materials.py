@@ -210,7 +210,7 @@ def test_emitters(tmp_path: Path) -> None:
         '<shape type="rectangle"><emitter type="area"><rgb name="radiance" value="3 2 1"/></emitter></shape>',
         '<emitter type="point"><point name="position" value="1 2 3"/><rgb name="intensity" value="5"/></emitter>',
         '<emitter type="point"><transform name="to_world"><translate y="4"/></transform></emitter>',
-        '<emitter type="collimated"/>',
+        '<emitter type="volume"/>',
     )
     assert scene.shapes[0].radiance == (3, 2, 1)
     near, above, sky = scene.lights
@@ -220,7 +220,7 @@ def test_emitters(tmp_path: Path) -> None:
     assert (near.position, near.intensity) == ((1, 2, 3), (5, 5, 5))
     assert (above.position, above.intensity) == ((0, 4, 0), (1, 1, 1))
     assert sky.radiance == (1, 1, 1)
-    assert scene.warnings == ('line 5: <emitter type="collimated"> is not supported and was ignored.',)
+    assert scene.warnings == ('line 5: <emitter type="volume"> is not supported and was ignored.',)
 
 
 def test_lights_without_power_are_dropped_and_counted(tmp_path: Path) -> None:
