@@ -50,6 +50,11 @@ LIGHT_FIELDS: list[tuple[str, str]] = [
     ("sky_width", "i8"),
     ("sky_height", "i8"),
 ]
+PROJECTOR_FIELDS: list[tuple[str, str]] = [
+    ("projectors", "i8"),  # int64 (n_projectors, PROJECTOR_COLUMNS): first of its numbers, columns, rows
+    ("projector_numbers", "i8"),  # float32: pictures and their tables, see `pmviewer.kernels.lights.projector`
+]
+"""Of scenes with projectors; they have LIGHT_FIELDS, too."""
 TEXTURE_FIELDS: list[tuple[str, str]] = [
     ("uvs", "i8"),  # float32 (n_triangles, 6): corners' texture coordinates; NaN for a triangle that has none
     ("quadric_frames", "i8"),  # float32 (n_quadrics, 9): unit axes that a quadric's texture coordinates refer to
@@ -111,6 +116,7 @@ def scene_dtype(
     media: bool = False,
     dispersion: bool = False,
     grids: bool = False,
+    projectors: bool = False,
 ) -> np.dtype:
     """The record of a scene with or without these features.
 
@@ -121,6 +127,7 @@ def scene_dtype(
         *(BLEND_FIELDS if blends else []),
         *(BSDF_FIELDS if bsdfs else []),
         *(LIGHT_FIELDS if lights else []),
+        *(PROJECTOR_FIELDS if projectors else []),
         *(TEXTURE_FIELDS if textures else []),
         *(INSTANCE_FIELDS if instances else []),
         *(COLOUR_FIELDS if colours else []),
@@ -174,14 +181,17 @@ M_GLASS = _columns[43]
 """
 BSDF_TABLE_SIZE = 64
 
-PARALLELOGRAM, DISK, SPHERE, CYLINDER, MESH, POINT, ENVIRONMENT, SPOT, DIRECTIONAL, IMAGE, GLOW = range(11)
+PARALLELOGRAM, DISK, SPHERE, CYLINDER, MESH, POINT, ENVIRONMENT, SPOT, DIRECTIONAL, IMAGE, GLOW, PROJECTOR = range(12)
 """Kinds of lights; SPOT, DIRECTIONAL and IMAGE are in scenes whose record has LIGHT_FIELDS alone, GLOW (a medium that
-emits, its row in `glows` being L_FIRST) where it has MEDIA_FIELDS."""
+emits, its row in `glows` being L_FIRST) where it has MEDIA_FIELDS, PROJECTOR where it has PROJECTOR_FIELDS."""
 LIGHT_COLUMNS = 20
 L_KIND, L_RADIANCE, L_A, L_B, L_C = _columns[[0, 1, 4, 7, 10]]
 L_AREA, L_RADIUS, L_LENGTH, L_FLIP, L_FIRST, L_COUNT = _columns[13:19]
 L_CUTOFF, L_BEAM = _columns[[10, 11]]
-"""Half angles in radians, of a spot."""
+"""Half angles in radians, of a spot. Of a projector L_A, L_B and L_C are its place and two axes, L_FLIP −1 where the
+third is −L_B × L_C; L_RADIUS and L_LENGTH half the picture's width and height on the plane at distance 1, L_AREA the
+luminance of the power, L_FIRST its row of `projectors`."""
+PROJECTOR_COLUMNS = 3
 
 BITMAP, CHECKERBOARD = 0, 1
 REPEAT, MIRROR, CLAMP = 0, 1, 2

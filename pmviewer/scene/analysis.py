@@ -21,6 +21,7 @@ from pmviewer.scene.description import (
     Material,
     PixelFilter,
     PointLight,
+    ProjectorLight,
     Scene,
     SpotLight,
 )
@@ -31,7 +32,7 @@ class SceneTraits:
     """`has_specular`: a smooth or transparent surface that can make caustics; `has_diffuse`: a surface that photons can
     be stored on whatever the settings; `many_lights`: more than one light to choose from; `rich`: materials beyond
     diffuse, mirrors that reflect the same at all angles, and clear smooth glass; `has_delta`: a smooth mirror, glass or
-    coat; `has_rough_glass`; `has_delta_lights`: point, spot or directional lights, which no ray can meet;
+    coat; `has_rough_glass`; `has_delta_lights`: point, spot or directional lights or projectors, which no ray can meet;
     `orthographic`: the scene's own camera; `lenses`: the names, as `camera.name` takes them, of cameras with a lens;
     `filters`: the reconstruction filters of cameras whose film has one, by the same names.
 
@@ -123,7 +124,9 @@ def analyse(scene: Scene) -> SceneTraits:
         has_delta=any(is_delta(m) for m in used),
         has_rough_glass=any(is_rough_glass(m) for m in used),
         has_smooth_glass=any(m.transparent and is_delta(m) for m in used),
-        has_delta_lights=any(isinstance(light, PointLight | SpotLight | DirectionalLight) for light in scene.lights),
+        has_delta_lights=any(
+            isinstance(light, PointLight | SpotLight | ProjectorLight | DirectionalLight) for light in scene.lights
+        ),
         orthographic=scene.camera.projection == "orthographic",
         lenses=frozenset(name for name, camera in _cameras(scene) if camera.aperture > 0),
         hiding=frozenset(name for name, camera in _cameras(scene) if camera.hides_lights),

@@ -21,6 +21,7 @@ from pmviewer.scene.description import (
     Mesh,
     Parallelogram,
     PointLight,
+    ProjectorLight,
     Scene,
     Shape,
     SpotLight,
@@ -31,6 +32,7 @@ _LISTED = 8
 _LIGHT_KINDS = {
     PointLight: "point light",
     SpotLight: "spot light",
+    ProjectorLight: "projector",
     DirectionalLight: "directional light",
     ConstantEnvironment: "constant environment",
     ImageEnvironment: "image environment",

@@ -270,6 +270,26 @@ class SpotLight:
     beam: float
 
 
+@dataclass(frozen=True, eq=False)
+class ProjectorLight:
+    """A point that throws a picture: `pixels` (h, w, 3) float32, finite and not negative, is the irradiance in W/m² on
+    the plane at distance 1 across its axis, and bilinear between the lines `columns` (w,) and `rows` (h,), shares of
+    the picture's width and height that ascend from 0 to 1, at least two; where two lines coincide it jumps.
+
+    `to_world` (3, 3) is orthonormal; it takes the direction of the picture's middle (0, 0, 1), its top (0, 1, 0) and
+    its left (1, 0, 0) to the scene's: pixel (0, 0) is at the top left as the projector sees it. `half` are half the
+    picture's width and height on that plane.
+    """
+
+    name: str
+    position: Vec3
+    to_world: Matrix
+    half: tuple[float, float]
+    pixels: NDArray[np.float32]
+    columns: NDArray[np.float64]
+    rows: NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class DirectionalLight:
     """Parallel light travelling along the unit vector `direction`; `irradiance` in W/m² on what faces it."""
@@ -291,7 +311,7 @@ class ImageEnvironment:
 
 
 Environment = ConstantEnvironment | ImageEnvironment
-Light = PointLight | SpotLight | DirectionalLight | Environment
+Light = PointLight | SpotLight | ProjectorLight | DirectionalLight | Environment
 
 
 FilterKind = Literal["box", "tent", "Gaussian", "Mitchell-Netravali", "Catmull-Rom", "Lanczos"]

@@ -8,7 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.scene.arrays.sky_table import sky_integral
-from pmviewer.scene.description import ConstantEnvironment, DirectionalLight, Light, PointLight, SpotLight
+from pmviewer.scene.description import (
+    ConstantEnvironment,
+    DirectionalLight,
+    Light,
+    PointLight,
+    ProjectorLight,
+    SpotLight,
+)
+from pmviewer.scene.projector import projector_power
 
 RGBArray = NDArray[np.float64]
 
@@ -30,6 +38,8 @@ def emitted_power(light: Light, radius: float) -> RGBArray:
         return 4 * math.pi * np.array(light.intensity)
     if isinstance(light, SpotLight):
         return spot_solid_angle(light) * np.array(light.intensity)
+    if isinstance(light, ProjectorLight):
+        return projector_power(light)
     if isinstance(light, DirectionalLight):
         return disc * np.array(light.irradiance)
     if isinstance(light, ConstantEnvironment):

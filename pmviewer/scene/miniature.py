@@ -15,7 +15,18 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.scene.description import Group, ImageEnvironment, Instance, Light, Material, Medium, Mesh, Scene, Shape
+from pmviewer.scene.description import (
+    Group,
+    ImageEnvironment,
+    Instance,
+    Light,
+    Material,
+    Medium,
+    Mesh,
+    ProjectorLight,
+    Scene,
+    Shape,
+)
 from pmviewer.scene.grid import Grid
 from pmviewer.scene.texture import Bitmap, Texture
 
@@ -110,6 +121,9 @@ def _material(material: Material) -> Material:
 
 
 def _light(light: Light) -> Light:
+    if isinstance(light, ProjectorLight):
+        corners = np.full((2, 2, 3), light.pixels.max(), np.float32)
+        return replace(light, pixels=corners, columns=np.array([0.0, 1.0]), rows=np.array([0.0, 1.0]))
     return replace(light, pixels=_coarse(light.pixels)) if isinstance(light, ImageEnvironment) else light
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from pmviewer.scene.analysis import analyse
 from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.describe import describe
 from pmviewer.scene.description import DirectionalLight, ImageEnvironment, SpotLight
-from pmviewer.scene.emission import emitted_power, spot_solid_angle
+from pmviewer.scene.emission import emitted_power
 from pmviewer.scene.formats.hdr import read_hdr
 from pmviewer.scene.formats.sky_image import read_sky
 from pmviewer.scene.formats.texture_file import read_picture
@@ -93,6 +92,11 @@ TURN = '<transform name="to_world"><translate y="4"/></transform>'
         (envmap('<float name="scale" value="-1"/>'), "-1 was taken as 0", False),
         (envmap('<float name="other" value="1"/>'), "'other'", True),
         ('<emitter type="spot"><texture name="texture" type="checkerboard"/></emitter>', "its texture", True),
+        ('<emitter type="projector"><transform name="to_world"><scale value="0"/></transform></emitter>', "no dir", 0),
+        ('<emitter type="projector"><float name="scale" value="-1"/></emitter>', "-1 was taken as 0", False),
+        ('<emitter type="projector"><rgb name="irradiance" value="-1 2 2"/></emitter>', "numbers count as 0", True),
+        ('<emitter type="projector"><float name="fov" value="180"/></emitter>', "was taken as 179", True),
+        ('<emitter type="projector"><float name="other" value="1"/></emitter>', "'other'", True),
     ],
 )
 def test_odd_lights_are_cut_or_left_out(tmp_path: Path, light: str, words: str, left: bool) -> None:
@@ -111,19 +115,6 @@ def test_a_spots_texture_counts_by_its_mean(tmp_path: Path) -> None:
     (spot,) = scene.lights
     assert isinstance(spot, SpotLight)
     assert spot.intensity == pytest.approx((6, 1, 1))
-
-
-def test_a_projector_becomes_a_spot_of_its_power(tmp_path: Path) -> None:
-    """Mitsuba 3.9.1's projector of irradiance 1 and fov 90 lights a plane at distance 1, facing it, with π on 2 × 2."""
-    words = '<float name="fov" value="90"/><rgb name="irradiance" value="2 1 0"/><float name="scale" value="3"/>'
-    scene = load(tmp_path, SHAPE, f'<emitter type="projector">{words}{TURN}</emitter>', sky="")
-    (spot,) = scene.lights
-    assert isinstance(spot, SpotLight)
-    assert (spot.position, spot.axis, spot.cutoff) == ((0, 4, 0), (0, 0, 1), spot.beam)
-    assert emitted_power(spot, 1.0) == pytest.approx([2 * 3 * math.pi * 4, 3 * math.pi * 4, 0])
-    # A pyramid of 90° by 90° is a sixth of the sphere.
-    assert spot_solid_angle(spot) == pytest.approx(4 * math.pi / 6)
-    assert "its picture is left out" in scene.warnings[0]
 
 
 def test_a_collimated_beam_is_the_narrowest_spot_of_its_power(tmp_path: Path) -> None:

@@ -106,7 +106,7 @@ def _height_in_cell(u, a, b, angle, step):
 
 
 @device
-def _across_cell(u, a, b):
+def across_cell(u, a, b):
     """s in [0, 1] with density proportional to a + s·(b − a)."""
     total = a + b
     if not total > _f4(0.0):
@@ -134,7 +134,7 @@ def image_direction(scene, light, u, v):
     step = _f8(math.pi) / _f8(rows)
     t = _height_in_cell(_f8(u), _f8(a0 + a1), _f8(b0 + b1), step * _f8(row), step)
     f = _f4(t)
-    s = _across_cell(v, a0 + f * (b0 - a0), a1 + f * (b1 - a1))
+    s = across_cell(v, a0 + f * (b0 - a0), a1 + f * (b1 - a1))
     theta = step * (_f8(row) + t)
     phi = _f8(2.0 * math.pi) * (_f8(column) + _f8(0.5) + _f8(s)) / _f8(width)
     r = math.sin(theta)

@@ -5,7 +5,7 @@ Mitsuba 3. Photons leave it with the surface's own cosine in that half of all di
 the vertex normals are: cosines and densities are always those of the surface.
 
 Lights are picked with probability proportional to their power's luminance. Spots, directional lights, image
-environments and media that emit have files of their own; scenes without them have another type of record
+environments, projectors and media that emit have files of their own; scenes without them have another type of record
 (`pmviewer.kernels.scene`) and compile nothing of them.
 """
 
@@ -19,6 +19,7 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.lights.distant import behind_scene, emit_directional, outside, sample_directional
 from pmviewer.kernels.lights.environment import emit_image, image_pdf, image_radiance, sample_image
+from pmviewer.kernels.lights.projector import emit_projector, sample_projector
 from pmviewer.kernels.lights.spot import emit_spot, sample_spot
 from pmviewer.kernels.lights.textured_light import area_density, emission_at, picked_triangle, radiance_from, spread
 from pmviewer.kernels.media.glow import emit_glow, sample_glow
@@ -43,6 +44,7 @@ from pmviewer.kernels.scene import (
     MESH,
     PARALLELOGRAM,
     POINT,
+    PROJECTOR,
     SPHERE,
     SPOT,
     light_number,
@@ -76,11 +78,22 @@ def pick_light(scene, u):
     return light, probability, min((u - low) / probability, _f4(0.99999994))
 
 
-@device
+@specialised
 def is_delta_light(scene, light):
     """Whether no ray can meet the light, which has neither extent nor solid angle."""
-    kind = np.int32(light_number(scene, light, L_KIND))
-    return kind in (POINT, SPOT, DIRECTIONAL)
+    if not has(scene, "projectors"):
+
+        def of_few(scene, light):
+            kind = np.int32(light_number(scene, light, L_KIND))
+            return kind in (POINT, SPOT, DIRECTIONAL)
+
+        return of_few
+
+    def of_all(scene, light):
+        kind = np.int32(light_number(scene, light, L_KIND))
+        return kind in (POINT, SPOT, DIRECTIONAL, PROJECTOR)
+
+    return of_all
 
 
 @device
@@ -172,8 +185,8 @@ def sample_one_light(scene, light, x, u, v):
 
     Returns unit `wi`, the end point of the shadow ray, the radiance L arriving if nothing is in between, its pdf per
     solid angle (0: no contribution; for point lights and spots L/pdf is intensity/distance², for directional ones
-    irradiance) and whether a BSDF sample could have found it (False for point, spot and directional lights, and for
-    media that emit, which are sampled where rays don't look for them).
+    irradiance) and whether a BSDF sample could have found it (False for point, spot and directional lights, projectors,
+    and for media that emit, which are sampled where rays don't look for them).
     """
     if has_media(scene):
         return _sample_with_glows
@@ -192,6 +205,23 @@ def _sample_but_glows(scene, light, x, u, v):
 
 
 def _sampler_but_of_glows(scene):
+    if has(scene, "projectors"):
+        return _sample_with_projectors
+    return _sampler_of_others(scene)
+
+
+def _sample_with_projectors(scene, light, x, u, v):
+    if np.int32(light_number(scene, light, L_KIND)) == PROJECTOR:
+        return sample_projector(scene, light, x)
+    return _sample_but_projectors(scene, light, x, u, v)
+
+
+@specialised
+def _sample_but_projectors(scene, light, x, u, v):
+    return _sampler_of_others(scene)
+
+
+def _sampler_of_others(scene):
     if not has(scene, "more_lights"):
 
         def plain(scene, light, x, u, v):
@@ -364,6 +394,23 @@ def _emit_but_glows(scene, light, position, direction):
 
 
 def _emitter_but_of_glows(scene):
+    if has(scene, "projectors"):
+        return _emit_with_projectors
+    return _emitter_of_others(scene)
+
+
+def _emit_with_projectors(scene, light, position, direction):
+    if np.int32(light_number(scene, light, L_KIND)) == PROJECTOR:
+        return emit_projector(scene, light, direction[0], direction[1])
+    return _emit_but_projectors(scene, light, position, direction)
+
+
+@specialised
+def _emit_but_projectors(scene, light, position, direction):
+    return _emitter_of_others(scene)
+
+
+def _emitter_of_others(scene):
     if not has(scene, "more_lights"):
 
         def plain(scene, light, position, direction):

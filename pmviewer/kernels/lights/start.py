@@ -15,6 +15,7 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.lights.distant import outside
 from pmviewer.kernels.lights.light import emit_from, light_point
+from pmviewer.kernels.lights.projector import projector_spread
 from pmviewer.kernels.lights.spot import spot_falloff
 from pmviewer.kernels.lights.textured_light import spread
 from pmviewer.kernels.scene import (
@@ -25,6 +26,7 @@ from pmviewer.kernels.scene import (
     L_CUTOFF,
     L_KIND,
     POINT,
+    PROJECTOR,
     SPOT,
     light_number,
 )
@@ -52,6 +54,23 @@ def spread_over(scene, light, position, d, distance2):
 @specialised
 def _inverse_density(scene, light, position, d):
     """1/p_ω; 0 where p_ω is."""
+    if has(scene, "projectors"):
+        return _inverse_with_projectors
+    return _inverse_of_others(scene)
+
+
+def _inverse_with_projectors(scene, light, position, d):
+    if np.int32(light_number(scene, light, L_KIND)) == PROJECTOR:
+        return projector_spread(scene, light, d)
+    return _inverse_but_projectors(scene, light, position, d)
+
+
+@specialised
+def _inverse_but_projectors(scene, light, position, d):
+    return _inverse_of_others(scene)
+
+
+def _inverse_of_others(scene):
     if not has(scene, "more_lights"):
         return lambda scene, light, position, d: _plain_inverse(scene, light, position, d)
 

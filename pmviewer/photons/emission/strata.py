@@ -6,7 +6,7 @@ two for the direction. So the strata of a light have equal shares of its power w
 directions, patches of its surface, or both:
 
 ==================================  =====================================
-point, spot                         directions
+point, spot, projector              directions
 directional                         places on the disc that photons start on
 surfaces, environments              directions; with many strata also places
 ==================================  =====================================
@@ -92,7 +92,7 @@ def strata_of(scene: FlatScene, most: int) -> Strata | None:
 
 def _divisions(kind: int, n: int) -> tuple[int, int, int, int]:
     root = min(int(n**0.5), MOST_DIVISIONS)
-    if kind in (K.POINT, K.SPOT):
+    if kind in (K.POINT, K.SPOT, K.PROJECTOR):
         return 1, 1, root, root
     if kind == K.DIRECTIONAL:
         return root, root, 1, 1

@@ -7,7 +7,8 @@ covered power Φ·c, so that all photons have the same power Σ Φ·c / n (the p
 ==========  ===================================  ==========================================================
 mode        lights                               what is confined
 ==========  ===================================  ==========================================================
-WHOLE       any whose map would cover all        nothing, c = 1
+WHOLE       projectors, and any whose map would  nothing, c = 1
+            cover all
 DIRECTIONS  points, spots, parallelograms, disks cells of directions around the light's axis
 PLACES      directional lights                   cells of the disc that photons start on
 WORLD       spheres, cylinders, meshes           cells of directions in the world; a photon is kept with the

@@ -34,7 +34,7 @@ from pmviewer.photons.projection.projected import (
     WORLD,
 )
 from pmviewer.scene.arrays.flatten import FlatScene
-from pmviewer.scene.description import LUMINANCE, DirectionalLight, Environment, PointLight, SpotLight
+from pmviewer.scene.description import LUMINANCE, DirectionalLight, Environment, PointLight, ProjectorLight, SpotLight
 from pmviewer.scene.emission import spot_solid_angle
 
 Float = NDArray[np.float64]
@@ -149,6 +149,8 @@ def _map_of(scene: FlatScene, light: int, spheres: Float) -> tuple[ProjectionMap
         nothing = np.zeros((ROWS, COLUMNS), np.bool_)
         empty = ProjectionMap(name, MODES[WORLD], nothing, np.zeros(ROWS + 1), np.eye(3), scene.center, 0.0)
         return empty, 0.0
+    if isinstance(described, ProjectorLight):
+        return _whole(scene, light)  # its cells of numbers are places on a picture, which have no axis to turn around
     u = np.linspace(0, 1, ROWS + 1)
     if isinstance(described, Environment):
         center, radius = enclosing(spheres)

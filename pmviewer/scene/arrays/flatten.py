@@ -87,7 +87,7 @@ class FlatScene:
     @property
     def delta_lights(self) -> bool:
         """Whether there are lights that no ray can meet."""
-        return bool(np.isin(self.lights[:, K.L_KIND], (K.POINT, K.SPOT, K.DIRECTIONAL)).any())
+        return bool(np.isin(self.lights[:, K.L_KIND], (K.POINT, K.SPOT, K.DIRECTIONAL, K.PROJECTOR)).any())
 
     @property
     def total_luminance(self) -> float:
@@ -154,6 +154,7 @@ def flatten(
         "light_triangles": lights.triangles,
         "light_triangle_cdf": lights.triangle_cdf,
         **lights.sky_arrays(),
+        **lights.projector_arrays(),
         **_shading_arrays(scene, features, stored, materials, lights, emissions),
         **(_media_arrays(scene, stored, glows) if features["media"] else {}),
         **(grid_arrays(scene.media, _more_grids(glows)) if features["grids"] else {}),
@@ -203,7 +204,7 @@ def flatten(
 
 
 SURFACES = ("bsdfs", "lights", "textures", "opacity", "principled", "blends")
-"""All kinds of materials, textures and lights, by the names that `_features` has for them."""
+"""All kinds of materials, textures and lights but projectors, by the names that `_features` has for them."""
 
 _FLAGS = {
     "bsdfs": "bsdfs",
@@ -221,6 +222,7 @@ def _features(scene: Scene, materials: MaterialTable, lights: LightTable, emits_
     return {
         "bsdfs": rich,
         "lights": lights.more,
+        "projectors": bool(lights.projectors),
         "instances": bool(scene.instances and scene.groups),
         "textures": emits_textures or (rich and needs_tangents(scene)),
         "colours": any(m.vertex_colours for m in used),

@@ -24,12 +24,14 @@ from pmviewer.scene.description import (
     Mesh,
     Parallelogram,
     PointLight,
+    ProjectorLight,
     Scene,
     Shape,
     Sphere,
     SpotLight,
 )
 from pmviewer.scene.emission import emitted_power
+from pmviewer.scene.projector import brightest_intensity, projector_arrays
 
 Float = NDArray[np.float32]
 BRIGHTEST = 1e32
@@ -50,7 +52,8 @@ def _areas(corners: Float) -> NDArray[np.float64]:
 class LightTable:
     """Emitting shapes in order, then the scene's other lights, then media that emit (`glows`).
 
-    `more` tells whether there are lights of the kinds that need LIGHT_FIELDS, `sky` is the image environment.
+    `more` tells whether there are lights of the kinds that need LIGHT_FIELDS, `sky` is the image environment,
+    `projectors` are those in the order of their rows.
     """
 
     def __init__(
@@ -96,15 +99,20 @@ class LightTable:
             powers.append(math.pi * area * np.array(shape.radiance))
             names.append(shape.name)
         self.sky: ImageEnvironment | None = None
+        self.projectors: list[ProjectorLight] = []
         self.more = False
         for light in scene.lights:
             if isinstance(light, Environment):
                 self.environment = len(rows)
             if isinstance(light, ImageEnvironment):
                 self.sky, self._sky_table = light, sky_table(light.pixels)
-            self.more = self.more or isinstance(light, SpotLight | DirectionalLight | ImageEnvironment)
-            rows.append(self._row(light))
+            self.more = self.more or isinstance(light, SpotLight | ProjectorLight | DirectionalLight | ImageEnvironment)
             powers.append(emitted_power(light, radius))
+            rows.append(self._row(light))
+            if isinstance(light, ProjectorLight):
+                rows[-1][K.L_AREA] = float(powers[-1] @ LUMINANCE)
+                rows[-1][K.L_FIRST] = len(self.projectors)
+                self.projectors.append(light)
             names.append(light.name)
         self.first_glow = len(rows)
         for number, glow in enumerate(glows):
@@ -146,6 +154,10 @@ class LightTable:
             return {}
         return {"sky_texels": self.sky.pixels, "sky_rows": self._sky_table.rows, "sky_cells": self._sky_table.cells}
 
+    def projector_arrays(self) -> dict[str, NDArray]:
+        """The projectors' arrays by the record's field; none without one."""
+        return projector_arrays(self.projectors)
+
     def _row(self, light: Light) -> list[float]:
         """Row of a light without a surface."""
         row = [0.0] * K.LIGHT_COLUMNS
@@ -155,6 +167,11 @@ class LightTable:
         elif isinstance(light, SpotLight):
             row[K.L_KIND], row[colour], row[a], row[b] = K.SPOT, light.intensity, light.position, light.axis
             row[K.L_CUTOFF], row[K.L_BEAM] = math.radians(light.cutoff), math.radians(light.beam)
+        elif isinstance(light, ProjectorLight):
+            row[K.L_KIND], row[colour], row[a] = K.PROJECTOR, (brightest_intensity(light),) * 3, light.position
+            row[K.L_B : K.L_B + 6] = light.to_world.T[:2].ravel().tolist()
+            row[K.L_FLIP] = 1.0 if np.linalg.det(light.to_world) > 0 else -1.0
+            row[K.L_RADIUS], row[K.L_LENGTH] = light.half
         elif isinstance(light, DirectionalLight):
             row[K.L_KIND], row[colour], row[b] = K.DIRECTIONAL, light.irradiance, light.direction
         elif isinstance(light, ConstantEnvironment):

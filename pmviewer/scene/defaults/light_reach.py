@@ -24,10 +24,12 @@ from pmviewer.scene.description import (
     Light,
     Material,
     PointLight,
+    ProjectorLight,
     Scene,
     Shape,
     SpotLight,
 )
+from pmviewer.scene.projector import intensity_towards
 from pmviewer.scene.texture import Bitmap
 
 Float = NDArray[np.float64]
@@ -163,11 +165,14 @@ class _Reach:
         return found
 
     def _of(self, light: Light, points: Float, normals: Float) -> Float:
-        if isinstance(light, PointLight | SpotLight):
+        if isinstance(light, PointLight | SpotLight | ProjectorLight):
             way = np.asarray(light.position) - points
             distance = np.maximum(np.linalg.norm(way, axis=1), 1e-12)
             rays = way / distance[:, None]
-            brightness = np.dot(light.intensity, LUMINANCE) / distance**2
+            if isinstance(light, ProjectorLight):
+                brightness = intensity_towards(light, -rays) @ LUMINANCE / distance**2
+            else:
+                brightness = np.dot(light.intensity, LUMINANCE) / distance**2
             if isinstance(light, SpotLight):
                 angle = np.degrees(np.arccos(np.clip(-rays @ np.asarray(light.axis), -1, 1)))
                 brightness *= np.clip((light.cutoff - angle) / max(light.cutoff - light.beam, 1e-3), 0, 1)

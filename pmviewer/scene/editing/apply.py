@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError
 from pmviewer.scene.arrays.instances import instance_bounds
 from pmviewer.scene.arrays.shape_bounds import shape_bounds
-from pmviewer.scene.description import ImageEnvironment, Light, Material, Scene, Shape
+from pmviewer.scene.description import ImageEnvironment, Light, Material, ProjectorLight, Scene, Shape
 from pmviewer.scene.editing.catalogue import Target, catalogue_of, refusal
 from pmviewer.scene.editing.recolour import dispersed, recoloured, roughened, with_emission, with_radiance
 from pmviewer.scene.editing.transform import Similarity, similarity, transformed
@@ -93,7 +93,7 @@ def _light(light: Light, values: Values) -> Light:
     for name in ("axis", "direction"):
         if hasattr(light, name):
             turned[name] = by.direction(getattr(light, name))
-    if isinstance(light, ImageEnvironment):
+    if isinstance(light, ImageEnvironment | ProjectorLight):
         turned["to_world"] = by.turn @ light.to_world
     return replace(light, **turned)
 

@@ -7,11 +7,13 @@ from pmviewer.scene.description import (
     DirectionalLight,
     ImageEnvironment,
     PointLight,
+    ProjectorLight,
     Scene,
     SpotLight,
 )
 from pmviewer.scene.editing.catalogue import Target, catalogue_of
 from pmviewer.scene.editing.recolour import GREY, colour_of, strength_of
+from pmviewer.scene.projector import projector_power
 from pmviewer.settings.edits import PROPERTIES, parts
 
 
@@ -49,6 +51,9 @@ def _hue(scene: Scene, target: Target) -> RGB:
             emitted = light.intensity
         elif isinstance(light, DirectionalLight):
             emitted = light.irradiance
+        elif isinstance(light, ProjectorLight):
+            r, g, b = (float(c) for c in projector_power(light))
+            emitted = (r, g, b)
         elif isinstance(light, ImageEnvironment):
             r, g, b = (float(c) for c in light.pixels.mean(axis=(0, 1), dtype="float64"))
             emitted = (r, g, b)

@@ -14,6 +14,7 @@ from pmviewer.scene.description import (
     Light,
     Material,
     PointLight,
+    ProjectorLight,
     Shape,
     SpotLight,
 )
@@ -48,7 +49,7 @@ def with_emission(light: Light, power: float, colour: RGB | None) -> Light:
         return replace(light, intensity=brightened(light.intensity, power, colour))
     if isinstance(light, DirectionalLight):
         return replace(light, irradiance=brightened(light.irradiance, power, colour))
-    if not isinstance(light, ImageEnvironment):
+    if not isinstance(light, ImageEnvironment | ProjectorLight):
         return replace(light, radiance=brightened(light.radiance, power, colour))
     pixels = light.pixels
     if colour is not None:

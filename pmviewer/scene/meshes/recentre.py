@@ -20,6 +20,7 @@ from pmviewer.scene.description import (
     Mesh,
     Parallelogram,
     PointLight,
+    ProjectorLight,
     Scene,
     Sphere,
     SpotLight,
@@ -93,6 +94,6 @@ def _moved(g: Geometry, by: NDArray[np.float64]) -> Geometry:
 
 
 def _moved_light(light: Light, by: NDArray[np.float64]) -> Light:
-    if isinstance(light, PointLight | SpotLight):
+    if isinstance(light, PointLight | SpotLight | ProjectorLight):
         return replace(light, position=_plus(light.position, by))
     return light

@@ -22,16 +22,16 @@ from pmviewer.scene.description import (
 )
 from pmviewer.scene.formats.mitsuba.document import Properties
 from pmviewer.scene.formats.mitsuba.interface import bounded
+from pmviewer.scene.formats.mitsuba.projector import read_projector
 from pmviewer.scene.formats.mitsuba.sky import TYPES as DAYLIGHT
 from pmviewer.scene.formats.mitsuba.sky import read_daylight
-from pmviewer.scene.formats.mitsuba.transform import Matrix
+from pmviewer.scene.formats.mitsuba.transform import Matrix, nearest_rotation
 from pmviewer.scene.formats.sky_image import read_sky
 
 CUTOFF = 20.0
 """Mitsuba's default in degrees; the beam width's is three quarters of the cut-off."""
 BEAM = 0.75
 _LEAST_CUTOFF = 0.01
-_ROTATION = 1e-3
 _LEFT_OUT = "Pictures that can't be used are left out, what they would light stays dark: {names}."
 
 
@@ -115,34 +115,6 @@ def _directional(p: Properties, name: str) -> list[Light]:
     return [] if direction is None else [DirectionalLight(name, direction, irradiance)]
 
 
-def _projector(p: Properties, name: str) -> list[Light]:
-    """A spot that sends as much light into as wide a cone. On a plane at distance 1 Mitsuba's projector has π times its
-    `irradiance`, cosine aside: its power is π times that and the picture's area there."""
-    from pmviewer.scene.formats.mitsuba.camera import field_of_view, share_of_width
-    from pmviewer.scene.texture import Bitmap
-
-    p.document.warn(
-        f"{p.element}: its picture is left out, a spot of its mean colour and power replaces it.", p.element
-    )
-    m = p.transform()
-    irradiance, scale = p.bounded_colour("irradiance", 1.0, None), max(p.number("scale", 1.0), 0.0)
-    picture = p.textures.get("irradiance")
-    height, width = picture.pixels.shape[:2] if isinstance(picture, Bitmap) else (1, 1)
-    fov, axis = field_of_view(p)
-    half = math.tan(math.radians(fov) / 2) * share_of_width(axis, width, height)
-    half_height = half * height / width
-    area = 4 * half * half_height
-    # Solid angle of a pyramid of these half widths, then the cone that has it.
-    solid = 4 * math.asin(half * half_height / math.sqrt((1 + half**2) * (1 + half_height**2)))
-    cone = math.degrees(math.acos(1 - solid / (2 * math.pi)))
-    factor = scale * math.pi * area / solid
-    x, y, z = (float(c) for c in m[:3, 3])
-    direction = _unit(m[:3, 2], p)
-    if direction is None:
-        return []
-    return [SpotLight(name, (x, y, z), direction, _times(irradiance, (factor, factor, factor)), cone, cone)]
-
-
 def _collimated(p: Properties, name: str) -> list[Light]:
     """A beam without width has no place in a picture's pixels: a spot of the least width with its power."""
     p.document.warn(f"{p.element} is shown as a spot of {_LEAST_CUTOFF}° with its power.", p.element)
@@ -197,20 +169,11 @@ def _turned(p: Properties) -> Matrix:
     return turn
 
 
-def nearest_rotation(m: Matrix) -> tuple[Matrix, bool]:
-    """The rotation, or mirroring, nearest to a matrix (3, 3), and whether the matrix keeps angles; the identity where
-    the matrix is singular."""
-    u, sizes, v = np.linalg.svd(m)
-    if not sizes[2] > 1e-12 * sizes[0]:
-        return np.eye(3), False
-    return np.asarray(u @ v), bool(sizes[0] - sizes[2] <= _ROTATION * sizes[0])
-
-
 _READERS: dict[str, Callable[[Properties, str], list[Light]]] = {
     "point": _point,
     "spot": _spot,
     "directional": _directional,
-    "projector": _projector,
+    "projector": read_projector,
     "collimated": _collimated,
     "constant": _constant,
     "envmap": _image,

@@ -14,6 +14,7 @@ from pmviewer.scene.formats.mitsuba.xml import Element
 Matrix = NDArray[np.float64]
 OPERATIONS = ("translate", "rotate", "scale", "matrix", "lookat")
 _SIMILAR = 1e-5
+_EVEN = 1e-3
 _NEARLY_UNIT = 0.01
 """Axes are written with few digits."""
 
@@ -161,3 +162,12 @@ def similar_columns(m: Matrix, count: int = 3) -> float | None:
     if np.abs(gram - square * np.eye(count)).max() > _SIMILAR * square:
         return None
     return math.sqrt(square)
+
+
+def nearest_rotation(m: Matrix) -> tuple[Matrix, bool]:
+    """The rotation, or mirroring, nearest to a matrix (3, 3), and whether the matrix keeps angles; the identity where
+    the matrix is singular."""
+    u, sizes, v = np.linalg.svd(m)
+    if not sizes[2] > 1e-12 * sizes[0]:
+        return np.eye(3), False
+    return np.asarray(u @ v), bool(sizes[0] - sizes[2] <= _EVEN * sizes[0])
