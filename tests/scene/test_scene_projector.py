@@ -148,8 +148,8 @@ def test_fields_with_edges_are_exact(tmp_path: Path) -> None:
 def test_a_picture_that_is_turned_is_sampled(tmp_path: Path) -> None:
     turned = bitmap('<transform name="to_uv"><rotate z="1" angle="90"/></transform>')
     scene, light = projector(tmp_path, turned, FOV)
-    assert "1024 × 1024" in scene.warnings[0]
-    assert light.pixels.shape == (1025, 1025, 3)
+    assert "2048 × 2048" in scene.warnings[0]
+    assert light.pixels.shape == (2049, 2049, 3)
     assert emitted_power(light, 1.0) == pytest.approx(math.pi * 2 * CORNERS.mean(axis=(0, 1)), rel=1e-2)
 
 

@@ -15,9 +15,9 @@ from pmviewer.scene.formats.mitsuba.texture import constant, is_constant
 from pmviewer.scene.formats.mitsuba.transform import Matrix, nearest_rotation
 from pmviewer.scene.texture import Bitmap, Texture, evaluate
 
-MOST_LINES = 8192
+MOST_LINES = 4096
 """Columns, or rows, of a picture."""
-REPLACED = 1024
+REPLACED = 2048
 """Those of one that is sampled instead."""
 _SHEAR = 1e-3
 
@@ -43,7 +43,7 @@ def read_projector(p: Properties, name: str) -> list[Light]:
     turn, (across, up, ahead) = placed
     pixels, columns, rows = _lines(p, picture)
     with np.errstate(over="ignore"):
-        pixels = (pixels * (factor * ahead)).astype(np.float32)
+        pixels *= np.float32(factor * ahead)
     if not np.isfinite(pixels).all():
         raise p.document.error(f"'scale' of {p.element} makes irradiances too large.", p.values.get("scale", p.element))
     halves = (half * across / ahead, half * height / width * up / ahead)
@@ -64,7 +64,7 @@ def _turned(p: Properties, m: Matrix) -> tuple[Matrix, Float] | None:
     return nearest_rotation(axes)[0], lengths
 
 
-def _lines(p: Properties, texture: Texture) -> tuple[Float, Float, Float]:
+def _lines(p: Properties, texture: Texture) -> tuple[NDArray[np.float32], Float, Float]:
     """Lines between which the texture is bilinear: its values (h, w, 3) where they cross, columns (w,), rows (h,)."""
     a, b, c, d, e, f = texture.to_uv
     nearest = not (isinstance(texture, Bitmap) and texture.filter == "bilinear")
@@ -72,8 +72,8 @@ def _lines(p: Properties, texture: Texture) -> tuple[Float, Float, Float]:
     if not is_constant(texture):
         width, height = _fields(texture)
         if b != 0 or d != 0 or max(abs(a) * width, abs(e) * height) > MOST_LINES:
-            what = f"The picture of {p.element} is shown as {REPLACED} × {REPLACED} pixels of it, as its 'to_uv' "
-            p.document.warn(what + ("turns it." if b != 0 or d != 0 else "repeats it often."), p.element)
+            why = "its 'to_uv' turns it" if b != 0 or d != 0 else f"it has more than {MOST_LINES:,} in a row or column"
+            p.document.warn(f"The picture of {p.element} is shown as {REPLACED} × {REPLACED} pixels: {why}.", p.element)
             columns = rows = np.linspace(0.0, 1.0, REPLACED + 1)
             nearest = False
         else:
@@ -101,6 +101,8 @@ def _edges(slope: float, start: float) -> Float:
     return np.array([0.0, *inside[(inside > 1e-9) & (inside < 1 - 1e-9)], 1.0])
 
 
-def _values(texture: Texture, columns: Float, rows: Float) -> Float:
-    u, v = np.meshgrid(columns, rows)
-    return evaluate(texture, np.stack([u.ravel(), v.ravel()], axis=1)).reshape(len(rows), len(columns), 3)
+def _values(texture: Texture, columns: Float, rows: Float) -> NDArray[np.float32]:
+    values = np.empty((len(rows), len(columns), 3), np.float32)
+    for row, v in zip(values, rows, strict=True):
+        row[:] = evaluate(texture, np.stack([columns, np.full(len(columns), v)], axis=1))
+    return values
