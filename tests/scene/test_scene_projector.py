@@ -12,6 +12,7 @@ import pytest
 from pmviewer.output.exr import write_exr
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.arrays.flatten import flatten
+from pmviewer.scene.defaults.light_reach import _Reach
 from pmviewer.scene.describe import describe
 from pmviewer.scene.description import ProjectorLight, Scene
 from pmviewer.scene.editing.apply import edited
@@ -197,3 +198,13 @@ def test_it_can_be_edited(tmp_path: Path) -> None:
     assert moved.position == pytest.approx((1, 2, 3))
     assert moved.to_world[:, 1] == pytest.approx([0, 1, 0], abs=1e-6)
     assert abs(moved.to_world[:, 2] @ [0, 0, 1]) < 1e-6
+
+
+def test_whether_its_light_reaches_a_place_is_known_without_tracing(tmp_path: Path) -> None:
+    """What decides whether a scene needs more lights: the luminance of white places that face it, at distance 2."""
+    scene, _ = projector(tmp_path, bitmap(), FOV)
+    reach = _Reach(scene, None, np.random.default_rng(1))
+    at = np.array([[1.5, 0.5, 2.0], [-1.5, -0.5, 2.0], [3.0, 0.0, 2.0]])
+    found = reach.from_lights(at, np.tile([0.0, 0.0, -1.0], (3, 1)))
+    # π E on the plane at distance 1, a quarter of it at 2, over π; of red, of white, and beside the picture.
+    assert found == pytest.approx([0.2126 / 4, 1 / 4, 0.0], rel=1e-4)
