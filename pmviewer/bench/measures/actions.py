@@ -1,8 +1,8 @@
 """A thousand random actions in the real window, by three seeds: no error, nothing lost, memory as it was.
 
 Every hundred actions everything is undone; settings and picture must then be those of the beginning, bit for bit. The
-first rounds compile what the actions ask for, and the code stays: memory counts from round to round of the second half,
-beside which stands how many kernels were loaded.
+rounds compile what the actions ask for, and the code stays: beside the memory, of which the last round is compared with
+the first and with the middle one, stands how many kernels were loaded.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def run(quick: bool = False) -> BenchResult:
         memory, kernels = report["resident"], report["kernels"]
         half = (len(memory) - 1) // 2
         first, middle, last = memory[0], memory[half], memory[-1]
-        growths.append(last / middle - 1)
+        growths.append((last / first - 1, last / middle - 1))
         rows.append(
             [seed, report["actions"], report["rounds"], len(report["wrong"]), report["frames"], report["seconds"],
              first, middle, last, last / middle - 1, kernels[half], kernels[-1]]
@@ -56,7 +56,10 @@ def run(quick: bool = False) -> BenchResult:
     wrong = [f"seed {seed}: {text}" for seed, report in zip(seeds, reports, strict=True) for text in report["wrong"]]
     targets = [
         Target("must show 1", len(wrong), 0, "errors, differences", False, f"{actions} actions each, all undone"),
-        Target("must show 1", 100 * max(growths), 5, "%", False, "memory, last round over the middle one"),
+        Target("must show 1", 100 * max(g[0] for g in growths), 5, "%", False, "memory, last round over the first"),
+        Target(
+            "must show 1", 100 * max(g[1] for g in growths), 5, "%", False, "memory, last round over the middle one"
+        ),
     ]
     return BenchResult("Random actions in the window", columns, rows, targets, notes=wrong)
 
