@@ -41,6 +41,9 @@ def shot(
         str | None,
         typer.Option(metavar="X,Y", help="Pixel that is pinned: its photons, and the inspector with --window."),
     ] = None,
+    hemisphere: Annotated[
+        bool, typer.Option("--hemisphere", help="What a gather at the pinned pixel sees, instead of the picture.")
+    ] = False,
     hold: Annotated[str, typer.Option(metavar="OBJECT", help="Object that has handles, with --window.")] = "",
     captions: Annotated[bool, typer.Option(help="Say in the picture which view it is.")] = True,
     threads: ThreadsOption = None,
@@ -54,7 +57,9 @@ def shot(
     from pmviewer.commands.job import load_job, with_snapshots
 
     job = with_snapshots(load_job(scene, set_ or [], define or [], edit or []), snapshot or [])
-    take_shot(job, output, passes, size, window, (pixel, pin, hold), captions, threads, panel or "", window_size)
+    take_shot(
+        job, output, passes, size, window, (pixel, pin, hold), captions, threads, panel or "", window_size, hemisphere
+    )
 
 
 def take_shot(
@@ -68,6 +73,7 @@ def take_shot(
     threads: int | None,
     panel: str = "",
     window_size: str | None = None,
+    hemisphere: bool = False,
 ) -> None:
     """Open the window, take its picture (`pmviewer.viewer.shot`), close it. `shown`: of --pixel, --pin and --hold.
     Raises PmviewerError; WindowError without a display."""
@@ -80,10 +86,12 @@ def take_shot(
     from pmviewer.viewer.start import start_viewer
 
     check_output(output, (".png",))
+    if hemisphere and shown[1] is None:
+        raise SettingError("--hemisphere is of a pixel that is pinned: name it by --pin X,Y.")
     settings = with_values(job.settings, overrides(passes, None, size, None, job.passes))
     chosen, pinned = (_pixel(option, text) for option, text in zip(("--pixel", "--pin"), shown, strict=False))
     camera = resolve_camera(load_scene(job.scene, job.parameters, rig=settings.light.rig), settings.camera)
-    shot = Shot(output, chosen, pinned, shown[2], panel)
+    shot = Shot(output, chosen, pinned, shown[2], panel, hemisphere)
     picture_size = None if window else (camera.width, camera.height)
     look: dict[str, Any] = {}
     if window and window_size is not None:

@@ -31,14 +31,16 @@ SETTLING = 4
 @dataclass
 class Shot:
     """What to write; `pixel` is the one whose gather rays are shown, `pinned` the one in the inspector, `held`
-    names the object with handles, `panel` the panel in front. `error` is why there is no file, once the window has
-    closed, `stored` what the last pass stored."""
+    names the object with handles, `panel` the panel in front; with `hemisphere` the file shows what a gather at the
+    pinned pixel sees instead of the window. `error` is why there is no file, once the window has closed, `stored`
+    what the last pass stored."""
 
     path: Path
     pixel: tuple[int, int] | None = None
     pinned: tuple[int, int] | None = None
     held: str = ""
     panel: str = ""
+    hemisphere: bool = False
     error: PmviewerError | None = None
     stored: str = ""
     done: bool = field(default=False, init=False)
@@ -53,7 +55,7 @@ class Shot:
         hello_imgui.request_refresh()
         try:
             if self._ready(state, viewport):
-                write_png(self.path, pixels())
+                write_png(self.path, self._hemisphere(state) if self.hemisphere else pixels())
                 self.stored = _stored(state.frame)
                 self._end()
         except PmviewerError as error:
@@ -100,6 +102,18 @@ class Shot:
             state.editing.choose(state.editing.catalogue.find("object", self.held))
         if self.panel:
             self._to_the_front()
+
+    def _hemisphere(self, state: ViewerState) -> NDArray[np.uint8]:
+        """The discs of the pinned pixel, side by side on white. Raises SettingError where there are none."""
+        from pmviewer.viewer.panels.inspector.fisheye import side_by_side
+
+        report = state.inspector.report
+        if report is None or report.fisheye is None:
+            raise SettingError(
+                f"--hemisphere: nothing gathers at the pixel {self.pinned}; it needs gather.estimation=on with the "
+                "final gather, and a diffuse surface there."
+            )
+        return side_by_side(report.fisheye)
 
     def _to_the_front(self) -> None:
         """Bring the panel there. Raises SettingError where there is none of that name."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.inspector.report import Fisheye
-from pmviewer.viewer.panels.inspector.fisheye import LESS, MORE, SIDE, described, disc, pictures
+from pmviewer.viewer.panels.inspector.fisheye import LESS, MORE, SIDE, described, disc, pictures, side_by_side
 
 RINGS, SECTORS = 4, 8
 X, Y, Z = np.eye(3)
@@ -50,3 +50,16 @@ def test_difference_is_orange_where_reprojection_is_brighter():
     assert "88%" in text
     assert "1.57 W/m²" in text
     assert list(pictures(of(gathered, (0, 0, 1)), (0.0, 0.0, 0.0))) == ["gathered"]
+
+
+def test_a_row_of_discs_on_white():
+    """As `pmviewer shot --hemisphere` writes them: what is gathered to the left, white beside the discs."""
+    gathered, told = np.zeros((RINGS, SECTORS, 3)), np.ones((RINGS, SECTORS, 3))
+    seen = of(gathered, (-1, 0, 1), reprojected=told, shot=np.zeros((RINGS, SECTORS), bool))
+    row, gap, middle = side_by_side(seen), SIDE // 20, SIDE // 2
+    assert row.shape == (SIDE, 3 * SIDE + 2 * gap, 3)
+    assert (row[middle, SIDE : SIDE + gap] == 255).all()
+    assert (row[0, 0] == 255).all()
+    assert (row[middle, middle] == 0).all()
+    assert (row[middle, SIDE + gap + middle] == 255).all()
+    assert side_by_side(of(gathered, (0, 0, 1))).shape == (SIDE, SIDE, 3)

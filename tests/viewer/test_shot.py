@@ -13,11 +13,10 @@ from pmviewer.output.png import read_png
 SMALL = ["camera.width=200", "camera.height=160", "photons.N=2000", "importance.N=500"]
 
 
-def take(tmp_path, *settings, pixel=None, pin=None, window=False, captions=True):
-    path = tmp_path / "shot.png"
-    take_shot(
-        load_job("cornell_diffuse", [*SMALL, *settings], []), path, 1, None, window, (pixel, pin, ""), captions, 1
-    )
+def take(tmp_path, *settings, pixel=None, pin=None, window=False, captions=True, hemisphere=False):
+    path, shown = tmp_path / "shot.png", (pixel, pin, "")
+    job = load_job("cornell_diffuse", [*SMALL, *settings], [])
+    take_shot(job, path, 1, None, window, shown, captions, 1, hemisphere=hemisphere)
     return read_png(path)[0]
 
 
@@ -43,6 +42,13 @@ def test_a_pinned_pixel_is_in_the_picture(tmp_path):
     assert rows.min() > 60
     with pytest.raises(PmviewerError, match="outside"):
         take(tmp_path, *settings, pin="120,5")
+
+
+def test_a_hemisphere_is_of_a_pixel_that_gathers(tmp_path):
+    for pin in (None, "100,140"):
+        with pytest.raises(PmviewerError, match="--hemisphere"):
+            take(tmp_path, "gather.estimation=off", pin=pin, hemisphere=True)
+    assert not list(tmp_path.glob("*.png"))
 
 
 @pytest.mark.parametrize(

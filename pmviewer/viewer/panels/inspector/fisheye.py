@@ -62,6 +62,13 @@ def pictures(of: Fisheye, ground: tuple[float, float, float]) -> dict[str, NDArr
     return made
 
 
+def side_by_side(of: Fisheye) -> NDArray[np.uint8]:
+    """All discs on white in a row, (SIDE, w, 3)."""
+    gap = np.ones((SIDE, SIDE // 20, 3), np.float32)
+    discs = [part for picture in pictures(of, (1.0, 1.0, 1.0)).values() for part in (picture, gap)][:-1]
+    return np.round(np.concatenate(discs, axis=1) * 255).astype(np.uint8)
+
+
 def described(of: Fisheye) -> str:
     """The figures of the discs and what their colours mean."""
     E = float(luminance(of.irradiance(of.gathered)))
