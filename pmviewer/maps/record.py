@@ -43,6 +43,8 @@ BOUNCES = 0x1F
 
 DIRECT, CAUSTIC, INDIRECT, INDIRECT_CAUSTIC = 0, 2, 1, 3
 """Path classes as `flags >> 6`."""
+ALL_CLASSES = 0b1111
+"""Mask with the bits of all path classes."""
 
 EXPONENT_BASE = (127 - 47) << 23
 """Bits of 2⁻⁴⁷ as float32, the power of code 0 if that did not mean none."""
@@ -62,7 +64,7 @@ def decode_directions(codes: np.ndarray) -> np.ndarray:
 
 def in_classes(photons: np.ndarray, mask: int) -> np.ndarray | None:
     """Which of photons (n, 6) are on a path whose class has its bit in the mask, (n,) bool; None where all are."""
-    if mask == 0b1111 or not len(photons):
+    if mask == ALL_CLASSES or not len(photons):
         return None
     classes = (photons.view(np.uint32)[:, 3] >> 6) & 3
     wanted = np.array([mask >> c & 1 for c in range(4)], bool)[classes]

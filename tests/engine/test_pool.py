@@ -46,12 +46,12 @@ def test_rendering_to_a_file_makes_a_pool_of_normal_priority(monkeypatch, tmp_pa
     from pmviewer.commands import cli
 
     seen: set[int] = set()
-    guarded = WorkPool._guarded
+    work = WorkPool._work
 
-    def watched(self, task):
+    def watched(self, batch):
         seen.add(niceness())
-        return guarded(self, task)
+        return work(self, batch)
 
-    monkeypatch.setattr(WorkPool, "_guarded", watched)
+    monkeypatch.setattr(WorkPool, "_work", watched)
     cli.render("cornell_diffuse", [tmp_path / "a.png"], passes=1, size="8x8", threads=1)
     assert seen == {niceness()}

@@ -1,10 +1,13 @@
 """The fixed-radius grid against brute force."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
 from pmviewer.errors import PmviewerError
-from pmviewer.maps.search.grid import build_grid, count_in_radius
+from pmviewer.maps.search.grid import build_grid, count_in_radius, grid_steps
+from pmviewer.tasks import in_steps
 from tests.support import naive_maps as naive
 
 f4 = np.float32
@@ -128,3 +131,22 @@ def test_bad_radius(radius):
 def test_bad_power_unit():
     with pytest.raises(PmviewerError, match=r"[Pp]ower"):
         build_grid(np.empty((0, 6), f4), 1.0, 0.0)
+
+
+@pytest.mark.parametrize("radius", [0.1, 0.003])
+def test_a_grid_built_in_pieces_is_the_same(radius):
+    """On any number of threads, dense and hashed; chosen classes as if the others had not been given."""
+    photons = naive.pack(naive.clustered(70_001, 5))
+    words = photons.view(np.uint32)
+    words[:, 3] = words[:, 3] & ~np.uint32(0xC0) | np.arange(len(photons), dtype=np.uint32) % 4 << 6
+    chosen = photons[np.isin(np.arange(len(photons)) % 4, (0, 3))]
+    for given, classes, wanted in ((photons, 0b1111, photons), (photons, 0b1001, chosen), (photons[:0], 0b1111, [])):
+        whole = build_grid(np.ascontiguousarray(wanted) if len(wanted) else given, radius)
+        with ThreadPoolExecutor(3) as threads:
+            steps = [grid_steps(given, radius, 1.0, pieces, classes) for pieces in (1, 3, 8)]
+            parts = in_steps(steps, lambda tasks: [done.result() for done in map(threads.submit, tasks)])
+        for made in parts:
+            np.testing.assert_array_equal(made.starts, whole.starts)
+            np.testing.assert_array_equal(made.photons, whole.photons)
+            assert made.n == len(wanted)
+            assert made.record[list(made.record.dtype.names)[2:]] == whole.record[list(made.record.dtype.names)[2:]]

@@ -45,6 +45,8 @@ AROUND = (3, 7)
 """Pixels along the sides of the boxes whose means stand for the truth that errors are relative to."""
 BLOCKS = 8
 """Blocks along each side of the picture whose differences tell how well D is known."""
+BAND = 32
+"""Rows of the picture a task."""
 WIDTH = 1.645
 """Standard errors of an interval that is to cover 90 %."""
 F8 = NDArray[np.float64]
@@ -130,13 +132,22 @@ def _is_level(n: int) -> bool:
 def _level(first: F8, total: F8, m: int, run: Runner) -> _Level:
     """D of m passes, whose sum is `first`, against the m passes after them; `total` is the sum of both."""
 
-    def of_channel(c: int) -> F8:
-        mean = total[..., c] / (2 * m)
-        around = np.minimum(*(uniform_filter(mean, size) for size in AROUND))
-        square: F8 = (2 * first[..., c] - total[..., c]) ** 2 / (2 * m * m)
-        return square / (around**2 + EPSILON)
+    rows = len(total)
 
-    plane = np.mean(run([partial(of_channel, c) for c in range(3)]), axis=0)
+    def of_band(begin: int) -> F8:
+        """Relative squared differences of BAND rows, the mean over channels."""
+        end, reach = min(begin + BAND, rows), max(AROUND) // 2
+        top, bottom = max(begin - reach, 0), min(end + reach, rows)
+        asked = slice(begin - top, end - top)
+        plane = np.zeros((end - begin, total.shape[1]))
+        for c in range(3):
+            mean = total[top:bottom, :, c] / (2 * m)
+            around = np.minimum(*(uniform_filter(mean, size)[asked] for size in AROUND))
+            square = (2 * first[begin:end, :, c] - total[begin:end, :, c]) ** 2 / (2 * m * m)
+            plane += square / (around**2 + EPSILON) / 3
+        return plane
+
+    plane = np.concatenate(run([partial(of_band, begin) for begin in range(0, rows, BAND)]))
     blocks = _block_means(plane)
     D = float(plane.mean())
     return _Level(m, D, float(blocks.std()) / math.sqrt(blocks.size) / D if D > 0 else 0.0)

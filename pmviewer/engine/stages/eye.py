@@ -26,6 +26,8 @@ from pmviewer.render.path import path_pass
 from pmviewer.render.record import N_COUNTS
 from pmviewer.settings.access import Settings
 
+LEAST_TILE = 4
+"""Fewest pixels that a task is divided into."""
 MOST_POINTS = 1024
 """Most gather rays of a pixel that are told of."""
 
@@ -64,26 +66,34 @@ def render_into(
 
 
 def _tiled(spans: Sequence[tuple[int, int]], tile: int) -> list[list[tuple[int, int]]]:
-    """Spans of pixels in tasks of some `tile` pixels: long ones divided, short ones together."""
+    """Spans of pixels in tasks of some `tile` pixels, short spans together, long ones divided; the last quarter of all
+    pixels in tasks of a quarter, so that threads end together."""
     tasks: list[list[tuple[int, int]]] = []
-    room = 0
+    left = sum(last - first for first, last in spans)
+    quarter, size, room = left // 4, tile, 0
     for first, last in spans:
-        for begin in range(first, last, tile):
-            end = min(begin + tile, last)
+        begin = first
+        while begin < last:
+            if left <= quarter:
+                size = max(tile // 4, LEAST_TILE)
+            end = min(begin + size, last)
             if room < end - begin:
                 tasks.append([])
-                room = tile
+                room = size
             tasks[-1].append((begin, end))
             room -= end - begin
+            left -= end - begin
+            begin = end
     return tasks
 
 
 def tile_size(pixels: int, eye: np.void, threads: int, virtual_lights: int = 0) -> int:
-    """Pixels a task, so that a task takes at most some 30 ms. The picture does not depend on it."""
+    """Pixels a task, so that a task takes at most some 15 ms and many threads end together: what a tile costs differs
+    by what it shows. The picture does not depend on it."""
     keller_wald = eye["choice"] == CHOICES.index("Keller-Wald")
     light_samples = int(eye["con_samples"] + eye["noncon_samples"] if keller_wald else eye["light_samples"])
     work = 1 + int(eye["gather_rays"]) + light_samples // 4 + virtual_lights // 2
-    return max(64 if virtual_lights < 64 else 4, min(4096 * 2 // work, -(-pixels // (4 * threads))))
+    return max(64 if virtual_lights < 64 else LEAST_TILE, min(4096 // work, -(-pixels // (4 * threads))))
 
 
 def outline_of(scene: OpenScene, camera: CameraPose, film: Film, settings: Settings, store: StageStore) -> NDArray:

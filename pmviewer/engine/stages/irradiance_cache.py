@@ -60,14 +60,14 @@ def lattices(width: int, height: int, seed: int, index: int) -> list[NDArray[np.
     """Candidates of each round: pixels that no coarser lattice has, in ascending order."""
     rng = np.random.default_rng([seed, index])
     x0, y0 = (int(offset) for offset in rng.integers(0, COARSEST, 2))
-    x, y = np.meshgrid(np.arange(width) + x0, np.arange(height) + y0)
-    pixels = np.arange(width * height, dtype=np.int32).reshape(height, width)
     rounds, step = [], COARSEST
     while step >= FINEST:
-        chosen = (x % step == 0) & (y % step == 0)
+        x, y = np.arange(-x0 % step, width, step), np.arange(-y0 % step, height, step)
+        chosen = (y[:, None] * width + x).astype(np.int32)
         if step < COARSEST:
-            chosen &= (x % (2 * step) != 0) | (y % (2 * step) != 0)
-        rounds.append(pixels[chosen])
+            coarser = (((y + y0) % (2 * step) == 0)[:, None]) & ((x + x0) % (2 * step) == 0)
+            chosen = chosen[~coarser]
+        rounds.append(chosen.ravel())
         step //= 2
     return rounds
 

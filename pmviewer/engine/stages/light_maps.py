@@ -24,14 +24,17 @@ from pmviewer.engine.store import StageStore
 from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import automatic_radius, largest_power, neighbourhood
 from pmviewer.maps.record import DIRECT, in_classes
-from pmviewer.maps.search.grid import PhotonGrid, build_grid
+from pmviewer.maps.search.grid import PhotonGrid, build_grid, grid_steps
 from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
 from pmviewer.maps.search.parts import parts_of
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Settings
+from pmviewer.tasks import Steps, in_steps, in_turn, one_step
 
 CHOOSING_PHOTONS = 1 << 17
 """Most photons in the map that chooses lights."""
+PIECES = 4
+"""Tasks a thread into which building a map is divided."""
 Float = NDArray[np.float32]
 
 
@@ -55,15 +58,19 @@ class MapBuilder:
         plan, photons = self.plan, traced.photons
         makes: list[Callable[[], Any]] = [
             lambda: self._guides(light, traced, carried.guides),
-            lambda: self._chooser(light, traced, carried.chooser),
             lambda: self._volume(light, traced) if plan.volume else None,
         ]
         if light.kept:  # the stage store belongs to one thread
             caustic, global_ = self._photon_maps(light, traced)
-            guides, chooser, volume = (make() for make in makes)
+            guides, volume = (make() for make in makes)
+            chooser = self._kept_chooser(light, traced, carried.chooser)
         else:
-            both = [partial(self._photon_map, light, photons, name) for name in ("caustic", "global")]
-            caustic, global_, guides, chooser, volume = self.pool.run([*both, *makes])
+            both = [
+                self._photon_map(light, photons, name, PIECES * self.pool.threads) for name in ("caustic", "global")
+            ]
+            choosing = self._chooser(light, traced, carried.chooser)
+            steps = [*both, choosing, *(one_step(make) for make in makes)]
+            caustic, global_, chooser, guides, volume = in_steps(steps, self.pool.run)
         radiance, reach = None, 0.0
         if plan.radiance:
             assert global_ is not None
@@ -113,7 +120,8 @@ class MapBuilder:
     def _photon_maps(self, light: LightPlan, traced: TracedPass) -> tuple[LookUpMap | None, LookUpMap | None]:
         found = []
         for name in ("caustic", "global"):
-            make = partial(self._photon_map, light, traced.photons, name)
+            steps = partial(self._photon_map, light, traced.photons, name, 1)
+            make = partial(_in_turn, steps)
             key = "map", traced.key, name, self._classes(name), self._look_up_key(light, name)
             found.append(self._kept(light, key, make, lambda made: made.structure.bytes if made else 0))
         return found[0], found[1]
@@ -126,22 +134,26 @@ class MapBuilder:
     def _classes(self, name: str) -> int:
         return self.plan.caustic_classes if name == "caustic" else self.plan.global_classes
 
-    def _photon_map(self, light: LightPlan, photons: PhotonMaps, name: str) -> LookUpMap | None:
+    def _photon_map(self, light: LightPlan, photons: PhotonMaps, name: str, pieces: int) -> Steps[LookUpMap | None]:
+        """In steps of up to so many tasks."""
         classes = self._classes(name)
         if not classes:
             return None
-        stored, unit = photons.caustic, photons.caustic_unit
-        if name == "global":
-            stored, unit = photons.global_, photons.global_unit
-        chosen = of_classes(stored, classes)
         if self.settings.estimate.lookup == "nearest":
-            brightest = self._brightest(name, photons, chosen, unit)
-            widest = self._max_radius(brightest, light.neighbours * light.maps)
-            if light.maps == 1:
-                return LookUpMap(build_kdtree(chosen, unit), widest)
-            parts = (of_classes(part, classes) for part in photons.parts(name))
-            return LookUpMap(parts_of([build_kdtree(part, unit) for part in parts]), widest)
-        return LookUpMap(build_grid(chosen, light.reach[name], unit), light.radii[name])
+            return (yield from one_step(lambda: self._photon_tree(light, photons, name, classes)))
+        stored, unit = _stored(photons, name)
+        return LookUpMap((yield from grid_steps(stored, light.reach[name], unit, pieces, classes)), light.radii[name])
+
+    def _photon_tree(self, light: LightPlan, photons: PhotonMaps, name: str, classes: int) -> LookUpMap:
+        """For the nearest photons, whole or in parts."""
+        stored, unit = _stored(photons, name)
+        chosen = of_classes(stored, classes)
+        brightest = self._brightest(name, photons, chosen, unit)
+        widest = self._max_radius(brightest, light.neighbours * light.maps)
+        if light.maps == 1:
+            return LookUpMap(build_kdtree(chosen, unit), widest)
+        parts = (of_classes(part, classes) for part in photons.parts(name))
+        return LookUpMap(parts_of([build_kdtree(part, unit) for part in parts]), widest)
 
     def _brightest(self, name: str, photons: PhotonMaps, chosen: Float, unit: float) -> float:
         """Luminance of the brightest photon of a map, in watts. Of photons stored with a probability it is that before:
@@ -202,21 +214,41 @@ class MapBuilder:
 
         return self._kept(light, ("guides", traced.key, self.plan.guide_mask, asked, radius), build, _bytes)
 
-    def _chooser(self, light: LightPlan, traced: TracedPass, radius: float | None) -> PhotonGrid | None:
+    def _kept_chooser(self, light: LightPlan, traced: TracedPass, radius: float | None) -> PhotonGrid | None:
+        if self.plan.choice == "power":
+            return None
+        make = partial(_in_turn, partial(self._chooser, light, traced, radius))
+        return self._kept(light, ("light choice", traced.key, self.settings.direct.choice_radius, radius), make, _bytes)
+
+    def _chooser(self, light: LightPlan, traced: TracedPass, radius: float | None) -> Steps[PhotonGrid | None]:
         """The pass's direct photons that choose lights, None where they don't. A small radius would miss lights."""
         if self.plan.choice == "power":
             return None
-        asked, photons, scene_radius = self.settings.direct.choice_radius, traced.photons, self.scene.flat.radius
-
-        def build() -> PhotonGrid:
-            some = as_arrived(photons)[: 8 * CHOOSING_PHOTONS]  # of all classes
-            primary = of_classes(some, 1 << DIRECT)[:CHOOSING_PHOTONS]
-            if radius is not None:
-                return build_grid(primary, radius, photons.global_unit)
+        photons, scene_radius = traced.photons, self.scene.flat.radius
+        primary = yield from one_step(lambda: _direct(photons))
+        if radius is None:
+            asked = self.settings.direct.choice_radius
             relative = neighbourhood(primary[:, :3]) / scene_radius if asked == "auto" else float(asked)
-            return build_grid(primary, min(max(relative, 1e-4), 1.0) * scene_radius, photons.global_unit)
+            radius = min(max(relative, 1e-4), 1.0) * scene_radius
+        return (yield from grid_steps(primary, radius, photons.global_unit, PIECES * self.pool.threads))
 
-        return self._kept(light, ("light choice", traced.key, asked, radius), build, _bytes)
+
+def _direct(photons: PhotonMaps) -> Float:
+    """The first photons that came from lights straight."""
+    some = as_arrived(photons)[: 8 * CHOOSING_PHOTONS]  # of all classes
+    return of_classes(some, 1 << DIRECT)[:CHOOSING_PHOTONS]
+
+
+def _in_turn(steps: Callable[[], Steps[Any]]) -> Any:
+    """On the thread that asks."""
+    return in_steps([steps()], in_turn)[0]
+
+
+def _stored(photons: PhotonMaps, name: str) -> tuple[Float, float]:
+    """Photons of the caustic or global map, and their unit of power."""
+    if name == "caustic":
+        return photons.caustic, photons.caustic_unit
+    return photons.global_, photons.global_unit
 
 
 def _bytes(grid: PhotonGrid | PhotonKdTree) -> int:

@@ -3,8 +3,7 @@
 Cells are 2r wide, so a look-up touches at most 2×2×2 of them. Cells that follow each other in x follow each other in
 memory: the photons of a row of two cells are one contiguous run, and a look-up is at most four runs that are tested
 eight photons at a time. Photons are stored in blocks of eight, each the six words of the record in turn: a run is one
-stretch of memory. A stable counting sort in two levels (coarse buckets of cells first, then cells within a bucket)
-brings photons into cell order; its scattered writes stay within the caches.
+stretch of memory. `cell_sort` brings photons into cell order.
 
 While the cells of the bounding box are not many more than the photons, the grid is dense. Otherwise (small radius in a
 large scene) cells are hashed (Teschner et al. 2003) into about n/2 buckets; four neighbours in x share one hash so that
@@ -18,13 +17,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from pmviewer.errors import SettingError
 from pmviewer.kernels.compile.jit import device, inlined, kernel
 from pmviewer.kernels.memory import load_i4, stack_get_i4, stack_i4, stack_put_i4
+from pmviewer.maps.record import ALL_CLASSES
+from pmviewer.maps.search.cell_sort import (
+    bounds_of_piece,
+    even_ends,
+    even_parts,
+    places_of,
+    sort_by_bucket,
+    sort_by_cell,
+)
 from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, count_bits, facing8, within8
+from pmviewer.tasks import Steps, in_steps, in_turn
 
 DENSE_CELLS_PER_PHOTON = 1.5
 FEWEST_DENSE_CELLS = 1 << 12
@@ -32,6 +42,8 @@ MOST_CELLS = 30_000_000
 """A dense grid has at most this many cells: beyond, look-ups miss the caches and a hash is no slower."""
 
 MOST_CELLS_ALONG_AXIS = 1 << 22
+FEWEST_OF_PIECE = 1 << 13
+"""Photons; fewer are not worth a task of their own."""
 MARGIN = 1.0 + 1e-6
 """Photons whose float32 distance rounds to inside may lie this much farther out."""
 
@@ -212,92 +224,36 @@ def count_in_radius(grids, points, radius, i0, i1, counts):
         counts[i] = total
 
 
-@kernel
-def _bounds(photons, box):
-    """Bounding box of photons (n, 6) into box (2, 3) float32; coordinates that are not numbers are left out."""
-    for axis in range(3):
-        box[0, axis], box[1, axis] = np.float32(np.inf), np.float32(-np.inf)
-    x0, y0, z0 = box[0]
-    x1, y1, z1 = box[1]
-    for i in range(len(photons)):
-        x, y, z = photons[i, 0], photons[i, 1], photons[i, 2]
-        x0, y0, z0 = min(x0, x), min(y0, y), min(z0, z)
-        x1, y1, z1 = max(x1, x), max(y1, y), max(z1, z)
-    box[0, 0], box[0, 1], box[0, 2] = x0, y0, z0
-    box[1, 0], box[1, 1], box[1, 2] = x1, y1, z1
-
-
-@kernel
-def _sort(photons, words, records, shift, keys, order, bucket_ends, cell_ends, blocks, starts):
-    """Two-level counting sort of photons (n, 6), seen as uint32 in `words`, by cell.
-
-    keys, order: (2, n) and (n,) int32 scratch; bucket_ends: zeroed int64, one per 2^shift cells, plus one; cell_ends:
-    (2^shift,) int64 scratch.
-    """
-    grid = records[0]
-    n = len(photons)
-    scale = grid.cells_per_length
-    for i in range(n):
-        cx = min(max(_i8((photons[i, 0] - grid.origin_x) * scale), 0), grid.nx - 1)
-        cy = min(max(_i8((photons[i, 1] - grid.origin_y) * scale), 0), grid.ny - 1)
-        cz = min(max(_i8((photons[i, 2] - grid.origin_z) * scale), 0), grid.nz - 1)
-        if grid.hash_mask == 0:
-            key = (cz * grid.ny + cy) * grid.nx + cx
-        else:
-            key = cell_bucket(cx, cy, cz, grid.hash_mask)
-        keys[0, i] = key
-        bucket_ends[key >> shift] += 1
-    total = 0
-    for b in range(len(bucket_ends)):
-        size = bucket_ends[b]
-        bucket_ends[b] = total
-        total += size
-    for i in range(n):
-        key = keys[0, i]
-        place = bucket_ends[key >> shift]
-        bucket_ends[key >> shift] = place + 1
-        keys[1, place] = key
-        order[place] = i
-    cells = len(starts) - 1
-    begin = 0
-    for b in range(len(bucket_ends)):
-        end = bucket_ends[b]
-        first_cell = b << shift
-        width = min(1 << shift, cells - first_cell)
-        cell_ends[:width] = 0
-        for i in range(begin, end):
-            cell_ends[keys[1, i] - first_cell] += 1
-        total = begin
-        for c in range(width):
-            starts[first_cell + c] = total
-            total += cell_ends[c]
-            cell_ends[c] = starts[first_cell + c]
-        for i in range(begin, end):
-            c = keys[1, i] - first_cell
-            place = cell_ends[c]
-            cell_ends[c] = place + 1
-            j = order[i]
-            for w in range(6):
-                blocks[place // WIDTH, w, place % WIDTH] = words[j, w]
-        begin = end
-    starts[cells] = n
-
-
 def build_grid(photons: np.ndarray, radius: float, power_unit: float = 1.0) -> PhotonGrid:
     """Sorts photons (n, 6) float32 into a grid for look-ups of at most `radius`. Runs without the GIL.
 
     Raises SettingError when the radius or the unit of power is not positive and finite.
     """
+    return in_steps([grid_steps(photons, radius, power_unit)], in_turn)[0]
+
+
+def grid_steps(
+    photons: np.ndarray, radius: float, power_unit: float = 1.0, pieces: int = 1, classes: int = ALL_CLASSES
+) -> Steps[PhotonGrid]:
+    """`build_grid` in steps of up to `pieces` tasks each, of photons whose path class has its bit in `classes`. The
+    grid does not depend on `pieces`. Raises SettingError as `build_grid` does."""
     if not (math.isfinite(radius) and radius > 0):
         raise SettingError(f"Look-up radius {radius!r} of a photon map: expected a positive length.")
     if not (math.isfinite(power_unit) and power_unit > 0):
         raise SettingError(f"Power unit {power_unit!r} of a photon map: expected a positive power.")
     photons = np.require(photons, np.float32, ["C", "W"])
-    n = len(photons)
-    box = np.zeros((2, 3), np.float32)
+    words = photons.view(np.uint32)
+    ends = even_ends(len(photons), min(pieces, len(photons) // FEWEST_OF_PIECE + 1))
+    boxes = np.zeros((len(ends), 2, 3), np.float32)
+    kept = np.zeros(len(ends), np.int64)
+    yield [
+        partial(bounds_of_piece, photons, words, classes, *ends[t], boxes[t], kept[t : t + 1]) for t in range(len(ends))
+    ]
+    n = int(kept.sum())
+    low, high = np.zeros((2, 3))
     if n:
-        _bounds(photons, box)
-    low, high = np.nan_to_num(box.astype(np.float64))
+        low = np.nan_to_num(boxes[:, 0].min(axis=0).astype(np.float64))
+        high = np.nan_to_num(boxes[:, 1].max(axis=0).astype(np.float64))
     extent = np.maximum(high - low, 0.0)
     # A cell below the spacing of float32 coordinates would separate nothing; a wider one is merely slower.
     cell = max(2.0 * radius * (1.0 + 1e-5), float(extent.max()) / (MOST_CELLS_ALONG_AXIS - 1))
@@ -312,11 +268,37 @@ def build_grid(photons: np.ndarray, radius: float, power_unit: float = 1.0) -> P
     record = np.zeros(1, RECORD)
     addresses = blocks.ctypes.data, starts.ctypes.data
     record[0] = (*addresses, n, *low, 1.0 / cell, *shape, hash_mask, radius, power_unit)
-    if n:
-        shift = max(4, math.ceil(math.log2(cells / 1024)))
-        keys, order = np.empty((2, n), np.int32), np.empty(n, np.int32)
-        bucket_ends = np.zeros((cells - 1 >> shift) + 1, np.int64)
-        cell_ends = np.empty(1 << shift, np.int64)
-        words = photons.view(np.uint32)
-        _sort(photons, words, record, shift, keys, order, bucket_ends, cell_ends, blocks, starts)
-    return PhotonGrid(n, blocks, starts, float(radius), float(power_unit), record)
+    grid = PhotonGrid(n, blocks, starts, float(radius), float(power_unit), record)
+    if not n:
+        return grid
+    shift = max(4, math.ceil(math.log2(cells / 1024)))
+    keys, sorted_keys, order = np.empty(len(photons), np.int32), np.empty(n, np.int32), np.empty(n, np.int32)
+    counts = np.zeros((len(ends), (cells - 1 >> shift) + 1), np.int64)
+    yield [partial(_keys, photons, words, classes, record, shift, keys, counts[t], *ends[t]) for t in range(len(ends))]
+    places, begins = places_of(counts)
+    yield [partial(sort_by_bucket, keys, shift, places[t], sorted_keys, order, *ends[t]) for t in range(len(ends))]
+    parts = [(int(a), int(b)) for a, b in even_parts(begins, len(ends))]
+    yield [partial(sort_by_cell, words, sorted_keys, order, begins, shift, blocks, starts, *part) for part in parts]
+    starts[cells] = n
+    return grid
+
+
+@kernel
+def _keys(photons, words, classes, records, shift, keys, counts, first, last):
+    """Cells of photons first … last−1 of (n, 6), seen as uint32 in `words`, into keys (n,) int32, −1 of those whose
+    class is not in `classes`; `counts` (buckets,) int64 adds up how many lie in 2^shift cells in a row."""
+    grid = records[0]
+    scale = grid.cells_per_length
+    for i in range(first, last):
+        if (classes >> _i8((words[i, 3] >> _u4(6)) & _u4(3))) & 1 == 0:
+            keys[i] = -1
+            continue
+        cx = min(max(_i8((photons[i, 0] - grid.origin_x) * scale), 0), grid.nx - 1)
+        cy = min(max(_i8((photons[i, 1] - grid.origin_y) * scale), 0), grid.ny - 1)
+        cz = min(max(_i8((photons[i, 2] - grid.origin_z) * scale), 0), grid.nz - 1)
+        if grid.hash_mask == 0:
+            key = (cz * grid.ny + cy) * grid.nx + cx
+        else:
+            key = cell_bucket(cx, cy, cz, grid.hash_mask)
+        keys[i] = key
+        counts[key >> shift] += 1
