@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from pmviewer.kernels.random import hash3
 from pmviewer.kernels.vector import add, cross, dot, scale, sub
 from pmviewer.maps.photon_words import encode_direction, encode_power
 from pmviewer.maps.variant import ABSENT
+from pmviewer.tasks import Runner, in_turn
 
 ROW = 32
 """Floats of a record."""
@@ -37,8 +39,10 @@ OFF_PLANE = np.float32(0.1)
 """A point farther than so many ρ off a record's plane is on another surface."""
 NEAREST = np.float32(1e-3)
 """Errors below this weigh the same."""
-SWEEPS = 8
-"""Most rounds of limiting radii by neighbours; two or three do."""
+SWEEPS = 16
+"""Most rounds of limiting radii by neighbours; the later ones ask few records."""
+FEWEST_OF_PART, MOST_PARTS = 512, 32
+"""Records that one task limits the others by, and tasks."""
 
 RECORD = np.dtype(
     [
@@ -237,21 +241,38 @@ def reach_of(harmonic, footprint, error, least, most):
     return min(max(error * harmonic, least * footprint), most * footprint)
 
 
-@kernel
-def limit_by_neighbours(caches, rows):
+def limit_by_neighbours(cache: IrradianceCache, run: Runner = in_turn) -> None:
     """Enforce R_i ≤ R_j + |x_i − x_j| for each record j that lies within the reach of record i (Křivánek and others
-    2006): a detail that one record found is news to those around it. `rows` are the cache's own, changed in place; the
-    index stays valid, for reaches only shrink."""
+    2006): a detail that one record found is news to those around it. The cache's rows are changed; its index stays
+    valid, for reaches only shrink.
+
+    All records look at once, at what the sweep before has left, and later sweeps ask only those that it lowered: the
+    result does not depend on how `run` shares the tasks.
+    """
+    rows, record = cache.rows, cache.record[0]
+    asked = np.arange(cache.n, dtype=np.int32)
     for _ in range(SWEEPS):
-        if _sweep(caches[0], rows) == 0:
+        parts = np.array_split(asked, max(1, min(MOST_PARTS, len(asked) // FEWEST_OF_PART)))
+        lowest = np.full((len(parts), cache.n), np.inf, np.float32)
+        tasks = [partial(_lower, cache.record, rows, *given) for given in zip(parts, lowest, strict=True)]
+        (run if len(tasks) > 1 else in_turn)(tasks)
+        harmonic = lowest.min(axis=0)
+        asked = np.flatnonzero(harmonic < rows[:, HARMONIC]).astype(np.int32)
+        if not len(asked):
             break
+        footprint = rows[asked, FOOTPRINT]
+        reach = np.maximum(record["error"] * harmonic[asked], record["least"] * footprint)
+        reach = np.minimum(reach, record["most"] * footprint)
+        rows[asked, HARMONIC] = harmonic[asked]
+        rows[asked, REACH] = np.minimum(rows[asked, REACH], reach)
 
 
-@device
-def _sweep(cache, rows):
-    """Limits each record by each once, in order; returns how many were lowered."""
-    lowered = 0
-    for j in range(len(rows)):
+@kernel
+def _lower(caches, rows, asked, lowest):
+    """The least R_j + |x_i − x_j| of the records j of `asked` within the reach of each record i, where it is less than
+    R_i, into lowest (n,) float32."""
+    cache = caches[0]
+    for j in asked:
         p = (rows[j, 0], rows[j, 1], rows[j, 2])
         levels, width = cache.levels, cache.cell
         level = _i8(0)
@@ -264,15 +285,11 @@ def _sweep(cache, rows):
                     distance = _f4(math.sqrt(dot(d, d)))
                     if distance < rows[i, REACH]:
                         harmonic = rows[j, HARMONIC] + distance
-                        if harmonic < rows[i, HARMONIC]:
-                            lowered += 1
-                            rows[i, HARMONIC] = harmonic
-                            reach = reach_of(harmonic, rows[i, FOOTPRINT], cache.error, cache.least, cache.most)
-                            rows[i, REACH] = min(rows[i, REACH], reach)
+                        if harmonic < rows[i, HARMONIC] and harmonic < lowest[i]:
+                            lowest[i] = harmonic
             levels = _u4(levels >> _u4(1))
             level += 1
             width = width * _f4(2.0)
-    return lowered
 
 
 @kernel

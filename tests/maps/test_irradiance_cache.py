@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pmviewer.maps import irradiance_cache
 from pmviewer.maps.irradiance_cache import (
     FOOTPRINT,
     HARMONIC,
@@ -155,7 +156,7 @@ def test_neighbours_limit_each_others_radii():
     rows = rows_at(points, [(0, 0, 1)] * n, 10 ** rng.uniform(-1.5, -0.5, n))
     cache = build_cache(rows, recipe())
     before = cache.rows.copy()
-    limit_by_neighbours(cache.record, cache.rows)
+    limit_by_neighbours(cache)
     R, reach = cache.rows[:, HARMONIC], cache.rows[:, REACH]
     assert (before[:, HARMONIC] >= R).all()
     assert (before[:, HARMONIC] > R).any()
@@ -165,10 +166,26 @@ def test_neighbours_limit_each_others_radii():
     assert reach == pytest.approx(np.minimum(before[:, REACH], 0.4 * R), rel=1e-5)
 
 
+def test_limits_do_not_depend_on_how_the_work_is_shared(monkeypatch):
+    rng = np.random.default_rng(6)
+    n = 3000
+    points = np.column_stack([rng.uniform(0, 1, (n, 2)), np.zeros(n)])
+    rows = rows_at(points, [(0, 0, 1)] * n, 10 ** rng.uniform(-2, -0.5, n))
+    found = []
+    for most in (1, 3, 32):
+        monkeypatch.setattr(irradiance_cache, "MOST_PARTS", most)
+        cache = build_cache(rows.copy(), recipe())
+        limit_by_neighbours(cache, lambda tasks: [task() for task in reversed(tasks)])
+        found.append(cache.rows)
+    assert (found[0] < rows[:, : found[0].shape[1]]).any()
+    for other in found[1:]:
+        np.testing.assert_array_equal(other, found[0])
+
+
 def test_limits_keep_to_the_least_reach():
     rows = rows_at([(0, 0, 0), (0.1, 0, 0)], [(0, 0, 1)] * 2, [1.0, 0.001])
     cache = build_cache(rows, recipe(least=0.25))
-    limit_by_neighbours(cache.record, cache.rows)
+    limit_by_neighbours(cache)
     assert cache.rows[0, REACH] == pytest.approx(0.25)
 
 

@@ -12,7 +12,6 @@ limit the mean is that of the plain gather.
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,6 +33,7 @@ from pmviewer.render.gather.cache_fill import fill_records
 from pmviewer.render.given import PassData
 from pmviewer.render.record import N_COUNTS
 from pmviewer.settings.schema import Gather
+from pmviewer.tasks import Runner, in_turn
 
 COARSEST, FINEST = 16, 4
 """Widths of the lattice in pixels, in the first and the last round."""
@@ -92,22 +92,22 @@ def fill_cache(given: PassData, record: NDArray[np.void], pool: WorkPool) -> tup
 
         total += sum(pool.run([task(first) for first in range(0, len(pixels), batch)]), np.zeros(N_COUNTS, np.int64))
         if made.any():
-            cache = pool.run([partial(_extended, cache, rows[made])])[0]
+            cache = _extended(cache, rows[made], pool.run)
     return cache, total
 
 
 def prepare_cache(given: PassData) -> None:
     """Call every kernel of this stage once, on nothing."""
     none = np.empty((0, ROW), np.float32)
-    cache = _extended(build_cache(none, np.zeros(1, RECORD)), none)
+    cache = _extended(build_cache(none, np.zeros(1, RECORD)), none, in_turn)
     rows, made, counts = np.empty((0, ROW), np.float32), np.empty(0, bool), np.zeros(N_COUNTS, np.int64)
     fill_records(given._replace(cache=cache.record), np.empty(0, np.int32), rows, made, counts, 0, 0)
     cache_cloud(cache)
 
 
-def _extended(cache: IrradianceCache, rows: NDArray[np.float32]) -> IrradianceCache:
+def _extended(cache: IrradianceCache, rows: NDArray[np.float32], run: Runner) -> IrradianceCache:
     together = build_cache(np.concatenate([cache.rows, rows]), cache.record)
-    limit_by_neighbours(together.record, together.rows)
+    limit_by_neighbours(together, run)
     return build_cache(together.rows, cache.record)
 
 
