@@ -57,8 +57,8 @@ def pixel_seed(eye, pixel):
 @device
 def _raw_direction(eye, pixel, u, v):
     """Of the ray through the pixel at (u, v), 1 along the view; of an orthographic camera its place from the eye."""
-    x = _f4(pixel % eye.width) + u
-    y = _f4(pixel // eye.width) + v
+    x = _f4(pixel % eye.width) + (eye.pixel_margin + eye.pixel_side * u)
+    y = _f4(pixel // eye.width) + (eye.pixel_margin + eye.pixel_side * v)
     return (
         eye.x_corner + x * eye.x_right + y * eye.x_down,
         eye.y_corner + x * eye.y_right + y * eye.y_down,

@@ -23,6 +23,8 @@ _FIELDS: list[tuple] = [
     ("width", "i4"),
     ("height", "i4"),
     ("orthographic", "i4"),
+    ("pixel_side", "f4"),  # of the part of a pixel that is seen, and how far it is from the pixel's left and top
+    ("pixel_margin", "f4"),
     ("sequence", "i4"),
     ("seed", "u4"),
     ("index", "u4"),  # the pass: the sample index of every pixel's sequences
@@ -183,6 +185,7 @@ def _set_camera(r: np.void, camera: CameraPose) -> None:
             r[f"{axis}_{part}"] = value
     r["near"], r["far"] = camera.near, camera.far
     r["width"], r["height"], r["orthographic"] = camera.width, camera.height, camera.orthographic
+    r["pixel_side"], r["pixel_margin"] = camera.pixel_side, 0.5 * (1.0 - camera.pixel_side)
 
 
 def _set_lens(r: np.void, camera: CameraPose) -> None:
