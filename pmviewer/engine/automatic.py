@@ -26,6 +26,8 @@ def automatic_values(looked: Looked, first_radius: float) -> dict[str, Any]:
         found["estimate.radius"] = first_radius / radius
         found["photons.max_bounces"] = most_bounces(settings.photons, plan.media)
         found["photons.projection"] = "off" if looked.light.tracer.projection is None else "on"
+    if not plan.path:
+        found["render.mirror_rays"] = plan.mirror_rays
     found["direct.choice"] = plan.choice
     found["direct.samples"] = samples_at_surface(settings.direct, plan.path, plan.media)
     if looked.latest is not None:

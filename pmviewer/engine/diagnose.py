@@ -100,7 +100,7 @@ def inspected(wanted: Wanted, looked: Looked, pool: WorkPool) -> Inspection:
         replace(wanted, points=True),
         planes=diagnostic_planes(wanted, looked, pool) | (_denoised(looked, pool) if wanted.denoised else {}),
         paths=paths_of(tracer, maps, wanted.paths) if wanted.paths else None,
-        gathered=gather_rays_of(looked.latest.given, *wanted.pixel, pool) if wanted.pixel else None,
+        gathered=gather_rays_of(looked.latest, *wanted.pixel, pool) if wanted.pixel else None,
         fates=fates_of(tracer, maps, importance, wanted.fates) if wanted.fates else None,
         lights=contributions_of(tracer, maps, importance) if wanted.lights else None,
         pixel=pixel_report(looked, wanted.pinned, partial(measures_at, looked, pool), pool) if wanted.pinned else None,

@@ -30,6 +30,10 @@ SHOWN = "Lights and the sky are shown, which the file or render.lights hides: no
 ALL = 1 << DIRECT | 1 << CAUSTIC | 1 << INDIRECT | 1 << INDIRECT_CAUSTIC
 
 
+MIRROR_RAYS = 2
+"""Samples a pass where mirrors and glass are seen, automatic."""
+
+
 @dataclass(frozen=True)
 class Plan:
     """Masks are bit sets of path classes (`1 << class`). `caustic_mask` of the caustic map, `global_mask` as indirect
@@ -49,7 +53,9 @@ class Plan:
     `direct.mis` says; `dispersion` whether glass splits light into colours; `lens`
     whether the render camera has one, `filtered` whether the film has another reconstruction filter than the plain box,
     `moments` whether the film keeps what passes tell of its noise, `split` whether camera paths go both ways at glass,
-    `hides` whether the picture shows no lights; `thin_glass` are the rules by which light passes panes of glass, ()
+    `mirror_rays` how many samples a pass pixels have that show a mirror or glass, and `one_sample` whether something
+    forbids more than one; `hides` whether the picture shows no
+    lights; `thin_glass` are the rules by which light passes panes of glass, ()
     where all of it is exact; `maps` is how many parts of the light pass have photon maps of their own; `warnings` are
     sentences for the log about what was asked for and can't be."""
 
@@ -78,6 +84,8 @@ class Plan:
     moments: bool = True
     split: bool = False
     hides: bool = False
+    one_sample: bool = False
+    mirror_rays: int = 1
     media: bool = False
     volume: bool = False
     phase_rays: bool = False
@@ -175,12 +183,14 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         lens=_has_lens(settings, traits),
         filtered=_filtered(settings, traits),
         split=_splits(settings, traits, plan),
+        one_sample=_one_sample(settings, traits, plan),
         hides=hides_lights(settings, traits) and not traits.has_media,
         moments=not (_divided(settings, plan) or is_signed(_filter(settings, traits))),
         thin_glass=thin_rules(settings, traits),
         dispersion=traits.has_dispersion,
         warnings=(*plan.warnings, *_of_thin(settings, traits), *_of_dispersion(plan, traits)),
     )
+    plan = replace(plan, mirror_rays=_mirror_rays(settings, traits, plan))
     if not plan.photons:
         return plan
     how = settings.importance
@@ -232,6 +242,20 @@ def _splits(settings: Settings, traits: SceneTraits, plan: Plan) -> bool:
     """Whether camera paths go both ways at glass."""
     glass = traits.has_smooth_glass and not traits.has_dispersion
     return settings.render.splits > 0 and glass and not (plan.path or plan.virtual)
+
+
+def _one_sample(settings: Settings, traits: SceneTraits, plan: Plan) -> bool:
+    """Whether something counts on one sample a pixel and pass: what is estimated belongs to it, virtual lights and
+    filters with negative parts add up weights, and the photons that pixels find set their radii."""
+    counted = plan.path or plan.virtual or plan.estimation or is_signed(_filter(settings, traits))
+    return counted or settings.estimate.radius_rule == "pixel"
+
+
+def _mirror_rays(settings: Settings, traits: SceneTraits, plan: Plan) -> int:
+    if plan.one_sample or not traits.follows(settings.photons.glossy):
+        return 1
+    asked = settings.render.mirror_rays
+    return MIRROR_RAYS if asked == "auto" else int(asked)
 
 
 def hides_lights(settings: Settings, traits: SceneTraits) -> bool:

@@ -40,6 +40,7 @@ from pmviewer.photons.projection.projected import NO_PROJECTION
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
 from pmviewer.render.filter import add_weights
+from pmviewer.render.mirrored import mark_mirrors
 from pmviewer.render.moments import prepare_moments
 from pmviewer.render.path import path_pass
 from pmviewer.render.pixel_radius import first_radii
@@ -119,9 +120,7 @@ def steps_of(scene: OpenScene, settings: Settings) -> list[Step]:
 
 def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]:
     record, photons = thin_record(scene.flat.record, settings, plan), np.zeros((1, 6), np.float32)
-    points, ends = np.empty((0, 3), np.float32), np.empty(0, np.float32)
-    hits = ends, np.empty(0, np.int32), np.empty((0, 2), np.float32)
-    steps = [Step("ray casting", cast_closest, (scene.flat.record[0], points, points, ends, ends, *hits))]
+    steps = [_casting(scene.flat.record)]
     light_pass, codes = np.zeros(1, LIGHT_PASS_DTYPE), np.zeros(1, np.uint32)
     in_media = photons if plan.media else None
     out = PhotonBuffers(photons, photons, codes, codes, np.zeros(N_COUNTS, np.int64), empty_ledger(), in_media)
@@ -145,6 +144,12 @@ def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]
     return [*steps, grid_step()]
 
 
+def _casting(record: NDArray[np.void]) -> Step:
+    points, ends = np.empty((0, 3), np.float32), np.empty(0, np.float32)
+    hits = ends, np.empty(0, np.int32), np.empty((0, 2), np.float32)
+    return Step("ray casting", cast_closest, (record[0], points, points, ends, ends, *hits))
+
+
 def grid_step() -> Step:
     """What every light pass ends with."""
     return Step("photon grid", build_grid, (np.zeros((1, 6), np.float32), 1.0, 1.0))
@@ -153,8 +158,11 @@ def grid_step() -> Step:
 def eye_steps(record: NDArray[np.void], traits: SceneTraits, settings: Settings, plan: Plan) -> list[Step]:
     """What the eye pass runs for a scene with such a `record`, whose contents don't count."""
     film, counts = np.zeros((1, 1)), np.zeros(N_EYE_COUNTS, np.int64)
-    eye, outline = blank_eye(settings, plan), np.zeros(0, np.uint8)
-    steps = [Step("filter", add_weights, (eye, outline, np.zeros((1, 2)), 0, 0))] if plan.filtered else []
+    eye, marks = blank_eye(settings, plan), np.zeros(0, np.uint8)
+    steps = [Step("filter", add_weights, (eye, marks, np.zeros((1, 2)), 0, 0))] if plan.filtered else []
+    if plan.mirror_rays > 1:
+        none = np.empty(0, np.int32), np.zeros(0, bool), np.zeros(0, np.uint8)
+        steps += [_casting(record), Step("mirrors", mark_mirrors, (record, *none))]
     record = thin_record(record, settings, plan)
     if plan.path:
         return [*steps, Step("path tracer", path_pass, (record, eye, film, counts, 0, 0))]
@@ -166,4 +174,4 @@ def eye_steps(record: NDArray[np.void], traits: SceneTraits, settings: Settings,
     if plan.reprojection:
         steps.append(Step("gather reprojection", prepare_reprojection, (given,)))
     radii = first_radii(1, 0.0, 0.0) if radii_of_pixels(Facts(settings, plan, traits)) else None
-    return [*steps, Step("camera pass", eye_pass, (given, outline, radii, film, counts, 0, 0))]
+    return [*steps, Step("camera pass", eye_pass, (given, marks, radii, film, counts, 0, 0))]

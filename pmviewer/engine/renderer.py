@@ -30,7 +30,7 @@ from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import first_radius, radii_of_pixels
 from pmviewer.engine.stages.estimation import estimate_gathers
-from pmviewer.engine.stages.eye import gather_rays_of, outline_of, render_into
+from pmviewer.engine.stages.eye import gather_rays_of, marks_of, render_into
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.irradiance_cache import fill_cache, recipe
 from pmviewer.engine.stages.light import LightStage
@@ -49,7 +49,6 @@ from pmviewer.render.clip import clipped
 from pmviewer.render.film import Addable, Film, Increment
 from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.gather.gather_points import POINT_COLUMNS
-from pmviewer.render.given import PassData
 from pmviewer.render.moments import Moments
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, RADIUS, first_radii, shrink
 from pmviewer.settings.access import Settings
@@ -120,7 +119,7 @@ class Renderer:
         """What made the coarse frame, until the first pass."""
         self._apart: Film | None = None
         self._told: Told | None = None
-        self._outline: NDArray[np.uint8] | None = None
+        self._marks: NDArray[np.uint8] | None = None
         self._watched = Watched()
 
     @property
@@ -275,7 +274,7 @@ class Renderer:
         self.recall()
         if self.latest is None:
             return np.empty((0, POINT_COLUMNS), np.float32)
-        return gather_rays_of(self.latest.given, x, y, self.pool)
+        return gather_rays_of(self.latest, x, y, self.pool)
 
     def _frame(self, serial: int, film: Film, coarse: bool, wanted: Wanted | None) -> Frame:
         wanted = wanted or wanted_of(self.facts)
@@ -299,7 +298,7 @@ class Renderer:
 
     def _pass(self, film: Film, camera: CameraPose, index: int, N: int) -> None:
         made = self._maps(film, camera, index, N)
-        self.tally.timed(self.pool, "camera pass", lambda: self._eye_pass(made.given, film))
+        self.tally.timed(self.pool, "camera pass", lambda: self._eye_pass(made, film))
 
     def _maps(self, film: Film, camera: CameraPose, index: int, N: int, again: bool = False) -> RenderedPass:
         """All of pass `index` but its picture; `again` for a pass that is in the film already."""
@@ -326,7 +325,8 @@ class Renderer:
             tally.add_estimates(estimates.counts)
             tally.add_counts(counts)
             given = given._replace(cache=estimates.record)
-        self.latest, self._told = RenderedPass(given, maps, shadows, cache, virtual, estimates), None
+        marks = tally.timed(pool, "camera pass", lambda: self._marks_of(film))
+        self.latest, self._told = RenderedPass(given, maps, marks, shadows, cache, virtual, estimates), None
         return self.latest
 
     def _light(self, film: Film, index: int, N: int, again: bool = False) -> PassMaps:
@@ -337,13 +337,16 @@ class Renderer:
                 self.light.run(0, N, self.first_radius, self.importance, widest)
         return self.light.run(index, N, self.first_radius, self.importance, widest)
 
-    def _eye_pass(self, given: PassData, film: Film) -> None:
-        outline = np.zeros(0, np.uint8)
-        if not self.plan.path:
-            if self._outline is None:  # the store may keep nothing
-                self._outline = outline_of(self.scene, self.camera, film, self.settings, self.store)
-            outline = self._outline
-        self.tally.add_counts(render_into(film, given, outline, self.plan, self.pool))
+    def _marks_of(self, film: Film) -> NDArray[np.uint8]:
+        if self.plan.path:
+            return np.zeros(0, np.uint8)
+        if self._marks is None:  # the store may keep nothing
+            of_view = self.scene, self.camera, film, self.settings, self.plan, self.store
+            self._marks = self.pool.run([lambda: marks_of(*of_view)])[0]
+        return self._marks
+
+    def _eye_pass(self, rendered: RenderedPass, film: Film) -> None:
+        self.tally.add_counts(render_into(film, rendered.given, rendered.marks, self.plan, self.pool))
 
     def _radii_of_pixels(self, film: Film, again: bool = False) -> dict[str, float]:
         """Gives the pixels the radii of the next pass, unless they have them `again`; returns the largest by map. None

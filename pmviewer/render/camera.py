@@ -66,6 +66,9 @@ class CameraPose:
     medium: int | None = None
     """Number of the medium around the eye, −1 for none, as `pmviewer.engine.immersion` finds it; None in scenes without
     media."""
+    pixel_side: float = 1.0
+    """Side of the square in the middle of each pixel that is seen, in pixels: with less than 1 a small picture is made
+    of pixels of a larger one, those between them left out (`pmviewer.engine.auto.trial`)."""
 
     @property
     def orthographic(self) -> bool:

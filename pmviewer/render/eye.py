@@ -1,4 +1,4 @@
-"""The eye pass: one sample per pixel of Jensen's four-way split (R1), from the maps of this pass.
+"""The eye pass: samples of each pixel of Jensen's four-way split (R1), from the maps of this pass.
 
 From the camera, mirrors, glass and smooth glossy lobes are followed, at the first glass both ways
 (`pmviewer.render.split`). Wherever a surface has lobes that photons are
@@ -32,6 +32,7 @@ from pmviewer.render.gather.guide import AIM_WORDS, aim
 from pmviewer.render.given import Aim, GatherRays, Sampler, opened
 from pmviewer.render.hidden_lights import hides_lights
 from pmviewer.render.media.volume import deposit_media
+from pmviewer.render.mirror_rays import OUTLINED, samples_of, share_of, take_sample
 from pmviewer.render.pixel import (
     CAUSTIC,
     DIRECT,
@@ -41,6 +42,7 @@ from pmviewer.render.pixel import (
     Pixel,
     deposit,
     lens_ray,
+    pixel_seed,
     properties,
     sampled_ray,
 )
@@ -80,7 +82,7 @@ def outline_emission(scene, eye, pixel):
             share = _f4(1.0) / _f4(eye.outline_rays)
             for j in range(eye.outline_rays):
                 L, weight = _outline_ray(scene, eye, pixel, j)
-                one = Pixel(pixel.number, pixel.seed, pixel.film, pixel.radii, pixel.counts, weight)
+                one = Pixel(pixel.number, pixel.seed, pixel.film, pixel.radii, pixel.counts, weight, None)
                 deposit(one, EMISSION, scale(L, share))
 
         return counted_each
@@ -183,65 +185,71 @@ def _emission(given, left, pdf, choice, hit, d):
 
 
 @kernel
-def eye_pass(given, outline, radii, film, counts, first, last):
-    """Add one sample to each of the pixels first … last−1.
+def eye_pass(given, marks, radii, film, counts, first, last):
+    """Add a pass's samples to each of the pixels first … last−1.
 
-    given: PassData of arrays (1,); outline: uint8 (pixels,), 1 where emission gets camera rays of its own
-    (`pmviewer.render.direct.outline`), or (0,); radii: float32 (pixels, COLUMNS), look-up radii of the pixels
-    (`pmviewer.render.pixel_radius`), or None; film: float64 (pixels, CHANNELS), see `pmviewer.render.planes`; counts:
-    int64 (N_COUNTS,).
+    given: PassData of arrays (1,), whose eye record is the call's own (`pmviewer.render.mirror_rays.own_eye`); marks:
+    uint8 (pixels,), OUTLINED where emission gets camera rays of its own (`pmviewer.render.direct.outline`) and MIRRORED
+    where there are several samples (`pmviewer.render.mirror_rays`), or (0,); radii: float32 (pixels, COLUMNS), look-up
+    radii of the pixels (`pmviewer.render.pixel_radius`), or None; film: float64 (pixels, CHANNELS), see
+    `pmviewer.render.planes`; counts: int64 (N_COUNTS,).
     """
     given = opened(given)
     scene, eye = given.scene, given.eye
     lights, found = stack_i4(LIST_WORDS), stack_i4(AIM_WORDS)
+    index, hidden = eye.index, hides_lights(eye)
     for number in range(first, last):
-        seed, ray, weight = sampled_ray(scene, eye, number)
-        pixel = Pixel(number, seed, film, radii, counts, weight)
-        hidden = hides_lights(eye)
-        outlined = not hidden and len(outline) > 0 and outline[number] != 0
+        outlined = not hidden and len(marks) > 0 and marks[number] & OUTLINED != 0
         if outlined:
-            outline_emission(scene, eye, pixel)
+            take_sample(eye, index)
+            outline_emission(scene, eye, Pixel(number, pixel_seed(eye, number), film, radii, counts, None, None))
             counts[C_RAYS] += eye.outline_rays
-        way, ways = first_way(ray)
-        choice = choose_by_power(lights, eye.light_samples)
-        while True:
-            ray, beta, first_depth, splits, u_way = way
-            left, pdf = ray.o, _f4(0.0)  # where, and with which density, a lobe was left that is not a delta
-            for depth in range(first_depth, eye.max_depth + 1):
-                hit = cast(scene, ray)
-                counts[C_RAYS] += 1
-                beta = deposit_media(given, ray, hit, beta, pixel, depth)
-                whole = depth == 0
-                seen = EMISSION if whole else SPECULAR
-                if hit.prim < 0:
+        samples = samples_of(eye, marks, number)
+        for sample in range(samples):
+            take_sample(eye, index * samples + sample)
+            seed, ray, weight = sampled_ray(scene, eye, number)
+            pixel = Pixel(number, seed, film, radii, counts, weight, share_of(eye, samples))
+            way, ways = first_way(ray)
+            choice = choose_by_power(lights, eye.light_samples)
+            while True:
+                ray, beta, first_depth, splits, u_way = way
+                left, pdf = ray.o, _f4(0.0)  # where, and with which density, a lobe was left that is not a delta
+                for depth in range(first_depth, eye.max_depth + 1):
+                    hit = cast(scene, ray)
+                    counts[C_RAYS] += 1
+                    beta = deposit_media(given, ray, hit, beta, pixel, depth)
+                    whole = depth == 0
+                    seen = EMISSION if whole else SPECULAR
+                    if hit.prim < 0:
+                        if met_light(scene, hit) >= 0 and not (whole and (outlined or hidden)):
+                            deposit(pixel, seen, mul(beta, _emission(given, left, pdf, choice, hit, ray.d)))
+                        break
+                    si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
+                    if whole:
+                        properties(eye, pixel, si)
+                        note_object(given, hit.prim, pixel)
                     if met_light(scene, hit) >= 0 and not (whole and (outlined or hidden)):
                         deposit(pixel, seen, mul(beta, _emission(given, left, pdf, choice, hit, ray.d)))
+                    groups = si.bsdf.groups
+                    beta, u_way = thinned(eye, beta, u_way), CERTAIN
+                    if groups == NOTHING or not largest(beta) > _f4(0.0):
+                        break
+                    if groups & STORED != 0:
+                        choice = _stored(given, si, beta, pixel, (lights, found), whole)
+                    if groups & FOLLOWED == 0:
+                        break
+                    if depth == eye.max_depth:
+                        counts[C_CUT] += 1
+                        break
+                    if not is_delta(si.bsdf):
+                        choice = _followed(given, si, beta, pixel, depth, choice, lights)
+                    ray, beta, pdf, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
+                    if eye.followed_direct == 0:
+                        pdf = _f4(0.0)
+                    if not largest(beta) > _f4(0.0):
+                        break
+                    left = si.p
+                if ways.n == 0:
                     break
-                si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
-                if whole:
-                    properties(eye, pixel, si)
-                    note_object(given, hit.prim, pixel)
-                if met_light(scene, hit) >= 0 and not (whole and (outlined or hidden)):
-                    deposit(pixel, seen, mul(beta, _emission(given, left, pdf, choice, hit, ray.d)))
-                groups = si.bsdf.groups
-                beta, u_way = thinned(eye, beta, u_way), CERTAIN
-                if groups == NOTHING or not largest(beta) > _f4(0.0):
-                    break
-                if groups & STORED != 0:
-                    choice = _stored(given, si, beta, pixel, (lights, found), whole)
-                if groups & FOLLOWED == 0:
-                    break
-                if depth == eye.max_depth:
-                    counts[C_CUT] += 1
-                    break
-                if not is_delta(si.bsdf):
-                    choice = _followed(given, si, beta, pixel, depth, choice, lights)
-                ray, beta, pdf, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
-                if eye.followed_direct == 0:
-                    pdf = _f4(0.0)
-                if not largest(beta) > _f4(0.0):
-                    break
-                left = si.p
-            if ways.n == 0:
-                break
-            way, ways = next_way(ways)
+                way, ways = next_way(ways)
+    take_sample(eye, index)

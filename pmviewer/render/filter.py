@@ -35,6 +35,7 @@ from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import OUTLINE, PIXEL, PIXEL_SALT
 from pmviewer.kernels.random import draw4, hash3
+from pmviewer.render.mirror_rays import OUTLINED
 from pmviewer.scene.description import PixelFilter
 from pmviewer.settings.schema import Render
 
@@ -173,16 +174,16 @@ def _weight(eye, seed, index, dimension):
 
 
 @kernel
-def add_weights(eyes, outline, weights, first, last):
+def add_weights(eyes, marks, weights, first, last):
     """Add what the camera rays of pixels first … last−1 count in the pass of the eye record (1,) to weights, float64
-    (pixels, 2): in the first column those for emission, which pixels on the `outline` have of their own
-    (`pmviewer.render.eye.eye_pass`), in the second those for all else."""
+    (pixels, 2): in the first column those for emission, which pixels with the mark of outlines have of their
+    own (`pmviewer.render.eye.eye_pass`), in the second those for all else."""
     eye = eyes[0]
     for pixel in range(first, last):
         seed = hash3(eye.seed, _u4(pixel), _u4(PIXEL_SALT))
         weight = _weight(eye, seed, eye.index, PIXEL)
         weights[pixel, 1] += weight
-        if len(outline) > 0 and outline[pixel] != 0:
+        if len(marks) > 0 and marks[pixel] & OUTLINED != 0:
             weight = 0.0
             for j in range(eye.outline_rays):
                 index = _u4(eye.index * _u4(eye.outline_rays) + _u4(j))

@@ -70,7 +70,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
     choice = choose_by_power(stack_i4(LIST_WORDS), eye.light_samples)
     for number in range(first, last):
         seed, ray, weight = sampled_ray(scene, eye, number)
-        pixel = Pixel(number, seed, film, None, counts, weight)
+        pixel = Pixel(number, seed, film, None, counts, weight, None)
         beta = WHITE
         stored = 0  # how often the path took lobes that photons are stored for
         mirrored = False  # whether it took a followed lobe before the first of these

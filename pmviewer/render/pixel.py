@@ -37,8 +37,9 @@ VOLUME, VOLUME_INDIRECT = PLANES["volume"].start, PLANES["volume indirect"].star
 
 class Pixel(NamedTuple):
     """A pixel that is sampled: its number and seed, and where its samples go: film, float64 (pixels, CHANNELS); radii,
-    of its look-ups, or None (`pmviewer.render.pixel_radius`); counts, int64 (N_COUNTS,); and what its sample counts by
-    the reconstruction filter, None for 1 (`pmviewer.render.filter`)."""
+    of its look-ups, or None (`pmviewer.render.pixel_radius`); counts, int64 (N_COUNTS,); what its sample counts by the
+    reconstruction filter, None for 1 (`pmviewer.render.filter`), and as one of several of the pass, likewise
+    (`pmviewer.render.mirror_rays`)."""
 
     number: Any
     seed: Any
@@ -46,6 +47,7 @@ class Pixel(NamedTuple):
     radii: Any
     counts: Any
     weight: Any
+    share: Any
 
 
 @device
@@ -57,8 +59,8 @@ def pixel_seed(eye, pixel):
 @device
 def _raw_direction(eye, pixel, u, v):
     """Of the ray through the pixel at (u, v), 1 along the view; of an orthographic camera its place from the eye."""
-    x = _f4(pixel % eye.width) + u
-    y = _f4(pixel // eye.width) + v
+    x = _f4(pixel % eye.width) + (eye.pixel_margin + eye.pixel_side * u)
+    y = _f4(pixel // eye.width) + (eye.pixel_margin + eye.pixel_side * v)
     return (
         eye.x_corner + x * eye.x_right + y * eye.x_down,
         eye.y_corner + x * eye.y_right + y * eye.y_down,
@@ -102,11 +104,19 @@ def sampled_ray(scene, eye, pixel):
 
 
 @specialised
+def shared(pixel, value):
+    """What a float64 of a sample adds to a mean over the pixel's samples."""
+    if absent(part(pixel, "share")):
+        return lambda pixel, value: value
+    return lambda pixel, value: value * _f8(pixel.share)
+
+
+@specialised
 def weighed(pixel, value):
     """What a float64 of a sample adds to the pixel's film."""
     if absent(part(pixel, "weight")):
-        return lambda pixel, value: value
-    return lambda pixel, value: value * _f8(pixel.weight)
+        return lambda pixel, value: shared(pixel, value)
+    return lambda pixel, value: shared(pixel, value) * _f8(pixel.weight)
 
 
 @device
@@ -126,6 +136,6 @@ def properties(eye, pixel, si):
     p, albedo, n = si.p, si.bsdf.albedo, face(shading_normal(si.bsdf), si.wo)
     depth = (p[0] - eye.x_eye) * eye.x_forward + (p[1] - eye.y_eye) * eye.y_forward + (p[2] - eye.z_eye) * eye.z_forward
     for k in range(3):
-        pixel.film[pixel.number, ALBEDO + k] += _f8(albedo[k])
-        pixel.film[pixel.number, NORMAL + k] += _f8(n[k])
-    pixel.film[pixel.number, DEPTH] += _f8(depth)
+        pixel.film[pixel.number, ALBEDO + k] += shared(pixel, _f8(albedo[k]))
+        pixel.film[pixel.number, NORMAL + k] += shared(pixel, _f8(n[k]))
+    pixel.film[pixel.number, DEPTH] += shared(pixel, _f8(depth))

@@ -13,6 +13,7 @@ from pmviewer.render.camera import CameraPose
 from pmviewer.render.filter import BOX, FILTER_FIELDS, filter_of, set_filter
 from pmviewer.render.hidden_lights import HIDDEN_FIELDS, hidden_from
 from pmviewer.render.lens import LENS_FIELDS
+from pmviewer.render.mirror_rays import MIRROR_FIELDS
 from pmviewer.render.split import SPLIT_FIELDS
 from pmviewer.settings.access import Settings
 
@@ -23,6 +24,8 @@ _FIELDS: list[tuple] = [
     ("width", "i4"),
     ("height", "i4"),
     ("orthographic", "i4"),
+    ("pixel_side", "f4"),  # of the part of a pixel that is seen, and how far it is from the pixel's left and top
+    ("pixel_margin", "f4"),
     ("sequence", "i4"),
     ("seed", "u4"),
     ("index", "u4"),  # the pass: the sample index of every pixel's sequences
@@ -75,14 +78,21 @@ MEDIA_FIELDS: list[tuple[str, str]] = [
 
 
 def eye_dtype(
-    lens: bool = False, filtered: bool = False, media: bool = False, split: bool = False, hides: bool = False
+    lens: bool = False,
+    filtered: bool = False,
+    media: bool = False,
+    split: bool = False,
+    hides: bool = False,
+    mirrored: bool = False,
 ) -> np.dtype:
     """The record of a camera with a lens or without, a reconstruction filter other than the plain box or not, of a
-    scene with media or without, of paths that split at glass or choose, and that hides lights or not: kernels are
-    compiled for the record's type, so that what is not there costs nothing."""
+    scene with media or without, of paths that split at glass or choose, that hides lights or not, and has several
+    samples where mirrors and glass are seen or one: kernels are compiled for the record's type, so that what is not
+    there costs nothing."""
     # In front, since numba warns where one record begins like another.
     extra = [*(LENS_FIELDS if lens else []), *(FILTER_FIELDS if filtered else []), *(MEDIA_FIELDS if media else [])]
     extra += [*(SPLIT_FIELDS if split else []), *(HIDDEN_FIELDS if hides else [])]
+    extra += MIRROR_FIELDS if mirrored else []
     return np.dtype([*extra, *_FIELDS], align=True)
 
 
@@ -101,8 +111,8 @@ themselves; paths from the camera that `max_depth` ended."""
 @dataclass(frozen=True)
 class Evaluation:
     """How a pass evaluates the terms of the picture: what it samples, and what it looks up in which maps. Each field is
-    one of EYE_DTYPE by its name, the last of scenes with media and of paths that split, but for `looked_for`, which
-    sets `mis`; radii and `corner` are in scene units. The defaults sample and look up nothing."""
+    one of EYE_DTYPE by its name, the last of scenes with media, of paths that split and of mirrors, but for
+    `looked_for`, which sets `mis`; radii and `corner` are in scene units. The defaults sample and look up nothing."""
 
     direct: bool = False
     followed_direct: bool = False
@@ -132,6 +142,7 @@ class Evaluation:
     volume_radius: float = 0.0
     free_paths: float = 0.0
     splits: int = 0
+    mirror_rays: int = 1
 
 
 NOTHING_EVALUATED = Evaluation()
@@ -145,7 +156,8 @@ def eye_record(
     chosen = filter_of(camera.filter, settings.render)
     in_media = camera.medium is not None
     hides = hidden_from(camera, settings.render)
-    record = np.zeros(1, eye_dtype(camera.aperture > 0, chosen != BOX, in_media, evaluation.splits > 0, hides))
+    split, mirrored = evaluation.splits > 0, evaluation.mirror_rays > 1
+    record = np.zeros(1, eye_dtype(camera.aperture > 0, chosen != BOX, in_media, split, hides, mirrored))
     r = record[0]
     if camera.medium is not None:
         r["medium"] = camera.medium
@@ -183,6 +195,7 @@ def _set_camera(r: np.void, camera: CameraPose) -> None:
             r[f"{axis}_{part}"] = value
     r["near"], r["far"] = camera.near, camera.far
     r["width"], r["height"], r["orthographic"] = camera.width, camera.height, camera.orthographic
+    r["pixel_side"], r["pixel_margin"] = camera.pixel_side, 0.5 * (1.0 - camera.pixel_side)
 
 
 def _set_lens(r: np.void, camera: CameraPose) -> None:

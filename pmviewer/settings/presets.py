@@ -23,6 +23,7 @@ RESET = (
     "render.caustic",
     "render.indirect",
     "render.outline_rays",
+    "render.mirror_rays",
 )
 """What a preset sets, by the beginnings of names."""
 

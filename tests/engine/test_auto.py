@@ -2,27 +2,34 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from pmviewer.engine.auto.bias import Bias, Blur, mean_over
 from pmviewer.engine.auto.candidates import CACHE, GATHER, PATH, PROGRESSIVE, assignments, candidates, given
 from pmviewer.engine.auto.choose import Goal, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.auto.model import error_after, seconds_to
-from pmviewer.engine.auto.trial import Costs, Measured
+from pmviewer.engine.auto.relative import squared
+from pmviewer.engine.auto.trial import Costs, Measured, Widths, trial
+from pmviewer.engine.auto.widths import Tried, told_by
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
+from pmviewer.maps.radius import progressive_radius
 from pmviewer.output.metric import EPSILON
 from pmviewer.render.film import Film
 from pmviewer.render.moments import Moments
+from pmviewer.render.planes import beauty_of
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import SETTINGS, Settings, flat, with_values
+from pmviewer.state import State
 
 PLAIN = SceneTraits(False, True, False, False, 1)
 
@@ -46,15 +53,85 @@ def test_a_user_s_own_settings_of_the_method_are_told():
 
 def test_what_the_model_promises_is_what_sums_over_passes_say():
     """Against sums written out by Knaus and Zwicker's recurrence."""
-    m = Measured(PROGRESSIVE, Costs(0.1, 1e-6, 0.0), eye=0.02, photons=300.0, bias2=1e-4, radius=0.01, blurs=True)
+    costs, widths = Costs(0.1, 1e-6, shown=2e-6), Widths(caustic=0.5, shown=2.0)
+    bias = Bias(Blur(3e-4, 1.0), Blur(1e-4, 1.5))
+    m = Measured(PROGRESSIVE, costs, eye=0.02, caustic=50.0, shown=300.0, gathered=7.0, bias=bias)
     area, areas = 1.0, []
     for i in range(1, 21):
         areas.append(area)
         area *= (i + 2 / 3) / (i + 1)
-    noise = 0.02 / 20**1.25 + 300.0 / 50_000 / 4 * sum(1 / a for a in areas) / 400
-    bias = 1e-4 * 2**3 * (sum(a**0.75 for a in areas) / 20) ** 2
-    assert error_after(m, 50_000, 2.0, 20) == pytest.approx(noise + bias, rel=1e-6)
-    assert seconds_to(m, 50_000, 2.0, noise + bias) == pytest.approx(20 * 0.15, rel=1e-3)
+    looked_up = (300.0 / 4 + 50.0 * 4) * sum(1 / a for a in areas) / 20
+    noise = 0.02 / 20**1.25 + (looked_up + 7.0) / 50_000 / 20
+    blurred = 1e-4 * 2**3 * (sum(a**0.75 for a in areas) / 20) ** 2
+    blurred += 3e-4 / 4 * (sum(a**0.5 for a in areas) / 20) ** 2
+    assert error_after(m, 50_000, widths, 20) == pytest.approx(noise + blurred, rel=1e-6)
+    seconds = 20 * (0.1 + 50_000 * (1e-6 + 4 * 2e-6))
+    assert seconds_to(m, 50_000, widths, noise + blurred) == pytest.approx(seconds, rel=1e-3)
+
+
+def test_a_bias_is_known_where_a_rendering_goes_on(cornell):
+    """Through the text of a checkpoint."""
+    error = ErrorEstimate(8, 8, Settings(), plan_of(Settings(), cornell.traits))
+    error.bias = Bias(Blur(1e-3, 0.8), Blur(2e-4), 3e-5)
+    state = error.state()
+    other = ErrorEstimate(8, 8, Settings(), plan_of(Settings(), cornell.traits))
+    other.restore(State(json.loads(json.dumps(state.numbers)), state.arrays))
+    assert other.bias == error.bias
+    assert other.bias(16) < error.bias(1) == pytest.approx(1.23e-3)
+
+
+def test_far_beyond_the_passes_that_are_summed_up_means_follow_their_power_law():
+    whole = [progressive_radius(1.0, i) ** -2 for i in range(1, 30_001)]
+    assert mean_over(30_000, -2.0) == pytest.approx(sum(whole) / 30_000, rel=0.01)
+    assert mean_over(np.array([1.0, 30_000]), -2.0)[0] == 1.0
+
+
+def test_radii_are_told_by_passes_with_others():
+    """Made-up pictures with a bias that goes with the radius, and noise of photons that is less in wider discs."""
+    rng = np.random.default_rng(5)
+    truth, biased = np.full((90, 90, 3), 0.8), rng.uniform(-1, 1, (90, 90, 3))
+    camera = [rng.normal(0, 0.02, truth.shape) for _ in range(2)]
+    photons = [rng.normal(0, 0.01, truth.shape) for _ in range(2)]
+
+    def tried(width: float) -> Tried:
+        images = [truth + 0.03 * width * biased + e + p / width for e, p in zip(camera, photons, strict=True)]
+        return Tried(images, 0.1 + 0.01 * width**2)
+
+    found = told_by(tried(2.0), tried(1.0), tried(0.5), truth, 2.0)
+    assert found.blur.order == pytest.approx(1.0, abs=0.1)
+    assert found.blur.bias2 == pytest.approx(0.03**2 / 3 / (0.64 + EPSILON), rel=0.15)
+    assert found.variance == pytest.approx(0.01**2 / (0.64 + EPSILON), rel=0.15)
+    assert found.cost == pytest.approx(0.01)
+
+
+def test_a_trial_sees_bias_that_is_narrower_than_its_pixels_are_apart(pool):
+    """Caustics of a ring of metal, thinner than the radius: by a trial of few pixels that are as small as the
+    picture's, as it shows in the picture itself."""
+    scene = open_scene("ring_caustic")
+    camera = {"camera.width": 128, "camera.height": 128}
+    tried = trial(scene, with_values(Settings(), camera), [PROGRESSIVE], pool, (48, 48), lambda text, share: None)
+    caustic = tried.measured[0].bias.caustic
+    images = []
+    for width in (0.5, 0.25):
+        runs = []
+        for seed in (11, 12):
+            values = camera | {"render.seed": seed, "estimate.caustic_radius": width}
+            renderer = Renderer(scene, with_values(Settings(), values), pool, StageStore(0))
+            renderer.step()
+            runs.append(beauty_of(renderer.film.planes()).astype(float))
+        images.append(runs)
+    differs = squared(*images, np.mean(images, axis=(0, 1)))
+    assert differs > 1e-3
+    assert caustic.bias2 * (1 - 2**-caustic.order) ** 2 == pytest.approx(differs, rel=0.5)
+
+
+def test_radii_are_settings():
+    """Each width scales its own look-ups alone."""
+    settings = Settings()
+    assert Widths().values(settings, 0.02) == {}
+    assert Widths(2.0, 2.0).values(settings, 0.02) == {"estimate.radius": 0.04}
+    assert Widths(caustic=0.5).values(settings, 0.02) == {"estimate.caustic_radius": 0.25}
+    assert Widths(shown=2.0).values(settings, 0.02) == {"estimate.radius": 0.04, "estimate.caustic_radius": 0.25}
 
 
 def test_without_time_for_a_trial_traits_choose(cornell):

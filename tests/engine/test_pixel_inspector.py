@@ -121,7 +121,7 @@ def test_the_nearest_photons_in_several_maps(pool, combine):
 
 def test_look_ups_over_mirrors_and_through_glass(pool):
     """They are of the last surface of the way, and what their photons add is seen through what is before it."""
-    renderer = renderer_of(pool)
+    renderer = renderer_of(pool, render={**PASS["render"], "mirror_rays": 1})
     renderer.step()
     told = report(renderer, 6, 18)
     assert [seen.shape for seen in told.objects] == ["mirror ball", "front"]
@@ -134,6 +134,20 @@ def test_look_ups_over_mirrors_and_through_glass(pool):
         assert look_up.p == pytest.approx(told.way[-1], abs=1e-6)
         assert look_up.sum == pytest.approx(look_up.value, rel=1e-4)
     assert sum(look_up.value for look_up in told.look_ups)[0] < told.terms[2, 0]
+
+
+def test_of_several_samples_all_look_ups_are_told(pool):
+    """Of a pixel on a mirror whose light is all of maps: with their shares they add up to what the film has."""
+    for samples in (1, 3):
+        renderer = renderer_of(pool, render={**PASS["render"], "direct": "approximate", "mirror_rays": samples})
+        renderer.step()
+        told = report(renderer, 6, 18)
+        assert len({tuple(look_up.p) for look_up in told.look_ups}) == samples
+        value = sum(look_up.value for look_up in told.look_ups)
+        assert value == pytest.approx(told.terms[2], rel=1e-4)
+        assert sum(look_up.sum for look_up in told.look_ups) == pytest.approx(value, rel=1e-4)
+        assert any(f"{samples} samples" in note for note in told.notes) == (samples > 1)
+        assert len(told.way) == 3
 
 
 def test_the_curve_of_a_kernel_passes_through_the_estimate(pool):

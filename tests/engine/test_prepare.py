@@ -78,8 +78,8 @@ def test_blank_records_have_the_types_of_a_pass(variant, box, pool):
 def test_blank_eyes_have_the_types_of_lens_and_filter(values, box, pool):
     settings = with_values(Settings(), values)
     renderer = Renderer(box, settings, pool, StageStore(0))
-    splitting = Evaluation(splits=2)
-    assert blank_eye(settings, renderer.plan).dtype == eye_record(renderer.camera, settings, 0, splitting).dtype
+    evaluated = Evaluation(splits=2, mirror_rays=renderer.plan.mirror_rays)
+    assert blank_eye(settings, renderer.plan).dtype == eye_record(renderer.camera, settings, 0, evaluated).dtype
 
 
 def signatures() -> set[tuple[str, Any]]:

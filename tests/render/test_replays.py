@@ -44,10 +44,12 @@ def box() -> Scene:
     return Scene("positions", None, (*walls, *spheres), materials, (), box_camera(), SIZE, SIZE)
 
 
-def rendered(**gather):
+def rendered(mirror_rays=1, **gather):
     pool = WorkPool(1)
     settings = settings_of(
-        render={"method": "gather", "outline_rays": 0, "splits": 0}, photons={"N": 2000}, gather={"rays": 2, **gather}
+        render={"method": "gather", "outline_rays": 0, "splits": 0, "mirror_rays": mirror_rays},
+        photons={"N": 2000},
+        gather={"rays": 2, **gather},
     )
     renderer = Renderer(open_scene(box()), settings, pool, StageStore(0))
     renderer.step()
@@ -65,6 +67,22 @@ def test_gather_rays_start_where_the_eye_pass_ended():
             assert len(points) > 0
             assert points[:, :3] == pytest.approx(np.tile(met[y, x], (len(points), 1)), abs=NEAR)
             checked += over_chain[y, x]
+    pool.close()
+    assert checked > 60
+
+
+def test_of_two_samples_each_gathers_where_it_ended():
+    """The picture shows the mean of both places."""
+    renderer, met, over_chain, pool = rendered(mirror_rays=2)
+    checked = 0
+    for y in range(SIZE):
+        for x in range(SIZE):
+            points = renderer.gather_points(x, y)
+            samples = renderer.latest.samples(y * SIZE + x)
+            assert len(points) <= 2 * samples
+            if len(points) == 2 * samples:
+                assert points[:, :3].mean(axis=0) == pytest.approx(met[y, x], abs=NEAR)
+                checked += samples == 2 and over_chain[y, x]
     pool.close()
     assert checked > 60
 

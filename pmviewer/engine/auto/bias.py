@@ -2,49 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from dataclasses import dataclass
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pmviewer.maps.radius import progressive_radius
 from pmviewer.settings.access import SETTINGS, Settings, get
 from pmviewer.settings.presets import RESET
 
-ORDER = 1.5
-"""Power of the radius that bias is taken to grow with: 2 in the open, 1 at edges."""
+ORDER = 1.0
+"""Power of the radius that bias grows with where nothing is known: 1 at edges and where light is brighter than the
+radius is wide, 2 in the open."""
 _SIZE = "camera.width", "camera.height"
+_KNOWN = 4096
+"""Passes whose radii are summed up one by one."""
+F8 = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Blur:
+    """What look-ups within a radius blur: the squared relative bias of the first pass, and the power of the radius that
+    the bias goes with."""
+
+    bias2: float = 0.0
+    order: float = ORDER
+
+    def wider(self, factor: float) -> Blur:
+        """With radii so many times as wide."""
+        return replace(self, bias2=self.bias2 * factor ** (2 * self.order))
+
+    def after(self, passes: Any) -> Any:
+        """Squared bias of the mean of so many passes, whose radii shrink; a number or an array."""
+        return self.bias2 * mean_over(passes, self.order) ** 2
 
 
 @dataclass(frozen=True)
 class Bias:
-    """`bias2` is the squared relative bias of the first pass, with radii `width` times the trial's."""
+    """By the caustic map, by the global map where it is shown, and by interpolation, which shrinks as radii do."""
 
-    bias2: float
-    width: float
-    interpolated: bool
-    """Whether it is that of interpolation, which falls with the cube root of the passes."""
+    caustic: Blur = Blur()
+    shown: Blur = Blur()
+    interpolated: float = 0.0
 
-    def __call__(self, passes: float) -> float:
-        """Squared relative bias after that many passes."""
-        duller = passes ** (-1 / 6) if self.interpolated else mean_of(radius_sums()[1], passes, -ORDER / 6)
-        return self.bias2 * self.width ** (2 * ORDER) * duller**2
+    def __call__(self, passes: Any) -> Any:
+        """Squared relative bias after that many passes, a number or an array: the parts sit in different places."""
+        duller = np.asarray(passes, float) ** (-1 / 3)
+        return self.caustic.after(passes) + self.shown.after(passes) + self.interpolated * duller
+
+    @staticmethod
+    def restored(told: Mapping[str, Any]) -> Bias:
+        """What `dataclasses.asdict` made of one."""
+        return Bias(Blur(**told["caustic"]), Blur(**told["shown"]), told["interpolated"])
 
 
 @cache
-def radius_sums() -> tuple[np.ndarray, np.ndarray]:
-    """Sums over the passes up to each of the first 4096: of r²₁/r²ᵢ, and of rᵢ/r₁ to the power that bias goes with."""
-    ratio = np.array([progressive_radius(1.0, i) ** 2 for i in range(1, 4097)])
-    return np.cumsum(1 / ratio), np.cumsum(ratio ** (ORDER / 2))
+def _sums(power: float) -> F8:
+    """Of (rᵢ/r₁)^power over the passes up to each of the first."""
+    ratio = np.array([progressive_radius(1.0, i) for i in range(1, _KNOWN + 1)])
+    return np.cumsum(ratio**power)
 
 
-def mean_of(sums: np.ndarray, n: float, power: float) -> float:
-    """Mean over n passes, of sums as `radius_sums` has them, going on by its power law."""
-    last = len(sums)
-    if n <= last:
-        return float(np.interp(n, np.arange(1, last + 1), sums)) / n
-    return float(sums[-1]) / last * (n / last) ** power
+def mean_over(passes: Any, power: float) -> Any:
+    """Mean of (rᵢ/r₁)^power over so many passes, a number or an array, beyond the first ones by the power law that the
+    radius falls with, rᵢ ∝ i^(−1/6)."""
+    sums, n = _sums(power), np.asarray(passes, float)
+    mean = np.interp(n, np.arange(1, _KNOWN + 1), sums) / n
+    return np.where(n <= _KNOWN, mean, sums[-1] / _KNOWN * (n / _KNOWN) ** (-power / 6))
 
 
 def way_of(settings: Settings) -> Hashable:

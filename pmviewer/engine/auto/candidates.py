@@ -17,15 +17,13 @@ GUIDED_FROM = 100.0
 
 @dataclass(frozen=True)
 class Candidate:
-    """`values` by full name, beside the defaults of what automatic mode sets. `shrinks` tells whether the radius
-    decides about nearly all of its light, so that other radii are worth a thought."""
+    """`values` by full name, beside the defaults of what automatic mode sets."""
 
     name: str
     values: Mapping[str, Any]
-    shrinks: bool = False
 
 
-PROGRESSIVE = Candidate("progressive", {}, shrinks=True)
+PROGRESSIVE = Candidate("progressive", {})
 GATHER = Candidate("gather", {"render.method": "gather"})
 CACHE = Candidate("gather with irradiance cache", {"render.method": "gather", "gather.cache": "on"})
 PATH = Candidate("path", {"render.method": "path"})
@@ -61,7 +59,7 @@ def candidates(traits: SceneTraits, glossy: float, seconds: float) -> tuple[list
     elif seconds < GUIDED_FROM or traits.has_media:
         left_out.append(("importance", f"its trial costs too much of less than {GUIDED_FROM:g} CPU s"))
     else:
-        found.append(Candidate("progressive, guided emission", GUIDED, shrinks=True))
+        found.append(Candidate("progressive, guided emission", GUIDED))
     return [*found, *_paths(traits, left_out)], left_out
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 from pmviewer.engine.auto.bias import Bias, way_of
 from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, Candidate, assignments, candidates
-from pmviewer.engine.auto.model import FEWEST, WIDTHS, Option, bias_of, options, seconds_to
-from pmviewer.engine.auto.trial import Tell, Trial, trial
+from pmviewer.engine.auto.model import FEWEST, Option, bias_of, in_time, numbers, to_error
+from pmviewer.engine.auto.trial import AUTOMATIC, Tell, Trial, Widths, trial
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.render.camera import resolve_camera
@@ -22,11 +22,13 @@ USUAL = 10.0
 """CPU seconds that are planned for where nobody gives any."""
 BETTER = 0.87
 """What another way must promise of the default's error to be taken: less is within the trial's own noise."""
-NEARLY = 1.2
+NEARLY = 1.1
 """What of the least error counts as the same."""
 PER_PHOTON, PER_PIXEL = 1.5e-6, 6e-6
 """CPU seconds of a trial by trajectory and by pixel and candidate: what its size is planned by, clock or no clock."""
-LEAST, LARGEST, FEWEST_PHOTONS = 48, 160, 20_000
+OF_RADII = 8
+"""Pictures that are rendered with other radii."""
+LEAST, LARGEST, FEWEST_PHOTONS = 40, 160, 20_000
 """Sides of the trial's picture in pixels, and N."""
 
 
@@ -74,15 +76,14 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     (width, height), N = planned
     tried = trial(opened, with_values(base, {"photons.N": N}), found, pool, (width, height), tell)
     picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, seconds - tried.cpu_seconds)
-    values, bias = assignments(_values(picked, base)), bias_of(picked.measured, picked.width)
-    if bias is not None:  # whoever renders so knows it
-        opened.biases[way_of(with_values(base, values))] = bias
+    values, bias = assignments(_values(picked, base)), bias_of(picked.measured, picked.widths)
+    opened.biases[way_of(with_values(base, values))] = bias  # whoever renders so knows it
     return Choice(
         picked.name,
         values,
         picked.error,
         picked.seconds,
-        (_sentence(picked, goal), *_table(tried, picked), *said),
+        (_sentence(picked, goal), *_reason(picked), *_table(tried, picked), *said),
         tried,
         bias,
     )
@@ -101,7 +102,7 @@ def _size(budget: float, count: int, width: int, height: int) -> tuple[tuple[int
     N = min(default, int(0.35 * budget / PER_PHOTON / 2))
     if N < FEWEST_PHOTONS:
         return None
-    pixels = 0.65 * budget / (PER_PIXEL * count * 4)
+    pixels = 0.65 * budget / (PER_PIXEL * (count * 4 + OF_RADII))
     if pixels < LEAST**2:
         return None
     shrink = math.sqrt(min(pixels, LARGEST**2) / (width * height))
@@ -112,43 +113,38 @@ def _size(budget: float, count: int, width: int, height: int) -> tuple[tuple[int
 
 def _by_time(tried: Trial, seconds: float) -> Option:
     """The least error after that time; the default unless another is clearly better."""
-    every = [option for m in tried.measured for option in options(m, WIDTHS, seconds)]
+    every = [in_time(m, N, widths, seconds) for m in tried.measured for N, widths in numbers(m)]
     enough = [option for option in every if option.passes >= FEWEST]
     if not enough:
         return max(every, key=lambda option: option.passes)
-    best = _calmest(enough, lambda option: option.error)
-    usual = [o for o in enough if _is_default(o)]
-    return usual[0] if usual and best.error > BETTER * usual[0].error else best
+    return _picked(enough, lambda option: option.error)
 
 
 def _by_error(tried: Trial, error: float) -> Option:
     """The least time to that error; where none reaches it, what comes nearest in a long time."""
-    found: list[Option] = []
-    for m in tried.measured:
-        for option in options(m, WIDTHS, 1.0):
-            seconds = seconds_to(m, option.N, option.width, error)
-            passes = seconds / m.costs.of(option.N, option.width**2) if math.isfinite(seconds) else math.inf
-            found.append(Option(m, option.N, option.width, passes, error, seconds))
-    reached = [o for o in found if math.isfinite(o.seconds)]
-    if not reached:
-        return _by_time(tried, 1000.0)
-    best = _calmest(reached, lambda option: option.seconds)
-    usual = [o for o in reached if _is_default(o)]
-    return usual[0] if usual and best.seconds > BETTER * usual[0].seconds else best
+    every = [to_error(m, N, widths, error) for m in tried.measured for N, widths in numbers(m)]
+    reached = [o for o in every if math.isfinite(o.seconds)]
+    return _picked(reached, lambda option: option.seconds) if reached else _by_time(tried, 1000.0)
 
 
-def _calmest(found: list[Option], of: Callable[[Option], float]) -> Option:
-    """Of the candidate with the least value the numbers nearest to the defaults that are hardly worse: those of two
-    trials are then the same more often."""
+def _picked(found: list[Option], of: Callable[[Option], float]) -> Option:
+    """The one with the least value. Of its candidate the numbers nearest to the defaults that are hardly worse: those
+    of two trials are then the same more often. The default unless another is clearly better."""
     best = min(found, key=of)
     near = [o for o in found if o.measured is best.measured and of(o) <= NEARLY * of(best)]
-    N = float(SETTINGS["photons.N"].default)
-    return min(near, key=lambda o: abs(math.log(o.N / N)) + 2 * abs(math.log(o.width)))
+    best = min(near, key=_from_default)
+    usual = next((o for o in found if _is_default(o)), None)
+    return usual if usual is not None and of(best) > BETTER * of(usual) else best
+
+
+def _from_default(option: Option) -> float:
+    widths = abs(math.log(option.widths.caustic)) + abs(math.log(option.widths.shown))
+    return abs(math.log(option.N / float(SETTINGS["photons.N"].default))) + 2 * widths
 
 
 def _is_default(option: Option) -> bool:
-    default = option.measured.candidate is PROGRESSIVE and option.width == 1.0
-    return default and option.N in (SETTINGS["photons.N"].default,)
+    default = option.measured.candidate is PROGRESSIVE and option.widths.alike
+    return default and SETTINGS["photons.N"].default == option.N
 
 
 def _values(picked: Option, base: Settings) -> dict[str, Any]:
@@ -157,13 +153,11 @@ def _values(picked: Option, base: Settings) -> dict[str, Any]:
     with_photons = with_values(base, assignments(values))
     if with_photons.render.method != "path" and SETTINGS["photons.N"].default != picked.N:
         values["photons.N"] = picked.N
-    if picked.width != 1.0:
-        values["estimate.radius"] = float(f"{picked.measured.radius * picked.width:.4g}")
-    return values
+    return values | picked.widths.values(with_photons, picked.measured.radius)
 
 
 def _sentence(picked: Option, goal: Goal) -> str:
-    width = "" if picked.width == 1.0 else f", radius {picked.width:.2g} times the automatic one"
+    width = "" if picked.widths.alike else f", {_in_words(picked.widths)}"
     photons = f", N = {picked.N:,}" if picked.measured.photons > 0 else ""
     if goal.error and math.isfinite(picked.seconds):
         promise = f"relMSE {goal.error:.2g} expected after {picked.seconds:.3g} CPU s"
@@ -172,12 +166,32 @@ def _sentence(picked: Option, goal: Goal) -> str:
     return f"{picked.name}{photons}{width}: {promise}"
 
 
+def _in_words(widths: Widths) -> str:
+    if widths.caustic == widths.shown:
+        return f"radius {widths.shown:.2g} times the automatic one"
+    parts = [("caustics' radius", widths.caustic), ("global map's radius", widths.shown)]
+    return ", ".join(f"{name} {width:.2g} times the automatic one" for name, width in parts if width != 1.0)
+
+
+def _reason(picked: Option) -> list[str]:
+    """Why other radii than the automatic ones."""
+    if picked.widths.alike or not math.isfinite(picked.seconds):
+        return []
+    m, lines = picked.measured, list[str]()
+    usual = in_time(m, picked.N, AUTOMATIC, picked.seconds)
+    for what, option in (("the automatic radius", usual), ("this one", picked)):
+        bias2 = float(bias_of(m, option.widths)(max(option.passes, 1.0)))
+        lines.append(f"{what}: relMSE {option.error:.2g} in that time, {bias2:.2g} of it bias")
+    return lines
+
+
 def _table(tried: Trial, picked: Option) -> list[str]:
     """Each candidate at its best, for the log."""
     lines = []
     for m in tried.measured:
         if math.isfinite(picked.seconds):
-            best = min(options(m, WIDTHS, picked.seconds), key=lambda o: o.error)
+            every = [in_time(m, N, widths, picked.seconds) for N, widths in numbers(m)]
+            best = min((o for o in every if o.passes >= 1), default=every[0], key=lambda o: o.error)
             lines.append(f"tried {m.candidate.name}: relMSE {best.error:.2g} with N = {best.N:,} in that time")
     lines.append(f"trial: {tried.pixels:,} pixels, {tried.cpu_seconds:.2g} CPU s")
     return lines

@@ -103,7 +103,7 @@ class ErrorEstimate:
         self._sums = {n: state.array(name, (None, None, 3), np.float64) for n, name in sorted(names.items())}
         self._levels = [_Level(**level) for level in state.number("levels")]
         self._passes, bias = int(state.number("passes")), state.number("bias")
-        self.bias = None if bias is None else Bias(**bias)
+        self.bias = None if bias is None else Bias.restored(bias)
 
     @property
     def latest(self) -> Remaining | None:
@@ -118,7 +118,7 @@ class ErrorEstimate:
         spread = math.sqrt(last.error**2 + ROUGHNESS**2 + UNSURE**2 / len(self._levels))
         if not math.isfinite(value) or value <= 0:
             return None
-        bias = self.bias(self._passes) if self.bias is not None else None
+        bias = float(self.bias(self._passes)) if self.bias is not None else None
         added = bias or 0.0
         factor = math.exp(WIDTH * spread)
         return Remaining(value + added, bias, value / factor + 0.5 * added, value * factor + 2 * added)

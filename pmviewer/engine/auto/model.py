@@ -1,26 +1,33 @@
-"""What the trial's figures promise for a given time: error over N, radius and passes.
+"""What the trial's figures promise for a given time: error over N, radii and passes.
 
 The variance of the mean of n passes is that of the camera rays, whose numbers complement one another from pass to pass,
 eye/n^1.25, plus the photons' part, which falls as 1/n. Where look-ups shrink, the photons' variance in pass i goes with
-r²₁/r²ᵢ, as for Knaus & Zwicker 2011, and bias with a power of rᵢ/r₁.
+r²₁/r²ᵢ, as for Knaus & Zwicker 2011, and bias with a power of rᵢ/r₁ that the trial has measured.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
+from typing import Any
 
-from pmviewer.engine.auto.bias import Bias, mean_of, radius_sums
-from pmviewer.engine.auto.trial import Measured
+import numpy as np
+
+from pmviewer.engine.auto.bias import Bias, mean_over
+from pmviewer.engine.auto.trial import AUTOMATIC, Measured, Widths
 
 PHOTONS = (12_500, 25_000, 50_000, 100_000, 150_000, 200_000, 300_000, 600_000, 1_200_000, 2_400_000)
 COMPLEMENT = 1.25
 """Power that the camera rays' part falls with: measured over the bundled scenes."""
-WIDTHS = (2**-0.5, 1.0, 2**0.5)
+CAUSTIC_WIDTHS = (0.25, 8**-0.5, 0.5, 2**-0.5, 1.0, 2**0.5, 2.0)
+SHOWN_WIDTHS = (0.5, 2**-0.5, 1.0, 2**0.5, 2.0)
 """Radii that are tried, relative to the automatic one."""
 FEWEST = 4
 """Passes: a picture of fewer says nothing of its own error."""
 MOST = 1 << 20
+_PASSES = 2.0 ** np.arange(0, 20.01, 0.125)
+"""Passes between which errors are interpolated."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +36,7 @@ class Option:
 
     measured: Measured
     N: int
-    width: float
+    widths: Widths
     passes: float
     error: float
     seconds: float
@@ -40,38 +47,54 @@ class Option:
         return self.measured.candidate.name
 
 
-def error_after(m: Measured, N: int, width: float, passes: float) -> float:
-    """relMSE after that many passes of N trajectories, with radii `width` times the trial's."""
-    noisier, photons = 1.0, m.photons / N
-    if m.candidate.shrinks:
-        photons /= width**2
-    if m.blurs:
-        noisier = mean_of(radius_sums()[0], passes, 1 / 3)
-    return m.eye / passes**COMPLEMENT + photons * noisier / passes + bias_of(m, width)(passes)
+def error_after(m: Measured, N: int, widths: Widths, passes: Any) -> Any:
+    """relMSE after that many passes, a number or an array, of N trajectories with such radii."""
+    n = np.asarray(passes, float)
+    looked_up = m.caustic / widths.caustic**2 + m.shown / widths.shown**2
+    photons = (looked_up * mean_over(n, -2.0) if looked_up else 0.0) + m.gathered
+    return m.eye / n**COMPLEMENT + photons / N / n + bias_of(m, widths)(n)
 
 
-def bias_of(m: Measured, width: float) -> Bias:
-    """Of look-ups with radii `width` times the trial's."""
-    return Bias(m.bias2, width, m.interpolated)
+def bias_of(m: Measured, widths: Widths) -> Bias:
+    """Of look-ups with such radii."""
+    bias = m.bias
+    return Bias(bias.caustic.wider(widths.caustic), bias.shown.wider(widths.shown), bias.interpolated)
 
 
-def options(m: Measured, widths: tuple[float, ...], seconds: float) -> list[Option]:
-    """All numbers for one candidate, with the error after that many CPU seconds."""
-    found = []
-    for N in PHOTONS if m.photons > 0 else (PHOTONS[4],):
-        for width in widths if m.candidate.shrinks and m.photons > 0 else (1.0,):
-            cost = m.costs.of(N, width**2)
-            passes = min(seconds / max(cost, 1e-6), float(MOST))
-            found.append(Option(m, N, width, passes, error_after(m, N, width, max(passes, 1.0)), seconds))
-    return found
+def numbers(m: Measured) -> list[tuple[int, Widths]]:
+    """All N and radii that are worth a thought for one candidate."""
+    if m.photons <= 0:
+        return [(PHOTONS[4], AUTOMATIC)]
+    shown = SHOWN_WIDTHS if m.shown > 0 else (1.0,)
+    if m.caustic > 0:
+        widths = [Widths(c, s) for c, s in itertools.product(CAUSTIC_WIDTHS, shown)]
+    else:  # without caustics their radius goes with the other
+        widths = [Widths(s, s) for s in shown]
+    return list(itertools.product(PHOTONS, widths))
 
 
-def seconds_to(m: Measured, N: int, width: float, error: float) -> float:
-    """CPU seconds to that error, by bisection over passes."""
-    low, high = 0.0, math.log2(MOST)
-    if error_after(m, N, width, 2**high) > error:
+def in_time(m: Measured, N: int, widths: Widths, seconds: float) -> Option:
+    """With the error after that many CPU seconds."""
+    passes = min(seconds / max(m.costs.of(N, widths), 1e-6), float(MOST))
+    return Option(m, N, widths, passes, float(error_after(m, N, widths, max(passes, 1.0))), seconds)
+
+
+def to_error(m: Measured, N: int, widths: Widths, error: float) -> Option:
+    """With the CPU seconds to that error, infinitely many where it is never reached."""
+    seconds = seconds_to(m, N, widths, error)
+    passes = seconds / m.costs.of(N, widths) if math.isfinite(seconds) else math.inf
+    return Option(m, N, widths, passes, error, seconds)
+
+
+def seconds_to(m: Measured, N: int, widths: Widths, error: float) -> float:
+    """CPU seconds to that error."""
+    errors = error_after(m, N, widths, _PASSES)
+    below = np.flatnonzero(errors <= error)
+    if not below.size:
         return math.inf
-    for _ in range(40):
-        middle = (low + high) / 2
-        low, high = (low, middle) if error_after(m, N, width, 2**middle) <= error else (middle, high)
-    return 2**high * m.costs.of(N, width**2)
+    i = int(below[0])
+    passes = float(_PASSES[i])
+    if i > 0:
+        share = math.log(errors[i - 1] / error) / math.log(errors[i - 1] / errors[i])
+        passes = float(_PASSES[i - 1]) * 2 ** (0.125 * share)
+    return passes * m.costs.of(N, widths)

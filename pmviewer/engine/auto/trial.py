@@ -1,12 +1,11 @@
 """The measured trial: what a pass of each candidate costs, how much passes differ by chance, and by how much they are
 wrong.
 
-A pass of a small picture is rendered with two seeds and two numbers of photons. Half the squared difference of two
-seeds is the variance of a pass. What of it falls with N is the photons' part, what doesn't the camera pass's; the times
-of the stages fall apart in the same way. The radius is that of the whole picture, so that a pixel has the variance that
-it will have there. How wrong the mean is shows against look-ups of twice the radius, or for methods that interpolate
-against the plain final gather: the product of the differences of two independent pairs of passes has the squared
-difference of their biases as its mean, without the noise of either.
+A pass is rendered with two seeds and two numbers of photons, of pixels that are spread over the picture, each as large
+as it will be: larger ones would average the bias of what is narrower than they are away. Half the squared difference of
+two seeds is the variance of a pass. What of it falls with N is the photons' part, what doesn't the camera pass's; the
+times of the stages fall apart in the same way. What either radius does, that of caustics and that of the global map
+where it is shown, is told by passes with twice and half of it (`pmviewer.engine.auto.widths`).
 """
 
 from __future__ import annotations
@@ -15,34 +14,33 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pmviewer.engine.auto.bias import ORDER
+from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.candidates import CACHE, GATHER, Candidate, assignments
-from pmviewer.engine.method import plan_of
+from pmviewer.engine.auto.relative import F8, squared, variance
+from pmviewer.engine.auto.widths import NONE, Tried, Widened, told_by
+from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.radius import first_radius
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
-from pmviewer.output.metric import EPSILON
 from pmviewer.render.camera import resolve_camera
 from pmviewer.render.planes import beauty_of
 from pmviewer.settings.access import Settings, with_values
 
 Tell = Callable[[str, float | None], None]
-F8 = NDArray[np.float64]
 
 FEWER = 4
 """Photons of the larger trial pass over those of the smaller one."""
-OUTLIERS = 0.0005
-"""Share of the noisiest pixels that say nothing in two passes."""
 RARE = 2.0
-"""What the photons' variance of a few small pictures is multiplied by: photons that are rare and bright are missing in
-nearly all of them, and make half of the error of a long picture (measured on cornell_glossy, office, museum)."""
+"""What the variance that photons of the global map bring is multiplied by: those that are rare and bright are missing
+in nearly all of a few small pictures, and make half of the error of a long one (measured on cornell_glossy, office,
+museum). Caustics of a light have none: different radii tell their part to a tenth (cornell_caustic, ring_caustic)."""
 BLOCK = 4
 """What interpolation does is compared in blocks of so many pixels squared: its bias is smooth, noise is not. Pictures
 with two radii have the same photons and camera rays, and little noise in their difference."""
@@ -50,38 +48,70 @@ SEEDS = (7_919, 104_729)
 """Added to the picture's seed."""
 STORE = 1 << 28
 WIDER = 2.0
-"""Radius that bias is told from, relative to that of the first pass."""
+"""Radii that are tried besides are wider and narrower by this."""
+
+
+@dataclass(frozen=True)
+class Widths:
+    """Radii relative to the automatic ones: of look-ups in the caustic map, and in the global one where it is shown."""
+
+    caustic: float = 1.0
+    shown: float = 1.0
+
+    @property
+    def alike(self) -> bool:
+        """Whether they are the automatic ones."""
+        return self.caustic == self.shown == 1.0
+
+    def values(self, settings: Settings, radius: float) -> dict[str, Any]:
+        """The settings that they stand for, where the automatic radius is that, relative to the scene."""
+        found: dict[str, Any] = {}
+        if self.shown != 1.0:
+            found["estimate.radius"] = float(f"{min(max(radius * self.shown, 1e-7), 10.0):.4g}")
+        if self.caustic != self.shown:
+            share = settings.estimate.caustic_radius * self.caustic / self.shown
+            found["estimate.caustic_radius"] = float(f"{min(max(share, 0.05), 2.0):.4g}")
+        return found
+
+
+AUTOMATIC = Widths()
 
 
 @dataclass(frozen=True)
 class Costs:
-    """CPU seconds of a pass of the whole picture: `base`, and `light` and `look_up` per trajectory. The latter goes
-    with the area of look-ups."""
+    """CPU seconds of a pass of the whole picture: `base`, and `light`, `caustic` and `shown` per trajectory. The latter
+    two, of look-ups, go with their areas."""
 
     base: float
     light: float
-    look_up: float
+    caustic: float = 0.0
+    shown: float = 0.0
 
-    def of(self, N: int, area: float) -> float:
-        """Of a pass of N trajectories, with look-ups of that area relative to the trial's."""
-        return self.base + N * (self.light + area * self.look_up)
+    def of(self, N: int, widths: Widths) -> float:
+        """Of a pass of N trajectories."""
+        look_up = self.caustic * widths.caustic**2 + self.shown * widths.shown**2
+        return self.base + N * (self.light + look_up)
 
 
 @dataclass(frozen=True)
 class Measured:
-    """`eye` is the relative variance of a pass that photons don't decide, `photons` that of one trajectory's; `bias2`
-    the squared relative bias of the first pass. `radius`: of the first pass, relative to the scene."""
+    """Relative variances of a pass: `eye` what photons don't decide; of one trajectory, `caustic` what look-ups of
+    caustics decide, `shown` those of a global map that is shown, `gathered` the rest. `bias`: of the first pass.
+    `radius`: of the first pass, relative to the scene."""
 
     candidate: Candidate
     costs: Costs
     eye: float
-    photons: float
-    bias2: float
-    radius: float
-    interpolated: bool = False
-    """Whether the bias is that of interpolation."""
-    blurs: bool = False
-    """Whether pixels look photons up within a radius that shrinks: the global map, or caustics beside a gather."""
+    caustic: float = 0.0
+    shown: float = 0.0
+    gathered: float = 0.0
+    bias: Bias = field(default_factory=Bias)
+    radius: float = 0.0
+
+    @property
+    def photons(self) -> float:
+        """Variance of one trajectory's."""
+        return self.caustic + self.shown + self.gathered
 
 
 @dataclass
@@ -103,6 +133,74 @@ class _Run:
     stages: dict[str, float]
 
 
+@dataclass
+class _Tried:
+    """A candidate's runs: with all photons and with fewer, and with other radii."""
+
+    candidate: Candidate
+    plan: Plan
+    radius: float
+    runs: list[_Run] = field(default_factory=list)
+    caustic: list[_Run] = field(default_factory=list)
+    shown: list[_Run] = field(default_factory=list)
+
+
+class _Trier:
+    """Renders what is tried. Settings have the N of the larger passes."""
+
+    def __init__(self, opened: OpenScene, settings: Settings, pool: WorkPool, size: tuple[int, int]) -> None:
+        self._opened, self._settings, self._pool = opened, settings, pool
+        self._full = resolve_camera(opened.scene, settings.camera)
+        self._size, self._side = size, size[0] / self._full.width
+        self.scale = self._full.width * self._full.height / (size[0] * size[1])
+        self._store = StageStore(STORE)
+        self._light: dict[int, float] = {}  # what light passes cost whose photons the store has by now
+
+    def settings_of(self, candidate: Candidate) -> Settings:
+        return with_values(self._settings, assignments(candidate.values))
+
+    def tried(self, candidate: Candidate) -> _Tried:
+        """All its passes."""
+        chosen = self.settings_of(candidate)
+        plan = plan_of(chosen, self._opened.traits)
+        radius = first_radius(self._opened.flat, self._full, chosen.estimate, plan.gather) / self._opened.flat.radius
+        radius = min(max(radius, 1e-7), 10.0)
+        small = with_values(
+            chosen,
+            {
+                "camera.width": self._size[0],
+                "camera.height": self._size[1],
+                "estimate.radius": radius,
+                "gather.cache_min": max(chosen.gather.cache_min * self._side, 0.1),
+                "gather.cache_max": max(chosen.gather.cache_max * self._side, 1.0),
+            },
+        )
+        found, N = _Tried(candidate, plan, radius), chosen.photons.N
+        found.runs = [self._run(small, count) for count in ((N, N // FEWER) if plan.photons else (N,))]
+        if plan.shown_directly:
+            found.shown = [self._run(with_values(small, w.values(chosen, radius)), N) for w in _either("shown")]
+        if plan.caustic_mask and not plan.gather:  # beside a gather they are the same
+            found.caustic = [self._run(with_values(small, w.values(chosen, radius)), N) for w in _either("caustic")]
+        return found
+
+    def _run(self, settings: Settings, N: int) -> _Run:
+        """A pass with each seed."""
+        images: list[F8] = []
+        stages: dict[str, float] = {}
+        guided = settings.importance.emission != "off"
+        for seed in SEEDS:
+            chosen = with_values(settings, {"photons.N": N, "render.seed": (settings.render.seed + seed) % 2**31})
+            renderer = Renderer(self._opened, chosen, self._pool, self._store)
+            renderer.camera = replace(renderer.camera, pixel_side=min(self._side, 1.0))
+            renderer.step()
+            images.append(beauty_of(renderer.film.planes()).astype(np.float64))
+            for name, spent in renderer.tally.stage_seconds.items():
+                stages[name] = min(stages.get(name, math.inf), spent)
+        if "light pass" in stages and not guided:
+            self._light[N] = stages["light pass"] = max(stages["light pass"], self._light.get(N, 0.0))
+        return _Run(N, images, stages)
+
+
 def trial(
     opened: OpenScene,
     settings: Settings,
@@ -111,121 +209,80 @@ def trial(
     size: tuple[int, int],
     tell: Tell,
 ) -> Trial:
-    """Measure the candidates on a picture of that size. Raises Cancelled when the pool is cancelled."""
-    N = settings.photons.N
-    result = Trial(pixels=size[0] * size[1])
-    full = resolve_camera(opened.scene, settings.camera)
-    runs: dict[str, tuple[Candidate, list[_Run], float]] = {}
-    wide: dict[str, _Run] = {}
-    store, light = StageStore(STORE), dict[int, float]()
+    """Measure the candidates on that many columns and rows of pixels. Raises Cancelled when the pool is cancelled."""
+    result, trier = Trial(pixels=size[0] * size[1]), _Trier(opened, settings, pool, size)
     for candidate in candidates:
-        chosen = with_values(settings, assignments(candidate.values))
-        prepare(opened, chosen, pool, tell)
+        prepare(opened, trier.settings_of(candidate), pool, tell)
     started, before = time.perf_counter(), pool.cpu_seconds
+    every: list[_Tried] = []
     for number, candidate in enumerate(candidates):
         tell(f"trying {candidate.name}", number / len(candidates))
-        chosen = with_values(settings, assignments(candidate.values))
-        plan = plan_of(chosen, opened.traits)
-        radius = first_radius(opened.flat, full, chosen.estimate, plan.gather) / opened.flat.radius
-        shrink = size[0] / full.width
-        small = {
-            "camera.width": size[0],
-            "camera.height": size[1],
-            "estimate.radius": min(max(radius, 1e-7), 10.0),
-            "gather.cache_min": max(chosen.gather.cache_min * shrink, 0.1),
-            "gather.cache_max": max(chosen.gather.cache_max * shrink, 1.0),
-        }
-        counts = (N, N // FEWER) if plan.photons else (N,)
-        found = [_run(opened, with_values(chosen, small), count, pool, store, light) for count in counts]
-        runs[candidate.name] = candidate, found, radius
-        if plan.shown_directly | plan.caustic_mask:
-            small["estimate.radius"] = min(WIDER * radius, 10.0)
-            wide[candidate.name] = _run(opened, with_values(chosen, small), N, pool, store, light)
-    mean = np.mean([image for _, found, _ in runs.values() for run in found for image in run.images], axis=0)
-    scale = full.width * full.height / result.pixels
-    gathers = runs.get(GATHER.name)
-    for name, (candidate, found, radius) in runs.items():
-        bias2 = 0.0
-        if name in wide:
-            bias2 = _bias2(wide[name].images, found[0].images, mean, 1) / (WIDER**ORDER - 1) ** 2
+        every.append(trier.tried(candidate))
+    mean = np.mean([image for tried in every for run in tried.runs for image in run.images], axis=0)
+    gathers = next((tried for tried in every if tried.candidate is GATHER), None)
+    with_caustics = next((tried for tried in every if tried.caustic), None)
+    for tried in every:
         interpolated = 0.0
-        if candidate is CACHE and gathers is not None:
-            interpolated = _bias2(found[0].images, gathers[1][0].images, mean, BLOCK)
-        measured = _measured(candidate, found, radius, mean, scale, max(bias2, interpolated))
-        result.measured.append(replace(measured, interpolated=interpolated > bias2, blurs=name in wide))
+        if tried.candidate is CACHE and gathers is not None:
+            interpolated = squared(tried.runs[0].images, gathers.runs[0].images, mean, BLOCK)
+        source = tried if tried.caustic or not tried.plan.caustic_mask else with_caustics
+        caustic = _widened(source, "caustic", mean, trier.scale) if source is not None else NONE
+        if source is not None:
+            caustic = caustic.wider(tried.radius / source.radius)
+        shown = _widened(tried, "shown", mean, trier.scale)
+        bias = Bias(caustic.blur, shown.blur, interpolated)
+        result.measured.append(_measured(tried, (caustic, shown), bias, mean, trier.scale))
     result.seconds, result.cpu_seconds = time.perf_counter() - started, pool.cpu_seconds - before
     return result
 
 
-def _run(
-    opened: OpenScene, settings: Settings, N: int, pool: WorkPool, store: StageStore, light: dict[int, float]
-) -> _Run:
-    """A pass with each seed. `light` remembers what light passes cost whose photons the store has by now."""
-    images: list[F8] = []
-    stages: dict[str, float] = {}
-    guided = settings.importance.emission != "off"
-    for seed in SEEDS:
-        chosen = with_values(settings, {"photons.N": N, "render.seed": (settings.render.seed + seed) % 2**31})
-        renderer = Renderer(opened, chosen, pool, store)
-        renderer.step()
-        images.append(beauty_of(renderer.film.planes()).astype(np.float64))
-        for name, spent in renderer.tally.stage_seconds.items():
-            stages[name] = min(stages.get(name, math.inf), spent)
-    if "light pass" in stages and not guided:
-        light[N] = stages["light pass"] = max(stages["light pass"], light.get(N, 0.0))
-    return _Run(N, images, stages)
+def _either(name: str) -> list[Widths]:
+    return [Widths(**{name: WIDER}), Widths(**{name: 1 / WIDER})]
 
 
-def _measured(candidate: Candidate, runs: list[_Run], radius: float, mean: F8, scale: float, bias2: float) -> Measured:
-    variances = [_variance(run.images, mean) for run in runs]
-    eye, photons = variances[0], 0.0
-    if len(runs) > 1:
-        many, few = runs
+def _widened(tried: _Tried, name: str, mean: F8, scale: float) -> Widened:
+    """What passes with other radii of that name tell; nothing without them."""
+    runs: list[_Run] = getattr(tried, name)
+    if not runs:
+        return NONE
+    wide, narrow = (Tried(run.images, run.stages.get("camera pass", 0.0)) for run in runs)
+    usual = Tried(tried.runs[0].images, 0.0)
+    found = told_by(wide, usual, narrow, mean, WIDER)
+    N = tried.runs[0].N
+    return replace(found, variance=found.variance * N, cost=found.cost * scale / N)
+
+
+def _measured(tried: _Tried, widened: tuple[Widened, Widened], bias: Bias, mean: F8, scale: float) -> Measured:
+    variances = [variance(run.images, mean) for run in tried.runs]
+    caustic, shown = (part.variance for part in widened)
+    eye, gathered = variances[0], 0.0
+    if len(tried.runs) > 1:
+        many, few = tried.runs
         photons = max(variances[1] - variances[0], 0.0) / (1 / few.N - 1 / many.N)
-        photons = min(photons, variances[0] * many.N)
+        photons = min(max(photons, caustic + shown), variances[0] * many.N)
         eye = variances[0] - photons / many.N
-        photons *= RARE
-    return Measured(candidate, _costs(runs, scale), eye, photons, bias2, radius)
+        fitting = min(1.0, photons / (caustic + shown)) if caustic + shown > 0 else 1.0
+        caustic, shown = caustic * fitting, shown * fitting
+        gathered = max(photons - caustic - shown, 0.0)
+    costs = _costs(tried.runs, (widened[0].cost, widened[1].cost), scale)
+    return Measured(tried.candidate, costs, eye, caustic, RARE * shown, RARE * gathered, bias, tried.radius)
 
 
-def _relative(squares: F8, mean: F8) -> F8:
-    return (squares / (mean**2 + EPSILON)).mean(axis=-1)
-
-
-def _variance(images: list[F8], mean: F8) -> float:
-    """Relative variance of a pass, without the noisiest pixels."""
-    each = np.sort(_relative((images[0] - images[1]) ** 2 / 2, mean), axis=None)
-    return float(each[: each.size - round(each.size * OUTLIERS)].mean())
-
-
-def _bias2(images: list[F8], against: list[F8], mean: F8, size: int) -> float:
-    """Squared relative bias against the other pictures, in blocks; 0 where it does not stand out of the noise."""
-    first, second = (_blocks(a - b, size) for a, b in zip(images, against, strict=True))
-    products = _relative(first * second, _blocks(mean, size))
-    found, error = float(products.mean()), float(products.std()) / math.sqrt(products.size)
-    return found if found > 2 * error else 0.0
-
-
-def _blocks(image: F8, size: int) -> F8:
-    if size == 1:
-        return image
-    h, w = (max(side // size, 1) for side in image.shape[:2])
-    cut = image[: h * size, : w * size]
-    return cut.reshape(h, cut.shape[0] // h, w, cut.shape[1] // w, 3).mean(axis=(1, 3))
-
-
-def _costs(runs: list[_Run], scale: float) -> Costs:
-    """The times of stages as base and slope over N; what is done per pixel counts `scale` times."""
+def _costs(runs: list[_Run], look_ups: tuple[float, float], scale: float) -> Costs:
+    """The times of stages as base and slope over N; what is done per pixel counts `scale` times. `look_ups`: what those
+    of either map cost, as far as they are in the slope."""
     many = runs[0]
     if len(runs) == 1:
-        return Costs(scale * sum(many.stages.values()), 0.0, 0.0)
+        return Costs(scale * sum(many.stages.values()), 0.0)
     few = runs[1]
-    base = light = look_up = 0.0
+    base = light = in_camera = 0.0
     for name, spent in many.stages.items():
         slope = min(max(spent - few.stages.get(name, 0.0), 0.0) / (many.N - few.N), spent / many.N)
         fixed = spent - slope * many.N
         if name == "camera pass":
-            base, look_up = base + scale * fixed, look_up + scale * slope
+            base, in_camera = base + scale * fixed, in_camera + scale * slope
         else:
             base, light = base + fixed, light + slope
-    return Costs(base, light, look_up)
+    fitting = min(1.0, in_camera / sum(look_ups)) if sum(look_ups) > 0 else 0.0
+    caustic, shown = (fitting * cost for cost in look_ups)
+    return Costs(base, light + in_camera - caustic - shown, caustic, shown)

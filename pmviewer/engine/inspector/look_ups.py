@@ -43,6 +43,7 @@ from pmviewer.render.diagnostics.pixel_replay import (
     empty_rows,
     replay_pixel,
 )
+from pmviewer.render.mirror_rays import own_eye
 from pmviewer.scene.spectrum import of_bands
 from pmviewer.settings.access import Settings
 
@@ -67,7 +68,8 @@ class Replay:
     virtual lights that face its surfaces (`pmviewer.render.diagnostics.pixel_replay.LIT`)."""
 
     def __init__(self, rendered: RenderedPass, radii: NDArray[np.float32] | None, pixel: int, n_lights: int) -> None:
-        self._arguments = rendered.given, radii, np.int64(pixel)
+        self._arguments = own_eye(rendered.given), radii
+        self._pixel = pixel, rendered.samples(pixel)
         self._expected = np.zeros(n_lights, np.float32)
         self._lights = empty_lights(min(MOST_SURFACES * lights_asked(rendered.given.virtual), MOST_LIT))
         self.samples: NDArray[np.float32] | None = None
@@ -82,7 +84,7 @@ class Replay:
     def _run(
         self, surface: int, group: int, wi: NDArray[np.float32]
     ) -> tuple[np.ndarray, Float, NDArray[np.int64], NDArray[np.float32], int]:
-        asked, counts = np.array([surface, group], np.int64), np.zeros(4, np.int64)
+        asked, counts = np.array([*self._pixel, surface, group], np.int64), np.zeros(4, np.int64)
         rows, shares = empty_rows(MOST_LOOK_UPS), np.zeros((len(wi), 3), np.float32)
         way, prims = np.zeros((MOST_POINTS, 3), np.float32), np.full(MOST_POINTS, -1, np.int64)
         wi = np.ascontiguousarray(wi, np.float32)

@@ -32,6 +32,10 @@ OTHER_AREA = (
     "The photons and weights are those of the look-up's disc. The estimate divides by another area (convex hull or "
     "differential checking), so that their sum is not its value."
 )
+SEVERAL = (
+    "The pixel shows a mirror or glass and has {n} samples a pass (render.mirror_rays): all that they looked up is "
+    "listed, each at 1/{n} of its light. The way is that of the first."
+)
 NO_PHOTONS = "The path tracer looks no photons up."
 
 
@@ -61,14 +65,14 @@ def pixel_report(looked: Looked, pinned: Pinned, measures: Measures, pool: WorkP
         way=way,
         objects=tuple(_seen(looked.scene, int(prim), looked.watched.areas) for prim in prims),
         look_ups=look_ups,
-        gathered=gather_rays_of(rendered.given, pinned.x, pinned.y, pool) if plan.gather else None,
+        gathered=gather_rays_of(rendered, pinned.x, pinned.y, pool) if plan.gather else None,
         measures=measures(map_, number),
         measured_map=map_,
         history=looked.watched.record((pinned.x, pinned.y), film.passes, terms.sum(axis=0)),
         lights=looked.scene.flat.light_names,
         samples=samples,
         life=_life(looked, pinned.photon),
-        notes=_notes(plan, look_ups),
+        notes=_notes(plan, look_ups, rendered.samples(number)),
         fisheye=fisheye_of(rendered, number, way[0], looked.settings.gather, pool) if plan.estimation else None,
         lit=lit,
     )
@@ -103,8 +107,9 @@ def _life(looked: Looked, photon: PhotonAt | None) -> PhotonLife | None:
     return looked.watched.life
 
 
-def _notes(plan: Plan, look_ups: tuple[LookUp, ...]) -> tuple[str, ...]:
-    """Sentences about what the figures do not say."""
+def _notes(plan: Plan, look_ups: tuple[LookUp, ...], n: int) -> tuple[str, ...]:
+    """Sentences about what the figures of n samples do not say."""
     if plan.path:
         return (NO_PHOTONS,)
-    return (OTHER_AREA,) if any(not look_up.exact for look_up in look_ups) else ()
+    notes = (OTHER_AREA,) if any(not look_up.exact for look_up in look_ups) else ()
+    return (*notes, SEVERAL.format(n=n)) if n > 1 else notes

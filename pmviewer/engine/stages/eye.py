@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.virtual_lights import lights_asked
 from pmviewer.engine.store import StageStore
 from pmviewer.render.camera import CameraPose
@@ -22,6 +23,8 @@ from pmviewer.render.filter import BOX, add_weights, filter_of, has_signs
 from pmviewer.render.gather.gather_points import POINT_COLUMNS, gather_points
 from pmviewer.render.given import PassData
 from pmviewer.render.hidden_lights import hidden_from
+from pmviewer.render.mirror_rays import own_eye
+from pmviewer.render.mirrored import mirrored_pixels
 from pmviewer.render.path import path_pass
 from pmviewer.render.record import N_COUNTS
 from pmviewer.settings.access import Settings
@@ -32,10 +35,8 @@ MOST_POINTS = 1024
 """Most gather rays of a pixel that are told of."""
 
 
-def render_into(
-    film: Film, given: PassData, outline: NDArray[np.uint8], plan: Plan, pool: WorkPool
-) -> NDArray[np.int64]:
-    """One sample a pixel more, of the path tracer or by maps. Returns the counts of `pmviewer.render.record`."""
+def render_into(film: Film, given: PassData, marks: NDArray[np.uint8], plan: Plan, pool: WorkPool) -> NDArray[np.int64]:
+    """A pass's samples more, of the path tracer or by maps. Returns the counts of `pmviewer.render.record`."""
     pixels = len(film.sums)
     signed = has_signs(given.eye)
     if signed and film.weights is None:
@@ -47,15 +48,15 @@ def render_into(
 
     def task(parts: Sequence[tuple[int, int]]) -> Callable[[], NDArray[np.int64]]:
         def run() -> NDArray[np.int64]:
-            counts = np.zeros(N_COUNTS, np.int64)
+            counts, own = np.zeros(N_COUNTS, np.int64), own_eye(given)
             for first, last in parts:
                 with film.one_addition(first, last):
                     if plan.path:
                         path_pass(given.scene, given.eye, film.sums, counts, first, last)
                     else:
-                        eye_pass(given, outline, film.radii, film.sums, counts, first, last)
+                        eye_pass(own, marks, film.radii, film.sums, counts, first, last)
                     if signed:
-                        add_weights(given.eye, outline, film.weights, first, last)
+                        add_weights(given.eye, marks, film.weights, first, last)
                 if film.moments is not None:
                     film.moments.add(film.sums, film.channels, first, last)
             return counts
@@ -108,14 +109,30 @@ def outline_of(scene: OpenScene, camera: CameraPose, film: Film, settings: Setti
     return store.get(key, lambda: outline_pixels(scene.scene, camera, reach), lambda pixels: pixels.nbytes)
 
 
-def gather_rays_of(given: PassData, x: int, y: int, pool: WorkPool) -> NDArray[np.float32]:
+def marks_of(
+    scene: OpenScene, camera: CameraPose, film: Film, settings: Settings, plan: Plan, store: StageStore
+) -> NDArray[np.uint8]:
+    """What the eye pass does more in which pixels (`pmviewer.render.mirror_rays`): uint8, empty where nothing. The film
+    may be smaller than the camera's picture."""
+    outline = outline_of(scene, camera, film, settings, store)
+    if plan.mirror_rays < 2:
+        return outline
+    glossy = settings.photons.glossy
+    small = replace(camera, width=film.width, height=film.height)
+    key = ("mirrors", scene.uid, small, glossy)
+    mirrored = store.get(key, lambda: mirrored_pixels(scene.flat, small, glossy), lambda pixels: pixels.nbytes)
+    return outline | mirrored if len(outline) and len(mirrored) else outline if len(outline) else mirrored
+
+
+def gather_rays_of(rendered: RenderedPass, x: int, y: int, pool: WorkPool) -> NDArray[np.float32]:
     """The gather rays of a pixel of the pass, (n, POINT_COLUMNS), see `pmviewer.render.gather.gather_points`; none
     where the pass does not gather, and for pixels outside of the image."""
-    eye = given.eye[0]
+    given, eye = own_eye(rendered.given), rendered.given.eye[0]
     width, height = int(eye["width"]), int(eye["height"])
     if eye["gather_rays"] == 0 or not (0 <= x < width and 0 <= y < height):
         return np.empty((0, POINT_COLUMNS), np.float32)
     rows = np.empty((MOST_POINTS, POINT_COLUMNS), np.float32)
     pixel, counts = np.int64(y * width + x), np.zeros(N_COUNTS, np.int64)
-    count = pool.run([lambda: gather_points(given, pixel, counts, rows)])[0]
+    samples = np.int64(rendered.samples(int(pixel)))
+    count = pool.run([lambda: gather_points(given, pixel, samples, counts, rows)])[0]
     return rows[:count].copy()

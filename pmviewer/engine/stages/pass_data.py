@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from pmviewer.render.direct.shadow import NO_SHADOWS
 from pmviewer.render.given import NO_VOLUME, PassData
 from pmviewer.render.lookup import NO_RADIANCE_PHOTONS
 from pmviewer.render.media.march import march_record
+from pmviewer.render.mirror_rays import MIRRORED
 from pmviewer.render.record import Evaluation, eye_dtype, eye_record
 from pmviewer.settings.access import Settings
 
@@ -37,10 +38,18 @@ class RenderedPass:
 
     given: PassData
     maps: PassMaps
+    marks: NDArray[np.uint8] = field(default_factory=lambda: np.zeros(0, np.uint8))
+    """Of pixels, as the eye pass takes them."""
     shadows: ShadowMap | None = None
     cache: IrradianceCache | None = None
     virtual: VirtualMap | None = None
     estimates: Estimates | None = None
+
+    def samples(self, pixel: int) -> int:
+        """Of a pixel in this pass."""
+        eye = self.given.eye[0]
+        several = "mirror_rays" in (eye.dtype.names or ()) and len(self.marks) > 0
+        return int(eye["mirror_rays"]) if several and self.marks[pixel] & MIRRORED else 1
 
 
 def pass_record(camera: CameraPose, settings: Settings, plan: Plan, maps: PassMaps, index: int) -> NDArray[np.void]:
@@ -77,6 +86,7 @@ def _evaluation(settings: Settings, plan: Plan, maps: PassMaps, index: int) -> E
         phase_rays=plan.phase_rays,
         looked_for=plan.looked_for,
         splits=settings.render.splits if plan.split else 0,
+        mirror_rays=plan.mirror_rays,
         volume_radius=maps.volume.radius if maps.volume is not None else 0.0,
         free_paths=free_paths(index, settings.estimate),
     )
@@ -142,7 +152,7 @@ def box_of(structure: Structure) -> NDArray[np.float64]:
 def blank_eye(settings: Settings, plan: Plan) -> NDArray[np.void]:
     """An eye record (1,) without contents. The free camera is a pinhole."""
     lens = plan.lens and not settings.free_camera.on
-    return np.zeros(1, eye_dtype(lens, plan.filtered, plan.media, plan.split, plan.hides))
+    return np.zeros(1, eye_dtype(lens, plan.filtered, plan.media, plan.split, plan.hides, plan.mirror_rays > 1))
 
 
 def blank_pass(scene: NDArray[np.void], settings: Settings, plan: Plan) -> PassData:

@@ -1,5 +1,5 @@
-"""One pixel's sample of a pass once more, with the numbers that the eye pass used: its way from the camera, and what it
-looked up in the photon maps there, or which virtual lights it asked (V4). Nothing is changed by it."""
+"""One pixel's samples of a pass once more, with the numbers that the eye pass used: its way from the camera, and what
+it looked up in the photon maps there, or which virtual lights it asked (V4). Nothing is changed by it."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from pmviewer.render.cast import cast
 from pmviewer.render.chain import arrive
 from pmviewer.render.direct.choice import LIST_WORDS, choose, expected_samples
 from pmviewer.render.given import opened
+from pmviewer.render.mirror_rays import take_sample
 from pmviewer.render.pixel import sampled_ray
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, own_radius
 from pmviewer.render.reflect import reflected, unfound
@@ -172,66 +173,72 @@ def _expected(given, si, expected):
 
 
 @kernel
-def replay_pixel(given, radii, pixel, asked, wi, shares, rows, vertices, prims, expected, lights, counts):
+def replay_pixel(given, radii, asked, wi, shares, rows, vertices, prims, expected, lights, counts):
     """Replay a pixel in the pass of the eye record.
 
-    given: as for `pmviewer.render.eye.eye_pass`; radii: as there; pixel: int64; asked: int64 (2,), the number of a
-    surface (−1: of none) and the group of its lobes whose `reflected_share` of light from the directions wi, float32
-    (m, 3), goes into shares (m, 3); rows: float32 (n, columns of ROW) of what is looked up, in the order of the eye
-    pass; vertices: float32 (v, 3), the ray's origin and the points that the path meets, of its ways where it splits the
-    one that never waits; prims: int64 (v,), the primitives there; expected: float32 (n_lights,), light samples that the
-    first surface of that way that stores photons spends on each light, left alone where there is none; lights: float32
-    (n, columns of LIT) of the virtual lights that face the surfaces of the pixel; counts: int64 (4,), how many rows and
-    points there are, at the surface number counts[2] − 1 the lights were chosen, 0 for nowhere, and how many of
-    `lights` are filled.
+    given, radii: as for `pmviewer.render.eye.eye_pass`; asked: int64 (4,), the pixel, its samples in the pass, and the
+    number of a surface (−1: of none) and the group of its lobes whose `reflected_share` of light from the directions
+    wi, float32 (m, 3), goes into shares (m, 3); rows: float32 (n, columns of ROW) of what is looked up, in the order of
+    the eye pass; vertices: float32 (v, 3), the ray's origin and the points that the path meets, of its first sample's
+    ways the one that never waits; prims: int64 (v,), the primitives there; expected: float32 (n_lights,), light samples
+    that the first surface of that way that stores photons spends on each light, left alone where there is none; lights:
+    float32 (n, columns of LIT) of the virtual lights that face the surfaces of the pixel; counts: int64 (4,), how many
+    rows and points there are, at the surface number counts[2] − 1 the lights were chosen, 0 for nowhere, and how many
+    of `lights` are filled.
     """
     given = opened(given)
     scene, eye = given.scene, given.eye
-    seed, ray, _ = sampled_ray(scene, eye, pixel)
-    way, ways = first_way(ray)
+    pixel, samples, index = asked[0], asked[1], eye.index
     main, surface = True, _i8(-1)
     row, points = _i8(0), _i8(1)
-    for k in range(3):
-        vertices[0, k] = ray.o[k]
-    while True:
-        ray, beta, first, splits, u = way
-        for depth in range(first, eye.max_depth + 1):
-            hit = cast(scene, ray)
-            if hit.prim < 0:
+    for sample in range(samples):
+        take_sample(eye, index * samples + sample)
+        seed, ray, _ = sampled_ray(scene, eye, pixel)
+        way, ways = first_way(ray)
+        if main:
+            for k in range(3):
+                vertices[0, k] = ray.o[k]
+        while True:
+            ray, beta, first, splits, u = way
+            for depth in range(first, eye.max_depth + 1):
+                hit = cast(scene, ray)
+                if hit.prim < 0:
+                    break
+                if main and points < len(vertices):
+                    prims[points] = hit.prim
+                    for k in range(3):
+                        vertices[points, k] = hit.p[k]
+                    points += 1
+                si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
+                groups = si.bsdf.groups
+                beta, u = thinned(eye, beta, u), CERTAIN
+                if groups == NOTHING or not largest(beta) > _f4(0.0):
+                    break
+                surface += 1
+                if surface == asked[2]:
+                    _shares(si, asked[3], wi, shares)
+                taken = scale(beta, _f4(1.0) / _f4(samples))
+                if groups & STORED != 0:
+                    if main and eye.direct != 0 and counts[2] == 0:
+                        _expected(given, si, expected)
+                        counts[2] = depth + 1
+                    row = _stored(given, radii, pixel, si, taken, (_i8(depth), surface), rows, row)
+                    counts[3] = _lit(given, si, taken, seed, (_i8(depth), surface), lights, counts[3])
+                if groups & FOLLOWED == 0 or depth == eye.max_depth:
+                    break
+                if eye.unfound != 0 and not is_delta(si.bsdf):
+                    r = own_radius(radii, OF_CAUSTIC, pixel, eye.caustic_radius)
+                    L = unfound(given.caustic_map, eye, r, si)
+                    both = _i8(1) if transmits(si.bsdf) else _i8(0)
+                    row = _put(rows, row, si, taken, L, r, (_i8(NOT_FOUND), _i8(_CAUSTICS), _i8(depth), both, surface))
+                ray, beta, _, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
+                if not largest(beta) > _f4(0.0):
+                    break
+            main = False
+            if ways.n == 0:
                 break
-            if main and points < len(vertices):
-                prims[points] = hit.prim
-                for k in range(3):
-                    vertices[points, k] = hit.p[k]
-                points += 1
-            si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
-            groups = si.bsdf.groups
-            beta, u = thinned(eye, beta, u), CERTAIN
-            if groups == NOTHING or not largest(beta) > _f4(0.0):
-                break
-            surface += 1
-            if surface == asked[0]:
-                _shares(si, asked[1], wi, shares)
-            if groups & STORED != 0:
-                if main and eye.direct != 0 and counts[2] == 0:
-                    _expected(given, si, expected)
-                    counts[2] = depth + 1
-                row = _stored(given, radii, pixel, si, beta, (_i8(depth), surface), rows, row)
-                counts[3] = _lit(given, si, beta, seed, (_i8(depth), surface), lights, counts[3])
-            if groups & FOLLOWED == 0 or depth == eye.max_depth:
-                break
-            if eye.unfound != 0 and not is_delta(si.bsdf):
-                r = own_radius(radii, OF_CAUSTIC, pixel, eye.caustic_radius)
-                L = unfound(given.caustic_map, eye, r, si)
-                both = _i8(1) if transmits(si.bsdf) else _i8(0)
-                row = _put(rows, row, si, beta, L, r, (_i8(NOT_FOUND), _i8(_CAUSTICS), _i8(depth), both, surface))
-            ray, beta, _, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
-            if not largest(beta) > _f4(0.0):
-                break
-        if ways.n == 0:
-            break
-        way, ways = next_way(ways)
-        main = False
+            way, ways = next_way(ways)
+    take_sample(eye, index)
     counts[0], counts[1] = row, points
 
 

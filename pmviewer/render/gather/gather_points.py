@@ -13,6 +13,7 @@ from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.gather.gather import gather_light, gather_survival
 from pmviewer.render.gather.guide import AIM_WORDS, aim, gather_direction
 from pmviewer.render.given import GatherRays, opened
+from pmviewer.render.mirror_rays import take_sample
 from pmviewer.render.pixel import sampled_ray
 from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import cast_straight
@@ -26,8 +27,8 @@ pixel (red, green, blue), and 1 if photons guided it, 0 if it followed the BSDF.
 
 
 @device
-def _replay(given, si, beta, seed, rows, row, counts):
-    """The gather rays of a surface into `rows` from `row` on; returns the next free row."""
+def _replay(given, si, beta, samples, seed, rows, row, counts):
+    """The gather rays of a surface, of one of so many samples, into `rows` from `row` on; returns the next free row."""
     n = given.eye.gather_rays
     rays = GatherRays(n, aim(given, si, seed, stack_i4(AIM_WORDS)), None, seed, BLACK)
     for j in range(n):
@@ -41,7 +42,7 @@ def _replay(given, si, beta, seed, rows, row, counts):
         if hit.prim < 0:
             continue
         L = mul(tint, gather_light(given, hit, wi, seed, sample, counts))
-        L = scale(mul(mul(beta, weight), L), share / (survival * _f4(n)))
+        L = scale(mul(mul(beta, weight), L), share / (survival * _f4(n * samples)))
         for k in range(3):
             rows[row, k], rows[row, 3 + k], rows[row, 6 + k] = si.p[k], hit.p[k], L[k]
         rows[row, 9] = _f4(0.0) if pdf > _f4(0.0) else _f4(1.0)
@@ -50,34 +51,38 @@ def _replay(given, si, beta, seed, rows, row, counts):
 
 
 @kernel
-def gather_points(given, pixel, counts, rows):
+def gather_points(given, pixel, samples, counts, rows):
     """Gather rays of the pixel in the pass of the eye record into rows, float32 (n, POINT_COLUMNS); returns how many.
 
-    Rays that meet nothing are left out. given: as for `pmviewer.render.eye.eye_pass`; counts: int64 (N_COUNTS,) of
-    scratch.
+    Rays that meet nothing are left out. given: as for `pmviewer.render.eye.eye_pass`; samples: int64, of the pixel in
+    the pass; counts: int64 (N_COUNTS,) of scratch.
     """
     given = opened(given)
     scene, eye = given.scene, given.eye
-    seed, ray, _ = sampled_ray(scene, eye, pixel)
-    way, ways = first_way(ray)
-    row = _i8(0)
-    while True:
-        ray, beta, first, splits, u = way
-        for depth in range(first, eye.max_depth + 1):
-            hit = cast(scene, ray)
-            if hit.prim < 0:
+    index, row = eye.index, _i8(0)
+    for sample in range(samples):
+        take_sample(eye, index * samples + sample)
+        seed, ray, _ = sampled_ray(scene, eye, pixel)
+        way, ways = first_way(ray)
+        while True:
+            ray, beta, first, splits, u = way
+            for depth in range(first, eye.max_depth + 1):
+                hit = cast(scene, ray)
+                if hit.prim < 0:
+                    break
+                si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
+                beta, u = thinned(eye, beta, u), CERTAIN
+                if not largest(beta) > _f4(0.0):
+                    break
+                if si.bsdf.groups & STORED != 0:
+                    row = _replay(given, si, beta, samples, seed, rows, row, counts)
+                if si.bsdf.groups & FOLLOWED == 0:
+                    break
+                ray, beta, _, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
+                if not largest(beta) > _f4(0.0):
+                    break
+            if ways.n == 0:
                 break
-            si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
-            beta, u = thinned(eye, beta, u), CERTAIN
-            if not largest(beta) > _f4(0.0):
-                break
-            if si.bsdf.groups & STORED != 0:
-                row = _replay(given, si, beta, seed, rows, row, counts)
-            if si.bsdf.groups & FOLLOWED == 0:
-                break
-            ray, beta, _, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
-            if not largest(beta) > _f4(0.0):
-                break
-        if ways.n == 0:
-            return row
-        way, ways = next_way(ways)
+            way, ways = next_way(ways)
+    take_sample(eye, index)
+    return row

@@ -29,6 +29,11 @@ THIN_GLASS = Need(
 )
 SMOOTH_GLASS = Need(lambda f: f.traits.has_smooth_glass, "No smooth glass in this scene.")
 ONE_INDEX = Need(lambda f: not f.plan.dispersion, "Where glass splits light into colours, paths go one way at it.")
+ONE_SAMPLE = Need(
+    lambda f: not f.plan.one_sample,
+    "One sample a pixel and pass: with virtual lights, estimated gathers, filters with negative parts, and radii that "
+    "pixels set by the photons they find.",
+)
 SPLIT = Need(
     lambda f: not (f.plan.path or f.plan.virtual), "The path tracer and virtual lights go one way at every surface."
 )
@@ -97,6 +102,22 @@ class Render(Group):
         ge=0,
         le=256,
         needs=(NO_PATHS,),
+    )
+    mirror_rays: int | Auto = setting(
+        "auto",
+        "Samples a pass of pixels that show a mirror or glass, along the whole way through them: what is seen there is "
+        "noisier than all else in the first passes. All other pixels have one. Automatic: 2.",
+        stage="image",
+        scale="integer",
+        unit="samples",
+        title="samples in mirrors",
+        ge=1,
+        le=16,
+        needs=(
+            FOLLOWED,
+            NO_PATHS,
+            ONE_SAMPLE,
+        ),
     )
     filter: Literal["auto", "box", "tent", "Gaussian", "Mitchell-Netravali", "Catmull-Rom", "Lanczos"] = setting(
         "auto",

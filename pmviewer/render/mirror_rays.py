@@ -1,0 +1,67 @@
+"""More camera rays for pixels that show mirrors and glass.
+
+What is seen over mirrors and glass is drawn together or apart by them: a pixel may see half a room, and most of the
+variance of a picture's first passes sits there. These pixels are known beforehand (`pmviewer.render.mirrored`), and get
+several samples a pass, each along the whole way that the eye pass follows. Which pixels depends on scene and camera
+alone, as with outlines of lights (`pmviewer.render.direct.outline`), so that the mean stays what it is.
+
+Sample s of the m of pass i has the index i·m + s in all of the pixel's sequences: samples of a pass complement one
+another as those of passes do. Random numbers are drawn by the eye record's `index`, which is set from sample to sample;
+whoever calls kernels gives them a record of their own (`own_eye`).
+
+Eye records without the field `mirror_rays` have one sample everywhere, and compile none of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.compile.specialise import has, specialised
+from pmviewer.render.given import PassData
+
+OUTLINED, MIRRORED = 1, 2
+"""Marks of pixels: the outline of a light crosses it; it shows a mirror or glass."""
+MIRROR_FIELDS: list[tuple[str, str]] = [("mirror_rays", "i4")]
+"""Of eye records: samples a pass of pixels that are MIRRORED."""
+_f4 = np.float32
+_i8 = np.int64
+_u4 = np.uint32
+
+
+def own_eye(given: PassData) -> PassData:
+    """With an eye record that no other call sees."""
+    return given._replace(eye=given.eye.copy())
+
+
+@specialised
+def samples_of(eye, marks, number):
+    """Samples of a pixel in the pass. marks: uint8 (pixels,), or (0,) where no pixel has any."""
+    if not has(eye, "mirror_rays"):
+        return lambda eye, marks, number: _i8(1)
+
+    def by_mark(eye, marks, number):
+        if len(marks) > 0 and marks[number] & MIRRORED != 0:
+            return _i8(eye.mirror_rays)
+        return _i8(1)
+
+    return by_mark
+
+
+@specialised
+def take_sample(eye, index):
+    """Have the eye record's random numbers be those of that index."""
+    if not has(eye, "mirror_rays"):
+        return lambda eye, index: None
+
+    def taken(eye, index):
+        eye.index = _u4(index)
+
+    return taken
+
+
+@specialised
+def share_of(eye, samples):
+    """What each of so many samples counts; None for 1."""
+    if not has(eye, "mirror_rays"):
+        return lambda eye, samples: None
+    return lambda eye, samples: _f4(1.0) / _f4(samples)
