@@ -14,8 +14,10 @@ at least two ρ wide and less than four, so that a look-up visits one cell a lev
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -254,7 +256,9 @@ def limit_by_neighbours(cache: IrradianceCache, run: Runner = in_turn) -> None:
     for _ in range(SWEEPS):
         parts = np.array_split(asked, max(1, min(MOST_PARTS, len(asked) // FEWEST_OF_PART)))
         lowest = np.full((len(parts), cache.n), np.inf, np.float32)
-        tasks = [partial(_lower, cache.record, rows, *given) for given in zip(parts, lowest, strict=True)]
+        tasks: list[Callable[[], Any]] = [
+            partial(_lower, cache.record, rows, *given) for given in zip(parts, lowest, strict=True)
+        ]
         (run if len(tasks) > 1 else in_turn)(tasks)
         harmonic = lowest.min(axis=0)
         asked = np.flatnonzero(harmonic < rows[:, HARMONIC]).astype(np.int32)
