@@ -209,11 +209,26 @@ def test_closed_lights_that_shine_inwards_are_known(shape, inward):
     assert turned is None or known.without(turned) is None
 
 
+def test_glass_around_a_camera_that_sits_in_the_dark_is_known():
+    """Scene 72 of seed 2611: light gets into a closed cube where a ball of glass crosses it. Not so with a lamp in it,
+    where the camera is beside it, or without the glass."""
+    known = next(d for d in DEVIATIONS if d.name == "glass in the dark")
+    scene = scene_of(2611, 72)
+    dark = known.without(scene)
+    assert len(dark["shapes"]) == len(scene["shapes"]) - 1
+    assert known.without(dark) is None
+    cube, lamp = scene["shapes"][2], scene["shapes"][-1]
+    inside = {**lamp, "to_world": [["scale", [0.01] * 3], *cube["to_world"]]}
+    assert known.without({**scene, "shapes": [*scene["shapes"], inside]}) is None
+    assert known.without({**scene, "camera": {**scene["camera"], "origin": [-1.5, 1.5, 0.3]}}) is None
+    assert known.without({**scene, "lights": [{"type": "point", "position": [-0.04, -0.3, 0.5]}]}) is None
+
+
 def test_known_deviations_explain_only_what_agrees_without_them(monkeypatch):
-    scene = next(
-        s for i in range(300) if len([d for d in DEVIATIONS if d.without(s := scene_of(1, i)) is not None]) >= 2
-    )
-    names = [d.name for d in DEVIATIONS if d.without(scene) is not None]
+    scenes = (scene_of(1, i) for i in range(300))
+    known = ((scene, [d.name for d in DEVIATIONS if d.without(scene) is not None]) for scene in scenes)
+    # Without glass a scene may lack what other entries take, too.
+    scene, names = next((s, names) for s, names in known if len(names) >= 2 and "glass in the dark" not in names)
     found, asked = comparison("path", 1e-9), []
 
     def explanation(comparison):
