@@ -39,8 +39,9 @@ def pytest_configure(config: pytest.Config) -> None:
 
     Processes side by side all read all files, each beginning at another one: a file that nobody has translated yet
     is translated by the first that comes by, not by all of them at the same time."""
-    gc.disable()
     worker = getattr(config, "workerinput", None)
+    if worker is not None or not config.getoption("numprocesses", None):  # one that imports them
+        gc.disable()
     if worker is not None and config.args_source == pytest.Config.ArgsSource.TESTPATHS:
         files = sorted(str(path) for path in Path(__file__).parent.rglob("test_*.py"))
         first = len(files) * int(worker["workerid"].removeprefix("gw")) // worker["workercount"]

@@ -110,8 +110,8 @@ def test_progressive_and_gather_agree_with_path_tracing(name):
     else:
         scene = box(diffuse(), SOLIDS[name])
     assert "bsdfs" in open_scene(scene).flat.record.dtype.names
-    path = pass_means(scene, "path", 40)
-    for method, passes in (("progressive", 14), ("gather", 8)):
+    path = pass_means(scene, "path", 24)
+    for method, passes in (("progressive", 10), ("gather", 5)):
         ours = pass_means(scene, method, passes)
         error = np.hypot(ours.std() / np.sqrt(len(ours)), path.std() / np.sqrt(len(path)))
         print(f"{name}, {method}: {ours.mean():.5f}, path {path.mean():.5f} ± {error:.5f}")
