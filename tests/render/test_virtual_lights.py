@@ -152,7 +152,7 @@ def test_passes_reach_the_path_tracer_in_an_open_scene(estimator, normalisation,
 
 
 def test_passes_reach_the_path_tracer_where_virtual_lights_are_glossy():
-    """They stand for photons around them, which blurs less from pass to pass."""
+    """They stand for photons around them, which blurs less from pass to pass. Within 3 %, twice the noise."""
     opened = open_scene("glossy_room")
 
     def mean(size, passes, **groups):
@@ -163,9 +163,9 @@ def test_passes_reach_the_path_tracer_where_virtual_lights_are_glossy():
         return (renderer.frame(0).image("indirect") @ LUMINANCE).mean()
 
     truth = mean(96, 24, render={"method": "path"})
-    found = mean(24, 60, render={"method": "virtual lights"}, virtual={"number": 200})
+    found = mean(24, 60, render={"method": "virtual lights"}, virtual={"number": 200, "photons": 8000})
     print(f"glossy room: {found / truth:.4f}")
-    assert found == pytest.approx(truth, rel=0.02)
+    assert found == pytest.approx(truth, rel=0.03)
 
 
 def test_without_c_an_open_scene_stays_too_bright_and_the_log_says_so(reference):
