@@ -29,6 +29,30 @@ def pool() -> Iterator[Any]:
     made.close()
 
 
+@pytest.fixture
+def every_surface(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scenes are opened as if every kind of material, texture, colour and light were in them."""
+    from tests.support import kinds
+
+    kinds.every_surface(monkeypatch)
+
+
+@pytest.fixture
+def any_light_in_media(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scenes with media are opened as if every kind of light were in them."""
+    from tests.support import kinds
+
+    kinds.any_light_in_media(monkeypatch)
+
+
+@pytest.fixture
+def every_path_may_split(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kernels are those of scenes with smooth glass."""
+    from tests.support import kinds
+
+    kinds.may_always_split(monkeypatch)
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--costs", type=int, default=0, metavar="N", help="list the N tests of the most CPU time")
 
@@ -50,12 +74,17 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Spread each room's files evenly over the run. Files side by side run at the same time, and those of one room wait
-    for each other to compile the same kernels."""
+    for each other to compile the same kernels. Long ones first: what comes last decides how long the others are idle.
+    """
     rooms: dict[Path, dict[Path, None]] = defaultdict(dict)
     for item in items:
         rooms[item.path.parent][item.path] = None
-    # By name: each process side by side has begun at another file.
-    place = {p: ((i + 0.5) / len(files), str(p)) for files in rooms.values() for i, p in enumerate(sorted(files))}
+    # Not as they were collected: each process side by side has begun at another file.
+    place = {
+        p: ((i + 0.5) / len(files), str(p))
+        for files in rooms.values()
+        for i, p in enumerate(sorted(files, key=lambda p: (-p.stat().st_size, p)))
+    }
     items.sort(key=lambda item: place[item.path])
 
 

@@ -66,6 +66,7 @@ def test_what_a_trial_tries_is_compiled_after_the_methods(at_the_start):
     assert all(click.text.startswith("render.") for click in found[1 : ways[0]])
 
 
+@pytest.mark.usefixtures("every_path_may_split")
 def test_after_its_clicks_nothing_is_left_to_compile(box, at_the_start):
     """A click is a picture as the window makes it: what it has rendered small, the session renders large."""
     click = next(each for each in at_the_start if each.text == "estimate.lookup = nearest")

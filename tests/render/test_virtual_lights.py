@@ -151,6 +151,7 @@ def test_passes_reach_the_path_tracer_in_an_open_scene(estimator, normalisation,
     assert image[inside].mean() == pytest.approx(reference[inside].mean(), rel=0.03)
 
 
+@pytest.mark.usefixtures("every_surface")
 def test_passes_reach_the_path_tracer_where_virtual_lights_are_glossy():
     """They stand for photons around them, which blurs less from pass to pass. Within 3 %, twice the noise."""
     opened = open_scene("glossy_room")

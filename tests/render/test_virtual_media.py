@@ -12,7 +12,10 @@ from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Camera, Medium, Parallelogram, PointLight, Shape
 from pmviewer.scene.medium import Phase
 from tests.render.test_media import cube_of, picture
+from tests.support import kinds
 from tests.support.scenes import diffuse
+
+pytestmark = pytest.mark.usefixtures("any_light_in_media")
 
 LAMP = (PointLight("lamp", (0.3, 0.6, 0.2), (3.0, 3.0, 3.0)),)
 CORNERS = (
@@ -59,7 +62,9 @@ def test_every_collision_is_a_light_of_what_it_scatters():
 @pytest.fixture(scope="module")
 def indirect_of_paths():
     """Half a million paths: few passes of many pixels, for every pass has its fixed cost."""
-    return picture(foggy_room(96), "path", 56, view="indirect").mean(axis=(0, 1))
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.any_light_in_media(patch)
+        return picture(foggy_room(96), "path", 56, view="indirect").mean(axis=(0, 1))
 
 
 @pytest.mark.parametrize("estimator", ["unweighted", "single step"])
