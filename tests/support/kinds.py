@@ -8,10 +8,13 @@ from dataclasses import replace
 from pmviewer.engine import method
 from pmviewer.scene.arrays import flatten
 
+EVERY_SURFACE = (*flatten.SURFACES, "colours")
+"""For `flatten`'s `features_at_least`."""
+
 
 def every_surface(monkeypatch):
     """As if every kind of material, texture, colour and light were in all scenes."""
-    _open_as_if(monkeypatch, "", *flatten.SURFACES, "colours")
+    _open_as_if(monkeypatch, "", *EVERY_SURFACE)
 
 
 def any_light_in_media(monkeypatch):
