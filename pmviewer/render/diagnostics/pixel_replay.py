@@ -225,7 +225,7 @@ def replay_pixel(given, radii, pixel, asked, wi, shares, rows, vertices, prims, 
                 L = unfound(given.caustic_map, eye, r, si)
                 both = _i8(1) if transmits(si.bsdf) else _i8(0)
                 row = _put(rows, row, si, beta, L, r, (_i8(NOT_FOUND), _i8(_CAUSTICS), _i8(depth), both, surface))
-            ray, beta, _, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
+            ray, beta, _, splits, ways = split_camera_path(given.scene, given.eye, si, beta, seed, depth, splits, ways)
             if not largest(beta) > _f4(0.0):
                 break
         if ways.n == 0:

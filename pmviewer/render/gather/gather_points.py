@@ -75,7 +75,7 @@ def gather_points(given, pixel, counts, rows):
                 row = _replay(given, si, beta, seed, rows, row, counts)
             if si.bsdf.groups & FOLLOWED == 0:
                 break
-            ray, beta, _, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
+            ray, beta, _, splits, ways = split_camera_path(given.scene, given.eye, si, beta, seed, depth, splits, ways)
             if not largest(beta) > _f4(0.0):
                 break
         if ways.n == 0:
