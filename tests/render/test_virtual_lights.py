@@ -139,11 +139,16 @@ def reference():
     return fine.reshape(12, FINE, 12, FINE, 3).mean(axis=(1, 3)) @ LUMINANCE
 
 
-@pytest.mark.parametrize("estimator", ["unweighted", *WEIGHTED])
-@pytest.mark.parametrize("normalisation", ["interpolated", "per pixel"])
+@pytest.mark.parametrize(
+    ("normalisation", "estimator"),
+    [
+        *(("interpolated", estimator) for estimator in ("unweighted", *WEIGHTED)),
+        ("per pixel", "every vertex"),
+        *(pytest.param("per pixel", e, marks=pytest.mark.extensive) for e in WEIGHTED if e != "every vertex"),
+    ],
+)
 def test_passes_reach_the_path_tracer_in_an_open_scene(estimator, normalisation, reference):
-    if estimator == "unweighted" and normalisation == "per pixel":
-        pytest.skip("nothing to normalise")
+    """Per pixel, the twin knows all of them at a point."""
     renderer = lit(open_box(), passes=100, estimator=estimator, normalisation=normalisation)
     image = renderer.frame(0).image("indirect") @ LUMINANCE
     inside = np.s_[2:-2, 2:-2]
