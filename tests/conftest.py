@@ -30,27 +30,33 @@ def pool() -> Iterator[Any]:
 
 
 @pytest.fixture
-def every_surface(monkeypatch: pytest.MonkeyPatch) -> None:
+def every_surface() -> Iterator[None]:
     """Scenes are opened as if every kind of material, texture, colour and light were in them."""
     from tests.support import kinds
 
-    kinds.every_surface(monkeypatch)
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.every_surface(patch)
+        yield
 
 
 @pytest.fixture
-def any_light_in_media(monkeypatch: pytest.MonkeyPatch) -> None:
+def any_light_in_media() -> Iterator[None]:
     """Scenes with media are opened as if every kind of light were in them."""
     from tests.support import kinds
 
-    kinds.any_light_in_media(monkeypatch)
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.any_light_in_media(patch)
+        yield
 
 
 @pytest.fixture
-def every_path_may_split(monkeypatch: pytest.MonkeyPatch) -> None:
+def every_path_may_split() -> Iterator[None]:
     """Kernels are those of scenes with smooth glass."""
     from tests.support import kinds
 
-    kinds.may_always_split(monkeypatch)
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.may_always_split(patch)
+        yield
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
