@@ -29,14 +29,49 @@ def pool() -> Iterator[Any]:
     made.close()
 
 
+@pytest.fixture
+def every_surface() -> Iterator[None]:
+    """Scenes are opened as if every kind of material, texture, colour and light were in them."""
+    from tests.support import kinds
+
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.every_surface(patch)
+        yield
+
+
+@pytest.fixture
+def any_light_in_media() -> Iterator[None]:
+    """Scenes with media are opened as if every kind of light were in them."""
+    from tests.support import kinds
+
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.any_light_in_media(patch)
+        yield
+
+
+@pytest.fixture
+def every_path_may_split() -> Iterator[None]:
+    """Kernels are those of scenes with smooth glass."""
+    from tests.support import kinds
+
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.may_always_split(patch)
+        yield
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--costs", type=int, default=0, metavar="N", help="list the N tests of the most CPU time")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Processes side by side all read all files, each beginning at another one: a file that nobody has translated yet
+    """The garbage collector rests until all modules are imported: it would search them again and again while more and
+    more are translated, for a quarter of the time.
+
+    Processes side by side all read all files, each beginning at another one: a file that nobody has translated yet
     is translated by the first that comes by, not by all of them at the same time."""
     worker = getattr(config, "workerinput", None)
+    if worker is not None or not config.getoption("numprocesses", None):  # one that imports them
+        gc.disable()
     if worker is not None and config.args_source == pytest.Config.ArgsSource.TESTPATHS:
         files = sorted(str(path) for path in Path(__file__).parent.rglob("test_*.py"))
         first = len(files) * int(worker["workerid"].removeprefix("gw")) // worker["workercount"]
@@ -45,12 +80,17 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Spread each room's files evenly over the run. Files side by side run at the same time, and those of one room wait
-    for each other to compile the same kernels."""
+    for each other to compile the same kernels. Long ones first: what comes last decides how long the others are idle.
+    """
     rooms: dict[Path, dict[Path, None]] = defaultdict(dict)
     for item in items:
         rooms[item.path.parent][item.path] = None
-    # By name: each process side by side has begun at another file.
-    place = {p: ((i + 0.5) / len(files), str(p)) for files in rooms.values() for i, p in enumerate(sorted(files))}
+    # Not as they were collected: each process side by side has begun at another file.
+    place = {
+        p: ((i + 0.5) / len(files), str(p))
+        for files in rooms.values()
+        for i, p in enumerate(sorted(files, key=lambda p: (-p.stat().st_size, p)))
+    }
     items.sort(key=lambda item: place[item.path])
 
 
@@ -58,6 +98,7 @@ def pytest_collection_finish() -> None:
     """Modules stay: the garbage collector need not look through them again and again."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 @pytest.hookimpl(tryfirst=True)

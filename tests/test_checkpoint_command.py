@@ -255,6 +255,7 @@ def test_time_goes_on_counting(tmp_path, at_pass, monkeypatch):
     assert read_exr(path)[1]["passes"] == 3
 
 
+@pytest.mark.usefixtures("every_path_may_split")
 def test_what_automatic_mode_has_chosen_stays(tmp_path, at_pass, monkeypatch, capsys):
     """Without a trial, for a short time; and more time may be given later."""
     path, words = tmp_path / "a.exr", ["-o", tmp_path / "a.exr", "--size", "16x12", "--checkpoint", "1h"]

@@ -6,11 +6,9 @@ import ast
 import statistics
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 
-import pmviewer
+from tests.support.sources import PACKAGE, package_files, parsed
 
-PACKAGE = Path(pmviewer.__file__).parent
 MOST_PARAMETERS, MOST_LINES, MEDIAN_FILE, LONGEST_FILE = 12, 100, 130, 500
 
 
@@ -18,18 +16,22 @@ MOST_PARAMETERS, MOST_LINES, MEDIAN_FILE, LONGEST_FILE = 12, 100, 130, 500
 def modules() -> dict[str, ast.Module]:
     """Every module of the package by its name without `pmviewer.`, parsed."""
     found = {}
-    for file in sorted(PACKAGE.rglob("*.py")):
+    for file in package_files():
         parts = file.relative_to(PACKAGE).with_suffix("").parts
         name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-        found[name] = ast.parse(file.read_text(encoding="utf-8"))
+        found[name] = parsed(file)
     return found
 
 
-def functions() -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
-    for module, tree in modules().items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-                yield f"{module}.{node.name}", node
+@cache
+def functions() -> list[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
+    """Every function of the package, with its module's name before its own."""
+    return [
+        (f"{module}.{node.name}", node)
+        for module, tree in modules().items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+    ]
 
 
 def imports(tree: ast.AST) -> Iterator[str]:
@@ -116,7 +118,7 @@ def test_no_function_is_too_long():
 
 
 def test_files_have_a_size_to_be_read():
-    lines = {str(file.relative_to(PACKAGE)): file.read_bytes().count(b"\n") for file in PACKAGE.rglob("*.py")}
+    lines = {str(file.relative_to(PACKAGE)): file.read_bytes().count(b"\n") for file in package_files()}
     assert {name: n for name, n in lines.items() if n > LONGEST_FILE} == {}
     assert statistics.median(lines.values()) <= MEDIAN_FILE
 

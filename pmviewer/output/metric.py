@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import chdtrc, erfc
 
 EPSILON = 0.01
 """Added to the squared reference, (W/(m² sr))²: dark pixels don't outweigh all others."""
@@ -167,6 +166,8 @@ def z_test(
     variance_of_mean, reference_variance: of each pixel's mean, (h, w, c), estimated from at least some tens of
         independent samples; or a number.
     """
+    from scipy.special import chdtrc  # late: whoever renders imports this module, and few of them test
+
     m, r = _pair(mean, reference)
     variance = np.broadcast_to(np.asarray(variance_of_mean, np.float64) + reference_variance, m.shape)
     difference = block_means(m - r, block)
@@ -182,7 +183,7 @@ def z_test(
     largest = float(z.max())
     squares = (z[noisy] ** 2).sum(axis=0)
     chi2 = float(squares.max())
-    by_largest = _sidak(float(erfc(largest / math.sqrt(2))), z.size)
+    by_largest = _sidak(math.erfc(largest / math.sqrt(2)), z.size)
     by_sum = _sidak(float(chdtrc(blocks, chi2)), squares.size) if blocks else 1.0
     p_value = min(1.0, 2 * min(by_largest, by_sum))
     return ZTest(largest, float((z > 2).mean()), float((z > 3).mean()), chi2, blocks, p_value)

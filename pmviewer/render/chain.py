@@ -74,11 +74,10 @@ def follow(scene, si, beta, u_lobe, u, v):
 
 
 @device
-def follow_camera_path(given, si, beta, seed, depth):
+def follow_camera_path(scene, eye, si, beta, seed, depth):
     """`follow` at the surface number `depth` of a path from the camera, which is thinned out where it forks often."""
-    eye = given.eye
-    u_lobe, u, v, u_end = chain_numbers(given.scene, eye.sequence, seed, eye.index, CHAIN + depth)
-    ray, beta, pdf = follow(given.scene, si, beta, u_lobe, u, v)
+    u_lobe, u, v, u_end = chain_numbers(scene, eye.sequence, seed, eye.index, CHAIN + depth)
+    ray, beta, pdf = follow(scene, si, beta, u_lobe, u, v)
     if si.bsdf.groups & STORED != 0 and depth >= FORKS:
         survival = min(largest(beta), _f4(1.0))
         if not u_end < survival:

@@ -137,7 +137,7 @@ def _stored(given, si, beta, pixel, scratch, whole):
     if eye.direct != 0:
         choice = choose(given.scene, eye, given.choice_map, si.p, si.ng, scratch[0])
         sampler = Sampler(eye.sequence, pixel.seed, eye.index, LIGHT)
-        L = direct_light(given, si, STORED, choice, n_bsdf, sampler, pixel.counts)
+        L = direct_light(given.scene, given.shadows, si, STORED, choice, n_bsdf, sampler, pixel.counts)
         deposit(pixel, DIRECT if whole else SPECULAR, mul(beta, L))
     _from_maps(given, si, beta, pixel, whole)
     virtual_light(given, si, beta, pixel, whole)
@@ -169,16 +169,15 @@ def _followed(given, si, beta, pixel, depth, choice, lights):
     if eye.followed_direct != 0:
         choice = choose_by_power(lights, eye.light_samples)
         sampler = Sampler(eye.sequence, pixel.seed, eye.index, CHAIN_LIGHT + depth)
-        L = direct_light(given, si, FOLLOWED, choice, eye.mis, sampler, pixel.counts)
+        L = direct_light(given.scene, given.shadows, si, FOLLOWED, choice, _i8(eye.mis), sampler, pixel.counts)
         deposit(pixel, SPECULAR, mul(beta, L))
     return choice
 
 
 @device
-def _emission(given, left, pdf, choice, hit, d):
+def _emission(scene, eye, left, pdf, choice, hit, d):
     """Radiance that what a camera ray of direction d met sends back: a light, or the sky where it met nothing. Light
     samples at the surface before, `left` with the density pdf, may have found it too; pdf is 0 after a delta."""
-    scene, eye = given.scene, given.eye
     if pdf > _f4(0.0):
         return found_light(scene, left, d, pdf, eye.mis, choice, eye.biased, hit)
     return radiance_of(scene, met_light(scene, hit), hit, d)
@@ -222,14 +221,14 @@ def eye_pass(given, marks, radii, film, counts, first, last):
                     seen = EMISSION if whole else SPECULAR
                     if hit.prim < 0:
                         if met_light(scene, hit) >= 0 and not (whole and (outlined or hidden)):
-                            deposit(pixel, seen, mul(beta, _emission(given, left, pdf, choice, hit, ray.d)))
+                            deposit(pixel, seen, mul(beta, _emission(scene, eye, left, pdf, choice, hit, ray.d)))
                         break
                     si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
                     if whole:
                         properties(eye, pixel, si)
                         note_object(given, hit.prim, pixel)
                     if met_light(scene, hit) >= 0 and not (whole and (outlined or hidden)):
-                        deposit(pixel, seen, mul(beta, _emission(given, left, pdf, choice, hit, ray.d)))
+                        deposit(pixel, seen, mul(beta, _emission(scene, eye, left, pdf, choice, hit, ray.d)))
                     groups = si.bsdf.groups
                     beta, u_way = thinned(eye, beta, u_way), CERTAIN
                     if groups == NOTHING or not largest(beta) > _f4(0.0):
@@ -243,7 +242,7 @@ def eye_pass(given, marks, radii, film, counts, first, last):
                         break
                     if not is_delta(si.bsdf):
                         choice = _followed(given, si, beta, pixel, depth, choice, lights)
-                    ray, beta, pdf, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
+                    ray, beta, pdf, splits, ways = split_camera_path(scene, eye, si, beta, seed, depth, splits, ways)
                     if eye.followed_direct == 0:
                         pdf = _f4(0.0)
                     if not largest(beta) > _f4(0.0):

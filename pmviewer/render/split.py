@@ -19,7 +19,7 @@ import numpy as np
 
 from pmviewer.kernels.bsdf.scattering import chain_numbers, mirrored_share
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.compile.specialise import has, part, specialised
+from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import CHAIN
 from pmviewer.kernels.vector import largest, scale
 from pmviewer.render.chain import BLACK, WHITE, follow, follow_camera_path
@@ -80,27 +80,27 @@ def next_way(ways):
 
 
 @specialised
-def split_camera_path(given, si, beta, seed, depth, splits, ways):
+def split_camera_path(scene, eye, si, beta, seed, depth, splits, ways):
     """`follow_camera_path`, or both ways: the ray, beta, the density, the splits so far and the ways that wait."""
-    if not has(part(given, "eye"), "splits"):
+    if not has(eye, "splits"):
 
-        def one(given, si, beta, seed, depth, splits, ways):
-            ray, beta, pdf = follow_camera_path(given, si, beta, seed, depth)
+        def one(scene, eye, si, beta, seed, depth, splits, ways):
+            ray, beta, pdf = follow_camera_path(scene, eye, si, beta, seed, depth)
             return ray, beta, pdf, splits, ways
 
         return one
 
-    def both(given, si, beta, seed, depth, splits, ways):
-        eye, share = given.eye, _ONE
+    def both(scene, eye, si, beta, seed, depth, splits, ways):
+        share = _ONE
         if splits < eye.splits:
-            share = mirrored_share(given.scene, si.bsdf, si.wo)
+            share = mirrored_share(scene, si.bsdf, si.wo)
         if not (share > _ZERO and share < _ONE):
-            ray, beta, pdf = follow_camera_path(given, si, beta, seed, depth)
+            ray, beta, pdf = follow_camera_path(scene, eye, si, beta, seed, depth)
             return ray, beta, pdf, splits, ways
-        mirrored, reflected, _ = follow(given.scene, si, beta, _ZERO, _ZERO, _ZERO)
-        bent, refracted, _ = follow(given.scene, si, beta, _BELOW_ONE, _BELOW_ONE, _ZERO)
+        mirrored, reflected, _ = follow(scene, si, beta, _ZERO, _ZERO, _ZERO)
+        bent, refracted, _ = follow(scene, si, beta, _BELOW_ONE, _BELOW_ONE, _ZERO)
         reflected, refracted = scale(reflected, share), scale(refracted, _ONE - share)
-        _, u, _, _ = chain_numbers(given.scene, eye.sequence, seed, eye.index, CHAIN + depth)
+        _, u, _, _ = chain_numbers(scene, eye.sequence, seed, eye.index, CHAIN + depth)
         if share > _HALF:
             ways = _waiting(ways, Way(bent, refracted, _i8(depth + 1), splits + 1, u))
             return mirrored, reflected, _ZERO, splits + 1, ways

@@ -13,15 +13,17 @@ PIXELS = (32, 32, 3)
 
 def runs(seed: int, count: int, samples: int, mean: float = 1.0, tail: float = 0.0) -> np.ndarray:
     """(count, 32, 32, 3) means of `samples` exponential samples of a pixel; with `tail`, every one in so many of them
-    is drawn from a Pareto distribution of index 2.2 instead, of the same mean."""
+    is drawn from a Pareto distribution of index 2.2 instead, of the same mean. Sums of exponential samples are drawn at
+    once: they have a gamma distribution."""
     rng = np.random.default_rng(seed)
-    drawn = rng.exponential(1, (samples, count, *PIXELS))
-    if tail:
-        rare = rng.uniform(size=drawn.shape) < 1 / tail
-        drawn[rare] = (rng.pareto(2.2, int(rare.sum())) + 1) * 1.2 / 2.2 * tail / 2
-        drawn[~rare] *= 0.5
-        drawn *= 1 / (0.5 + 0.5 * (1 - 1 / tail))
-    return mean * drawn.mean(axis=0)
+    shape = (count, *PIXELS)
+    if not tail:
+        return mean / samples * rng.standard_gamma(samples, shape)
+    rare = rng.binomial(samples, 1 / tail, shape)
+    bright = (rng.pareto(2.2, int(rare.sum())) + 1) * 1.2 / 2.2 * tail / 2
+    sums = np.bincount(np.repeat(np.arange(rare.size), rare.ravel()), bright, rare.size).reshape(shape)
+    sums += 0.5 * rng.standard_gamma(samples - rare)
+    return mean / samples / (0.5 + 0.5 * (1 - 1 / tail)) * sums
 
 
 def p_of(ours: np.ndarray, theirs: np.ndarray, **more: float) -> float:

@@ -35,8 +35,14 @@ def box():
     return open_scene(diffuse_box(size=8))
 
 
-def test_clicks_are_those_that_run_something_else(box):
-    found = {click.text: click.settings for click in clicks(box, Settings())}
+@pytest.fixture(scope="module")
+def at_the_start(box):
+    """The clicks from the defaults."""
+    return clicks(box, Settings())
+
+
+def test_clicks_are_those_that_run_something_else(at_the_start):
+    found = {click.text: click.settings for click in at_the_start}
     assert next(iter(found)) == ""
     assert {"render.method = gather", "render.method = path", "estimate.lookup = nearest"} <= found.keys()
     assert found["estimate.lookup = nearest"] == with_values(Settings(), {"estimate.lookup": "nearest"})
@@ -45,24 +51,25 @@ def test_clicks_are_those_that_run_something_else(box):
     assert "render.filter = tent" in found
 
 
-def test_from_another_state_other_clicks_matter(box):
+def test_from_another_state_other_clicks_matter(box, at_the_start):
     """What only gathering uses is one click away from gathering alone."""
-    here = {click.text for click in clicks(box, Settings())}
+    here = {click.text for click in at_the_start}
     there = {click.text for click in clicks(box, settings_of(render={"method": "gather"}))}
     assert {"gather.directions = photon cones", "render.method = progressive"} <= there - here
 
 
-def test_what_a_trial_tries_is_compiled_after_the_methods(box):
+def test_what_a_trial_tries_is_compiled_after_the_methods(at_the_start):
     """The irradiance cache is more than one click away, and automatic mode tries it."""
-    found = list(clicks(box, Settings()))
+    found = at_the_start
     ways = [n for n, click in enumerate(found) if click.text.startswith("automatic mode: ")]
     assert any(found[n].settings.gather.cache == "on" for n in ways)
     assert all(click.text.startswith("render.") for click in found[1 : ways[0]])
 
 
-def test_after_its_clicks_nothing_is_left_to_compile(box):
+@pytest.mark.usefixtures("every_path_may_split")
+def test_after_its_clicks_nothing_is_left_to_compile(box, at_the_start):
     """A click is a picture as the window makes it: what it has rendered small, the session renders large."""
-    click = next(each for each in clicks(box, Settings()) if each.text == "estimate.lookup = nearest")
+    click = next(each for each in at_the_start if each.text == "estimate.lookup = nearest")
     pool = WorkPool(1)
     click.run(pool)
     pool.close()
@@ -106,10 +113,10 @@ def test_a_waiting_helper_compiles_the_tree_builder_for_all_scenes():
     assert [len(kernel.signatures) for kernel in kernels] == [1] * 4, "other types than those of a tree's own"
 
 
-def test_a_helper_tells_how_far_it_is(box):
+def test_a_helper_tells_how_far_it_is(box, at_the_start):
     heard = []
     helper = Helper()
-    every = len(clicks(box, Settings())) + 50  # the first alone
+    every = len(at_the_start) + 50  # the first alone
     helper.ask(Clicks(box.scene, box.flat.record.dtype, Settings(), every), lambda: heard.append(helper.progress))
     helper.wait()
     assert helper.finished

@@ -145,6 +145,7 @@ def test_without_time_for_a_trial_traits_choose(cornell):
     assert "too few" in choice.sentences[0]
 
 
+@pytest.mark.usefixtures("every_path_may_split")
 def test_a_trial_picks_settings_that_alone_give_the_same_picture(cornell):
     """What it chose stands in plain settings; of what it doesn't set nothing is changed, and the same trial picks the
     same method again."""

@@ -66,6 +66,7 @@ WAYS = {
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("any_light_in_media")
 @pytest.mark.parametrize(("scene", "values"), WAYS.values(), ids=WAYS.keys())
 def test_going_on_is_as_never_having_stopped(scene, values, tmp_path):
     whole, other = renderer(scene, values, 2), resumed(tmp_path / "a.checkpoint", scene, values)

@@ -17,6 +17,8 @@ from tests.render.test_media import CAMERA, cube_of, picture
 from tests.support.importon_paths import GATHER, SHOWN, traced
 from tests.support.scenes import GREY, diffuse, rendered, settings_of
 
+pytestmark = pytest.mark.usefixtures("any_light_in_media", "every_path_may_split")
+
 WALL = Shape("wall", Parallelogram((-9, -9, -2), (18, 0, 0), (0, 18, 0)), 1)
 LAMP = (PointLight("lamp", (0.5, 1.5, 3.0), (30.0, 30.0, 30.0)),)
 

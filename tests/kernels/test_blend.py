@@ -19,6 +19,7 @@ from pmviewer.scene.arrays.material_row import material_table
 from pmviewer.scene.describe import describe
 from pmviewer.scene.description import Material, Principled, Shape
 from pmviewer.scene.texture import Bitmap
+from tests.support.kinds import EVERY_SURFACE
 from tests.support.scenes import GLASS, MIRROR, box_walls, diffuse, diffuse_box
 
 STORED, FOLLOWED = 1, 2
@@ -136,7 +137,7 @@ def test_parts_are_chosen_by_their_shares():
     parts = [diffuse(name) for name in "abc"]
     nested = blend(0.25, parts[0], blend(0.4, parts[1], parts[2], "inner"), "outer")
     scene = with_floor(nested)
-    flat, table = flatten(scene), material_table(scene)
+    flat, table = flatten(scene, features_at_least=EVERY_SURFACE), material_table(scene)
     p, wo = np.random.default_rng(3).random((N, 3), np.float32), directions(N)
     out, again = np.empty(N, np.int64), np.empty(N, np.int64)
     _parts(flat.record, np.int64(0), np.int64(0), p, wo, out)
@@ -152,7 +153,7 @@ def test_a_texture_gives_the_share():
     """Its luminance at the hit: u = 1/4, v = 1/8 lie in the first of four texels."""
     pixels = np.array([[[0.2], [0.9]], [[0.9], [0.9]]], np.float32)
     mixed = blend(0.5, diffuse("a"), diffuse("b"), textures={"weight": Bitmap(pixels, filter="nearest")})
-    flat = flatten(with_floor(mixed))
+    flat = flatten(with_floor(mixed), features_at_least=EVERY_SURFACE)
     p, wo = np.random.default_rng(4).random((N, 3), np.float32), directions(N)
     p[:, 1] = 0
     out = np.empty(N, np.int64)
@@ -165,7 +166,7 @@ def test_a_part_for_each_side():
     front, back = diffuse("front"), diffuse("back")
     sides = blend(0.3, front, blend(0.0, back, diffuse("never"), "inner"), by_side=True)
     scene = with_floor(blend(1.0, diffuse("never too"), sides, "outer"))
-    flat, table = flatten(scene), material_table(scene)
+    flat, table = flatten(scene, features_at_least=EVERY_SURFACE), material_table(scene)
     p, wo = np.random.default_rng(5).random((N, 3), np.float32), directions(N)
     out = np.empty(N, np.int64)
     _parts(flat.record, np.int64(0), np.int64(0), p, wo, out)
@@ -203,7 +204,8 @@ CLEAR = Material("clear", "principled", alpha=(0.5, 0.5), principled=Principled(
 )
 def test_photons_are_kept_for_every_part(first, second, glossy, front, back):
     """Whichever part is chosen; and none has lobes that photons are not kept for."""
-    flat = flatten(with_floor(second if first is None else blend(0.5, first, second)))
+    scene = with_floor(second if first is None else blend(0.5, first, second))
+    flat = flatten(scene, features_at_least=EVERY_SURFACE)
     wo = directions(400)
     out = np.empty((len(wo), 2), np.int64)
     _kept(flat.record, np.int64(0), wo, np.float32(glossy), out)
@@ -215,7 +217,7 @@ def test_photons_are_kept_for_every_part(first, second, glossy, front, back):
 def test_absorption_is_that_of_the_part_which_absorbs():
     glass = replace(GLASS, absorption=(0.5, 1.0, 2.0))
     scene = with_floor(blend(0.5, diffuse(), glass))
-    out, flat = np.empty(3, np.float32), flatten(scene)
+    out, flat = np.empty(3, np.float32), flatten(scene, features_at_least=EVERY_SURFACE)
     _through(flat.record, np.int64(0), out)
     assert out == pytest.approx(np.exp(-0.7 * np.array([0.5, 1.0, 2.0])) * [1, 2, 3])
 

@@ -13,11 +13,12 @@ import pytest
 from pmviewer.kernels import dimensions
 from pmviewer.kernels.dimensions import BOUNCE, DEPTH, DIMENSIONS, IMPORTON_DEPTH, LIGHT_SAMPLE, STREAMS
 from pmviewer.settings.access import info_of
+from tests.support.sources import PACKAGE, package_files, parsed
 
-PACKAGE = Path(dimensions.__file__).parents[1]
 TABLE = "pmviewer.kernels.dimensions"
 DRAWS = {"draw1", "draw4", "chain_numbers", "Sampler"}
 """What takes a dimension last; a `Sampler` hands its own on."""
+SALTED = "hash3"
 
 
 def largest(setting: str) -> int:
@@ -71,8 +72,10 @@ def test_seeds_made_from_a_renders_by_exclusive_or_differ():
 
 @functools.cache
 def sources() -> list[tuple[Path, ast.Module]]:
-    files = [p for p in sorted(PACKAGE.rglob("*.py")) if p.name not in ("random.py", "dimensions.py")]
-    return [(p, ast.parse(p.read_text(encoding="utf-8"))) for p in files]
+    """Those that name what draws or salts."""
+    names = (*DRAWS, SALTED)
+    files = [p for p in package_files() if p.name not in ("random.py", "dimensions.py")]
+    return [(p, parsed(p)) for p in files if any(name in p.read_text(encoding="utf-8") for name in names)]
 
 
 def called(node: ast.Call) -> str:
@@ -144,7 +147,7 @@ def test_kernels_draw_by_the_table():
 def test_kernels_salt_seeds_by_the_table():
     for path, tree in sources():
         for node in ast.walk(tree):
-            if isinstance(node, ast.Call) and called(node) == "hash3":
+            if isinstance(node, ast.Call) and called(node) == SALTED:
                 for argument in node.args:
                     inner = argument.args[0] if isinstance(argument, ast.Call) else argument
                     number = inner.value if isinstance(inner, ast.Constant) else 0

@@ -11,6 +11,7 @@ from pmviewer.kernels.accel import occlusion, raycast
 from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Group, Instance, Material, Mesh, Parallelogram, Shape, Sphere
 from pmviewer.scene.texture import Bitmap, Checkerboard
+from tests.support.kinds import EVERY_SURFACE
 from tests.support.scenes import diffuse, diffuse_box
 
 N = 100_000
@@ -38,13 +39,13 @@ def sheet(z, material, name="sheet"):
     return Shape(name, Parallelogram((-1, -1, z), (2, 0, 0), (0, 2, 0)), material)
 
 
-def scene_of(*shapes, veil=None, instances=()):
+def scene_of(*shapes, veil=None, instances=(), features=EVERY_SURFACE):
     """The shapes within a large box of 14 triangles that holds a light, and the first id after those; material 1 is
-    `veil`."""
+    `veil`. As if these features were there, so that kernels are those of many tests."""
     box = diffuse_box(4.0)
     veil = veil or replace(diffuse(), opacity=0.3)
     scene = replace(box, shapes=(*box.shapes, *shapes), materials=(diffuse(), veil), instances=instances)
-    return flatten(scene), 14
+    return flatten(scene, features_at_least=features), 14
 
 
 def share(hit, expected):
@@ -177,6 +178,6 @@ def test_glass_that_absorbs_is_never_passed():
     glass = Material("glass", "dielectric", opacity=0.5, absorption=(1.0, 0.0, 0.0))
     assert not glass.passable
     assert replace(glass, absorption=(0.0, 0.0, 0.0)).passable
-    flat, first = scene_of(sheet(0.0, 1), veil=glass)
+    flat, first = scene_of(sheet(0.0, 1), veil=glass, features=())
     assert "passable" not in flat.record.dtype.names
     assert (cast(flat, *down(1000))[1] >= first).all()

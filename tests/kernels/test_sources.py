@@ -6,11 +6,12 @@ import ast
 import pytest
 
 from pmviewer.kernels.compile.sources import PACKAGE, imported_names, sources_of
+from tests.support.sources import package_files, parsed
 
 
-def parsed(source: str | bytes) -> set[str]:
+def imports(tree: ast.Module) -> set[str]:
     names: set[str] = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module:
             names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
         elif isinstance(node, ast.Import):
@@ -19,10 +20,9 @@ def parsed(source: str | bytes) -> set[str]:
 
 
 def test_of_every_file_of_the_package():
-    for file in PACKAGE.rglob("*.py"):
-        source = file.read_bytes()
-        ours = {name for name in imported_names(source) if name.startswith(PACKAGE.name)}
-        imported = {name for name in parsed(source) if name.startswith(PACKAGE.name)}
+    for file in package_files():
+        ours = {name for name in imported_names(file.read_bytes()) if name.startswith(PACKAGE.name)}
+        imported = {name for name in imports(parsed(file)) if name.startswith(PACKAGE.name)}
         # A docstring may show how the package is imported.
         assert imported <= ours <= imported | {PACKAGE.name}, file
 
@@ -37,7 +37,7 @@ def test_of_every_file_of_the_package():
     ],
 )
 def test_of_every_way_to_write_an_import(source):
-    assert imported_names(source.encode()) == parsed(source)
+    assert imported_names(source.encode()) == imports(ast.parse(source))
 
 
 def test_what_is_imported_by_what_is_imported_counts():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -68,14 +70,20 @@ def unit_square(rng, n):
     return naive.pack(np.c_[rng.random((n, 2)), np.zeros(n)])
 
 
+@functools.cache
+def square_maps(M, n, trial, combine, places):
+    """Maps of a square, and where they are looked up in its middle."""
+    rng = np.random.default_rng([M, trial])
+    parts = [unit_square(rng, n) for _ in range(M)]
+    points = np.c_[rng.uniform(0.2, 0.8, (places, 2)), np.zeros(places)]
+    return Combined(parts, 1 / (M * n), combine), points
+
+
 def moments(M, in_each, rim, combine, share=1.0, trials=60, places=400, n=1600, **fields):
     """Mean, its standard error, and relative variance of look-ups in the middle of squares of M·n photons."""
     means, variances = [], []
     for trial in range(trials):
-        rng = np.random.default_rng([M, trial])
-        parts = [unit_square(rng, n) for _ in range(M)]
-        points = np.c_[rng.uniform(0.2, 0.8, (places, 2)), np.zeros(places)]
-        several = Combined(parts, 1 / (M * n), combine)
+        several, points = square_maps(M, n, trial, combine, places)
         E = estimate(several, points, 1.0, k=in_each, rim=rim, share=share, **fields)[:, 0].astype(float)
         means.append(E.mean())
         variances.append(E.var())

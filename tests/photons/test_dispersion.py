@@ -17,6 +17,8 @@ from pmviewer.scene.dispersion import GLASSES
 from pmviewer.settings.access import Photons
 from tests.support.dispersive import SCHOTT, lit_sphere
 
+pytestmark = pytest.mark.usefixtures("every_surface")
+
 INCIDENCE = 60.0
 """Of the light on the prism's first face, in degrees; its angle is 60°."""
 

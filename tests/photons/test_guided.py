@@ -124,8 +124,10 @@ def test_too_few_photons_for_the_lights():
 
 
 @pytest.mark.parametrize("name", ["parallelogram", "sphere", "cylinder", "mesh", "point", "environment", "spot", "sun"])
-def test_strata_hold_equal_power(name):
+def test_strata_hold_equal_power(name, request):
     """Even photons of all strata are the photons of the light: same mean direction and place, for every kind."""
+    if name in ("spot", "sun"):
+        request.getfixturevalue("every_surface")
     if name == "spot":
         light = SpotLight("spot", (0.3, 1.2, -0.4), (0.0, -1.0, 0.0), (2.0, 3.0, 1.0), 40.0, 20.0)
     elif name == "sun":

@@ -67,6 +67,7 @@ def agrees(value, error, expected):
     return abs(value - expected) <= 4.5 * error + 1e-5
 
 
+@pytest.mark.usefixtures("every_surface")
 @pytest.mark.parametrize("albedo", [0.0, 0.6])
 def test_light_within_a_ball_that_lets_it_pass(albedo):
     """Of opacity a and albedo ρ: each flight to the ball ends with a, and ρ of those go on, all of them inside."""
@@ -130,6 +131,7 @@ def test_clear_glass_absorbs_nothing():
     assert mean[ESCAPED] == pytest.approx(1, abs=1e-5)
 
 
+@pytest.mark.usefixtures("every_surface")
 def test_absorption_in_glass_is_in_the_books():
     """A point in the middle of a matched (ior 1) ball of radius R: everything crosses R of it once, exp(−aR) is left.
     Before, what glass absorbed was in no entry."""

@@ -13,6 +13,8 @@ from pmviewer.scene.description import Medium
 from pmviewer.settings.access import Photons
 from tests.render.test_media import SKY, cube_of, mixed_scene
 
+pytestmark = pytest.mark.usefixtures("any_light_in_media")
+
 
 def serially(tasks):
     return [task() for task in tasks]

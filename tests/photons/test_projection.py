@@ -26,6 +26,8 @@ from tests.support.device import from_python
 from tests.support.light_probe import LEANING, MORE, emit
 from tests.support.scenes import GLASS, LIGHTS, ball_mesh, diffuse_box, light_scene, settings_of
 
+pytestmark = pytest.mark.usefixtures("every_surface")
+
 BALL = Sphere((-0.2, 0.25, 0.15), 0.12)
 ALL = {**LIGHTS, **MORE, "leaning mesh": LEANING}
 

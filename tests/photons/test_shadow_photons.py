@@ -17,6 +17,8 @@ from pmviewer.settings.access import Settings, with_values
 from tests.support import naive_maps as naive
 from tests.support.scenes import diffuse
 
+pytestmark = pytest.mark.usefixtures("every_path_may_split")
+
 ON = {"direct.shadow_photons": True}
 
 

@@ -110,8 +110,8 @@ MIXES = {
 @pytest.mark.parametrize("name", MIXES)
 def test_progressive_and_gather_agree_with_path_tracing(name):
     scene = box(*MIXES[name])
-    path = pass_means(scene, 44, settings("path"))
-    for method, passes in (("progressive", 16), ("gather", 8)):
+    path = pass_means(scene, 24, settings("path"))
+    for method, passes in (("progressive", 10), ("gather", 5)):
         agree(pass_means(scene, passes, settings(method)), path, f"{name}, {method}")
 
 
@@ -120,8 +120,8 @@ def test_light_that_no_path_finds_is_kept_for_every_part():
     they reflect as stored ones."""
     light = PointLight("point", (0.3, 0.6, 0.3), (1.0, 1.0, 1.0))
     scene = box(blend(0.5, replace(METAL, alpha=(0.15, 0.15)), BLACK), blend(0.3, GLASS, MIRROR), light)
-    followed = pass_means(scene, 40, settings("progressive", photons={"glossy": 0.2}))
-    stored = pass_means(scene, 40, settings("progressive", photons={"glossy": 0.1}))
+    followed = pass_means(scene, 24, settings("progressive", photons={"glossy": 0.2}))
+    stored = pass_means(scene, 24, settings("progressive", photons={"glossy": 0.1}))
     agree(followed, stored, "followed", 0.02)
 
 
@@ -131,7 +131,7 @@ def test_textures_of_weight_and_metal():
     colours = Checkerboard((0.1 + 0.9 * 0.6,) * 3, (0.1 + 0.1 * 0.6,) * 3)
     mixed = box(blend(0.5, dark, bright, textures={"weight": FIELD}), diffuse())
     plain = box(replace(diffuse("floor", (0.4,) * 3), textures={"reflectance": colours}), diffuse())
-    agree(pass_means(mixed, 40, settings("path")), pass_means(plain, 40, settings("path")), "path")
+    agree(pass_means(mixed, 24, settings("path")), pass_means(plain, 24, settings("path")), "path")
     one = Bitmap(np.full((1, 1, 1), 0.6, np.float32))
     numbers, texture = (
         rendered(box(replace(LAYERED, textures=t)), settings("path"), 2).frame(0).image()
@@ -147,7 +147,7 @@ def test_parts_have_their_own_bumps():
     bumps = {"textures": {"bump": Bitmap(waves)}, "bump_scale": 0.3}
     first, second = (replace(part, **bumps) for part in TWO_COLOURS.parts)
     sides = [
-        pass_means(box(m, MIRROR), 24, settings("path"))
+        pass_means(box(m, MIRROR), 16, settings("path"))
         for m in (replace(TWO_COLOURS, parts=(first, second)), replace(MIXED, **bumps), MIXED)
     ]
     agree(*sides[:2], "bumped")

@@ -38,9 +38,9 @@ def test_the_closed_sphere_stays_uniform():
 
 @pytest.mark.parametrize("scene", [diffuse_box(), cornell_box()], ids=["diffuse box", "mirror and glass"])
 def test_the_mean_is_that_of_the_plain_gather_at_less_noise(scene):
-    groups = {"render": {"method": "gather"}, "photons": {"N": 50_000}}
-    plain = rendered(scene, settings_of(**groups), 16)
-    renderer = cached(scene, 16, photons={"N": 50_000}, gather={"cache_samples": 64})
+    groups = {"render": {"method": "gather"}, "photons": {"N": 20_000}}
+    plain = rendered(scene, settings_of(**groups), 12)
+    renderer = cached(scene, 12, photons={"N": 20_000}, gather={"cache_samples": 64})
     for term in ("direct", "indirect", "specular"):
         ours, theirs = renderer.frame(1).image(term).mean(), plain.frame(1).image(term).mean()
         print(term, ours, theirs)

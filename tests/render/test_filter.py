@@ -92,9 +92,9 @@ def _places(eyes, out):
 def test_weighted_places_are_distributed_as_the_filter(name):
     """The weighted share of places left of x is ∫f up to x over all of ∫f, and the weights have the mean 1."""
     radius = {"box": 0.8}.get(name, DEFAULTS[name].radius)
-    out = np.empty((2000 * 2000, 3))
+    out = np.empty((1000 * 1000, 3))
     _places(record_of(filter=name, filter_radius=radius), out)
-    fine = (np.arange(200_000) + 0.5) / 100_000 * radius - radius
+    fine = (np.arange(50_000) + 0.5) / 25_000 * radius - radius
     f = evaluate(PixelFilter(name, radius, DEFAULTS[name].shape), fine)
     integral = np.cumsum(f) / f.sum()
     assert out[:, 2].mean() == pytest.approx(1, abs=4e-3)

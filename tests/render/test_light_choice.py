@@ -35,7 +35,7 @@ from pmviewer.settings.access import SETTINGS
 from tests.support.naive_maps import pack
 from tests.support.scenes import box_walls, diffuse, rendered, settings_of
 
-SIZE, SEEDS = 16, 40
+SIZE, SEEDS = 16, 24
 N_LIGHTS = 8
 RULES = {
     "photons": {"choice": "photons"},

@@ -72,7 +72,7 @@ def test_every_scene_has_an_expectation():
 @pytest.mark.parametrize("name", list(SCENES))
 def test_path_tracer_shows_mitsubas_picture(name):
     expected = SCENES[name]
-    assert p_value(block_runs(name, "path", 64), expected["mean"], expected["error"], EXPECTED["runs"]) > SIGNIFICANCE
+    assert p_value(block_runs(name, "path", 32), expected["mean"], expected["error"], EXPECTED["runs"]) > SIGNIFICANCE
 
 
 @pytest.mark.extensive

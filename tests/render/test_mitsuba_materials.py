@@ -102,7 +102,7 @@ def check(name, method, passes):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_path_tracer_shows_mitsubas_picture(name):
-    check(name, "path", 64)
+    check(name, "path", 32)
 
 
 @pytest.mark.extensive

@@ -33,7 +33,7 @@ def block_runs(name, method, passes):
     try:
         for seed in range(1, RUNS + 1):
             values = {"render": {"method": method, "seed": seed}, "estimate": {"radius": 0.01}}
-            renderer = Renderer(opened, settings_of(photons={"N": 30_000}, **values), pool, StageStore(0))
+            renderer = Renderer(opened, settings_of(photons={"N": 16_000}, **values), pool, StageStore(0))
             for _ in range(passes):
                 renderer.step()
             image = renderer.frame(0).image().astype(np.float64)
@@ -62,7 +62,7 @@ def check(name, method, passes, tolerance):
 
 @pytest.mark.parametrize("name", list(VIEWS))
 def test_path_tracer(name):
-    check(name, "path", 64, 0.0)
+    check(name, "path", 32, 0.0)
 
 
 @pytest.mark.extensive
@@ -76,4 +76,4 @@ def test_photon_methods(name, method):
 
 @pytest.mark.parametrize("method", ["progressive", "gather"])
 def test_photon_methods_hide_lights(method):
-    check("hidden_lights", method, 24, 0.02)
+    check("hidden_lights", method, 12, 0.02)

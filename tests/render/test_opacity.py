@@ -59,7 +59,7 @@ def test_a_lights_opacity_dims_it(method, kind):
         Camera((0, 0.9, 3.0), (0, 0, 0), (0, 1, 0), 20.0),
         Camera((0.1, 0.1, 0.2), (0, 1, 0), (0, 0, 1), 50.0),
     )
-    passes = 256 if method == "path" else 32
+    passes = 64 if method == "path" else 32
     for camera, tolerance in ((floor, 0.015), (upwards, 0.03)):
         settings = settings_of(render={"method": method}, photons={"N": 5000})
         a, b = (rendered(replace(s, camera=camera), settings, passes).frame(0).image() for s in (ours, twin))

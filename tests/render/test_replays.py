@@ -16,6 +16,8 @@ from pmviewer.scene.description import Scene, Shape, Sphere
 from pmviewer.scene.texture import Bitmap
 from tests.support.scenes import GLASS, MIRROR, box_camera, box_walls, diffuse, settings_of
 
+pytestmark = pytest.mark.usefixtures("every_surface")
+
 SIZE, TEXELS = 24, 128
 ABOVE = 1.5
 """Added to positions in [-1, 1], so that they are radiances."""

@@ -103,15 +103,22 @@ def test_photons_agree_with_path_tracing_on_smooth_coarse_meshes(name):
         assert a.mean() == pytest.approx(b.mean(), rel=0.03)
 
 
-@pytest.mark.parametrize("name", [*MATERIALS, *SOLIDS])
+ALIKE = ("smooth metal", "rough plastic, looked up", "rough plastic, followed", "schlick", "thin glass")
+"""Lobes of their own that are stored or followed as others are; each by itself is tested in `tests/kernels`."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.extensive] if name in ALIKE else []) for name in (*MATERIALS, *SOLIDS)],
+)
 def test_progressive_and_gather_agree_with_path_tracing(name):
     if name in MATERIALS:
         scene = box(MATERIALS[name], GLASS)
     else:
         scene = box(diffuse(), SOLIDS[name])
     assert "bsdfs" in open_scene(scene).flat.record.dtype.names
-    path = pass_means(scene, "path", 40)
-    for method, passes in (("progressive", 14), ("gather", 8)):
+    path = pass_means(scene, "path", 24)
+    for method, passes in (("progressive", 10), ("gather", 5)):
         ours = pass_means(scene, method, passes)
         error = np.hypot(ours.std() / np.sqrt(len(ours)), path.std() / np.sqrt(len(path)))
         print(f"{name}, {method}: {ours.mean():.5f}, path {path.mean():.5f} ± {error:.5f}")

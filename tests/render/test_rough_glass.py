@@ -8,6 +8,8 @@ import pytest
 from pmviewer.scene.description import Camera, ConstantEnvironment, Material, Parallelogram, Scene, Shape
 from tests.support.scenes import rendered, settings_of
 
+pytestmark = pytest.mark.usefixtures("every_surface")
+
 ALPHA = 0.3
 
 

@@ -57,7 +57,7 @@ def test_caches_change_nothing():
 @pytest.mark.parametrize("method", METHODS)
 def test_seed_changes_the_noise_alone(method):
     images = [
-        rendered(cornell_box(size=32), settings_of(render={"method": method, "seed": seed}, photons={"N": 40_000}), 8)
+        rendered(cornell_box(size=32), settings_of(render={"method": method, "seed": seed}, photons={"N": 20_000}), 6)
         .frame(1)
         .image()
         for seed in (1, 2)

@@ -66,7 +66,7 @@ def test_corners_are_no_longer_dark():
         settings = settings_of(gather={"rays": 8, "secondary": secondary}, **groups)
         images[secondary] = rendered(scene, settings, 16).frame(1).image("indirect").astype(float)
     path = settings_of(render={"method": "path"})
-    right = rendered(scene, path, 600).frame(1).image("indirect").astype(float)
+    right = rendered(scene, path, 300).frame(1).image("indirect").astype(float)
     edges = edge_pixels(rendered(scene, path, 1))
     errors = {s: image[edges].mean() / right[edges].mean() - 1 for s, image in images.items()}
     elsewhere = {s: image[~edges].mean() / right[~edges].mean() - 1 for s, image in images.items()}

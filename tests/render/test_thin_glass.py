@@ -22,7 +22,10 @@ from pmviewer.scene.description import (
     Shape,
     Sphere,
 )
+from tests.support import kinds
 from tests.support.scenes import box_camera, box_walls, diffuse, panel, rendered, settings_of
+
+pytestmark = pytest.mark.usefixtures("every_surface")
 
 TINT = (0.9, 0.5, 0.2)
 NEAR = PointLight("near", (0.3, 2.0, 0.2), (3.0, 3.0, 3.0))
@@ -156,7 +159,9 @@ def test_a_pane_that_shines_is_seen_by_light_samples_and_rays():
         lamp = Shape("lamp", Parallelogram((-0.5, 1.0, -0.5), (1, 0, 0), (0, 0, 1)), 1, (1.0,) * 3)
         scene = floor_below(pane(rule))
         unseen = Shape("pane", Parallelogram((50, -5, 50), (0, 0, 1), (1, 0, 0)), 1)
-        images.append(image_of(replace(scene, shapes=(*scene.shapes, lamp, unseen), lights=()), 16))
+        images.append(
+            image_of(replace(scene, shapes=(*scene.shapes, lamp, unseen), lights=()), 16, photons={"N": 2000})
+        )
     assert images[0].mean() > 0.05
     assert images[1].mean() == pytest.approx(images[0].mean(), rel=0.01)
 
@@ -185,7 +190,9 @@ def divided_box(rule, size=60):
 @pytest.fixture(scope="module")
 def divided_path():
     """Mean of the picture by path tracing."""
-    return image_of(divided_box("tinted"), 90, render={"method": "path"}).mean(axis=(0, 1))
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.every_surface(patch)
+        return image_of(divided_box("tinted"), 60, render={"method": "path"}).mean(axis=(0, 1))
 
 
 @pytest.mark.slow
@@ -194,8 +201,8 @@ def test_panes_that_reflect_keep_all_light(method, divided_path):
     """Between light and pane, and back from the floor to the pane's underside: the path tracer's light in the mean;
     without reflections less."""
     groups = {"render": {"method": method}, "photons": {"N": 25_000}, "estimate": {"radius": 0.02}}
-    reflecting = image_of(divided_box("tinted and reflecting"), 24, **groups).mean(axis=(0, 1))
-    tinted = image_of(divided_box("tinted"), 8, **groups).mean(axis=(0, 1))
+    reflecting = image_of(divided_box("tinted and reflecting"), 12, **groups).mean(axis=(0, 1))
+    tinted = image_of(divided_box("tinted"), 12, **groups).mean(axis=(0, 1))
     assert reflecting == pytest.approx(divided_path, rel=0.015)
     assert np.all(tinted < reflecting)
     assert tinted == pytest.approx(divided_path, rel=0.15)

@@ -12,7 +12,10 @@ from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Camera, Medium, Parallelogram, PointLight, Shape
 from pmviewer.scene.medium import Phase
 from tests.render.test_media import cube_of, picture
+from tests.support import kinds
 from tests.support.scenes import diffuse
+
+pytestmark = pytest.mark.usefixtures("any_light_in_media")
 
 LAMP = (PointLight("lamp", (0.3, 0.6, 0.2), (3.0, 3.0, 3.0)),)
 CORNERS = (
@@ -56,10 +59,17 @@ def test_every_collision_is_a_light_of_what_it_scatters():
     assert way.mean() == pytest.approx(1 / 2.0, rel=0.05)
 
 
+@pytest.fixture(scope="module")
+def indirect_of_paths():
+    """Half a million paths: few passes of many pixels, for every pass has its fixed cost."""
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.any_light_in_media(patch)
+        return picture(foggy_room(96), "path", 56, view="indirect").mean(axis=(0, 1))
+
+
 @pytest.mark.parametrize("estimator", ["unweighted", "single step"])
-def test_light_on_walls_in_fog_is_that_of_paths(estimator):
+def test_light_on_walls_in_fog_is_that_of_paths(estimator, indirect_of_paths):
     """Within 4 %, most of it noise: the density that weighs single steps blurs some percent with so few photons."""
-    truth = picture(foggy_room(), "path", 8000, view="indirect").mean(axis=(0, 1))
-    virtual = {"estimator": estimator, "number": 200, "photons": 8000}
+    virtual = {"estimator": estimator, "number": 200, "photons": 4000}
     found = picture(foggy_room(), "virtual lights", 60, view="indirect", photons={"N": 1000}, virtual=virtual)
-    np.testing.assert_allclose(found.mean(axis=(0, 1)), truth, rtol=0.04)
+    np.testing.assert_allclose(found.mean(axis=(0, 1)), indirect_of_paths, rtol=0.04)

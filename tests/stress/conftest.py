@@ -1,12 +1,10 @@
-"""One variant of kernels for drawn scenes, most of which have glass."""
+"""One variant of kernels for scenes with and without smooth glass."""
 
 from __future__ import annotations
 
 import pytest
 
-from tests.support.splitting import may_always_split
-
 
 @pytest.fixture(autouse=True)
-def every_path_may_split(monkeypatch):
-    may_always_split(monkeypatch)
+def always_may_split(every_path_may_split):
+    """In every test of this room."""

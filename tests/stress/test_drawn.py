@@ -33,6 +33,7 @@ PLAIN_KERNELS = {
     "render.filter_radius": "auto",
     "estimate.radius_rule": SETTINGS["estimate.radius_rule"].default,
     "render.lights": "shown",
+    "render.splits": SETTINGS["render.splits"].default,
     "photons.maps": 1,
 }
 VARIANTS = {

@@ -19,7 +19,7 @@ BUTTON = f"**/{fa.ICON_FA_GAUGE_HIGH}##choose_automatically"
 
 
 @pytest.fixture
-def app(tmp_path, monkeypatch):
+def app(tmp_path, monkeypatch, every_path_may_split):
     monkeypatch.chdir(tmp_path)
     with app_on_engine(tmp_path, "cornell_diffuse", VALUES) as app:
         yield app

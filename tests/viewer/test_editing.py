@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
@@ -133,6 +134,7 @@ def test_an_object_tells_its_area_and_the_photons_on_it(tmp_path):
     assert int(counts.photons.sum()) + counts.unknown == len(photons)
 
 
+@pytest.mark.usefixtures("every_surface")
 def test_another_light_rig_takes_the_edits_of_lights_with_it(tmp_path):
     with app_on_engine(tmp_path, "cornell_caustic", SMALL) as app:
 

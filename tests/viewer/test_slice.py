@@ -42,6 +42,7 @@ def test_the_mouse_finds_the_nearest_place_of_a_line():
     assert PLACED.nearest(240.0, 125.0, np.zeros(3), np.array([0.0, 0.0, 1.0])) is None, "along the view"
 
 
+@pytest.mark.usefixtures("any_light_in_media", "every_path_may_split")
 def test_the_slice_is_dragged_turned_and_put_back(tmp_path):
     with app_on_engine(tmp_path, "cornell_smoke", SMALL) as app:
 

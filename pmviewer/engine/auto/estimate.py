@@ -20,8 +20,6 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
-from scipy.optimize import nnls
 
 from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.method import Plan
@@ -131,6 +129,7 @@ def _is_level(n: int) -> bool:
 
 def _level(first: F8, total: F8, m: int, run: Runner) -> _Level:
     """D of m passes, whose sum is `first`, against the m passes after them; `total` is the sum of both."""
+    from scipy.ndimage import uniform_filter  # late: processes that only compile, or wait for work, start without
 
     rows = len(total)
 
@@ -155,6 +154,8 @@ def _level(first: F8, total: F8, m: int, run: Runner) -> _Level:
 
 def _parts(levels: list[_Level], powers: tuple[float, ...]) -> list[tuple[float, float]]:
     """Powers and factors of the parts of V, from D at all levels."""
+    from scipy.optimize import nnls
+
     m = np.array([level.passes for level in levels], float)
     D = np.array([max(level.D, 1e-300) for level in levels])
     weight = 1 / (D * np.sqrt([ROUGHNESS**2 + level.error**2 for level in levels]))

@@ -231,7 +231,7 @@ def replay_pixel(given, radii, asked, wi, shares, rows, vertices, prims, expecte
                     L = unfound(given.caustic_map, eye, r, si)
                     both = _i8(1) if transmits(si.bsdf) else _i8(0)
                     row = _put(rows, row, si, taken, L, r, (_i8(NOT_FOUND), _i8(_CAUSTICS), _i8(depth), both, surface))
-                ray, beta, _, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
+                ray, beta, _, splits, ways = split_camera_path(scene, eye, si, beta, seed, depth, splits, ways)
                 if not largest(beta) > _f4(0.0):
                     break
             main = False

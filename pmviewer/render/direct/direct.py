@@ -109,9 +109,9 @@ def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler):
 
 
 @device
-def direct_light(given, si, group, choice, n_bsdf, sampler, counts):
-    """L of `light_samples` in a pass (PassData), its rays counted."""
-    L, rays, saved = light_samples(given.scene, given.shadows, si, group, choice, n_bsdf, sampler)
+def direct_light(scene, shadows, si, group, choice, n_bsdf, sampler, counts):
+    """L of `light_samples`, its rays counted."""
+    L, rays, saved = light_samples(scene, shadows, si, group, choice, n_bsdf, sampler)
     counts[C_RAYS] += rays
     counts[C_SHADOW_RAYS] += rays
     counts[C_SAVED] += saved

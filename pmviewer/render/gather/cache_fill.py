@@ -72,7 +72,7 @@ def uncovered_hit(given, pixel, counts):
                 return True, si.p, si.ng, n, si.gap, cache.pixel_size + travelled * cache.pixel_angle
         if si.bsdf.groups & FOLLOWED == 0 or depth == eye.max_depth:
             break
-        ray, beta, _ = follow_camera_path(given, si, beta, seed, depth)
+        ray, beta, _ = follow_camera_path(given.scene, given.eye, si, beta, seed, depth)
         if not largest(beta) > _f4(0.0):
             break
     return NO_HIT

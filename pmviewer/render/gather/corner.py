@@ -29,6 +29,7 @@ from pmviewer.render.reflect import reflected
 from pmviewer.render.straight import cast_straight
 
 _f4 = np.float32
+_i8 = np.int64
 _u4 = np.uint32
 
 NO_CORNERS = ABSENT
@@ -59,7 +60,7 @@ def _again(given, si, seed, index, counts, hit):
     scene, eye = given.scene, given.eye
     sampler = Sampler(eye.sequence, hash3(seed, _u4(SECOND_GATHER_SALT), _u4(0)), index, SECOND_LIGHT)
     choice = choose(scene, eye, given.choice_map, si.p, si.ng, stack_i4(LIST_WORDS))
-    L = direct_light(given, si, STORED, choice, eye.mis, sampler, counts)
+    L = direct_light(scene, given.shadows, si, STORED, choice, _i8(eye.mis), sampler, counts)
     if eye.caustic_mask != 0:
         L = add(L, reflected(given.caustic_map, eye, eye.caustic_radius, si, eye.caustic_mask))
     u, v, u_lobe, _ = draw4(eye.sequence, sampler.seed, index, SECOND_RAY)

@@ -78,7 +78,7 @@ def gather_points(given, pixel, samples, counts, rows):
                     row = _replay(given, si, beta, samples, seed, rows, row, counts)
                 if si.bsdf.groups & FOLLOWED == 0:
                     break
-                ray, beta, _, splits, ways = split_camera_path(given, si, beta, seed, depth, splits, ways)
+                ray, beta, _, splits, ways = split_camera_path(scene, eye, si, beta, seed, depth, splits, ways)
                 if not largest(beta) > _f4(0.0):
                     break
             if ways.n == 0:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import functools
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -74,7 +75,7 @@ class Overlay(ABC):
     @classmethod
     def style(cls, settings: Settings) -> Any:
         """Its group of settings."""
-        return settings.overlays.styles()[cls.name]
+        return getattr(settings.overlays, _attributes(type(settings.overlays))[cls.name])
 
     @classmethod
     def is_shown(cls, settings: Settings) -> bool:
@@ -146,6 +147,12 @@ class Overlay(ABC):
 
     def legend(self, source: Source) -> None:  # noqa: B027
         """What the colours mean, with imgui, in the panel."""
+
+
+@functools.cache
+def _attributes(overlays: type[Any]) -> dict[str, str]:
+    """The attributes of that group of settings by the names in their paths: asked for some fifty times a frame."""
+    return {field.alias or name: name for name, field in overlays.model_fields.items()}
 
 
 def _same(before: Needs | None, now: Needs | None) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import groupby
-from typing import Any
+from typing import Any, NamedTuple
 
 from imgui_bundle import icons_fontawesome_6 as fa
 from imgui_bundle import imgui
@@ -30,6 +30,14 @@ STACKED = 14.0
 _OPEN = ("Light pass", "Density estimate", "Method")
 
 
+class _Facts(NamedTuple):
+    """Every setting's value and why it has no effect, and those that differ from their defaults, in their order."""
+
+    values: dict[str, Any]
+    reasons: dict[str, str | None]
+    changed: dict[str, None]
+
+
 class SettingsPanel:
     """Rows for every setting of the schema but those that have a place of their own: overlays, toolbar, comparison."""
 
@@ -40,7 +48,7 @@ class SettingsPanel:
         """Only settings that contain this are listed."""
         self.pinned: tuple[float, float, float, float] | None = None
         """Where on the screen the rows above the groups are: left, top, right, bottom."""
-        self._known: tuple[Settings, Any, dict[str, Any], dict[str, str | None]] | None = None
+        self._known: tuple[Settings, Any, _Facts] | None = None
         listed = [i for i in SETTINGS.values() if i.path not in PINNED and not i.path.startswith(_ELSEWHERE)]
         self._groups = [(heading, list(infos)) for heading, infos in groupby(listed, key=lambda info: info.group)]
 
@@ -65,9 +73,7 @@ class SettingsPanel:
         imgui.end_child()
 
     def _filter_row(self) -> None:
-        everything = [
-            p for p, info in SETTINGS.items() if not p.startswith(_ELSEWHERE) and self._value(p) != info.default
-        ]
+        everything = [path for path in self._facts().changed if not path.startswith(_ELSEWHERE)]
         size = imgui.get_frame_height() * 1.15 + imgui.get_style().item_spacing.x
         imgui.set_next_item_width(-2 * size)
         _, self.find = imgui.input_text_with_hint(
@@ -112,7 +118,7 @@ class SettingsPanel:
         else:
             identity = heading
             imgui.set_next_item_open(heading in _OPEN, imgui.Cond_.once)
-        changed = sum(self._value(i.path) != i.default for i in infos)
+        changed = sum(i.path in self._facts().changed for i in infos)
         note = f"   {changed} changed" if changed else ""
         if imgui.collapsing_header(f"{heading}{note}###{identity}") and self.begin_rows(heading):
             section = ""
@@ -126,7 +132,7 @@ class SettingsPanel:
     def _changed(self) -> None:
         """What differs from the defaults, group by group, each with its reset."""
         wanted = self.find.strip().lower()
-        changed = [i for i in SETTINGS.values() if self._value(i.path) != i.default and wanted in i.path.lower()]
+        changed = [SETTINGS[path] for path in self._facts().changed if wanted in path.lower()]
         if not changed:
             imgui.text_disabled("Every setting has its default.")
         for heading, infos in groupby(changed, key=lambda info: info.group):
@@ -146,18 +152,20 @@ class SettingsPanel:
 
     def reason(self, path: str) -> str | None:
         """Why the setting has no effect now, or None."""
-        return self._facts()[1][path]
+        return self._facts().reasons[path]
 
     def _value(self, path: str) -> Any:
-        return self._facts()[0][path]
+        return self._facts().values[path]
 
-    def _facts(self) -> tuple[dict[str, Any], dict[str, str | None]]:
-        """Every setting's value and why it has no effect, worked out once for each change."""
+    def _facts(self) -> _Facts:
+        """Of the settings as they are, worked out once for each change."""
         settings, traits = self.state.settings, self.state.session.traits
         if self._known is None or self._known[0] is not settings or self._known[1] is not traits:
             reasons = {path: self.state.inactive_reason(path, settings, traits) for path in SETTINGS}
-            self._known = settings, traits, flat(settings), reasons
-        return self._known[2], self._known[3]
+            values = flat(settings)
+            changed = {path: None for path, info in SETTINGS.items() if values[path] != info.default}
+            self._known = settings, traits, _Facts(values, reasons, changed)
+        return self._known[2]
 
     @staticmethod
     def begin_rows(name: str, name_em: float = 8.8, room: float = 0) -> bool:
@@ -176,7 +184,7 @@ class SettingsPanel:
     def row(self, info: SettingInfo) -> None:
         """Label, widget and reset of one setting, inside the table of `begin_rows`."""
         state, value = self.state, self._value(info.path)
-        reason = self._facts()[1][info.path]
+        reason = self.reason(info.path)
         resolved = state.resolved(info.path) if value == "auto" else value
         imgui.table_next_row()
         imgui.table_next_column()
