@@ -7,14 +7,17 @@ Whoever starts the work listens (`watched`); the work itself, however deep down,
 from __future__ import annotations
 
 import os
+import queue
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
 
 Task = Callable[[], Any]
+_EVERY = 0.1
+"""Seconds between two looks at whether parallel work is still wanted."""
 
 
 class Cancelled(Exception):
@@ -80,21 +83,30 @@ def grown(tasks: list[Task], more: Callable[[Any], Sequence[Task]]) -> list[tupl
     """Results of the tasks and of those that `more` makes of each result, numbered and in the order of being added."""
     watch = _watch.get()
     threads = (watch.threads if watch is not None else None) or available_threads()
+    done: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
+    number: dict[Future[Any], int] = {}
+    results: list[tuple[int, Any]] = []
     with ThreadPoolExecutor(threads, "pmviewer load") as pool:
-        number: dict[Future[Any], int] = {pool.submit(task): i for i, task in enumerate(tasks)}
-        waiting, results = set(number), []
+
+        def add(task: Task) -> None:
+            future = pool.submit(task)
+            number[future] = len(number)
+            future.add_done_callback(done.put)
+
         try:
-            while waiting:
-                done, waiting = wait(waiting, timeout=0.1, return_when=FIRST_COMPLETED)
+            for task in tasks:
+                add(task)
+            while len(results) < len(number):
                 check()
-                for future in done:
-                    result = future.result()
-                    results.append((number[future], result))
-                    for task in more(result):
-                        added = pool.submit(task)
-                        number[added] = len(number)
-                        waiting.add(added)
+                try:
+                    future = done.get(timeout=_EVERY)
+                except queue.Empty:
+                    continue
+                result = future.result()
+                results.append((number[future], result))
+                for task in more(result):
+                    add(task)
         finally:
-            for future in waiting:
+            for future in number:
                 future.cancel()
     return sorted(results, key=lambda pair: pair[0])

@@ -171,3 +171,24 @@ def test_binary_stl_with_odd_headers(tmp_path: Path) -> None:
     assert len(meshes(streamed)[0][1].faces) == 3
     with pytest.raises(SceneError, match="neither a binary nor a text"):
         stl(tmp_path, bytes(range(256)) * 8)
+
+
+def test_parts_of_a_large_binary_stl_are_one_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read on one thread and on three, in parts that end in the middle of what is read at once."""
+    rng = np.random.default_rng(4)
+    records = np.zeros(1000, [("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    records["v"] = rng.normal(size=(300, 3)).astype("<f4")[np.argsort(rng.random((1000, 300)), axis=1)[:, :3]]
+    records["a"][990] = 5
+    data = b"many".ljust(80) + struct.pack("<I", len(records)) + records.tobytes()
+    found = []
+    for fewest in (10_000, 1):
+        monkeypatch.setattr("pmviewer.scene.formats.stl._FEWEST", fewest)
+        monkeypatch.setattr("pmviewer.scene.formats.stl._AT_ONCE", 70)
+        monkeypatch.setattr("pmviewer.scene.formats.stl.available_threads", lambda: 3)
+        scene = stl(tmp_path, data)
+        assert any("Colours" in w for w in scene.warnings)
+        found.append(meshes(scene)[0][1])
+    for mesh in found:
+        assert np.array_equal(mesh.vertices[mesh.faces], records["v"])
+    assert np.array_equal(found[0].vertices, found[1].vertices)
+    assert len(found[0].vertices) == 300

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+from functools import partial
 from pathlib import Path
+from threading import Lock
 from typing import BinaryIO
 
 import numpy as np
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
 from pmviewer.kernels.meshes.rows import text_facets
-from pmviewer.progress import stage
+from pmviewer.progress import available_threads, parallel, stage
 from pmviewer.scene.description import Mesh
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.open_file import open_regular
@@ -19,7 +21,9 @@ from pmviewer.scene.meshes.welding import FACET, Welder
 
 _HEADER, _RECORD = 84, 50
 _AT_ONCE = 20_000
-"""Triangles of a binary file that are in memory as they were read."""
+"""Triangles of a binary file that one thread has in memory as they were read."""
+_FEWEST = 50_000
+"""Triangles from which on a thread of their own pays."""
 
 
 def read_stl(path: Path, diagnostics: Diagnostics) -> list[tuple[str, Mesh]]:
@@ -64,18 +68,39 @@ def _binary(header: bytes, records: BinaryIO, n: int, path: Path, diagnostics: D
     if not n:
         raise SceneError("The STL file has no triangles.", path, hint="Export it again.")
     stage(f"reading {n:,} triangles")
-    welder, coloured, left = Welder(n), b"COLOR=" in header, n
-    while left:
-        data = records.read(_RECORD * min(left, _AT_ONCE))
-        facets = np.frombuffer(data, FACET, len(data) // _RECORD)
-        if not len(facets):
-            raise SceneError("The STL file ended while it was read.", path, hint="Open it again.")
-        welder.add(facets)
-        coloured = coloured or bool(facets["attribute"].any())
-        left -= len(facets)
-    if coloured:
+    source, each = _Records(records), max(_FEWEST, -(-n // available_threads()))
+    parts = parallel([partial(source.part, first, min(first + each, n), n) for first in range(0, n, each)])
+    if not all(complete for _, _, complete in parts):
+        raise SceneError("The STL file ended while it was read.", path, hint="Open it again.")
+    welder = parts[0][0]
+    for other, _, _ in parts[1:]:
+        welder.join(other)
+    if b"COLOR=" in header or any(coloured for _, coloured, _ in parts):
         diagnostics.warn("Colours of the STL file are ignored: programs do not agree on how to write them.")
     return [(path.stem, welder.mesh())]
+
+
+class _Records:
+    """A file's triangles, from where it stands, for several threads."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self._start, self._lock = file, file.tell(), Lock()
+
+    def part(self, first: int, end: int, all_: int) -> tuple[Welder, bool, bool]:
+        """The triangles [first, end) joined, whether any has a colour, and whether the file has so many. The first part
+        has room for `all_`."""
+        welder, coloured = Welder(end - first if first else all_), False
+        for at in range(first, end, _AT_ONCE):
+            count = min(end - at, _AT_ONCE)
+            with self._lock:
+                self._file.seek(self._start + _RECORD * at)
+                data = self._file.read(_RECORD * count)
+            if len(data) < _RECORD * count:
+                return welder, coloured, False
+            facets = np.frombuffer(data, FACET, count)
+            welder.add(facets)
+            coloured = coloured or bool(facets["attribute"].any())
+        return welder, coloured, True
 
 
 def _text(data: bytes, path: Path) -> list[tuple[str, Mesh]]:
