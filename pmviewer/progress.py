@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import os
 import queue
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from contextvars import ContextVar
-from dataclasses import dataclass
-from typing import Any
+from contextvars import ContextVar, copy_context
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
+T = TypeVar("T")
 Task = Callable[[], Any]
 _EVERY = 0.1
 """Seconds between two looks at whether parallel work is still wanted."""
@@ -62,6 +64,29 @@ def check() -> None:
     watch = _watch.get()
     if watch is not None and watch.unwanted is not None and watch.unwanted():
         raise Cancelled
+
+
+@contextmanager
+def beside(task: Callable[[], T]) -> Iterator[Callable[[], T]]:
+    """Within this context the task runs on a thread of its own; calling what is given waits for its result, and raises
+    what it raises. At the end the task is stopped as unwanted if it still runs."""
+    left, watch = threading.Event(), _watch.get() or _Watch(None, None, None)
+    unwanted = watch.unwanted or _never
+
+    def run() -> T:
+        _watch.set(replace(watch, unwanted=lambda: left.is_set() or unwanted()))
+        return task()
+
+    with ThreadPoolExecutor(1, "pmviewer beside") as pool:
+        future = pool.submit(copy_context().run, run)
+        try:
+            yield future.result
+        finally:
+            left.set()
+
+
+def _never() -> bool:
+    return False
 
 
 def available_threads() -> int:
