@@ -68,7 +68,9 @@ EVERY = 13
 GLOWING_FROM, GLOW_SEED = 10_000, 0x610
 """From this number on to the next all scenes have media that emit; those before it are as they were without any."""
 DENSE_FROM, DENSE_SEED = 20_000, 0xDE5
-"""From this number on all scenes have dense media, which don't emit."""
+"""From this number on to the next all scenes have dense media, which don't emit."""
+PROJECTED_FROM, PROJECTOR_SEED = 30_000, 0x9E0
+"""From this number on scenes follow the profiles again, and all have projectors."""
 SCALES = (1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3)
 HALF = 2.0
 """Half the edge of the ground, and of a room."""
@@ -76,7 +78,10 @@ HALF = 2.0
 
 def scene_of(seed: int, index: int) -> Node:
     """Scene `index` of `seed`."""
-    profile = MEDIA if index % EVERY == EVERY - 1 or index >= GLOWING_FROM else PROFILES[index % len(PROFILES)]
+    in_media = index % EVERY == EVERY - 1 or GLOWING_FROM <= index < PROJECTED_FROM
+    profile = MEDIA if in_media else PROFILES[index % len(PROFILES)]
+    if in_media and index >= PROJECTED_FROM:
+        profile = replace(MEDIA, bsdfs=("diffuse",))  # Mitsuba's particles know no media, its paths no caustics
     draw = Draw(seed, index)
     closed = draw.chance(profile.room)
     profile = _choose(draw, profile, closed)
@@ -91,10 +96,12 @@ def scene_of(seed: int, index: int) -> Node:
     if profile.medium:
         scene["scale"] = 1.0
         media.fill(draw, scene)
-        if index >= DENSE_FROM:
+        if DENSE_FROM <= index < PROJECTED_FROM:
             media.thicken(Draw(seed + DENSE_SEED, index), scene)
-        elif index >= GLOWING_FROM:
+        elif GLOWING_FROM <= index < DENSE_FROM:
             media.ignite(Draw(seed + GLOW_SEED, index), scene)
+    if index >= PROJECTED_FROM:
+        lights.project(Draw(seed + PROJECTOR_SEED, index), scene)
     scene["camera"] = _camera(draw, closed, scene)
     for deviation in DEVIATIONS:
         if deviation.rare and profile.name != "tilted normals" and draw.chance(0.85):
