@@ -48,6 +48,13 @@ def test_headers_as_programs_write_them(tmp_path: Path, end: str) -> None:
     assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
+def test_names_of_places_in_capitals(tmp_path: Path) -> None:
+    header = HEADER.format("ascii").replace(" x", " X").replace(" y", " Y").replace(" z", " Z")
+    mesh = read_ply(ply(tmp_path, header, rows(*POINTS, *FACES)))
+    assert mesh.vertices.tolist() == [list(p) for p in POINTS]
+    assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_binary_rows_of_different_lengths(tmp_path: Path, order: str) -> None:
     header = (
@@ -155,6 +162,24 @@ def test_solids_of_a_text_stl(tmp_path: Path) -> None:
     assert a.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0], [2.5, 0, 0]]
     assert a.faces.tolist() == [[0, 1, 2], [0, 3, 2]]
     assert b.vertices[:, 0].max() == 3
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        lambda text: text.encode("utf-16"),
+        lambda text: text.replace("\n", " ").encode(),
+        lambda text: text.upper().replace("\n", "\t").encode(),
+    ],
+    ids=["utf-16", "one line", "one line in capitals"],
+)
+def test_text_stl_in_other_dress(tmp_path: Path, written) -> None:
+    text = f"solid a\n{FACET.format(1)}{FACET.format('2.5e0')}endsolid a\n"
+    ((_, mesh),) = meshes(stl(tmp_path, written(text)))
+    assert mesh.vertices[mesh.faces].tolist() == [
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
+        [[0, 0, 0], [2.5, 0, 0], [0, 1, 0]],
+    ]
 
 
 def test_binary_stl_with_odd_headers(tmp_path: Path) -> None:

@@ -114,8 +114,12 @@ def scene_of(seed: int, index: int) -> Node:
         for shape in scene["shapes"]:
             if "mesh" in shape and "emitter" in shape:
                 shape["face_normals"] = True
-            if _checkered(shape):  # which Mitsuba's particle tracer can't start from
-                shape["emitter"]["radiance"] = shape["emitter"]["radiance"]["color1"]
+            emitter = shape.get("emitter", {})
+            if _checkered(emitter, "radiance"):  # which Mitsuba's particle tracer can't start from
+                emitter["radiance"] = emitter["radiance"]["color1"]
+        for light in scene["lights"]:
+            if _checkered(light, "irradiance"):
+                light["irradiance"] = light["irradiance"]["color1"]
     return scene
 
 
@@ -150,9 +154,9 @@ def disperses(scene: Node) -> bool:
     return any("glass" in bsdf or "abbe" in bsdf for bsdf in bsdfs_of(scene))
 
 
-def _checkered(shape: Node) -> bool:
-    radiance = shape.get("emitter", {}).get("radiance")
-    return isinstance(radiance, dict) and radiance["type"] == "checkerboard"
+def _checkered(emitter: Node, name: str) -> bool:
+    value = emitter.get(name)
+    return isinstance(value, dict) and value["type"] == "checkerboard"
 
 
 def needs_particles(scene: Node) -> bool:

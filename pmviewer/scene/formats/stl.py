@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from functools import partial
 from pathlib import Path
 from threading import Lock
@@ -22,6 +23,8 @@ from pmviewer.scene.meshes.welding import FACET, Welder
 _HEADER, _RECORD = 84, 50
 _AT_ONCE = 20_000
 """Triangles of a binary file that one thread has in memory as they were read."""
+_CORNER = re.compile(rb"\s(vertex)\s", re.IGNORECASE)
+"""What each line of a text file with a corner begins with, where there are lines."""
 _FEWEST = 50_000
 """Triangles from which on a thread of their own pays."""
 
@@ -38,6 +41,8 @@ def read_stl(path: Path, diagnostics: Diagnostics) -> list[tuple[str, Mesh]]:
         if claimed >= 0 and size == _HEADER + _RECORD * claimed:
             return _binary(data, file, claimed, path, diagnostics)
         data += file.read()
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        data = data.decode("utf-16", "replace").encode("utf-8")
     start = data[:1024].removeprefix(b"\xef\xbb\xbf").lstrip()
     if start[:5].lower() == b"solid" and (b"facet" in data[:100_000].lower() or b"endsolid" in data[-1000:].lower()):
         return _text(data, path)
@@ -104,7 +109,10 @@ class _Records:
 
 
 def _text(data: bytes, path: Path) -> list[tuple[str, Mesh]]:
-    data = data.replace(b"\r", b"\n") + b"\n" * 16
+    data = data.replace(b"\r", b"\n")
+    if data.count(b"\n") < data.count(b"vertex") + data.count(b"VERTEX"):  # any blanks may stand between words
+        data = _CORNER.sub(b"\n\\1 ", data)
+    data += b"\n" * 16
     bytes_ = np.frombuffer(data, np.uint8)
     nothing = np.empty((0, 3)), np.empty((0, 2), np.int64)
     n, k = text_facets(bytes_, *nothing)
