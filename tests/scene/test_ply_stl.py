@@ -183,10 +183,10 @@ def test_text_stl_in_other_dress(tmp_path: Path, written) -> None:
 
 
 def test_binary_stl_with_odd_headers(tmp_path: Path) -> None:
-    scene = stl(tmp_path, binary_stl(3, attribute=0x8000))
+    scene = stl(tmp_path, binary_stl(3, attribute=0x1234))
     ((_, mesh),) = meshes(scene)
     assert (len(mesh.faces), len(mesh.vertices)) == (3, 3)
-    assert any("Colours" in w for w in scene.warnings)
+    assert any("no colours" in w for w in scene.warnings)
     odd = binary_stl(3).replace(b"solid", b"thing")
     assert len(meshes(stl(tmp_path, odd + b"trailing words"))[0][1].faces) == 3
     cut = stl(tmp_path, odd[:-20])
@@ -211,9 +211,37 @@ def test_parts_of_a_large_binary_stl_are_one_mesh(tmp_path: Path, monkeypatch: p
         monkeypatch.setattr("pmviewer.scene.formats.stl._AT_ONCE", 70)
         monkeypatch.setattr("pmviewer.scene.formats.stl.available_threads", lambda: 3)
         scene = stl(tmp_path, data)
-        assert any("Colours" in w for w in scene.warnings)
+        assert any("no colours" in w for w in scene.warnings)
         found.append(meshes(scene)[0][1])
     for mesh in found:
         assert np.array_equal(mesh.vertices[mesh.faces], records["v"])
     assert np.array_equal(found[0].vertices, found[1].vertices)
     assert len(found[0].vertices) == 300
+
+
+MIDDLE = ((15 / 31 + 0.055) / 1.055) ** 2.4
+"""What 15 of 31 is, decoded from sRGB (IEC 61966-2-1)."""
+
+
+@pytest.mark.parametrize(
+    ("header", "attributes", "expected"),
+    [
+        (b"made by Magics COLOR=\xff\x00\x00\xff", [15 << 5, 0x8000], [[0, MIDDLE, 0], [1, 0, 0]]),
+        (b"made by Magics COLOR=\x00\xff\x00\xff", [0, 0], [[0, 1, 0], [0, 1, 0]]),
+        (b"VisCAM", [0x8000 | 15 << 10, 0], [[MIDDLE, 0, 0], [0.7, 0.7, 0.7]]),
+    ],
+    ids=["Magics", "Magics, one colour", "VisCAM"],
+)
+def test_colours_of_binary_stl(tmp_path: Path, header: bytes, attributes: list[int], expected: list) -> None:
+    """Two triangles that share an edge: its vertices are there twice where colours differ."""
+    records = np.zeros(2, [("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    records["v"] = [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0], [0, 1, 0]]]
+    records["a"] = attributes
+    scene = stl(tmp_path, header.ljust(80) + struct.pack("<I", 2) + records.tobytes())
+    ((_, mesh),) = meshes(scene)
+    assert np.array_equal(mesh.vertices[mesh.faces], records["v"])
+    assert mesh.colours is not None
+    assert mesh.colours[mesh.faces] == pytest.approx(np.repeat(np.array(expected)[:, None], 3, axis=1), abs=1e-5)
+    assert len(mesh.vertices) == (4 if expected[0] == expected[1] else 6)
+    assert scene.materials[scene.shapes[0].material].vertex_colours
+    assert not any("colours" in w for w in scene.warnings)

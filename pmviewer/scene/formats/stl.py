@@ -1,4 +1,4 @@
-"""STL, text and binary: triangles with nothing else."""
+"""STL, text and binary: triangles with nothing else, but for colours in some binary files."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from pmviewer.progress import available_threads, parallel, stage
 from pmviewer.scene.description import Mesh
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.open_file import open_regular
+from pmviewer.scene.formats.stl_colours import coloured, colours_by_attribute
 from pmviewer.scene.meshes.welding import FACET, Welder
 
 _HEADER, _RECORD = 84, 50
@@ -74,15 +75,22 @@ def _binary(header: bytes, records: BinaryIO, n: int, path: Path, diagnostics: D
         raise SceneError("The STL file has no triangles.", path, hint="Export it again.")
     stage(f"reading {n:,} triangles")
     source, each = _Records(records), max(_FEWEST, -(-n // available_threads()))
-    parts = parallel([partial(source.part, first, min(first + each, n), n) for first in range(0, n, each)])
-    if not all(complete for _, _, complete in parts):
+    attributes = np.zeros(n, np.uint16)
+    parts = parallel([partial(source.part, i, min(i + each, n), attributes) for i in range(0, n, each)])
+    if not all(complete for _, complete in parts):
         raise SceneError("The STL file ended while it was read.", path, hint="Open it again.")
     welder = parts[0][0]
-    for other, _, _ in parts[1:]:
+    for other, _ in parts[1:]:
         welder.join(other)
-    if b"COLOR=" in header or any(coloured for _, coloured, _ in parts):
-        diagnostics.warn("Colours of the STL file are ignored: programs do not agree on how to write them.")
-    return [(path.stem, welder.mesh())]
+    mesh = welder.mesh()
+    colours = colours_by_attribute(header[:80], attributes)
+    if colours is not None:
+        mesh = coloured(mesh, attributes, colours)
+    elif attributes.any():
+        diagnostics.warn(
+            "Numbers behind the STL file's triangles are ignored: they are no colours as programs write them."
+        )
+    return [(path.stem, mesh)]
 
 
 class _Records:
@@ -91,21 +99,21 @@ class _Records:
     def __init__(self, file: BinaryIO) -> None:
         self._file, self._start, self._lock = file, file.tell(), Lock()
 
-    def part(self, first: int, end: int, all_: int) -> tuple[Welder, bool, bool]:
-        """The triangles [first, end) joined, whether any has a colour, and whether the file has so many. The first part
-        has room for `all_`."""
-        welder, coloured = Welder(end - first if first else all_), False
+    def part(self, first: int, end: int, attributes: NDArray[np.uint16]) -> tuple[Welder, bool]:
+        """The triangles [first, end) joined, and whether the file has so many. The first part has room for all of them,
+        as many as there are attributes, which become theirs."""
+        welder = Welder(end - first if first else len(attributes))
         for at in range(first, end, _AT_ONCE):
             count = min(end - at, _AT_ONCE)
             with self._lock:
                 self._file.seek(self._start + _RECORD * at)
                 data = self._file.read(_RECORD * count)
             if len(data) < _RECORD * count:
-                return welder, coloured, False
+                return welder, False
             facets = np.frombuffer(data, FACET, count)
             welder.add(facets)
-            coloured = coloured or bool(facets["attribute"].any())
-        return welder, coloured, True
+            attributes[at : at + count] = facets["attribute"]
+        return welder, True
 
 
 def _text(data: bytes, path: Path) -> list[tuple[str, Mesh]]:
