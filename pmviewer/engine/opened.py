@@ -22,7 +22,7 @@ from pmviewer.scene.defaults.light_rigs import Rig
 from pmviewer.scene.description import Scene
 from pmviewer.scene.editing.apply import edited
 from pmviewer.scene.load import read_scene
-from pmviewer.scene.meshes.recentre import recentred
+from pmviewer.scene.meshes.recentre import lies_far, recentred
 from pmviewer.settings.access import Settings
 from pmviewer.settings.edits import Edits
 
@@ -95,7 +95,8 @@ def open_scene(
         return _opened(source, source.name, None, replace(arrangement, rig="auto"), on_type)
     content = read_scene(source, parameters or {}, search_paths)
     check_scene_memory(content)
-    with tree_ahead(content, wanted=not content.cameras and not arrangement.edits) as ahead:
+    stays = not arrangement.edits and not lies_far(content)
+    with tree_ahead(content, wanted=stays and not content.cameras) as ahead:
         whole = completed(content, arrangement.rig)
         return _opened(whole, str(source), content, arrangement, on_type, ahead=ahead)
 
