@@ -43,7 +43,7 @@ class Curves:
 def tubes(curves: Curves, *, cubic: bool) -> Mesh:
     """The surface around the curves with normals, facing outwards: polygons through the points with round ends, or
     uniform cubic B-splines, open at their ends. Polygons need two points each, splines four."""
-    segments = len(curves.points) - (3 if cubic else 1) * len(curves)
+    segments = len(curves.points) + (-3 if cubic else 2 * len(_CAP) - 1) * len(curves)
     pieces, sides = _FINENESS[-1]
     for pieces, sides in _FINENESS:
         if 2 * sides * segments * (pieces if cubic else 1) <= MOST_TRIANGLES:
@@ -90,19 +90,18 @@ def _rounded(curves: Curves, along: Float) -> tuple[Curves, Float, Float]:
     """The same with rings of hemispheres at both ends, and how far the normals of all rings lean along the tangents,
     as the sines of angles."""
     begins, ends = curves.first[:-1], curves.first[1:] - 1
-    owner = np.repeat(np.arange(len(curves)), np.diff(curves.first))
-    points, tangents, leans, owners = [curves.points], [along], [np.zeros(len(along))], [owner]
-    order = [np.arange(len(owner), dtype=np.float64)]
+    points, tangents = [curves.points], [along]
+    leans: list[Float] = [np.zeros(len(along))]
+    order: list[Float] = [np.arange(len(along), dtype=np.float64)]
     for place, sign in ((begins, -1.0), (ends, 1.0)):
         for k, latitude in enumerate(_CAP, 1):
-            ring = curves.points[place].copy()
+            ring = curves.points[place]
             ring[:, :3] += sign * math.sin(latitude) * ring[:, 3:] * along[place]
             ring[:, 3] *= math.cos(latitude)
             points.append(ring)
             tangents.append(along[place])
-            leans.append(np.full(len(place), sign * math.sin(latitude)))
-            owners.append(np.arange(len(place)))
-            order.append(place + sign * 0.1 * k)
+            leans.append(np.zeros(len(place)) + sign * math.sin(latitude))
+            order.append(np.asarray(place + sign * 0.1 * k, np.float64))
     sort = np.argsort(np.concatenate(order), kind="stable")
     first = curves.first + 2 * len(_CAP) * np.arange(len(curves.first))
     return Curves(np.concatenate(points)[sort], first), np.concatenate(tangents)[sort], np.concatenate(leans)[sort]
