@@ -7,14 +7,19 @@ Whoever starts the work listens (`watched`); the work itself, however deep down,
 from __future__ import annotations
 
 import os
+import queue
+import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from contextvars import ContextVar
-from dataclasses import dataclass
-from typing import Any
+from contextvars import ContextVar, copy_context
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
+T = TypeVar("T")
 Task = Callable[[], Any]
+_EVERY = 0.1
+"""Seconds between two looks at whether parallel work is still wanted."""
 
 
 class Cancelled(Exception):
@@ -61,6 +66,29 @@ def check() -> None:
         raise Cancelled
 
 
+@contextmanager
+def beside(task: Callable[[], T]) -> Iterator[Callable[[], T]]:
+    """Within this context the task runs on a thread of its own; calling what is given waits for its result, and raises
+    what it raises. At the end the task is stopped as unwanted if it still runs."""
+    left, watch = threading.Event(), _watch.get() or _Watch(None, None, None)
+    unwanted = watch.unwanted or _never
+
+    def run() -> T:
+        _watch.set(replace(watch, unwanted=lambda: left.is_set() or unwanted()))
+        return task()
+
+    with ThreadPoolExecutor(1, "pmviewer beside") as pool:
+        future = pool.submit(copy_context().run, run)
+        try:
+            yield future.result
+        finally:
+            left.set()
+
+
+def _never() -> bool:
+    return False
+
+
 def available_threads() -> int:
     """Processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -80,21 +108,30 @@ def grown(tasks: list[Task], more: Callable[[Any], Sequence[Task]]) -> list[tupl
     """Results of the tasks and of those that `more` makes of each result, numbered and in the order of being added."""
     watch = _watch.get()
     threads = (watch.threads if watch is not None else None) or available_threads()
+    done: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
+    number: dict[Future[Any], int] = {}
+    results: list[tuple[int, Any]] = []
     with ThreadPoolExecutor(threads, "pmviewer load") as pool:
-        number: dict[Future[Any], int] = {pool.submit(task): i for i, task in enumerate(tasks)}
-        waiting, results = set(number), []
+
+        def add(task: Task) -> None:
+            future = pool.submit(task)
+            number[future] = len(number)
+            future.add_done_callback(done.put)
+
         try:
-            while waiting:
-                done, waiting = wait(waiting, timeout=0.1, return_when=FIRST_COMPLETED)
+            for task in tasks:
+                add(task)
+            while len(results) < len(number):
                 check()
-                for future in done:
-                    result = future.result()
-                    results.append((number[future], result))
-                    for task in more(result):
-                        added = pool.submit(task)
-                        number[added] = len(number)
-                        waiting.add(added)
+                try:
+                    future = done.get(timeout=_EVERY)
+                except queue.Empty:
+                    continue
+                result = future.result()
+                results.append((number[future], result))
+                for task in more(result):
+                    add(task)
         finally:
-            for future in waiting:
+            for future in number:
                 future.cancel()
     return sorted(results, key=lambda pair: pair[0])

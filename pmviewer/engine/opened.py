@@ -16,12 +16,13 @@ from pmviewer.photons.projection.projection import Projection
 from pmviewer.scene.analysis import SceneTraits, analyse
 from pmviewer.scene.arrays.covered_emission import ignored_opacity, without_unseen_lights
 from pmviewer.scene.arrays.flatten import FlatScene, flatten
+from pmviewer.scene.arrays.tree_ahead import TreeAhead, tree_ahead
 from pmviewer.scene.defaults.completion import completed
 from pmviewer.scene.defaults.light_rigs import Rig
 from pmviewer.scene.description import Scene
 from pmviewer.scene.editing.apply import edited
 from pmviewer.scene.load import read_scene
-from pmviewer.scene.meshes.recentre import recentred
+from pmviewer.scene.meshes.recentre import lies_far, recentred
 from pmviewer.settings.access import Settings
 from pmviewer.settings.edits import Edits
 
@@ -94,7 +95,10 @@ def open_scene(
         return _opened(source, source.name, None, replace(arrangement, rig="auto"), on_type)
     content = read_scene(source, parameters or {}, search_paths)
     check_scene_memory(content)
-    return _opened(completed(content, arrangement.rig), str(source), content, arrangement, on_type)
+    stays = not arrangement.edits and not lies_far(content)
+    with tree_ahead(content, wanted=stays and not content.cameras) as ahead:
+        whole = completed(content, arrangement.rig)
+        return _opened(whole, str(source), content, arrangement, on_type, ahead=ahead)
 
 
 def rearranged(opened: OpenScene, arrangement: Arrangement) -> OpenScene:
@@ -122,12 +126,13 @@ def _opened(
     arrangement: Arrangement,
     on_type: OnType = nobody,
     like: FlatScene | None = None,
+    ahead: TreeAhead | None = None,
 ) -> OpenScene:
     scene = edited(whole, arrangement.edits)
     check_scene_memory(scene)
     scene = without_unseen_lights(recentred(scene))
     traits = analyse(scene)
-    flat = flatten(scene, lambda of_record: on_type(of_record, traits), like)
+    flat = flatten(scene, lambda of_record: on_type(of_record, traits), like, ahead=ahead)
     said = (*hidden_lights(scene, flat), *ignored_opacity(scene), *flat.said)
     if said:
         scene = replace(scene, warnings=(*scene.warnings, *said))

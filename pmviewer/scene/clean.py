@@ -128,11 +128,16 @@ def clean_mesh(mesh: Mesh, dropped: Counter[str]) -> Mesh | None:
     those of the neighbouring faces; colours are cut to 0 … 1.
     """
     vertices, faces = np.ascontiguousarray(mesh.vertices, np.float64), np.ascontiguousarray(mesh.faces, np.int32)
-    verdict = np.empty(len(faces), np.uint8)
-    starts = range(0, len(faces), _AT_ONCE)
-    sizes = LARGEST_COORDINATE, _FLATTEST
-    ends = [min(start + _AT_ONCE, len(faces)) for start in starts]
-    bad = parallel([partial(judge, vertices, faces, i, j, *sizes, verdict) for i, j in zip(starts, ends)])
+    verdict, place = np.empty(len(faces), np.uint8), np.empty(len(vertices), np.int32)
+    low, high = np.empty(3), np.empty(3)
+    judged = partial(judge, vertices, faces)
+    pieces = [(i, min(i + _AT_ONCE, len(faces))) for i in range(0, len(faces), _AT_ONCE)]
+    # What is used is counted beside: most files have good triangles only, and it need not be done again.
+    tasks = [
+        partial(number_used, vertices, faces, place, low, high),
+        *(partial(judged, i, j, LARGEST_COORDINATE, _FLATTEST, verdict) for i, j in pieces),
+    ]
+    n_used, *bad = parallel(tasks) if len(pieces) > 1 else [task() for task in tasks]
     if sum(bad):
         for reason, number in (
             ("triangle with a NaN, infinite or huge vertex", NOT_FINITE),
@@ -144,8 +149,8 @@ def clean_mesh(mesh: Mesh, dropped: Counter[str]) -> Mesh | None:
         faces = np.compress(verdict == WHOLE, faces, axis=0)
     if not len(faces):
         return None
-    place, low, high = np.empty(len(vertices), np.int32), np.empty(3), np.empty(3)
-    n_used = number_used(vertices, faces, place, low, high)
+    if sum(bad):
+        n_used = number_used(vertices, faces, place, low, high)
     cleaned = _without_unused(mesh, vertices, faces, None if n_used == len(vertices) else place)
     know_bounds(cleaned, low, high)
     return cleaned

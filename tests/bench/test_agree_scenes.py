@@ -14,12 +14,24 @@ import pytest
 
 from pmviewer.bench.agree.features import features
 from pmviewer.bench.agree.files import make_mesh
-from pmviewer.bench.agree.generate import DENSE_FROM, GLOWING_FROM, MEDIA, PROFILES, needs_particles, scene_of
+from pmviewer.bench.agree.generate import (
+    DENSE_FROM,
+    EVERY,
+    GLOWING_FROM,
+    MEDIA,
+    PROFILES,
+    PROJECTED_FROM,
+    needs_particles,
+    scene_of,
+)
+from pmviewer.bench.agree.media import has_media
 from pmviewer.bench.agree.tree import from_json, to_json, written_out
 from pmviewer.bench.agree.trial import HARMLESS
 from pmviewer.bench.agree.xml import number, scene_text, write_scene
 from pmviewer.scene.arrays.flatten import flatten
+from pmviewer.scene.description import ProjectorLight
 from pmviewer.scene.load import load_scene
+from pmviewer.scene.projector import projector_power
 
 EXPECTED = """
 shape: rectangle disk sphere cylinder cube obj ply instance
@@ -172,3 +184,37 @@ def test_media_are_dense_from_a_number_on(tmp_path):
     assert thick >= 25
     path, _ = write_scene(scene_of(3, DENSE_FROM), tmp_path, "dense")
     assert [w for w in load_scene(path).warnings if not any(h in w for h in HARMLESS)] == []
+
+
+def test_projectors_are_in_all_scenes_from_a_number_on_and_the_scenes_before_are_as_they_were(tmp_path):
+    """The digests are those of the generator before there were any."""
+    for first, digest in (
+        (GLOWING_FROM, "91d43e61f9d22cb00b3c90a8341e059c7824f54325dd129285375598d6cb8566"),
+        (DENSE_FROM, "d12fe6ac7ebf21460666c90e09b961cd208fb25a0c8bb20b4064d533b65c2fc9"),
+        (PROJECTED_FROM - 20, "8986c1716827423e700e0360a47d45c378c89b2241faaf7ef3e9c9f2dfc9298b"),
+    ):
+        before = "".join(to_json(scene_of(3, i)) for i in range(first, first + 20))
+        assert hashlib.sha256(before.encode()).hexdigest() == digest
+    made = [scene_of(3, i) for i in range(PROJECTED_FROM, PROJECTED_FROM + 6 * EVERY)]
+    assert all("light: projector" in features(scene) for scene in made)
+    assert sum(has_media(scene) for scene in made) == 6
+    assert not any(has_media(scene) and needs_particles(scene) for scene in made)
+    count = Counter(scene["profile"] for scene in made)
+    assert set(count) == {profile.name for profile in (*PROFILES, MEDIA)}
+    alone = [s for s in made if not any("emitter" in shape for shape in s["shapes"]) and len(s["lights"]) == 1]
+    assert len(alone) >= 10
+    pictures = Counter(type(light["irradiance"]) for s in made for light in s["lights"] if light["type"] == "projector")
+    assert min(pictures[dict], pictures[list]) >= 5
+
+
+def test_scenes_with_projectors_are_read_without_a_warning_and_scale(tmp_path):
+    for i in range(PROJECTED_FROM, PROJECTED_FROM + 14):
+        made = scene_of(3, i)
+        one, ten = (write_scene({**made, "scale": s}, tmp_path, f"scene{i}_{s:g}")[0] for s in (1.0, 10.0))
+        scene, large = load_scene(one), load_scene(ten)
+        assert [w for w in scene.warnings if not any(h in w for h in HARMLESS)] == [], i
+        lights = [[light for light in loaded.lights if isinstance(light, ProjectorLight)] for loaded in (scene, large)]
+        assert len(lights[0]) == len(lights[1]) >= 1
+        for small, big in zip(*lights, strict=True):
+            assert np.allclose(np.array(small.position) * 10, big.position)
+            assert np.allclose(100 * projector_power(small), projector_power(big), rtol=1e-5)

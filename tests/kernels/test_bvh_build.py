@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pmviewer.kernels import scene as K
 from pmviewer.kernels.accel import bvh, bvh_binary
+from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.progress import Cancelled, watched
 
 N = 3 * bvh_binary.ALONE
@@ -51,3 +53,46 @@ def test_boxes_hold_what_is_below_them(triangles: np.ndarray) -> None:
 def test_building_stops_when_nobody_wants_the_tree(triangles: np.ndarray) -> None:
     with pytest.raises(Cancelled), watched(unwanted=lambda: True):
         bvh.build(triangles, np.empty((0, 12), np.float32))
+
+
+@pytest.mark.parametrize("room", [64, 5])
+def test_a_begun_tree_is_finished_with_what_comes_later(triangles: np.ndarray, room: int) -> None:
+    """A floor and a sphere come later, with room or without: rays meet what they meet in a tree built at once."""
+    n = len(triangles)
+    floor = [[[-3, -1, -3], [3, -1, -3], [3, -1, 3]], [[-3, -1, -3], [3, -1, 3], [-3, -1, 3]]] * 3
+    everything = np.concatenate([triangles, np.array(floor, np.float32)])
+    sphere = np.array([[0, 0, 1.2, 0, 0, 0, 1, 0.5, 0, 1, 0, 0]], np.float32)
+    trees = [
+        bvh.build(everything, sphere, started=bvh.begun(everything, n, room)),
+        bvh.build(everything, sphere),
+    ]
+    ids = trees[0].blocks.view(np.int32)[:, 9]
+    assert sorted(ids[ids >= 0].tolist()) == list(range(len(everything)))
+    found = [closest(tree) for tree in trees]
+    assert np.array_equal(found[0][0], found[1][0])
+    assert set(found[0][1].tolist()) >= {-1, len(everything)}
+    assert {int(i) // n for i in found[0][1]} == {-1, 0, 1}
+    overlapping = found[0][1] >= n  # the floor is there three times
+    assert np.array_equal(found[0][1][~overlapping], found[1][1][~overlapping])
+
+
+def test_a_begun_tree_without_more_is_the_tree(triangles: np.ndarray) -> None:
+    nothing = np.empty((0, 12), np.float32)
+    trees = [bvh.build(triangles, nothing, started=bvh.begun(triangles, N, 8)), bvh.build(triangles, nothing)]
+    assert np.array_equal(trees[0].blocks.view(np.int32), trees[1].blocks.view(np.int32))
+    assert np.array_equal(trees[0].nodes.view(np.int32), trees[1].nodes.view(np.int32))
+    assert bvh.begun(np.zeros((5, 3, 3), np.float32), 3, 2) is None
+
+
+def closest(tree: bvh.Bvh) -> tuple[np.ndarray, np.ndarray]:
+    """Distance and primitive that rays from around meet."""
+    generator = np.random.default_rng(8)
+    origins = generator.uniform(-4, 4, (4000, 3)).astype(np.float32)
+    directions = generator.uniform(-1, 1, (4000, 3)) - origins
+    directions = (directions / np.linalg.norm(directions, axis=1, keepdims=True)).astype(np.float32)
+    record = np.zeros(1, K.SCENE_DTYPE)
+    tree.store(record[0])
+    t, prim, uv = np.empty(4000, np.float32), np.empty(4000, np.int32), np.empty((4000, 2), np.float32)
+    near, far = np.full(4000, 1e-4, np.float32), np.full(4000, np.inf, np.float32)
+    cast_closest(record[0], origins, directions, near, far, t, prim, uv)
+    return t, prim

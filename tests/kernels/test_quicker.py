@@ -48,6 +48,25 @@ class Triple(NamedTuple):
     third: Pair
 
 
+def test_records_have_names_of_their_own_in_every_process():
+    """What one process has compiled another one links with its own: names must not depend on what came before."""
+    script = (
+        "import sys, numpy as np; from numba import from_dtype; from numba.core.registry import cpu_target;"
+        "from pmviewer.kernels.compile import jit;"
+        "before = [from_dtype(np.dtype([(f'x{i}', 'f8')])) for i in range(int(sys.argv[1]))];"
+        "records = [from_dtype(np.dtype([('a', 'f4'), (name, 'i8')])) for name in 'bc'];"
+        "print(*[cpu_target.target_context.mangler('a.f', (record,)) for record in records])"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    found = []
+    for before in ("0", "7"):
+        done = subprocess.run([sys.executable, "-c", script, before], capture_output=True, text=True, env=environment)
+        assert done.returncode == 0, done.stderr
+        found.append(done.stdout.split())
+    assert found[0] == found[1]
+    assert len(set(found[0])) == 2
+
+
 def test_names_are_short_and_tell_types_apart():
     mangled = cpu_target.target_context.mangler
     assert mangled("a.f", (float32, int64)) == itanium_mangler.mangle("a.f", (float32, int64))

@@ -118,6 +118,16 @@ def test_vertex_colours_are_decoded(tmp_path: Path) -> None:
     assert bytes_.colours[0] == pytest.approx([1, 0, 0.21404], abs=1e-4)
 
 
+def test_paint_of_zbrush(tmp_path: Path) -> None:
+    """Colours in comments, up to 64 a line: mask, red, green, blue. Without one for each vertex they are none."""
+    points = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+    painted = "#MRGB ffff0080ff00FF00\n#MRGB 00ffffff\n"
+    (mesh,) = meshes(opened(tmp_path, f"{points}#Vertex colours\n{painted}f 1 2 3\n"))
+    assert mesh.colours == pytest.approx(np.array([[1, 0, 0.21586], [0, 1, 0], [1, 1, 1]]), abs=1e-4)
+    (mesh,) = meshes(opened(tmp_path, f"{points}#MRGB ffff0080ff00ff00\nf 1 2 3\n"))
+    assert mesh.colours is None
+
+
 def test_one_shape_a_material_and_one_light_a_group(tmp_path: Path) -> None:
     text = "mtllib my lamps.mtl\n" + SQUARE
     for i in range(3):

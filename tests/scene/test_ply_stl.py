@@ -48,6 +48,13 @@ def test_headers_as_programs_write_them(tmp_path: Path, end: str) -> None:
     assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
+def test_names_of_places_in_capitals(tmp_path: Path) -> None:
+    header = HEADER.format("ascii").replace(" x", " X").replace(" y", " Y").replace(" z", " Z")
+    mesh = read_ply(ply(tmp_path, header, rows(*POINTS, *FACES)))
+    assert mesh.vertices.tolist() == [list(p) for p in POINTS]
+    assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_binary_rows_of_different_lengths(tmp_path: Path, order: str) -> None:
     header = (
@@ -157,11 +164,29 @@ def test_solids_of_a_text_stl(tmp_path: Path) -> None:
     assert b.vertices[:, 0].max() == 3
 
 
+@pytest.mark.parametrize(
+    "written",
+    [
+        lambda text: text.encode("utf-16"),
+        lambda text: text.replace("\n", " ").encode(),
+        lambda text: text.upper().replace("\n", "\t").encode(),
+    ],
+    ids=["utf-16", "one line", "one line in capitals"],
+)
+def test_text_stl_in_other_dress(tmp_path: Path, written) -> None:
+    text = f"solid a\n{FACET.format(1)}{FACET.format('2.5e0')}endsolid a\n"
+    ((_, mesh),) = meshes(stl(tmp_path, written(text)))
+    assert mesh.vertices[mesh.faces].tolist() == [
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
+        [[0, 0, 0], [2.5, 0, 0], [0, 1, 0]],
+    ]
+
+
 def test_binary_stl_with_odd_headers(tmp_path: Path) -> None:
-    scene = stl(tmp_path, binary_stl(3, attribute=0x8000))
+    scene = stl(tmp_path, binary_stl(3, attribute=0x1234))
     ((_, mesh),) = meshes(scene)
     assert (len(mesh.faces), len(mesh.vertices)) == (3, 3)
-    assert any("Colours" in w for w in scene.warnings)
+    assert any("no colours" in w for w in scene.warnings)
     odd = binary_stl(3).replace(b"solid", b"thing")
     assert len(meshes(stl(tmp_path, odd + b"trailing words"))[0][1].faces) == 3
     cut = stl(tmp_path, odd[:-20])
@@ -171,3 +196,52 @@ def test_binary_stl_with_odd_headers(tmp_path: Path) -> None:
     assert len(meshes(streamed)[0][1].faces) == 3
     with pytest.raises(SceneError, match="neither a binary nor a text"):
         stl(tmp_path, bytes(range(256)) * 8)
+
+
+def test_parts_of_a_large_binary_stl_are_one_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read on one thread and on three, in parts that end in the middle of what is read at once."""
+    rng = np.random.default_rng(4)
+    records = np.zeros(1000, [("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    records["v"] = rng.normal(size=(300, 3)).astype("<f4")[np.argsort(rng.random((1000, 300)), axis=1)[:, :3]]
+    records["a"][990] = 5
+    data = b"many".ljust(80) + struct.pack("<I", len(records)) + records.tobytes()
+    found = []
+    for fewest in (10_000, 1):
+        monkeypatch.setattr("pmviewer.scene.formats.stl._FEWEST", fewest)
+        monkeypatch.setattr("pmviewer.scene.formats.stl._AT_ONCE", 70)
+        monkeypatch.setattr("pmviewer.scene.formats.stl.available_threads", lambda: 3)
+        scene = stl(tmp_path, data)
+        assert any("no colours" in w for w in scene.warnings)
+        found.append(meshes(scene)[0][1])
+    for mesh in found:
+        assert np.array_equal(mesh.vertices[mesh.faces], records["v"])
+    assert np.array_equal(found[0].vertices, found[1].vertices)
+    assert len(found[0].vertices) == 300
+
+
+MIDDLE = ((15 / 31 + 0.055) / 1.055) ** 2.4
+"""What 15 of 31 is, decoded from sRGB (IEC 61966-2-1)."""
+
+
+@pytest.mark.parametrize(
+    ("header", "attributes", "expected"),
+    [
+        (b"made by Magics COLOR=\xff\x00\x00\xff", [15 << 5, 0x8000], [[0, MIDDLE, 0], [1, 0, 0]]),
+        (b"made by Magics COLOR=\x00\xff\x00\xff", [0, 0], [[0, 1, 0], [0, 1, 0]]),
+        (b"VisCAM", [0x8000 | 15 << 10, 0], [[MIDDLE, 0, 0], [0.7, 0.7, 0.7]]),
+    ],
+    ids=["Magics", "Magics, one colour", "VisCAM"],
+)
+def test_colours_of_binary_stl(tmp_path: Path, header: bytes, attributes: list[int], expected: list) -> None:
+    """Two triangles that share an edge: its vertices are there twice where colours differ."""
+    records = np.zeros(2, [("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    records["v"] = [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0], [0, 1, 0]]]
+    records["a"] = attributes
+    scene = stl(tmp_path, header.ljust(80) + struct.pack("<I", 2) + records.tobytes())
+    ((_, mesh),) = meshes(scene)
+    assert np.array_equal(mesh.vertices[mesh.faces], records["v"])
+    assert mesh.colours is not None
+    assert mesh.colours[mesh.faces] == pytest.approx(np.repeat(np.array(expected)[:, None], 3, axis=1), abs=1e-5)
+    assert len(mesh.vertices) == (4 if expected[0] == expected[1] else 6)
+    assert scene.materials[scene.shapes[0].material].vertex_colours
+    assert not any("colours" in w for w in scene.warnings)

@@ -72,7 +72,7 @@ OPENS: dict[str, tuple[str, dict[str, int]]] = {
     "singular_camera.xml": ('line 2: The to_world matrix of <sensor type="perspective"> is singular', {}),
     "unknown_bsdf.xml": ('line 4: <bsdf type="hair"> is not supported', {}),
     "unknown_ref.xml": ("line 4: <ref> refers to the id 'velvet', which is not defined: it was ignored", {}),
-    "unknown_shape.xml": ('line 5: <shape type="bsplinecurve"> is not supported', {}),
+    "unknown_shape.xml": ('line 5: <shape type="sdfgrid"> is not supported', {}),
     "unsupported_light.xml": ('line 4: <emitter type="collimated">', {}),
     "zero_area_light.xml": ("The file has no light", {"zero-area light": 1}),
     "zero_radius.xml": ("", {"empty sphere": 1}),

@@ -31,6 +31,29 @@ def test_each_place_has_one_vertex(places: int) -> None:
     assert np.array_equal(vertices, corners.reshape(-1, 3)[np.sort(first)])
 
 
+@pytest.mark.parametrize("places", [12, 300, 10**6])
+@pytest.mark.parametrize("parts", [2, 3])
+def test_parts_joined_are_what_one_makes_of_all(places: int, parts: int) -> None:
+    """Vertices, their order and the faces, whether parts share nearly all places or none."""
+    rng = np.random.default_rng(places + parts)
+    corners = rng.normal(size=(places, 3)).astype(np.float32)[rng.integers(places, size=(500, 3))]
+    corners[7, 1, 2], corners[300, 0, 0] = np.nan, -0.0
+    whole = None
+    for piece in np.array_split(corners, parts):
+        welder = Welder(len(piece) if whole else len(corners))
+        facets = np.empty(len(piece), FACET)
+        facets["corners"] = piece
+        welder.add(facets)
+        if whole:
+            whole.join(welder)
+        else:
+            whole = welder
+    assert whole is not None
+    mesh, (vertices, faces) = whole.mesh(), welded(corners, 1)
+    assert np.array_equal(mesh.vertices, vertices, equal_nan=True)
+    assert np.array_equal(mesh.faces, faces)
+
+
 def test_minus_zero_is_zero_and_what_is_no_number_stays() -> None:
     corners = np.zeros((2, 3, 3), np.float32)
     corners[0, :, 0], corners[1, :, 0] = (0, 1, 2), (-0.0, 3, np.nan)

@@ -12,7 +12,7 @@ import numpy as np
 
 from pmviewer.bench import peer
 from pmviewer.bench.agree.features import GROUPS, features
-from pmviewer.bench.agree.generate import DENSE_FROM, GLOWING_FROM, scene_of
+from pmviewer.bench.agree.generate import DENSE_FROM, GLOWING_FROM, PROJECTED_FROM, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH
 from pmviewer.bench.agree.results import Results
@@ -26,8 +26,8 @@ from pmviewer.bench.report import BenchResult, Cell, Target
 from pmviewer.errors import PmviewerError, SettingError
 
 SCENES, QUICK_SCENES, SEED = 500, 12, 1
-EXTRA = ((12, GLOWING_FROM), (12, DENSE_FROM))
-"""How many scenes from which number on a whole run adds: media that emit, and dense ones."""
+EXTRA = ((12, GLOWING_FROM), (12, DENSE_FROM), (12, PROJECTED_FROM))
+"""How many scenes from which number on a whole run adds: media that emit, dense ones, and projectors."""
 SHRINK_TRIES, MOST_SHRUNK = 120, 20
 
 
@@ -55,7 +55,7 @@ def run(
 ) -> BenchResult:
     """Try the scenes `first` … `first` + `scenes` − 1 of `seed` and save what disagrees into `keep`, a folder beside
     `json` or a temporary one if not given. Where `scenes` is not given and `quick` is not asked for, scenes with media
-    that emit and with dense ones come on top.
+    that emit, with dense ones and with projectors come on top.
 
     `json` takes each verdict as soon as it is there, and scenes whose verdicts are in it are not run; with `again`,
     those that other sources gave are.
@@ -193,6 +193,7 @@ def _settings_notes() -> list[str]:
         "Mitsuba renders every scene at scale 1: its rays leave surfaces by 9e-5 of a unit at least",
         f"nearest: estimate.lookup=nearest with k = 10 within {NEAREST_REACH:g} of these radii",
         f"a disagreement is one by Holm's correction at {LEVEL:g} over all comparisons of the run",
-        "where point, spot or directional lights meet smooth mirrors, glass or coats, photon methods are compared with "
-        "Mitsuba's particle tracer in the pixels that see none of these, or with each other if there are none",
+        "where point, spot or directional lights or projectors meet smooth mirrors, glass or coats, photon methods are "
+        "compared with Mitsuba's particle tracer in the pixels that see none of these, or with each other if there are "
+        "none",
     ]

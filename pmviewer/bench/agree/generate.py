@@ -68,7 +68,9 @@ EVERY = 13
 GLOWING_FROM, GLOW_SEED = 10_000, 0x610
 """From this number on to the next all scenes have media that emit; those before it are as they were without any."""
 DENSE_FROM, DENSE_SEED = 20_000, 0xDE5
-"""From this number on all scenes have dense media, which don't emit."""
+"""From this number on to the next all scenes have dense media, which don't emit."""
+PROJECTED_FROM, PROJECTOR_SEED = 30_000, 0x9E0
+"""From this number on scenes follow the profiles again, and all have projectors."""
 SCALES = (1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3)
 HALF = 2.0
 """Half the edge of the ground, and of a room."""
@@ -76,7 +78,10 @@ HALF = 2.0
 
 def scene_of(seed: int, index: int) -> Node:
     """Scene `index` of `seed`."""
-    profile = MEDIA if index % EVERY == EVERY - 1 or index >= GLOWING_FROM else PROFILES[index % len(PROFILES)]
+    in_media = index % EVERY == EVERY - 1 or GLOWING_FROM <= index < PROJECTED_FROM
+    profile = MEDIA if in_media else PROFILES[index % len(PROFILES)]
+    if in_media and index >= PROJECTED_FROM:
+        profile = replace(MEDIA, bsdfs=("diffuse",))  # Mitsuba's particles know no media, its paths no caustics
     draw = Draw(seed, index)
     closed = draw.chance(profile.room)
     profile = _choose(draw, profile, closed)
@@ -91,10 +96,12 @@ def scene_of(seed: int, index: int) -> Node:
     if profile.medium:
         scene["scale"] = 1.0
         media.fill(draw, scene)
-        if index >= DENSE_FROM:
+        if DENSE_FROM <= index < PROJECTED_FROM:
             media.thicken(Draw(seed + DENSE_SEED, index), scene)
-        elif index >= GLOWING_FROM:
+        elif GLOWING_FROM <= index < DENSE_FROM:
             media.ignite(Draw(seed + GLOW_SEED, index), scene)
+    if index >= PROJECTED_FROM:
+        lights.project(Draw(seed + PROJECTOR_SEED, index), scene)
     scene["camera"] = _camera(draw, closed, scene)
     for deviation in DEVIATIONS:
         if deviation.rare and profile.name != "tilted normals" and draw.chance(0.85):
@@ -107,8 +114,12 @@ def scene_of(seed: int, index: int) -> Node:
         for shape in scene["shapes"]:
             if "mesh" in shape and "emitter" in shape:
                 shape["face_normals"] = True
-            if _checkered(shape):  # which Mitsuba's particle tracer can't start from
-                shape["emitter"]["radiance"] = shape["emitter"]["radiance"]["color1"]
+            emitter = shape.get("emitter", {})
+            if _checkered(emitter, "radiance"):  # which Mitsuba's particle tracer can't start from
+                emitter["radiance"] = emitter["radiance"]["color1"]
+        for light in scene["lights"]:
+            if _checkered(light, "irradiance"):
+                light["irradiance"] = light["irradiance"]["color1"]
     return scene
 
 
@@ -143,9 +154,9 @@ def disperses(scene: Node) -> bool:
     return any("glass" in bsdf or "abbe" in bsdf for bsdf in bsdfs_of(scene))
 
 
-def _checkered(shape: Node) -> bool:
-    radiance = shape.get("emitter", {}).get("radiance")
-    return isinstance(radiance, dict) and radiance["type"] == "checkerboard"
+def _checkered(emitter: Node, name: str) -> bool:
+    value = emitter.get(name)
+    return isinstance(value, dict) and value["type"] == "checkerboard"
 
 
 def needs_particles(scene: Node) -> bool:

@@ -6,12 +6,13 @@ from typing import Any
 
 from pmviewer.bench.agree.draw import Draw
 from pmviewer.bench.agree.materials import Materials
+from pmviewer.bench.agree.media import ABOVE, has_media
 from pmviewer.bench.agree.shapes import KINDS, shape
 from pmviewer.bench.agree.tree import Node
 
 PLAIN = ("point", "constant")
 MORE = ("spot", "directional", "envmap", *PLAIN)
-DELTA = frozenset(("point", "spot", "directional"))
+DELTA = frozenset(("point", "spot", "directional", "projector"))
 """Lights that no path meets by chance."""
 DISTANT = frozenset(("directional", "constant", "envmap"))
 """Lights at infinity."""
@@ -39,6 +40,42 @@ def bare(draw: Draw, kind: str, above: float) -> Node:
         "scale": draw.number(0.3, 1.5),
         "to_world": [draw.turn(), draw.turn()],
     }
+
+
+def project(draw: Draw, scene: Node) -> None:
+    """Add one or two projectors to the scene, in half of the cases in place of all other lights."""
+    if draw.chance(0.5):
+        scene["lights"] = []
+        scene["shapes"] = [shape for shape in scene["shapes"] if "emitter" not in shape]
+    above = 2.2 if scene["closed"] else 2.8
+    low = max(0.6 * above, ABOVE if has_media(scene) else 0.0)
+    scene["lights"] += [_projector(draw, low, above) for _ in range(draw.pick((1, 1, 2)))]
+
+
+def _projector(draw: Draw, low: float, above: float) -> Node:
+    """Its picture may be mirrored and repeated; a colour fills the whole pyramid."""
+    place = [draw.number(-1, 1), draw.number(-1, 1), draw.number(low, above)]
+    target = [draw.number(-0.4, 0.4), draw.number(-0.4, 0.4), 0.3]
+    size = [draw.pick((1.0, 1.0, -1.0, 2.0)), draw.pick((1.0, 1.0, -1.0)), 1.0]
+    look: list[Any] = [["scale", size]] if size != [1.0, 1.0, 1.0] else []
+    node: Node = {"type": "projector", "to_world": [*look, ["lookat", place, target, [0.3, 1.0, 0.1]]]}
+    to_uv = [["scale", [draw.number(0.5, 4), draw.number(0.5, 4), 1.0]]]
+    kind = draw.pick(("bitmap", "bitmap", "checkerboard", "colour"))
+    if kind == "bitmap":
+        picture = {"kind": "colour", "seed": draw.seed(), "width": draw.integer(2, 24), "height": draw.integer(2, 24)}
+        filter, wrap = draw.pick(("bilinear", "nearest")), draw.pick(("repeat", "mirror", "clamp"))
+        node["irradiance"] = {"type": kind, "picture": picture, "raw": draw.chance(0.3), "filter_type": filter,
+                              "wrap_mode": wrap}  # fmt: skip
+        node["irradiance"] |= {"to_uv": to_uv} if draw.chance(0.4) else {}
+    elif kind == "checkerboard":
+        node["irradiance"] = {"type": kind, "color0": draw.colour(0, 0.4), "color1": draw.colour(0.3, 1)}
+        node["irradiance"]["to_uv"] = to_uv
+    else:
+        node["irradiance"] = draw.colour(0.2, 1)
+    node |= {"scale": draw.number(5, 25), "fov": draw.number(20, 90)}
+    if draw.chance(0.5):
+        node["fov_axis"] = draw.pick(("x", "y", "smaller", "larger", "diagonal"))
+    return node
 
 
 def area(draw: Draw, materials: Materials, above: float, textured: bool, kind: str = "") -> Node:

@@ -96,11 +96,18 @@ def _scaled(node: Node, s: float) -> Node:
         node["position"] = [s * x for x in node["position"]]
     if node["type"] in ("point", "spot"):
         node["intensity"] = [s * s * x for x in node["intensity"]]
-    if node["type"] == "spot":
-        node["to_world"] = [["lookat", *([s * x for x in v] for v in node["to_world"][0][1:3]), node["to_world"][0][3]]]
+    if node["type"] == "projector":
+        node["scale"] = s * s * node.get("scale", 1.0)
+    if node["type"] in ("spot", "projector"):
+        node["to_world"] = [_moved(step, s) if step[0] == "lookat" else step for step in node["to_world"]]
     elif node["type"] not in ("point", "directional", "constant", "envmap"):
         node["to_world"] = [*node.get("to_world", []), ["scale", [s, s, s]]]
     return node
+
+
+def _moved(lookat: list[Any], s: float) -> list[Any]:
+    """The same view from s times as far from the origin."""
+    return ["lookat", *([s * x for x in v] for v in lookat[1:3]), lookat[3]]
 
 
 def _camera(camera: Node, s: float, size: int) -> str:

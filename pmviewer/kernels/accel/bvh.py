@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.accel.bvh_binary import build_binary
+from pmviewer.kernels.accel.bvh_binary import Part, binary_tree, both, built_part
 from pmviewer.kernels.accel.bvh_pack import collapse, triangle_boxes
 from pmviewer.kernels.accel.bvh_split import plan_range, subtree
 from pmviewer.kernels.accel.bvh_wide import pack
@@ -91,9 +91,35 @@ class Bvh:
         record["n_triangles"] = self.n_triangles
 
 
-def build(triangles: F4, quadrics: F4, boxed: tuple[F4, F4] | None = None) -> Bvh:
+@dataclass(frozen=True)
+class Begun:
+    """The tree over the first `n_triangles` of `triangles` (n, 3, 3), to which others are added that aren't there yet,
+    up to `room` primitives: `begun` makes it, `build` finishes it, once. `boxes` (n_kept + room, 8)."""
+
+    triangles: F4
+    n_triangles: int
+    boxes: F4
+    n_kept: int
+    root: Part
+    room: int
+
+
+def begun(triangles: F4, n_triangles: int, room: int) -> Begun | None:
+    """Build the tree over the first `n_triangles` of `triangles` (n, 3, 3) float32, C-contiguous, as far as can be done
+    before the others are known. None if none of them is usable. Raises Cancelled."""
+    boxes = aligned_empty((n_triangles + room, LANES), np.float32)
+    n_kept, around = _boxes_of(triangles[:n_triangles], 0, boxes, 0)
+    if not n_kept:
+        return None
+    box, centers = around.min(axis=0)
+    root = built_part(boxes[:n_kept], n_kept, 0, box, centers, 1)
+    return Begun(triangles, n_triangles, boxes[: n_kept + room], n_kept, root, room)
+
+
+def build(triangles: F4, quadrics: F4, boxed: tuple[F4, F4] | None = None, started: Begun | None = None) -> Bvh:
     """The tree over `triangles` (n, 3, 3), world-space vertices, `quadrics` (m, 12), see `quadric`, and instances, of
-    which `boxed` has the lower and upper corners, (k, 3) each.
+    which `boxed` has the lower and upper corners, (k, 3) each. `started` is what was begun with the first of the
+    triangles; if there is no room for the others, it is built anew.
 
     Triangles without area and primitives with non-finite coordinates are left out of the tree: no ray meets them. Their
     ids stay taken.
@@ -105,9 +131,13 @@ def build(triangles: F4, quadrics: F4, boxed: tuple[F4, F4] | None = None) -> Bv
     lower, upper = quadric_bounds(own_quadrics[: len(quadrics)])
     if boxed is not None:
         lower, upper = np.concatenate([lower, boxed[0]]), np.concatenate([upper, boxed[1]])
-    boxes = aligned_empty((len(triangles) + len(lower), LANES), np.float32)
-    n_kept, around = _boxes_of(triangles, boxes)
+    if started is not None and len(triangles) - started.n_triangles + len(lower) > started.room:
+        started = None
+    known, done = (0, 0) if started is None else (started.n_triangles, started.n_kept)
+    boxes = started.boxes if started else aligned_empty((len(triangles) + len(lower), LANES), np.float32)
+    more, around = _boxes_of(triangles, known, boxes, done)
     kept = np.flatnonzero(np.isfinite(lower).all(1) & np.isfinite(upper).all(1))
+    n_kept = done + more
     boxes = boxes[: n_kept + len(kept)]
     others = boxes[n_kept:]
     others[:, 0:3], others[:, 4:7] = lower[kept], -upper[kept]
@@ -115,8 +145,13 @@ def build(triangles: F4, quadrics: F4, boxed: tuple[F4, F4] | None = None) -> Bv
     around = np.concatenate([around, [[_joined(others), _joined(others - others[:, TURNED])]]]).min(axis=0)
     others.view(np.int32)[:, 3] = kept
 
-    binary = build_binary(boxes, n_kept, around[0], around[1])
-    nodes, blocks = pack(triangles, boxes, n_kept, binary)
+    if started is None:
+        root = built_part(boxes, n_kept, 0, around[0], around[1])
+    elif len(boxes) == done:
+        root = started.root
+    else:
+        root = both(started.root, built_part(boxes, n_kept, done, around[0], around[1], 1))
+    nodes, blocks = pack(triangles, boxes, n_kept, binary_tree(root))
     return Bvh(nodes, blocks, own_quadrics, len(triangles))
 
 
@@ -125,25 +160,26 @@ def _joined(rows: F4) -> F4:
     return np.asarray(rows.min(axis=0, initial=np.inf), np.float32)
 
 
-def _boxes_of(triangles: F4, boxes: F4) -> tuple[int, F4]:
-    """Fill `boxes` with those of the usable triangles in their order; returns their number and, (k, 2, 8), boxes around
-    parts of them with those around their centres."""
-    starts = range(0, len(triangles), _AT_ONCE)
+def _boxes_of(triangles: F4, first: int, boxes: F4, row: int) -> tuple[int, F4]:
+    """Fill `boxes` from `row` on, at most `first`, with those of the usable ones of the triangles from `first` on, in
+    their order; returns their number and, (k, 2, 8), boxes around parts of them with those around their centres."""
+    starts = range(first, len(triangles), _AT_ONCE)
     around = aligned_empty((len(starts) + 1, 2, LANES), np.float32)
     around[-1] = np.inf
-    from_, to, over = triangles.ctypes.data, boxes.ctypes.data, around.ctypes.data
+    apart = first - row
+    from_, to, over = triangles.ctypes.data, boxes.ctypes.data - boxes.strides[0] * apart, around.ctypes.data
     found = parallel(
         [
             partial(triangle_boxes, from_, to, over + around.strides[0] * k, i, min(i + _AT_ONCE, len(triangles)))
             for k, i in enumerate(starts)
         ]
     )
-    count = 0
+    end = row
     for start, more in zip(starts, found):
-        if count < start:
-            boxes[count : count + more] = boxes[start : start + more].copy()
-        count += more
-    return count, around
+        if end < start - apart:
+            boxes[end : end + more] = boxes[start - apart : start - apart + more].copy()
+        end += more
+    return end - row, around
 
 
 def builder_kernels() -> list[Callable[[], object]]:

@@ -4,6 +4,7 @@ same time (`bvh_split`).
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -34,74 +35,94 @@ class Binary:
 
 
 @dataclass
-class _Part:
+class Part:
     """A node and what is below it: two more parts, or a whole subtree (its nodes, itself the first, and its own costs).
     `box` (8,) has (first box, count) as a leaf would."""
 
     box: F4
     centers: F4
     depth: int
-    children: tuple[_Part, ...] = ()
+    children: tuple[Part, ...] = ()
     nodes: F4 | None = None
     costs: F4 | None = None
     n_blocks: int = 0
 
 
+class _Workshop(threading.local):
+    """Memory in which a thread builds one part after the other: fresh pages for each would cost a tenth of the build.
+    `nodes` and `costs` (2 n + 2, 8) are for parts of up to n boxes."""
+
+    def __init__(self, n: int) -> None:
+        self.nodes = aligned_empty((2 * n + 2, LANES), np.float32)
+        self.costs = np.empty((2 * n + 2, LANES), np.float32)
+        self.scratch = aligned_empty((SCRATCH_BYTES // ROW_BYTES, LANES), np.float32)
+
+
 @dataclass(frozen=True)
 class _Boxes:
-    """All boxes (n, 8), those from `n_triangles` on being quadrics or instances, and as much memory to sort them."""
+    """All boxes (n, 8), those from `n_triangles` on being quadrics or instances, and memory to sort those from `first`
+    on."""
 
     rows: F4
-    spare: F4
     n_triangles: int
+    first: int
+    spare: F4
+    workshop: _Workshop
 
 
-def build_binary(rows: F4, n_triangles: int, box: F4, centers: F4) -> Binary:
-    """The tree over boxes (n, 8), which it reorders; those from `n_triangles` on are quadrics or instances. `box` (8,)
-    is that around all of them, `centers` (8,) that around their centres.
+def built_part(rows: F4, n_triangles: int, first: int, box: F4, centers: F4, depth: int = 0) -> Part:
+    """The tree over the boxes (n, 8) from `first` on, which it reorders; those from `n_triangles` on are quadrics or
+    instances. `box` (8,) is that around all of them, `centers` (8,) that around their centres, `depth` how many nodes
+    there will be above.
 
     It is the same for any number of threads. Raises Cancelled.
     """
-    boxes = _Boxes(rows, aligned_empty((max(len(rows), 1), LANES), np.float32), n_triangles)
-    root = _Part(box, centers, 0)
-    root.box.view(np.int32)[[FIRST, HELD]] = 0, len(rows)
+    count = len(rows) - first
+    spare = aligned_empty((max(count, 1), LANES), np.float32)
+    boxes = _Boxes(rows, n_triangles, first, spare, _Workshop(min(count, ALONE)))
+    root = Part(box.copy(), centers.copy(), depth)
+    root.box.view(np.int32)[[FIRST, HELD]] = first, count
 
-    def task(part: _Part) -> Callable[[], _Part]:
+    def task(part: Part) -> Callable[[], Part]:
         return partial(_advance, boxes, part)
 
-    if len(rows) <= ALONE:
+    if count <= ALONE:
         check()
         _advance(boxes, root)
     else:
         grown([task(root)], lambda part: [task(child) for child in part.children])
-    return _joined(root)
+    return root
 
 
-def _advance(boxes: _Boxes, part: _Part) -> _Part:
+def both(left: Part, right: Part) -> Part:
+    """A node above two parts, of which one is no child: their depths must begin with 1."""
+    box, centers = np.minimum(left.box, right.box), np.minimum(left.centers, right.centers)
+    return Part(box, centers, 0, (left, right))
+
+
+def _advance(boxes: _Boxes, part: Part) -> Part:
     """Split the part in two, or build all of it."""
     begin, count = part.box.view(np.int32)[[FIRST, HELD]].tolist()
-    alone = count <= ALONE
-    nodes = aligned_empty((2 * count + 2 if alone else 3, LANES), np.float32)
+    alone, workshop = count <= ALONE, boxes.workshop
+    nodes, scratch = workshop.nodes, workshop.scratch
     nodes[0] = part.box
-    scratch = aligned_empty((SCRATCH_BYTES // ROW_BYTES, LANES), np.float32)
     stack = scratch[CENTERS // ROW_BYTES :]
     stack[0] = part.centers
-    spare = boxes.spare.ctypes.data + ROW_BYTES * begin
+    spare = boxes.spare.ctypes.data + ROW_BYTES * (begin - boxes.first)
     used, part.n_blocks = subtree(
         boxes.rows.ctypes.data, boxes.n_triangles, spare, nodes.ctypes.data, part.depth, scratch.ctypes.data,
         2 * count + 2 if alone else 1,
     )  # fmt: skip
     if alone:
-        costs = np.zeros((used + 2, LANES), np.float32)
-        plan_range(nodes.ctypes.data, costs.ctypes.data, 0, used)
-        part.nodes, part.costs = nodes[:used].copy(), costs[:1].copy()
+        plan_range(nodes.ctypes.data, workshop.costs.ctypes.data, 0, used)
+        part.nodes, part.costs = nodes[:used].copy(), workshop.costs[:1].copy()
     else:
-        part.children = tuple(_Part(nodes[i + 1], stack[i].copy(), part.depth + 1) for i in range(2))
+        part.children = tuple(Part(nodes[i + 1].copy(), stack[i].copy(), part.depth + 1) for i in range(2))
     return part
 
 
-def _joined(root: _Part) -> Binary:
-    """The parts as one tree, whose collapse is planned above them too."""
+def binary_tree(root: Part) -> Binary:
+    """What is in the parts as one tree, whose collapse is planned above them too. The parts are used up."""
     upper = [root]
     for part in upper:
         upper += part.children
@@ -126,7 +147,7 @@ def _joined(root: _Part) -> Binary:
     return Binary(nodes, len(upper), sum(part.n_blocks for part in upper))
 
 
-def _place(part: _Part, nodes: F4, root: int, start: int) -> None:
+def _place(part: Part, nodes: F4, root: int, start: int) -> None:
     """Copy a whole subtree to its place: its root to the row `root`, what is below to those from `start` on."""
     assert part.nodes is not None
     below = slice(start, start + len(part.nodes) - 1)

@@ -30,7 +30,19 @@ LONG_NAME = 64
 def install() -> None:
     """From now on, in this process."""
     _without_lock_events()
-    for step in (_names, _sizes, _loops, _options, _variables, _references, _places, _lifetimes, _calls, _listings):
+    for step in (
+        _names,
+        _records,
+        _sizes,
+        _loops,
+        _options,
+        _variables,
+        _references,
+        _places,
+        _lifetimes,
+        _calls,
+        _listings,
+    ):
         step()
 
 
@@ -53,6 +65,22 @@ def _names() -> None:
         return original(name, (), abi_tags=(*abi_tags, hashed), uid=uid)
 
     funcdesc.default_mangler = default_mangler
+
+
+def _records() -> None:
+    """Numba names a record by a number that each process hands out anew. Code that another process has compiled then
+    has names of this one's own code for other records, and the linker takes the one for the other: pictures without a
+    surface, or the end of the program. The number is one of what is in the record instead."""
+
+    def mangling_args(self: Any) -> tuple[str, tuple[int]]:
+        return type(self).__name__, (_number_of(str(self)),)
+
+    types.Record.mangling_args = property(mangling_args)
+
+
+@functools.cache
+def _number_of(written: str) -> int:
+    return int(hashlib.sha256(written.encode()).hexdigest()[:15], 16)
 
 
 def _sizes() -> None:

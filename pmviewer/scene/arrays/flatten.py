@@ -32,6 +32,7 @@ from pmviewer.scene.arrays.media import has_media, light_media, media_of_prims, 
 from pmviewer.scene.arrays.shape_bounds import shape_bounds
 from pmviewer.scene.arrays.stored_geometry import StoredGeometry, same_surfaces, stored_geometry
 from pmviewer.scene.arrays.textured_emission import Emission, textured_lights
+from pmviewer.scene.arrays.tree_ahead import TreeAhead
 from pmviewer.scene.description import LUMINANCE, Scene
 from pmviewer.scene.grid import Grid
 from pmviewer.scene.spectrum import spectrum
@@ -113,15 +114,19 @@ def flatten(
     on_type: Callable[[np.dtype], None] = lambda of_record: None,
     like: FlatScene | None = None,
     features_at_least: Collection[str] = (),
+    ahead: TreeAhead | None = None,
 ) -> FlatScene:
     """Build arrays, acceleration structure and light table. `on_type` hears of what type the record will be, before the
     tree is built. The tree of `like` serves for the same surfaces. With `features_at_least` the record is that of
-    a scene with those SURFACES, too: what isn't there is not met and changes nothing but which kernels run.
+    a scene with those SURFACES, too: what isn't there is not met and changes nothing but which kernels run. `ahead` is
+    the tree of the scene before it was completed, which is used if it fits.
 
     Raises SceneError when the scene has no surface or no light that emits.
     """
     known = like if like is not None and same_surfaces(like.owner, scene) else None
-    stored = stored_geometry(scene) if known is None else replace(known.stored, shapes=scene.shapes)
+    if known is not None or ahead is None or not ahead.fits(scene):
+        ahead = None
+    stored = stored_geometry(scene, ahead) if known is None else replace(known.stored, shapes=scene.shapes)
     materials = material_table(scene)
     prim_material = np.array([s.material for s in stored.shapes], np.int32)[stored.shape_of_prim]
     center, radius = bounding_sphere(scene)
@@ -142,7 +147,7 @@ def flatten(
     elif stored.groups:
         bvh, shown = build_instanced(scene, stored.groups, stored.vertices, stored.quadrics, stored.shape_of_prim, r)
     else:
-        bvh, shown = build(stored.vertices, stored.quadrics), None
+        bvh, shown = build(stored.vertices, stored.quadrics, started=ahead.begun() if ahead else None), None
         bvh.store(r)
     arrays: dict[str, NDArray] = {
         "vertices": stored.vertices,

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.meshes.mesh import at_corners, face_normals
-from pmviewer.progress import parallel
+from pmviewer.kernels.meshes.mesh import face_normals
 from pmviewer.scene.arrays.instances import Normal, normalised
 from pmviewer.scene.arrays.light_table import axis_of, side_of
+from pmviewer.scene.arrays.tree_ahead import TreeAhead, fill_corners, take_corners
 from pmviewer.scene.description import Cylinder, Disk, Mesh, Parallelogram, Scene, Shape, Sphere
 
 Float = NDArray[np.float32]
-_AT_ONCE = 1 << 17
-"""Triangles that one thread looks at at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +43,8 @@ def same_surfaces(one: Scene, other: Scene) -> bool:
     return all(a.geometry is b.geometry for a, b in zip(one.shapes, other.shapes))
 
 
-def stored_geometry(scene: Scene) -> StoredGeometry:
-    """Raises SceneError when the scene has no surface."""
+def stored_geometry(scene: Scene, ahead: TreeAhead | None = None) -> StoredGeometry:
+    """Raises SceneError when the scene has no surface. The triangles that `ahead` knows are in its memory."""
     groups = [normalised(group, scene) for group in scene.groups] if scene.instances else []
     shapes = scene.shapes + tuple(shape for group in groups for shape in group.shapes)
     meshes = [(i, _triangulate(s.geometry)) for i, s in enumerate(shapes) if _is_triangles(s)]
@@ -60,7 +57,7 @@ def stored_geometry(scene: Scene) -> StoredGeometry:
         groups=groups,
         meshes=meshes,
         round_shapes=round_shapes,
-        vertices=_corners([m for _, m in meshes], sum(counts)),
+        vertices=_vertices([m for _, m in meshes], sum(counts), ahead),
         quadrics=np.array([_quadric_row(shapes[i]) for i in round_shapes], np.float32).reshape(-1, 12),
         shape_of_prim=np.repeat(
             np.array([i for i, _ in meshes] + round_shapes, np.int32), counts + [1] * len(round_shapes)
@@ -80,12 +77,14 @@ def _triangulate(geometry: object) -> Mesh:
     return Mesh(np.array([corner, corner + u, corner + u + v, corner + v]), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
 
 
-def _corners(meshes: list[Mesh], n: int) -> Float:
+def _vertices(meshes: list[Mesh], n: int, ahead: TreeAhead | None) -> Float:
     """(n, 3, 3) vertices at the corners of all triangles."""
-    out, start = np.empty((n, 3, 3), np.float32), 0
-    for m in meshes:
-        _take(m.vertices, m.faces, out[start : start + len(m.faces)])
-        start += len(m.faces)
+    if ahead is None or n > len(ahead.triangles):
+        out = np.empty((n, 3, 3), np.float32)
+        fill_corners(meshes, out)
+    else:
+        out = ahead.triangles[:n]
+        fill_corners(meshes[ahead.n_meshes :], out[ahead.n_triangles :])
     return out
 
 
@@ -96,18 +95,11 @@ def _corner_normals(meshes: list[Mesh], n: int) -> Float | None:
     for m in meshes:
         rows = out[start : start + len(m.faces)]
         if m.normals is not None:
-            _take(m.normals, m.faces, rows)
+            take_corners(m.normals, m.faces, rows)
         else:
             face_normals(np.ascontiguousarray(m.vertices), m.faces, rows)
         start += len(m.faces)
     return out
-
-
-def _take(values: NDArray[np.float64], faces: NDArray[np.int32], out: Float) -> None:
-    """out (F, 3, 3) = values (V, 3) at the corners of the faces, whose indices were checked before."""
-    values, faces = np.ascontiguousarray(values, np.float64), np.ascontiguousarray(faces, np.int32)
-    starts = range(0, len(faces), _AT_ONCE)
-    parallel([partial(at_corners, values, faces, i, min(i + _AT_ONCE, len(faces)), out) for i in starts])
 
 
 def _quadric_row(shape: Shape) -> list[float]:

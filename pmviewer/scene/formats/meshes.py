@@ -132,7 +132,7 @@ def _read(path: Path, ending: str, diagnostics: Diagnostics, choices: Mapping[st
         return read_obj(path, diagnostics)
     if ending == ".stl":
         solids = read_stl(path, diagnostics)
-        return MeshFile([Shape(name, mesh, 0) for name, mesh in solids], [DEFAULT_MATERIAL])
+        return MeshFile([Shape(name, mesh, 0) for name, mesh in solids], [_look_of(solids[0][1])])
     return _ply_scene(path, diagnostics)
 
 
@@ -141,9 +141,7 @@ def _ply_scene(path: Path, diagnostics: Diagnostics) -> MeshFile:
     ply = read_ply_file(path)
     for note in ply.notes:
         diagnostics.warn(note)
-    material = replace(DEFAULT_MATERIAL, vertex_colours=ply.mesh.colours is not None)
-    if material.vertex_colours:
-        material = replace(material, reflectance=(1.0, 1.0, 1.0))
+    material = _look_of(ply.mesh)
     if ply.picture and ply.mesh.uv is not None:
         picture = found_beside(path.parent, ply.picture)
         try:
@@ -157,6 +155,13 @@ def _ply_scene(path: Path, diagnostics: Diagnostics) -> MeshFile:
             texture = Bitmap(pixels, to_uv=(1.0, 0.0, 0.0, 0.0, -1.0, 1.0), name=picture.name)
             material = replace(material, reflectance=texture.mean, textures={"reflectance": texture})
     return MeshFile([Shape(path.stem, ply.mesh, 0)], [material])
+
+
+def _look_of(mesh: Mesh) -> Material:
+    """Of a file without materials: grey, or the colours of the mesh."""
+    if mesh.colours is None:
+        return DEFAULT_MATERIAL
+    return replace(DEFAULT_MATERIAL, vertex_colours=True, reflectance=(1.0, 1.0, 1.0))
 
 
 def _aimed(camera: Camera, box: tuple[np.ndarray, np.ndarray]) -> Camera:

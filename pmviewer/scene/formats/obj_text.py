@@ -26,6 +26,9 @@ N_COUNTS = 8
 _CORNERS, _COLOURED = 6, 7
 MISSING, BAD = -1, -(2**31) + 1
 
+_PAINT = re.compile(rb"^#MRGB[ \t]+((?:[0-9a-fA-F]{8})+)", re.MULTILINE)
+"""What ZBrush writes of the colours of vertices."""
+
 Counts = NDArray[np.int64]
 
 
@@ -90,7 +93,7 @@ def read_text(data: bytes) -> ObjText:
         v=arrays.v,
         vt=arrays.vt,
         vn=arrays.vn,
-        colours=arrays.colours if total[_COLOURED] else None,
+        colours=arrays.colours if total[_COLOURED] else _painted(data, len(arrays.v)),
         corners=arrays.corners,
         corner_vt=arrays.corner_vt if len(arrays.corner_vt) else None,
         corner_vn=arrays.corner_vn if len(arrays.corner_vn) else None,
@@ -98,6 +101,15 @@ def read_text(data: bytes) -> ObjText:
         events=arrays.events,
         ignored=int(total[_IGNORED]),
     )
+
+
+def _painted(data: bytes, count: int) -> NDArray[np.float64] | None:
+    """(count, 3) colours from 0 to 1 of ZBrush's comments, "#MRGB" and then eight hexadecimal digits a vertex: a mask,
+    red, green and blue. None if there are none, or not as many as vertices."""
+    digits = b"".join(_PAINT.findall(data)) if b"#MRGB" in data else b""
+    if not count or len(digits) != 8 * count:
+        return None
+    return np.frombuffer(bytes.fromhex(digits.decode("ascii")), np.uint8).reshape(-1, 4)[:, 1:] / 255.0
 
 
 def _normalised(data: bytes) -> bytes:

@@ -58,6 +58,8 @@ def read_ply_file(path: Path, attribute: str = "") -> PlyFile:
     header = read_header(data, path)
     columns = read_columns(data, header, path)
     vertex = {name: c for name, c in columns.get("vertex", {}).items() if not isinstance(c, ListColumn)}
+    if not {"x", "y", "z"} <= vertex.keys():
+        vertex = {name.lower(): column for name, column in vertex.items()}
     if any(element.name == "vertex" and not element.count for element in header.elements):
         raise SceneError("The PLY file has no vertices.", path, hint="Export it with its mesh.")
     if not {"x", "y", "z"} <= vertex.keys():

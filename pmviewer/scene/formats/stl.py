@@ -1,9 +1,12 @@
-"""STL, text and binary: triangles with nothing else."""
+"""STL, text and binary: triangles with nothing else, but for colours in some binary files."""
 
 from __future__ import annotations
 
 import io
+import re
+from functools import partial
 from pathlib import Path
+from threading import Lock
 from typing import BinaryIO
 
 import numpy as np
@@ -11,15 +14,20 @@ from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
 from pmviewer.kernels.meshes.rows import text_facets
-from pmviewer.progress import stage
+from pmviewer.progress import available_threads, parallel, stage
 from pmviewer.scene.description import Mesh
 from pmviewer.scene.diagnostics import Diagnostics
 from pmviewer.scene.formats.open_file import open_regular
+from pmviewer.scene.formats.stl_colours import coloured, colours_by_attribute
 from pmviewer.scene.meshes.welding import FACET, Welder
 
 _HEADER, _RECORD = 84, 50
 _AT_ONCE = 20_000
-"""Triangles of a binary file that are in memory as they were read."""
+"""Triangles of a binary file that one thread has in memory as they were read."""
+_CORNER = re.compile(rb"\s(vertex)\s", re.IGNORECASE)
+"""What each line of a text file with a corner begins with, where there are lines."""
+_FEWEST = 50_000
+"""Triangles from which on a thread of their own pays."""
 
 
 def read_stl(path: Path, diagnostics: Diagnostics) -> list[tuple[str, Mesh]]:
@@ -34,6 +42,8 @@ def read_stl(path: Path, diagnostics: Diagnostics) -> list[tuple[str, Mesh]]:
         if claimed >= 0 and size == _HEADER + _RECORD * claimed:
             return _binary(data, file, claimed, path, diagnostics)
         data += file.read()
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        data = data.decode("utf-16", "replace").encode("utf-8")
     start = data[:1024].removeprefix(b"\xef\xbb\xbf").lstrip()
     if start[:5].lower() == b"solid" and (b"facet" in data[:100_000].lower() or b"endsolid" in data[-1000:].lower()):
         return _text(data, path)
@@ -64,22 +74,53 @@ def _binary(header: bytes, records: BinaryIO, n: int, path: Path, diagnostics: D
     if not n:
         raise SceneError("The STL file has no triangles.", path, hint="Export it again.")
     stage(f"reading {n:,} triangles")
-    welder, coloured, left = Welder(n), b"COLOR=" in header, n
-    while left:
-        data = records.read(_RECORD * min(left, _AT_ONCE))
-        facets = np.frombuffer(data, FACET, len(data) // _RECORD)
-        if not len(facets):
-            raise SceneError("The STL file ended while it was read.", path, hint="Open it again.")
-        welder.add(facets)
-        coloured = coloured or bool(facets["attribute"].any())
-        left -= len(facets)
-    if coloured:
-        diagnostics.warn("Colours of the STL file are ignored: programs do not agree on how to write them.")
-    return [(path.stem, welder.mesh())]
+    source, each = _Records(records), max(_FEWEST, -(-n // available_threads()))
+    attributes = np.zeros(n, np.uint16)
+    parts = parallel([partial(source.part, i, min(i + each, n), attributes) for i in range(0, n, each)])
+    if not all(complete for _, complete in parts):
+        raise SceneError("The STL file ended while it was read.", path, hint="Open it again.")
+    welder = parts[0][0]
+    for other, _ in parts[1:]:
+        welder.join(other)
+    mesh = welder.mesh()
+    colours = colours_by_attribute(header[:80], attributes)
+    if colours is not None:
+        mesh = coloured(mesh, attributes, colours)
+    elif attributes.any():
+        diagnostics.warn(
+            "Numbers behind the STL file's triangles are ignored: they are no colours as programs write them."
+        )
+    return [(path.stem, mesh)]
+
+
+class _Records:
+    """A file's triangles, from where it stands, for several threads."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self._start, self._lock = file, file.tell(), Lock()
+
+    def part(self, first: int, end: int, attributes: NDArray[np.uint16]) -> tuple[Welder, bool]:
+        """The triangles [first, end) joined, and whether the file has so many. The first part has room for all of them,
+        as many as there are attributes, which become theirs."""
+        welder = Welder(end - first if first else len(attributes))
+        for at in range(first, end, _AT_ONCE):
+            count = min(end - at, _AT_ONCE)
+            with self._lock:
+                self._file.seek(self._start + _RECORD * at)
+                data = self._file.read(_RECORD * count)
+            if len(data) < _RECORD * count:
+                return welder, False
+            facets = np.frombuffer(data, FACET, count)
+            welder.add(facets)
+            attributes[at : at + count] = facets["attribute"]
+        return welder, True
 
 
 def _text(data: bytes, path: Path) -> list[tuple[str, Mesh]]:
-    data = data.replace(b"\r", b"\n") + b"\n" * 16
+    data = data.replace(b"\r", b"\n")
+    if data.count(b"\n") < data.count(b"vertex") + data.count(b"VERTEX"):  # any blanks may stand between words
+        data = _CORNER.sub(b"\n\\1 ", data)
+    data += b"\n" * 16
     bytes_ = np.frombuffer(data, np.uint8)
     nothing = np.empty((0, 3)), np.empty((0, 2), np.int64)
     n, k = text_facets(bytes_, *nothing)

@@ -38,9 +38,9 @@ def recentred(scene: Scene) -> Scene:
     if not scene.all_shapes:
         return scene
     center, radius = bounding_sphere(scene)
-    distance = float(np.linalg.norm(center))
-    if not FAR * radius < distance < np.inf:
+    if not _is_far(center, radius):
         return _with_camera_warning(scene, center, radius)
+    distance = float(np.linalg.norm(center))
     by = -center
     x, y, z = center
     sentence = (
@@ -62,6 +62,15 @@ def recentred(scene: Scene) -> Scene:
         warnings=(*scene.warnings, sentence),
     )
     return _with_camera_warning(moved, np.zeros(3), radius)
+
+
+def lies_far(scene: Scene) -> bool:
+    """Would it be moved to the origin?"""
+    return bool(scene.all_shapes) and _is_far(*bounding_sphere(scene))
+
+
+def _is_far(center: NDArray[np.float64], radius: float) -> bool:
+    return FAR * radius < float(np.linalg.norm(center)) < np.inf
 
 
 def _with_camera_warning(scene: Scene, center: NDArray[np.float64], radius: float) -> Scene:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.meshes.weld import rehash, weld
+from pmviewer.kernels.meshes.mesh import renumber
+from pmviewer.kernels.meshes.weld import EMPTY, rehash, weld
+from pmviewer.progress import parallel
 from pmviewer.scene.description import Mesh
 
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -14,6 +18,10 @@ _FULLEST = 0.6
 """Share of the table in use up to which collisions are rare."""
 _LEAST = 8
 """Slots, of which three corners must find room."""
+_AHEAD = 128
+"""Triangles whose places in the table are fetched together."""
+_AT_ONCE = 1 << 18
+"""Triangles that one thread renumbers at a time."""
 
 
 class Welder:
@@ -26,11 +34,12 @@ class Welder:
 
     def __init__(self, count: int) -> None:
         self._index = np.empty(3 * count, np.int32)
+        self._ahead = np.empty((2, 3 * _AHEAD), np.uint32)
         self._filled = self._used = 0
         self._allocate(max(1 << count.bit_length(), _LEAST))
 
     def _allocate(self, slots: int) -> None:
-        self._table = np.full(slots, -1, np.int32)
+        self._table = np.full(slots, EMPTY, np.uint32)
         self._vertices = np.empty((int(_FULLEST * slots), 3), np.uint32)
 
     def add(self, facets: NDArray[np.void]) -> None:
@@ -38,7 +47,7 @@ class Welder:
         corners = facets["corners"].view(np.uint32)
         while len(corners):
             index = self._index[3 * self._filled :]
-            done, self._used = weld(corners, self._table, self._vertices, self._used, index)
+            done, self._used = weld(corners, self._table, self._vertices, self._used, index, self._ahead)
             self._filled += done
             corners = corners[done:]
             if len(corners):
@@ -46,6 +55,21 @@ class Welder:
                 self._allocate(2 * len(self._table))
                 self._vertices[: len(known)] = known
                 rehash(known, self._table)
+
+    def join(self, other: Welder) -> None:
+        """The other's triangles after the own: the same as if they had been added here."""
+        known, first = other._vertices[: other._used], self._filled
+        loose = np.zeros(-(-len(known) // 3), FACET)
+        corners = np.repeat(known[:1], 3 * len(loose), axis=0)
+        corners[: len(known)] = known
+        loose["corners"] = corners.view(np.float32).reshape(-1, 3, 3)
+        self.add(loose)
+        number = self._index[3 * first :][: len(known)].copy()
+        faces = other._index[: 3 * other._filled].reshape(-1, 3)
+        self._filled = first + len(faces)
+        own = self._index[3 * first : 3 * self._filled].reshape(-1, 3)
+        pieces = [slice(i, i + _AT_ONCE) for i in range(0, len(faces), _AT_ONCE)]
+        parallel([partial(renumber, faces[piece], number, own[piece]) for piece in pieces])
 
     def mesh(self) -> Mesh:
         """The triangles so far."""

@@ -9,12 +9,13 @@ import numpy as np
 from pmviewer.scene.arrays import primitives
 from pmviewer.scene.arrays.texture_coordinates import orthonormal
 from pmviewer.scene.description import Cylinder, Disk, Frame, Geometry, Parallelogram, Sphere, Vec3
+from pmviewer.scene.formats.mitsuba.curves import CURVES, curves
 from pmviewer.scene.formats.mitsuba.displacement import displacement
 from pmviewer.scene.formats.mitsuba.document import Properties
 from pmviewer.scene.formats.mitsuba.mesh_file import MESH_FILES, mesh_file
 from pmviewer.scene.formats.mitsuba.transform import Matrix, apply, mirrors, similar_columns
 
-SUPPORTED = (*MESH_FILES, "rectangle", "cube", "sphere", "disk", "cylinder")
+SUPPORTED = (*MESH_FILES, *CURVES, "rectangle", "cube", "sphere", "disk", "cylinder")
 
 
 def _vec3(v: np.ndarray) -> Vec3:
@@ -32,6 +33,8 @@ def _smooth_geometry(p: Properties) -> Geometry:
     flip = p.boolean("flip_normals", False)
     if p.type in MESH_FILES:
         return mesh_file(p, to_world, flip)
+    if p.type in CURVES:
+        return curves(p, to_world, flip)
     if p.type == "cube":
         return primitives.transformed(primitives.cube(), to_world, flip)
     if p.type == "rectangle":
