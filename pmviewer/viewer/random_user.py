@@ -294,11 +294,12 @@ def window(scene: str, folder: Path) -> Iterator[ViewerApp]:
     """A window on the engine with that scene, small, which leaves the user's configuration alone."""
     from pmviewer.engine.effects import inactive_reason
     from pmviewer.engine.session import Session
-    from pmviewer.kernels.compile import elsewhere
+    from pmviewer.kernels.compile import elsewhere, placed
     from pmviewer.viewer.app import ViewerApp
     from pmviewer.viewer.dialogs.recent import RecentFiles
 
-    elsewhere.install()  # as the window has it
+    elsewhere.install()  # as the window has all three
+    placed.install()
     few_arenas()
     session = Session(settings=with_values(Settings(), START))
     recent = RecentFiles(folder / "recent.txt")

@@ -70,8 +70,10 @@ def _make_session(
             compiler.begin()
         from pmviewer.engine.memory import few_arenas
         from pmviewer.engine.session import Session
+        from pmviewer.kernels.compile import placed
 
         few_arenas()
+        placed.install()
         return Session(threads, settings, compiles_ahead=True, clicks=clicks, helper=helper, cluster=cluster)
 
     return make
