@@ -51,10 +51,10 @@ def twice(vectors, out):
 v, out = np.array([[3.0, 4.0], [6.0, 8.0]]), np.zeros(2)
 for function in (lengths, twice) if "twice" in sys.argv else (lengths,):
     print(function(v, out))
-try:
-    lengths(v * 1e6, out)
-except ValueError as error:
-    print(error.args)
+    try:
+        function(v * 1e6, out)
+    except ValueError as error:
+        print(error.args)
 for dispatcher in (lengths, twice):
     for result in dispatcher.overloads.values():
         print(dispatcher.py_func.__name__, result.library._image is not None)
@@ -63,7 +63,7 @@ for dispatcher in (lengths, twice):
 LARGE = """
 import sys
 import numpy as np
-from pmviewer.engine.memory import give_back
+from pmviewer.heap import give_back
 from pmviewer.kernels.compile import placed
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.viewer.random_user import resident

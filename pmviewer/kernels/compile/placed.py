@@ -10,13 +10,21 @@ import ctypes
 from typing import Any
 
 import llvmlite.binding as llvm
+from numba.core.compiler import CompileResult
 from numba.core.registry import cpu_target
 
 from pmviewer.kernels.compile import image, jit  # noqa: F401 - which changes the compiler first
 from pmviewer.kernels.compile.library import KernelLibrary, _KernelCodegen
 
-_constants: dict[str, ctypes.c_void_p] = {}
-"""Where code finds a function's Python constants, by name: all kernels that contain the function share the place."""
+
+class _Constants(ctypes.c_void_p):
+    """The place where code finds a function's Python constants, which `held` keeps."""
+
+    held: Any = None
+
+
+_constants: dict[str, _Constants] = {}
+"""By name: all kernels that contain the function share the place."""
 
 
 class PlacedLibrary(KernelLibrary):
@@ -46,7 +54,7 @@ class PlacedLibrary(KernelLibrary):
 
 
 def _place_of(constants: str) -> int:
-    return ctypes.addressof(_constants.setdefault(constants, ctypes.c_void_p()))
+    return ctypes.addressof(_constants.setdefault(constants, _Constants()))
 
 
 class _PlacedCodegen(_KernelCodegen):
@@ -62,11 +70,23 @@ class _PlacedCodegen(_KernelCodegen):
     def set_env(self, env_name: str, env: Any) -> None:
         """Give native code its constants, wherever it is."""
         if env_name in _constants:
-            _constants[env_name].value = id(env)
+            _constants[env_name].held, _constants[env_name].value = env, id(env)
         super().set_env(env_name, env)
+
+
+def _rebuild(cls: type[CompileResult], *state: Any) -> CompileResult:
+    """What numba makes of a file. It keeps the constants of all functions in a kernel, a hundred each with a long name;
+    an image has those that its code asks for."""
+    result = _rebuild_all(cls, *state)
+    placed = isinstance(result.library, PlacedLibrary) and result.library._image is not None
+    return result._replace(referenced_envs=()) if placed else result
+
+
+_rebuild_all = CompileResult._rebuild.__func__
 
 
 def install() -> None:
     """From now on, in this process; nothing where object files are of another kind."""
     if image.is_possible():
         cpu_target.target_context.codegen().__class__ = _PlacedCodegen
+        CompileResult._rebuild = classmethod(_rebuild)
