@@ -1,4 +1,4 @@
-"""Refusing what would not fit into memory before it is tried, as an overcommitting system would end the whole program."""
+"""Refusing what would not fit into memory before it is tried: an overcommitting system would end the whole program."""
 
 from __future__ import annotations
 

@@ -20,6 +20,7 @@ pytestmark = pytest.mark.skipif(not image.is_possible(), reason="object files ar
 MODULE = """
 import sys
 import numpy as np
+from numba.core.environment import Environment
 from pmviewer.kernels.compile import image, placed
 from pmviewer.kernels.compile.jit import device, kernel
 import pmviewer.kernels.compile.jit as jit
@@ -55,6 +56,8 @@ for function in (lengths, twice) if "twice" in sys.argv else (lengths,):
         function(v * 1e6, out)
     except ValueError as error:
         print(error.args)
+if "constants" in sys.argv:
+    print(sum("checked" in name for name in Environment._memo))
 for dispatcher in (lengths, twice):
     for result in dispatcher.overloads.values():
         print(dispatcher.py_func.__name__, result.library._image is not None)
@@ -102,6 +105,12 @@ def test_what_is_placed_gives_the_same_and_raises_the_same(tmp_path):
     assert placed.pop() == "lengths True"
     assert placed == compiled
     assert compiled[1] == "('too long', 'by far')"
+
+
+def test_constants_that_no_code_asks_for_are_not_kept(tmp_path):
+    run(tmp_path, MODULE)
+    assert run(tmp_path, MODULE, "constants")[-2:] == ["0", "lengths True"]
+    assert run(tmp_path, MODULE, "constants", "refused")[-2:] == ["1", "lengths False"]
 
 
 def test_what_is_placed_can_be_linked_into_what_is_compiled(tmp_path):
