@@ -1,10 +1,6 @@
-"""Refusing what would not fit into memory before it is tried, as an overcommitting system would end the whole program;
-giving back what is not needed any more."""
+"""Refusing what would not fit into memory before it is tried: an overcommitting system would end the whole program."""
 
 from __future__ import annotations
-
-import ctypes
-import sys
 
 from pmviewer.errors import SceneError, SettingError
 from pmviewer.render.moments import BYTES_PER_PIXEL as OF_MOMENTS
@@ -23,29 +19,6 @@ BYTES_PER_TRIANGLE = 300
 """Vertices and normals in float64 and float32, and the tree with what building it takes (`pmviewer bench load`)."""
 
 BYTES_PER_INSTANCE = 1200
-
-_M_ARENA_MAX = -8
-"""Of malloc.h."""
-
-
-def give_back() -> None:
-    """Return to the system what has been freed. The C library of Linux keeps it otherwise: arrays of a batch are below
-    the size from which it would not. Elsewhere nothing is done."""
-    if not sys.platform.startswith("linux"):
-        return
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # musl has none
-    if trim is not None:
-        trim(0)
-
-
-def few_arenas() -> None:
-    """Have all threads share two of the C library's heaps, where Linux's would make eight a processor: each keeps what
-    is scattered over it, and a program that lives long has threads come and go. Kernels allocate next to nothing."""
-    if not sys.platform.startswith("linux"):
-        return
-    options = getattr(ctypes.CDLL(None), "mallopt", None)  # musl has none
-    if options is not None:
-        options(_M_ARENA_MAX, 2)
 
 
 def check_scene_memory(scene: Scene) -> None:

@@ -340,7 +340,7 @@ class Session:
         lower_priority()
         while True:
             with self._changed:
-                self._changed.wait_for(self._has_work)
+                self._frugal.wait(self._changed, self._has_work)
                 if self._closed:
                     return
                 self._pool.cancel.clear()

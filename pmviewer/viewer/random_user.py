@@ -23,7 +23,7 @@ import numpy as np
 from imgui_bundle import ImVec2, hello_imgui, imgui
 from imgui_bundle.immapp import testing
 
-from pmviewer.engine.memory import few_arenas, give_back
+from pmviewer.heap import give_back, one_heap
 from pmviewer.kernels.compile.jit import loaded
 from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, get, with_values
 from pmviewer.settings.edits import PROPERTIES
@@ -294,12 +294,13 @@ def window(scene: str, folder: Path) -> Iterator[ViewerApp]:
     """A window on the engine with that scene, small, which leaves the user's configuration alone."""
     from pmviewer.engine.effects import inactive_reason
     from pmviewer.engine.session import Session
-    from pmviewer.kernels.compile import elsewhere
+    from pmviewer.kernels.compile import elsewhere, placed
     from pmviewer.viewer.app import ViewerApp
     from pmviewer.viewer.dialogs.recent import RecentFiles
 
-    elsewhere.install()  # as the window has it
-    few_arenas()
+    one_heap()  # as the window has all three
+    elsewhere.install()
+    placed.install()
     session = Session(settings=with_values(Settings(), START))
     recent = RecentFiles(folder / "recent.txt")
     app = ViewerApp(session, recent=recent, remember=False, inactive_reason=inactive_reason)

@@ -13,6 +13,7 @@ import glfw
 import platformdirs
 
 from pmviewer.errors import WindowError
+from pmviewer.heap import one_heap
 from pmviewer.settings.access import Settings
 from pmviewer.viewer.background import PATIENCE
 from pmviewer.viewer.session_link import SessionLike, SessionLink
@@ -68,10 +69,10 @@ def _make_session(
         compiler = elsewhere.install()
         if helper is not None:  # a first start: there will be much to compile
             compiler.begin()
-        from pmviewer.engine.memory import few_arenas
         from pmviewer.engine.session import Session
+        from pmviewer.kernels.compile import placed
 
-        few_arenas()
+        placed.install()
         return Session(threads, settings, compiles_ahead=True, clicks=clicks, helper=helper, cluster=cluster)
 
     return make
@@ -107,6 +108,7 @@ def start_viewer(
     engine is busy: a kernel that is being compiled can't be interrupted, and there is nothing of it to keep. Such a
     window, the user's own, also keeps session and film on disk for the case of a crash. Without `clicks` nobody will
     click, and nothing is compiled for it."""
+    one_heap()
     check_screen()
     link = SessionLink(_make_session(threads, settings, cluster, clicks), settings)
     app = make_app(link, inactive_reason=_inactive_reason, autosaves=autosaves() if leave else None)

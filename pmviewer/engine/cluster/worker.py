@@ -17,7 +17,6 @@ from typing import Any, TypeVar
 
 from pmviewer.engine.cluster.packed import PackedIncrement, pack
 from pmviewer.engine.cluster.shared_memory import Handle, Writer, Written
-from pmviewer.engine.memory import give_back
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
@@ -25,6 +24,7 @@ from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.engine.told import Told
 from pmviewer.errors import PmviewerError
+from pmviewer.heap import give_back
 from pmviewer.progress import Cancelled
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.arrays.flatten import FlatScene, flatten
