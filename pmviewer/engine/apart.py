@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pmviewer.engine.radius import radii_of_pixels
+from pmviewer.engine.method import radii_of_pixels
 from pmviewer.errors import SettingError
 from pmviewer.settings.needs import Facts
 

@@ -25,9 +25,17 @@ CUT_OFF = 0.01
 
 
 def caveats(
-    settings: Settings, plan: Plan, tally: Tally, energy: Energy | None, scene_radius: float, pixels: int, passes: int
+    settings: Settings,
+    plan: Plan,
+    tally: Tally,
+    energy: Energy | None,
+    scene_radius: float,
+    pixels: int,
+    passes: int,
+    paths: int,
 ) -> list[str]:
-    """What to know about the passes so far. scene_radius: of the bounding sphere; pixels: of the picture."""
+    """What to know about the passes so far. scene_radius: of the bounding sphere; pixels: of the picture; paths: of the
+    camera in all passes."""
     said = [THIN_GLASS[rule] for rule in plan.thin_glass if rule in THIN_GLASS]
     if "tinted and reflecting" in plan.thin_glass and plan.gather and not settings.photons.indirect_caustics:
         said.append(
@@ -37,7 +45,7 @@ def caveats(
     if settings.region.on and not plan.virtual and passes > 1:
         said.append("Outside of the region (region.on) the picture has one pass.")
     said += [_dropped(place, count) for place, count in tally.dropped.items() if count]
-    cut = tally.cut / max(pixels * passes, 1)
+    cut = tally.cut / max(paths, 1)
     if cut > CUT_PATHS:
         said.append(
             f"{cut:.1%} of the paths from the camera end on their way at render.max_depth = "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pmviewer.engine.caveats import caveats
 from pmviewer.engine.diagnose import Looked
 from pmviewer.engine.energy import Energy
@@ -12,6 +14,7 @@ from pmviewer.engine.stages.virtual_lights import bias_of, objects_of
 from pmviewer.engine.tally import Tally
 from pmviewer.engine.told import Told
 from pmviewer.maps.irradiance_cache import REACH
+from pmviewer.render.mirror_rays import MIRRORED
 from pmviewer.render.virtual_lights.film import WeightedFilm
 
 
@@ -103,6 +106,9 @@ def _statistics(looked: Looked, tally: Tally, told: Told) -> Statistics:
 def _warnings(looked: Looked, tally: Tally, energy: Energy | None, told: Told) -> tuple[str, ...]:
     """Sentences for the log."""
     plan, film = looked.plan, looked.film
-    cut = caveats(looked.settings, plan, tally, energy, looked.scene.flat.radius, len(film.sums), film.passes)
+    pixels, marks = len(film.sums), looked.latest.marks if looked.latest is not None else np.empty(0, np.uint8)
+    more = (plan.mirror_rays - 1) * int(np.count_nonzero(marks & MIRRORED))
+    paths = film.passes * (pixels + more)
+    cut = caveats(looked.settings, plan, tally, energy, looked.scene.flat.radius, pixels, film.passes, paths)
     biased = bias_of(looked.settings) if plan.virtual else ()
     return (*plan.warnings, *biased, *told.sentences, *cut)

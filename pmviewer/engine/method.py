@@ -12,7 +12,8 @@ from pmviewer.render.filter import BOX, filter_of, is_signed
 from pmviewer.render.hidden_lights import are_hidden
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.scene.description import PixelFilter
-from pmviewer.settings.access import Settings, with_values
+from pmviewer.settings.access import Settings, needs_of, with_values
+from pmviewer.settings.needs import Facts, unmet
 from pmviewer.settings.schema.importance import WITHOUT_IMPORTANCE, Deposit
 
 MANY_LIGHTS = 8
@@ -248,7 +249,13 @@ def _one_sample(settings: Settings, traits: SceneTraits, plan: Plan) -> bool:
     """Whether something counts on one sample a pixel and pass: what is estimated belongs to it, virtual lights and
     filters with negative parts add up weights, and the photons that pixels find set their radii."""
     counted = plan.path or plan.virtual or plan.estimation or is_signed(_filter(settings, traits))
-    return counted or settings.estimate.radius_rule == "pixel"
+    return counted or radii_of_pixels(Facts(settings, plan, traits))
+
+
+def radii_of_pixels(facts: Facts) -> bool:
+    """Whether each pixel has radii of its own (`pmviewer.render.pixel_radius`)."""
+    asked = facts.settings.estimate.radius_rule == "pixel"
+    return asked and unmet(needs_of("estimate.radius_rule"), facts) is None
 
 
 def _mirror_rays(settings: Settings, traits: SceneTraits, plan: Plan) -> int:

@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.method import Plan, plan_of
+from pmviewer.engine.method import Plan, plan_of, radii_of_pixels
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.radius import radii_of_pixels
 from pmviewer.engine.stages.convergence import prepare_convergence
 from pmviewer.engine.stages.estimation import prepare_estimation
 from pmviewer.engine.stages.importance import prepare_importance

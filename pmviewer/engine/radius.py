@@ -13,8 +13,7 @@ from pmviewer.maps.radius import automatic_volume_radius, progressive_radius
 from pmviewer.render.camera import CameraPose
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.scene.medium import Medium
-from pmviewer.settings.access import Estimate, needs_of
-from pmviewer.settings.needs import Facts, unmet
+from pmviewer.settings.access import Estimate
 
 FOOTPRINTS, GATHER_FOOTPRINTS = 4.0, 3.0
 """Radius in pixel footprints: maps shown directly need a calm estimate; gather rays average it anyway, so that theirs
@@ -64,12 +63,6 @@ def volume_neighbours(index: int, estimate: Estimate) -> tuple[int, float]:
     """Neighbours in media in pass `index`, and the share of their ball's volume that they count in: the bias goes with
     r², so that their volume shrinks with (r²ᵢ/r²₁)^1.5."""
     return shrunk(estimate.volume_k, progressive_radius(1.0, index + 1, estimate.alpha) ** 3)
-
-
-def radii_of_pixels(facts: Facts) -> bool:
-    """Whether each pixel has radii of its own (`pmviewer.render.pixel_radius`)."""
-    asked = facts.settings.estimate.radius_rule == "pixel"
-    return asked and unmet(needs_of("estimate.radius_rule"), facts) is None
 
 
 def pass_radius(first: float, index: int, estimate: Estimate, scene_radius: float) -> float:

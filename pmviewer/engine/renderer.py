@@ -25,10 +25,10 @@ from pmviewer.engine.inspection import Inspection, Wanted
 from pmviewer.engine.inspector.watched import Watched
 from pmviewer.engine.make_frame import frame_of
 from pmviewer.engine.memory import check_memory
-from pmviewer.engine.method import Plan, plan_of
+from pmviewer.engine.method import Plan, plan_of, radii_of_pixels
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.radius import first_radius, radii_of_pixels
+from pmviewer.engine.radius import first_radius
 from pmviewer.engine.stages.estimation import estimate_gathers
 from pmviewer.engine.stages.eye import gather_rays_of, marks_of, render_into
 from pmviewer.engine.stages.importance import ImportanceStage

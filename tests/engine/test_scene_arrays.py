@@ -146,3 +146,10 @@ def test_traits_are_of_what_is_used():
     assert not black.has_specular
     two = replace(diffuse_box(), lights=(ConstantEnvironment("sky", (1.0,) * 3),))
     assert analyse(two).many_lights
+
+
+def test_scenes_without_colours_used_store_none():
+    """Those of a mesh whose material asks for none."""
+    mesh = Mesh(np.eye(3), np.array([[0, 1, 2]], np.int32), colours=np.ones((3, 3)))
+    box = diffuse_box()
+    assert "colours" not in flatten(replace(box, shapes=(*box.shapes, Shape("m", mesh, 0)))).record.dtype.names

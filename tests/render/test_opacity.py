@@ -150,10 +150,3 @@ def test_colours_at_vertices_multiply_the_reflectance_of_copies_and_textures():
         np.testing.assert_allclose(across[:, 1], 0.5 * share, atol=2e-3)
         down = image[np.abs(x) < 0.9][:, inside].mean(axis=1)
         np.testing.assert_allclose(down[:, 2], 0.4 * (0.4 + 0.2 * x[np.abs(x) < 0.9]), atol=2e-3)
-
-
-def test_scenes_without_colours_used_store_none(monkeypatch):
-    monkeypatch.undo()  # as they are opened by users
-    mesh = Mesh(np.eye(3), np.array([[0, 1, 2]], np.int32), colours=np.ones((3, 3)))
-    scene = replace(lamp_scene(BLACK), shapes=(*lamp_scene(BLACK).shapes, Shape("m", mesh, 0)))
-    assert "colours" not in open_scene(scene).flat.record.dtype.names

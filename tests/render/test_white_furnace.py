@@ -19,7 +19,7 @@ def test_white_ball_vanishes(ball, method):
     scene = ball_in_environment(MIRROR if ball == "mirror" else GLASS)
     if ball == "glass mesh":
         scene = replace(scene, shapes=(Shape("ball", ball_mesh(1.0, 3), 0),))
-    renderer = rendered(scene, settings_of(render={"method": method, "max_depth": 200, "splits": 0}), passes=4)
+    renderer = rendered(scene, settings_of(render={"method": method, "max_depth": 1000, "splits": 0}), passes=4)
     image = renderer.frame(1).image()
     print(f"{ball}, {method}: mean {image.mean():.6f}, extremes {image.min():.6f} {image.max():.6f}")
     assert image.mean() == pytest.approx(1.0, abs=1e-3 if method == "path" else 1e-5)

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pmviewer.bench.report import BenchResult, Cell, Target
-from pmviewer.engine.method import Plan
+from pmviewer.engine.method import MIRROR_RAYS, Plan
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
@@ -45,33 +45,35 @@ FEWEST, MOST = 15, 150
 @dataclass(frozen=True)
 class Needs:
     """What a scene needs, said by hand: caustic maps, light choice by photons, camera rays along the outline of a
-    light, and the parts of the record that its kernels are compiled with (arguments of `scene_dtype`)."""
+    light, several of them where mirrors and glass are seen, and the parts of the record that its kernels are compiled
+    with (arguments of `scene_dtype`)."""
 
     caustics: bool = False
     choice: str = "power"
     outline: bool = False
+    mirrors: bool = False
     fields: tuple[str, ...] = ()
 
 
 NEEDS: Mapping[str, Needs] = {
     "cornell_diffuse": Needs(outline=True),
-    "cornell_caustic": Needs(caustics=True, outline=True),
-    "cornell_glossy": Needs(caustics=True, outline=True, fields=("bsdfs",)),
+    "cornell_caustic": Needs(caustics=True, mirrors=True, outline=True),
+    "cornell_glossy": Needs(caustics=True, mirrors=True, outline=True, fields=("bsdfs",)),
     "cornell_lights": Needs(outline=True),
-    "cornell_water": Needs(caustics=True, outline=True),
+    "cornell_water": Needs(caustics=True, mirrors=True, outline=True),
     # Smooth normals on diffuse rock: photons must know them, which the plain kernels don't.
     "cornell_fractal": Needs(outline=True, fields=("bsdfs", "instances")),
-    "ring_caustic": Needs(caustics=True, outline=True),
-    "cardioid_010": Needs(caustics=True, fields=("bsdfs",)),
+    "ring_caustic": Needs(caustics=True, mirrors=True, outline=True),
+    "cardioid_010": Needs(caustics=True, mirrors=True, fields=("bsdfs",)),
     "colonnade": Needs(fields=("bsdfs", "lights")),
     "corner_room": Needs(outline=True),
     "glossy_room": Needs(outline=True, fields=("bsdfs",)),
-    "car_cabin": Needs(caustics=True, fields=("bsdfs",)),
+    "car_cabin": Needs(caustics=True, mirrors=True, fields=("bsdfs",)),
     "rooms_10x10": Needs(choice="photons", outline=True),
     "skylight_room": Needs(),
-    "three_glasses": Needs(caustics=True, fields=("bsdfs",)),
-    "cognac": Needs(caustics=True, fields=("bsdfs",)),
-    "museum": Needs(caustics=True, fields=("bsdfs", "textures")),
+    "three_glasses": Needs(caustics=True, mirrors=True, fields=("bsdfs",)),
+    "cognac": Needs(caustics=True, mirrors=True, fields=("bsdfs",)),
+    "museum": Needs(caustics=True, mirrors=True, fields=("bsdfs", "textures")),
 }
 QUICK = ("cornell_diffuse", "cornell_caustic", "skylight_room", "cornell_lights")
 
@@ -96,6 +98,7 @@ def stripped_plan(needs: Needs) -> Plan:
         global_mask=indirect,
         global_classes=indirect,
         choice=needs.choice,
+        mirror_rays=MIRROR_RAYS if needs.mirrors else 1,
     )
 
 
