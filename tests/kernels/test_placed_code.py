@@ -88,7 +88,9 @@ for x, out in given[1:]:
 give_back()
 print((resident() - before) / len(given[1:]))
 """
-STATEMENTS = "\n    ".join(f"x = np.sin(x * {i}.5) + out[{i}] * np.exp(x - {i}.25); out[{i}] = x" for i in range(400))
+PAGES = 10 * mmap.PAGESIZE / 2**20
+"""MiB that filled pages and what Python keeps of a kernel take beside."""
+STATEMENTS = "\n    ".join(f"x = np.sin(x * {i}.5) + out[{i}] * np.exp(x - {i}.25); out[{i}] = x" for i in range(200))
 
 
 def run(folder: Path, module: str, *words: str) -> list[str]:
@@ -133,7 +135,7 @@ def test_what_is_placed_takes_little_more_than_its_code(tmp_path):
     files = list((tmp_path / "cache").rglob("*.nbc"))
     assert len(files) == 4
     size = sum(len(pickle.loads(file.read_bytes())[1][0][2][0]) for file in files) / 4 / 2**20
-    assert placed < 1.3 * size < loaded
+    assert placed < size + PAGES < loaded
 
 
 def object_file(text: str, model: str = "large") -> bytes:
