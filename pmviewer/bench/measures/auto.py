@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench import peer
-from pmviewer.bench.measures.error import Curve, measure_peer, reference
+from pmviewer.bench.measures.error import PEER, Curve, measure_peer, reference
 from pmviewer.bench.report import BenchResult, Target
 from pmviewer.engine.auto.choose import Choice, Goal, choose
 from pmviewer.engine.opened import OpenScene, open_scene
@@ -92,7 +92,8 @@ def _name(choice: Choice) -> str:
     short = choice.name.replace("gather with irradiance cache", "cache")
     changed = choice.changed
     N = f", N {changed['photons.N']:,}" if "photons.N" in changed else ""
-    return short + N + (", radius" if "estimate.radius" in changed else "")
+    radii = {"estimate.radius": ", radius", "estimate.caustic_radius": ", caustic radius"}
+    return short + N + "".join(said for path, said in radii.items() if path in changed)
 
 
 def _runs(scene: str, runs: int, pool: WorkPool) -> tuple[list[str | float | int], list[float], list[bool]]:
@@ -171,7 +172,7 @@ def run(quick: bool = False, scenes: int | None = None) -> BenchResult:
     ]
     if any(map(math.isfinite, ratios)):
         known = sum(map(math.isfinite, ratios))
-        note = f"relMSE over Mitsuba 3's path tracer at {seconds:g} CPU s"
+        note = f"relMSE over {PEER}, {peer.variant()}, at {seconds:g} CPU s, the trial counted"
         targets.insert(0, Target("P17", _mean(ratios), 0.08, "", False, f"{note}, geometric mean of {known}"))
         targets.insert(
             1, Target("P17", max(r for r in ratios if math.isfinite(r)), 0.3, "", False, f"{note}, worst scene")

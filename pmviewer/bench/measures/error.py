@@ -47,6 +47,7 @@ QUICK_SHARE = 0.1
 PEER_BUDGET = 2.5
 """Mitsuba's budget over ours: its time to a target must be found where it is twice ours."""
 PEER = "Mitsuba 3 path"
+AUTOMATIC, TRIAL_APART = "automatic", ", its trial not counted"
 AUTOMATIC_BUDGET = 8.0
 """Of the curves by what automatic mode chooses, over their target's seconds."""
 
@@ -130,7 +131,8 @@ def measure_peer(scene: str, budget: float) -> Curve:
     """Mitsuba's path integrator on the same file, its samples per pixel in place of passes. Raises PmviewerError."""
     spp, cpu, images = peer.error_images(scene, budget)
     found = [metrics(image.astype(np.float64), reference(scene)) for image in images]
-    return Curve(scene, PEER, spp, cpu, [m.relmse_all for m in found], [m.mean_ratio for m in found])
+    method = f"{PEER}, {peer.variant()}"
+    return Curve(scene, method, spp, cpu, [m.relmse_all for m in found], [m.mean_ratio for m in found])
 
 
 def automatic(scene: str, error: float, budget: float) -> tuple[Curve, str]:
@@ -144,7 +146,7 @@ def automatic(scene: str, error: float, budget: float) -> tuple[Curve, str]:
     said = f"automatic mode for {error:g} on {scene}: {changed}; {choice.trial.cpu_seconds:.2g} CPU s of trial besides"
     values = dict(choice.values)
     curve = measure(opened, values["render.method"], budget, values=values)
-    return replace(curve, method=f"automatic for {error:g}"), said
+    return replace(curve, method=f"{AUTOMATIC} for {error:g}"), said
 
 
 def against_peer(curves: list[Curve], peers: list[Curve]) -> list[Target]:
@@ -154,7 +156,7 @@ def against_peer(curves: list[Curve], peers: list[Curve]) -> list[Target]:
         ours = min(c.time_to(error) for c in curves if c.scene == scene)
         curve = next(c for c in peers if c.scene == scene)
         theirs = curve.time_to(error)
-        note = f"of Mitsuba 3's time to relMSE {error:g} on {scene}"
+        note = f"of the time of {curve.method} to relMSE {error:g} on {scene}"
         if not math.isfinite(theirs):
             theirs, note = curve.cpu[-1], note + f", which it did not reach within {curve.cpu[-1]:.3g} CPU s"
         targets.append(Target(f"{target} peer", ours / theirs, share, "", False, note))
@@ -186,7 +188,8 @@ def run(quick: bool = False) -> BenchResult:
     targets = []
     for target, scene, error, bound, _ in TARGETS:
         best = min((c for c in curves if c.scene == scene), key=lambda c: c.time_to(error))
-        note = f"{scene} to relMSE {error:g}, best: {best.method}"
+        apart = TRIAL_APART if best.method.startswith(AUTOMATIC) else ""
+        note = f"{scene} to relMSE {error:g}, best: {best.method}{apart}"
         targets.append(Target(target, best.time_to(error), bound, "CPU s", False, note))
     if peers:
         targets += against_peer(curves, peers)

@@ -120,8 +120,7 @@ class MapBuilder:
     def _photon_maps(self, light: LightPlan, traced: TracedPass) -> tuple[LookUpMap | None, LookUpMap | None]:
         found = []
         for name in ("caustic", "global"):
-            steps = partial(self._photon_map, light, traced.photons, name, 1)
-            make = partial(_in_turn, steps)
+            make = partial(_in_turn, partial(self._photon_map, light, traced.photons, name, 1))
             key = "map", traced.key, name, self._classes(name), self._look_up_key(light, name)
             found.append(self._kept(light, key, make, lambda made: made.structure.bytes if made else 0))
         return found[0], found[1]
