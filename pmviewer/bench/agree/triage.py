@@ -88,7 +88,7 @@ def explanation(
         outcome = outcome_of(simpler, found, found.stage - 1, (*salt, 1), shared_kernels)
         return outcome is not None and outcome.p > AGREES
 
-    may = [d for d in DEVIATIONS if d.among_ours or found.peer.startswith("Mitsuba")]
+    may = [d for d in DEVIATIONS if d.concerns(found.peer)]
     has = {d.name: without for d in may if (without := d.without(scene)) is not None}
     for name in sorted(has, key=lambda name: name not in first):
         if agrees(has[name]):
