@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.meshes.mesh import FLAT, NOT_FINITE, WHOLE, judge, number_used, renumber
+from pmviewer.kernels.meshes.mesh import FLAT, NOT_FINITE, judge, keep_used, keep_whole, number_used, renumber
 from pmviewer.progress import parallel
 from pmviewer.scene.description import (
     Camera,
@@ -131,7 +131,7 @@ def clean_mesh(mesh: Mesh, dropped: Counter[str]) -> Mesh | None:
     verdict, place = np.empty(len(faces), np.uint8), np.empty(len(vertices), np.int32)
     low, high = np.empty(3), np.empty(3)
     judged = partial(judge, vertices, faces)
-    pieces = [(i, min(i + _AT_ONCE, len(faces))) for i in range(0, len(faces), _AT_ONCE)]
+    pieces = [(piece.start, piece.stop) for piece in _pieces(faces)]
     # What is used is counted beside: most files have good triangles only, and it need not be done again.
     tasks = [
         partial(number_used, vertices, faces, place, low, high),
@@ -146,7 +146,11 @@ def clean_mesh(mesh: Mesh, dropped: Counter[str]) -> Mesh | None:
             count = int((verdict == number).sum())
             if count:
                 dropped[reason] += count
-        faces = np.compress(verdict == WHOLE, faces, axis=0)
+        ends = np.cumsum([j - i - wrong for (i, j), wrong in zip(pieces, bad)], dtype=np.int64).tolist()
+        whole = np.empty((ends[-1], 3), np.int32)
+        places = zip(pieces, [0, *ends], ends)
+        parallel([partial(keep_whole, faces, verdict, i, j, whole[to:end]) for (i, j), to, end in places])
+        faces = whole
     if not len(faces):
         return None
     if sum(bad):
@@ -171,9 +175,19 @@ def _without_unused(
         normals = _mended(Mesh(whole, faces, normals))[used]
     uv = None if mesh.uv is None else _finite(mesh.uv[used])
     colours = None if mesh.colours is None else _colours(mesh.colours[used])
-    renumbered = np.empty_like(faces)
-    renumber(faces, place, renumbered)
-    return Mesh(np.take(vertices, used, axis=0), renumbered, normals, uv, colours)
+    kept, renumbered = np.empty((len(used), 3)), np.empty_like(faces)
+    parallel(
+        [
+            partial(keep_used, vertices, place, kept),
+            *(partial(renumber, faces[p], place, renumbered[p]) for p in _pieces(faces)),
+        ]
+    )
+    return Mesh(kept, renumbered, normals, uv, colours)
+
+
+def _pieces(faces: NDArray[np.int32]) -> list[slice]:
+    """What one thread looks at at a time."""
+    return [slice(i, min(i + _AT_ONCE, len(faces))) for i in range(0, len(faces), _AT_ONCE)]
 
 
 def _finite(uv: NDArray[np.float64] | None) -> NDArray[np.float64] | None:

@@ -36,13 +36,15 @@ def area(mesh: Mesh) -> float:
     [
         SQUARE + "f 1 2 3\nf 1 3 4\n",
         SQUARE + "f -4 -3 -2\nf -4 -2 -1\n",
+        SQUARE + "fo 1 2 3\nfo 1 3 4\n",
+        SQUARE.upper() + "F 1 2 3\nFO 1 3 4\n",
         (SQUARE + "f 1 2 3\nf 1 3 4\n").replace("\n", "\r\n"),
         (SQUARE + "f 1 2 3\nf 1 3 4\n").replace("\n", "\r"),
         SQUARE + "f 1 \\\n 2 3 \\\r\n 4",
         "\ufeff" + SQUARE + "f\t1//  2 3 4 # a comment\n",
         "v +0. -0 0.0e0 1\nv 1e0 0 0 1\nv 10.E-1 .1e+1 0\nv 0 0.1e1 0\nf 1 2 3 4\nl 1 2\np 1\n",
     ],
-    ids=["plain", "relative", "CRLF", "CR", "continued", "BOM", "numbers"],
+    ids=["plain", "relative", "old", "capitals", "CRLF", "CR", "continued", "BOM", "numbers"],
 )
 def test_a_square_in_all_spellings(tmp_path: Path, text: str) -> None:
     (mesh,) = meshes(opened(tmp_path, text))
@@ -50,6 +52,17 @@ def test_a_square_in_all_spellings(tmp_path: Path, text: str) -> None:
     assert len(mesh.faces) == 2
     assert area(mesh) == pytest.approx(1)
     assert mesh.normals is None
+
+
+def test_keywords_in_capitals(tmp_path: Path) -> None:
+    text = "MTLLIB m.mtl\n" + SQUARE + "VT 0.25 0.5\nVN 0 0 1\nUSEMTL Red\nFO 1/1/1 2/1/1 3/1/1 4/1/1\nL 1 2\n"
+    scene = opened(tmp_path, text, m="NEWMTL Red\nKD 0.5 0.25 0.125\n")
+    (mesh,) = meshes(scene)
+    assert area(mesh) == pytest.approx(1)
+    assert mesh.normals is not None
+    assert (mesh.normals == [0, 0, 1]).all()
+    assert scene.materials[scene.shapes[0].material].reflectance == pytest.approx((0.5, 0.25, 0.125))
+    assert any("1 lines and points" in warning for warning in scene.warnings)
 
 
 def test_utf_16_and_latin_1(tmp_path: Path) -> None:

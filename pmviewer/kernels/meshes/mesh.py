@@ -88,6 +88,25 @@ def renumber(faces, number, out):
 
 
 @kernel
+def keep_whole(faces, verdict, begin, end, out):
+    """Those of the faces [begin, end) whose verdict is WHOLE become the first rows of out (≥ that many, 3) int32."""
+    row = 0
+    for f in range(begin, end):
+        if verdict[f] == WHOLE:
+            out[row, 0], out[row, 1], out[row, 2] = faces[f, 0], faces[f, 1], faces[f, 2]
+            row += 1
+
+
+@kernel
+def keep_used(vertices, number, out):
+    """out (V', 3) float64 = those of vertices (V, 3) that have a number in number (V,), in its order."""
+    for i in range(len(number)):
+        row = number[i]
+        if row >= 0:
+            out[row, 0], out[row, 1], out[row, 2] = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+
+
+@kernel
 def at_corners(values, faces, begin, end, out):
     """out (F, 3, 3) float32 = values (V, 3) float64 at the corners of the faces [begin, end)."""
     for f in range(begin, end):

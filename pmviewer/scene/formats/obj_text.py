@@ -19,7 +19,7 @@ from pmviewer.progress import parallel
 _PIECE = 1 << 22
 """Bytes that one thread reads at a time."""
 _V, _VT, _VN, _FACE, _EVENT, _IGNORED, _NOTHING = range(7)
-_V_LETTER, _T, _N, _F, _L, _P = (ord(c) for c in "vtnflp")
+_V_LETTER, _T, _N, _F, _O, _L, _P = (ord(c) for c in "vtnfolp")
 _COLOUR_WORDS = 6
 """Numbers after `v` from which three of them are a colour; a fourth or seventh is a weight."""
 N_COUNTS = 8
@@ -153,9 +153,15 @@ def _room_for(total: Counts) -> _Arrays:
 
 
 @device
+def _lower(sign):
+    """Of a capital its small letter."""
+    return sign + 32 if 65 <= sign <= 90 else sign + 0
+
+
+@device
 def _kind(data, i):
-    """Of the statement at i."""
-    a, b = data[i], data[i + 1]
+    """Of the statement at i, whose keyword may be in capitals. The old `fo` is `f`."""
+    a, b = _lower(data[i]), _lower(data[i + 1])
     if ends_line(a) or a == HASH:
         return _NOTHING
     if a == _V_LETTER:
@@ -166,7 +172,7 @@ def _kind(data, i):
                 return _VT
             if b == _N:
                 return _VN
-    elif b <= 32 and a == _F:
+    elif a == _F and (b <= 32 or (b == _O and data[i + 2] <= 32)):
         return _FACE
     elif b <= 32 and (a == _L or a == _P):  # noqa: SIM109
         return _IGNORED
@@ -204,7 +210,7 @@ def count_statements(data, begin, end, counts):
             if _words(data, i + 1) >= _COLOUR_WORDS:
                 counts[_COLOURED] += 1
         elif kind == _FACE:
-            counts[_CORNERS] += _words(data, i + 1)
+            counts[_CORNERS] += _words(data, skip_word(data, i))
         i = next_line(data, i)
         lines += 1
     return lines
@@ -285,7 +291,7 @@ def read_statements(data, begin, end, counts, line, arrays):
         elif kind == _FACE:
             starts[n_face] = n_corner
             n_face += 1
-            j = skip_blanks(data, i + 1)
+            j = skip_blanks(data, skip_word(data, i))
             while not ends_line(data[j]) and data[j] != HASH:
                 corners[n_corner], k = _index(data, j, n_v)
                 t = n = np.int64(MISSING)

@@ -93,6 +93,17 @@ def _binary(header: bytes, records: BinaryIO, n: int, path: Path, diagnostics: D
     return [(path.stem, mesh)]
 
 
+def _filled(room: memoryview, file: BinaryIO) -> bool:
+    """Read as many bytes as there is room for; False if the file ends before."""
+    read = 0
+    while read < len(room):
+        more = file.readinto(room[read:])  # type: ignore[attr-defined]  # which typeshed's BinaryIO lacks
+        if not more:
+            return False
+        read += more
+    return True
+
+
 class _Records:
     """A file's triangles, from where it stands, for several threads."""
 
@@ -103,14 +114,15 @@ class _Records:
         """The triangles [first, end) joined, and whether the file has so many. The first part has room for all of them,
         as many as there are attributes, which become theirs."""
         welder = Welder(end - first if first else len(attributes))
+        room = np.empty(min(end - first, _AT_ONCE), FACET)  # one for all: fresh memory costs more than to read into it
         for at in range(first, end, _AT_ONCE):
-            count = min(end - at, _AT_ONCE)
+            facets = room[: end - at]
+            count = len(facets)
             with self._lock:
                 self._file.seek(self._start + _RECORD * at)
-                data = self._file.read(_RECORD * count)
-            if len(data) < _RECORD * count:
+                complete = _filled(facets.view(np.uint8).data, self._file)
+            if not complete:
                 return welder, False
-            facets = np.frombuffer(data, FACET, count)
             welder.add(facets)
             attributes[at : at + count] = facets["attribute"]
         return welder, True

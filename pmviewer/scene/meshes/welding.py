@@ -22,6 +22,8 @@ _AHEAD = 128
 """Triangles whose places in the table are fetched together."""
 _AT_ONCE = 1 << 18
 """Triangles that one thread renumbers at a time."""
+_JOINED_AT_ONCE = 2000
+"""Triangles that the vertices of another part are added as: small enough to stay in the cache."""
 
 
 class Welder:
@@ -59,11 +61,13 @@ class Welder:
     def join(self, other: Welder) -> None:
         """The other's triangles after the own: the same as if they had been added here."""
         known, first = other._vertices[: other._used], self._filled
-        loose = np.zeros(-(-len(known) // 3), FACET)
-        corners = np.repeat(known[:1], 3 * len(loose), axis=0)
-        corners[: len(known)] = known
-        loose["corners"] = corners.view(np.float32).reshape(-1, 3, 3)
-        self.add(loose)
+        for start in range(0, len(known), 3 * _JOINED_AT_ONCE):
+            piece = known[start : start + 3 * _JOINED_AT_ONCE]
+            loose = np.empty(-(-len(piece) // 3), FACET)
+            corners = np.repeat(known[:1], 3 * len(loose), axis=0)
+            corners[: len(piece)] = piece
+            loose["corners"] = corners.view(np.float32).reshape(-1, 3, 3)
+            self.add(loose)
         number = self._index[3 * first :][: len(known)].copy()
         faces = other._index[: 3 * other._filled].reshape(-1, 3)
         self._filled = first + len(faces)
