@@ -15,7 +15,16 @@ from pmviewer.viewer.overlays.inspected import CHOSEN_COLOUR, DISC_COLOUR, disc_
 from pmviewer.viewer.panels.inspector.plots import on_hemisphere
 from pmviewer.viewer.panels.inspector.sorted_table import ordered, unit_of
 from pmviewer.viewer.viewport.picking import on_picture
-from tests.viewer.driver import app_on_engine, drag_picture, drive, finished, make_app, viewport_pixels, wait_until
+from tests.viewer.driver import (
+    app_on_engine,
+    click_at_once,
+    drag_picture,
+    drive,
+    finished,
+    make_app,
+    viewport_pixels,
+    wait_until,
+)
 from tests.viewer.fake_session import FakeSession
 
 K = imgui.Key
@@ -99,6 +108,27 @@ def test_a_click_pins_a_pixel_and_lets_it_go(tmp_path):
 
     drive(app, script)
     assert seen == {"front at start": True, "front when pinned": True}
+
+
+@pytest.mark.parametrize("typing", [False, True], ids=["over the search field", "which has the keyboard"])
+def test_a_click_counts_in_the_frame_of_its_mouse_move(tmp_path, typing):
+    """Wherever the mouse comes from: what it was over in the frame before does not hold it."""
+    session, field = FakeSession(), "//Settings/**/##filter"
+    app = make_app(session, tmp_path)
+    app.state.open("scene.xml")
+
+    def script(c):
+        if typing:
+            c.item_click(field)
+            c.key_chars("samples")
+            c.yield_(3)
+        c.mouse_move(field)
+        assert imgui.get_io().want_text_input == typing
+        click_at_once(c, place(app, 0.26, 0.76))
+        assert session.pinned == Pinned(16, 48)
+        assert not imgui.get_io().want_text_input
+
+    drive(app, script)
 
 
 @pytest.fixture
