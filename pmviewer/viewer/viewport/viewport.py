@@ -164,6 +164,7 @@ class Viewport:
             self._texture = picture.draw("window", target, camera, display, settings, navigating=navigating, pair=pair)
             self._drawn_key = key
             self.redraws += 1
+        picture.rest()
 
     def capture(self, *, overlays: bool) -> np.ndarray | None:
         """(height, width, 3) uint8: the picture at its own resolution, with or without the points; of compared
