@@ -1,18 +1,29 @@
-"""The C library's heap in programs that live long: what is free in it goes back to the system. Linux only; elsewhere
-nothing is done."""
+"""Memory of programs that live long: what is kept for speed alone is let go while nothing is done, and what is free in
+the C library's heap goes back to the system (on Linux; elsewhere it stays)."""
 
 from __future__ import annotations
 
 import ctypes
 import sys
+from collections.abc import Callable
 
 _M_ARENA_MAX = -8
 """Of malloc.h."""
 
+_kept: list[Callable[[], None]] = []
+
+
+def keeps(let_go: Callable[[], None]) -> None:
+    """Have `give_back` call this: it frees what takes milliseconds to be made anew. Called from any thread, it leaves
+    what is in use, and waits for nobody."""
+    _kept.append(let_go)
+
 
 def give_back() -> None:
-    """Return to the system what has been freed. The C library of Linux keeps it otherwise: arrays of a batch are below
-    the size from which it would not."""
+    """Let go of what is kept for speed alone, and return to the system what has been freed. The C library of Linux
+    keeps it otherwise: arrays of a batch are below the size from which it would not."""
+    for let_go in _kept:
+        let_go()
     if not sys.platform.startswith("linux"):
         return
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # musl has none

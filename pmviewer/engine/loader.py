@@ -70,6 +70,11 @@ class Loader:
         """Whether a scene that was asked for is still being loaded."""
         return self.done < self.asked
 
+    @property
+    def waits(self) -> bool:
+        """Whether a scene is being loaded, or has not been taken yet."""
+        return self.pending or self.loaded is not None
+
     def start(
         self, load: Callable[[], OpenScene], name: str, settings: Settings | None, film: Path | None = None
     ) -> None:

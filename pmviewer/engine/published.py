@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from pmviewer.engine.frame import Frame, Level, Message, Preview, State, Status
@@ -22,6 +22,7 @@ class Published:
         self.serial = 0
         self.status = Status()
         self._messages: list[Message] = []
+        self._warned: set[str] = set()
 
     def take_messages(self) -> list[Message]:
         """Messages since the last call."""
@@ -34,6 +35,12 @@ class Published:
         with self.changed:
             self._messages.append(Message(level, text, time.time()))
         self.notify()
+
+    def warn(self, warnings: Iterable[str]) -> None:
+        """Say those that were not said of the picture before."""
+        for warning in set(warnings) - self._warned:
+            self.say("warning", warning)
+        self._warned = set(warnings)
 
     def tell(self, state: State, text: str, passes: int = 0, progress: float | None = None) -> None:
         """What goes on now."""

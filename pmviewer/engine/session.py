@@ -78,7 +78,6 @@ class Session:
         self._pinned: Pinned | None = None
         self._attempt = 0
         self._failed_version = -1
-        self._warned: set[str] = set()
         self._pool = WorkPool(threads, behind_window=True)
         self._pool.on_progress = self._within_pass
         self._pass_began = self._told = 0.0
@@ -243,6 +242,15 @@ class Session:
         return self._published.frame
 
     @property
+    def is_newest(self) -> bool:
+        """Whether the newest frame is of the newest scene and settings, as far as these decide what is rendered, and
+        holds what the display asks for."""
+        with self._changed:
+            frame = self.frame
+            newest = frame is not None and frame.version == self._version
+            return newest and not self._loader.waits and self._unseen() is None
+
+    @property
     def status(self) -> Status:
         """What goes on now."""
         return self._published.status
@@ -314,7 +322,7 @@ class Session:
             if self._closed or self._has_failed():
                 return True
             frame = self.frame
-            if self._load_waits() or frame is None or frame.version != self._version:
+            if frame is None or not self.is_newest:
                 return False
             done = frame.statistics.passes if not frame.coarse else 0
             return self.status.state == "finished" or (passes is not None and done >= passes)
@@ -324,15 +332,11 @@ class Session:
 
     def _has_failed(self) -> bool:
         """Whether nothing more will come of the last request."""
-        if self._load_waits():
+        if self._loader.waits:
             return False
         if self._opened is None:
             return self.status.state == "failed"
         return self._failed_version == self._version
-
-    def _load_waits(self) -> bool:
-        """Whether a scene is being loaded or waits for the worker."""
-        return self._loader.pending or self._loader.loaded is not None
 
     # worker -----------------------------------------------------------------------------------------------------
 
@@ -371,9 +375,7 @@ class Session:
     def _has_work(self) -> bool:
         if self._closed or self._loader.loaded is not None:
             return True
-        if self._opened is None:
-            return False
-        if self._stopped:
+        if self._opened is None or self._stopped:
             return False
         if self._is_stale():
             return self._failed_version != self._version
@@ -434,9 +436,7 @@ class Session:
             draw = renderer.frame if renderer.passes else renderer.coarse_frame
             frame = draw(self._published.serial + 1, self._wanted(renderer))
             self._published.show(frame, self._version)
-            for warning in set(frame.statistics.warnings) - self._warned:
-                self._published.say("warning", warning)
-            self._warned = set(frame.statistics.warnings)
+            self._published.warn(frame.statistics.warnings)
         finally:
             with self._changed:
                 self._first_picture = False

@@ -59,11 +59,11 @@ class Live:
         before, or after so many seconds."""
 
         def shown() -> bool:
-            frame = self._app.state.frame
-            if frame is None or frame.coarse or frame.settings != self.settings:
+            session, frame = self._app.state.session, self._app.state.frame
+            if frame is None or frame.coarse or not session.is_newest:
                 return False
             enough = passes is not None and frame.statistics.passes >= passes
-            return enough or self._app.state.session.status.state == "finished"
+            return enough or session.status.state == "finished"
 
         return self.until(shown, seconds)
 

@@ -7,18 +7,19 @@ percent darker. So it is a view and a layer of its own, with a name that says so
 from __future__ import annotations
 
 import threading
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import OutputError
+from pmviewer.heap import keeps
+from pmviewer.output import oidn
 
 INSTALL = "pip install 'pmviewer[denoise]'"
 
 _lock = threading.Lock()
-_devices: dict[int, Any] = {}
-"""By number of threads. They live as long as the process, and so do their trained weights."""
+_devices: dict[int, oidn.Device] = {}
+"""By number of threads, until nothing is done for a while."""
 
 
 def denoised(
@@ -37,8 +38,8 @@ def denoised(
     Raises OutputError where Open Image Denoise is not installed or refuses to work here.
     """
     try:
-        import pyoidn
-    except (ImportError, OSError) as error:
+        oidn.library()
+    except (ImportError, OSError, AttributeError) as error:
         raise OutputError(f"Open Image Denoise can't be used ({error}): {INSTALL}") from error
     images = {
         "color": np.ascontiguousarray(np.maximum(colour, 0.0), np.float32),
@@ -47,33 +48,21 @@ def denoised(
         "output": np.empty(colour.shape, np.float32),
     }
     with _lock:
-        device = _device(pyoidn, threads)
-        filter_ = pyoidn.Filter(device, "RT")
-        try:
-            for name, image in images.items():
-                filter_.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
-            filter_.set_bool("hdr", True)
-            filter_.set_quality(pyoidn.OIDN_QUALITY_FAST if fast else pyoidn.OIDN_QUALITY_HIGH)
-            filter_.commit()
-            filter_.execute()
-            _check(device)
-        finally:
-            filter_.release()
+        if threads not in _devices:
+            _devices[threads] = oidn.Device(threads)
+        _devices[threads].denoise(images, oidn.FAST if fast else oidn.HIGH)
     return images["output"]
 
 
-def _device(pyoidn: Any, threads: int) -> Any:
-    if threads not in _devices:
-        device = pyoidn.Device()
-        device.set_int("numThreads", threads)
-        device.set_bool("setAffinity", False)  # or its threads stay on cores that the render threads share
-        device.commit()
-        _check(device)
-        _devices[threads] = device
-    return _devices[threads]
+def rest() -> None:
+    """Free what the denoiser holds, five megabytes, unless it is at work: the next picture takes five milliseconds
+    more."""
+    if _lock.acquire(blocking=False):
+        try:
+            while _devices:
+                _devices.popitem()[1].release()
+        finally:
+            _lock.release()
 
 
-def _check(device: Any) -> None:
-    said = device.get_error()
-    if said is not None:
-        raise OutputError(f"Open Image Denoise failed: {said}.")
+keeps(rest)

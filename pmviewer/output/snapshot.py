@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError, SettingError
 from pmviewer.output.exr import BEAUTY, Value, read_exr, write_exr
 from pmviewer.output.frame_export import EXR_NAMES, LAYERS, VOLUME_LAYERS, Exportable, frame_metadata, layers_of
+from pmviewer.output.kept_layers import kept
 from pmviewer.output.png import read_png
 from pmviewer.settings.access import SETTINGS, Settings, parse_assignments, with_values
 
@@ -40,7 +41,8 @@ class CurvePoint:
 @dataclass(frozen=True, eq=False)
 class Snapshot:
     """`number` tells it from others, `name` is the user's, `layers` are (h, w, c) float32 by view ("beauty" at least),
-    `about` what an EXR's attributes tell of it. `curve`: how its error fell, against the reference `truth`."""
+    on disk and read only, `about` what an EXR's attributes tell of it. `curve`: how its error fell, against the
+    reference `truth`."""
 
     number: int
     name: str
@@ -51,15 +53,15 @@ class Snapshot:
     encoded: bool = False
     """Whether it comes from display values, which are cut at 1."""
 
-    @property
+    @cached_property
     def size(self) -> tuple[int, int]:
         """Width and height in pixels."""
         height, width = self.layers["beauty"].shape[:2]
         return width, height
 
-    @property
+    @cached_property
     def bytes(self) -> int:
-        """Of its layers in memory."""
+        """Of its layers."""
         return sum(layer.nbytes for layer in self.layers.values())
 
     def image(self, view: str) -> NDArray[np.float32]:
@@ -99,9 +101,9 @@ class Snapshot:
 
 
 def snapshot_of(number: int, name: str, frame: Exportable) -> Snapshot:
-    """Of a frame as it is now; its layers are copied."""
-    layers = {view: np.array(frame.image(view), np.float32) for view in layers_of(frame)}
-    return Snapshot(number, name, layers, frame_metadata(frame))
+    """Of a frame as it is now; its layers are copied, to the disk."""
+    layers = {view: frame.image(view) for view in layers_of(frame)}
+    return Snapshot(number, name, kept(layers), frame_metadata(frame))
 
 
 def write_snapshot(path: str | Path, snapshot: Snapshot) -> None:
@@ -121,7 +123,7 @@ def read_snapshot(path: str | Path, number: int = 0) -> Snapshot:
     with a picture in colours or grey."""
     path = Path(path)
     if path.suffix.lower() == ".png":
-        return Snapshot(number, path.stem, {"beauty": _decoded(path)}, encoded=True)
+        return Snapshot(number, path.stem, kept({"beauty": _decoded(path)}), encoded=True)
     if path.suffix.lower() != ".exr":
         raise SceneError("A snapshot is a picture.", path, hint=f"Give a file that ends in {' or '.join(SUFFIXES)}.")
     layers, about = read_exr(path)
@@ -132,7 +134,7 @@ def read_snapshot(path: str | Path, number: int = 0) -> Snapshot:
     views = {view: _colours(layer, view) for view, layer in named.items() if view in (*LAYERS, *VOLUME_LAYERS)}
     name, encoded = str(about.pop(_NAME, path.stem)), about.pop("encoded", "") == "true"
     curve, truth = _curve(str(about.pop(_CURVE, ""))), str(about.pop(_TRUTH, ""))
-    return Snapshot(number, name, views, about, curve, truth, encoded)
+    return Snapshot(number, name, kept(views), about, curve, truth, encoded)
 
 
 def _colours(layer: NDArray[np.float32], view: str) -> NDArray[np.float32]:

@@ -53,7 +53,8 @@ class AutomaticRun:
 
     def opening(self, *, chosen: bool) -> None:
         """A scene is being opened; `chosen`: with settings that somebody has kept for it."""
-        self._expected, self._before = self.at_start and not chosen, self._session.opened_scene
+        self._expected = self.at_start and not chosen
+        self._before = self._session.opened_scene if self._expected else None
 
     def start(self) -> None:
         """Begin a trial of the open scene, or cancel the one that runs."""
@@ -65,7 +66,7 @@ class AutomaticRun:
         if opened is None:
             self._say("warning", "Open a scene first: automatic mode tries ways of rendering it.")
             return
-        self._expected = False
+        self._expected, self._before = False, None
         self._start(opened, asked=True)
 
     def _start(self, opened: Any, *, asked: bool) -> None:
@@ -118,6 +119,7 @@ class AutomaticRun:
         opened, frame, settings = self._session.opened_scene, self._session.frame, self._session.settings
         if not self._expected or self.running or opened is None or opened is self._before or frame is None:
             return
+        self._before = None  # it would stay in memory
         if frame.coarse or frame.statistics.passes < SEEN or frame.scene_name != opened.scene.name:
             return
         self._expected = False

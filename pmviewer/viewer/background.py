@@ -47,10 +47,14 @@ CHOOSING = Lane("choosing", shown=True)
 ENGINE = Lane("engine")
 
 
+def _nothing() -> str:
+    return ""
+
+
 @dataclass(eq=False)
 class Work:
     """One piece of work. `stop` is called when it is cancelled; work that calls `pmviewer.progress.check` needs none.
-    Everything may be asked from any thread."""
+    Everything may be asked from any thread. Work that is done has let go of what it was done with."""
 
     title: str
     lane: Lane
@@ -74,9 +78,9 @@ class Work:
 
     def cancel(self) -> None:
         """Ask it to end; work that waits for its turn is never begun."""
-        self.cancelled = True
-        if self.stop is not None and self.running:
-            self.stop()
+        self.cancelled, stop = True, self.stop
+        if stop is not None and self.running:
+            stop()
 
 
 class Background:
@@ -126,6 +130,7 @@ class Background:
                 self._guard(work)
             with self._lock:
                 queue.popleft()
+                work.do, work.stop = _nothing, None
                 work.done.set()
                 last = not queue
             if self.on_done:

@@ -79,22 +79,20 @@ class Inspector:
         asked = frame.inspection.wanted.pinned
         return asked is not None and self.pinned == (asked.x, asked.y)
 
-    @property
-    def look_up(self) -> LookUp | None:
-        """The chosen one, or the last where the path is shorter than it was."""
-        report = self.report
-        if report is None or not report.look_ups:
+    def look_up_of(self, report: PixelReport) -> LookUp | None:
+        """The chosen one of a report, or its last where the path is shorter than it was. Whoever reads more than one
+        thing reads them of one report: the next frame comes at any time."""
+        if not report.look_ups:
             return None
         if self.number is None:  # what the pixel does not use comes last
             adds = [(float(luminance(one.value)) > 0, one.used, float(luminance(one.value))) for one in report.look_ups]
             self.number = adds.index(max(adds))
         return report.look_ups[min(self.number, len(report.look_ups) - 1)]
 
-    @property
-    def lit(self) -> LitPlace | None:
-        """The chosen surface that virtual lights reach, or the last where the path is shorter than it was."""
-        report = self.report
-        if report is None or not report.lit:
+    def lit_of(self, report: PixelReport) -> LitPlace | None:
+        """The chosen surface of a report that virtual lights reach, or its last where the path is shorter than it
+        was."""
+        if not report.lit:
             return None
         if self.surface is None:
             adds = [float(luminance(place.sum)) for place in report.lit]

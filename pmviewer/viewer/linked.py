@@ -116,7 +116,7 @@ class Linked:
             self._forget()
         if not snapshots or opened is None or live is None:
             self._stop()
-            if self._job is None and self._pictures:
+            if self._job is None and (self._pictures or self._arrived or self._store is not None):
                 self._forget()
             return
         self._take()

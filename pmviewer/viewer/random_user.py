@@ -232,8 +232,8 @@ class RandomUser:
         still = 0
         while still < 5:
             frame = state.frame
-            done = state.session.status.state == "finished" and not state.session.loading and frame is not None
-            done = done and not frame.coarse and frame.settings == state.settings  # type: ignore[union-attr]
+            done = state.session.status.state == "finished" and state.session.is_newest
+            done = done and frame is not None and not frame.coarse
             still = still + 1 if done else 0
             if time.monotonic() > end:
                 what = state.session.status

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import weakref
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -22,9 +23,10 @@ AGAIN_AFTER = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Counted:
-    """What was counted of a pass, by map; `passes` of the film at that time."""
+    """What was counted of a pass, by map; `opened` refers to the scene as it was arranged, `passes` are the film's at
+    that time."""
 
-    opened: Any
+    opened: weakref.ref[Any]
     serial: int
     passes: int
     maps: Mapping[str, Received]
@@ -41,12 +43,12 @@ class ReceivedByObjects:
         self._counted: Counted | None = None
         self._failed = -1
         self._areas: dict[int, float | None] = {}
-        self._areas_of: Any = None
+        self._areas_of: Callable[[], Any] = lambda: None
 
     def counted(self) -> Counted | None:
         """The newest count of the open scene as it is; another pass is counted soon. None until there is one."""
         opened, frame, known = self._session.opened_scene, self._frame(), self._counted
-        if known is not None and known.opened is not opened:
+        if known is not None and known.opened() is not opened:
             known = self._counted = None
         if opened is None or frame is None or frame.coarse or not self._is_of(frame, opened):
             return known
@@ -60,8 +62,8 @@ class ReceivedByObjects:
         opened = self._session.opened_scene
         if opened is None:
             return None
-        if self._areas_of is not opened:
-            self._areas, self._areas_of = {}, opened
+        if self._areas_of() is not opened:
+            self._areas, self._areas_of = {}, weakref.ref(opened)
         if number not in self._areas:
             from pmviewer.engine.inspector.received import surface_of
 
@@ -80,5 +82,5 @@ class ReceivedByObjects:
 
         self._failed = frame.serial
         maps = {name: received(opened, frame.clouds[name]) for name in MAPS if name in frame.clouds}
-        self._counted, self._failed = Counted(opened, frame.serial, frame.statistics.passes, maps), -1
+        self._counted, self._failed = Counted(weakref.ref(opened), frame.serial, frame.statistics.passes, maps), -1
         return ""

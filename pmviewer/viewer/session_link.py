@@ -33,6 +33,11 @@ class SessionLike(Protocol):
         """The newest one, None before the first."""
 
     @property
+    def is_newest(self) -> bool:
+        """Whether the newest frame is of the newest scene and settings, as far as these decide what is rendered, and
+        holds what the display asks for. Its own settings may tell another display, or another end."""
+
+    @property
     def status(self) -> Status:
         """What goes on now."""
 
@@ -261,6 +266,10 @@ class SessionLink(SessionLike):
     @property
     def frame(self) -> Frame | None:
         return self._session.frame if self._session else None
+
+    @property
+    def is_newest(self) -> bool:
+        return self._session is not None and self._session.is_newest
 
     @property
     def status(self) -> Status:

@@ -22,7 +22,7 @@ SUFFIXES = (".exr", ".png")
 """Of files that open as snapshots."""
 MOST = 24
 MOST_BYTES = 1 << 30
-"""Of all their layers in memory, and about that on disk: a further snapshot is refused."""
+"""Of all their layers, which lie on the disk: a further snapshot is refused."""
 THUMBNAIL = 160
 """Longest side in pixels."""
 Thumbnail = NDArray[np.uint8]

@@ -1,11 +1,14 @@
 """The denoiser on pictures whose truth is known."""
 
 import sys
+import threading
 
 import numpy as np
 import pytest
 
 from pmviewer.errors import OutputError
+from pmviewer.heap import give_back
+from pmviewer.output import denoise, oidn
 from pmviewer.output.denoise import denoised
 
 
@@ -38,7 +41,40 @@ def test_noise_goes_and_edges_stay():
     assert clean.mean() == pytest.approx(truth.mean(), rel=0.03)
 
 
+def test_while_nothing_is_done_it_holds_nothing(monkeypatch):
+    """The next picture is the same. What is at work is left alone."""
+    _, noisy, albedo, normal = two_walls(0.5)
+    first = denoised(noisy, albedo, normal, threads=1)
+    (device,) = denoise._devices.values()
+    give_back()
+    assert denoise._devices == {}
+    assert device._device is None
+    assert np.array_equal(denoised(noisy, albedo, normal, threads=1), first)
+    seen = []
+    run = oidn.Device.denoise
+
+    def slow(device, images, quality):
+        beside = threading.Thread(target=give_back)
+        beside.start()
+        beside.join()
+        seen.append(device._device is not None)
+        run(device, images, quality)
+
+    monkeypatch.setattr(oidn.Device, "denoise", slow)
+    assert np.array_equal(denoised(noisy, albedo, normal, threads=1), first)
+    assert seen == [True]
+
+
+def test_what_it_refuses_is_told():
+    """A picture of other sizes than its guides."""
+    _, noisy, albedo, normal = two_walls(0.5)
+    with pytest.raises(OutputError, match=r"Open Image Denoise failed: .*\w"):
+        denoised(noisy, albedo[:32], normal)
+    assert np.isfinite(denoised(noisy, albedo, normal)).all()
+
+
 def test_without_it_the_sentence_says_how_to_get_it(monkeypatch):
+    oidn.library.cache_clear()
     monkeypatch.setitem(sys.modules, "pyoidn", None)
     nothing = np.zeros((4, 4, 3), np.float32)
     with pytest.raises(OutputError, match=r"pip install 'pmviewer\[denoise\]'"):

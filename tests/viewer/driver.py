@@ -129,6 +129,14 @@ def drag(context: Context, ref: str, start: float, end: float) -> None:
     context.yield_(2)
 
 
+def click_at_once(context: Context, position: ImVec2) -> None:
+    """A click whose press comes in the frame in which the mouse gets there; the engine's own waits in between."""
+    context.inputs.mouse_pos_value, context.inputs.mouse_buttons_value = position, 1
+    context.yield_(1)
+    context.inputs.mouse_buttons_value = 0
+    context.yield_(3)
+
+
 def drag_picture(context: Context, app: ViewerApp, dx: float, dy: float, button: int = 0) -> None:
     """Drag from the picture's middle by that many points."""
     x, y = app.viewport.origin

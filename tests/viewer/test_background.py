@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+import weakref
 
 import pytest
 
@@ -122,3 +123,21 @@ def test_a_closing_window_finishes_files_and_leaves_the_rest(background, said):
     assert said[1:] == [("info", "wrote another")]
     never.set()
     assert deaf.done.wait(10)
+
+
+def test_work_that_is_done_holds_nothing_of_what_it_was_done_with(background):
+    """Whoever started it may keep it: a scene would stay in memory with it."""
+
+    class Scene:
+        pass
+
+    scene = Scene()
+    gone = weakref.ref(scene)
+    work = background.start(COMPARING, "comparing", lambda of=scene: f"{of is not None}", stop=lambda of=scene: None)
+    assert work.done.wait(10)
+    del scene
+    until = time.monotonic() + 10
+    while gone() is not None and time.monotonic() < until:  # the thread is at its last words
+        time.sleep(0.01)
+    assert gone() is None
+    work.cancel()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from imgui_bundle import ImVec2, imgui
@@ -117,8 +120,16 @@ def test_an_object_tells_its_area_and_the_photons_on_it(tmp_path):
             c.yield_(4)
             seen["counted"], seen["cloud"] = state.received.counted(), state.frame.clouds["global"]
             seen["rows"] = [rows_of(state, n) for n in range(len(seen["targets"]))]
+            before = weakref.ref(state.session.opened_scene)
+            editing.set(seen["targets"][1], {"move": (0.0, 0.1, 0.0)})
+            editing.choose(None)
+            wait_until(c, lambda: finished(app) and state.frame.settings.edit.changes)
+            c.yield_(3)
+            gc.collect()
+            seen["before"] = before()
 
         drive(app, script)
+    assert seen["before"] is None, "the scene as it was arranged before is gone, though photons on it were counted"
     photons, counts = seen["cloud"].photons, seen["counted"].maps["global"]
     x = photons[:, 0]
     middle = (x.min() + x.max()) / 2

@@ -11,6 +11,7 @@ import moderngl
 import pytest
 
 from pmviewer.settings.access import Settings, with_values
+from pmviewer.viewer.gl import program
 from tests.viewer.driver import drive, make_app, on_window_thread
 from tests.viewer.fake_session import FakeSession
 
@@ -62,6 +63,34 @@ def test_scene_changes_leave_nothing_behind(app, tmp_path):
     assert counts == [counts[0]] * 10
     assert counts[0]["VertexArray"] - hidden[0]["VertexArray"] == 3, "two clouds and the frustum are freed"
     assert counts[0]["Buffer"] - hidden[0]["Buffer"] == 3
+    assert counts[0]["Program"] - hidden[0]["Program"] == 2, "the clouds' and the frustum's"
+
+
+def test_programs_are_compiled_when_an_overlay_is_shown_and_not_for_its_frames(app, monkeypatch):
+    compiled, rests = [], []
+    load, rest = program.load_program, program._release_compiler
+    monkeypatch.setattr(program, "load_program", lambda context, name: compiled.append(name) or load(context, name))
+    monkeypatch.setattr(program, "_release_compiler", lambda: rests.append(len(compiled)) or rest())
+    seen = {}
+
+    def script(c):
+        for _ in range(5):
+            app.state.session.publish()
+            c.yield_(2)
+        seen["shown"] = list(compiled)
+        app.state.change({"overlays.caustic.show": False})
+        c.yield_(3)
+        app.state.change({"overlays.global.show": False})  # the last one
+        c.yield_(3)
+        app.state.change({"overlays.caustic.show": True})
+        c.yield_(3)
+        seen["again"] = list(compiled)
+
+    drive(app, script)
+    assert sorted(seen["shown"]) == ["frustum", "geometry", "picture", "points"]
+    assert seen["again"] == [*seen["shown"], "points"]
+    assert rests[-1] == len(compiled), "what the compiler holds goes after the last one"
+    assert len(rests) < len(compiled), "and not after each"
 
 
 def test_what_the_collector_finds_on_another_thread_is_freed_on_the_windows(app):

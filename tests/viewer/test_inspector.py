@@ -12,10 +12,20 @@ from pmviewer.engine import diagnose
 from pmviewer.engine.inspector.report import PhotonAt, Pinned
 from pmviewer.render.camera import resolve_camera
 from pmviewer.viewer.overlays.inspected import CHOSEN_COLOUR, DISC_COLOUR, disc_lines
+from pmviewer.viewer.panels.inspector.panel import InspectorPanel
 from pmviewer.viewer.panels.inspector.plots import on_hemisphere
 from pmviewer.viewer.panels.inspector.sorted_table import ordered, unit_of
 from pmviewer.viewer.viewport.picking import on_picture
-from tests.viewer.driver import app_on_engine, drag_picture, drive, finished, make_app, viewport_pixels, wait_until
+from tests.viewer.driver import (
+    app_on_engine,
+    click_at_once,
+    drag_picture,
+    drive,
+    finished,
+    make_app,
+    viewport_pixels,
+    wait_until,
+)
 from tests.viewer.fake_session import FakeSession
 
 K = imgui.Key
@@ -101,6 +111,27 @@ def test_a_click_pins_a_pixel_and_lets_it_go(tmp_path):
     assert seen == {"front at start": True, "front when pinned": True}
 
 
+@pytest.mark.parametrize("typing", [False, True], ids=["over the search field", "which has the keyboard"])
+def test_a_click_counts_in_the_frame_of_its_mouse_move(tmp_path, typing):
+    """Wherever the mouse comes from: what it was over in the frame before does not hold it."""
+    session, field = FakeSession(), "//Settings/**/##filter"
+    app = make_app(session, tmp_path)
+    app.state.open("scene.xml")
+
+    def script(c):
+        if typing:
+            c.item_click(field)
+            c.key_chars("samples")
+            c.yield_(3)
+        c.mouse_move(field)
+        assert imgui.get_io().want_text_input == typing
+        click_at_once(c, place(app, 0.26, 0.76))
+        assert session.pinned == Pinned(16, 48)
+        assert not imgui.get_io().want_text_input
+
+    drive(app, script)
+
+
 @pytest.fixture
 def app(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -136,7 +167,7 @@ def test_the_photons_of_a_pixel_are_drawn_listed_and_followed(app, monkeypatch):
         shares["path before"] = share(viewport_pixels(c, app), CHOSEN_COLOUR)
         inspector.number = 1
         c.yield_(4)
-        look_up = inspector.look_up
+        look_up = inspector.look_up_of(inspector.report)
         assert look_up.map == "global"
         assert look_up.found.n > 5
         nearest = look_up.found.records[0, :3]
@@ -180,6 +211,37 @@ def test_the_photons_of_a_pixel_are_drawn_listed_and_followed(app, monkeypatch):
     drive(app, script)
     assert shares["disc"] > 0.0002 > shares["disc before"] == shares["disc after"]
     assert shares["path"] > 0.0002 > shares["path before"]
+
+
+def test_the_panel_outlives_what_changes_while_it_is_drawn(app, monkeypatch):
+    """A pass may come between two of its lines, and its own button lets the pixel go."""
+    seen = {}
+
+    def script(c):
+        wait_until(c, lambda: finished(app))
+        click(c, app, *FLOOR)
+        inspector, published = app.state.inspector, app.state.session._published
+        wait_until(c, lambda: inspector.report is not None)
+        heading = InspectorPanel._heading
+
+        def next_pass_after(panel, report):
+            heading(panel, report)
+            frame = published.frame
+            look_ups = tuple(replace(one) for one in frame.inspection.pixel.look_ups)
+            pixel = replace(frame.inspection.pixel, look_ups=look_ups)
+            published.frame = replace(frame, inspection=replace(frame.inspection, pixel=pixel))
+            seen["frames"] = seen.get("frames", 0) + 1
+
+        monkeypatch.setattr(InspectorPanel, "_heading", next_pass_after)
+        c.yield_(5)
+        monkeypatch.setattr(InspectorPanel, "_heading", heading)
+        c.yield_(2)
+        c.item_click("//Inspector/Unpin")
+        c.yield_(2)
+        assert inspector.pinned is None
+
+    drive(app, script)
+    assert seen["frames"] >= 5
 
 
 def test_it_stays_on_its_pixel_while_passes_go_on(app):

@@ -86,3 +86,24 @@ def test_what_cannot_follow_says_why_and_stays(tmp_path):
             assert not state.background.running()
 
         drive(app, script)
+
+
+def test_what_nobody_waits_for_any_more_is_forgotten(tmp_path):
+    """Cameras that are unlinked before the first picture is there leave no photons and no pictures behind."""
+    with app_on_engine(tmp_path, "cornell_caustic", SMALL) as app:
+
+        def script(c):
+            state = app.state
+            wait_until(c, lambda: finished(app))
+            state.take_snapshot()
+            state.change({"compare.mode": "side by side", "compare.b": "1", **THERE})
+            wait_until(c, lambda: finished(app) and state.frame.settings.camera == state.settings.camera)
+            state.change({"compare.linked": True})
+            wait_until(c, lambda: state.linked._store is not None)
+            state.change({"compare.linked": False})
+            wait_until(c, lambda: not state.background.running())
+            c.yield_(3)
+            linked = state.linked
+            assert (linked._store, linked._arranged, linked._arrived, linked._pictures) == (None, None, [], {})
+
+        drive(app, script)

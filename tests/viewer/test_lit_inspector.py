@@ -65,7 +65,7 @@ def test_a_row_marks_its_light_in_the_picture(tmp_path):
         seen["lines before"] = share(viewport_pixels(c, app), REACH_COLOUR)
         inspector.pin((32, 32))
         session.frame = replace(session.frame, serial=session.frame.serial + 1, inspection=Inspection(pixel=report()))
-        wait_until(c, lambda: inspector.lit is not None)
+        wait_until(c, lambda: inspector.report and inspector.lit_of(inspector.report))
         c.yield_(4)
         seen["lines"] = share(viewport_pixels(c, app), REACH_COLOUR)
         seen["marked before"] = share(viewport_pixels(c, app), CHOSEN_COLOUR)

@@ -24,6 +24,11 @@ def test_a_script_changes_the_window_and_reads_it(tmp_path):
         assert live.settings.photons.N == 500
         assert live.wait()
         seen["after"] = live.picture()
+        live.set({"display.tone": "Reinhard"})  # nothing is rendered for it
+        seen["waited"] = live.wait(seconds=120)
+        live.set({"display.view": "look-up radius", "display.tone": "filmic"})  # is made from what there is
+        seen["held"] = live.wait(seconds=120) and "look-up radius" in app.state.frame.diagnostics
+        live.set({"display.view": "beauty"})
         seen["done"] = True
         live.wait(10**6)  # until the window is closed
         raise ValueError("at its end")
@@ -37,7 +42,10 @@ def test_a_script_changes_the_window_and_reads_it(tmp_path):
             assert finished(app)
             assert np.array_equal(app.state.frame.image(), seen["after"])
             assert not np.array_equal(seen["before"], seen["after"])
-            app.state.undo()
+            assert seen["waited"]
+            assert seen["held"]
+            for _ in range(4):
+                app.state.undo()
             assert app.state.settings.photons.N == 2000
 
         drive(app, window)

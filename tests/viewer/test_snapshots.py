@@ -21,7 +21,7 @@ from pmviewer.settings.access import Settings, changed_stages, with_values
 from pmviewer.viewer import snapshots as strip
 from pmviewer.viewer.panels.snapshots.table import figure_rows, setting_rows
 from pmviewer.viewer.sides import frame_side, same_camera
-from tests.viewer.driver import chord, drag_picture, drive, on_window_thread, viewport_pixels
+from tests.viewer.driver import chord, click_at_once, drag_picture, drive, on_window_thread, viewport_pixels
 from tests.viewer.fake_session import SIZE, FakeSession
 
 K = imgui.Key
@@ -331,8 +331,9 @@ def test_the_button_at_the_legend_sets_the_range(app, session, tmp_path):
         assert (shown.scale.lower, shown.scale.upper, shown.scale.log) == (1e-5, 1.0, True)
         assert shown.histogram.total == SIZE * SIZE
         camera = session.settings.camera
-        c.item_click(f"//Viewport/**/{fa.ICON_FA_SLIDERS}##false.colours")
-        c.yield_(3)
+        button = f"//Viewport/**/{fa.ICON_FA_SLIDERS}##false.colours"
+        click_at_once(c, c.item_info(button).rect_full.get_center())
+        assert session.pinned is None, "the button is not the picture, even at once"
         c.item_click("//$FOCUSED/##display.range")
         c.yield_(2)
         c.item_click("//$FOCUSED/by hand")

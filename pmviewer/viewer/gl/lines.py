@@ -33,10 +33,9 @@ class LineCloud:
         self.release()
         if not len(ends):
             return
-        program = self._program
         self._buffer = self._shaders.context.buffer(np.ascontiguousarray(ends, np.float32))
-        names = [n for n in ATTRIBUTES if n in program]
-        self._array = self._shaders.context.vertex_array(program, [(self._buffer, LAYOUT, *names)])
+        names = [n for n in ATTRIBUTES if n in self._program]
+        self._array = self._shaders.array("lines", [(self._buffer, LAYOUT, *names)])
         self._log_range = log_range(ends[::2], colouring)
         count = len(ends) // 2
         self._summary = summary_of(ends[::2], power_unit, count, count, colouring)
@@ -44,7 +43,7 @@ class LineCloud:
     def release(self) -> None:
         """Free what lies on the GPU."""
         if self._array is not None:
-            self._array.release()
+            self._shaders.drop(self._array)
         if self._buffer is not None:
             self._buffer.release()
         self._array = self._buffer = None

@@ -30,12 +30,12 @@ class Marks:
         content = np.column_stack([points, levels]).astype(np.float32)
         self._buffer = self._shaders.context.buffer(content)
         layout = [(self._buffer, "3f4 1f4", "position", "level")]
-        self._array = self._shaders.context.vertex_array(self._shaders.get("marks"), layout)
+        self._array = self._shaders.array("marks", layout)
 
     def release(self) -> None:
         """Free what lies on the GPU."""
         if self._array is not None and self._buffer is not None:
-            self._array.release()
+            self._shaders.drop(self._array)
             self._buffer.release()
         self._array = self._buffer = None
 
@@ -65,12 +65,12 @@ class Strokes:
         if len(ends):
             self._buffer = self._shaders.context.buffer(np.ascontiguousarray(ends, np.float32))
             layout = [(self._buffer, "3f4", "position")]
-            self._array = self._shaders.context.vertex_array(self._shaders.get("frustum"), layout)
+            self._array = self._shaders.array("frustum", layout)
 
     def release(self) -> None:
         """Free what lies on the GPU."""
         if self._array is not None and self._buffer is not None:
-            self._array.release()
+            self._shaders.drop(self._array)
             self._buffer.release()
         self._array = self._buffer = None
 

@@ -74,8 +74,9 @@ class Planes:
 
     def __init__(self, shaders: Shaders) -> None:
         self._context = shaders.context
-        self._program = shaders.get("picture")
-        self._triangle = self._context.vertex_array(self._program, [])
+        self._shaders = shaders
+        self._triangle = shaders.array("picture", [])
+        self._program = self._triangle.program
         self._colours = ColourTables(self._context)
         self.reference = HeldTexture(self._context)
         self.pair = PairPlanes(self._context)
@@ -163,7 +164,7 @@ class Planes:
         self.reference.release()
         self.pair.upload(None)
         self._colours.release()
-        self._triangle.release()
+        self._shaders.drop(self._triangle)
 
     def draw(self, display: Display, width: int, other: moderngl.Texture | None = None, plain: bool = False) -> None:
         """Draw the frame's plane, or another picture, into the bound framebuffer's viewport, `width` pixels wide.

@@ -51,7 +51,7 @@ class PointCloud:
     def release(self) -> None:
         """Free what lies on the GPU."""
         for array in self._arrays.values():
-            array.release()
+            self._shaders.drop(array)
         self._arrays.clear()
         if self._buffer is not None:
             self._buffer.release()
@@ -116,5 +116,5 @@ class PointCloud:
             rest = f" {RECORD_BYTES * (stride - 1)}x1" if stride > 1 else ""
             names = [n for n in ATTRIBUTES if n in self._program]
             content = [(self._buffer, LAYOUT + rest, *names)]
-            self._arrays[stride] = self._shaders.context.vertex_array(self._program, content)
+            self._arrays[stride] = self._shaders.array("points", content)
         return self._arrays[stride]

@@ -50,14 +50,14 @@ class Surfaces:
             if any(used for _, used in names):
                 layout = " ".join("3f4" if used else "12x1" for _, used in names)
                 content.append((buffer, layout, *(n for n, used in names if used)))
-        self._array = context.vertex_array(program, content)
+        self._array = self._shaders.array("geometry", content)
         self.center, self.radius = np.asarray(geometry.center, float), float(geometry.radius)
         return True
 
     def release(self) -> None:
         """Free what lies on the GPU."""
         if self._array is not None:
-            self._array.release()
+            self._shaders.drop(self._array)
         for buffer in (self._buffer, self._albedo):
             if buffer is not None:
                 buffer.release()

@@ -64,11 +64,11 @@ class FocalPlane(Overlay):
         self.release()
         self._buffer = self.shaders.context.buffer(plane_vertices(camera))
         content = [(self._buffer, "3f4 2f4 3f4", "position", "corner", "tint")]
-        self._array = self.shaders.context.vertex_array(self.shaders.get("cells"), content)
+        self._array = self.shaders.array("cells", content)
 
     def release(self) -> None:
         if self._array is not None and self._buffer is not None:
-            self._array.release()
+            self.shaders.drop(self._array)
             self._buffer.release()
         self._array = self._buffer = None
 

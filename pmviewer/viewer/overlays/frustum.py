@@ -57,11 +57,11 @@ class Frustum(Overlay):
         ends = np.ascontiguousarray(frustum_lines(camera, length), np.float32)
         self._buffer = self.shaders.context.buffer(ends)
         content = [(self._buffer, "3f4", "position")]
-        self._array = self.shaders.context.vertex_array(self.shaders.get("frustum"), content)
+        self._array = self.shaders.array("frustum", content)
 
     def release(self) -> None:
         if self._array is not None and self._buffer is not None:
-            self._array.release()
+            self.shaders.drop(self._array)
             self._buffer.release()
         self._array = self._buffer = None
 

@@ -104,7 +104,8 @@ class Inspected(Overlay):
         report = source.inspector.report if source.inspector is not None else None
         if report is None or source.inspector is None:
             return None
-        return report, source.inspector.look_up, source.inspector.lit, source.inspector.light
+        inspector = source.inspector
+        return report, inspector.look_up_of(report), inspector.lit_of(report), inspector.light
 
     def take(
         self,

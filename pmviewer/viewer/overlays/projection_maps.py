@@ -86,11 +86,11 @@ class ProjectionMaps(Overlay):
             vertices = [cell_vertices(cells, radius, light_colour(number)) for number, cells in shown]
             self._buffer = self.shaders.context.buffer(np.concatenate(vertices))
             content = [(self._buffer, "3f4 2f4 3f4", "position", "corner", "tint")]
-            self._array = self.shaders.context.vertex_array(self.shaders.get("cells"), content)
+            self._array = self.shaders.array("cells", content)
 
     def release(self) -> None:
         if self._array is not None:
-            self._array.release()
+            self.shaders.drop(self._array)
         if self._buffer is not None:
             self._buffer.release()
         self._array = self._buffer = None

@@ -30,19 +30,15 @@ _LINES = 8.0
 
 
 def draw_false_legend(viewport: Viewport, top: float = 0.0) -> None:
-    """Of the view or difference in false colours that is shown, and the button to its settings; below `top`, where a
-    caption ends that goes across."""
+    """Of the view or difference in false colours that is shown; below `top`, where a caption ends that goes across.
+    `Viewport.legend_end` is where it ends, for the button to its settings."""
     shown = viewport.picture.planes.shown if viewport.picture is not None else None
     if shown is None:
         return
     if shown.info.classes:
-        bottom = _class_legend(viewport, shown.info.classes, shown.look.class_colours, top)
-    elif shown.info.cells:
-        return
-    else:
-        bottom = _scale_legend(viewport, shown, top)
-    if not viewport.alone:
-        _settings_button(viewport, shown, bottom)
+        viewport.legend_end = _class_legend(viewport, shown.info.classes, shown.look.class_colours, top)
+    elif not shown.info.cells:
+        viewport.legend_end = _scale_legend(viewport, shown, top)
 
 
 def draw_marks(viewport: Viewport) -> None:
@@ -140,8 +136,13 @@ def _draw_histogram(histogram: Histogram, place: tuple[float, float, float, floa
             draw.add_rect_filled((x1 - width, float(high)), (x1, float(low)), code)
 
 
-def _settings_button(viewport: Viewport, shown: Shown, bottom: float) -> None:
-    """Under the legend, at the right edge."""
+def draw_settings_button(viewport: Viewport) -> None:
+    """Under the legend that was drawn last, at the right edge. To be called before the picture's button: of things that
+    overlap, the first takes the mouse."""
+    shown = viewport.picture.planes.shown if viewport.picture is not None else None
+    bottom = viewport.legend_end
+    if shown is None or bottom is None or viewport.alone:
+        return
     line, back = imgui.get_text_line_height(), imgui.get_cursor_screen_pos()
     side = 1.15 * imgui.get_frame_height()
     x = viewport.origin[0] + viewport.size[0] - 0.1 * line - side

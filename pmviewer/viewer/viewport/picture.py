@@ -41,6 +41,10 @@ class Picture:
         self.layers.forget()
         self.framebuffers.drop("capture")
 
+    def rest(self) -> None:
+        """Once per window frame, after drawing: free what only compiling shaders needs."""
+        self._shaders.rest()
+
     def release(self) -> None:
         """Free everything."""
         self.forget_frame()

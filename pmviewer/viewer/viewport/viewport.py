@@ -29,6 +29,7 @@ from pmviewer.viewer.sides import Side
 from pmviewer.viewer.state import ViewerState
 from pmviewer.viewer.viewport.gizmo import Gizmo
 from pmviewer.viewer.viewport.hud import draw_hud
+from pmviewer.viewer.viewport.legend import draw_settings_button
 from pmviewer.viewer.viewport.navigation import DRAG_THRESHOLD, Clicks, Navigation
 from pmviewer.viewer.viewport.picking import picked
 from pmviewer.viewer.viewport.picture import Picture
@@ -60,6 +61,8 @@ class Viewport:
         """How often the picture was drawn: an idle window draws nothing."""
         self.origin = (0.0, 0.0)
         self.size = (0.0, 0.0)
+        self.legend_end: float | None = None
+        """Where the legend of false colours ends on the screen, None while there is none."""
         self._ratio = 1.0
         self._texture: moderngl.Texture | None = None
         self._drawn_key: Any = None
@@ -161,6 +164,7 @@ class Viewport:
             self._texture = picture.draw("window", target, camera, display, settings, navigating=navigating, pair=pair)
             self._drawn_key = key
             self.redraws += 1
+        picture.rest()
 
     def capture(self, *, overlays: bool) -> np.ndarray | None:
         """(height, width, 3) uint8: the picture at its own resolution, with or without the points; of compared
@@ -207,6 +211,8 @@ class Viewport:
             imgui.set_cursor_screen_pos(corner)
             self.gizmo.gui(self.shown_camera())
         self.slice.gui(self.shown_camera() if self._texture is not None else None)
+        draw_settings_button(self)
+        self.legend_end = None
         imgui.set_cursor_screen_pos(corner)
         buttons = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_middle
         if self.gizmo.wants_mouse:
@@ -214,7 +220,6 @@ class Viewport:
             draw_hud(self, not self.alone)
             self.draw_toasts()
             return
-        imgui.set_next_item_allow_overlap()  # for the button at the legend
         imgui.invisible_button("##picture", self.size, buttons | imgui.ButtonFlags_.mouse_button_right)
         hovered, active = imgui.is_item_hovered(), imgui.is_item_active()
         if hovered:

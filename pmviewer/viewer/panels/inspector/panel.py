@@ -62,6 +62,8 @@ class InspectorPanel:
             return
         report = inspector.report
         self._heading(report)
+        if inspector.pinned is None:  # by the heading's button
+            return
         if report is None:
             wrapped(OUTSIDE if inspector.outside else "Comes with the next pass.")
             return
@@ -103,7 +105,7 @@ class InspectorPanel:
 
     def _lit(self, report: PixelReport) -> None:
         inspector = self._state.inspector
-        place = inspector.lit
+        place = inspector.lit_of(report)
         assert place is not None
         names = [place_name(one) for one in report.lit]
         chosen = one_of("##surface", names, report.lit.index(place), "whose virtual lights are listed and drawn")
@@ -114,7 +116,7 @@ class InspectorPanel:
 
     def _look_ups(self, report: PixelReport) -> None:
         inspector = self._state.inspector
-        look_up = inspector.look_up
+        look_up = inspector.look_up_of(report)
         assert look_up is not None
         names = [look_up_name(one) for one in report.look_ups]
         chosen = one_of("##look-up", names, report.look_ups.index(look_up), "whose photons are listed and drawn")
