@@ -226,7 +226,7 @@ def test_glass_around_a_camera_that_sits_in_the_dark_is_known():
 
 def test_mirrored_glass_is_known_to_stop_particles_alone():
     """Scene 30012 of seed 9: a mirrored cube of glass. Our own methods and Mitsuba's paths have no such excuse."""
-    known = next(d for d in DEVIATIONS if d.name == "mirrored mesh by particles")
+    known = next(d for d in DEVIATIONS if d.name == "mirrored shape by particles")
     assert [known.concerns(peer) for peer in ("Mitsuba particles", "Mitsuba path", "our path")] == [True, False, False]
     scene = scene_of(9, 30012)
     without = known.without(scene)
@@ -234,6 +234,34 @@ def test_mirrored_glass_is_known_to_stop_particles_alone():
     assert [scene["shapes"][i]["type"] for i in changed] == ["cube"]
     assert ["scale", [1.0, 1.0, -1.0]] in scene["shapes"][changed[0]]["to_world"]
     assert ["scale", [1.0, 1.0, 1.0]] in without["shapes"][changed[0]]["to_world"]
+    assert known.without(without) is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "stops"), [("rectangle", True), ("cube", True), ("disk", False), ("cylinder", False), ("sphere", False)]
+)
+def test_mirrored_shapes_that_stop_particles(kind, stops):
+    """Scene 267 of seed 2611 has a metal rectangle."""
+    known = next(d for d in DEVIATIONS if d.name == "mirrored shape by particles")
+    mirrored = {"shapes": [{"type": kind, "to_world": [["scale", [-1.0, 1.0, 1.0]]]}], "groups": {}}
+    assert (known.without(mirrored) is not None) == stops
+    plain = {"shapes": [{"type": kind, "to_world": [["scale", [1.0, 1.0, 1.0]]]}], "groups": {}}
+    assert known.without(plain) is None
+
+
+def test_a_sphere_light_is_known_to_send_particles_as_before_it_was_turned():
+    """Scene 169 of seed 2611. The sphere stays where it is, as large and as bright; others' turns stay, too."""
+    known = next(d for d in DEVIATIONS if d.name == "turned sphere light by particles")
+    assert [known.concerns(peer) for peer in ("Mitsuba particles", "Mitsuba path")] == [True, False]
+    scene = scene_of(2611, 169)
+    without = known.without(scene)
+    (changed,) = (i for i, shape in enumerate(scene["shapes"]) if shape != without["shapes"][i])
+    before, after = scene["shapes"][changed], without["shapes"][changed]
+    assert before["type"] == "sphere"
+    assert after["emitter"] == before["emitter"]
+    assert [kind for kind, _ in after["to_world"]] == ["scale", "translate"]
+    np.testing.assert_allclose(after["to_world"][0][1], [0.4] * 3)
+    np.testing.assert_allclose(after["to_world"][1][1], [-0.6137, 0.389, 0.2])
     assert known.without(without) is None
 
 
