@@ -64,7 +64,9 @@ for dispatcher in (lengths, twice):
 """
 
 LARGE = """
+import gc
 import sys
+import llvmlite.binding as llvm
 import numpy as np
 from pmviewer.heap import give_back
 from pmviewer.kernels.compile import placed
@@ -82,11 +84,12 @@ def large(x, out):
 given = [(kind(0.1), np.zeros(500, to)) for kind in (np.float32, np.float64) for to in (np.float32, np.float64)]
 large(*given[0])  # the first one brings what all share
 give_back()
-before = resident()
+before, modules = resident(), sum(isinstance(o, llvm.ModuleRef) for o in gc.get_objects())
 for x, out in given[1:]:
     large(x, out)
 give_back()
 print((resident() - before) / len(given[1:]))
+print(sum(isinstance(o, llvm.ModuleRef) for o in gc.get_objects()) - modules)
 """
 PAGES = 10 * mmap.PAGESIZE / 2**20
 """MiB that filled pages and what Python keeps of a kernel take beside."""
@@ -131,11 +134,12 @@ def test_what_cannot_be_placed_is_loaded_by_llvm(tmp_path):
 def test_what_is_placed_takes_little_more_than_its_code(tmp_path):
     module = LARGE.replace("STATEMENTS", STATEMENTS)
     run(tmp_path, module)
-    placed, loaded = (float(run(tmp_path, module, word)[0]) for word in ("placed", "by LLVM"))
+    (placed, modules), (loaded, _) = (map(float, run(tmp_path, module, word)) for word in ("placed", "by LLVM"))
     files = list((tmp_path / "cache").rglob("*.nbc"))
     assert len(files) == 4
     size = sum(len(pickle.loads(file.read_bytes())[1][0][2][0]) for file in files) / 4 / 2**20
     assert placed < size + PAGES < loaded
+    assert modules == 0  # LLVM's, of 80 KiB each
 
 
 def object_file(text: str, model: str = "large") -> bytes:

@@ -10,6 +10,7 @@ import ctypes
 from typing import Any
 
 import llvmlite.binding as llvm
+from numba.core.codegen import CodeLibrary
 from numba.core.compiler import CompileResult
 from numba.core.registry import cpu_target
 
@@ -47,7 +48,9 @@ class PlacedLibrary(KernelLibrary):
             placed = image.load(data[0], codegen.address_of, _place_of)
         except (image.Unloadable, OSError):
             return super()._unserialize(codegen, state)
-        library: PlacedLibrary = codegen.create_library(name)
+        library = cls.__new__(cls)
+        CodeLibrary.__init__(library, codegen, name)  # without the LLVM module of CPUCodeLibrary
+        library._linking_libraries, library._final_module, library._shared_module = [], None, None
         library._image = placed
         library._native = library._finalized = library._disable_inspection = True
         return library
