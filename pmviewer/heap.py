@@ -6,6 +6,7 @@ from __future__ import annotations
 import ctypes
 import sys
 from collections.abc import Callable
+from functools import cache
 
 _M_ARENA_MAX = -8
 """Of malloc.h."""
@@ -26,7 +27,7 @@ def give_back() -> None:
         let_go()
     if not sys.platform.startswith("linux"):
         return
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # musl has none
+    trim = getattr(_c_library(), "malloc_trim", None)  # musl has none
     if trim is not None:
         trim(0)
 
@@ -37,6 +38,11 @@ def one_heap() -> None:
     be called before threads begin: a heap that is there stays. Kernels allocate next to nothing."""
     if not sys.platform.startswith("linux"):
         return
-    options = getattr(ctypes.CDLL(None), "mallopt", None)  # musl has none
+    options = getattr(_c_library(), "mallopt", None)  # musl has none
     if options is not None:
         options(_M_ARENA_MAX, 1)
+
+
+@cache
+def _c_library() -> ctypes.CDLL:
+    return ctypes.CDLL(None)

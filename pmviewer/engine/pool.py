@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
-from typing import Any
+from typing import Any, NoReturn
 
 from pmviewer.progress import Cancelled as Cancelled
 from pmviewer.progress import Task as Task
@@ -42,6 +42,17 @@ class _Batch:
         self.through: list[int] = []
         self.errors: dict[int, BaseException] = {}
         self.stopped = False
+
+
+def _raise_of(batch: _Batch) -> NoReturn:
+    """Raise what the first of the tasks that failed has raised. It knows the frames that it went through; if these knew
+    it, too, they and all pictures and maps in them would stay until Python looks for such circles."""
+    error = batch.errors[min(batch.errors)]
+    batch.errors.clear()
+    try:
+        raise error
+    finally:
+        del error
 
 
 class WorkPool:
@@ -77,7 +88,7 @@ class WorkPool:
             batch.stopped = True
             wait(workers)
         if batch.errors:
-            raise batch.errors[min(batch.errors)]
+            _raise_of(batch)
         if len(batch.through) < len(tasks):  # closed meanwhile
             raise Cancelled
         return batch.results

@@ -70,7 +70,7 @@ class Proxy:
         o, d, near, far = self._rays(origins, directions, np.inf)
         t, prim, uv = np.empty(len(o), np.float32), np.empty(len(o), np.int32), np.empty((len(o), 2), np.float32)
         cast_closest(self._record[0], o, d, near, far, t, prim, uv)
-        front = (self.normals[prim] * directions).sum(axis=1) < 0
+        front = np.einsum("ij,ij->i", self.normals[prim], directions) < 0
         return Hits(np.where(prim >= 0, t, np.inf).astype(np.float64), prim, front & (prim >= 0))
 
     def occluded(self, origins: Float, directions: Float, distance: Float | float) -> Bools:
@@ -112,14 +112,14 @@ def proxy_of(scene: Scene, keep: Bools | None = None) -> Proxy | None:
     if not 0 < radius < np.inf:
         return None
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(cross, axis=1)
+    length = np.sqrt(np.einsum("ij,ij->i", cross, cross))
     used = length > 1e-12 * radius**2
     if not used.any():
         return None
     if not used.all():
         corners, cross, length, shape, normals = (x[used] for x in (corners, cross, length, shape, normals))
         points = corners.reshape(-1, 3)
-    facing = np.where((cross * normals).sum(axis=1) < 0, -1.0, 1.0)
+    facing = np.where(np.einsum("ij,ij->i", cross, normals) < 0, -1.0, 1.0)
     bvh = build(np.ascontiguousarray(corners, np.float32), np.zeros((0, 12), np.float32))
     record = np.zeros(1, K.SCENE_DTYPE)
     bvh.store(record[0])
@@ -229,7 +229,8 @@ def _merged(vertices: Float, faces: NDArray, shape_of: NDArray, fronts: Fronts, 
     kept = kept[: spanning(faces, key, kept)]
     k = key[faces[kept]].astype(np.int64)
     if len(k) > MOST_EXACT // 4:
-        packed = np.sort(k, axis=1) @ np.array([side**6, side**3, 1])
+        least, most = (of(of(k[:, 0], k[:, 1]), k[:, 2]) for of in (np.minimum, np.maximum))
+        packed = least * side**6 + (k[:, 0] + k[:, 1] + k[:, 2] - least - most) * side**3 + most
         _, first = np.unique(packed, return_index=True)
         first.sort()
         kept, k = kept[first], k[first]

@@ -133,7 +133,9 @@ def _within(proxy: Proxy, samples: Float, percent: float, beyond: float) -> Floa
     """The points in the box that holds the samples but for so many percent at each end, and of its size beyond."""
     low, high = np.percentile(samples, (percent, 100 - percent), axis=0)
     reach = beyond * float((high - low).max())
-    inside = ((proxy.points >= low - reach) & (proxy.points <= high + reach)).all(axis=1)
+    inside = np.ones(len(proxy.points), bool)
+    for column, least, most in zip(proxy.points.T, low - reach, high + reach):
+        inside &= (column >= least) & (column <= most)
     return proxy.points[inside] if inside.any() else proxy.points
 
 
