@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import queue
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
@@ -104,11 +104,6 @@ def parallel(tasks: Sequence[Task]) -> list[Any]:
     return [result for _, result in grown(list(tasks), lambda result: ())] if len(tasks) > 1 else [t() for t in tasks]
 
 
-def _cancel(futures: Iterable[Future[Any]]) -> None:
-    for future in futures:
-        future.cancel()
-
-
 def grown(tasks: list[Task], more: Callable[[Any], Sequence[Task]]) -> list[tuple[int, Any]]:
     """Results of the tasks and of those that `more` makes of each result, numbered and in the order of being added."""
     watch = _watch.get()
@@ -116,38 +111,36 @@ def grown(tasks: list[Task], more: Callable[[Any], Sequence[Task]]) -> list[tupl
     done: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
     number: dict[Future[Any], int] = {}
     results: list[tuple[int, Any]] = []
+    pool = ThreadPoolExecutor(threads, "pmviewer load")
+
+    def add(task: Task) -> None:
+        future = pool.submit(task)
+        number[future] = len(number)
+        future.add_done_callback(done.put)
+
+    def ended() -> tuple[int, Any] | None:
+        try:
+            future = done.get(timeout=_EVERY)
+        except queue.Empty:
+            return None
+        try:
+            return number[future], future.result()
+        finally:
+            del future
+
     try:
-        with ThreadPoolExecutor(threads, "pmviewer load") as pool:
-
-            def add(task: Task) -> None:
-                future = pool.submit(task)
-                number[future] = len(number)
-                future.add_done_callback(done.put)
-
-            def ended() -> tuple[int, Any] | None:
-                try:
-                    future = done.get(timeout=_EVERY)
-                except queue.Empty:
-                    return None
-                try:
-                    return number[future], future.result()
-                finally:
-                    del future  # an error that it knows would stay, with all that is in the frames that it came through
-
-            try:
-                for task in tasks:
+        for task in tasks:
+            add(task)
+        while len(results) < len(number):
+            check()
+            if (one := ended()) is not None:
+                results.append(one)
+                for task in more(one[1]):
                     add(task)
-                while len(results) < len(number):
-                    check()
-                    if (one := ended()) is None:
-                        continue
-                    results.append(one)
-                    for task in more(one[1]):
-                        add(task)
-            finally:
-                _cancel(number)
-                number.clear()
     finally:
-        while not done.empty():  # what ended meanwhile knows the queue
+        pool.shutdown(cancel_futures=True)
+        # An error knows the frames that it came through: no frame may know it, by a future, or they all stay.
+        number.clear()
+        while not done.empty():
             done.get()
     return sorted(results, key=lambda pair: pair[0])
