@@ -68,8 +68,8 @@ def check() -> None:
 
 @contextmanager
 def beside(task: Callable[[], T]) -> Iterator[Callable[[], T]]:
-    """Within this context the task runs on a thread of its own; calling what is given waits for its result, and raises
-    what it raises. At the end the task is stopped as unwanted if it still runs."""
+    """Within this context the task runs on a thread of its own; calling what is given, once, waits for its result, and
+    raises what it raises. At the end the task is stopped as unwanted if it still runs."""
     left, watch = threading.Event(), _watch.get() or _Watch(None, None, None)
     unwanted = watch.unwanted or _never
 
@@ -78,9 +78,17 @@ def beside(task: Callable[[], T]) -> Iterator[Callable[[], T]]:
         return task()
 
     with ThreadPoolExecutor(1, "pmviewer beside") as pool:
-        future = pool.submit(copy_context().run, run)
+        begun = [pool.submit(copy_context().run, run)]
+
+        def result() -> T:
+            future = begun.pop()
+            try:
+                return future.result()
+            finally:
+                del future  # as in `grown`
+
         try:
-            yield future.result
+            yield result
         finally:
             left.set()
 

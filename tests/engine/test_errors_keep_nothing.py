@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 
 from pmviewer.engine.pool import WorkPool
-from pmviewer.progress import Cancelled, parallel
+from pmviewer.progress import Cancelled, beside, parallel
 
 
 class Picture:
@@ -41,6 +41,12 @@ def cancelled(tasks):
         pool.close()
 
 
+def by_beside(tasks):
+    with beside(tasks[0]) as first, beside(tasks[1]) as second:
+        first()
+        second()
+
+
 def raises_again(run, tasks, pictures):
     picture = Picture()
     pictures.append(weakref.ref(picture))
@@ -48,7 +54,13 @@ def raises_again(run, tasks, pictures):
 
 
 @pytest.mark.parametrize(
-    ("run", "error"), [(by_pool, ZeroDivisionError), (parallel, ZeroDivisionError), (cancelled, Cancelled)]
+    ("run", "error"),
+    [
+        (by_pool, ZeroDivisionError),
+        (parallel, ZeroDivisionError),
+        (by_beside, ZeroDivisionError),
+        (cancelled, Cancelled),
+    ],
 )
 def test_an_error_of_a_task_keeps_nothing_that_it_came_through(no_collector, run, error):
     pictures, both = [], threading.Barrier(2)
