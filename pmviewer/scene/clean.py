@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SceneError
-from pmviewer.kernels.meshes.mesh import FLAT, NOT_FINITE, judge, keep_used, keep_whole, number_used, renumber
+from pmviewer.kernels.meshes.mesh import FLAT, NOT_FINITE, judge, keep_used, keep_whole, number_marked, renumber
 from pmviewer.progress import parallel
 from pmviewer.scene.description import (
     Camera,
@@ -128,54 +128,62 @@ def clean_mesh(mesh: Mesh, dropped: Counter[str]) -> Mesh | None:
     those of the neighbouring faces; colours are cut to 0 … 1.
     """
     vertices, faces = np.ascontiguousarray(mesh.vertices, np.float64), np.ascontiguousarray(mesh.faces, np.int32)
-    verdict, place = np.empty(len(faces), np.uint8), np.empty(len(vertices), np.int32)
+    verdict, place = np.empty(len(faces), np.uint8), np.full(len(vertices), -1, np.int32)
     low, high = np.empty(3), np.empty(3)
-    judged = partial(judge, vertices, faces)
     pieces = [(piece.start, piece.stop) for piece in _pieces(faces)]
-    # What is used is counted beside: most files have good triangles only, and it need not be done again.
-    tasks = [
-        partial(number_used, vertices, faces, place, low, high),
-        *(partial(judged, i, j, LARGEST_COORDINATE, _FLATTEST, verdict) for i, j in pieces),
-    ]
-    n_used, *bad = parallel(tasks) if len(pieces) > 1 else [task() for task in tasks]
+    judged = partial(judge, vertices, faces)
+    bad = parallel([partial(judged, i, j, LARGEST_COORDINATE, _FLATTEST, verdict, place) for i, j in pieces])
+    for reason, number in (
+        ("triangle with a NaN, infinite or huge vertex", NOT_FINITE),
+        ("degenerate triangle", FLAT),
+    ):
+        if sum(bad) and (count := int((verdict == number).sum())):
+            dropped[reason] += count
+    if sum(bad) == len(faces):
+        return None
+    numbered = partial(number_marked, vertices, place, low, high)
     if sum(bad):
-        for reason, number in (
-            ("triangle with a NaN, infinite or huge vertex", NOT_FINITE),
-            ("degenerate triangle", FLAT),
-        ):
-            count = int((verdict == number).sum())
-            if count:
-                dropped[reason] += count
         ends = np.cumsum([j - i - wrong for (i, j), wrong in zip(pieces, bad)], dtype=np.int64).tolist()
         whole = np.empty((ends[-1], 3), np.int32)
         places = zip(pieces, [0, *ends], ends)
-        parallel([partial(keep_whole, faces, verdict, i, j, whole[to:end]) for (i, j), to, end in places])
+        kept = [partial(keep_whole, faces, verdict, i, j, whole[to:end]) for (i, j), to, end in places]
+        n_used, *_ = parallel([numbered, *kept])
         faces = whole
-    if not len(faces):
-        return None
-    if sum(bad):
-        n_used = number_used(vertices, faces, place, low, high)
-    cleaned = _without_unused(mesh, vertices, faces, None if n_used == len(vertices) else place)
+    else:
+        n_used = numbered()
+    if n_used == len(vertices):
+        cleaned = _with_all(mesh, vertices, faces)
+    else:
+        cleaned = _without_unused(mesh, vertices, faces, place, n_used, faces if sum(bad) else np.empty_like(faces))
     know_bounds(cleaned, low, high)
     return cleaned
 
 
+def _with_all(mesh: Mesh, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Mesh:
+    """The mesh with these faces, which use all of its vertices."""
+    normals = None if mesh.normals is None else _mended(Mesh(vertices, faces, mesh.normals))
+    return Mesh(vertices, faces, normals, _finite(mesh.uv), _colours(mesh.colours))
+
+
 def _without_unused(
-    mesh: Mesh, vertices: NDArray[np.float64], faces: NDArray[np.int32], place: NDArray[np.int32] | None
+    mesh: Mesh,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    place: NDArray[np.int32],
+    n_used: int,
+    renumbered: NDArray[np.int32],
 ) -> Mesh:
-    """The mesh with these faces. `place` (V,) has the new number of each vertex, −1 for those that no face uses; None
-    where they use all."""
-    if place is None:
-        normals = None if mesh.normals is None else _mended(Mesh(vertices, faces, mesh.normals))
-        return Mesh(vertices, faces, normals, _finite(mesh.uv), _colours(mesh.colours))
-    used = np.flatnonzero(place >= 0)
-    normals = mesh.normals
-    if normals is not None:
-        whole = np.where(np.isfinite(vertices), vertices, 0.0)
-        normals = _mended(Mesh(whole, faces, normals))[used]
-    uv = None if mesh.uv is None else _finite(mesh.uv[used])
-    colours = None if mesh.colours is None else _colours(mesh.colours[used])
-    kept, renumbered = np.empty((len(used), 3)), np.empty_like(faces)
+    """The mesh with these faces and the `n_used` vertices that they use. `place` (V,) has the new number of each
+    vertex, −1 for others; the faces get theirs in `renumbered`, which may be the faces themselves."""
+    normals, uv, colours = mesh.normals, mesh.uv, mesh.colours
+    if normals is not None or uv is not None or colours is not None:
+        used = np.flatnonzero(place >= 0)
+        if normals is not None:
+            whole = np.where(np.isfinite(vertices), vertices, 0.0)
+            normals = _mended(Mesh(whole, faces, normals))[used]
+        uv = None if uv is None else _finite(uv[used])
+        colours = None if colours is None else _colours(colours[used])
+    kept = np.empty((n_used, 3))
     parallel(
         [
             partial(keep_used, vertices, place, kept),

@@ -64,15 +64,21 @@ def test_minus_zero_is_zero_and_what_is_no_number_stays() -> None:
 
 
 def test_cells() -> None:
-    """The means of the vertices in each cell, and which triangles span three: by loops over all."""
+    """The means of the vertices in each cell, and the first triangle between each three: by loops over all."""
     rng = np.random.default_rng(3)
     vertices, cells, size, start = rng.uniform(-1.5, 1.5, (400, 3)), 5, 0.4, np.full(3, -1.0)
-    faces = rng.integers(0, 400, (300, 3)).astype(np.int32)
-    key, mean, kept = np.empty(400, np.int32), np.empty((7**3, 3)), np.empty(300, np.int64)
+    faces = rng.integers(0, 12, (300, 3)).astype(np.int32)
+    key, mean = np.empty(400, np.int32), np.empty((7**3, 3))
     cell_means(vertices, start, size, cells, key, mean)
     at = [tuple(min(max(int(np.floor(c)), -1), cells) + 1 for c in (v - start) / size) for v in vertices]
     assert key.tolist() == [(x * 7 + y) * 7 + z for x, y, z in at]
     for k in set(key.tolist()):
         assert np.allclose(mean[k], vertices[key == k].mean(axis=0))
-    count = spanning(faces, key, kept)
-    assert kept[:count].tolist() == [i for i, f in enumerate(faces) if len({at[j] for j in f}) == 3]
+    sets = [frozenset(at[j] for j in f) for f in faces]
+    firsts = [i for i, cells_of in enumerate(sets) if len(cells_of) == 3 and cells_of not in sets[:i]]
+    assert firsts != [i for i, cells_of in enumerate(sets) if len(cells_of) == 3]
+    for most in (300, len(firsts), len(firsts) - 1):
+        kept = np.full(most, -1, np.int64)
+        count = spanning(faces, key, np.empty(1024, np.int32), kept)
+        assert count == min(len(firsts), most + 1)
+        assert kept[:count].tolist() == firsts[:most]

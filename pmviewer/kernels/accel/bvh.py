@@ -94,11 +94,13 @@ class Bvh:
 @dataclass(frozen=True)
 class Begun:
     """The tree over the first `n_triangles` of `triangles` (n, 3, 3), to which others are added that aren't there yet,
-    up to `room` primitives: `begun` makes it, `build` finishes it, once. `boxes` (n_kept + room, 8)."""
+    up to `room` primitives: `begun` makes it, `build` finishes it, once. `boxes` (n_kept + room, 8), `memory` that
+    sorting them took."""
 
     triangles: F4
     n_triangles: int
     boxes: F4
+    memory: F4
     n_kept: int
     root: Part
     room: int
@@ -112,8 +114,9 @@ def begun(triangles: F4, n_triangles: int, room: int) -> Begun | None:
     if not n_kept:
         return None
     box, centers = around.min(axis=0)
-    root = built_part(boxes[:n_kept], n_kept, 0, box, centers, 1)
-    return Begun(triangles, n_triangles, boxes[: n_kept + room], n_kept, root, room)
+    memory = _memory(n_kept)
+    root = built_part(boxes[:n_kept], n_kept, 0, box, centers, memory, 1)
+    return Begun(triangles, n_triangles, boxes[: n_kept + room], memory, n_kept, root, room)
 
 
 def build(triangles: F4, quadrics: F4, boxed: tuple[F4, F4] | None = None, started: Begun | None = None) -> Bvh:
@@ -145,14 +148,22 @@ def build(triangles: F4, quadrics: F4, boxed: tuple[F4, F4] | None = None, start
     around = np.concatenate([around, [[_joined(others), _joined(others - others[:, TURNED])]]]).min(axis=0)
     others.view(np.int32)[:, 3] = kept
 
+    memory = _memory(len(boxes)) if started is None else started.memory
     if started is None:
-        root = built_part(boxes, n_kept, 0, around[0], around[1])
+        root = built_part(boxes, n_kept, 0, around[0], around[1], memory)
     elif len(boxes) == done:
         root = started.root
     else:
-        root = both(started.root, built_part(boxes, n_kept, done, around[0], around[1], 1))
-    nodes, blocks = pack(triangles, boxes, n_kept, binary_tree(root))
+        added = built_part(boxes, n_kept, done, around[0], around[1], _memory(len(boxes) - done), 1)
+        root = both(started.root, added)
+    nodes, blocks = pack(triangles, boxes, n_kept, binary_tree(root), memory)
     return Bvh(nodes, blocks, own_quadrics, len(triangles))
+
+
+def _memory(n: int) -> F4:
+    """Rows in which n boxes can be sorted and that blocks of seven triangles take over then, so that the system need
+    not clear other memory for them. What is beyond the boxes is no memory until it is written to."""
+    return aligned_empty((max(6 * n // 4, 1), LANES), np.float32)
 
 
 def _joined(rows: F4) -> F4:

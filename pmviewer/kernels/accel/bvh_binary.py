@@ -70,15 +70,14 @@ class _Boxes:
     workshop: _Workshop
 
 
-def built_part(rows: F4, n_triangles: int, first: int, box: F4, centers: F4, depth: int = 0) -> Part:
+def built_part(rows: F4, n_triangles: int, first: int, box: F4, centers: F4, spare: F4, depth: int = 0) -> Part:
     """The tree over the boxes (n, 8) from `first` on, which it reorders; those from `n_triangles` on are quadrics or
-    instances. `box` (8,) is that around all of them, `centers` (8,) that around their centres, `depth` how many nodes
-    there will be above.
+    instances. `box` (8,) is that around all of them, `centers` (8,) that around their centres, `spare` (≥ as many, 8)
+    memory to sort them, `depth` how many nodes there will be above.
 
     It is the same for any number of threads. Raises Cancelled.
     """
     count = len(rows) - first
-    spare = aligned_empty((max(count, 1), LANES), np.float32)
     boxes = _Boxes(rows, n_triangles, first, spare, _Workshop(min(count, ALONE)))
     root = Part(box.copy(), centers.copy(), depth)
     root.box.view(np.int32)[[FIRST, HELD]] = first, count

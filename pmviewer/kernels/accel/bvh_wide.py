@@ -43,8 +43,9 @@ class _Input:
         )  # fmt: skip
 
 
-def pack(triangles: F4, boxes: F4, n_triangles: int, binary: Binary) -> tuple[F4, F4]:
-    """Wide nodes (k, 8, 8) and blocks (max(n_blocks, 1), 10, 8) of the binary tree over the boxes. Raises Cancelled."""
+def pack(triangles: F4, boxes: F4, n_triangles: int, binary: Binary, memory: F4) -> tuple[F4, F4]:
+    """Wide nodes (k, 8, 8) and blocks (max(n_blocks, 1), 10, 8) of the binary tree over the boxes; the blocks in
+    `memory` (n, 8), aligned, where there is room. Raises Cancelled."""
     given = _Input(triangles, boxes, n_triangles, binary)
     everything = len(binary.nodes)
     whole = binary.n_upper if binary.n_upper > 1 else everything
@@ -60,7 +61,9 @@ def pack(triangles: F4, boxes: F4, n_triangles: int, binary: Binary) -> tuple[F4
         n_nodes, n_blocks = n_nodes + own_nodes, n_blocks + own_blocks
     nodes = aligned_empty((n_nodes, NODE_ROWS, LANES), np.float32)
     # An unused lane refers to block 0, which therefore always exists.
-    blocks = aligned_empty((max(binary.n_blocks, 1), BLOCK_ROWS, LANES), np.float32)
+    rows = BLOCK_ROWS * max(binary.n_blocks, 1)
+    fits = rows <= len(memory)
+    blocks = (memory[:rows] if fits else aligned_empty((rows, LANES), np.float32)).reshape(-1, BLOCK_ROWS, LANES)
     blocks[0] = 0.0
     parallel([partial(given.run, job, everything if i else whole, nodes, blocks) for i, job in enumerate(jobs)])
     return nodes, blocks

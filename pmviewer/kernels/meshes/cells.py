@@ -35,13 +35,38 @@ def cell_means(vertices, start, size, cells, key, mean):
                 mean[k, axis] /= count[k]
 
 
+@device
+def _mixed(a, b, c):
+    h = np.uint64(a) * np.uint64(0x9E3779B97F4A7C15) ^ np.uint64(b) * np.uint64(0xC2B2AE3D27D4EB4F)
+    h = (h ^ np.uint64(c)) * np.uint64(0x165667B19E3779F9)
+    return h ^ (h >> np.uint64(32))
+
+
 @kernel
-def spanning(faces, key, kept):
-    """The faces whose corners lie in three different cells: their numbers go to kept (F,) int64; returns how many."""
+def spanning(faces, key, table, kept):
+    """The first face between each three different cells: its number goes to kept (m,) int64. `table` (a power of two
+    above m,) int32 is scratch. Returns how many there are, m + 1 for more than m."""
+    mask = np.uint64(len(table) - 1)
+    table[:] = -1
     count = 0
     for f in range(len(faces)):
         a, b, c = key[faces[f, 0]], key[faces[f, 1]], key[faces[f, 2]]
-        if a != b and b != c and c != a:
-            kept[count] = f
-            count += 1
+        if a == b or b == c or c == a:
+            continue
+        low, high = min(a, min(b, c)), max(a, max(b, c))
+        middle = a ^ b ^ c ^ low ^ high
+        slot = _mixed(low, middle, high) & mask
+        while table[slot] >= 0:
+            other = kept[table[slot]]
+            p, q, r = key[faces[other, 0]], key[faces[other, 1]], key[faces[other, 2]]
+            if min(p, min(q, r)) == low and max(p, max(q, r)) == high and p ^ q ^ r ^ low ^ high == middle:
+                break
+            slot = (slot + np.uint64(1)) & mask
+        if table[slot] >= 0:
+            continue
+        if count == len(kept):
+            return count + 1
+        table[slot] = np.int32(count)
+        kept[count] = f
+        count += 1
     return count

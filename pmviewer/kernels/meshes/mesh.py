@@ -32,10 +32,10 @@ def _edge(vertices, a, b):
 
 
 @kernel
-def judge(vertices, faces, begin, end, largest, flattest, verdict):
+def judge(vertices, faces, begin, end, largest, flattest, verdict, number):
     """For the faces [begin, end): NOT_FINITE where a coordinate of vertices (V, 3) float64 is no number up to `largest`
     in size, FLAT where the height of what float32 makes of the triangle is `flattest` of its longest edge or less.
-    Returns how many are not WHOLE."""
+    number (V,) int32 becomes 0 for the vertices of those that are WHOLE. Returns how many are not."""
     bad = 0
     for f in range(begin, end):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
@@ -53,18 +53,24 @@ def judge(vertices, faces, begin, end, largest, flattest, verdict):
         if not (area > flattest * longest and longest > 0):
             verdict[f] = FLAT
             bad += 1
+            continue
+        # Other threads write the same number.
+        number[a] = number[b] = number[c] = 0
     return bad
 
 
 @kernel
-def number_used(vertices, faces, number, low, high):
-    """number (V,) int32 becomes 0, 1, 2 … for the vertices (V, 3) that faces use, in their own order, −1 for others;
-    low and high (3,) the corners of the box around them. Returns how many are used."""
-    for i in range(len(number)):
-        number[i] = -1
+def mark_used(faces, number):
+    """number (V,) int32 becomes 0 for the vertices that faces use."""
     for f in range(len(faces)):
         for k in range(3):
             number[faces[f, k]] = 0
+
+
+@kernel
+def number_marked(vertices, number, low, high):
+    """number (V,) int32, 0 for vertices (V, 3) that are used and −1 for others, becomes 0, 1, 2 … for those that are,
+    in their own order; low and high (3,) the corners of the box around them. Returns how many they are."""
     x0, y0, z0, x1, y1, z1 = np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf
     used = np.int32(0)
     for i in range(len(number)):
@@ -81,7 +87,7 @@ def number_used(vertices, faces, number, low, high):
 
 @kernel
 def renumber(faces, number, out):
-    """out (F, 3) int32 = number (V,) at the corners of the faces."""
+    """out (F, 3) int32, which may be the faces themselves, = number (V,) at the corners of the faces."""
     for f in range(len(faces)):
         for k in range(3):
             out[f, k] = number[faces[f, k]]
@@ -127,3 +133,14 @@ def face_normals(vertices, faces, out):
         length = max(np.sqrt(nx * nx + ny * ny + nz * nz), 1e-300)
         for k in range(3):
             out[f, k, 0], out[f, k, 1], out[f, k, 2] = nx / length, ny / length, nz / length
+
+
+@kernel
+def across(vertices, faces, chosen, out):
+    """out (n, 3) float64 = along the normals of the chosen (n,) of the faces, as long as twice their areas."""
+    for i in range(len(chosen)):
+        f = chosen[i]
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        px, py, pz = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2]
+        qx, qy, qz = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2]
+        out[i, 0], out[i, 1], out[i, 2] = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx

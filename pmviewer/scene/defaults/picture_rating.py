@@ -56,20 +56,18 @@ def rated_pictures(proxy: Proxy, cameras: list[Camera], close: float, *, inside:
     rays = _rays_of(cameras, SIDE).reshape(-1, 3)
     eyes = np.repeat(np.array([camera.origin for camera in cameras]), SIDE * SIDE, axis=0)
     hits = proxy.closest(eyes, rays)
-    found = []
-    for i, camera in enumerate(cameras):
-        here = slice(i * SIDE * SIDE, (i + 1) * SIDE * SIDE)
-        met = hits.met[here]
-        if not met.any():
-            found.append(Rated(camera, 0.0, 0.0, 0.0))
-            continue
-        _, number = np.unique(hits.triangle[here][met], return_counts=True)
-        share = number / met.sum()
-        entropy = -float((share * np.log(share)).sum()) + 1.0
-        front = float(hits.front[here][met].mean())
-        cover = float(met.mean())
-        near = float((hits.distance[here][met] < close).mean())
-        filled = min(1.0, cover / 0.6) if inside else min(1.0, 0.1 + cover / 0.4)
-        rating = entropy * (_BACK + (1 - _BACK) * front) * filled * (1 - near) ** 2
-        found.append(Rated(camera, rating, front, cover))
-    return found
+    n, met = len(cameras), hits.met.reshape(len(cameras), -1)
+    triangle, total = hits.triangle.reshape(met.shape), np.maximum(met.sum(axis=1), 1)
+    key = (np.arange(n)[:, None] * len(proxy.areas) + triangle)[met]
+    key, number = np.unique(key, return_counts=True)
+    # −Σ pᵢ log pᵢ with pᵢ = number / total
+    sums = np.bincount(key // len(proxy.areas), number * np.log(number), n)
+    entropy = np.log(total) - sums / total + 1.0
+    front = (hits.front.reshape(met.shape) & met).sum(axis=1) / total
+    near = ((hits.distance.reshape(met.shape) < close) & met).sum(axis=1) / total
+    cover = met.mean(axis=1)
+    filled = np.minimum(1.0, cover / 0.6 if inside else 0.1 + cover / 0.4)
+    rating = entropy * (_BACK + (1 - _BACK) * front) * filled * (1 - near) ** 2
+    rating[cover == 0] = 0.0
+    columns = (rating.tolist(), front.tolist(), cover.tolist())
+    return [Rated(camera, *row) for camera, *row in zip(cameras, *columns)]

@@ -20,6 +20,7 @@ from pmviewer.kernels.accel.bvh import Bvh, build
 from pmviewer.kernels.accel.occlusion import cast_occluded
 from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.kernels.meshes.cells import cell_means, spanning
+from pmviewer.kernels.meshes.mesh import across
 from pmviewer.scene.arrays.tessellate import triangles_of
 from pmviewer.scene.description import Group, Mesh, Scene, Shape
 
@@ -129,7 +130,8 @@ def proxy_of(scene: Scene, keep: Bools | None = None) -> Proxy | None:
 
 Part = tuple[Float, Float, NDArray[np.int64], Float]
 """Corners (n, 3, 3), a vector to the front of each (n, 3), shape (n,), and the places of the corners (m, 3)."""
-Fronts = Callable[[NDArray[np.int64]], Float]
+About = Callable[[NDArray[np.int64]], tuple[Float, NDArray[np.int64]]]
+"""Vectors to the front of faces, and the numbers of their shapes."""
 
 
 def _parts(scene: Scene, keep: Bools) -> list[Part]:
@@ -153,7 +155,7 @@ def _parts(scene: Scene, keep: Bools) -> list[Part]:
     if sum(len(part[0]) for part in parts) > 2 * MOST_EXACT and scene.instances:
         corners, normals, shape, _ = (np.concatenate(column) for column in zip(*parts))
         faces = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
-        return [_merged(corners.reshape(-1, 3), faces, shape, lambda kept: normals[kept])]
+        return [_merged(corners.reshape(-1, 3), faces, lambda kept: (normals[kept], shape[kept]))]
     return parts
 
 
@@ -181,40 +183,41 @@ def _reduced(shapes: list[tuple[int, Shape]]) -> list[Part]:
             parts.append((corners, normals.mean(axis=1), np.full(len(corners), i), corners.reshape(-1, 3)))
     if not meshes:
         return parts
-    counts = [len(mesh.faces) for _, mesh in meshes]
-    shape_of = np.repeat([i for i, _ in meshes], counts)
     starts = np.cumsum([0, *(len(mesh.vertices) for _, mesh in meshes)])
     if len(meshes) == 1:
         vertices, faces = meshes[0][1].vertices, meshes[0][1].faces
     else:
         vertices = np.concatenate([mesh.vertices for _, mesh in meshes])
         faces = np.concatenate([mesh.faces + start for (_, mesh), start in zip(meshes, starts)])
-    firsts = np.cumsum([0, *counts])
+    firsts = np.cumsum([0, *(len(mesh.faces) for _, mesh in meshes)])
 
-    def fronts(kept: NDArray[np.int64]) -> Float:
-        """Sums of the vertex normals of these faces, or, without, what the order of the corners says."""
+    def about(kept: NDArray[np.int64]) -> tuple[Float, NDArray[np.int64]]:
+        """Sums of the vertex normals of these faces, or, without, what the order of the corners says; and whose they
+        are."""
         found = np.empty((len(kept), 3))
         owner = np.searchsorted(firsts, kept, side="right") - 1
-        for k in np.unique(owner):
+        for k in np.flatnonzero(np.bincount(owner)):
             mesh, at = meshes[k][1], owner == k
-            corners = mesh.faces[kept[at] - firsts[k]]
+            chosen = kept[at] - firsts[k]
             if mesh.normals is not None:
-                found[at] = mesh.normals[corners].sum(axis=1)
+                found[at] = mesh.normals[mesh.faces[chosen]].sum(axis=1)
             else:
-                a, b, c = (mesh.vertices[corners[:, j]] for j in range(3))
-                found[at] = np.cross(b - a, c - a)
-        return found
+                own = np.empty((len(chosen), 3))
+                across(np.ascontiguousarray(mesh.vertices, np.float64), np.ascontiguousarray(mesh.faces), chosen, own)
+                found[at] = own
+        return found, np.array([i for i, _ in meshes])[owner]
 
     if len(faces) <= MOST_EXACT:
-        parts.append((vertices[faces], fronts(np.arange(len(faces))), shape_of, vertices))
+        normals, numbers = about(np.arange(len(faces)))
+        parts.append((vertices[faces], normals, numbers, vertices))
     else:
-        parts.append(_merged(vertices, faces, shape_of, fronts))
+        parts.append(_merged(vertices, faces, about))
     return parts
 
 
-def _merged(vertices: Float, faces: NDArray, shape_of: NDArray, fronts: Fronts, cells: int = CELLS) -> Part:
+def _merged(vertices: Float, faces: NDArray, about: About, cells: int = CELLS) -> Part:
     """The triangles between the means of the vertices in each cell. What lies far outside goes to the grid's rim, where
-    few vertices share a cell, so that backdrops stay in their place. `fronts` gives vectors to the front of faces."""
+    few vertices share a cell, so that backdrops stay in their place."""
     some = vertices[:: max(1, len(vertices) // 100_000)]
     low, high = np.percentile(some, (1, 99), axis=0)
     size = float((high - low).max()) * 1.2 / cells
@@ -225,20 +228,17 @@ def _merged(vertices: Float, faces: NDArray, shape_of: NDArray, fronts: Fronts, 
     key, mean = np.empty(len(vertices), np.int32), np.empty((side**3, 3))
     cell_means(np.ascontiguousarray(vertices, np.float64), start, size, cells, key, mean)
     faces = np.ascontiguousarray(faces)
-    kept = np.empty(len(faces), np.int64)
-    kept = kept[: spanning(faces, key, kept)]
-    k = key[faces[kept]].astype(np.int64)
-    if len(k) > MOST_EXACT // 4:
-        least, most = (of(of(k[:, 0], k[:, 1]), k[:, 2]) for of in (np.minimum, np.maximum))
-        packed = least * side**6 + (k[:, 0] + k[:, 1] + k[:, 2] - least - most) * side**3 + most
-        _, first = np.unique(packed, return_index=True)
-        first.sort()
-        kept, k = kept[first], k[first]
-    if len(k) > 2 * MOST_EXACT and cells > 8:
-        return _merged(vertices, faces, shape_of, fronts, cells // 2)
+    most = 2 * MOST_EXACT if cells > 8 else len(faces)
+    kept = np.empty(min(most, len(faces)), np.int64)
+    count = spanning(faces, key, np.empty(1 << (2 * len(kept)).bit_length(), np.int32), kept)
+    if count > len(kept):
+        return _merged(vertices, faces, about, cells // 2)
+    kept = kept[:count].copy()
+    k = key[faces[kept]]
     finer = min(MOST_CELLS, int(cells * math.sqrt(MOST_EXACT / 2 / max(len(k), 1))))
     if cells == CELLS and finer > 1.3 * CELLS:
-        return _merged(vertices, faces, shape_of, fronts, finer)
+        return _merged(vertices, faces, about, finer)
     met = np.zeros(len(mean), bool)
     met[k] = True
-    return mean[k], fronts(kept), shape_of[kept], mean[met]
+    normals, shape = about(kept)
+    return mean[k], normals, shape, mean[met]

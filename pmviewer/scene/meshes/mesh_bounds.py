@@ -7,7 +7,7 @@ import weakref
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.meshes.mesh import number_used
+from pmviewer.kernels.meshes.mesh import mark_used, number_marked
 from pmviewer.scene.description import Mesh
 
 _known: dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
@@ -19,7 +19,9 @@ def mesh_bounds(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     if id(mesh) not in _known:
         box = np.empty(3), np.empty(3)
         vertices, faces = np.ascontiguousarray(mesh.vertices, np.float64), np.ascontiguousarray(mesh.faces, np.int32)
-        number_used(vertices, faces, np.empty(len(vertices), np.int32), *box)
+        number = np.full(len(vertices), -1, np.int32)
+        mark_used(faces, number)
+        number_marked(vertices, number, *box)
         know_bounds(mesh, *box)
     low, high = _known[id(mesh)]
     return low.copy(), high.copy()
