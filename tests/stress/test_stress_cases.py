@@ -10,7 +10,7 @@ import pytest
 from pmviewer.bench.stress.inputs import NONSENSE, inputs
 from pmviewer.bench.stress.lab import Case, Lab, Outcome, Row, run_case
 from pmviewer.bench.stress.sizes import counts, kept, meshes, pictures, radii, scales
-from pmviewer.bench.stress.suite import all_cases, table
+from pmviewer.bench.stress.suite import all_cases, run_cases, table
 from pmviewer.bench.stress.surfaces import lights, materials, overlaps
 from pmviewer.engine.pool import WorkPool
 from pmviewer.errors import SceneError
@@ -88,9 +88,22 @@ def test_whatever_a_case_raises_is_its_row(lab):
     assert run_case(lab, Case("a", "b", "", refuse)).verdict == "refused"
     assert run_case(lab, Case("a", "b", "", refuse, nonsense=True)).verdict == "said"
     assert run_case(lab, Case("a", "b", "", fail)).verdict == "ZeroDivisionError: by nothing"
-    result = table([row_of(Outcome(1.0, 0.1, 1.0)), row_of(Outcome(problem="broken"))])
+    result = table([row_of(Outcome(1.0, 0.1, 1.0)), row_of(Outcome(problem="broken"))], 1.0)
     assert [target.ok for target in result.targets] == [False, True, True]
     assert any("broken" in note for note in result.notes)
+
+
+def test_a_case_in_a_process_of_its_own_says_the_same(lab):
+    """A picture with numbers, a file that makes no sense; and a case that isn't there, which ends the process."""
+    cases, told = all_cases(), []
+    numbers = [next(i for i, c in enumerate(cases) if c.name == name) for name in ("1 × 1", "fov 180")]
+    rows = run_cases([*cases, Case("a", "b", "", lambda lab: Outcome())], [len(cases), *numbers], told.append)
+    assert sorted(row.case.name for row in told) == sorted(row.case.name for row in rows)
+    assert [row.case for row in rows[1:]] == [cases[i] for i in numbers]
+    assert rows[0].wrong.startswith("the process ended with status 1: IndexError")
+    for row, number in zip(rows[1:], numbers):
+        own = run_case(Lab(lab.pool), cases[number])
+        assert repr(row.outcome) == repr(own.outcome)
 
 
 def test_share_of_a_disc_on_a_sphere_by_points():
