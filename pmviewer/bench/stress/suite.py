@@ -11,11 +11,11 @@ from itertools import groupby
 
 from pmviewer.bench.guarded import Ended, Guarded, Limits
 from pmviewer.bench.report import BenchResult, Cell, Target
+from pmviewer.bench.stress.answers import THREADS, row_of
 from pmviewer.bench.stress.drawn import drawn
 from pmviewer.bench.stress.inputs import inputs
 from pmviewer.bench.stress.lab import Case, Outcome, Row
 from pmviewer.bench.stress.media import media
-from pmviewer.bench.stress.server import THREADS, row_of
 from pmviewer.bench.stress.sizes import counts, meshes, pictures, radii, scales
 from pmviewer.bench.stress.surfaces import lights, materials, overlaps
 
