@@ -161,9 +161,9 @@ def build(triangles: F4, quadrics: F4, boxed: tuple[F4, F4] | None = None, start
 
 
 def _memory(n: int) -> F4:
-    """Rows in which n boxes can be sorted and that blocks of seven triangles take over then, so that the system need
-    not clear other memory for them. What is beyond the boxes is no memory until it is written to."""
-    return aligned_empty((max(6 * n // 4, 1), LANES), np.float32)
+    """Rows in which n boxes can be sorted, and that the wide tree takes over then unless its blocks have less than
+    seven triangles: the system need not clear other memory for it. Rows beyond the boxes are none until used."""
+    return aligned_empty((max(13 * n // 8, 1), LANES), np.float32)
 
 
 def _joined(rows: F4) -> F4:

@@ -44,8 +44,8 @@ class _Input:
 
 
 def pack(triangles: F4, boxes: F4, n_triangles: int, binary: Binary, memory: F4) -> tuple[F4, F4]:
-    """Wide nodes (k, 8, 8) and blocks (max(n_blocks, 1), 10, 8) of the binary tree over the boxes; the blocks in
-    `memory` (n, 8), aligned, where there is room. Raises Cancelled."""
+    """Wide nodes (k, 8, 8) and blocks (max(n_blocks, 1), 10, 8) of the binary tree over the boxes, next to each other:
+    in `memory` (n, 8), aligned, where there is room. Raises Cancelled."""
     given = _Input(triangles, boxes, n_triangles, binary)
     everything = len(binary.nodes)
     whole = binary.n_upper if binary.n_upper > 1 else everything
@@ -59,11 +59,12 @@ def pack(triangles: F4, boxes: F4, n_triangles: int, binary: Binary, memory: F4)
     for source, target, own_nodes, own_blocks in (job[:JOB_LEFT].tolist() for job in below):
         jobs.append(_job(source, target, n_nodes, n_blocks))
         n_nodes, n_blocks = n_nodes + own_nodes, n_blocks + own_blocks
-    nodes = aligned_empty((n_nodes, NODE_ROWS, LANES), np.float32)
     # An unused lane refers to block 0, which therefore always exists.
-    rows = BLOCK_ROWS * max(binary.n_blocks, 1)
-    fits = rows <= len(memory)
-    blocks = (memory[:rows] if fits else aligned_empty((rows, LANES), np.float32)).reshape(-1, BLOCK_ROWS, LANES)
+    ends = np.cumsum([n_nodes * NODE_ROWS, max(binary.n_blocks, 1) * BLOCK_ROWS]).tolist()
+    if ends[1] > len(memory):
+        memory = aligned_empty((ends[1], LANES), np.float32)
+    nodes = memory[: ends[0]].reshape(-1, NODE_ROWS, LANES)
+    blocks = memory[ends[0] : ends[1]].reshape(-1, BLOCK_ROWS, LANES)
     blocks[0] = 0.0
     parallel([partial(given.run, job, everything if i else whole, nodes, blocks) for i, job in enumerate(jobs)])
     return nodes, blocks
