@@ -77,3 +77,16 @@ def test_unpack_names_everything(directions):
     np.testing.assert_array_equal(unpacked["bounces"], flags & 0x1F)
     np.testing.assert_array_equal(unpacked["path_class"], flags >> 6)
     np.testing.assert_array_equal(unpacked["light"], light)
+
+
+def test_the_first_photons_of_some_classes():
+    """Against a loop over the flags, which say two bits of the class."""
+    rng = np.random.default_rng(2)
+    photons = rng.random((500, 6), np.float32)
+    photons.view(np.uint32)[:, 3] = rng.integers(0, 1 << 32, 500, np.uint32)
+    flags = photons.view(np.uint32)[:, 3] & 0xFF
+    for mask in (0b0001, 0b0110, 0b1111, 0):
+        wanted = [i for i in range(500) if mask >> (int(flags[i]) >> 6) & 1]
+        for most in (1, 100, 10_000):
+            found = record.first_in_classes(photons, mask, most)
+            assert np.array_equal(found.view(np.uint32), photons[wanted[:most]].view(np.uint32))

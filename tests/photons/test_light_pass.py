@@ -261,7 +261,7 @@ def test_photons_that_do_not_fit_are_refused_before_they_are_traced(monkeypatch)
         return serially(tasks)
 
     monkeypatch.setattr(batch_module, "PROBED", 1)
-    monkeypatch.setattr(lightpass, "BATCH", 1000)
+    monkeypatch.setattr(lightpass, "TASK", 1000)
     monkeypatch.setattr(batch_module, "available_memory", lambda: 10**9)
     with pytest.raises(SettingError, match=r"about 25,600,000 photons .* need 1\.5 GB .* 1\.0 GB are free"):
         trace(diffuse_box(albedo=1.0), N=400_000, run=counted)

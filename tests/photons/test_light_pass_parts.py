@@ -15,6 +15,8 @@ from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.stages.projection import projection_for
 from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.engine.store import StageStore
+from pmviewer.photons.light_pass.batch import Batch, joined_batches
+from pmviewer.photons.light_pass.ledger import N_COUNTS, empty_ledger
 from pmviewer.photons.light_pass.parts import runs_of_part
 from pmviewer.tasks import in_turn
 from tests.support.scenes import cornell_box, settings_of
@@ -127,3 +129,25 @@ def test_pictures_of_several_maps_have_the_same_mean(combine):
             assert means[4] == pytest.approx(means[1], rel=0.01)
     finally:
         pool.close()
+
+
+def test_batches_of_many_photons_are_joined_in_order():
+    rng = np.random.default_rng(4)
+    sizes = [0, 30_000, 1, 50_000, 0, 12_345]
+
+    def batch(n):
+        photons = rng.random((n, 6), np.float32)
+        none = np.empty(0, np.uint32)
+        counts, ledgers = np.zeros(N_COUNTS, np.int64), empty_ledger()
+        counts[0] = n
+        return Batch(photons[: n // 10], photons, counts, ledgers, rng.integers(0, 9, n).astype(np.uint32), none)
+
+    batches = [batch(n) for n in sizes]
+    pool = WorkPool(3)
+    whole = joined_batches(batches, pool.run)
+    pool.close()
+    assert np.array_equal(whole.global_, np.concatenate([b.global_ for b in batches]))
+    assert np.array_equal(whole.caustic, np.concatenate([b.caustic for b in batches]))
+    assert np.array_equal(whole.global_normals, np.concatenate([b.global_normals for b in batches]))
+    assert (len(whole.caustic_normals), len(whole.volume), whole.counts[0]) == (0, 0, sum(sizes))
+    assert len(joined_batches([]).global_) == 0

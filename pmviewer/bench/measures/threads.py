@@ -55,12 +55,14 @@ class _Stage:
 
 
 class WatchedPool(WorkPool):
-    """Remembers by stage what its tasks and the thread that calls it cost."""
+    """Remembers by stage what its tasks and the thread that calls it cost. It has one thread, and is taken for one of
+    `threads`, for which work is divided finely enough."""
 
-    def __init__(self, threads: int | None = None) -> None:
+    def __init__(self, threads: int = 1) -> None:
         self.stages: dict[str, _Stage] = {}
         self._name, self._since = BETWEEN, time.thread_time()
-        super().__init__(threads)
+        super().__init__(1)
+        self.threads = threads
 
     @property
     def stage(self) -> str:
@@ -123,9 +125,9 @@ def _clocked(opened: OpenScene, settings: Settings, threads: int, passes: int) -
     return best
 
 
-def _watched(opened: OpenScene, settings: Settings, passes: int) -> tuple[dict[str, _Stage], int]:
-    """What the counted passes cost by stage, and how many they are."""
-    pool = WatchedPool(1)
+def _watched(opened: OpenScene, settings: Settings, threads: int, passes: int) -> tuple[dict[str, _Stage], int]:
+    """What the counted passes cost by stage where so many threads are there, and how many they are."""
+    pool = WatchedPool(threads)
     try:
         prepare(opened, settings, pool, lambda text, share: None)
         renderer = Renderer(opened, settings, pool, StageStore(0))
@@ -147,18 +149,23 @@ def run(quick: bool = False) -> BenchResult:
     targets: list[Target] = []
     for scene, values in CASES[: 2 if quick else None]:
         opened, settings = open_scene(scene), with_values(Settings(), {**SIZE, **values})
-        stages, counted = _watched(opened, settings, passes)
+        watched = {n: _watched(opened, settings, n, passes) for n in THREADS}
         one, two = (_clocked(opened, settings, threads, passes) for threads in (1, 2))
         name = f"{scene}, {settings.render.method}{', cache' if settings.gather.cache == 'on' else ''}"
-        alone = sum(stage.alone for stage in stages.values())
-        for title, stage in sorted(stages.items(), key=lambda item: -item[1].alone):
-            lost = [(n * stage.on(n) - stage.alone) / (n - 1) / alone for n in THREADS]
+        alone = {n: sum(stage.alone for stage in stages.values()) for n, (stages, _) in watched.items()}
+        few, counted = watched[THREADS[0]]
+        for title, stage in sorted(few.items(), key=lambda item: -item[1].alone):
+            lost = [
+                (n * own.on(n) - own.alone) / (n - 1) / alone[n]
+                for n, (stages, _) in watched.items()
+                for own in [stages.get(title, _Stage())]
+            ]
             rows.append([name, title, 1e3 * stage.alone / counted, *(f"{share:.1%}" for share in lost), ""])
-        times = {n: sum(stage.on(n) for stage in stages.values()) for n in THREADS}
-        shares = {n: serial_share(alone, times[n], n) for n in THREADS}
+        times = {n: sum(stage.on(n) for stage in stages.values()) for n, (stages, _) in watched.items()}
+        shares = {n: serial_share(alone[n], times[n], n) for n in THREADS}
         speed = f"{one / two:.2f}×"
-        rows.append([name, "pass", 1e3 * alone / counted, *(f"{shares[n]:.1%}" for n in THREADS), speed])
-        targets.append(Target("P19", alone / times[2], 1.9, "×", True, f"{name}: two threads, by CPU times"))
+        rows.append([name, "pass", 1e3 * alone[2] / counted, *(f"{shares[n]:.1%}" for n in THREADS), speed])
+        targets.append(Target("P19", alone[2] / times[2], 1.9, "×", True, f"{name}: two threads, by CPU times"))
         targets.append(Target("P19", 100 * shares[8], 2.0, "%", False, f"{name}: serial share on eight threads"))
         if available_threads() > 1:
             targets.append(Target("P19", one / two, 1.9, "×", True, f"{name}: two threads, by the clock"))

@@ -23,7 +23,7 @@ from pmviewer.engine.stages.radiance_photons import median_radius, radiance_phot
 from pmviewer.engine.store import StageStore
 from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import automatic_radius, largest_power, neighbourhood
-from pmviewer.maps.record import DIRECT, in_classes
+from pmviewer.maps.record import DIRECT, first_in_classes, in_classes
 from pmviewer.maps.search.grid import PhotonGrid, build_grid, grid_steps
 from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
 from pmviewer.maps.search.parts import parts_of
@@ -235,7 +235,7 @@ class MapBuilder:
 def _direct(photons: PhotonMaps) -> Float:
     """The first photons that came from lights straight."""
     some = as_arrived(photons)[: 8 * CHOOSING_PHOTONS]  # of all classes
-    return of_classes(some, 1 << DIRECT)[:CHOOSING_PHOTONS]
+    return first_in_classes(some, 1 << DIRECT, CHOOSING_PHOTONS)
 
 
 def _in_turn(steps: Callable[[], Steps[Any]]) -> Any:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +17,19 @@ from pmviewer.photons.light_pass.roulette import EQUAL, MOST_COPIES
 from pmviewer.photons.light_pass.trace import PhotonBuffers, trace_photons
 from pmviewer.resources import available_memory
 from pmviewer.scene.arrays.flatten import FlatScene
-from pmviewer.tasks import Runner
+from pmviewer.tasks import Runner, in_turn
 
 Float = NDArray[np.float32]
 Codes = NDArray[np.uint32]
 
 BATCH = 8192
-"""Photons a task: fixed, so that the result does not depend on the number of threads."""
+"""Photons a task where rules judge whole batches: fixed, so that the number of threads does not change the result."""
+TASK = 4096
+"""Photons a task where nothing depends on batches: with many threads all would wait for the last of large ones."""
 PROBED = 16
 """Batches that tell how much memory all of them need, where they might need more than there is."""
+_COPIED = 1 << 15
+"""Photons that one task copies at least."""
 BYTES_PER_STORED = 60
 """A photon as it arrived, joined to the others, and in its map."""
 
@@ -125,3 +131,33 @@ def joined_codes(parts: Iterable[Codes]) -> Codes:
     """Normals (n,) of all parts, in order."""
     codes = list(parts)
     return codes[0] if len(codes) == 1 else np.concatenate([np.empty(0, np.uint32), *codes])
+
+
+def joined_batches(batches: Sequence[Batch], run: Runner = in_turn) -> Batch:
+    """Batches as one; of many photons each thread copies its share."""
+    tasks: list[Callable[[], Any]] = []
+
+    def copied(parts: list[Any]) -> Any:
+        ends = np.cumsum([0, *map(len, parts)]).tolist()
+        if len(parts) < 2 or ends[-1] < 2 * _COPIED:
+            return joined_codes(parts) if parts and parts[0].ndim == 1 else joined(parts)
+        whole = np.empty((ends[-1], *parts[0].shape[1:]), parts[0].dtype)
+        begin = 0
+        for i in range(1, len(ends)):
+            if ends[i] - ends[begin] >= _COPIED or i == len(parts):
+                tasks.append(partial(np.concatenate, parts[begin:i], out=whole[ends[begin] : ends[i]]))
+                begin = i
+        return whole
+
+    whole = Batch(
+        caustic=copied([b.caustic for b in batches]),
+        global_=copied([b.global_ for b in batches]),
+        counts=sum((b.counts for b in batches), np.zeros(N_COUNTS, np.int64)),
+        ledgers=sum((b.ledgers for b in batches), empty_ledger()),
+        global_normals=copied([b.global_normals for b in batches]),
+        caustic_normals=copied([b.caustic_normals for b in batches]),
+        volume=copied([b.volume for b in batches]),
+    )
+    if tasks:
+        run(tasks)
+    return whole

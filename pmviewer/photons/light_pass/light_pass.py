@@ -19,6 +19,7 @@ from pmviewer.photons.light_pass.batch import (
     GLOBAL_NORMALS,
     NO_NORMALS,
     NORMALS,
+    TASK,
     Batch,
     Codes,
     Float,
@@ -26,19 +27,20 @@ from pmviewer.photons.light_pass.batch import (
     Task,
     bounded,
     joined,
+    joined_batches,
     joined_codes,
     trace_batch,
 )
 from pmviewer.photons.light_pass.deposit import deposit
 from pmviewer.photons.light_pass.ledger import C_DROPPED, C_RAYS
-from pmviewer.photons.light_pass.parts import cuts_of, joined_batches
+from pmviewer.photons.light_pass.parts import cuts_of
 from pmviewer.photons.light_pass.paths import PhotonPaths
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.photons.light_pass.plan import PassPlan, pass_record, plan_pass
 from pmviewer.photons.projection.projection import Projection
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import Photons
-from pmviewer.tasks import Runner
+from pmviewer.tasks import Runner, in_turn
 
 
 def trace_pass(
@@ -67,24 +69,27 @@ def trace_pass(
     paths = watch if isinstance(watch, PhotonPaths) else None
     last = plan.traced if paths is None else min(plan.traced, paths.n)
     normals = NORMALS if deposition is not None else GLOBAL_NORMALS if with_normals else NO_NORMALS
-    batches = _batches(scene, plan, last, normals, paths)
+    each = TASK if deposition is None else BATCH
+    batches = _batches(scene, plan, last, each, normals, paths)
     if deposition is not None:
         fates = watch if isinstance(watch, Fates) else None
         maps = deposit(plan, deposition, batches, last, first_index, run, fates)
     else:
-        results = bounded([task for _, task in batches], BATCH * plan.most_stored, run)
-        maps = _joined(plan, results, last)
+        results = bounded([task for _, task in batches], each * plan.most_stored, run)
+        maps = _joined(plan, results, last, run)
     return maps if guided is None else _with_tests(maps, guided)
 
 
-def _batches(scene: FlatScene, plan: PassPlan, last: int, normals: int, paths: PhotonPaths | None) -> list[Numbered]:
-    """The batches of the first `last` trajectories, test photons that are stored among them."""
+def _batches(
+    scene: FlatScene, plan: PassPlan, last: int, each: int, normals: int, paths: PhotonPaths | None
+) -> list[Numbered]:
+    """The batches of the first `last` trajectories, `each` of that many, test photons that are stored among them."""
 
     def batch(i0: int) -> Task:
-        i1 = min(i0 + BATCH, last)
+        i1 = min(i0 + each, last)
         return lambda: trace_batch(scene, plan.record, plan.emission, i0, i1, normals, paths)
 
-    batches = [(i0, batch(i0)) for i0 in range(0, last, BATCH)]
+    batches = [(i0, batch(i0)) for i0 in range(0, last, each)]
     if plan.guided is None or paths is not None:
         return batches
     return _mixed(batches, [(last + j, task) for j, task in enumerate(plan.guided.kept)])
@@ -101,12 +106,12 @@ def _mixed(traced: list[Numbered], kept: list[Numbered]) -> list[Numbered]:
 def joined_parts(plan: PassPlan, parts: Sequence[Batch]) -> PhotonMaps:
     """The maps of a planned pass from all of its parts, in order, wherever they were traced
     (`pmviewer.photons.light_pass.parts.trace_part`)."""
-    return replace(_joined(plan, parts, plan.traced), cuts=cuts_of(parts))
+    return replace(_joined(plan, parts, plan.traced, in_turn), cuts=cuts_of(parts))
 
 
-def _joined(plan: PassPlan, results: Sequence[Batch], last: int) -> PhotonMaps:
+def _joined(plan: PassPlan, results: Sequence[Batch], last: int, run: Runner) -> PhotonMaps:
     """The maps of a pass that stores all that arrives, of its first `last` trajectories."""
-    whole = joined_batches(results)
+    whole = joined_batches(results, run)
     return PhotonMaps(
         caustic=whole.caustic,
         global_=whole.global_,

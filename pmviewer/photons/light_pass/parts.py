@@ -13,8 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.photons.light_pass.batch import BATCH, Batch, Task, bounded, joined, joined_codes, trace_batch
-from pmviewer.photons.light_pass.ledger import N_COUNTS, empty_ledger
+from pmviewer.photons.light_pass.batch import BATCH, Batch, Task, bounded, joined_batches, trace_batch
 from pmviewer.photons.light_pass.plan import PassPlan
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.tasks import Runner
@@ -49,19 +48,6 @@ def cuts_of(parts: Sequence[Batch]) -> dict[str, NDArray[np.int64]]:
         "caustic": np.cumsum([0, *(len(part.caustic) for part in parts)], dtype=np.int64),
         "global": np.cumsum([0, *(len(part.global_) for part in parts)], dtype=np.int64),
     }
-
-
-def joined_batches(batches: Sequence[Batch]) -> Batch:
-    """Batches as one."""
-    return Batch(
-        caustic=joined(b.caustic for b in batches),
-        global_=joined(b.global_ for b in batches),
-        counts=sum((b.counts for b in batches), np.zeros(N_COUNTS, np.int64)),
-        ledgers=sum((b.ledgers for b in batches), empty_ledger()),
-        global_normals=joined_codes(b.global_normals for b in batches),
-        caustic_normals=joined_codes(b.caustic_normals for b in batches),
-        volume=joined(b.volume for b in batches),
-    )
 
 
 def _tasks(scene: FlatScene, plan: PassPlan, part: int, parts: int, normals: int) -> list[Task]:
