@@ -67,7 +67,7 @@ def test_same_photons_for_any_threads_and_batches(sequence, monkeypatch):
     finally:
         pool.close()
     for batch in (1000, 50_000):
-        monkeypatch.setattr(lightpass, "BATCH", batch)
+        monkeypatch.setattr(lightpass, "TASK", batch)
         assert same(trace(cornell_box(), sequence=sequence), expected)
     assert not same(trace(cornell_box(), sequence=sequence, seed=2), expected)
 
@@ -76,7 +76,7 @@ def test_full_buffers_change_nothing(monkeypatch):
     """An albedo of 0.99 stores far more photons a trajectory than a buffer is made for: batches are resumed."""
     scene = diffuse_box(albedo=0.97)
     whole = trace(scene, N=4000)
-    monkeypatch.setattr(lightpass, "BATCH", 37)
+    monkeypatch.setattr(lightpass, "TASK", 37)
     print(f"{len(whole.global_) / 2000:.1f} photons stored a trajectory")
     assert len(whole.global_) > 20 * 2000
     assert same(trace(scene, N=4000), whole)
