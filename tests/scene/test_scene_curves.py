@@ -47,19 +47,32 @@ def test_a_straight_polygon_is_a_rod_with_round_ends() -> None:
 
 
 def test_all_points_of_a_bent_tube_are_as_far_from_its_curve_as_their_radius() -> None:
-    curves = Curves(np.concatenate([BEND, BEND + [0, 5, 0, 0]]), np.array([0, 4, 8]))
+    bend = np.array([[0, 0, 0, 0.2], [0, 0, 2, 0.2], [0.3, 0, 4, 0.1], [0.9, 0, 6, 0.1]])
+    curves = Curves(np.concatenate([bend, bend + [0, 5, 0, 0]]), np.array([0, 4, 8]))
     mesh = tubes(curves, cubic=False)
     sides = 8
     wide = np.pi / sides / np.sin(np.pi / sides)
     rings = mesh.vertices.reshape(2, -1, sides, 3)
     assert rings.shape[1] == 4 + 4  # two more at each end
     for curve, shift in zip(rings, (0, 5), strict=True):
-        for ring, point in zip(curve[2:-2], BEND, strict=True):
+        for ring, point in zip(curve[2:-2], bend, strict=True):
             assert ring.mean(axis=0) == pytest.approx(point[:3] + [0, shift, 0])
             assert np.linalg.norm(ring - ring.mean(axis=0), axis=1) == pytest.approx(point[3] * wide)
     assert (crosses(mesh)[:, None] @ mesh.normals[mesh.faces].mean(axis=1)[:, :, None] > 0).all()
     count = len(mesh.vertices) // 2
     assert not ((mesh.faces < count).any(axis=1) & (mesh.faces >= count).any(axis=1)).any()
+
+
+def test_tubes_are_as_wide_between_sharp_corners_as_elsewhere() -> None:
+    """A rod with round ends for each piece, which overlap at the corners: their volumes add up."""
+    r = 0.1
+    zigzag = np.array([[-1, 0, -1, r], [-0.5, 0, 1, r], [-0.25, 0, -1, r], [0, 0, 1, r], [1, 0, 1.1, r]])
+    mesh = tubes(Curves(np.concatenate([zigzag, zigzag + [0, 3, 0, 0]]), np.array([0, 5, 10])), cubic=False)
+    lengths = np.linalg.norm(np.diff(zigzag[:, :3], axis=0), axis=1)
+    volume = (mesh.vertices[mesh.faces[:, 0]] * crosses(mesh)).sum() / 6
+    octagon = np.pi / 8 / np.tan(np.pi / 8)
+    rods = np.pi * r * r * lengths.sum() + len(lengths) * 4 / 3 * np.pi * r**3
+    assert volume == pytest.approx(2 * octagon * rods, rel=0.04)
 
 
 def test_cubic_curves_are_uniform_b_splines(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -50,11 +50,12 @@ def answer(mi: Any, request: dict[str, Any]) -> dict[str, Any]:
         adapted = _one_line(refused)
     if about["camera"] not in PROJECTIVE:
         return {"error": f"the camera '{about['camera']}' takes no picture to compare"}
-    # Its path tracer multiplies light samples on masked surfaces by the opacity twice.
+    # Its path tracer multiplies light samples on masked surfaces by the opacity twice, and leaves out media.
     masked = any(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null) for shape in scene.shapes() if shape.bsdf())
+    media = any(shape.is_medium_transition() for shape in scene.shapes())
     integrator = mi.load_dict(
         {
-            "type": "volpath" if masked else "path",
+            "type": "volpath" if masked or media else "path",
             "max_depth": request["max_depth"],
             "rr_depth": RR_DEPTH,
             "hide_emitters": about["hidden"],

@@ -18,6 +18,9 @@ MOST_TRIANGLES = 4_000_000
 """Beyond these, tubes have fewer sides and curves fewer pieces."""
 _FINENESS = ((4, 8), (2, 6), (1, 4), (1, 3))
 """Pieces of a cubic segment and sides of a tube, finest first."""
+SHARPEST = math.radians(20)
+"""Bend of a polygon up to which both pieces share a ring of points. It is round at a lean, and the tube narrower by the
+cosine of half the bend: 1.5 %."""
 _CAP = (math.radians(45), math.radians(85))
 """Latitudes of the rings that make a tube's end round."""
 
@@ -41,8 +44,10 @@ class Curves:
 
 
 def tubes(curves: Curves, *, cubic: bool) -> Mesh:
-    """The surface around the curves with normals, facing outwards: polygons through the points with round ends, or
-    uniform cubic B-splines, open at their ends. Polygons need two points each, splines four."""
+    """The surface around the curves with normals, facing outwards: polygons through the points with round ends and
+    corners, or uniform cubic B-splines, open at their ends. Polygons need two points each, splines four."""
+    if not cubic:
+        curves = _cut_at_corners(curves)
     segments = len(curves.points) + (-3 if cubic else 2 * len(_CAP) - 1) * len(curves)
     pieces, sides = _FINENESS[-1]
     for pieces, sides in _FINENESS:
@@ -72,6 +77,21 @@ def _spline(curves: Curves, pieces: int) -> Curves:
     keep[:, -1] = False
     keep[last, -1] = True
     return Curves(found[keep], np.concatenate([[0], np.cumsum(number * pieces + 1)]))
+
+
+def _cut_at_corners(curves: Curves) -> Curves:
+    """The same with an end on either side of each point where a polygon bends by more than `SHARPEST`."""
+    step = np.diff(curves.points[:, :3], axis=0)
+    length = np.linalg.norm(step, axis=1)
+    cosine = np.einsum("ij,ij->i", step[:-1], step[1:])
+    sharp = np.zeros(len(curves.points), bool)
+    sharp[1:-1] = cosine < math.cos(SHARPEST) * length[:-1] * length[1:]
+    sharp[curves.first[:-1]] = sharp[curves.first[1:] - 1] = False
+    number = np.repeat(np.arange(len(sharp)), 1 + sharp)
+    second = np.zeros(len(number), bool)
+    second[1:] = number[1:] == number[:-1]
+    begins = np.isin(number, curves.first[:-1]) | second
+    return Curves(curves.points[number], np.append(np.flatnonzero(begins), len(number)))
 
 
 def _tangents(curves: Curves) -> Float:
