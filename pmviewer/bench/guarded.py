@@ -135,6 +135,11 @@ class Guarded:
         self._process = None
         return status
 
+    def renew(self, above: int) -> None:
+        """End the process if it holds more than so many bytes; the next request starts another."""
+        if self._process is not None and resident_bytes(self._process.pid) > above:
+            self._end(kill=True)
+
     def close(self) -> None:
         """End the process, if there is one."""
         if self._process is not None:

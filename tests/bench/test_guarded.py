@@ -48,6 +48,16 @@ def test_a_process_without_an_answer_is_ended_and_started_again(server, do, kind
 
 
 @linux
+def test_a_process_that_holds_too_much_is_replaced_between_requests(server):
+    server.renew(0)
+    before = server.ask({"do": "answer"}, LIMITS)["pid"]
+    server.renew(LIMITS.memory)
+    assert server.ask({"do": "answer"}, LIMITS)["pid"] == before
+    server.renew(1 << 20)
+    assert server.ask({"do": "answer"}, LIMITS)["pid"] != before
+
+
+@linux
 def test_a_process_that_somebody_stops_does_not_hang(server):
     pid = server.ask({"do": "answer"}, LIMITS)["pid"]
     os.kill(pid, signal.SIGSTOP)

@@ -31,6 +31,10 @@ LONGEST = 96
 """Pixels of the longer side."""
 MAX_DEPTH = 8
 """Scatterings of both path tracers; Mitsuba counts one more."""
+MEDIA_DEPTH = 96
+"""The same where there are media: next to nothing is cut off, as Mitsuba doesn't count what passes thin glass."""
+TIRED = 2 << 30
+"""Bytes that a process may hold between two files: what was compiled for many of them must not count for the next."""
 PASSES = 4
 """Of the default method's picture."""
 NOISE = 0.003
@@ -71,7 +75,7 @@ def run(
     if not chosen:
         raise SettingError(f"{folder} holds no complete scene file.")
     effort = QUICK_EFFORT if quick else EFFORT
-    store = Store(json, f"{LONGEST} {MAX_DEPTH} {NOISE} {effort} {PASSES}")
+    store = Store(json, f"{LONGEST} {MAX_DEPTH} {MEDIA_DEPTH} {NOISE} {effort} {PASSES}")
     rows = []
     for row in tried(chosen, folder, store, effort):
         rows.append(row)
@@ -119,6 +123,7 @@ def tried(paths: Sequence[Path], folder: Path, store: Store, effort: float) -> I
         try:
             return _one(path, path.relative_to(folder).as_posix(), store, effort, mine)
         finally:
+            mine.ours.renew(TIRED)
             idle.put(mine)
 
     with ThreadPoolExecutor(len(helpers)) as pool:
@@ -185,12 +190,12 @@ def _theirs(row: Row, path: Path, known: dict[str, Any] | None, effort: float, h
         return
     answer = _asked(
         helpers.mitsuba,
-        {"mode": "file", "path": str(path), "longest": LONGEST, "max_depth": MAX_DEPTH + 1, "noise": NOISE,
-         "cpu": effort},
+        {"mode": "file", "path": str(path), "longest": LONGEST, "max_depth": MAX_DEPTH + 1,
+         "media_depth": MEDIA_DEPTH + 1, "noise": NOISE, "cpu": effort},
     )  # fmt: skip
     row.refused = answer.get("error") or answer.get("crash", "")
     if not row.refused:
-        row.theirs, row.adapted = answer["means"], answer["adapted"]
+        row.theirs, row.adapted, row.media = answer["means"], answer["adapted"], answer["media"]
         row.sizes += [answer["size"], *([answer["file_size"]] if answer["file_size"] else [])]
 
 
@@ -199,7 +204,8 @@ def _picture(row: Row, path: Path, effort: float, helpers: _Helpers) -> None:
     answer = _asked(
         helpers.ours,
         {"do": "picture", "path": str(path), "longest": LONGEST, "size": size, "passes": PASSES,
-         "paths": bool(row.theirs), "max_depth": MAX_DEPTH, "noise": NOISE, "cpu": effort},
+         "paths": bool(row.theirs), "max_depth": MEDIA_DEPTH if row.media else MAX_DEPTH, "noise": NOISE,
+         "cpu": effort},
     )  # fmt: skip
     row.error, row.crash = answer.get("error", ""), answer.get("crash", "")
     if row.opens:
@@ -229,7 +235,8 @@ def report(folder: Path, rows: list[Row], found: dict[Path, Survey], seconds: fl
     )
     return BenchResult(f"Files below {folder}", COLUMNS, [_cells(row) for row in rows], targets,
                        [*_notes(rows, found), f"Mitsuba 3 renders {len(both)} of the XML files that open, refuses "
-                        f"{refused}; {LONGEST} pixels, {MAX_DEPTH} scatterings; {seconds:.0f} s in all"])  # fmt: skip
+                        f"{refused}; {LONGEST} pixels, {MAX_DEPTH} scatterings "
+                        f"({MEDIA_DEPTH} with media); {seconds:.0f} s in all"])  # fmt: skip
 
 
 def _cells(row: Row) -> list[Cell]:

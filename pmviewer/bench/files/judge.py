@@ -54,6 +54,7 @@ class Row:
     theirs: list[list[float]] = field(default_factory=list)
     refused: str = ""
     adapted: str = ""
+    media: bool = False
     sizes: list[list[int]] = field(default_factory=list)
     png: str = ""
 

@@ -30,10 +30,12 @@ NEARLY_SMOOTH = 0.002
 
 
 def answer(mi: Any, request: dict[str, Any]) -> dict[str, Any]:
-    """{"size", "file_size", "means": (n, 3) of chunks of `CHUNK` samples, "adapted": what was changed}, or {"error"}.
+    """{"size", "file_size", "means": (n, 3) of chunks of `CHUNK` samples, "adapted": what was changed, "media": whether
+    there are some}, or {"error"}.
 
-    `request`: "path", "longest" (pixels of the longer side), "max_depth" (Mitsuba's way of counting), "noise" (relative
-    standard error of the mean that is enough), "cpu" (seconds after which it must do).
+    `request`: "path", "longest" (pixels of the longer side), "max_depth" and, where there are media, "media_depth"
+    (Mitsuba's way of counting), "noise" (relative standard error of the mean that is enough), "cpu" (seconds after
+    which it must do).
     """
     import drjit
 
@@ -56,12 +58,12 @@ def answer(mi: Any, request: dict[str, Any]) -> dict[str, Any]:
     integrator = mi.load_dict(
         {
             "type": "volpath" if masked or media else "path",
-            "max_depth": request["max_depth"],
+            "max_depth": request["media_depth" if media else "max_depth"],
             "rr_depth": RR_DEPTH,
             "hide_emitters": about["hidden"],
         }
     )
-    return {**about, "adapted": adapted, "means": _means(mi, scene, integrator, request)}
+    return {**about, "adapted": adapted, "media": media, "means": _means(mi, scene, integrator, request)}
 
 
 def _one_line(error: BaseException) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 from pmviewer.bench.collected import sources_stamp
 from pmviewer.bench.files.judge import Row
 
-THEIRS = ("theirs", "refused", "adapted")
+THEIRS = ("theirs", "refused", "adapted", "media")
 
 
 def file_stamp(path: Path) -> str:
