@@ -132,17 +132,32 @@ def test_the_box_of_the_file_counts_where_it_is_asked_for(tmp_path):
     np.testing.assert_array_equal(np.diag(medium.density.to_world), [2, 2, 2, 1])
 
 
-def test_constants_alone_are_a_homogeneous_medium(tmp_path):
-    inner = '<volume name="sigma_t" type="constvolume"><rgb name="value" value="1 2 3"/></volume>'
-    medium, warnings = medium_of(tmp_path, inner)
+def constant(name, inner=""):
+    return f'<volume name="{name}" type="constvolume"><rgb name="value" value="1 2 3"/>{inner}</volume>'
+
+
+def test_a_constant_density_of_version_0_6_fills_its_shape(tmp_path):
+    medium, warnings = medium_of(tmp_path, constant("density"))
     assert (medium.sigma_t, medium.density, medium.varies) == ((1, 2, 3), None, False)
     assert not warnings
-
-
-def test_a_constant_density_fills_the_box_of_the_albedo(tmp_path):
-    medium, _ = medium_of(tmp_path, '<float name="sigma_t" value="2"/>' + grid(name="albedo"))
-    assert medium.density.values.shape == (1, 1, 1, 1)
+    medium, _ = medium_of(tmp_path, constant("density") + grid(name="albedo"))
     np.testing.assert_array_equal(medium.density.to_world, medium.albedo_grid.to_world)
+
+
+@pytest.mark.parametrize(
+    ("inner", "box"),
+    [
+        (constant("sigma_t"), [1, 1, 1]),
+        (constant("sigma_t", '<transform name="to_world"><scale x="2" y="3" z="4"/></transform>'), [2, 3, 4]),
+        ('<float name="sigma_t" value="2"/>' + grid(name="albedo"), [1, 1, 1]),
+    ],
+)
+def test_a_constant_extinction_fills_its_box_as_in_mitsuba_3(tmp_path, inner, box):
+    """Its heterogeneous medium is where the box of sigma_t is: of a constant the unit cube, moved by `to_world`."""
+    medium, warnings = medium_of(tmp_path, inner)
+    assert medium.density.values.tolist() == [[[[1.0]]]]
+    np.testing.assert_array_equal(np.diag(medium.density.to_world), [*box, 1])
+    assert not warnings
 
 
 @pytest.mark.parametrize(
@@ -157,6 +172,7 @@ def test_a_constant_density_fills_the_box_of_the_albedo(tmp_path):
         (grid(), vol(-NUMBERS), "23 numbers that are negative"),
         (grid(), vol(NUMBERS * np.float32(np.nan)), "24 numbers that are negative or not finite"),
         (grid().replace('<scale value="2"/>', '<scale z="0"/>'), None, "its box is flat"),
+        (constant("sigma_t", '<transform name="to_world"><scale z="0"/></transform>'), None, "has a flat box"),
         ('<volume name="sigma_t" type="magic"/>', None, "is not supported"),
     ],
 )
@@ -173,7 +189,7 @@ def test_an_empty_grid_leaves_its_shape_clear(tmp_path):
 
 def test_only_scenes_with_grids_have_their_fields(tmp_path):
     (tmp_path / "a.vol").write_bytes(vol())
-    for inner, expected in ((grid(), True), ("", False)):
+    for inner, expected in ((grid(), True), (constant("density"), False)):
         medium = f'<medium type="heterogeneous" id="fog">{inner}</medium>'
         flat = flatten(scene_of(tmp_path, medium, CUBE.format(INSIDE)))
         assert flat.has_media

@@ -117,8 +117,9 @@ def test_a_spots_texture_counts_by_its_mean(tmp_path: Path) -> None:
     assert spot.intensity == pytest.approx((6, 1, 1))
 
 
-def test_a_collimated_beam_is_the_narrowest_spot_of_its_power(tmp_path: Path) -> None:
-    words = f'<rgb name="power" value="2 1 0"/>{TURN}'
+@pytest.mark.parametrize("name", ["power", "intensity"])
+def test_a_collimated_beam_is_the_narrowest_spot_of_its_power(tmp_path: Path, name: str) -> None:
+    words = f'<rgb name="{name}" value="2 1 0"/>{TURN}'
     scene = load(tmp_path, SHAPE, f'<emitter type="collimated">{words}</emitter>', sky="", version="0.6.0")
     (spot,) = scene.lights
     assert isinstance(spot, SpotLight)

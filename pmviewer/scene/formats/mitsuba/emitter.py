@@ -118,7 +118,8 @@ def _directional(p: Properties, name: str) -> list[Light]:
 def _collimated(p: Properties, name: str) -> list[Light]:
     """A beam without width has no place in a picture's pixels: a spot of the least width with its power."""
     p.document.warn(f"{p.element} is shown as a spot of {_LEAST_CUTOFF}° with its power.", p.element)
-    m, power = p.transform(), p.bounded_colour("power", 1.0, None)
+    # "intensity" is what forks of version 0.5 call it.
+    m, power = p.transform(), p.bounded_colour("power" if "power" in p else "intensity", 1.0, None)
     direction = _unit(m[:3, 2], p)
     solid = 4 * math.pi * math.sin(math.radians(_LEAST_CUTOFF) / 2) ** 2
     x, y, z = (float(c) for c in m[:3, 3])

@@ -71,15 +71,16 @@ class Media:
         return _finished(p, Medium("medium", sigma_t, albedo, emission))
 
     def _varying(self, p: Properties) -> Medium | None:
-        """A medium with grids; None, with a warning, where one can't be read."""
-        density = self.volumes.of(p, "density" if self.volumes.has(p, "density") else "sigma_t", 1.0, None)
+        """A medium with grids; None, with a warning, where one can't be read. As in Mitsuba 3 it is where the volume of
+        its extinction is, constant or not; version 0.6, which says "density", knows no box of a constant."""
+        older = self.volumes.has(p, "density")
+        density = self.volumes.of(p, "density" if older else "sigma_t", 1.0, None)
         albedo, emission = self.volumes.of(p, "albedo", 0.75, 1.0), self.volumes.of(p, "emission", 0.0, None)
         p.known("method", "step_size")
         if density is None or albedo is None or emission is None:
             self.document.ignore(p.element, "lacks its numbers: what it fills is clear")
             return None
-        other = albedo.grid or emission.grid
-        grid = density.grid
+        grid, other = density.grid if older else density.boxed, albedo.grid or emission.grid
         if grid is None and other is not None:
             grid = Grid(np.ones((1, 1, 1, 1), np.float32), other.to_world, "box")
         medium = Medium(

@@ -22,10 +22,16 @@ _FLATTEST = 1e-12
 
 
 class Volume(NamedTuple):
-    """A constant `factor`, and a grid that it multiplies."""
+    """A constant `factor`, and a grid that it multiplies; without one the constant's `box`, (4, 4): the unit cube."""
 
     factor: RGB
     grid: Grid | None = None
+    box: NDArray[np.float64] = np.eye(4)
+
+    @property
+    def boxed(self) -> Grid:
+        """The grid, or one of a single cell that is 1 in the box."""
+        return self.grid or Grid(np.ones((1, 1, 1, 1), np.float32), self.box, "box")
 
 
 class Volumes:
@@ -53,9 +59,12 @@ class Volumes:
     def _read(self, p: Properties, name: str, default: float, most: float | None) -> Volume | None:
         if p.type == "constvolume":
             value = p.bounded_colour("value", default, most)
-            p.known("to_world")
+            box = p.transform()
             p.warn_unused()
-            return Volume(value)
+            if not _is_box(box):
+                self.document.ignore(p.element, "has a flat box")
+                return None
+            return Volume(value, box=box)
         if p.type != "gridvolume":
             self.document.ignore(p.element, "is not supported")
             return None
