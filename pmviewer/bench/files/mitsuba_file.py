@@ -57,7 +57,8 @@ def answer(mi: Any, request: dict[str, Any]) -> dict[str, Any]:
     media = any(shape.is_medium_transition() for shape in scene.shapes())
     integrator = mi.load_dict(
         {
-            "type": "volpath" if masked or media else "path",
+            # Where extinction has a colour, "volpath" has fireflies that no noise of chunks tells of.
+            "type": "volpathmis" if media else "volpath" if masked else "path",
             "max_depth": request["media_depth" if media else "max_depth"],
             "rr_depth": RR_DEPTH,
             "hide_emitters": about["hidden"],
