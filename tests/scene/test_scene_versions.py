@@ -46,6 +46,24 @@ def test_scale_and_offset_of_textures(tmp_path: Path) -> None:
     assert scene.warnings == ()
 
 
+@pytest.mark.parametrize(
+    ("version", "inside", "kind"),
+    [
+        ("0.5.0", "", "null"),
+        ("0.6.0", '<bsdf type="diffuse"/>', "diffuse"),
+        ("0.6.0", '<ref id="grey"/>', "diffuse"),
+        ("2.0.0", "", "diffuse"),
+    ],
+)
+def test_light_passes_a_mediums_boundary_without_a_bsdf(tmp_path: Path, version: str, inside: str, kind: str) -> None:
+    """Shape::configure of Mitsuba 0.5 and 0.6 gives it "null"; Mitsuba 3 gives every shape without one "diffuse"."""
+    medium = '<medium type="homogeneous" id="fog"/><bsdf type="diffuse" id="grey"/>'
+    shape = f'<shape type="cube"><ref name="interior" id="fog"/>{inside}</shape>'
+    scene = old(tmp_path, medium, shape, version=version)
+    assert material(scene).kind == kind
+    assert any("light passes it" in said for said in scene.warnings) == (kind == "null")
+
+
 @pytest.mark.parametrize("version", ["", "new", "3.x"])
 def test_odd_versions_are_said(tmp_path: Path, version: str) -> None:
     path = xml_file(tmp_path, '<shape type="cube"/>', CAMERA, SKY, version=version)

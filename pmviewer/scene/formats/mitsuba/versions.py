@@ -76,6 +76,7 @@ def upgrade(root: Element, diagnostics: Diagnostics) -> None:
         element = todo.pop()
         if version < (2,):
             _rename(element, version)
+            _clear_boundary(element, diagnostics)
         if element.tag == "shape" and "type" in element.attributes:
             element.attributes["type"] = element.attributes["type"].lower()  # "shapeGroup", "Rectangle"
         _texture_scale(element)
@@ -116,6 +117,20 @@ def _rename(element: Element, version: Version) -> None:
                 new = names.get((element.tag, kind, name)) or names.get((element.tag, "", name))
                 if new:
                     child.attributes["name"] = new
+
+
+def _clear_boundary(element: Element, diagnostics: Diagnostics) -> None:
+    """Before version 2 a shape at which a medium begins or ends lets light pass if it has no BSDF; today it is grey."""
+    names = {child.attributes.get("name") for child in element.children if child.tag in ("medium", "ref")}
+    others = any(
+        child.tag in ("bsdf", "emitter", "luminaire", "sensor", "camera", "subsurface")
+        or (child.tag == "ref" and child.attributes.get("name") not in ("interior", "exterior"))
+        for child in element.children
+    )
+    if element.tag == "shape" and names & {"interior", "exterior"} and not others:
+        element.children.append(Element("bsdf", {"type": "null"}, element.line, [], element.file))
+        sentence = f"{element} has a medium and no BSDF: light passes it, as in version 0.6."
+        diagnostics.warn(sentence, element.line, file=element.file)
 
 
 def _old_camera(element: Element) -> None:
