@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.output.diagnostic_views import LUMINANCE
-from pmviewer.render.planes import view_of
+from pmviewer.render.planes import VOLUME_TERMS, view_of
 
 KEY = 0.4
 """Share of the light that would make a surface look as bright as its albedo: parts lie in shadow or turn away."""
@@ -36,11 +36,11 @@ def metered(planes: NDArray[np.float32]) -> float:
 
     What shows nothing but the background, or glows, is left out unless there is nothing else.
     """
-    beauty = sum(view_of(planes, term).astype(np.float64) for term in ("direct", "specular", "caustic", "indirect"))
-    light = np.nan_to_num(np.asarray(beauty) @ LUMINANCE, posinf=0.0, neginf=0.0)
-    glow = np.nan_to_num(view_of(planes, "emission").astype(np.float64) @ LUMINANCE, posinf=0.0, neginf=0.0)
+    light = _luminance(planes, "direct", "specular", "caustic", "indirect", *VOLUME_TERMS)
+    glow = _luminance(planes, "emission")
     albedo = view_of(planes, "albedo").astype(np.float64) @ LUMINANCE
-    surface = (view_of(planes, "depth")[..., 0] > 0) & (glow <= light)
+    something = (view_of(planes, "depth")[..., 0] > 0) | (_luminance(planes, *VOLUME_TERMS) > 0)
+    surface = something & (glow <= light)
     values, weights = _blocks(light, surface)
     if not len(values) or not values.max() > 0:
         values, weights = _blocks(light + glow, np.ones(light.shape, bool))
@@ -54,6 +54,12 @@ def metered(planes: NDArray[np.float32]) -> float:
     if bright > 0:  # else what shines is next to nothing of the picture
         exposure -= min(max(exposure + math.log2(bright), 0.0), MOST_LOWERED)
     return min(max(round(round(exposure / STEP) * STEP, 2), -20.0), 20.0)
+
+
+def _luminance(planes: NDArray[np.float32], *terms: str) -> NDArray[np.float64]:
+    """(h, w) of the sum of the terms; 0 where it is not finite."""
+    total = sum(view_of(planes, term).astype(np.float64) for term in terms)
+    return np.nan_to_num(np.asarray(total) @ LUMINANCE, posinf=0.0, neginf=0.0)
 
 
 def _blocks(light: NDArray[np.float64], counts: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

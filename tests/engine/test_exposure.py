@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.exposure import metered
-from pmviewer.render.planes import CHANNELS, PLANES
+from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS, PLANES
 
 
 def planes(light, albedo=0.5, depth=1.0, glow=0.0, size=48):
@@ -74,6 +74,14 @@ def test_highlights_hold_it_back():
     light = np.full((48, 48), 0.02)
     light[:, :8] = 5.0
     assert metered(planes(light)) < metered(planes(0.02)) - 1
+
+
+def test_what_media_scatter_counts_as_what_surfaces_do():
+    """A cloud in the middle of nothing, a quarter of the picture, becomes middle grey."""
+    made = np.zeros((48, 48, MEDIA_CHANNELS), np.float32)
+    made[12:36, 12:36, PLANES["volume"]] = 0.3
+    made[12:36, 12:36, PLANES["volume indirect"]] = 0.42
+    assert metered(made) == pytest.approx(math.log2(0.18 / 0.72), abs=0.03)
 
 
 def test_a_picture_without_light_or_surface():
