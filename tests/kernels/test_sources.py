@@ -6,12 +6,12 @@ import ast
 import pytest
 
 from pmviewer.kernels.compile.sources import PACKAGE, imported_names, sources_of
-from tests.support.sources import package_files, parsed
+from tests.support.sources import package_files, parsed, statements
 
 
 def imports(tree: ast.Module) -> set[str]:
     names: set[str] = set()
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.ImportFrom) and node.module:
             names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
         elif isinstance(node, ast.Import):

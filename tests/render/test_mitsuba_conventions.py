@@ -25,9 +25,9 @@ FOLDER = Path(__file__).parents[1] / "scene" / "mitsuba_conventions"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text("utf-8"))
 SCENES = EXPECTED["scenes"]
 PATH, PHOTONS = (16, 8), (8, 4)
-"""Runs and passes of each. Many short runs: of eight the spread is known so badly that Student's t has to be 13 before a
-block counts as wrong, of sixteen 7. Half of the blocks may be off by no more than 0.4 % (mirrored_mesh_own_normals) to
-5 % (bumpmap_on_metal; 24 % where smooth_mesh_light_inside_out is lit by few paths)."""
+"""Runs and passes of each. Many short runs: of eight the spread is known so badly that Student's t has to be 13 before
+a block counts as wrong, of sixteen 7. Half of the blocks may be off by no more than 0.4 % (mirrored_mesh_own_normals)
+to 5 % (bumpmap_on_metal; 24 % where smooth_mesh_light_inside_out is lit by few paths)."""
 SIGNIFICANCE = 1e-4
 ROUNDING = 1e-5
 """Relative: six digits are recorded."""
@@ -75,7 +75,8 @@ def test_every_scene_has_an_expectation():
 @pytest.mark.parametrize("name", list(SCENES))
 def test_path_tracer_shows_mitsubas_picture(name):
     expected = SCENES[name]
-    assert p_value(block_runs(name, "path", *PATH), expected["mean"], expected["error"], EXPECTED["runs"]) > SIGNIFICANCE
+    ours = block_runs(name, "path", *PATH)
+    assert p_value(ours, expected["mean"], expected["error"], EXPECTED["runs"]) > SIGNIFICANCE
 
 
 @pytest.mark.extensive
@@ -84,5 +85,5 @@ def test_path_tracer_shows_mitsubas_picture(name):
 def test_photon_methods_show_it_too(name, method):
     """Within one percent of a block, for what a look-up blurs."""
     expected = SCENES[name]
-    found = p_value(block_runs(name, method, *PHOTONS), expected["mean"], expected["error"], EXPECTED["runs"], tolerance=0.01)
-    assert found > SIGNIFICANCE
+    ours = block_runs(name, method, *PHOTONS)
+    assert p_value(ours, expected["mean"], expected["error"], EXPECTED["runs"], tolerance=0.01) > SIGNIFICANCE
