@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pmviewer.errors import SettingError
 from pmviewer.scene.description import Camera, NamedCamera, PixelFilter, Scene, Vec3
 from pmviewer.settings.access import CameraSettings
+from pmviewer.settings.schema import Render
 
 Matrix = NDArray[np.float64]
 
@@ -299,3 +300,13 @@ def _view_width(camera: Camera, settings: CameraSettings, width: int, height: in
         return camera.width
     half = math.tan(math.radians(_fov_x(camera, width, height)) / 2)
     return 2 * half * max(math.dist(camera.origin, camera.target), 1e-15)
+
+
+def are_hidden(own: bool, render: Render) -> bool:
+    """Whether lights are hidden from a camera of which the file says `own`, with these settings."""
+    return own if render.lights == "auto" else render.lights == "hidden"
+
+
+def hidden_from(camera: CameraPose, render: Render) -> bool:
+    """Whether a pass by that camera hides lights: not in scenes with media."""
+    return camera.medium is None and are_hidden(camera.hides_lights, render)
