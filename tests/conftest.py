@@ -51,7 +51,7 @@ def any_light_in_media() -> Iterator[None]:
 
 @pytest.fixture
 def every_path_may_split() -> Iterator[None]:
-    """Kernels are those of scenes with smooth glass."""
+    """Kernels are those of scenes with mirrors and smooth glass."""
     from tests.support import kinds
 
     with pytest.MonkeyPatch.context() as patch:

@@ -7,7 +7,7 @@ import statistics
 from collections.abc import Iterator
 from functools import cache
 
-from tests.support.sources import PACKAGE, package_files, parsed
+from tests.support.sources import PACKAGE, package_files, parsed, statements, within
 
 MOST_PARAMETERS, MOST_LINES, MEDIAN_FILE, LONGEST_FILE = 12, 100, 130, 500
 
@@ -29,14 +29,14 @@ def functions() -> list[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
     return [
         (f"{module}.{node.name}", node)
         for module, tree in modules().items()
-        for node in ast.walk(tree)
+        for node in statements(tree)
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
     ]
 
 
 def imports(tree: ast.AST) -> Iterator[str]:
     """Modules of the package that running this code imports, within functions too; not what type checkers alone see."""
-    for node in ast.iter_child_nodes(tree):
+    for node in within(tree):
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
             for other in node.orelse:
                 yield from imports(ast.Module([other], []))
@@ -129,7 +129,7 @@ def undocumented(trees: dict[str, ast.Module]) -> set[str]:
     there; setters by their property."""
     classes: dict[str, list[ast.ClassDef]] = {}
     for tree in trees.values():
-        for node in ast.walk(tree):
+        for node in statements(tree):
             if isinstance(node, ast.ClassDef):
                 classes.setdefault(node.name, []).append(node)
 

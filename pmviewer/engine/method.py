@@ -8,8 +8,8 @@ from typing import Literal, NamedTuple
 from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, THIN, in_media
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
+from pmviewer.render.camera import are_hidden
 from pmviewer.render.filter import BOX, filter_of, is_signed
-from pmviewer.render.hidden_lights import are_hidden
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.scene.description import PixelFilter
 from pmviewer.settings.access import Settings, needs_of, with_values

@@ -36,14 +36,14 @@ from pmviewer.photons.emission.tested import prepare_weighing
 from pmviewer.photons.light_pass.ledger import N_COUNTS, empty_ledger
 from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE, PhotonBuffers, trace_photons
 from pmviewer.photons.projection.projected import NO_PROJECTION
+from pmviewer.render.counts import N_COUNTS as N_EYE_COUNTS
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
-from pmviewer.render.filter import add_weights
+from pmviewer.render.filter_samples import add_weights
 from pmviewer.render.mirrored import mark_mirrors
 from pmviewer.render.moments import prepare_moments
 from pmviewer.render.path import path_pass
 from pmviewer.render.pixel_radius import first_radii
-from pmviewer.render.record import N_COUNTS as N_EYE_COUNTS
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings
 from pmviewer.settings.needs import Facts

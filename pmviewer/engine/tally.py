@@ -14,7 +14,7 @@ from pmviewer.engine.energy import EnergyLedger
 from pmviewer.engine.pool import WorkPool
 from pmviewer.photons.deposition.deposited import Deposited
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
-from pmviewer.render.record import C_CACHED, C_CUT, C_DROPPED, C_GATHERED, C_RAYS, C_SAVED, C_SHADOW_RAYS
+from pmviewer.render.counts import C_CACHED, C_CUT, C_DROPPED, C_GATHERED, C_RAYS, C_SAVED, C_SHADOW_RAYS
 from pmviewer.state import State
 
 NUMBERS = "emitted", "rays", "shadow_rays", "saved_rays", "cached", "cut", "gathered", "records", "cpu_seconds"
@@ -174,7 +174,7 @@ class Tally:
         self.records += counts["gathered"]
 
     def add_counts(self, counts: NDArray[np.int64]) -> None:
-        """Counts of an eye-pass kernel (`pmviewer.render.record`)."""
+        """Counts of an eye-pass kernel (`pmviewer.render.counts`)."""
         self.rays += int(counts[C_RAYS])
         self.shadow_rays += int(counts[C_SHADOW_RAYS])
         self.cached += int(counts[C_CACHED])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from pmviewer.errors import SettingError
 from pmviewer.scene.description import Camera, NamedCamera, PixelFilter, Scene, Vec3
 from pmviewer.settings.access import CameraSettings
+from pmviewer.settings.schema import Render
 
 Matrix = NDArray[np.float64]
 
@@ -90,10 +92,14 @@ class CameraPose:
         return self.view_width / 2 if self.orthographic else math.tan(math.radians(self.fov) / 2)
 
     def axes(self) -> tuple[Matrix, Matrix, Matrix]:
-        """Unit vectors to the right of the image, to its top, and into the view.
+        """Unit vectors to the right of the image, to its top, and into the view; read-only.
 
         Raises SettingError when eye and target coincide. An `up` along the view direction is replaced.
         """
+        return self._axes
+
+    @cached_property  # every pass asks, of the same camera
+    def _axes(self) -> tuple[Matrix, Matrix, Matrix]:
         forward = np.subtract(self.target, self.origin, dtype=np.float64)
         length = float(np.linalg.norm(forward))
         if not math.isfinite(length) or length == 0:
@@ -105,21 +111,30 @@ class CameraPose:
             right = np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))])
         right /= np.linalg.norm(right)
         top = np.cross(right, forward)
-        return (-right if self.mirrored else right), top, forward
+        right = -right if self.mirrored else right
+        for axis in (right, top, forward):
+            axis.flags.writeable = False
+        return right, top, forward
 
     def ray_frame(self) -> NDArray[np.float64]:
         """(4, 3): the eye, the image's top left corner from there, and the change per pixel right and down.
 
         Corner and changes are directions, or places on the plane through the eye of an orthographic camera, whose rays
-        all have the direction of the view.
+        all have the direction of the view. Read-only.
         """
+        return self._ray_frame
+
+    @cached_property
+    def _ray_frame(self) -> NDArray[np.float64]:
         right, top, forward = self.axes()
         half = self.half_width()
         step = 2 * half / self.width
         corner = (0.0 if self.orthographic else 1.0) * forward - right * half + top * (step * self.height / 2)
         across, along = right * step, -top * step
         corner += across * (self.shift[0] * self.width) + along * (self.shift[1] * self.height)
-        return np.array([self.origin, corner, across, along], dtype=np.float64)
+        frame = np.array([self.origin, corner, across, along], dtype=np.float64)
+        frame.flags.writeable = False
+        return frame
 
     def rays(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> tuple[Matrix, Matrix]:
         """Origins and unit directions (n, 3) of the rays through places (n,) of the image, in pixels."""
@@ -299,3 +314,13 @@ def _view_width(camera: Camera, settings: CameraSettings, width: int, height: in
         return camera.width
     half = math.tan(math.radians(_fov_x(camera, width, height)) / 2)
     return 2 * half * max(math.dist(camera.origin, camera.target), 1e-15)
+
+
+def are_hidden(own: bool, render: Render) -> bool:
+    """Whether lights are hidden from a camera of which the file says `own`, with these settings."""
+    return own if render.lights == "auto" else render.lights == "hidden"
+
+
+def hidden_from(camera: CameraPose, render: Render) -> bool:
+    """Whether a pass by that camera hides lights: not in scenes with media."""
+    return camera.medium is None and are_hidden(camera.hides_lights, render)

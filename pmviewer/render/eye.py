@@ -24,9 +24,10 @@ from pmviewer.kernels.vector import add, largest, mul, scale
 from pmviewer.maps.record import CAUSTIC as CAUSTIC_CLASS
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, arrive
+from pmviewer.render.counts import C_CUT, C_RAYS
 from pmviewer.render.direct.choice import LIST_WORDS, choose, choose_by_power
 from pmviewer.render.direct.direct import direct_light, found_light, met_light, radiance_of
-from pmviewer.render.filter import place_in_filter
+from pmviewer.render.filter_samples import place_in_filter
 from pmviewer.render.gather.cached import cached, surface_rays
 from pmviewer.render.gather.guide import AIM_WORDS, aim
 from pmviewer.render.given import Aim, GatherRays, Sampler, opened
@@ -47,7 +48,6 @@ from pmviewer.render.pixel import (
     sampled_ray,
 )
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius
-from pmviewer.render.record import C_CUT, C_RAYS
 from pmviewer.render.reflect import reflected, unfound
 from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import cast_on

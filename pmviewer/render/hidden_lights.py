@@ -12,9 +12,7 @@ from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.scene import light_of
-from pmviewer.render.camera import CameraPose
 from pmviewer.render.cast import Ray
-from pmviewer.settings.schema import Render
 
 HIDDEN_FIELDS: list[tuple[str, str]] = [("hides", "i4")]
 """Of eye records: 1, its presence says it."""
@@ -24,16 +22,6 @@ MOST_PASSED = 1024
 _f4 = np.float32
 _i8 = np.int64
 _BEYOND = _f4(1.0 + 2.0**-21)
-
-
-def are_hidden(own: bool, render: Render) -> bool:
-    """Whether lights are hidden from a camera of which the file says `own`, with these settings."""
-    return own if render.lights == "auto" else render.lights == "hidden"
-
-
-def hidden_from(camera: CameraPose, render: Render) -> bool:
-    """Whether a pass by that camera hides lights: not in scenes with media."""
-    return camera.medium is None and are_hidden(camera.hides_lights, render)
 
 
 @specialised

@@ -46,6 +46,8 @@ def mirrored_pixels(scene: FlatScene, camera: CameraPose, glossy: float) -> NDAr
     """(width · height,) uint8, MIRRORED where the middle of the pixel's square shows a mirror or glass; (0,)
     where none does."""
     mirrors = np.array([is_mirror(material, glossy) for material in scene.owner.materials], bool)
+    if not mirrors.any():
+        return np.zeros(0, np.uint8)
     block = block_of(camera)
     columns, rows = (-(-side // block) for side in (camera.width, camera.height))
     x, y = (block * (places.ravel() + 0.5) for places in np.meshgrid(np.arange(columns), np.arange(rows)))

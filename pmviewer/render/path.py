@@ -19,6 +19,7 @@ from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import largest, mul, scale
 from pmviewer.render.cast import cast, leaving
 from pmviewer.render.chain import WHITE, arrive, scatter
+from pmviewer.render.counts import C_CUT, C_RAYS, C_SHADOW_RAYS
 from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power
 from pmviewer.render.direct.direct import light_samples, met_light, power_heuristic, radiance_of
 from pmviewer.render.given import Sampler
@@ -37,7 +38,6 @@ from pmviewer.render.pixel import (
     properties,
     sampled_ray,
 )
-from pmviewer.render.record import C_CUT, C_RAYS, C_SHADOW_RAYS
 
 _f4 = np.float32
 ROULETTE_DEPTH = 8

@@ -15,11 +15,11 @@ from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.surface import face
 from pmviewer.kernels.vector import is_good, normalize
 from pmviewer.render.cast import of_wave, ray_of_camera
-from pmviewer.render.filter import place_in_filter
+from pmviewer.render.counts import C_DROPPED
+from pmviewer.render.filter_samples import place_in_filter
 from pmviewer.render.hidden_lights import past_lights
 from pmviewer.render.lens import lens_numbers, through_lens
 from pmviewer.render.planes import PLANES
-from pmviewer.render.record import C_DROPPED
 
 _f4 = np.float32
 _f8 = np.float64

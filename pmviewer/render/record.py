@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.random import SOBOL
 from pmviewer.maps.estimate.filters import FILTERS
-from pmviewer.render.camera import CameraPose
-from pmviewer.render.filter import BOX, FILTER_FIELDS, filter_of, set_filter
-from pmviewer.render.hidden_lights import HIDDEN_FIELDS, hidden_from
+from pmviewer.render.camera import CameraPose, hidden_from
+from pmviewer.render.filter import BOX, filter_of, set_filter
+from pmviewer.render.filter_samples import FILTER_FIELDS
+from pmviewer.render.hidden_lights import HIDDEN_FIELDS
 from pmviewer.render.lens import LENS_FIELDS
 from pmviewer.render.mirror_rays import MIRROR_FIELDS
 from pmviewer.render.split import SPLIT_FIELDS
@@ -100,12 +101,6 @@ EYE_DTYPE = eye_dtype()
 """Of a pinhole and the box filter."""
 
 RIMS = ("left out", "half", "whole")
-
-N_COUNTS = 7
-C_RAYS, C_SHADOW_RAYS, C_DROPPED, C_SAVED, C_CACHED, C_GATHERED, C_CUT = range(N_COUNTS)
-"""All rays, those of them that test visibility towards a light sample, samples dropped, and shadow rays not cast,
-because shadow photons know; with an irradiance cache, surface points that it served and those that gathered
-themselves; paths from the camera that `max_depth` ended."""
 
 
 @dataclass(frozen=True)

@@ -238,8 +238,8 @@ def _mismatch(reference: Reference, scene: Scene, frame: Frame) -> str | None:
                 "The lens was changed: the reference is seen through the scene's own. Press Backspace to return to it."
             )
         return "The camera was moved: the reference is seen by the scene's own. Press Backspace to return to it."
+    from pmviewer.render.camera import are_hidden
     from pmviewer.render.filter import is_own  # numba, which the window doesn't wait for
-    from pmviewer.render.hidden_lights import are_hidden
 
     if not is_own(own.filter, frame.settings.render):
         return "The reconstruction filter was changed: the reference has the scene's own (render.filter = auto)."

@@ -137,19 +137,21 @@ def sides(material):
 
 
 @pytest.mark.parametrize("material", [DIFFUSE, PAPER, *GLOSSY, *GLASSES], ids=lambda m: m.name)
-def test_samples_follow_their_density(probe, numbers, material):
-    """χ² of N samples; what falls below the surface is a cell of its own, with the probability that is left."""
+def test_samples_follow_their_density_and_weigh_the_albedo(probe, numbers, material):
+    """χ² of N samples; what falls below the surface is a cell of its own, with the probability that is left. A white
+    furnace: their mean weight is the albedo by quadrature, and that is at most 1."""
     cosines = sides(material)
     for cos in cosines:
         wo = towards(cos)
         wi, weight, _, _ = probe.sample(material, group_of(material), wo, numbers)
         used = wi[weight.sum(1) > 0]
-        counts, expected = [], []
+        counts, expected, whole_albedo = [], [], np.zeros(3)
         for grid in grids(material, wo):
             directions, solid = grid.quadrature()
-            _, pdf, _ = probe.evaluate(material, group_of(material), wo, directions)
+            f, pdf, _ = probe.evaluate(material, group_of(material), wo, directions)
             expected.append(grid.sums(pdf * solid))
             counts.append(grid.counts(used))
+            whole_albedo += reflected(f, directions, solid)
         counts, expected = np.concatenate(counts), np.concatenate(expected)
         whole = expected.sum()
         assert whole <= 1 + 1e-3
@@ -164,6 +166,14 @@ def test_samples_follow_their_density(probe, numbers, material):
         p = stats.chi2.sf(((counts - expected) ** 2 / np.maximum(expected, 1e-3)).sum(), len(counts) - 1)
         tests = sum(len(sides(m)) for m in (DIFFUSE, PAPER, *GLOSSY, *GLASSES))
         assert p > 0.01 / tests, (cos, p, whole)
+        error = weight.std(0) / np.sqrt(len(weight))
+        assert np.all(np.abs(weight.mean(0) - whole_albedo) < 5 * error + 2e-3), (cos, weight.mean(0), whole_albedo)
+        assert whole_albedo.max() <= 1 + 1e-3, cos
+
+
+def reflected(f, directions, solid):
+    """Sum (3,) of f |cos| dω over a quadrature's directions."""
+    return (f * (np.abs(directions[:, 2]) * solid)[:, None]).sum(0)
 
 
 def albedo(probe, material, wo, group, glossy=EVERYTHING_STORED):
@@ -172,20 +182,8 @@ def albedo(probe, material, wo, group, glossy=EVERYTHING_STORED):
     for grid in grids(material, wo):
         directions, solid = grid.quadrature()
         f, _, _ = probe.evaluate(material, group, wo, directions, glossy)
-        total += (f * (np.abs(directions[:, 2]) * solid)[:, None]).sum(0)
+        total += reflected(f, directions, solid)
     return total
-
-
-@pytest.mark.parametrize("material", [DIFFUSE, PAPER, *GLOSSY, *GLASSES], ids=lambda m: m.name)
-def test_white_furnace(probe, numbers, material):
-    """The mean weight is the albedo by quadrature, and that is at most 1."""
-    for cos in sides(material):
-        wo = towards(cos)
-        expected = albedo(probe, material, wo, group_of(material))
-        _, weight, _, _ = probe.sample(material, group_of(material), wo, numbers[:100_000])
-        error = weight.std(0) / np.sqrt(len(weight))
-        assert np.all(np.abs(weight.mean(0) - expected) < 5 * error + 2e-3), (cos, weight.mean(0), expected)
-        assert expected.max() <= 1 + 1e-3, cos
 
 
 def test_lossless_lobes_keep_nearly_everything(probe):

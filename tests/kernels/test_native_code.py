@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 MODULE = """
 import sys
 import llvmlite.binding as llvm
@@ -65,8 +67,19 @@ def run(folder, *functions):
     return subprocess.run(command, env=env, capture_output=True, text=True, check=True, timeout=300).stdout.splitlines()
 
 
-def test_machine_code_is_made_for_what_python_calls_alone(tmp_path):
-    assert run(tmp_path, "lengths") == [
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Of compiled code, which the first process finds empty."""
+    return tmp_path_factory.mktemp("native")
+
+
+@pytest.fixture(scope="module")
+def first(folder):
+    return run(folder, "lengths")
+
+
+def test_machine_code_is_made_for_what_python_calls_alone(first):
+    assert first == [
         "5.0 10.0 as it is",
         "another length",
         "lengths length squared",
@@ -76,9 +89,8 @@ def test_machine_code_is_made_for_what_python_calls_alone(tmp_path):
     ]
 
 
-def test_what_was_saved_is_linked_into_what_is_compiled_later(tmp_path):
-    run(tmp_path, "lengths")
-    assert run(tmp_path, "lengths", "twice") == [
+def test_what_was_saved_is_linked_into_what_is_compiled_later(folder, first):
+    assert run(folder, "lengths", "twice") == [
         "5.0 10.0 as it is",
         "25.0 100.0 by bitcode",
         "another length",
@@ -87,4 +99,4 @@ def test_what_was_saved_is_linked_into_what_is_compiled_later(tmp_path):
         "lengths True",
         "twice True",
     ]
-    assert run(tmp_path, "twice")[:2] == ["25.0 100.0 as it is", "another length"]
+    assert run(folder, "twice")[:2] == ["25.0 100.0 as it is", "another length"]

@@ -9,6 +9,7 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import llvmlite.binding as llvm
 import pytest
@@ -56,8 +57,7 @@ for function in (lengths, twice) if "twice" in sys.argv else (lengths,):
         function(v * 1e6, out)
     except ValueError as error:
         print(error.args)
-if "constants" in sys.argv:
-    print(sum("checked" in name for name in Environment._memo))
+print(sum("checked" in name for name in Environment._memo), "kept")
 for dispatcher in (lengths, twice):
     for result in dispatcher.overloads.values():
         print(dispatcher.py_func.__name__, result.library._image is not None)
@@ -66,15 +66,24 @@ for dispatcher in (lengths, twice):
 LARGE = """
 import gc
 import sys
+from mmap import PAGESIZE
 import llvmlite.binding as llvm
 import numpy as np
 from pmviewer.heap import give_back
 from pmviewer.kernels.compile import placed
-from pmviewer.kernels.compile.jit import kernel
-from pmviewer.viewer.random_user import resident
+from pmviewer.kernels.compile.jit import device, kernel
 
 if "placed" in sys.argv:
     placed.install()
+
+def resident():
+    return int(open("/proc/self/statm").read().split()[1]) * PAGESIZE / 2**20
+
+@device
+def step(x, i, out):
+    x = np.sin(x * (i + 0.5)) + out[i] * np.exp(x - (i + 0.25))
+    out[i] = x
+    return x
 
 @kernel
 def large(x, out):
@@ -93,7 +102,7 @@ print(sum(isinstance(o, llvm.ModuleRef) for o in gc.get_objects()) - modules)
 """
 PAGES = 10 * mmap.PAGESIZE / 2**20
 """MiB that filled pages and what Python keeps of a kernel take beside."""
-STATEMENTS = "\n    ".join(f"x = np.sin(x * {i}.5) + out[{i}] * np.exp(x - {i}.25); out[{i}] = x" for i in range(200))
+STATEMENTS = "\n    ".join(f"x = step(x, {i}, out)" for i in range(60))
 
 
 def run(folder: Path, module: str, *words: str) -> list[str]:
@@ -103,39 +112,77 @@ def run(folder: Path, module: str, *words: str) -> list[str]:
     return subprocess.run(command, env=env, capture_output=True, text=True, check=True, timeout=300).stdout.splitlines()
 
 
-def test_what_is_placed_gives_the_same_and_raises_the_same(tmp_path):
-    compiled = run(tmp_path, MODULE)
-    assert compiled.pop() == "lengths False"
-    placed = run(tmp_path, MODULE)
-    assert placed.pop() == "lengths True"
-    assert placed == compiled
-    assert compiled[1] == "('too long', 'by far')"
+class Told(NamedTuple):
+    """What a process has said: of calls, how many functions' constants are kept, and which kernel is placed."""
+
+    calls: list[str]
+    kept: str
+    kernels: list[str]
+
+    @classmethod
+    def by(cls, folder: Path, *words: str) -> Told:
+        lines = run(folder, MODULE, *words)
+        kept = next(i for i, line in enumerate(lines) if line.endswith("kept"))
+        return cls(lines[:kept], lines[kept], lines[kept + 1 :])
 
 
-def test_constants_that_no_code_asks_for_are_not_kept(tmp_path):
-    run(tmp_path, MODULE)
-    assert run(tmp_path, MODULE, "constants")[-2:] == ["0", "lengths True"]
-    assert run(tmp_path, MODULE, "constants", "refused")[-2:] == ["1", "lengths False"]
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory) -> Path:
+    """A folder in which nothing has been compiled, for all tests that run MODULE."""
+    return tmp_path_factory.mktemp("kept")
 
 
-def test_what_is_placed_can_be_linked_into_what_is_compiled(tmp_path):
-    run(tmp_path, MODULE)
-    *told, lengths, twice = run(tmp_path, MODULE, "twice")
-    assert (lengths, twice) == ("lengths True", "twice False")
-    assert run(tmp_path, MODULE, "twice") == [*told, "lengths True", "twice True"]
+@pytest.fixture(scope="module")
+def compiled(kept) -> Told:
+    """By the process that has compiled it."""
+    return Told.by(kept)
 
 
-def test_what_cannot_be_placed_is_loaded_by_llvm(tmp_path):
-    run(tmp_path, MODULE)
-    assert run(tmp_path, MODULE, "refused")[-1] == "lengths False"
-    assert run(tmp_path, MODULE, "refused")[:-1] == run(tmp_path, MODULE)[:-1]
+@pytest.fixture(scope="module")
+def refused(kept, compiled) -> Told:
+    """By one that can't place what it finds."""
+    return Told.by(kept, "refused")
+
+
+@pytest.fixture(scope="module")
+def linked(kept, compiled) -> Told:
+    """By one that has found the first kernel and compiled the second, which calls it."""
+    return Told.by(kept, "twice")
+
+
+@pytest.fixture(scope="module")
+def placed(kept, linked) -> Told:
+    """By one that finds both."""
+    return Told.by(kept, "twice")
+
+
+def test_what_is_placed_gives_the_same_and_raises_the_same(compiled, linked, placed):
+    assert compiled.kernels == ["lengths False"]
+    assert placed.kernels == ["lengths True", "twice True"]
+    assert placed.calls[:2] == compiled.calls
+    assert placed.calls == linked.calls
+    assert compiled.calls[1] == "('too long', 'by far')"
+
+
+def test_constants_that_no_code_asks_for_are_not_kept(placed, refused):
+    assert placed.kept == "0 kept"
+    assert refused.kept == "1 kept"
+
+
+def test_what_is_placed_can_be_linked_into_what_is_compiled(linked):
+    assert linked.kernels == ["lengths True", "twice False"]
+
+
+def test_what_cannot_be_placed_is_loaded_by_llvm(compiled, refused):
+    assert refused.kernels == ["lengths False"]
+    assert refused.calls == compiled.calls
 
 
 def test_what_is_placed_takes_little_more_than_its_code(tmp_path):
     module = LARGE.replace("STATEMENTS", STATEMENTS)
     run(tmp_path, module)
     (placed, modules), (loaded, _) = (map(float, run(tmp_path, module, word)) for word in ("placed", "by LLVM"))
-    files = list((tmp_path / "cache").rglob("*.nbc"))
+    files = list((tmp_path / "cache").rglob("*.large-*.nbc"))
     assert len(files) == 4
     size = sum(len(pickle.loads(file.read_bytes())[1][0][2][0]) for file in files) / 4 / 2**20
     assert placed < size + PAGES < loaded

@@ -6,12 +6,12 @@ import ast
 import pytest
 
 from pmviewer.kernels.compile.sources import PACKAGE, imported_names, sources_of
-from tests.support.sources import package_files, parsed
+from tests.support.sources import package_files, parsed, statements
 
 
 def imports(tree: ast.Module) -> set[str]:
     names: set[str] = set()
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.ImportFrom) and node.module:
             names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
         elif isinstance(node, ast.Import):
@@ -44,3 +44,11 @@ def test_what_is_imported_by_what_is_imported_counts():
     reached = sources_of(PACKAGE / "engine" / "session.py")
     assert PACKAGE / "kernels" / "vector.py" in reached
     assert PACKAGE / "viewer" / "app.py" not in reached
+
+
+@pytest.mark.parametrize("module", ["eye", "path"])
+def test_pictures_are_not_compiled_again_when_a_setting_or_the_description_of_scenes_changes(module):
+    """Each variant of their kernels takes seconds to compile."""
+    reached = {source.relative_to(PACKAGE).parts[0] for source in sources_of(PACKAGE / "render" / f"{module}.py")}
+    assert "render" in reached
+    assert not reached & {"settings", "scene", "engine"}

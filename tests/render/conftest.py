@@ -1,12 +1,14 @@
-"""One variant of kernels for scenes with and without smooth glass."""
+"""One variant of kernels for scenes with and without mirrors and smooth glass."""
 
 from __future__ import annotations
 
 import pytest
 
+AS_THEY_ARE = ("test_split.py", "test_mirror_rays.py", "test_same_picture.py")
+
 
 @pytest.fixture(autouse=True)
 def always_may_split(request):
-    """Kernels without a way to follow both are run by test_split.py, test_same_picture.py and other rooms' tests."""
-    if request.path.name not in ("test_split.py", "test_same_picture.py"):
+    """Kernels with one way and one sample are run by the tests of these files, and by other rooms' tests."""
+    if request.path.name not in AS_THEY_ARE:
         request.getfixturevalue("every_path_may_split")

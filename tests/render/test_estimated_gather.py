@@ -14,6 +14,7 @@ from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.stages.estimation import NARROWEST, first_tiles, grid_lines, shrink_of
 from pmviewer.engine.store import StageStore
 from pmviewer.output.diagnostic_views import DIAGNOSTICS, coloured
+from pmviewer.render.counts import N_COUNTS
 from pmviewer.render.gather.estimation import (
     DIFFUSE,
     ESTIMATE,
@@ -38,7 +39,6 @@ from pmviewer.render.gather.tiles import (
     divide_tiles,
     mark_safe,
 )
-from pmviewer.render.record import N_COUNTS
 from pmviewer.scene.analysis import analyse
 from tests.support.scenes import closed_sphere, cornell_box, diffuse_box, rendered, settings_of
 

@@ -9,7 +9,8 @@ import pytest
 
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.render.film import Film
-from pmviewer.render.filter import BOX, DEFAULTS, evaluate, filter_of, has_signs, place_in_filter
+from pmviewer.render.filter import BOX, DEFAULTS, evaluate, filter_of, has_signs
+from pmviewer.render.filter_samples import place_in_filter
 from pmviewer.render.planes import CHANNELS, PLANES
 from pmviewer.render.record import EYE_DTYPE, eye_record
 from pmviewer.scene.analysis import analyse

@@ -15,7 +15,8 @@ from pmviewer.render.mirror_rays import MIRRORED
 from pmviewer.render.mirrored import BLOCK, is_mirror, mirrored_pixels
 from pmviewer.render.planes import PLANES
 from pmviewer.scene.description import Material
-from tests.support.scenes import GLASS, MIRROR, cornell_box, diffuse_box, settings_of
+from tests.support import kinds
+from tests.support.scenes import GLASS, MIRROR, cornell_box, diffuse_box, rendered, settings_of
 
 SIZE = 24
 
@@ -111,3 +112,14 @@ def test_what_has_neither_mirrors_nor_glass_is_compiled_without(pool):
         {"estimate": {"radius_rule": "pixel"}},
     ):
         assert "One sample" in inactive_reason("render.mirror_rays", settings_of(**values), box)
+
+
+def test_kernels_for_mirrors_and_glass_show_a_room_without_them_as_it_is(monkeypatch):
+    """Other tests' scenes are opened so, for one variant of kernels (`tests.support.kinds`); rounding is theirs."""
+    settings = settings_of(photons={"N": 2000})
+    plain = rendered(diffuse_box(size=16), settings, 2)
+    kinds.may_always_split(monkeypatch)
+    other = rendered(diffuse_box(size=16), settings, 2)
+    assert {"mirror_rays", "splits"} <= set(blank_eye(settings, other.plan).dtype.names)
+    assert not {"mirror_rays", "splits"} & set(blank_eye(settings, plain.plan).dtype.names)
+    np.testing.assert_allclose(other.film.sums, plain.film.sums, rtol=1e-4, atol=1e-6)

@@ -24,7 +24,10 @@ pytestmark = pytest.mark.usefixtures("every_surface")
 FOLDER = Path(__file__).parents[1] / "scene" / "mitsuba_conventions"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text("utf-8"))
 SCENES = EXPECTED["scenes"]
-RUNS = 8
+PATH, PHOTONS = (16, 8), (8, 4)
+"""Runs and passes of each. Many short runs: of eight the spread is known so badly that Student's t has to be 13 before
+a block counts as wrong, of sixteen 7. Half of the blocks may be off by no more than 0.4 % (mirrored_mesh_own_normals)
+to 5 % (bumpmap_on_metal; 24 % where smooth_mesh_light_inside_out is lit by few paths)."""
 SIGNIFICANCE = 1e-4
 ROUNDING = 1e-5
 """Relative: six digits are recorded."""
@@ -32,13 +35,13 @@ RADIUS = 0.01
 """Of the scene's: what a look-up blurs must be less than the noise."""
 
 
-def block_runs(name, method, passes):
-    """(RUNS, blocks) means over blocks and channels of pictures with different seeds."""
+def block_runs(name, method, runs, passes):
+    """(runs, blocks) means over blocks and channels of pictures with different seeds."""
     opened = open_scene(str(FOLDER / f"{name}.xml"))
     pool = WorkPool()
     rows = []
     try:
-        for seed in range(1, RUNS + 1):
+        for seed in range(1, runs + 1):
             values = {"render": {"method": method, "seed": seed}, "estimate": {"radius": RADIUS}}
             renderer = Renderer(opened, settings_of(**values), pool, StageStore(0))
             for _ in range(passes):
@@ -72,7 +75,8 @@ def test_every_scene_has_an_expectation():
 @pytest.mark.parametrize("name", list(SCENES))
 def test_path_tracer_shows_mitsubas_picture(name):
     expected = SCENES[name]
-    assert p_value(block_runs(name, "path", 32), expected["mean"], expected["error"], EXPECTED["runs"]) > SIGNIFICANCE
+    ours = block_runs(name, "path", *PATH)
+    assert p_value(ours, expected["mean"], expected["error"], EXPECTED["runs"]) > SIGNIFICANCE
 
 
 @pytest.mark.extensive
@@ -81,5 +85,5 @@ def test_path_tracer_shows_mitsubas_picture(name):
 def test_photon_methods_show_it_too(name, method):
     """Within one percent of a block, for what a look-up blurs."""
     expected = SCENES[name]
-    found = p_value(block_runs(name, method, 4), expected["mean"], expected["error"], EXPECTED["runs"], tolerance=0.01)
-    assert found > SIGNIFICANCE
+    ours = block_runs(name, method, *PHOTONS)
+    assert p_value(ours, expected["mean"], expected["error"], EXPECTED["runs"], tolerance=0.01) > SIGNIFICANCE

@@ -23,15 +23,17 @@ from tests.support.scenes import settings_of
 pytestmark = pytest.mark.usefixtures("every_surface")
 
 EXPECTED = json.loads((Path(__file__).parent / "mitsuba_views" / "expected.json").read_text("utf-8"))
-RUNS = 6
+PATH = (16, 8)
+"""Runs and passes: of few runs the spread is known badly, and Student's t has to be large before a block counts as
+wrong. Half of the blocks may be off by no more than 1.3 % (vertex_colours) to 6 % (veils_area)."""
 SIGNIFICANCE = 1e-4
 
 
-def block_runs(name, method, passes):
-    """(RUNS, blocks · 3) means over blocks of pictures with different seeds."""
+def block_runs(name, method, runs, passes):
+    """(runs, blocks · 3) means over blocks of pictures with different seeds."""
     opened, pool, rows, b = open_scene(description(name)), WorkPool(), [], EXPECTED["block"]
     try:
-        for seed in range(1, RUNS + 1):
+        for seed in range(1, runs + 1):
             values = {"render": {"method": method, "seed": seed}, "estimate": {"radius": 0.01}}
             renderer = Renderer(opened, settings_of(photons={"N": 16_000}, **values), pool, StageStore(0))
             for _ in range(passes):
@@ -44,13 +46,13 @@ def block_runs(name, method, passes):
     return np.array(rows)
 
 
-def check(name, method, passes, tolerance):
+def check(name, method, runs, passes, tolerance):
     """All blocks agree within their noise and that share of a block, and the whole picture within one percent."""
-    ours = block_runs(name, method, passes)
+    ours = block_runs(name, method, runs, passes)
     mean, error = (np.array(EXPECTED["scenes"][name][key]) for key in ("mean", "error"))
     rounding = (2e-5 * mean) ** 2  # six digits are recorded, and float32 sums of pixels that show the sky alone
-    a, b = ours.var(axis=0, ddof=1) / RUNS + rounding, error**2 + rounding
-    freedom = (a + b) ** 2 / (a**2 / (RUNS - 1) + b**2 / (EXPECTED["runs"] - 1))
+    a, b = ours.var(axis=0, ddof=1) / runs + rounding, error**2 + rounding
+    freedom = (a + b) ** 2 / (a**2 / (runs - 1) + b**2 / (EXPECTED["runs"] - 1))
     beyond = np.maximum(np.abs(ours.mean(axis=0) - mean) - tolerance * mean, 0.0)
     smallest = float(2 * student.sf(beyond / np.sqrt(a + b), freedom).min())
     ratio = ours.mean() / mean.mean()
@@ -62,7 +64,7 @@ def check(name, method, passes, tolerance):
 
 @pytest.mark.parametrize("name", list(VIEWS))
 def test_path_tracer(name):
-    check(name, "path", 32, 0.0)
+    check(name, "path", *PATH, 0.0)
 
 
 @pytest.mark.extensive
@@ -71,9 +73,9 @@ def test_path_tracer(name):
 )
 def test_photon_methods(name, method):
     """Within two percent of a block, for what look-ups blur along edges. Each pair compiles kernels of its own."""
-    check(name, method, 24, 0.02)
+    check(name, method, 6, 24, 0.02)
 
 
 @pytest.mark.parametrize("method", ["progressive", "gather"])
 def test_photon_methods_hide_lights(method):
-    check("hidden_lights", method, 12, 0.02)
+    check("hidden_lights", method, 6, 12, 0.02)

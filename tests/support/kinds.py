@@ -34,8 +34,15 @@ def _open_as_if(monkeypatch, where, *features):
 
 
 def may_always_split(monkeypatch):
-    """Kernels follow both ways at glass whether there is some or not (`pmviewer.render.split`): one variant in place
-    of two, of the same picture."""
-    splits = method._splits
-    glassy = {"has_smooth_glass": True}
-    monkeypatch.setattr(method, "_splits", lambda *of: splits(of[0], replace(of[1], **glassy), *of[2:]))
+    """Kernels follow both ways at glass, and have several samples of pixels that show mirrors, whether there are some
+    or not (`pmviewer.render.split`, `pmviewer.render.mirror_rays`): one variant in place of four, of the same
+    picture."""
+    for name in ("_splits", "_mirror_rays"):
+        monkeypatch.setattr(method, name, _as_if_mirrors_and_glass(getattr(method, name)))
+
+
+def _as_if_mirrors_and_glass(decide):
+    """A decision of `pmviewer.engine.method`, made for such a scene."""
+    return lambda settings, traits, plan: decide(
+        settings, replace(traits, has_smooth_glass=True, has_specular=True), plan
+    )

@@ -6,6 +6,7 @@ from __future__ import annotations
 import ast
 import functools
 import gc
+from collections.abc import Iterator
 from pathlib import Path
 
 import pmviewer
@@ -28,3 +29,17 @@ def parsed(file: Path) -> ast.Module:
 def package_files() -> list[Path]:
     """Every source of the package."""
     return sorted(PACKAGE.rglob("*.py"))
+
+
+def within(node: ast.AST) -> Iterator[ast.AST]:
+    """The statements of a statement's blocks, and handlers and cases, which have blocks of their own. Nine tenths of a
+    tree are expressions, in which nothing is defined or imported."""
+    for block in ("body", "handlers", "orelse", "finalbody", "cases"):
+        yield from getattr(node, block, ())
+
+
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Those of all blocks in it, at any depth."""
+    for statement in within(node):
+        yield statement
+        yield from statements(statement)

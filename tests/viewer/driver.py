@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from imgui_bundle import ImVec2, hello_imgui, imgui
+from imgui_bundle import _patch_runners_add_save_screenshot_param as runners
 from imgui_bundle.immapp import testing
 
 from pmviewer.engine.effects import inactive_reason
@@ -17,6 +18,9 @@ from pmviewer.engine.session import Session
 from pmviewer.settings.access import Settings, with_values
 from pmviewer.viewer.app import ViewerApp
 from pmviewer.viewer.dialogs.recent import RecentFiles
+
+# Who opens a window is asked for the sake of imgui_bundle's tutorials: by all modules' sources, 25 ms a window.
+runners._get_caller_filename = lambda depth: ""
 
 Context = Any
 Pixels = np.ndarray

@@ -34,9 +34,9 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
+from pmviewer.render.counts import N_COUNTS
 from pmviewer.render.gather.estimation import ESTIMATE, TOLD, gather_samples
 from pmviewer.render.gather.reprojection import PARTIAL
-from pmviewer.render.record import N_COUNTS
 from pmviewer.settings.access import Settings, with_values
 
 SCENES: Mapping[str, dict[str, Any]] = {

@@ -6,9 +6,8 @@ from pathlib import Path
 
 from pmviewer.errors import SceneError, SettingError
 from pmviewer.output.compare import Reference, load_reference
-from pmviewer.render.camera import resolve_camera, size_only
+from pmviewer.render.camera import are_hidden, resolve_camera, size_only
 from pmviewer.render.filter import is_own
-from pmviewer.render.hidden_lights import are_hidden
 from pmviewer.scene.description import Scene
 from pmviewer.scene.load import reference_of
 from pmviewer.settings.access import Settings

@@ -9,9 +9,9 @@ from pmviewer.engine.inspector.report import Fisheye, Float
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.reprojection import no_hits, rule_of
+from pmviewer.render.counts import N_COUNTS
 from pmviewer.render.gather.estimation import DIFFUSE, KIND, NORMAL, POINT, SAMPLE, trace_samples
 from pmviewer.render.gather.reprojection import SOURCES, look_around
-from pmviewer.render.record import N_COUNTS
 from pmviewer.settings.schema import Gather
 
 

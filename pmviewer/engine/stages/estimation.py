@@ -25,6 +25,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.stages.reprojection import KnownHits
 from pmviewer.maps.hemisphere import strata
 from pmviewer.render.camera import CameraPose
+from pmviewer.render.counts import N_COUNTS
 from pmviewer.render.gather.estimation import ESTIMATE, ESTIMATES, SAMPLE, TOLD, gather_samples, trace_samples
 from pmviewer.render.gather.tiles import (
     CRITICAL,
@@ -38,7 +39,6 @@ from pmviewer.render.gather.tiles import (
     mark_safe,
 )
 from pmviewer.render.given import PassData
-from pmviewer.render.record import N_COUNTS
 from pmviewer.settings.schema import Gather
 
 SHRINK = 1.0 / 6.0
@@ -126,7 +126,7 @@ def blank_estimates() -> NDArray[np.void]:
 def estimate_gathers(
     given: PassData, gather: Gather, camera: CameraPose, pool: WorkPool
 ) -> tuple[Estimates, NDArray[np.int64]]:
-    """The estimates of a pass and the counts of its kernels (`pmviewer.render.record`)."""
+    """The estimates of a pass and the counts of its kernels (`pmviewer.render.counts`)."""
     eye = given.eye[0]
     width, height, seed, index = (int(eye[name]) for name in ("width", "height", "seed", "index"))
     shrink, pixels = shrink_of(index), width * height

@@ -14,19 +14,19 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.virtual_lights import lights_asked
 from pmviewer.engine.store import StageStore
-from pmviewer.render.camera import CameraPose
+from pmviewer.render.camera import CameraPose, hidden_from
+from pmviewer.render.counts import N_COUNTS
 from pmviewer.render.direct.choice import CHOICES
 from pmviewer.render.direct.outline import outline_pixels
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
-from pmviewer.render.filter import BOX, add_weights, filter_of, has_signs
+from pmviewer.render.filter import BOX, filter_of, has_signs
+from pmviewer.render.filter_samples import add_weights
 from pmviewer.render.gather.gather_points import POINT_COLUMNS, gather_points
 from pmviewer.render.given import PassData
-from pmviewer.render.hidden_lights import hidden_from
 from pmviewer.render.mirror_rays import own_eye
 from pmviewer.render.mirrored import mirrored_pixels
 from pmviewer.render.path import path_pass
-from pmviewer.render.record import N_COUNTS
 from pmviewer.settings.access import Settings
 
 LEAST_TILE = 4
@@ -36,7 +36,7 @@ MOST_POINTS = 1024
 
 
 def render_into(film: Film, given: PassData, marks: NDArray[np.uint8], plan: Plan, pool: WorkPool) -> NDArray[np.int64]:
-    """A pass's samples more, of the path tracer or by maps. Returns the counts of `pmviewer.render.record`."""
+    """A pass's samples more, of the path tracer or by maps. Returns the counts of `pmviewer.render.counts`."""
     pixels = len(film.sums)
     signed = has_signs(given.eye)
     if signed and film.weights is None:

@@ -29,9 +29,9 @@ from pmviewer.maps.irradiance_cache import (
     limit_by_neighbours,
 )
 from pmviewer.render.camera import CameraPose
+from pmviewer.render.counts import N_COUNTS
 from pmviewer.render.gather.cache_fill import fill_records
 from pmviewer.render.given import PassData
-from pmviewer.render.record import N_COUNTS
 from pmviewer.settings.schema import Gather
 from pmviewer.tasks import Runner, in_turn
 

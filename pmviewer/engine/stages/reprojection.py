@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.pool import WorkPool
+from pmviewer.render.counts import N_COUNTS
 from pmviewer.render.gather.estimation import ESTIMATE, SAMPLE, TOLD
 from pmviewer.render.gather.reprojection import FULL, NOT_GATHERED, PARTIAL, SOURCES, gather_reprojected, sources_of
 from pmviewer.render.gather.zbuffer import HIT
 from pmviewer.render.given import PassData
-from pmviewer.render.record import N_COUNTS
 from pmviewer.settings.schema import Gather
 
 FEWEST = 2

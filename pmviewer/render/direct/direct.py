@@ -16,10 +16,10 @@ from pmviewer.kernels.random import SOBOL, draw4
 from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.vector import add, dot, largest, mul, scale
 from pmviewer.render.chain import BLACK, WHITE
+from pmviewer.render.counts import C_RAYS, C_SAVED, C_SHADOW_RAYS
 from pmviewer.render.direct.choice import chosen_light, expected_samples
 from pmviewer.render.direct.shadow import LIT, UNKNOWN, known_visibility
 from pmviewer.render.media.through import ANYWHERE, place_of
-from pmviewer.render.record import C_RAYS, C_SAVED, C_SHADOW_RAYS
 from pmviewer.render.straight import transmission
 
 _f4 = np.float32

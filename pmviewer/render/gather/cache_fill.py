@@ -31,10 +31,10 @@ from pmviewer.maps.irradiance_cache import (
 )
 from pmviewer.render.cast import cast, ray_from
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow_camera_path
+from pmviewer.render.counts import C_DROPPED, C_RAYS
 from pmviewer.render.gather.gather import gather_light
 from pmviewer.render.given import opened
 from pmviewer.render.pixel import pixel_seed, sampled_ray
-from pmviewer.render.record import C_DROPPED, C_RAYS
 from pmviewer.render.straight import cast_on, way
 
 _f4 = np.float32

@@ -15,10 +15,10 @@ from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.vector import dot, largest, mul, scale
 from pmviewer.maps.irradiance_cache import interpolate
 from pmviewer.render.chain import BLACK
+from pmviewer.render.counts import C_CACHED, C_GATHERED, C_RAYS
 from pmviewer.render.direct.direct import found_light
 from pmviewer.render.gather.estimation import estimated
 from pmviewer.render.gather.gather import gather_rays
-from pmviewer.render.record import C_CACHED, C_GATHERED, C_RAYS
 from pmviewer.render.straight import cast_straight
 
 _f4 = np.float32

@@ -22,10 +22,10 @@ from pmviewer.kernels.vector import luminance
 from pmviewer.maps.hemisphere import irradiance_and_gradients
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, WHITE, arrive
+from pmviewer.render.counts import C_DROPPED, C_RAYS
 from pmviewer.render.gather.cache_fill import gather_hemisphere
 from pmviewer.render.given import opened
 from pmviewer.render.pixel import pixel_seed, sampled_ray
-from pmviewer.render.record import C_DROPPED, C_RAYS
 
 _f4 = np.float32
 _f8 = np.float64

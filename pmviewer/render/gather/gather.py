@@ -16,12 +16,12 @@ from pmviewer.kernels.dimensions import GATHER_CHAIN, GATHER_FORK, GATHER_WAVE
 from pmviewer.kernels.vector import add, dot, largest, mul, scale
 from pmviewer.render.cast import Hit, cast, leaving
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow
+from pmviewer.render.counts import C_RAYS
 from pmviewer.render.direct.direct import found_light
 from pmviewer.render.gather.corner import gather_again, is_corner
 from pmviewer.render.gather.guide import gather_direction
 from pmviewer.render.media.emitted import emitted_nearby
 from pmviewer.render.media.volume import gathered_from_media
-from pmviewer.render.record import C_RAYS
 from pmviewer.render.reflect import gathered
 from pmviewer.render.straight import cast_straight
 

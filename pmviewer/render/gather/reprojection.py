@@ -17,13 +17,13 @@ from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import basis, dot, mul
 from pmviewer.maps.hemisphere import cell_direction, irradiance_and_gradients
 from pmviewer.render.chain import BLACK, arrive
+from pmviewer.render.counts import C_DROPPED
 from pmviewer.render.gather.cache_fill import gather_cell
 from pmviewer.render.gather.estimation import FACE, GAP, NORMAL, POINT, standard_error
 from pmviewer.render.gather.zbuffer import FACE as HIT_FACE
 from pmviewer.render.gather.zbuffer import HIT, LIGHT, PATCH, PLACE, USABLE, WAY, Hemisphere, clear, plot, resolve
 from pmviewer.render.given import opened
 from pmviewer.render.pixel import pixel_seed
-from pmviewer.render.record import C_DROPPED
 
 NOT_GATHERED, PARTIAL, FULL = 0, 1, 2
 """Of a pixel's gather: none, some directions reprojected, all of them shot."""

@@ -26,6 +26,7 @@ from pmviewer.kernels.scene import DIRECTIONAL, ENVIRONMENT, IMAGE, L_KIND, ligh
 from pmviewer.kernels.vector import add, along, largest, mul, scale
 from pmviewer.maps.estimate.beam import beam_radiance
 from pmviewer.render.cast import Ray, cast
+from pmviewer.render.counts import C_RAYS, C_SHADOW_RAYS
 from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power, chosen_light
 from pmviewer.render.direct.direct import found_light
 from pmviewer.render.given import Sampler
@@ -36,7 +37,6 @@ from pmviewer.render.media.phase_light import one_light_sample
 from pmviewer.render.media.through import next_stretch, way_through
 from pmviewer.render.pixel import EMISSION, SPECULAR, VOLUME_INDIRECT, deposit
 from pmviewer.render.pixel import VOLUME as SINGLE
-from pmviewer.render.record import C_RAYS, C_SHADOW_RAYS
 
 _f4 = np.float32
 _i8 = np.int64

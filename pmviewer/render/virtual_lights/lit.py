@@ -34,9 +34,9 @@ from pmviewer.maps.virtual_lights import (
     W_SQUARES,
     W_SUM,
 )
+from pmviewer.render.counts import C_DROPPED, C_RAYS, C_SHADOW_RAYS
 from pmviewer.render.pixel import INDIRECT, SPECULAR, weighed
 from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS
-from pmviewer.render.record import C_DROPPED, C_RAYS, C_SHADOW_RAYS
 from pmviewer.render.straight import let_through
 from pmviewer.render.virtual_lights.descent import CUT_WORDS, ask_cut, descend
 from pmviewer.render.virtual_lights.light import facing_of, sent, towards, weight_of

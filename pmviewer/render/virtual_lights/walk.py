@@ -28,7 +28,7 @@ from pmviewer.kernels.vector import luminance
 from pmviewer.maps.virtual_lights import FULL, MODIFIED
 from pmviewer.render.cast import cast, leaving
 from pmviewer.render.chain import WHITE, arrive, scatter
-from pmviewer.render.record import C_RAYS, C_SHADOW_RAYS
+from pmviewer.render.counts import C_RAYS, C_SHADOW_RAYS
 from pmviewer.render.straight import visible
 from pmviewer.render.virtual_lights.light import LEAST_ALBEDO
 
