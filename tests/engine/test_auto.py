@@ -169,7 +169,7 @@ def test_without_time_for_a_trial_traits_choose(cornell):
         choice = choose(cornell, Settings(), Goal(seconds=0.01), pool, lambda text, share: None)
     finally:
         pool.close()
-    assert choice.changed == {"render.method": "gather", "gather.cache": "on"}
+    assert choice.changed == CACHE.values
     assert math.isnan(choice.expected)
     assert "too few" in choice.sentences[0]
 
