@@ -116,6 +116,14 @@ def test_the_candidates_of_all_rounds_are_a_lattice():
     assert any(not np.array_equal(a, b) for a, b in zip(rounds, lattices(50, 30, 1, 5), strict=True))
 
 
+def test_lattices_are_as_wide_in_a_picture_of_which_parts_are_seen():
+    """Of a quarter of each pixel's side, sixteen to four pixels are four to one."""
+    rounds = lattices(50, 30, 1, 4, 0.25)
+    assert len(rounds) == 3
+    assert np.array_equal(np.sort(np.concatenate(rounds)), np.arange(50 * 30))
+    assert len(rounds[0]) == pytest.approx(50 * 30 / 16, rel=0.2)
+
+
 def test_reaches_shrink_with_the_passes():
     settings = settings_of(gather={"cache_error": 0.4, "cache_min": 3.0, "cache_max": 32.0})
     camera = resolve_camera(diffuse_box(), settings.camera)

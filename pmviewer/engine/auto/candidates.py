@@ -25,7 +25,11 @@ class Candidate:
 
 PROGRESSIVE = Candidate("progressive", {})
 GATHER = Candidate("gather", {"render.method": "gather"})
-CACHE = Candidate("gather with irradiance cache", {"render.method": "gather", "gather.cache": "on"})
+WIDE_RECORDS = {"gather.cache_min": 12.0, "gather.cache_max": 48.0}
+"""Records that reach three times as far as those that stay next to the plain gather: fewer of them, and less noise in
+the same time in all bundled scenes tried, from 2 to 64 passes and from 64² to 256² pixels; from four times on, bias
+shows."""
+CACHE = Candidate("gather with irradiance cache", {"render.method": "gather", "gather.cache": "on", **WIDE_RECORDS})
 PATH = Candidate("path", {"render.method": "path"})
 GUIDED = {"importance.map": "average", "importance.emission": "Christensen keep"}
 

@@ -21,7 +21,7 @@ import numpy as np
 from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.candidates import CACHE, GATHER, Candidate, assignments
 from pmviewer.engine.auto.relative import F8, squared, variance
-from pmviewer.engine.auto.widths import NONE, Tried, Widened, told_by
+from pmviewer.engine.auto.widths import NONE, WIDER, Tried, Widened, told_by
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
@@ -38,17 +38,15 @@ Tell = Callable[[str, float | None], None]
 FEWER = 4
 """Photons of the larger trial pass over those of the smaller one."""
 RARE = 2.0
-"""What the variance that photons of the global map bring is multiplied by: those that are rare and bright are missing
-in nearly all of a few small pictures, and make half of the error of a long one (measured on cornell_glossy, office,
-museum). Caustics of a light have none: different radii tell their part to a tenth (cornell_caustic, ring_caustic)."""
+"""What the variance that gather rays bring from photons is multiplied by: bright ones that few rays find are missing
+in nearly all of a few small pictures (the whole pictures had 1.0 to 4.5 times as much: cornell_diffuse, rooms_10x10,
+museum, office). Maps that are shown have none: different radii tell their part to a tenth, in office to a quarter."""
 BLOCK = 4
 """What interpolation does is compared in blocks of so many pixels squared: its bias is smooth, noise is not. Pictures
 with two radii have the same photons and camera rays, and little noise in their difference."""
 SEEDS = (7_919, 104_729)
 """Added to the picture's seed."""
 STORE = 1 << 28
-WIDER = 2.0
-"""Radii that are tried besides are wider and narrower by this."""
 
 
 @dataclass(frozen=True)
@@ -247,7 +245,7 @@ def _widened(tried: _Tried, name: str, mean: F8, scale: float) -> Widened:
         return NONE
     wide, narrow = (Tried(run.images, run.stages.get("camera pass", 0.0)) for run in runs)
     usual = Tried(tried.runs[0].images, 0.0)
-    found = told_by(wide, usual, narrow, mean, WIDER)
+    found = told_by(wide, usual, narrow, mean)
     N = tried.runs[0].N
     return replace(found, variance=found.variance * N, cost=found.cost * scale / N)
 
@@ -265,7 +263,7 @@ def _measured(tried: _Tried, widened: tuple[Widened, Widened], bias: Bias, mean:
         caustic, shown = caustic * fitting, shown * fitting
         gathered = max(photons - caustic - shown, 0.0)
     costs = _costs(tried.runs, (widened[0].cost, widened[1].cost), scale)
-    return Measured(tried.candidate, costs, eye, caustic, RARE * shown, RARE * gathered, bias, tried.radius)
+    return Measured(tried.candidate, costs, eye, caustic, shown, RARE * gathered, bias, tried.radius)
 
 
 def _costs(runs: list[_Run], look_ups: tuple[float, float], scale: float) -> Costs:

@@ -1,9 +1,13 @@
-"""What passes with a wider and a narrower radius tell of it: bias, the power of the radius that bias goes with, the
-variance that the photons in it make, and what looking them up costs.
+"""What passes with a wider and a narrower radius tell of it: bias, the variance that the photons in it make, and what
+looking them up costs.
 
-All of them have the same photons and camera rays. Bias b ∝ r^p differs by b·(w^p − 1) between radii w·r and r, and by
-b·(1 − w^−p) between r and r/w, so that the quotient of both differences is w^p. Where light is narrower than the radius
-p is 1 or less, in the open 2; the quotient is noisy, so that p is taken half way between it and the usual one.
+All of them have the same photons and camera rays, so that they differ by their biases and little else. Where light
+ends at an outline, which is where most of it is wrong, the mean over a disc of radius r errs in a band of width 2r.
+With F(x) = (arccos x − x·√(1 − x²))/π, the part of a disc that lies beyond a straight line at x of its radius, the
+squared bias is r·2∫F² per length of line, and from the radius r to 2r it grows by 2.16 times the squared difference of
+both. In bundled scenes with a reference (museum, corner_room, cornell_lights, glossy_room, glass_egg, cornell_diffuse,
+cornell_caustic, ring_caustic) it grew by 2.0 to 2.9 times that. With bias b ∝ r^p both differences have the quotient
+2^p, which is noisy, so that p is taken half way between it and the usual one.
 """
 
 from __future__ import annotations
@@ -11,10 +15,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pmviewer.engine.auto.bias import ORDER, Blur
 from pmviewer.engine.auto.relative import F8, squared, variance
 
-ORDERS = 0.7, 1.5
+WIDER = 2.0
+"""Radii that are tried besides are wider and narrower by this."""
+GROWTH = 2.16
+"""Of the squared bias from a radius to one WIDER times as wide, over the squared difference of what both show."""
+ORDERS = 0.5, 1.5
 """The least and the greatest p that a trial believes in."""
 
 
@@ -44,20 +54,21 @@ class Widened:
 NONE = Widened(Blur(), 0.0, 0.0)
 
 
-def told_by(wide: Tried, usual: Tried, narrow: Tried, mean: F8, factor: float) -> Widened:
-    """From passes with radii of `factor` and 1/`factor` times the usual one, and with that. mean: the picture that
-    errors are relative to."""
-    span = factor**2 - 1 / factor**2
+def told_by(wide: Tried, usual: Tried, narrow: Tried, mean: F8) -> Widened:
+    """From passes with radii of WIDER and 1/WIDER times the usual one, and with that. mean: the picture that errors are
+    relative to."""
+    span = WIDER**2 - 1 / WIDER**2
     noise = max(variance(narrow.images, mean) - variance(wide.images, mean), 0.0) / span
-    return Widened(_blur(wide, usual, narrow, mean, factor), noise, max(wide.seconds - narrow.seconds, 0.0) / span)
+    return Widened(_blur(wide, usual, narrow, mean), noise, max(wide.seconds - narrow.seconds, 0.0) / span)
 
 
-def _blur(wide: Tried, usual: Tried, narrow: Tried, mean: F8, factor: float) -> Blur:
-    above, below = squared(wide.images, usual.images, mean), squared(usual.images, narrow.images, mean)
+def _blur(wide: Tried, usual: Tried, narrow: Tried, mean: F8) -> Blur:
+    """The power is told by errors relative to what the narrow radius shows, which is blurred least: where light has
+    leaked into the dark, the others are brighter than the truth, and the more so the wider they are."""
+    sharp = np.mean(narrow.images, axis=0)
+    above, below = squared(wide.images, usual.images, sharp), squared(usual.images, narrow.images, sharp)
     order = ORDER
     if above > 0 and below > 0:
-        seen = 0.5 * math.log(above / below) / math.log(factor)
+        seen = 0.5 * math.log(above / below) / math.log(WIDER)
         order = min(max((ORDER + seen) / 2, ORDERS[0]), ORDERS[1])
-    if above > 0:
-        return Blur(above / (factor**order - 1) ** 2, order)
-    return Blur(below / (1 - factor**-order) ** 2, order)
+    return Blur(GROWTH * squared(wide.images, usual.images, mean) / (WIDER ** (2 * order) - 1), order)

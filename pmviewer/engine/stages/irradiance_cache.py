@@ -12,6 +12,7 @@ limit the mean is that of the plain gather.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -56,15 +57,17 @@ def recipe(gather: Gather, camera: CameraPose, index: int) -> NDArray[np.void]:
     return record
 
 
-def lattices(width: int, height: int, seed: int, index: int) -> list[NDArray[np.int32]]:
-    """Candidates of each round: pixels that no coarser lattice has, in ascending order."""
+def lattices(width: int, height: int, seed: int, index: int, side: float = 1.0) -> list[NDArray[np.int32]]:
+    """Candidates of each round: pixels that no coarser lattice has, in ascending order. Where the camera sees parts of
+    pixels alone, of that `side`, lattices are as wide in those."""
+    coarsest = 1 << max(round(math.log2(COARSEST * side)), 0)
     rng = np.random.default_rng([seed, index])
-    x0, y0 = (int(offset) for offset in rng.integers(0, COARSEST, 2))
-    rounds, step = [], COARSEST
-    while step >= FINEST:
+    x0, y0 = (int(offset) for offset in rng.integers(0, coarsest, 2))
+    rounds, step = [], coarsest
+    while step >= max(coarsest * FINEST // COARSEST, 1):
         x, y = np.arange(-x0 % step, width, step), np.arange(-y0 % step, height, step)
         chosen = (y[:, None] * width + x).astype(np.int32)
-        if step < COARSEST:
+        if step < coarsest:
             coarser = (((y + y0) % (2 * step) == 0)[:, None]) & ((x + x0) % (2 * step) == 0)
             chosen = chosen[~coarser]
         rounds.append(chosen.ravel())
@@ -73,12 +76,14 @@ def lattices(width: int, height: int, seed: int, index: int) -> list[NDArray[np.
 
 
 def fill_cache(given: PassData, record: NDArray[np.void], pool: WorkPool) -> tuple[IrradianceCache, NDArray[np.int64]]:
-    """The cache of a pass and the rays counted; `how` is the pass's recipe."""
+    """The cache of a pass and the rays counted; `record` is the pass's recipe."""
+    given, side = given._replace(eye=_seeing_all(given.eye)), float(given.eye["pixel_side"][0])
     camera = given.eye[0]
     cache = build_cache(np.empty((0, ROW), np.float32), record)
     total = np.zeros(N_COUNTS, np.int64)
     batch = max(1, BATCH_RAYS // int(record["rings"][0] * record["sectors"][0]))
-    for pixels in lattices(int(camera["width"]), int(camera["height"]), int(camera["seed"]), int(camera["index"])):
+    size = int(camera["width"]), int(camera["height"])
+    for pixels in lattices(*size, int(camera["seed"]), int(camera["index"]), side):
         rows, made = np.empty((len(pixels), ROW), np.float32), np.empty(len(pixels), bool)
 
         def task(first: int, rows: Any = rows, made: Any = made, pixels: Any = pixels, cache: Any = cache) -> Any:
@@ -94,6 +99,13 @@ def fill_cache(given: PassData, record: NDArray[np.void], pool: WorkPool) -> tup
         if made.any():
             cache = _extended(cache, rows[made], pool.run)
     return cache, total
+
+
+def _seeing_all(eye: NDArray[np.void]) -> NDArray[np.void]:
+    """The eye record of a camera that sees all of its pixels: records lie between the parts that are seen, too."""
+    whole = eye.copy()
+    whole["pixel_side"], whole["pixel_margin"] = 1.0, 0.0
+    return whole
 
 
 def prepare_cache(given: PassData) -> None:
