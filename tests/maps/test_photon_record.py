@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pmviewer.maps import photon_words, record
+from pmviewer.maps.first import first_in_classes
 from tests.support import naive_maps as naive
 from tests.support.device import from_python
 
@@ -88,5 +89,5 @@ def test_the_first_photons_of_some_classes():
     for mask in (0b0001, 0b0110, 0b1111, 0):
         wanted = [i for i in range(500) if mask >> (int(flags[i]) >> 6) & 1]
         for most in (1, 100, 10_000):
-            found = record.first_in_classes(photons, mask, most)
+            found = first_in_classes(photons, mask, most)
             assert np.array_equal(found.view(np.uint32), photons[wanted[:most]].view(np.uint32))

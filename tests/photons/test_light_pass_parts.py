@@ -150,4 +150,6 @@ def test_batches_of_many_photons_are_joined_in_order():
     assert np.array_equal(whole.caustic, np.concatenate([b.caustic for b in batches]))
     assert np.array_equal(whole.global_normals, np.concatenate([b.global_normals for b in batches]))
     assert (len(whole.caustic_normals), len(whole.volume), whole.counts[0]) == (0, 0, sum(sizes))
-    assert len(joined_batches([]).global_) == 0
+    for none in (joined_batches([]), joined_batches([joined_batches([]), batch(0), batch(0)])):
+        assert (none.global_.shape, none.caustic.shape, none.volume.shape) == ((0, 6), (0, 6), (0, 6))
+        assert (none.global_normals.shape, none.caustic_normals.shape) == ((0,), (0,))

@@ -21,9 +21,10 @@ from pmviewer.engine.stages.light_trace import TracedPass
 from pmviewer.engine.stages.pass_maps import Carried, LookUpMap, PassMaps, Structure
 from pmviewer.engine.stages.radiance_photons import median_radius, radiance_photons_of
 from pmviewer.engine.store import StageStore
+from pmviewer.maps.first import first_in_classes
 from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.radius import automatic_radius, largest_power, neighbourhood
-from pmviewer.maps.record import DIRECT, first_in_classes, in_classes
+from pmviewer.maps.record import DIRECT, in_classes
 from pmviewer.maps.search.grid import PhotonGrid, build_grid, grid_steps
 from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
 from pmviewer.maps.search.parts import parts_of

@@ -137,10 +137,10 @@ def joined_batches(batches: Sequence[Batch], run: Runner = in_turn) -> Batch:
     """Batches as one; of many photons each thread copies its share."""
     tasks: list[Callable[[], Any]] = []
 
-    def copied(parts: list[Any]) -> Any:
+    def copied(parts: list[Any], join: Callable[[list[Any]], Any]) -> Any:
         ends = np.cumsum([0, *map(len, parts)]).tolist()
         if len(parts) < 2 or ends[-1] < 2 * _COPIED:
-            return joined_codes(parts) if parts and parts[0].ndim == 1 else joined(parts)
+            return join(parts)
         whole = np.empty((ends[-1], *parts[0].shape[1:]), parts[0].dtype)
         begin = 0
         for i in range(1, len(ends)):
@@ -150,13 +150,13 @@ def joined_batches(batches: Sequence[Batch], run: Runner = in_turn) -> Batch:
         return whole
 
     whole = Batch(
-        caustic=copied([b.caustic for b in batches]),
-        global_=copied([b.global_ for b in batches]),
+        caustic=copied([b.caustic for b in batches], joined),
+        global_=copied([b.global_ for b in batches], joined),
         counts=sum((b.counts for b in batches), np.zeros(N_COUNTS, np.int64)),
         ledgers=sum((b.ledgers for b in batches), empty_ledger()),
-        global_normals=copied([b.global_normals for b in batches]),
-        caustic_normals=copied([b.caustic_normals for b in batches]),
-        volume=copied([b.volume for b in batches]),
+        global_normals=copied([b.global_normals for b in batches], joined_codes),
+        caustic_normals=copied([b.caustic_normals for b in batches], joined_codes),
+        volume=copied([b.volume for b in batches], joined),
     )
     if tasks:
         run(tasks)
