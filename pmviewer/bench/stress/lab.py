@@ -74,7 +74,7 @@ class Case:
     run: Callable[[Lab], Outcome]
     nonsense: bool = False
     long: bool = False
-    """Left out by `--quick`."""
+    """Left out by `--quick`; it takes much time or memory, and runs alone."""
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,8 @@ LIMITS = Limits(cpu=600, idle=300, memory=16 << 30)
 """Of a case; one beyond them is wrong."""
 _AT_ONCE = 8
 """Neighbouring cases of a group that one process runs: they share kernels."""
+_FRESH = 512 << 20
+"""Bytes that a process may hold when it runs a case that needs much itself."""
 OWN_KERNELS = "drawn"
 """The group whose cases don't."""
 
@@ -52,10 +54,12 @@ def _tell(row: Row) -> None:
 
 def run_cases(cases: list[Case], numbers: list[int], tell: Callable[[Row], None]) -> list[Row]:
     """Rows of those of `all_cases` that have these numbers, in their order. `tell` hears of each when it is there. A
-    case that ends its process, or exceeds the limits, is a row as others."""
+    case that ends its process, or exceeds the limits, is a row as others. Those that need much memory run alone at the
+    end, one after the other."""
+    large = [i for i in numbers if cases[i].long]
     units = [
         group[i : i + each]
-        for name, found in groupby(numbers, lambda i: cases[i].group)
+        for name, found in groupby((i for i in numbers if i not in large), lambda i: cases[i].group)
         for group, each in [(list(found), 1 if name == OWN_KERNELS else _AT_ONCE)]
         for i in range(0, len(group), each)
     ]
@@ -73,17 +77,30 @@ def run_cases(cases: list[Case], numbers: list[int], tell: Callable[[Row], None]
             idle.put(server)
 
     rows: dict[int, Row] = {}
-    with ThreadPoolExecutor(PROCESSES) as pool:
-        futures = [pool.submit(work, unit) for unit in units]
-        try:
-            for future in as_completed(futures):
-                for i, row in future.result():
-                    rows[i] = row
-                    tell(row)
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+
+    def take(found: list[tuple[int, Row]]) -> None:
+        for i, row in found:
+            rows[i] = row
+            tell(row)
+
+    try:
+        with ThreadPoolExecutor(PROCESSES) as pool:
+            futures = [pool.submit(work, unit) for unit in units]
+            try:
+                for future in as_completed(futures):
+                    take(future.result())
+            except BaseException:  # stopped: nobody waits for the cases that run
+                pool.shutdown(wait=False, cancel_futures=True)
+                for server in servers:
+                    server.close()
+                raise
+        for i in large:
             for server in servers:
-                server.close()
+                server.renew(_FRESH)
+            take([(i, _asked(servers[0], i, cases[i]))])
+    finally:
+        for server in servers:
+            server.close()
     return [rows[i] for i in numbers]
 
 
