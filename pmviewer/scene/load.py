@@ -79,7 +79,12 @@ def read_scene(
 
     Raises SceneError for anything wrong with the input, and nothing else.
     """
-    scene = _read(_find(path_or_name), parameters or {}, search_paths)
+    path = _find(path_or_name)
+    try:
+        scene = _read(path, parameters or {}, search_paths)
+    except OSError as error:  # of a disk, while one of the files is being read
+        what = f"A file of the scene can't be read: {error.strerror or error}."
+        raise SceneError(what, Path(error.filename) if error.filename else path) from None
     leaning = leaning_mirrors(scene)
     return replace(scene, warnings=(*scene.warnings, leaning)) if leaning else scene
 

@@ -1,5 +1,6 @@
 """Every file in tests/broken gives its one clear error or warning, and none hangs."""
 
+import io
 import os
 from pathlib import Path
 
@@ -117,6 +118,24 @@ def test_names_that_lead_nowhere(name: str, tmp_path: Path, monkeypatch: pytest.
 def test_unknown_name_lists_the_bundled_scenes() -> None:
     with pytest.raises(SceneError, match="cornell_caustic, cornell_diffuse"):
         load_scene("cornel_caustic")
+
+
+@pytest.mark.parametrize("ending", [".ply", ".obj", ".stl", ".glb"])
+@pytest.mark.parametrize("size", [84, 2000])
+def test_a_file_that_can_be_opened_and_not_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str, size: int
+) -> None:
+    """As on a bad disk, or /proc/self/mem."""
+
+    class Unreadable(io.BytesIO):
+        def read(self, size: int | None = -1) -> bytes:
+            raise OSError(5, "Input/output error")
+
+    path = tmp_path / f"memory{ending}"
+    path.write_bytes(bytes(size))
+    monkeypatch.setattr("pmviewer.scene.formats.open_file.os.fdopen", lambda *args: Unreadable())
+    with pytest.raises(SceneError, match=r"can't be read: Input/output error\."):
+        load_scene(path)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")

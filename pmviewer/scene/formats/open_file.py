@@ -30,7 +30,12 @@ def open_regular(path: Path, what: str = "The file") -> tuple[BinaryIO, int]:
         raise SceneError(f"{what} is not a regular file.", path)
     file = os.fdopen(descriptor, "rb")
     if about.st_size <= _LONGEST_POINTER:
-        if file.read(len(_POINTER)) == _POINTER:
+        try:
+            start = file.read(len(_POINTER))
+        except OSError as error:  # a process's memory, say, which is a regular file of no size
+            file.close()
+            raise SceneError(f"{what} can't be read: {error.strerror or error}.", path) from None
+        if start == _POINTER:
             file.close()
             hint = "Fetch it with 'git lfs pull'."
             raise SceneError(f"{what} was not downloaded: this is Git LFS's note of where it is.", path, hint=hint)
