@@ -122,14 +122,20 @@ def at_corners(values, faces, begin, end, out):
                 out[f, k, axis] = values[i, axis]
 
 
+@device
+def _across(vertices, faces, f):
+    """Along the normal of face f, as long as twice its area."""
+    a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+    px, py, pz = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2]
+    qx, qy, qz = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2]
+    return py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
+
+
 @kernel
 def face_normals(vertices, faces, out):
     """The unit normal of each face three times over, (F, 3, 3) float32; zero where the face has no area."""
     for f in range(len(faces)):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        px, py, pz = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2]
-        qx, qy, qz = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2]
-        nx, ny, nz = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
+        nx, ny, nz = _across(vertices, faces, f)
         length = max(np.sqrt(nx * nx + ny * ny + nz * nz), 1e-300)
         for k in range(3):
             out[f, k, 0], out[f, k, 1], out[f, k, 2] = nx / length, ny / length, nz / length
@@ -139,8 +145,4 @@ def face_normals(vertices, faces, out):
 def across(vertices, faces, chosen, out):
     """out (n, 3) float64 = along the normals of the chosen (n,) of the faces, as long as twice their areas."""
     for i in range(len(chosen)):
-        f = chosen[i]
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        px, py, pz = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2]
-        qx, qy, qz = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2]
-        out[i, 0], out[i, 1], out[i, 2] = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
+        out[i, 0], out[i, 1], out[i, 2] = _across(vertices, faces, chosen[i])

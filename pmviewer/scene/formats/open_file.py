@@ -23,7 +23,7 @@ def open_regular(path: Path, what: str = "The file") -> tuple[BinaryIO, int]:
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except (OSError, ValueError) as error:
-        raise SceneError(f"{what} can't be read: {getattr(error, 'strerror', None) or error}.", path) from None
+        raise _unreadable(what, error, path) from None
     about = os.fstat(descriptor)
     if not stat.S_ISREG(about.st_mode):
         os.close(descriptor)
@@ -34,7 +34,7 @@ def open_regular(path: Path, what: str = "The file") -> tuple[BinaryIO, int]:
             start = file.read(len(_POINTER))
         except OSError as error:  # a process's memory, say, which is a regular file of no size
             file.close()
-            raise SceneError(f"{what} can't be read: {error.strerror or error}.", path) from None
+            raise _unreadable(what, error, path) from None
         if start == _POINTER:
             file.close()
             hint = "Fetch it with 'git lfs pull'."
@@ -50,7 +50,11 @@ def read_regular(path: Path, what: str = "The file") -> bytes:
         try:
             return file.read()
         except OSError as error:
-            raise SceneError(f"{what} can't be read: {error.strerror or error}.", path) from None
+            raise _unreadable(what, error, path) from None
+
+
+def _unreadable(what: str, error: Exception, path: Path) -> SceneError:
+    return SceneError(f"{what} can't be read: {getattr(error, 'strerror', None) or error}.", path)
 
 
 def found_beside(folder: Path, name: str) -> Path:

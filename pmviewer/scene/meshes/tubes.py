@@ -19,8 +19,8 @@ MOST_TRIANGLES = 4_000_000
 _FINENESS = ((4, 8), (2, 6), (1, 4), (1, 3))
 """Pieces of a cubic segment and sides of a tube, finest first."""
 SHARPEST = math.radians(20)
-"""Bend of a polygon up to which both pieces share a ring of points. It is round at a lean, and the tube narrower by the
-cosine of half the bend: 1.5 %."""
+"""Bend of a polygon up to which both pieces share a ring of points. The ring stands between them, and the tube is
+narrower by the cosine of half the bend: 1.5 % at most."""
 _CAP = (math.radians(45), math.radians(85))
 """Latitudes of the rings that make a tube's end round."""
 
