@@ -38,6 +38,7 @@ _FIELDS = [
     ("lit_high_x", "f4"),
     ("lit_high_y", "f4"),
     ("lit_high_z", "f4"),
+    ("lit_spread", "f4"),  # the largest area of a light over its probability
 ]
 
 BSDF_FIELDS: list[tuple[str, str]] = [

@@ -14,10 +14,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, is_lambertian
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import BSDF, CHAIN_LIGHT, LIGHT, OUTLINE
+from pmviewer.kernels.lights.reach import samples_suffice
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import add, largest, mul, scale
@@ -25,7 +26,7 @@ from pmviewer.maps.record import CAUSTIC as CAUSTIC_CLASS
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.counts import C_CUT, C_RAYS
-from pmviewer.render.direct.choice import LIST_WORDS, choose, choose_by_power
+from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose, choose_by_power
 from pmviewer.render.direct.direct import direct_light, found_light, met_light, radiance_of
 from pmviewer.render.filter_samples import place_in_filter
 from pmviewer.render.gather.cached import cached, surface_rays
@@ -121,18 +122,29 @@ def _from_maps(given, si, beta, pixel, whole):
 
 
 @device
+def _light_rays(given, si, gather, aimed):
+    """How many rays by the BSDF of a surface look for lights: those that gather unless photons guide them, else one, or
+    none where light samples suffice."""
+    eye = given.eye
+    if eye.mis == 0:
+        return _i8(0)
+    if gather > 0:
+        return max(gather - aimed.rays, _i8(1))
+    if eye.choice == BY_POWER and is_lambertian(si.bsdf) and samples_suffice(given.scene, eye.light_samples, si.p):
+        return _i8(0)
+    return _i8(1)
+
+
+@device
 def _stored(given, si, beta, pixel, scratch, whole):
     """Light by the STORED lobes of a surface: direct light, what the maps show, gather rays. scratch: lists of lights
     and of photons. Returns the choice of lights."""
     eye = given.eye
-    bu, bv, u_lobe, _ = draw4(eye.sequence, pixel.seed, eye.index, BSDF)
     known, gather = cached(given, si, pixel, whole)
     aimed = Aim(scratch[1], _i8(0), _i8(0))
     if gather > 0:
         aimed = aim(given, si, pixel.seed, scratch[1])
-    n_bsdf = _i8(0)
-    if eye.mis != 0:
-        n_bsdf = max(gather - aimed.rays, _i8(1))
+    n_bsdf = _light_rays(given, si, gather, aimed)
     choice = choose_by_power(scratch[0], eye.light_samples)
     if eye.direct != 0:
         choice = choose(given.scene, eye, given.choice_map, si.p, si.ng, scratch[0])
@@ -147,7 +159,11 @@ def _stored(given, si, beta, pixel, scratch, whole):
     if eye.gather_rays > 0:
         n = max(n, _i8(1))
     if n > 0:
-        rays = GatherRays(n, aimed, choice, pixel.seed, (u_lobe, bu, bv))
+        numbers = BLACK
+        if n_bsdf > 0 and gather == 0:
+            u, v, u_lobe, _ = draw4(eye.sequence, pixel.seed, eye.index, BSDF)
+            numbers = u_lobe, u, v
+        rays = GatherRays(n, n_bsdf, aimed, choice, pixel.seed, numbers)
         direct, indirect = surface_rays(given, known, gather, si, beta, rays, pixel.counts)
         share = scale(beta, _f4(1.0) / _f4(n))
         deposit(pixel, DIRECT if whole else SPECULAR, mul(share, direct))

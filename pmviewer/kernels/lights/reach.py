@@ -1,11 +1,15 @@
-"""Whether a ray may meet a light at all, asked before it is cast.
+"""Whether rays by a BSDF's lobes, half of direct light's multiple importance sampling
+(`pmviewer.render.direct.direct`), have anything to find that samples of lights have not.
 
-Rays by a BSDF's lobes are half of direct light's multiple importance sampling (`pmviewer.render.direct.direct`), and
-where nothing is gathered they look for lights alone. Most of them pass all lights far off: one box around whatever
-emits tells it for a fraction of the price of a ray, and the picture stays the same bit for bit.
+Where nothing is gathered they look for lights alone. Most of them pass all lights far off: one box around whatever
+emits tells it for a fraction of the price of a ray, and the picture stays the same bit for bit. And on a Lambertian
+surface that is far from all lights, the heuristic leaves them next to nothing: there direct light is that of light
+samples alone, unbiased since the place decides and no random number.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -16,6 +20,11 @@ from pmviewer.kernels.media.medium import has_media
 _f4 = np.float32
 _LEAST = _f4(1e-20)
 """In place of a smaller component of a direction: its reciprocal is finite, and 0 · inf does not arise."""
+
+
+_LEAST_RATIO = _f4(10.0 / math.pi)
+"""Ten times the density of a diffuse lobe at its peak: where all light samples are as dense as that, the power
+heuristic leaves at most a hundredth of any light to the BSDF's rays."""
 
 
 @device
@@ -43,3 +52,26 @@ def may_meet_light(scene, p, d):
         return max(max(x0, y0), max(z0, _f4(0.0))) <= min(x1, min(y1, z1))
 
     return by_box
+
+
+@device
+def _outside(x, low, high):
+    """How far x lies outside an interval."""
+    return max(max(low - x, x - high), _f4(0.0))
+
+
+@specialised
+def samples_suffice(scene, n, p):
+    """Whether n samples of lights, chosen by power, find direct light at the point p of a Lambertian surface as well
+    alone. A sample of a light of area A and probability P has a density of at least n·P·d²/A over directions, d being
+    the distance to the box; `lit_spread` is the largest A/P. In scenes with media, never."""
+    if has_media(scene):
+        return lambda scene, n, p: False
+
+    def by_distance(scene, n, p):
+        x = _outside(p[0], scene.lit_low_x, scene.lit_high_x)
+        y = _outside(p[1], scene.lit_low_y, scene.lit_high_y)
+        z = _outside(p[2], scene.lit_low_z, scene.lit_high_z)
+        return _f4(n) * (x * x + y * y + z * z) >= _LEAST_RATIO * scene.lit_spread
+
+    return by_distance

@@ -123,7 +123,6 @@ def gather_rays(given, si, beta, rays, counts):
     """
     scene, eye = given.scene, given.eye
     direct, indirect = BLACK, BLACK
-    n_bsdf = rays.n - rays.aimed.rays
     for j in range(rays.n):
         wi, weight, pdf, share, u_end, sample = gather_direction(given, rays, si, j)
         if dot(wi, si.ng) <= _f4(0.0) or not largest(weight) > _f4(0.0):
@@ -144,8 +143,8 @@ def gather_rays(given, si, beta, rays, counts):
             nearby = emitted_nearby(scene, leaving(si, wi), hit, si.p)
             direct = add(direct, scale(mul(weight, nearby), share))
         weight = mul(weight, tint)
-        if eye.direct != 0 and eye.mis != 0 and pdf > _f4(0.0):
-            L = found_light(scene, si.p, wi, pdf, n_bsdf, rays.choice, eye.biased, hit)
+        if eye.direct != 0 and rays.n_bsdf > 0 and pdf > _f4(0.0):
+            L = found_light(scene, si.p, wi, pdf, rays.n_bsdf, rays.choice, eye.biased, hit)
             direct = add(direct, mul(weight, L))
         if eye.gather_rays > 0:
             L = gather_light(given, hit, wi, rays.seed, sample, counts)

@@ -30,7 +30,7 @@ pixel (red, green, blue), and 1 if photons guided it, 0 if it followed the BSDF.
 def _replay(given, si, beta, samples, seed, rows, row, counts):
     """The gather rays of a surface, of one of so many samples, into `rows` from `row` on; returns the next free row."""
     n = given.eye.gather_rays
-    rays = GatherRays(n, aim(given, si, seed, stack_i4(AIM_WORDS)), None, seed, BLACK)
+    rays = GatherRays(n, _i8(0), aim(given, si, seed, stack_i4(AIM_WORDS)), None, seed, BLACK)
     for j in range(n):
         wi, weight, pdf, share, u_end, sample = gather_direction(given, rays, si, j)
         if row >= len(rows) or dot(wi, si.ng) <= _f4(0.0) or not largest(weight) > _f4(0.0):

@@ -184,6 +184,7 @@ def flatten(
     if lights.sky is not None:
         r["sky_height"], r["sky_width"] = lights.sky.pixels.shape[:2]
     r["center_x"], r["center_y"], r["center_z"], r["radius"] = *center, radius
+    r["lit_spread"] = lights.spread
     for name, number in zip(LIT_BOX, lit_box(scene, lights, float(np.abs(center).max()) + radius), strict=True):
         r[name] = number
     said: list[str] = []
