@@ -19,7 +19,7 @@ from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import BSDF, CHAIN_LIGHT, LIGHT, OUTLINE
 from pmviewer.kernels.lights.reach import samples_suffice
-from pmviewer.kernels.memory import stack_i4
+from pmviewer.kernels.memory import row_of, stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import add, largest, mul, scale
 from pmviewer.maps.record import CAUSTIC as CAUSTIC_CLASS
@@ -48,7 +48,7 @@ from pmviewer.render.pixel import (
     properties,
     sampled_ray,
 )
-from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius
+from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius, radii_of
 from pmviewer.render.reflect import reflected, unfound
 from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import cast_on
@@ -104,7 +104,7 @@ def _from_maps(given, si, beta, pixel, whole):
     map. `whole`: at the camera ray's own surface, so that terms are told apart."""
     eye = given.eye
     if eye.caustic_mask != 0:
-        r = own_radius(pixel.radii, OF_CAUSTIC, pixel.number, eye.caustic_radius)
+        r = own_radius(pixel.radii, OF_CAUSTIC, eye.caustic_radius)
         L = reflected(given.caustic_map, eye, r, si, eye.caustic_mask)
         count_found(pixel, OF_CAUSTIC, given.caustic_map, eye, r, si, eye.caustic_mask)
         deposit(pixel, CAUSTIC if whole else SPECULAR, mul(beta, L))
@@ -115,7 +115,7 @@ def _from_maps(given, si, beta, pixel, whole):
         elif k == 2:
             mask, term = eye.global_caustics, CAUSTIC
         if mask != 0:
-            r = own_radius(pixel.radii, OF_GLOBAL, pixel.number, eye.global_radius)
+            r = own_radius(pixel.radii, OF_GLOBAL, eye.global_radius)
             L = reflected(given.global_map, eye, r, si, mask)
             count_found(pixel, OF_GLOBAL, given.global_map, eye, r, si, mask)
             deposit(pixel, term if whole else SPECULAR, mul(beta, L))
@@ -177,7 +177,7 @@ def _followed(given, si, beta, pixel, depth, choice, lights):
     """Light by FOLLOWED lobes that are no deltas, besides what following them finds. Returns the choice of lights."""
     eye = given.eye
     if eye.unfound != 0:
-        r = own_radius(pixel.radii, OF_CAUSTIC, pixel.number, eye.caustic_radius)
+        r = own_radius(pixel.radii, OF_CAUSTIC, eye.caustic_radius)
         L = unfound(given.caustic_map, eye, r, si)
         if si.bsdf.groups & STORED == 0:
             count_found(pixel, OF_CAUSTIC, given.caustic_map, eye, r, si, _CAUSTICS)
@@ -212,18 +212,19 @@ def eye_pass(given, marks, radii, film, counts, first, last):
     given = opened(given)
     scene, eye = given.scene, given.eye
     lights, found = stack_i4(LIST_WORDS), stack_i4(AIM_WORDS)
-    index, hidden = eye.index, hides_lights(eye)
+    index, hidden, tally = eye.index, hides_lights(eye), row_of(counts, 0)
     for number in range(first, last):
+        row, own = row_of(film, number), radii_of(radii, number)
         outlined = not hidden and len(marks) > 0 and marks[number] & OUTLINED != 0
         if outlined:
             take_sample(eye, index)
-            outline_emission(scene, eye, Pixel(number, pixel_seed(eye, number), film, radii, counts, None, None))
-            counts[C_RAYS] += eye.outline_rays
+            outline_emission(scene, eye, Pixel(number, pixel_seed(eye, number), row, own, tally, None, None))
+            tally[C_RAYS] += eye.outline_rays
         samples = samples_of(eye, marks, number)
         for sample in range(samples):
             take_sample(eye, index * samples + sample)
             seed, ray, weight = sampled_ray(scene, eye, number)
-            pixel = Pixel(number, seed, film, radii, counts, weight, share_of(eye, samples))
+            pixel = Pixel(number, seed, row, own, tally, weight, share_of(eye, samples))
             way, ways = first_way(ray)
             choice = choose_by_power(lights, eye.light_samples)
             while True:
@@ -231,7 +232,7 @@ def eye_pass(given, marks, radii, film, counts, first, last):
                 left, pdf = ray.o, _f4(0.0)  # where, and with which density, a lobe was left that is not a delta
                 for depth in range(first_depth, eye.max_depth + 1):
                     hit = cast(scene, ray)
-                    counts[C_RAYS] += 1
+                    tally[C_RAYS] += 1
                     beta = deposit_media(given, ray, hit, beta, pixel, depth)
                     whole = depth == 0
                     seen = EMISSION if whole else SPECULAR
@@ -254,7 +255,7 @@ def eye_pass(given, marks, radii, film, counts, first, last):
                     if groups & FOLLOWED == 0:
                         break
                     if depth == eye.max_depth:
-                        counts[C_CUT] += 1
+                        tally[C_CUT] += 1
                         break
                     if not is_delta(si.bsdf):
                         choice = _followed(given, si, beta, pixel, depth, choice, lights)
