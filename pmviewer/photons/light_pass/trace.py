@@ -35,6 +35,7 @@ from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import COPIES, EMISSION, EMITTER, FURTHER_PHOTONS_SALT, PHOTON_SCATTER, STORE, WAVE
 from pmviewer.kernels.lights.light import is_delta_light
 from pmviewer.kernels.media.medium import has_media, light_medium
+from pmviewer.kernels.memory import row_of
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import STRAIGHT, adjoint_cosines, face, leave, surface_at
@@ -121,11 +122,14 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
     `PhotonBuffers`; paths: None, or where to write whole paths (`pmviewer.photons.light_pass.paths`).
     """
     # Taken apart outside of the loop: counting references to arrays for each photon would take a quarter of the time.
-    global_out, caustic_out, global_normals, caustic_normals, counts, ledgers, volume_out = out
+    global_out, caustic_out, global_normals, caustic_normals, counted, ledgers, volume_out = out
+    counts, room = row_of(counted, 0), (len(global_out), len(caustic_out))
+    into_global = row_of(global_out, 0), row_of(global_normals, 0), len(global_normals) > 0
+    into_caustic = row_of(caustic_out, 0), row_of(caustic_normals, 0), len(caustic_normals) > 0
     scene, pass_ = scenes[0], passes[0]
     most = pass_.max_bounces if pass_.roulette != EQUAL else MOST_COPIES * pass_.max_bounces
     for i in range(i0, i1):
-        full = counts[C_GLOBAL] + most > len(global_out) or counts[C_CAUSTIC] + most > len(caustic_out)
+        full = counts[C_GLOBAL] + most > room[0] or counts[C_CAUSTIC] + most > room[1]
         if full or is_full(volume_out, counts, most):
             return i
         to_global = i < pass_.global_trajectories
@@ -179,9 +183,9 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 arrival = Arrival(p, wi, ng, _u4(word | _u4(UNFOUND)) if unfound else word, light, wave)
                 if _is_caustic(pass_, word):
                     in_caustic = _in_caustic(pass_, word, stored)
-                    _store(caustic_out, caustic_normals, counts, C_CAUSTIC, arrival, in_caustic, times)
+                    _store(into_caustic, counts, C_CAUSTIC, arrival, in_caustic, times)
                 if to_global and kept & STORED != 0 and _is_chosen(pass_, seed, index, bounces):
-                    _store(global_out, global_normals, counts, C_GLOBAL, arrival, stored, times)
+                    _store(into_global, counts, C_GLOBAL, arrival, stored, times)
                 ledgers[kind, E_STORED] += _f8(before * factor)
             if b.groups == NOTHING:  # a part of a blend that others keep photons for
                 ledgers[kind, E_ABSORBED] += _f8(before * factor)
@@ -346,13 +350,14 @@ def _in_caustic(pass_, flags, power):
 
 
 @inlined
-def _store(rows, normals, counts, which, arrival, power, times):
-    """Keep a photon `times` times in rows (capacity, 6), its surface's normal in `normals` unless that is empty;
-    counts[which] rows are filled."""
+def _store(into, counts, which, arrival, power, times):
+    """Keep a photon `times` times. into: pointers to rows (capacity, 6) and normals (capacity,) and whether there are
+    normals; counts[which] rows are filled."""
+    rows, normals, with_normals = into
     ng = arrival.ng
     for _ in range(times):
         write_of_wave(rows, counts[which], arrival.p, arrival.wi, power, arrival.flags, arrival.light, arrival.wave)
-        if len(normals) > 0:
+        if with_normals:
             normals[counts[which]] = encode_direction(ng[0], ng[1], ng[2])
         counts[which] += 1
 
