@@ -122,14 +122,12 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
     `PhotonBuffers`; paths: None, or where to write whole paths (`pmviewer.photons.light_pass.paths`).
     """
     # Taken apart outside of the loop: counting references to arrays for each photon would take a quarter of the time.
-    global_out, caustic_out, global_normals, caustic_normals, counted, ledgers, volume_out = out
-    counts, room = row_of(counted, 0), (len(global_out), len(caustic_out))
-    into_global = row_of(global_out, 0), row_of(global_normals, 0), len(global_normals) > 0
-    into_caustic = row_of(caustic_out, 0), row_of(caustic_normals, 0), len(caustic_normals) > 0
+    counts, ledgers, volume_out = row_of(out.counts, 0), out.ledgers, out.volume_out
+    into_global, into_caustic = _room(out.global_out, out.global_normals), _room(out.caustic_out, out.caustic_normals)
     scene, pass_ = scenes[0], passes[0]
     most = pass_.max_bounces if pass_.roulette != EQUAL else MOST_COPIES * pass_.max_bounces
     for i in range(i0, i1):
-        full = counts[C_GLOBAL] + most > room[0] or counts[C_CAUSTIC] + most > room[1]
+        full = counts[C_GLOBAL] + most > into_global[3] or counts[C_CAUSTIC] + most > into_caustic[3]
         if full or is_full(volume_out, counts, most):
             return i
         to_global = i < pass_.global_trajectories
@@ -350,10 +348,15 @@ def _in_caustic(pass_, flags, power):
 
 
 @inlined
+def _room(rows, normals):
+    """Pointers to rows (capacity, 6) and to normals (capacity,), whether there are normals, and the capacity."""
+    return row_of(rows, 0), row_of(normals, 0), len(normals) > 0, len(rows)
+
+
+@inlined
 def _store(into, counts, which, arrival, power, times):
-    """Keep a photon `times` times. into: pointers to rows (capacity, 6) and normals (capacity,) and whether there are
-    normals; counts[which] rows are filled."""
-    rows, normals, with_normals = into
+    """Keep a photon `times` times in these `_room`; counts[which] rows are filled."""
+    rows, normals, with_normals, _ = into
     ng = arrival.ng
     for _ in range(times):
         write_of_wave(rows, counts[which], arrival.p, arrival.wi, power, arrival.flags, arrival.light, arrival.wave)
