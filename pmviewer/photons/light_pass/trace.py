@@ -122,9 +122,9 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
     `PhotonBuffers`; paths: None, or where to write whole paths (`pmviewer.photons.light_pass.paths`).
     """
     # Taken apart outside of the loop: counting references to arrays for each photon would take a quarter of the time.
-    counts, ledgers, volume_out = row_of(out.counts, 0), out.ledgers, out.volume_out
+    scene, pass_, ledgers, volume_out = scenes[0], passes[0], out.ledgers, out.volume_out
+    counts = row_of(out.counts, 0)
     into_global, into_caustic = _room(out.global_out, out.global_normals), _room(out.caustic_out, out.caustic_normals)
-    scene, pass_ = scenes[0], passes[0]
     most = pass_.max_bounces if pass_.roulette != EQUAL else MOST_COPIES * pass_.max_bounces
     for i in range(i0, i1):
         full = counts[C_GLOBAL] + most > into_global[3] or counts[C_CAUSTIC] + most > into_caustic[3]
@@ -135,10 +135,9 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
         seed, index = _stream(pass_, i)
         p, d, beta, light, starts, factor = _emitted(scene, pass_, projections[kind], i, seed, index)
         ledgers[kind, E_EMITTED] += _f8(factor)  # its luminance is 1
-        good = is_good(beta)
-        if not (good and starts):
-            counts[C_DROPPED] += 0 if good else 1
-            ledgers[kind, _of_no_start(scene, beta) if good else E_DROPPED] += _f8(factor)
+        if not (is_good(beta) and starts):
+            counts[C_DROPPED] += 0 if is_good(beta) else 1
+            ledgers[kind, _of_no_start(scene, beta) if is_good(beta) else E_DROPPED] += _f8(factor)
             continue
         _book_start(scene, beta, factor, ledgers, kind)
         begin_path(paths, i, p, d, scale(beta, factor), light)
