@@ -9,49 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.sobol import SOBOL_TABLE, scrambled_point
 
 INDEPENDENT, SOBOL = 0, 1
 
 _u4 = np.uint32
 _f4 = np.float32
-
-
-def _direction_numbers() -> np.ndarray:
-    """(4, 32) uint32 direction numbers of the first four Sobol dimensions (Joe and Kuo 2008)."""
-    numbers = np.zeros((4, 32), np.uint64)
-    numbers[0] = [1 << (31 - k) for k in range(32)]
-    for dimension, (a, m) in enumerate([(0, [1]), (1, [1, 3]), (1, [1, 3, 1])], start=1):
-        s = len(m)
-        v = [m[k] << (31 - k) for k in range(s)]
-        for k in range(s, 32):
-            value = v[k - s] ^ (v[k - s] >> s)
-            for j in range(1, s):
-                if (a >> (s - 1 - j)) & 1:
-                    value ^= v[k - j]
-            v.append(value)
-        numbers[dimension] = v
-    return numbers.astype(np.uint32)
-
-
-def _reverse(bits: np.ndarray) -> np.ndarray:
-    """Bit-reversed uint32 array."""
-    return np.packbits(np.unpackbits(bits.astype(">u4").view(np.uint8).reshape(-1, 4), axis=1)[:, ::-1], axis=1).view(
-        ">u4"
-    )
-
-
-def _byte_tables(numbers: np.ndarray) -> np.ndarray:
-    """(4 dimensions · 4 bytes · 256,) uint32: the bit-reversed point of an index is the xor of four look-ups."""
-    tables = np.zeros((4, 4, 256), np.uint32)
-    for byte in range(4):
-        for value in range(256):
-            for bit in range(8):
-                if value >> bit & 1:
-                    tables[:, byte, value] ^= numbers[:, 8 * byte + bit]
-    return _reverse(tables.reshape(-1)).astype(np.uint32).reshape(-1)
-
-
-SOBOL_TABLE = _byte_tables(_direction_numbers())
 
 
 @device
@@ -101,19 +64,6 @@ def owen(x, seed):
 
 
 @device
-def sobol_reversed(index, dimension):
-    """Bit-reversed uint32 coordinate 1–3 of the Sobol point with that index (coordinate 0 is the index itself)."""
-    base = np.int64(dimension) * np.int64(1024)
-    i = _u4(index)
-    return _u4(
-        SOBOL_TABLE[base + np.int64(i & _u4(255))]
-        ^ SOBOL_TABLE[base + np.int64(256) + np.int64((i >> _u4(8)) & _u4(255))]
-        ^ SOBOL_TABLE[base + np.int64(512) + np.int64((i >> _u4(16)) & _u4(255))]
-        ^ SOBOL_TABLE[base + np.int64(768) + np.int64(i >> _u4(24))]
-    )
-
-
-@device
 def _scrambled(reversed_bits, seed):
     return unit_float(reverse_bits(owen_reversed(reversed_bits, seed)))
 
@@ -126,13 +76,7 @@ def draw4(sequence, seed, index, dimension_set):
     """
     key = hash3(seed, _u4(dimension_set), _u4(0x9E3779B9))
     if sequence == SOBOL:
-        i = owen(_u4(index), key)
-        return (
-            _scrambled(i, _u4(key ^ _u4(0xA511E9B3))),
-            _scrambled(sobol_reversed(i, np.int64(1)), _u4(_u4(key * _u4(0x9E3779B1)) ^ _u4(0x63D83595))),
-            _scrambled(sobol_reversed(i, np.int64(2)), _u4(_u4(key * _u4(0x85EBCA77)) ^ _u4(0xC2B2AE3D))),
-            _scrambled(sobol_reversed(i, np.int64(3)), _u4(_u4(key * _u4(0x27D4EB2F)) ^ _u4(0x165667B1))),
-        )
+        return scrambled_point(SOBOL_TABLE, owen_reversed(reverse_bits(_u4(index)), key), key)
     return (
         unit_float(hash3(key, _u4(index), _u4(0))),
         unit_float(hash3(key, _u4(index), _u4(1))),

@@ -32,6 +32,13 @@ _FIELDS = [
     ("center_y", "f4"),
     ("center_z", "f4"),
     ("radius", "f4"),  # of the bounding sphere
+    ("lit_low_x", "f4"),  # box around the surfaces that emit: infinite with an environment, low > high without any
+    ("lit_low_y", "f4"),
+    ("lit_low_z", "f4"),
+    ("lit_high_x", "f4"),
+    ("lit_high_y", "f4"),
+    ("lit_high_z", "f4"),
+    ("lit_spread", "f4"),  # the largest area of a light over its probability
 ]
 
 BSDF_FIELDS: list[tuple[str, str]] = [

@@ -28,13 +28,12 @@ def _sin_cos_eighth(x):
 def square_to_disk(u, v):
     """Uniform point on the unit disc, concentric map (Shirley and Chiu 1997)."""
     a, b = _f4(2.0) * u - _f4(1.0), _f4(2.0) * v - _f4(1.0)
-    if abs(a) > abs(b):
-        sin, cos = _sin_cos_eighth(_f4(math.pi / 4) * (b / a))
-        return a * cos, a * sin
-    if b == _f4(0.0):
-        return _f4(0.0), _f4(0.0)
-    sin, cos = _sin_cos_eighth(_f4(math.pi / 4) * (a / b))
-    return b * sin, b * cos
+    # Selections, no branches: which half of the square it is, nobody can guess.
+    wide = abs(a) > abs(b)
+    r, other = (a, b) if wide else (b, a)
+    r_or_one = r if r != _f4(0.0) else _f4(1.0)
+    sin, cos = _sin_cos_eighth(_f4(math.pi / 4) * (other / r_or_one))
+    return (r * cos, r * sin) if wide else (r * sin, r * cos)
 
 
 @device

@@ -37,6 +37,8 @@ POINT, NORMAL, REACH, HARMONIC, IRRADIANCE, ROTATION, TRANSLATION, FOOTPRINT, LE
 pixel there, and its level in the hierarchy."""
 
 MOST_LEVELS = 31
+MOST_CELLS = 27
+"""Of a level that a record reaches into: a cell is twice as wide as any reach there, and rounding may add one."""
 OFF_PLANE = np.float32(0.1)
 """A point farther than so many ρ off a record's plane is on another surface."""
 NEAREST = np.float32(1e-3)
@@ -44,7 +46,7 @@ NEAREST = np.float32(1e-3)
 SWEEPS = 16
 """Most rounds of limiting radii by neighbours; the later ones ask few records."""
 FEWEST_OF_PART, MOST_PARTS = 512, 32
-"""Records that one task limits the others by, and tasks."""
+"""Records of a task, and tasks."""
 
 RECORD = np.dtype(
     [
@@ -106,50 +108,51 @@ def _cell_of(x, width):
     return _i8(math.floor(x / width))
 
 
-@device
-def _buckets_of(rows, i, cell, mask, buckets):
-    """The distinct buckets of record i's cells into `buckets`; returns how many there are."""
-    level = _i8(rows[i, LEVEL])
-    width = cell * _f4(_i8(1) << level)
-    reach = rows[i, REACH]
-    n = 0
-    for cx in range(_cell_of(rows[i, 0] - reach, width), _cell_of(rows[i, 0] + reach, width) + 1):
-        for cy in range(_cell_of(rows[i, 1] - reach, width), _cell_of(rows[i, 1] + reach, width) + 1):
-            for cz in range(_cell_of(rows[i, 2] - reach, width), _cell_of(rows[i, 2] + reach, width) + 1):
-                bucket = _bucket(mask, level, cx, cy, cz)
-                known = False
-                for j in range(n):
-                    known = known or buckets[j] == bucket
-                if not known:
-                    buckets[n] = bucket
-                    n += 1
-    return n
+@kernel
+def _find_buckets(rows, cell, mask, buckets, counts):
+    """The distinct buckets of each record's cells into buckets (n, MOST_CELLS), how many there are into counts (n,)."""
+    for i in range(len(rows)):
+        level, reach = _i8(rows[i, LEVEL]), rows[i, REACH]
+        width = cell * _f4(_i8(1) << level)
+        n = 0
+        for cx in range(_cell_of(rows[i, 0] - reach, width), _cell_of(rows[i, 0] + reach, width) + 1):
+            for cy in range(_cell_of(rows[i, 1] - reach, width), _cell_of(rows[i, 1] + reach, width) + 1):
+                for cz in range(_cell_of(rows[i, 2] - reach, width), _cell_of(rows[i, 2] + reach, width) + 1):
+                    bucket = _i4(_bucket(mask, level, cx, cy, cz))
+                    known = False
+                    for j in range(n):
+                        known = known or buckets[i, j] == bucket
+                    if not known:
+                        buckets[i, n] = bucket
+                        n += 1
+        counts[i] = n
 
 
 @kernel
-def _count_entries(rows, cell, mask, starts):
-    """Adds up in starts[b + 1] how many records bucket b lists."""
-    buckets = np.empty(27, np.int64)
-    for i in range(len(rows)):
-        for j in range(_buckets_of(rows, i, cell, mask, buckets)):
-            starts[buckets[j] + 1] += 1
+def _list_entries(buckets, counts, starts, entries):
+    """Where each bucket starts into starts (buckets + 1,), zeros before, and its records in ascending order into
+    entries (sum of counts,)."""
+    for i in range(len(counts)):
+        for j in range(counts[i]):
+            starts[buckets[i, j] + 1] += 1
     for b in range(len(starts) - 1):
         starts[b + 1] += starts[b]
-
-
-@kernel
-def _list_entries(rows, cell, mask, starts, entries):
-    """Writes the records of each bucket in ascending order."""
-    buckets = np.empty(27, np.int64)
     place = starts.copy()
-    for i in range(len(rows)):
-        for j in range(_buckets_of(rows, i, cell, mask, buckets)):
-            entries[place[buckets[j]]] = i
-            place[buckets[j]] += 1
+    for i in range(len(counts)):
+        for j in range(counts[i]):
+            entries[place[buckets[i, j]]] = i
+            place[buckets[i, j]] += 1
 
 
-def build_cache(rows: NDArray[np.float32], like: NDArray[np.void]) -> IrradianceCache:
-    """Index records (n, ROW), whose levels are filled in; `like` is a RECORD (1,) that tells how records are made."""
+def _parts_of(n: int) -> list[slice]:
+    """So many records in parts for tasks, at least one."""
+    parts = max(1, min(MOST_PARTS, n // FEWEST_OF_PART))
+    return [slice(n * k // parts, n * (k + 1) // parts) for k in range(parts)]
+
+
+def build_cache(rows: NDArray[np.float32], like: NDArray[np.void], run: Runner = in_turn) -> IrradianceCache:
+    """Index records (n, ROW), whose levels are filled in; `like` is a RECORD (1,) that tells how records are made.
+    `run` does tasks."""
     rows = np.ascontiguousarray(rows, np.float32)
     record = like.copy()
     n = len(rows)
@@ -162,10 +165,13 @@ def build_cache(rows: NDArray[np.float32], like: NDArray[np.void]) -> Irradiance
         rows[:, LEVEL] = levels
         rows[:, REACH] = np.minimum(rows[:, REACH], 0.5 * cell * 2.0**levels)
     mask = (1 << max(4, (4 * n).bit_length())) - 1
-    starts = np.zeros(mask + 2, np.int32)
-    _count_entries(rows, _f4(cell), _u4(mask), starts)
-    entries = np.empty(int(starts[-1]), np.int32)
-    _list_entries(rows, _f4(cell), _u4(mask), starts, entries)
+    buckets, counts = np.empty((n, MOST_CELLS), np.int32), np.empty(n, np.int32)
+    tasks: list[Callable[[], Any]] = [
+        partial(_find_buckets, rows[part], _f4(cell), _u4(mask), buckets[part], counts[part]) for part in _parts_of(n)
+    ]
+    (run if len(tasks) > 1 else in_turn)(tasks)
+    starts, entries = np.zeros(mask + 2, np.int32), np.empty(int(counts.sum()), np.int32)
+    _list_entries(buckets, counts, starts, entries)
     record["rows"], record["starts"], record["entries"] = rows.ctypes.data, starts.ctypes.data, entries.ctypes.data
     record["n"], record["mask"], record["cell"] = n, mask, cell
     record["levels"] = int(np.bitwise_or.reduce(1 << levels)) if n else 0
@@ -254,7 +260,7 @@ def limit_by_neighbours(cache: IrradianceCache, run: Runner = in_turn) -> None:
     rows, record = cache.rows, cache.record[0]
     asked = np.arange(cache.n, dtype=np.int32)
     for _ in range(SWEEPS):
-        parts = np.array_split(asked, max(1, min(MOST_PARTS, len(asked) // FEWEST_OF_PART)))
+        parts = [asked[part] for part in _parts_of(len(asked))]
         lowest = np.full((len(parts), cache.n), np.inf, np.float32)
         tasks: list[Callable[[], Any]] = [
             partial(_lower, cache.record, rows, *given) for given in zip(parts, lowest, strict=True)

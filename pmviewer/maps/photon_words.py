@@ -62,13 +62,14 @@ def decode_direction(code):
 
 @device
 def write_photon(rows, row, p, wi, power, flags, light):
-    """Photon `row` of rows (n, 6) float32: point p, unit wi, power (red, green, blue) in units of the map's, flags and
-    id of the light."""
-    rows[row, 0], rows[row, 1], rows[row, 2] = p
+    """Photon `row` of rows, pointer to float32 (n, 6): point p, unit wi, power (red, green, blue) in units of the
+    map's, flags and id of the light."""
+    at = np.int64(row) * 6
+    rows[at], rows[at + 1], rows[at + 2] = p
     r, g, b = encode_power(power[0]), encode_power(power[1]), encode_power(power[2])
-    rows[row, 3] = float_of_bits(_u4(encode_direction(wi[0], wi[1], wi[2]) | _u4(flags)))
-    rows[row, 4] = float_of_bits(_u4(r | _u4(g << _u4(16))))
-    rows[row, 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
+    rows[at + 3] = float_of_bits(_u4(encode_direction(wi[0], wi[1], wi[2]) | _u4(flags)))
+    rows[at + 4] = float_of_bits(_u4(r | _u4(g << _u4(16))))
+    rows[at + 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
 
 
 @device
@@ -87,12 +88,13 @@ def write_banded(rows, row, p, wi, power, flags, light, band):
     """`write_photon` of a photon of that band of wavelengths (`pmviewer.maps.record`)."""
     write_photon(rows, row, p, wi, power, flags, light)
     noise = hash3(_u4(bits_of_float(p[0])), _u4(bits_of_float(p[1])), _u4(bits_of_float(p[2])))
+    at = np.int64(row) * 6
     more = hash3(noise, _u4(BAND_SALT), _u4(band))
     r = encode_marked(power[0], _u4(band) & _u4(3), _u4(noise & _u4(0x7FFF)))
     g = encode_marked(power[1], _u4(_u4(band) >> _u4(2)) & _u4(3), _u4(_u4(noise >> _u4(16)) & _u4(0x7FFF)))
     b = encode_marked(power[2], _u4(_u4(band) >> _u4(4)) & _u4(3), _u4(more & _u4(0x7FFF)))
-    rows[row, 4] = float_of_bits(_u4(r | _u4(g << _u4(16))))
-    rows[row, 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
+    rows[at + 4] = float_of_bits(_u4(r | _u4(g << _u4(16))))
+    rows[at + 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
 
 
 @inlined

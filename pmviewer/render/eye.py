@@ -14,18 +14,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, is_lambertian
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import BSDF, CHAIN_LIGHT, LIGHT, OUTLINE
-from pmviewer.kernels.memory import stack_i4
+from pmviewer.kernels.lights.reach import samples_suffice
+from pmviewer.kernels.memory import row_of, stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import add, largest, mul, scale
 from pmviewer.maps.record import CAUSTIC as CAUSTIC_CLASS
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.counts import C_CUT, C_RAYS
-from pmviewer.render.direct.choice import LIST_WORDS, choose, choose_by_power
+from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose, choose_by_power
 from pmviewer.render.direct.direct import direct_light, found_light, met_light, radiance_of
 from pmviewer.render.filter_samples import place_in_filter
 from pmviewer.render.gather.cached import cached, surface_rays
@@ -47,7 +48,7 @@ from pmviewer.render.pixel import (
     properties,
     sampled_ray,
 )
-from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius
+from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius, radii_of
 from pmviewer.render.reflect import reflected, unfound
 from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import cast_on
@@ -103,7 +104,7 @@ def _from_maps(given, si, beta, pixel, whole):
     map. `whole`: at the camera ray's own surface, so that terms are told apart."""
     eye = given.eye
     if eye.caustic_mask != 0:
-        r = own_radius(pixel.radii, OF_CAUSTIC, pixel.number, eye.caustic_radius)
+        r = own_radius(pixel.radii, OF_CAUSTIC, eye.caustic_radius)
         L = reflected(given.caustic_map, eye, r, si, eye.caustic_mask)
         count_found(pixel, OF_CAUSTIC, given.caustic_map, eye, r, si, eye.caustic_mask)
         deposit(pixel, CAUSTIC if whole else SPECULAR, mul(beta, L))
@@ -114,10 +115,24 @@ def _from_maps(given, si, beta, pixel, whole):
         elif k == 2:
             mask, term = eye.global_caustics, CAUSTIC
         if mask != 0:
-            r = own_radius(pixel.radii, OF_GLOBAL, pixel.number, eye.global_radius)
+            r = own_radius(pixel.radii, OF_GLOBAL, eye.global_radius)
             L = reflected(given.global_map, eye, r, si, mask)
             count_found(pixel, OF_GLOBAL, given.global_map, eye, r, si, mask)
             deposit(pixel, term if whole else SPECULAR, mul(beta, L))
+
+
+@device
+def _light_rays(given, si, gather, aimed):
+    """How many rays by the BSDF of a surface look for lights: those that gather unless photons guide them, else one, or
+    none where light samples suffice."""
+    eye = given.eye
+    if eye.mis == 0:
+        return _i8(0)
+    if gather > 0:
+        return max(gather - aimed.rays, _i8(1))
+    if eye.choice == BY_POWER and is_lambertian(si.bsdf) and samples_suffice(given.scene, eye.light_samples, si.p):
+        return _i8(0)
+    return _i8(1)
 
 
 @device
@@ -125,14 +140,11 @@ def _stored(given, si, beta, pixel, scratch, whole):
     """Light by the STORED lobes of a surface: direct light, what the maps show, gather rays. scratch: lists of lights
     and of photons. Returns the choice of lights."""
     eye = given.eye
-    bu, bv, u_lobe, _ = draw4(eye.sequence, pixel.seed, eye.index, BSDF)
     known, gather = cached(given, si, pixel, whole)
     aimed = Aim(scratch[1], _i8(0), _i8(0))
     if gather > 0:
         aimed = aim(given, si, pixel.seed, scratch[1])
-    n_bsdf = _i8(0)
-    if eye.mis != 0:
-        n_bsdf = max(gather - aimed.rays, _i8(1))
+    n_bsdf = _light_rays(given, si, gather, aimed)
     choice = choose_by_power(scratch[0], eye.light_samples)
     if eye.direct != 0:
         choice = choose(given.scene, eye, given.choice_map, si.p, si.ng, scratch[0])
@@ -147,7 +159,11 @@ def _stored(given, si, beta, pixel, scratch, whole):
     if eye.gather_rays > 0:
         n = max(n, _i8(1))
     if n > 0:
-        rays = GatherRays(n, aimed, choice, pixel.seed, (u_lobe, bu, bv))
+        numbers = BLACK
+        if n_bsdf > 0 and gather == 0:
+            u, v, u_lobe, _ = draw4(eye.sequence, pixel.seed, eye.index, BSDF)
+            numbers = u_lobe, u, v
+        rays = GatherRays(n, n_bsdf, aimed, choice, pixel.seed, numbers)
         direct, indirect = surface_rays(given, known, gather, si, beta, rays, pixel.counts)
         share = scale(beta, _f4(1.0) / _f4(n))
         deposit(pixel, DIRECT if whole else SPECULAR, mul(share, direct))
@@ -161,7 +177,7 @@ def _followed(given, si, beta, pixel, depth, choice, lights):
     """Light by FOLLOWED lobes that are no deltas, besides what following them finds. Returns the choice of lights."""
     eye = given.eye
     if eye.unfound != 0:
-        r = own_radius(pixel.radii, OF_CAUSTIC, pixel.number, eye.caustic_radius)
+        r = own_radius(pixel.radii, OF_CAUSTIC, eye.caustic_radius)
         L = unfound(given.caustic_map, eye, r, si)
         if si.bsdf.groups & STORED == 0:
             count_found(pixel, OF_CAUSTIC, given.caustic_map, eye, r, si, _CAUSTICS)
@@ -196,18 +212,19 @@ def eye_pass(given, marks, radii, film, counts, first, last):
     given = opened(given)
     scene, eye = given.scene, given.eye
     lights, found = stack_i4(LIST_WORDS), stack_i4(AIM_WORDS)
-    index, hidden = eye.index, hides_lights(eye)
+    index, hidden, tally = eye.index, hides_lights(eye), row_of(counts, 0)
     for number in range(first, last):
+        row, own = row_of(film, number), radii_of(radii, number)
         outlined = not hidden and len(marks) > 0 and marks[number] & OUTLINED != 0
         if outlined:
             take_sample(eye, index)
-            outline_emission(scene, eye, Pixel(number, pixel_seed(eye, number), film, radii, counts, None, None))
-            counts[C_RAYS] += eye.outline_rays
+            outline_emission(scene, eye, Pixel(number, pixel_seed(eye, number), row, own, tally, None, None))
+            tally[C_RAYS] += eye.outline_rays
         samples = samples_of(eye, marks, number)
         for sample in range(samples):
             take_sample(eye, index * samples + sample)
             seed, ray, weight = sampled_ray(scene, eye, number)
-            pixel = Pixel(number, seed, film, radii, counts, weight, share_of(eye, samples))
+            pixel = Pixel(number, seed, row, own, tally, weight, share_of(eye, samples))
             way, ways = first_way(ray)
             choice = choose_by_power(lights, eye.light_samples)
             while True:
@@ -215,7 +232,7 @@ def eye_pass(given, marks, radii, film, counts, first, last):
                 left, pdf = ray.o, _f4(0.0)  # where, and with which density, a lobe was left that is not a delta
                 for depth in range(first_depth, eye.max_depth + 1):
                     hit = cast(scene, ray)
-                    counts[C_RAYS] += 1
+                    tally[C_RAYS] += 1
                     beta = deposit_media(given, ray, hit, beta, pixel, depth)
                     whole = depth == 0
                     seen = EMISSION if whole else SPECULAR
@@ -238,7 +255,7 @@ def eye_pass(given, marks, radii, film, counts, first, last):
                     if groups & FOLLOWED == 0:
                         break
                     if depth == eye.max_depth:
-                        counts[C_CUT] += 1
+                        tally[C_CUT] += 1
                         break
                     if not is_delta(si.bsdf):
                         choice = _followed(given, si, beta, pixel, depth, choice, lights)

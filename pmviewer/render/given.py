@@ -71,11 +71,12 @@ class Aim(NamedTuple):
 
 
 class GatherRays(NamedTuple):
-    """The rays that a surface casts by its STORED lobes: their number n; what guides them, an Aim; the choice of lights
-    that their emission is weighted against; the pixel's seed; three numbers for the ray that is of the BSDF alone,
-    where none gathers."""
+    """The rays that a surface casts by its STORED lobes: their number n; those of them that look for lights, n_bsdf, 0
+    where samples of lights are left all to find; what guides rays, an Aim; the choice of lights that their emission is
+    weighted against; the pixel's seed; three numbers for the ray that is of the BSDF alone, where none gathers."""
 
     n: Any
+    n_bsdf: Any
     aimed: Any
     choice: Any
     seed: Any

@@ -14,7 +14,7 @@ from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import FURTHER_LIGHT, PATH_LIGHT, PATH_SCATTER, PATH_STRIDE
 from pmviewer.kernels.lights.light import light_pdf
-from pmviewer.kernels.memory import stack_i4
+from pmviewer.kernels.memory import row_of, stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import largest, mul, scale
 from pmviewer.render.cast import cast, leaving
@@ -67,10 +67,10 @@ def path_survival(depth, beta):
 def path_pass(scenes, eyes, film, counts, first, last):
     """Add one path to each of the pixels first … last−1; arguments as in `pmviewer.render.eye.eye_pass`."""
     scene, eye = scenes[0], eyes[0]
-    choice = choose_by_power(stack_i4(LIST_WORDS), eye.light_samples)
+    choice, tally = choose_by_power(stack_i4(LIST_WORDS), eye.light_samples), row_of(counts, 0)
     for number in range(first, last):
         seed, ray, weight = sampled_ray(scene, eye, number)
-        pixel = Pixel(number, seed, film, None, counts, weight, None)
+        pixel = Pixel(number, seed, row_of(film, number), None, tally, weight, None)
         beta = WHITE
         stored = 0  # how often the path took lobes that photons are stored for
         mirrored = False  # whether it took a followed lobe before the first of these
@@ -81,7 +81,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
         for depth in range(eye.max_depth + 1):
             arrival = arrive_by_flight(scene, eye, ray, beta, seed, depth, origin, followed)
             hit = arrival.hit
-            counts[C_RAYS] += arrival.rays
+            tally[C_RAYS] += arrival.rays
             term = EMISSION
             if depth > 0:
                 term = term_of(eye, mirrored, stored, by_chain, in_medium)
@@ -97,7 +97,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
                         si, _ = arrive(scene, eye.glossy, ray.d, seen, beta)
                         properties(eye, pixel, si)
                 if depth == eye.max_depth:
-                    counts[C_CUT] += 1
+                    tally[C_CUT] += 1
                     break
                 stored += 1
                 in_medium = in_medium or stored == 1
@@ -105,8 +105,8 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 u_pick, lu, lv, _ = draw4(eye.sequence, seed, eye.index, PATH_LIGHT + PATH_STRIDE * depth)
                 sampler = Sampler(eye.sequence, seed, eye.index, FURTHER_LIGHT)
                 after = scatter_in_medium(scene, eye, ray, arrival, choice, sampler, (u_lobe, u, v), (u_pick, lu, lv))
-                counts[C_RAYS] += after.rays
-                counts[C_SHADOW_RAYS] += after.rays
+                tally[C_RAYS] += after.rays
+                tally[C_SHADOW_RAYS] += after.rays
                 deposit(pixel, term_of(eye, mirrored, stored, by_chain, in_medium), after.L)
                 survival = path_survival(depth, after.beta)
                 if not u_end < survival:
@@ -134,7 +134,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
             if si.bsdf.groups == NOTHING:
                 break
             if depth == eye.max_depth:
-                counts[C_CUT] += 1
+                tally[C_CUT] += 1
                 break
             u, v, u_lobe, u_end = draw4(eye.sequence, seed, eye.index, PATH_SCATTER + PATH_STRIDE * depth)
             group, share, u_lobe = pick_group(si.bsdf, si.wo, u_lobe)
@@ -147,8 +147,8 @@ def path_pass(scenes, eyes, film, counts, first, last):
             if group == STORED or not is_delta(si.bsdf):
                 sampler = Sampler(eye.sequence, seed, eye.index, PATH_LIGHT + PATH_STRIDE * depth)
                 L, rays, _ = light_samples(scene, None, si, group, choice, eye.mis, sampler)
-                counts[C_RAYS] += rays
-                counts[C_SHADOW_RAYS] += rays
+                tally[C_RAYS] += rays
+                tally[C_SHADOW_RAYS] += rays
                 deposit(pixel, term_of(eye, mirrored, stored, by_chain, in_medium), mul(beta, L))
             wi, beta, pdf, compression = scatter(scene, si, group, beta, u_lobe, u, v)
             beta = scale(beta, compression)

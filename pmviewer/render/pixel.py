@@ -36,8 +36,9 @@ VOLUME, VOLUME_INDIRECT = PLANES["volume"].start, PLANES["volume indirect"].star
 
 
 class Pixel(NamedTuple):
-    """A pixel that is sampled: its number and seed, and where its samples go: film, float64 (pixels, CHANNELS); radii,
-    of its look-ups, or None (`pmviewer.render.pixel_radius`); counts, int64 (N_COUNTS,); what its sample counts by the
+    """A pixel that is sampled: its number and seed, and where its samples go: film, its row of float64
+    (pixels, CHANNELS); radii, its row of those of look-ups, or None (`pmviewer.render.pixel_radius`); counts, int64
+    (N_COUNTS,), all three by `row_of`; what its sample counts by the
     reconstruction filter, None for 1 (`pmviewer.render.filter`), and as one of several of the pass, likewise
     (`pmviewer.render.mirror_rays`)."""
 
@@ -124,7 +125,7 @@ def deposit(pixel, plane, value):
     """Add a sample to a plane of the film, or count it when it is not finite or negative."""
     if is_good(value):
         for k in range(3):
-            pixel.film[pixel.number, plane + k] += weighed(pixel, _f8(value[k]))
+            pixel.film[plane + k] += weighed(pixel, _f8(value[k]))
     else:
         pixel.counts[C_DROPPED] += 1
 
@@ -136,6 +137,6 @@ def properties(eye, pixel, si):
     p, albedo, n = si.p, si.bsdf.albedo, face(shading_normal(si.bsdf), si.wo)
     depth = (p[0] - eye.x_eye) * eye.x_forward + (p[1] - eye.y_eye) * eye.y_forward + (p[2] - eye.z_eye) * eye.z_forward
     for k in range(3):
-        pixel.film[pixel.number, ALBEDO + k] += shared(pixel, _f8(albedo[k]))
-        pixel.film[pixel.number, NORMAL + k] += shared(pixel, _f8(n[k]))
-    pixel.film[pixel.number, DEPTH] += shared(pixel, _f8(depth))
+        pixel.film[ALBEDO + k] += shared(pixel, _f8(albedo[k]))
+        pixel.film[NORMAL + k] += shared(pixel, _f8(n[k]))
+    pixel.film[DEPTH] += shared(pixel, _f8(depth))

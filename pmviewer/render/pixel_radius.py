@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.specialise import absent, part, specialised
+from pmviewer.kernels.memory import row_of
 from pmviewer.render.lookup import looked_up
 
 OF_CAUSTIC, OF_GLOBAL = 0, 1
@@ -50,11 +51,19 @@ def shrink(radii: NDArray[np.float32], alpha: float, floor: float) -> None:
 
 
 @specialised
-def own_radius(radii, which, pixel, radius):
-    """The pixel's radius for a map, OF_CAUSTIC or OF_GLOBAL; `radius`, that of the pass, where `radii` is None."""
+def own_radius(radii, which, radius):
+    """A pixel's radius for a map, OF_CAUSTIC or OF_GLOBAL, from its row; that of the pass where there is None."""
     if absent(radii):
-        return lambda radii, which, pixel, radius: radius
-    return lambda radii, which, pixel, radius: radii[pixel, RADIUS + which]
+        return lambda radii, which, radius: radius
+    return lambda radii, which, radius: radii[RADIUS + which]
+
+
+@specialised
+def radii_of(radii, pixel):
+    """The pixel's row of radii (pixels, COLUMNS); None of None."""
+    if absent(radii):
+        return lambda radii, pixel: None
+    return lambda radii, pixel: row_of(radii, pixel)
 
 
 @specialised
@@ -66,6 +75,6 @@ def count_found(pixel, which, photons, eye, radius, si, class_mask):
 
     def told(pixel, which, photons, eye, radius, si, class_mask):
         _, found = looked_up(photons, eye, radius, si.p, si.ng, class_mask)
-        pixel.radii[pixel.number, FOUND + which] += found
+        pixel.radii[FOUND + which] += found
 
     return told

@@ -8,7 +8,15 @@ from scipy import stats
 from scipy.stats import qmc
 
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.kernels.random import INDEPENDENT, SOBOL, draw1, draw4, hash3, owen, reverse_bits, sobol_reversed
+from pmviewer.kernels.random import INDEPENDENT, SOBOL, draw1, draw4, hash3, owen
+from pmviewer.kernels.sobol import (
+    SEED_BITS,
+    SEED_FACTORS,
+    SOBOL_TABLE,
+    bit_reversed_points,
+    reversed_bits,
+    scrambled_point,
+)
 
 SEQUENCES = {"independent": INDEPENDENT, "sobol": SOBOL}
 
@@ -32,11 +40,9 @@ def _draw1_many(sequence, seed, first, dimension_set, out):
 
 
 @kernel
-def _sobol_many(out):
+def _scrambled_points(indices, keys, out):
     for i in range(len(out)):
-        out[i, 0] = reverse_bits(np.uint32(i))
-        for d in range(1, out.shape[1]):
-            out[i, d] = reverse_bits(sobol_reversed(np.uint32(i), d))
+        out[i] = scrambled_point(SOBOL_TABLE, indices[i], keys[i])
 
 
 @kernel
@@ -58,12 +64,27 @@ def one(sequence, seed, first, n, dimension_set):
 
 
 def test_unscrambled_points_are_joe_and_kuos():
-    points = np.empty((4096, 4), np.uint32)
-    _sobol_many(points)
+    points = reversed_bits(bit_reversed_points(reversed_bits(np.arange(4096, dtype=np.uint32))))
     expected = qmc.Sobol(4, scramble=False, bits=32).random(4096)  # in Gray code order: the same set
     ours = points.astype(np.float64) / 2**32
     assert np.array_equal(np.sort(ours, axis=0), np.sort(expected, axis=0))
     assert {tuple(p) for p in ours} == {tuple(p) for p in expected}
+
+
+def test_four_lanes_scramble_as_four_numbers_do():
+    """`owen`, which the tests below show to be a nested scramble, of one coordinate after the other."""
+    rng = np.random.default_rng(5)
+    indices, keys = rng.integers(0, 2**32, (2, 500), dtype=np.uint32)
+    out = np.empty((500, 4), np.float32)
+    _scrambled_points(indices, keys, out)
+    points = bit_reversed_points(indices)
+    with np.errstate(over="ignore"):
+        seeds = keys[:, None] * np.array(SEED_FACTORS, np.uint32) ^ np.array(SEED_BITS, np.uint32)
+    for lane in range(4):
+        expected = np.empty(500, np.uint32)
+        for i in range(500):
+            _owen_many(reversed_bits(points[i : i + 1, lane]), seeds[i, lane], expected[i : i + 1])
+        assert np.array_equal(out[:, lane], (expected >> 8) * np.float32(2.0**-24))
 
 
 @pytest.mark.parametrize(("seed", "dimension_set"), [(1, 0), (7, 3), (12345, 2000)])

@@ -8,6 +8,7 @@ import pytest
 import pmviewer
 from pmviewer.bench.measures.dispersion import prism_scene
 from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.memory import row_of
 from pmviewer.maps.photon_words import write_banded
 from pmviewer.maps.record import bands, unpack
 from pmviewer.photons.light_pass.light_pass import trace_pass
@@ -77,7 +78,7 @@ def _write(rows, powers, band):
         p = (np.float32(0.001 * i), np.float32(0.3), np.float32(-1.7))
         wi = (np.float32(0.0), np.float32(1.0), np.float32(0.0))
         power = (powers[i, 0], powers[i, 1], powers[i, 2])
-        write_banded(rows, i, p, wi, power, np.uint32(2), 7, np.uint32(band))
+        write_banded(row_of(rows, 0), i, p, wi, power, np.uint32(2), 7, np.uint32(band))
 
 
 def test_a_band_costs_no_power():

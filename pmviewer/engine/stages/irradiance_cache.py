@@ -118,9 +118,9 @@ def prepare_cache(given: PassData) -> None:
 
 
 def _extended(cache: IrradianceCache, rows: NDArray[np.float32], run: Runner) -> IrradianceCache:
-    together = build_cache(np.concatenate([cache.rows, rows]), cache.record)
+    together = build_cache(np.concatenate([cache.rows, rows]), cache.record, run)
     limit_by_neighbours(together, run)
-    return build_cache(together.rows, cache.record)
+    return build_cache(together.rows, cache.record, run)
 
 
 def cache_cloud(cache: IrradianceCache) -> tuple[NDArray[np.float32], float]:

@@ -62,16 +62,16 @@ def intersect_quadric(address, ox, oy, oz, dx, dy, dz, tmin, tmax):
         start, slope = (sx * ax + sy * ay + sz * az) * scale, (vx * ax + vy * ay + vz * az) * scale
         sx, sy, sz = sx - start * ax, sy - start * ay, sz - start * az
         vx, vy, vz = vx - slope * ax, vy - slope * ay, vz - slope * az
-    a = vx * vx + vy * vy + vz * vz
-    middle = -(sx * vx + sy * vy + sz * vz) / a
+    inverse = 1.0 / (vx * vx + vy * vy + vz * vz)
+    middle = -(sx * vx + sy * vy + sz * vz) * inverse
     # Discriminant from the perpendicular from the centre to the ray: no cancellation for small, distant spheres
     # (Haines et al. 2019).
     px, py, pz = sx + middle * vx, sy + middle * vy, sz + middle * vz
     discriminant = radius * radius - (px * px + py * py + pz * pz)
     if not discriminant >= 0.0:
         return tmax
-    half = math.sqrt(discriminant / a)
-    product = (sx * sx + sy * sy + sz * sz - radius * radius) / a
+    half = math.sqrt(discriminant * inverse)
+    product = (sx * sx + sy * sy + sz * sz - radius * radius) * inverse
     far = middle + (half if middle >= 0.0 else -half)
     other = product / far if far != 0.0 else 0.0
     t0, t1 = min(far, other), max(far, other)

@@ -86,13 +86,16 @@ def irradiance_radius(grid, place, radius, weighting):
     filter_kind, cone_k = weighting
     disc = Disc(p, place.n, r2, place.flatness * radius, place.class_mask)
     ranges, squared, weights, sums = stack_i4(16), stack_i4(8), stack_i4(8), stack_i4(24)
+    runs = grid_ranges(grid, p[0], p[1], p[2], radius, ranges)
+    if runs == 0:  # most look-ups for caustics
+        return _f4(0.0), _f4(0.0), _f4(0.0), _i4(0)
     for lane in range(WIDTH):
         stack_put_f4(weights, lane, _f4(1.0))
     for lane in range(3 * WIDTH):
         stack_put_f4(sums, lane, _f4(0.0))
     red, green, blue = _f8(0.0), _f8(0.0), _f8(0.0)
     count, pending = _i4(0), _i4(0)
-    for k in range(grid_ranges(grid, p[0], p[1], p[2], radius, ranges)):
+    for k in range(runs):
         first, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
         for block in range(first // WIDTH, (end - 1) // WIDTH + 1):
             mask = counted_in_block(grid, block, first, end, disc, squared)

@@ -20,6 +20,7 @@ from pmviewer.kernels.media.flight import fly
 from pmviewer.kernels.media.medium import has_media, medium_beyond, phase_numbers
 from pmviewer.kernels.media.phase import sample_phase
 from pmviewer.kernels.media.varying import albedo_at
+from pmviewer.kernels.memory import row_of
 from pmviewer.kernels.random import draw1, draw4
 from pmviewer.kernels.vector import dot, is_good, luminance, mul, scale
 from pmviewer.maps.record import BOUNCES, HAD_DIFFUSE
@@ -161,7 +162,7 @@ def _store(pass_, of, volume_out, counts, collision, bounces):
     for _ in range(times):
         row = counts[C_VOLUME]
         wi, power = (-d[0], -d[1], -d[2]), scale(scattered, of.factor)
-        write_of_wave(volume_out, row, p, wi, power, word, of.light, wave)
+        write_of_wave(row_of(volume_out, 0), row, p, wi, power, word, of.light, wave)
         counts[C_VOLUME] += 1
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, specialised
+from pmviewer.kernels.memory import row_of
 from pmviewer.photons.light_pass.banded import write_of_wave
 
 MOST_VERTICES = 64
@@ -60,7 +61,7 @@ def _put(paths, i, p, wi, beta, flags, light, wave):
     row = counts[i]
     if row >= MOST_VERTICES:
         return
-    write_of_wave(vertices[i], row, p, wi, beta, flags, light, wave)
+    write_of_wave(row_of(vertices[i], 0), row, p, wi, beta, flags, light, wave)
     counts[i] = row + 1
 
 

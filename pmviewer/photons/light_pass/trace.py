@@ -35,6 +35,7 @@ from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import COPIES, EMISSION, EMITTER, FURTHER_PHOTONS_SALT, PHOTON_SCATTER, STORE, WAVE
 from pmviewer.kernels.lights.light import is_delta_light
 from pmviewer.kernels.media.medium import has_media, light_medium
+from pmviewer.kernels.memory import row_of
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import STRAIGHT, adjoint_cosines, face, leave, surface_at
@@ -121,11 +122,12 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
     `PhotonBuffers`; paths: None, or where to write whole paths (`pmviewer.photons.light_pass.paths`).
     """
     # Taken apart outside of the loop: counting references to arrays for each photon would take a quarter of the time.
-    global_out, caustic_out, global_normals, caustic_normals, counts, ledgers, volume_out = out
-    scene, pass_ = scenes[0], passes[0]
+    scene, pass_, ledgers, volume_out = scenes[0], passes[0], out.ledgers, out.volume_out
+    counts = row_of(out.counts, 0)
+    into_global, into_caustic = _room(out.global_out, out.global_normals), _room(out.caustic_out, out.caustic_normals)
     most = pass_.max_bounces if pass_.roulette != EQUAL else MOST_COPIES * pass_.max_bounces
     for i in range(i0, i1):
-        full = counts[C_GLOBAL] + most > len(global_out) or counts[C_CAUSTIC] + most > len(caustic_out)
+        full = counts[C_GLOBAL] + most > into_global[3] or counts[C_CAUSTIC] + most > into_caustic[3]
         if full or is_full(volume_out, counts, most):
             return i
         to_global = i < pass_.global_trajectories
@@ -133,10 +135,9 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
         seed, index = _stream(pass_, i)
         p, d, beta, light, starts, factor = _emitted(scene, pass_, projections[kind], i, seed, index)
         ledgers[kind, E_EMITTED] += _f8(factor)  # its luminance is 1
-        good = is_good(beta)
-        if not (good and starts):
-            counts[C_DROPPED] += 0 if good else 1
-            ledgers[kind, _of_no_start(scene, beta) if good else E_DROPPED] += _f8(factor)
+        if not (is_good(beta) and starts):
+            counts[C_DROPPED] += 0 if is_good(beta) else 1
+            ledgers[kind, _of_no_start(scene, beta) if is_good(beta) else E_DROPPED] += _f8(factor)
             continue
         _book_start(scene, beta, factor, ledgers, kind)
         begin_path(paths, i, p, d, scale(beta, factor), light)
@@ -179,9 +180,9 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 arrival = Arrival(p, wi, ng, _u4(word | _u4(UNFOUND)) if unfound else word, light, wave)
                 if _is_caustic(pass_, word):
                     in_caustic = _in_caustic(pass_, word, stored)
-                    _store(caustic_out, caustic_normals, counts, C_CAUSTIC, arrival, in_caustic, times)
+                    _store(into_caustic, counts, C_CAUSTIC, arrival, in_caustic, times)
                 if to_global and kept & STORED != 0 and _is_chosen(pass_, seed, index, bounces):
-                    _store(global_out, global_normals, counts, C_GLOBAL, arrival, stored, times)
+                    _store(into_global, counts, C_GLOBAL, arrival, stored, times)
                 ledgers[kind, E_STORED] += _f8(before * factor)
             if b.groups == NOTHING:  # a part of a blend that others keep photons for
                 ledgers[kind, E_ABSORBED] += _f8(before * factor)
@@ -346,13 +347,19 @@ def _in_caustic(pass_, flags, power):
 
 
 @inlined
-def _store(rows, normals, counts, which, arrival, power, times):
-    """Keep a photon `times` times in rows (capacity, 6), its surface's normal in `normals` unless that is empty;
-    counts[which] rows are filled."""
+def _room(rows, normals):
+    """Pointers to rows (capacity, 6) and to normals (capacity,), whether there are normals, and the capacity."""
+    return row_of(rows, 0), row_of(normals, 0), len(normals) > 0, len(rows)
+
+
+@inlined
+def _store(into, counts, which, arrival, power, times):
+    """Keep a photon `times` times in these `_room`; counts[which] rows are filled."""
+    rows, normals, with_normals, _ = into
     ng = arrival.ng
     for _ in range(times):
         write_of_wave(rows, counts[which], arrival.p, arrival.wi, power, arrival.flags, arrival.light, arrival.wave)
-        if len(normals) > 0:
+        if with_normals:
             normals[counts[which]] = encode_direction(ng[0], ng[1], ng[2])
         counts[which] += 1
 

@@ -26,7 +26,7 @@ from pmviewer.render.direct.shadow import UNKNOWN, known_visibility
 from pmviewer.render.hidden_lights import past_lights
 from pmviewer.render.lookup import irradiance, looked_up
 from pmviewer.render.pixel import camera_ray, pixel_seed
-from pmviewer.render.pixel_radius import own_radius
+from pmviewer.render.pixel_radius import own_radius, radii_of
 
 FEWEST_SAMPLES = 8
 """Light samples that decide about a pixel, at least."""
@@ -92,7 +92,7 @@ def lookup_view(scenes, eyes, maps, radii, which, radius, class_mask, out, first
         hit, ng, _ = stored_hit(scene, eye, pixel)
         out[pixel, 0] = out[pixel, 1] = _NONE
         if hit.prim >= 0:
-            r = own_radius(radii, which, pixel, radius)
+            r = own_radius(radii_of(radii, pixel), which, radius)
             out[pixel, 0], out[pixel, 1] = looked_up(photons, eye, r, hit.p, ng, class_mask)
 
 

@@ -20,7 +20,7 @@ from pmviewer.render.direct.choice import LIST_WORDS, choose, expected_samples
 from pmviewer.render.given import opened
 from pmviewer.render.mirror_rays import take_sample
 from pmviewer.render.pixel import sampled_ray
-from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, own_radius
+from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, own_radius, radii_of
 from pmviewer.render.reflect import reflected, unfound
 from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import let_through
@@ -93,11 +93,11 @@ def _stored(given, radii, pixel, si, beta, numbers, rows, row):
     eye = given.eye
     depth, surface = numbers
     if eye.caustic_mask != 0:
-        r = own_radius(radii, OF_CAUSTIC, pixel, eye.caustic_radius)
+        r = own_radius(radii_of(radii, pixel), OF_CAUSTIC, eye.caustic_radius)
         L = reflected(given.caustic_map, eye, r, si, eye.caustic_mask)
         row = _put(rows, row, si, beta, L, r, (_i8(OF_CAUSTICS), _i8(eye.caustic_mask), depth, _i8(0), surface))
     for k in range(4):
-        mask, r = eye.global_mask, own_radius(radii, OF_GLOBAL, pixel, eye.global_radius)
+        mask, r = eye.global_mask, own_radius(radii_of(radii, pixel), OF_GLOBAL, eye.global_radius)
         if k == 1:
             mask = eye.direct_mask
         elif k == 2:
@@ -227,7 +227,7 @@ def replay_pixel(given, radii, asked, wi, shares, rows, vertices, prims, expecte
                 if groups & FOLLOWED == 0 or depth == eye.max_depth:
                     break
                 if eye.unfound != 0 and not is_delta(si.bsdf):
-                    r = own_radius(radii, OF_CAUSTIC, pixel, eye.caustic_radius)
+                    r = own_radius(radii_of(radii, pixel), OF_CAUSTIC, eye.caustic_radius)
                     L = unfound(given.caustic_map, eye, r, si)
                     both = _i8(1) if transmits(si.bsdf) else _i8(0)
                     row = _put(rows, row, si, taken, L, r, (_i8(NOT_FOUND), _i8(_CAUSTICS), _i8(depth), both, surface))

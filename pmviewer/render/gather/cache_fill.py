@@ -15,6 +15,7 @@ from pmviewer.kernels.bsdf.dispersion import new_wave
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian, shading_normal
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import CACHE_SALT, GATHER_WAVE, HEMISPHERE
+from pmviewer.kernels.memory import row_of
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import dot, largest, luminance, mul
 from pmviewer.maps.hemisphere import cell_direction, irradiance_and_gradients
@@ -116,20 +117,20 @@ def fill_records(given, pixels, rows, filled, counts, first, last):
     counts: int64 (N_COUNTS,).
     """
     given = opened(given)
-    eye, cache = given.eye, given.cache
+    eye, cache, tally = given.eye, given.cache, row_of(counts, 0)
     cells = np.empty((cache.rings * cache.sectors, 5), np.float32)
     E, rotation, translation = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     for i in range(first, last):
         pixel = pixels[i]
-        found, p, ng, n, gap, footprint = uncovered_hit(given, pixel, counts)
+        found, p, ng, n, gap, footprint = uncovered_hit(given, pixel, tally)
         filled[i] = found
         if not found:
             continue
         seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(CACHE_SALT))
-        gather_hemisphere(given, p, ng, n, gap, seed, cells, counts)
+        gather_hemisphere(given, p, ng, n, gap, seed, cells, tally)
         harmonic = irradiance_and_gradients(cells, cache.rings, cache.sectors, n, E, rotation, translation)
         if not (E[0] + E[1] + E[2] < _f8(np.inf) and harmonic > _f8(0.0)):
-            counts[C_DROPPED] += 1
+            tally[C_DROPPED] += 1
             filled[i] = False
             continue
         harmonic = limit_gradient(cache, harmonic, footprint, E, translation)

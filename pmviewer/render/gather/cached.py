@@ -12,6 +12,7 @@ import numpy as np
 from pmviewer.kernels.bsdf.plain import INV_PI
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_sample, is_lambertian, shading_normal
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
+from pmviewer.kernels.lights.reach import may_meet_light
 from pmviewer.kernels.vector import dot, largest, mul, scale
 from pmviewer.maps.irradiance_cache import interpolate
 from pmviewer.render.chain import BLACK
@@ -67,14 +68,15 @@ def surface_rays(given, known, gather, si, beta, rays, counts):
             return gather_rays(given, si, beta, rays, counts)
         scene, eye = given.scene, given.eye
         direct = BLACK
-        if eye.direct != 0 and eye.mis != 0:
+        if eye.direct != 0 and rays.n_bsdf > 0:
             u_lobe, u, v = rays.numbers
             wi, weight, pdf, _ = bsdf_sample(scene, si.bsdf, STORED, si.wo, u_lobe, u, v)
-            if dot(wi, si.ng) > _f4(0.0) and largest(weight) > _f4(0.0):
+            met = dot(wi, si.ng) > _f4(0.0) and largest(weight) > _f4(0.0)
+            if met and may_meet_light(scene, si.p, wi):
                 counts[C_RAYS] += 1
                 hit, tint = cast_straight(scene, si, wi)
                 weight = mul(weight, tint)
-                direct = mul(weight, found_light(scene, si.p, wi, pdf, rays.n, rays.choice, eye.biased, hit))
+                direct = mul(weight, found_light(scene, si.p, wi, pdf, rays.n_bsdf, rays.choice, eye.biased, hit))
         return direct, scale(mul(si.bsdf.albedo, known), INV_PI)
 
     return with_cache

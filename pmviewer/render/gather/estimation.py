@@ -16,7 +16,7 @@ import numpy as np
 from pmviewer.kernels.bsdf.scattering import STORED, is_lambertian, shading_normal
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import CACHE_SALT
-from pmviewer.kernels.memory import load_f4
+from pmviewer.kernels.memory import load_f4, row_of
 from pmviewer.kernels.random import hash3
 from pmviewer.kernels.vector import luminance
 from pmviewer.maps.hemisphere import irradiance_and_gradients
@@ -111,7 +111,7 @@ def gather_samples(given, pixels, samples, estimates, told, counts, first, last)
     counted as dropped and left without an estimate.
     """
     given = opened(given)
-    eye, strata = given.eye, given.cache
+    eye, strata, tally = given.eye, given.cache, row_of(counts, 0)
     cells = np.empty((strata.rings * strata.sectors, 5), np.float32)
     E, rotation, translation = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     for i in range(first, last):
@@ -119,10 +119,10 @@ def gather_samples(given, pixels, samples, estimates, told, counts, first, last)
         row = samples[pixel]
         n = _vector(row, NORMAL)
         seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(CACHE_SALT))
-        gather_hemisphere(given, _vector(row, POINT), _vector(row, FACE), n, row[GAP], seed, cells, counts)
+        gather_hemisphere(given, _vector(row, POINT), _vector(row, FACE), n, row[GAP], seed, cells, tally)
         mean = irradiance_and_gradients(cells, strata.rings, strata.sectors, n, E, rotation, translation)
         if not E[0] + E[1] + E[2] < _f8(np.inf):
-            counts[C_DROPPED] += 1
+            tally[C_DROPPED] += 1
             continue
         told[pixel, 0], told[pixel, 1], told[pixel, 2] = mean, standard_error(cells), _f4(0.0)
         estimates[pixel, 0], estimates[pixel, 1], estimates[pixel, 2] = E[0], E[1], E[2]

@@ -13,6 +13,7 @@ from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, chain_nu
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.kernels.dimensions import GATHER_CHAIN, GATHER_FORK, GATHER_WAVE
+from pmviewer.kernels.lights.reach import may_meet_light
 from pmviewer.kernels.vector import add, dot, largest, mul, scale
 from pmviewer.render.cast import Hit, cast, leaving
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow
@@ -122,10 +123,11 @@ def gather_rays(given, si, beta, rays, counts):
     """
     scene, eye = given.scene, given.eye
     direct, indirect = BLACK, BLACK
-    n_bsdf = rays.n - rays.aimed.rays
     for j in range(rays.n):
         wi, weight, pdf, share, u_end, sample = gather_direction(given, rays, si, j)
         if dot(wi, si.ng) <= _f4(0.0) or not largest(weight) > _f4(0.0):
+            continue
+        if eye.gather_rays == 0 and not may_meet_light(scene, si.p, wi):
             continue
         if eye.gather_rays > 0:
             survival = gather_survival(eye, beta, weight, share)
@@ -141,8 +143,8 @@ def gather_rays(given, si, beta, rays, counts):
             nearby = emitted_nearby(scene, leaving(si, wi), hit, si.p)
             direct = add(direct, scale(mul(weight, nearby), share))
         weight = mul(weight, tint)
-        if eye.direct != 0 and eye.mis != 0 and pdf > _f4(0.0):
-            L = found_light(scene, si.p, wi, pdf, n_bsdf, rays.choice, eye.biased, hit)
+        if eye.direct != 0 and rays.n_bsdf > 0 and pdf > _f4(0.0):
+            L = found_light(scene, si.p, wi, pdf, rays.n_bsdf, rays.choice, eye.biased, hit)
             direct = add(direct, mul(weight, L))
         if eye.gather_rays > 0:
             L = gather_light(given, hit, wi, rays.seed, sample, counts)

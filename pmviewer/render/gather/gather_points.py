@@ -6,7 +6,7 @@ import numpy as np
 
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED
 from pmviewer.kernels.compile.jit import device, kernel
-from pmviewer.kernels.memory import stack_i4
+from pmviewer.kernels.memory import row_of, stack_i4
 from pmviewer.kernels.vector import dot, largest, mul, scale
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, arrive
@@ -30,7 +30,7 @@ pixel (red, green, blue), and 1 if photons guided it, 0 if it followed the BSDF.
 def _replay(given, si, beta, samples, seed, rows, row, counts):
     """The gather rays of a surface, of one of so many samples, into `rows` from `row` on; returns the next free row."""
     n = given.eye.gather_rays
-    rays = GatherRays(n, aim(given, si, seed, stack_i4(AIM_WORDS)), None, seed, BLACK)
+    rays = GatherRays(n, _i8(0), aim(given, si, seed, stack_i4(AIM_WORDS)), None, seed, BLACK)
     for j in range(n):
         wi, weight, pdf, share, u_end, sample = gather_direction(given, rays, si, j)
         if row >= len(rows) or dot(wi, si.ng) <= _f4(0.0) or not largest(weight) > _f4(0.0):
@@ -59,7 +59,7 @@ def gather_points(given, pixel, samples, counts, rows):
     """
     given = opened(given)
     scene, eye = given.scene, given.eye
-    index, row = eye.index, _i8(0)
+    index, row, tally = eye.index, _i8(0), row_of(counts, 0)
     for sample in range(samples):
         take_sample(eye, index * samples + sample)
         seed, ray, _ = sampled_ray(scene, eye, pixel)
@@ -75,7 +75,7 @@ def gather_points(given, pixel, samples, counts, rows):
                 if not largest(beta) > _f4(0.0):
                     break
                 if si.bsdf.groups & STORED != 0:
-                    row = _replay(given, si, beta, samples, seed, rows, row, counts)
+                    row = _replay(given, si, beta, samples, seed, rows, row, tally)
                 if si.bsdf.groups & FOLLOWED == 0:
                     break
                 ray, beta, _, splits, ways = split_camera_path(scene, eye, si, beta, seed, depth, splits, ways)

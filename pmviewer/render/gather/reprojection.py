@@ -13,6 +13,7 @@ import numpy as np
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import CACHE_SALT, HEMISPHERE
+from pmviewer.kernels.memory import row_of
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import basis, dot, mul
 from pmviewer.maps.hemisphere import cell_direction, irradiance_and_gradients
@@ -175,7 +176,7 @@ def gather_reprojected(given, pixels, sources, samples, known_hits, rule, estima
     begin, count, hits = known_hits
     cover, parts = rule
     first, last = span
-    eye, n = given.eye, given.cache.rings * given.cache.sectors
+    eye, n, tally = given.eye, given.cache.rings * given.cache.sectors, row_of(counts, 0)
     cells, known = np.zeros((n, 5), np.float32), np.empty(n, np.bool_)
     depth, owner = np.empty(n * parts * parts, np.float32), np.empty(n * parts * parts, np.int32)
     E, rotation, translation = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
@@ -185,10 +186,10 @@ def gather_reprojected(given, pixels, sources, samples, known_hits, rule, estima
         view = view_from(given, samples[pixel], parts)
         reprojected = see_known(view, sources[i], begin, count, hits, cover, depth, owner, cells, known)
         seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(CACHE_SALT))
-        shot = _shoot_cells(given, view, samples[pixel, GAP], seed, known, cells, found[filled:], counts)
+        shot = _shoot_cells(given, view, samples[pixel, GAP], seed, known, cells, found[filled:], tally)
         mean = irradiance_and_gradients(cells, view.rings, view.sectors, view.n, E, rotation, translation)
         if not E[0] + E[1] + E[2] < _f8(np.inf):
-            counts[C_DROPPED] += 1
+            tally[C_DROPPED] += 1
             made[i - first] = 0
             continue
         made[i - first] = shot
@@ -212,6 +213,6 @@ def look_around(given, pixel, sources, samples, known_hits, rule, cells, known, 
     see_known(view, sources, begin, count, hits, cover, depth, owner, cells, known)
     seed = hash3(pixel_seed(given.eye, pixel), given.eye.index, _u4(CACHE_SALT))
     found = np.empty((n, HIT), np.float32)
-    _shoot_cells(given, view, samples[pixel, GAP], seed, known, cells, found, counts)
+    _shoot_cells(given, view, samples[pixel, GAP], seed, known, cells, found, row_of(counts, 0))
     for axis in range(3):
         axes[0, axis], axes[1, axis] = view.s[axis], view.t[axis]

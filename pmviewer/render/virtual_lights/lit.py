@@ -162,25 +162,25 @@ def from_virtual_lights(given, si, beta, pixel, whole):
             counts[C_DROPPED] += 1
             continue
         Y = _f8(luminance(F))
-        film[pixel.number, sums + W_SUM] += Y
-        film[pixel.number, sums + W_SQUARES] += Y * Y
+        film[sums + W_SUM] += Y
+        film[sums + W_SQUARES] += Y * Y
         if virtual.estimator == CLAMPED and geometry > virtual.clamp:
             F = scale(F, virtual.clamp / geometry)
-            film[pixel.number, sums + W_LOST] += Y - _f8(luminance(F))
+            film[sums + W_LOST] += Y - _f8(luminance(F))
         target = _i8(plane)
         if weighted and _f4(0.0) < G:
             target = _i8(base + W_F)
-            film[pixel.number, base + W_G] += _f8(throughput * each * G)
-        film[pixel.number, target] += weighed(pixel, _f8(F[0]))
-        film[pixel.number, target + 1] += weighed(pixel, _f8(F[1]))
-        film[pixel.number, target + 2] += weighed(pixel, _f8(F[2]))
-    film[pixel.number, sums + W_LIGHTS] += _f8(asked[0])
+            film[base + W_G] += _f8(throughput * each * G)
+        film[target] += weighed(pixel, _f8(F[0]))
+        film[target + 1] += weighed(pixel, _f8(F[1]))
+        film[target + 2] += weighed(pixel, _f8(F[2]))
+    film[sums + W_LIGHTS] += _f8(asked[0])
     if weighted:
         albedo, counted = normalisation(given, si, pixel)
         if virtual.estimator == PRINTED_FULL:
             albedo = _f4(1.0)
-        film[pixel.number, base + W_A] += _f8(throughput * albedo)
-        film[pixel.number, base + W_C] += _f8(throughput * counted)
+        film[base + W_A] += _f8(throughput * albedo)
+        film[base + W_C] += _f8(throughput * counted)
 
 
 @specialised
@@ -204,11 +204,11 @@ def note_object(given, prim, pixel):
                 number = _i8(load_i4(given.virtual.objects, prim))
             else:
                 number = given.virtual.n_objects + find_instance(given.scene, prim)
-            pixel.film[pixel.number, sums_at(given.scene) + W_OBJECT] = _f8(number)
+            pixel.film[sums_at(given.scene) + W_OBJECT] = _f8(number)
 
         return instanced
 
     def stored(given, prim, pixel):
-        pixel.film[pixel.number, sums_at(given.scene) + W_OBJECT] = _f8(load_i4(given.virtual.objects, prim))
+        pixel.film[sums_at(given.scene) + W_OBJECT] = _f8(load_i4(given.virtual.objects, prim))
 
     return stored

@@ -29,7 +29,7 @@ from pmviewer.scene.arrays.instances import build_instanced, instance_bounds
 from pmviewer.scene.arrays.light_table import LightTable
 from pmviewer.scene.arrays.material_row import MaterialTable, is_rich, material_table, used_materials
 from pmviewer.scene.arrays.media import has_media, light_media, media_of_prims, medium_rows
-from pmviewer.scene.arrays.shape_bounds import shape_bounds
+from pmviewer.scene.arrays.shape_bounds import box_around, box_to_be_met
 from pmviewer.scene.arrays.stored_geometry import StoredGeometry, same_surfaces, stored_geometry
 from pmviewer.scene.arrays.textured_emission import Emission, textured_lights
 from pmviewer.scene.arrays.tree_ahead import TreeAhead
@@ -98,15 +98,25 @@ class FlatScene:
 
 def bounding_sphere(scene: Scene) -> tuple[NDArray[np.float64], float]:
     """Centre and radius of the sphere around the bounding box of all shapes and instances."""
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for shape in scene.shapes:
-        for corner in shape_bounds(shape):
-            low, high = np.minimum(low, corner), np.maximum(high, corner)
+    low, high = box_around(scene.shapes)
     if scene.instances:
         more_low, more_high = instance_bounds(scene.instances)
         low, high = np.minimum(low, more_low), np.maximum(high, more_high)
     center = (low + high) / 2
     return center, max(float(np.linalg.norm(high - low)) / 2, 1e-30)
+
+
+LIT_BOX = ("lit_low_x", "lit_low_y", "lit_low_z", "lit_high_x", "lit_high_y", "lit_high_z")
+
+
+def lit_box(scene: Scene, lights: LightTable, largest: float) -> tuple[float, ...]:
+    """What a ray must meet to meet a light, by the record's LIT_BOX: rays into the sky meet an environment. Coordinates
+    go up to `largest`."""
+    if lights.environment >= 0:
+        return (-np.inf,) * 3 + (np.inf,) * 3
+    emit = (shape for shape, light in zip(scene.shapes, lights.of_shape, strict=True) if light >= 0)
+    low, high = box_to_be_met(emit, largest)
+    return (*low, *high)
 
 
 def flatten(
@@ -174,6 +184,9 @@ def flatten(
     if lights.sky is not None:
         r["sky_height"], r["sky_width"] = lights.sky.pixels.shape[:2]
     r["center_x"], r["center_y"], r["center_z"], r["radius"] = *center, radius
+    r["lit_spread"] = lights.spread
+    for name, number in zip(LIT_BOX, lit_box(scene, lights, float(np.abs(center).max()) + radius), strict=True):
+        r[name] = number
     said: list[str] = []
     if features["media"]:
         r["emits"] = len(glows)

@@ -141,6 +141,14 @@ class LightTable:
         share = np.cumsum(self.power @ LUMINANCE)
         return np.concatenate([[0.0], share / share[-1]]).astype(np.float32)
 
+    @property
+    def spread(self) -> float:
+        """The largest area of a surface that emits over the probability of its light; 0 without any."""
+        areas, shares = self.rows[:, K.L_AREA].astype(np.float64), self.power @ LUMINANCE
+        shown = self.of_shape[self.of_shape >= 0]
+        with np.errstate(divide="ignore", over="ignore"):
+            return float((areas[shown] / shares[shown]).max(initial=0.0) * shares.sum())
+
     def weaken_glows(self, shares: NDArray[np.float64]) -> None:
         """Media that emit have these shares (n,) of their power; rows and distribution change in place."""
         own = slice(self.first_glow, None)
