@@ -135,6 +135,7 @@ def edge_of(name, x):
     return np.array([f[fine > -d].sum() for d in x]) / f.sum()
 
 
+@pytest.mark.usefixtures("room_for_split_paths")
 @pytest.mark.parametrize("method", ["path", "progressive"])
 @pytest.mark.parametrize("name", DEFAULTS)
 def test_an_edge_has_the_filters_shape(name, method):
@@ -168,6 +169,7 @@ def test_pixels_whose_weights_cancel_have_the_mean_of_those_around():
     assert film.planes().shape == (1, 3, CHANNELS)
 
 
+@pytest.mark.usefixtures("room_for_split_paths")
 def test_threads_change_nothing():
     """A lens and a signed filter together, with the extra rays of outlines."""
     scene = edge_scene(PixelFilter("Mitchell-Netravali", 2.0, (1 / 3, 1 / 3)), 0.2)
