@@ -50,12 +50,12 @@ def any_light_in_media() -> Iterator[None]:
 
 
 @pytest.fixture
-def any_bsdf_where_light_splits() -> Iterator[None]:
-    """Scenes with dispersive glass are opened as if rough surfaces were in them."""
+def any_bsdf() -> Iterator[None]:
+    """Scenes are opened as if rough surfaces were in them."""
     from tests.support import kinds
 
     with pytest.MonkeyPatch.context() as patch:
-        kinds.any_bsdf_where_light_splits(patch)
+        kinds.any_bsdf(patch)
         yield
 
 

@@ -23,9 +23,10 @@ def any_light_in_media(monkeypatch):
     _open_as_if(monkeypatch, "media", "lights", "grids")
 
 
-def any_bsdf_where_light_splits(monkeypatch):
-    """As if rough surfaces were in scenes with dispersive glass."""
-    _open_as_if(monkeypatch, "dispersion", "bsdfs")
+def any_bsdf(monkeypatch):
+    """As if rough surfaces were in all scenes: for kernels that only some tests need, which so take two thirds of the
+    time to compile."""
+    _open_as_if(monkeypatch, "", "bsdfs")
 
 
 def _open_as_if(monkeypatch, where, *features):
