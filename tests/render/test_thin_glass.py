@@ -182,8 +182,8 @@ def test_rough_mirrors_see_panes_as_they_are():
     rough = Material("rough", "rough conductor", (0.9,) * 3, two_sided=True, alpha=(0.2, 0.2))
     scene = replace(scene, materials=(rough, scene.materials[1]))
     photons = {"N": 200, "glossy": 0.3}
-    path = image_by_other_kernels(scene, 400, render={"method": "path"}, photons=photons)
-    ours = image_of(scene, 400, photons=photons)
+    path = image_by_other_kernels(scene, 150, render={"method": "path"}, photons=photons)
+    ours = image_of(scene, 150, photons=photons)
     assert path.mean() > 0.2
     assert ours.mean(axis=(0, 1)) == pytest.approx(path.mean(axis=(0, 1)), rel=0.02)
 
