@@ -41,11 +41,21 @@ def every_surface() -> Iterator[None]:
 
 @pytest.fixture
 def any_light_in_media() -> Iterator[None]:
-    """Scenes with media are opened as if every kind of light were in them."""
+    """Scenes with media are opened as if lattices and every kind of light were in them."""
     from tests.support import kinds
 
     with pytest.MonkeyPatch.context() as patch:
         kinds.any_light_in_media(patch)
+        yield
+
+
+@pytest.fixture
+def any_bsdf() -> Iterator[None]:
+    """Scenes are opened as if rough surfaces were in them."""
+    from tests.support import kinds
+
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.any_bsdf(patch)
         yield
 
 
@@ -56,6 +66,16 @@ def every_path_may_split() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         kinds.may_always_split(patch)
+        yield
+
+
+@pytest.fixture
+def room_for_split_paths() -> Iterator[None]:
+    """Pixels with one path have the kernels of those with several."""
+    from tests.support import kinds
+
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.room_for_split_paths(patch)
         yield
 
 

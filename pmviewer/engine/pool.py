@@ -60,6 +60,8 @@ class WorkPool:
 
     `on_progress` hears which stage runs, and which share of its current tasks is through (None: they are few).
     `behind_window` lowers the threads' priority; without a window nobody waits, and they keep the process's own.
+    Where neither is asked for and one thread is enough, it is the caller's own: to wake another takes longer than small
+    tasks do.
     """
 
     def __init__(self, threads: int | None = None, *, behind_window: bool = False) -> None:
@@ -69,6 +71,7 @@ class WorkPool:
         self.stage = ""
         self.on_progress: Callable[[str, float | None], None] | None = None
         self._lock = threading.Lock()
+        self._behind_window = behind_window
         self._executor = ThreadPoolExecutor(
             self.threads, "pmviewer", initializer=lower_priority if behind_window else None
         )
@@ -79,7 +82,19 @@ class WorkPool:
         Raises Cancelled as soon as the running tasks are through when `cancel` is set, and whatever a task raises.
         """
         batch = _Batch(tasks)
-        workers = [self._executor.submit(self._work, batch) for _ in range(min(self.threads, len(tasks)))]
+        if min(self.threads, len(tasks)) < 2 and self.on_progress is None and not self._behind_window:
+            self._work(batch)
+        else:
+            self._share(batch)
+        if batch.errors:
+            _raise_of(batch)
+        if len(batch.through) < len(tasks):  # closed meanwhile
+            raise Cancelled
+        return batch.results
+
+    def _share(self, batch: _Batch) -> None:
+        """Have threads do it, and wait for them."""
+        workers = [self._executor.submit(self._work, batch) for _ in range(min(self.threads, len(batch.tasks)))]
         try:
             while wait(workers, REPORT_SECONDS if self.on_progress is not None else None).not_done:
                 self._report(batch)
@@ -87,11 +102,6 @@ class WorkPool:
         finally:
             batch.stopped = True
             wait(workers)
-        if batch.errors:
-            _raise_of(batch)
-        if len(batch.through) < len(tasks):  # closed meanwhile
-            raise Cancelled
-        return batch.results
 
     def _work(self, batch: _Batch) -> None:
         """On one thread: the next task that nobody has begun, until there is none. Threads fetch their tasks

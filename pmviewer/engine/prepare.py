@@ -31,7 +31,7 @@ from pmviewer.maps.search.grid import build_grid
 from pmviewer.maps.search.kdtree import build_kdtree
 from pmviewer.photons.deposition.depositor import prepare_rules
 from pmviewer.photons.emission.scattered import scattered_record
-from pmviewer.photons.emission.strata import STRATA_DTYPE
+from pmviewer.photons.emission.stratified import STRATA_DTYPE
 from pmviewer.photons.emission.tested import prepare_weighing
 from pmviewer.photons.light_pass.ledger import N_COUNTS, empty_ledger
 from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE, PhotonBuffers, trace_photons

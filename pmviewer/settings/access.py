@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import operator
 import types
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Union, get_args, get_origin
 
@@ -179,11 +181,13 @@ def needs_of(path: str) -> Needs:
 
 def get(settings: Settings, path: str) -> Any:
     """The value of the setting with that full name."""
+    return _getter(path)(settings)
+
+
+@functools.cache
+def _getter(path: str) -> Callable[[Settings], Any]:
     info_of(path)
-    value: Any = settings
-    for part in path.split("."):
-        value = getattr(value, "global_" if part == "global" else part)
-    return value
+    return operator.attrgetter(".".join("global_" if part == "global" else part for part in path.split(".")))
 
 
 def with_values(settings: Settings, values: dict[str, Any]) -> Settings:

@@ -121,6 +121,7 @@ def test_radii_are_told_by_passes_with_others():
     assert found.cost == pytest.approx(0.01)
 
 
+@pytest.mark.usefixtures("every_path_may_split")
 def test_a_trial_sees_bias_that_is_narrower_than_its_pixels_are_apart(pool):
     """Caustics of a ring of metal, thinner than the radius: by a trial of few pixels that are as small as the
     picture's, as it shows in the picture itself against the scene's reference."""
@@ -139,6 +140,7 @@ def test_a_trial_sees_bias_that_is_narrower_than_its_pixels_are_apart(pool):
     assert tried.measured[0].bias.caustic.bias2 == pytest.approx(bias2, rel=0.4)
 
 
+@pytest.mark.usefixtures("every_path_may_split")
 def test_a_trial_of_few_pixels_has_the_records_of_the_whole_picture(pool):
     """Noise of a pass with the irradiance cache, by the trial and by four passes of the picture itself."""
     scene, N = open_scene("cornell_diffuse"), 20_000

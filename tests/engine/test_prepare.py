@@ -89,7 +89,16 @@ def signatures() -> set[tuple[str, Any]]:
 
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
-@pytest.mark.parametrize("variant", ["progressive", "radiance photons, nearest", "guided emission", "virtual lights"])
+@pytest.mark.parametrize(
+    "variant",
+    [
+        "progressive",
+        "radiance photons",
+        pytest.param("radiance photons, nearest", marks=pytest.mark.extensive),
+        "guided emission",
+        "virtual lights",
+    ],
+)
 def test_the_large_kernels_of_a_pass_were_prepared(variant, box, pool):
     """Nothing that takes the eye's or the light pass's record compiles later."""
     settings = settings_of(variant)

@@ -122,7 +122,7 @@ def test_the_picture_says_what_is_wrong_with_it(rule):
     assert len(said) == (rule != "exact")
 
 
-@pytest.mark.usefixtures("every_surface")
+@pytest.mark.usefixtures("any_bsdf")
 def test_gather_rays_that_follow_mirrors_miss_what_panes_reflect():
     for method, on, sentences in (("gather", False, 2), ("gather", True, 1), ("progressive", False, 1)):
         chosen = settings("tinted and reflecting", method, **{"photons.N": 1000, "photons.indirect_caustics": on})
@@ -130,7 +130,7 @@ def test_gather_rays_that_follow_mirrors_miss_what_panes_reflect():
         assert sum("thin glass" in warning for warning in said) == sentences
 
 
-@pytest.mark.usefixtures("every_surface")
+@pytest.mark.usefixtures("any_bsdf")
 def test_the_picture_is_the_same_for_any_number_of_threads():
     box = replace(box_with(PANE), width=64, height=48)
     chosen = settings("tinted and reflecting", **{"photons.N": 20_000})

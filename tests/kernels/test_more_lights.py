@@ -25,6 +25,11 @@ def scene_of(*lights, floor=True):
     return replace(light_scene(floor=True), lights=lights)
 
 
+def flat_of(*lights):
+    """Flattened as if there were projectors, too: the kernels of tests of those."""
+    return flatten(scene_of(*lights), features_at_least=("lights", "projectors"))
+
+
 @kernel
 def _sky(scenes, directions, radiance, pdf):
     scene = scenes[0]
@@ -44,7 +49,7 @@ def sky(flat, directions):
 def test_emitted_power_of_all_lights_together():
     """2^20 photons: each light's power within 0.1 % of the analytic value, of each kind that is not an area light."""
     lights = (*MORE.values(), LIGHTS["point"])
-    flat = flatten(scene_of(*lights))
+    flat = flat_of(*lights)
     n = 2**20
     _, _, beta, light = emit(flat, n)
     for index, described in enumerate(lights):
@@ -55,7 +60,7 @@ def test_emitted_power_of_all_lights_together():
         assert flat.light_power[index] == pytest.approx(expected, rel=1e-9)
         # An image is sampled by its luminance: colours are right in the mean, and here it has few of the photons.
         assert power == pytest.approx(expected, rel=3e-2 if described.name == "image" else 1e-3)
-    flat = flatten(scene_of(MORE["image"]))
+    flat = flat_of(MORE["image"])
     power = emit(flat, n)[2].mean(0) * flat.total_luminance
     print(f"image alone: {power} W, {np.abs(power / flat.light_power[0] - 1).max():.1e} off")
     assert power == pytest.approx(flat.light_power[0], rel=1e-3)
@@ -70,7 +75,7 @@ def test_power_in_closed_form_is_the_integral_of_what_is_seen():
         f = np.clip((cutoff - theta) / max(cutoff - beam, 1e-12), 0, 1)
         total = (f * np.sin(theta)).sum() * 2 * math.pi * math.pi / 200_000
         assert emitted_power(light, 1.0) == pytest.approx(total * np.array(light.intensity), rel=1e-4)
-    flat = flatten(scene_of(MORE["image"]))
+    flat = flat_of(MORE["image"])
     z = (np.arange(1000) + 0.5) / 500 - 1
     phi = (np.arange(1000) + 0.5) / 1000 * 2 * math.pi
     z, phi = (a.ravel() for a in np.meshgrid(z, phi))
@@ -85,7 +90,7 @@ def test_power_in_closed_form_is_the_integral_of_what_is_seen():
 @pytest.mark.parametrize("name", ["spot", "sharp spot", "soft spot", "thin spot"])
 def test_photons_of_spots_have_the_density_of_the_intensity(name):
     light = MORE[name]
-    position, direction, beta, _ = emit(flatten(scene_of(light)), MANY, INDEPENDENT)
+    position, direction, beta, _ = emit(flat_of(light), MANY, INDEPENDENT)
     assert np.abs(position - light.position).max() < 1e-6
     np.testing.assert_allclose(beta, np.broadcast_to(beta[0], beta.shape), rtol=1e-6)
     axis = np.array([light.axis])
@@ -109,7 +114,7 @@ def test_photons_of_spots_have_the_density_of_the_intensity(name):
 
 def test_photons_of_a_directional_light_fill_a_disc_before_the_scene():
     light = MORE["directional"]
-    flat = flatten(scene_of(light))
+    flat = flat_of(light)
     position, direction, _, _ = emit(flat, MANY, INDEPENDENT)
     assert np.abs(direction - light.direction).max() < 1e-6
     offset = (position - flat.center) / flat.radius
@@ -143,7 +148,7 @@ def sky_expected(flat):
 
 def test_directions_of_an_image_have_its_luminance_as_density():
     """Chi-square with MANY samples: towards a point, and of photons; every photon's power has luminance 1."""
-    flat = flatten(scene_of(MORE["image"]))
+    flat = flat_of(MORE["image"])
     expected = sky_expected(flat)
     assert expected.sum() == pytest.approx(1, rel=1e-4)
     wi, end, radiance, pdf, _, _ = sample(flat, (0.02, 0.01, 0.03), MANY)
@@ -171,7 +176,7 @@ def test_directions_of_an_image_have_its_luminance_as_density():
 
 def test_an_even_image_is_a_constant_sky():
     image = ImageEnvironment("even", np.full((5, 4, 3), 0.8, np.float32), TURN)
-    flat = flatten(scene_of(image))
+    flat = flat_of(image)
     assert flat.light_power[0] == pytest.approx(4 * math.pi**2 * flat.radius**2 * 0.8, rel=1e-6)
     wi, _, radiance, pdf, _, _ = sample(flat, (0.0, 0.01, 0.0), 100_000)
     assert pdf == pytest.approx(1 / (4 * math.pi), rel=1e-5)
@@ -184,7 +189,7 @@ def test_image_is_laid_out_as_documented():
     pixels = np.zeros((9, 16, 3), np.float32)
     pixels[:, :, 0] = np.arange(16)[None]
     pixels[:, :, 1] = np.arange(9)[:, None]
-    flat = flatten(scene_of(ImageEnvironment("layout", pixels, np.eye(3))))
+    flat = flat_of(ImageEnvironment("layout", pixels, np.eye(3)))
     seen, _ = sky(flat, [(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 0, -1), (0, 1, 0), (0, -1, 0)])
     assert seen[:, 0][:4] == pytest.approx([7.5, 3.5, 11.5, 7.5])
     assert seen[:, 1] == pytest.approx([4, 4, 4, 4, 0, 8], abs=1e-4)
@@ -194,7 +199,7 @@ def test_image_is_laid_out_as_documented():
 def test_irradiance_of_lights_without_size_is_analytic(name):
     light = MORE[name]
     x, n = np.array([0.05, 0.0, 0.04]), np.array([0.0, 1.0, 0.0])
-    wi, _, radiance, pdf, _, _ = sample(flatten(scene_of(light)), x, 8)
+    wi, _, radiance, pdf, _, _ = sample(flat_of(light), x, 8)
     E = radiance[0] * (wi[0] @ n) / pdf[0]
     if name == "directional":
         expected = np.array(light.irradiance) * -light.direction[1]
@@ -209,7 +214,7 @@ def test_irradiance_of_lights_without_size_is_analytic(name):
 
 def test_behind_a_spot_it_is_dark():
     light = MORE["spot"]
-    _, _, _, pdf, _, _ = sample(flatten(scene_of(light)), np.array(light.position) + (0, 1.0, 0), 8)
+    _, _, _, pdf, _, _ = sample(flat_of(light), np.array(light.position) + (0, 1.0, 0), 8)
     assert np.all(pdf == 0)
 
 

@@ -102,7 +102,7 @@ print(sum(isinstance(o, llvm.ModuleRef) for o in gc.get_objects()) - modules)
 """
 PAGES = 10 * mmap.PAGESIZE / 2**20
 """MiB that filled pages and what Python keeps of a kernel take beside."""
-STATEMENTS = "\n    ".join(f"x = step(x, {i}, out)" for i in range(60))
+STATEMENTS = "\n    ".join(f"x = step(x, {i}, out)" for i in range(40))
 
 
 def run(folder: Path, module: str, *words: str) -> list[str]:

@@ -8,6 +8,8 @@ import pytest
 from pmviewer.scene.description import Camera, ConstantEnvironment, Disk, Material, Parallelogram, Scene, Shape
 from tests.support.scenes import rendered, settings_of
 
+pytestmark = pytest.mark.usefixtures("every_surface")
+
 T = (0.8, 0.5, 0.2)
 REFLECTANCE = 0.5
 RADIUS, HEIGHT = 1.0, 1.0

@@ -14,8 +14,8 @@ from pmviewer.scene.description import Camera, Medium, Parallelogram, PointLight
 from pmviewer.scene.grid import Grid
 from pmviewer.scene.medium import Phase
 from pmviewer.settings.access import Photons
-from tests.render.test_grids import BARELY, TO_CUBE, cloud
-from tests.render.test_media import METHODS, cube_of, picture
+from tests.render.test_grids import TO_CUBE, cloud
+from tests.render.test_media import BARELY, METHODS, cube_of, picture
 from tests.support.scenes import GLASS, diffuse, rendered, settings_of
 
 pytestmark = pytest.mark.usefixtures("any_light_in_media")

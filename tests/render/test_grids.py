@@ -14,14 +14,12 @@ from pmviewer.scene.description import ConstantEnvironment, Medium
 from pmviewer.scene.grid import Grid
 from pmviewer.scene.load import read_scene
 from pmviewer.scene.medium import Phase
-from tests.render.test_media import CAMERA, METHODS, SKY, cube_of, picture
+from tests.render.test_media import BARELY, CAMERA, METHODS, SKY, cube_of, picture
 
 pytestmark = pytest.mark.usefixtures("any_light_in_media")
 
 TO_CUBE = np.array([[2.0, 0, 0, -1], [0, 2, 0, -1], [0, 0, 2, -1], [0, 0, 0, 1]])
 """The unit cube to [−1, 1]³."""
-BARELY = (1e-6,) * 3
-"""Albedo of media that absorb, so that kernels are those of media that scatter; paths would be scattered by chance."""
 
 
 def ramp(n=64):

@@ -10,6 +10,8 @@ from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import ProjectorLight, Scene
 from tests.support.scenes import box_camera, box_walls, diffuse, rendered, settings_of
 
+pytestmark = pytest.mark.usefixtures("every_surface")
+
 DOWN = np.array([[-1.0, 0, 0], [0, 0, -1], [0, -1, 0]])
 """Looks down, its top towards −z."""
 METHODS = {"path": {}, "progressive": {"estimate": {"radius": 0.01}}, "gather": {"estimate": {"radius": 0.02}}}

@@ -16,7 +16,7 @@ from pmviewer.scene.description import Scene, Shape, Sphere
 from pmviewer.scene.texture import Bitmap
 from tests.support.scenes import GLASS, MIRROR, box_camera, box_walls, diffuse, settings_of
 
-pytestmark = pytest.mark.usefixtures("every_surface")
+pytestmark = pytest.mark.usefixtures("every_surface", "room_for_split_paths")
 
 SIZE, TEXELS = 24, 128
 ABOVE = 1.5

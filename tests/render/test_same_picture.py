@@ -12,6 +12,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.scene.description import Sphere
+from tests.render.test_media import mixed_scene
 from tests.support.scenes import cornell_box, rendered, settings_of
 
 METHODS = ["progressive", "gather", "path", "global map", "caustic map"]
@@ -108,16 +109,21 @@ def test_place_of_the_scene_changes_nothing():
 
 
 @pytest.mark.extensive
+@pytest.mark.parametrize(
+    ("scene", "widened"),
+    [(cornell_box(size=16), "every_surface"), (mixed_scene(64), "any_light_in_media")],
+    ids=["mirror and glass", "fog"],
+)
 @pytest.mark.parametrize("method", ["path", "progressive", "gather"])
-def test_what_else_kernels_know_changes_no_picture(method, request):
-    """Kernels for scenes like this alone, and those for any material, texture and light."""
+def test_what_else_kernels_know_changes_no_picture(method, scene, widened, request):
+    """Kernels for scenes like this alone, and those for any material, texture and light, or for any medium."""
     own, any_ = [], []
     for pictures in (own, any_):
         for seed in (1, 2, 3, 4):
             settings = settings_of(render={"method": method, "seed": seed}, photons={"N": 20_000})
-            pictures.append(rendered(cornell_box(size=16), settings, 16).frame(1).image().mean((0, 1)))
+            pictures.append(rendered(scene, settings, 16).frame(1).image().mean((0, 1)))
         if pictures is own:
-            request.getfixturevalue("every_surface")
+            request.getfixturevalue(widened)
     error = np.hypot(*(np.std(pictures, axis=0, ddof=1) / 2 for pictures in (own, any_)))
     difference = np.abs(np.mean(own, axis=0) - np.mean(any_, axis=0))
     assert (difference < 4 * error + 1e-6).all(), (difference, error)

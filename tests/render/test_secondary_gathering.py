@@ -89,13 +89,19 @@ def edge_pixels(renderer):
     return edges
 
 
-def test_threads_change_nothing():
+MUCH_MORE = {"gather": {"directions": "photon cones", "radiance_photons": "1/4"}, "estimate": {"lookup": "nearest"}}
+
+
+@pytest.mark.parametrize(
+    "more", [{}, pytest.param(MUCH_MORE, marks=pytest.mark.extensive)], ids=["alone", "with all that gathers have"]
+)
+def test_threads_change_nothing(more):
     scene = open_scene(cornell_box(size=32))
     settings = settings_of(
         render={"method": "gather"},
         photons={"N": 20_000},
-        gather={"rays": 2, "secondary": 3.0, "directions": "photon cones", "radiance_photons": "1/4"},
-        estimate={"lookup": "nearest"},
+        gather={"rays": 2, "secondary": 3.0, **more.get("gather", {})},
+        estimate=more.get("estimate", {}),
     )
     one, two = (rendered(scene, settings, 2, threads) for threads in (1, 2))
     assert np.array_equal(one.film.sums, two.film.sums)

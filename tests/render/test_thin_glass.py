@@ -25,7 +25,7 @@ from pmviewer.scene.description import (
 from tests.support import kinds
 from tests.support.scenes import box_camera, box_walls, diffuse, panel, rendered, settings_of
 
-pytestmark = pytest.mark.usefixtures("every_surface")
+pytestmark = pytest.mark.usefixtures("any_bsdf")
 
 TINT = (0.9, 0.5, 0.2)
 NEAR = PointLight("near", (0.3, 2.0, 0.2), (3.0, 3.0, 3.0))
@@ -58,6 +58,20 @@ def image_of(scene, passes=1, **groups):
     return rendered(scene, settings_of(**groups), passes).frame(0).image().astype(np.float64)
 
 
+def image_by_other_kernels(scene, passes=1, **groups):
+    """Of paths and of exact glass, which have nothing to do with rules for panes: other tests have the kernels."""
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.every_surface(patch)
+        return image_of(scene, passes, **groups)
+
+
+def without_panes(glass, **more):
+    """The floor as it is lit without them; one that nobody meets keeps the kernels for panes."""
+    scene = floor_below(glass, **more)
+    far = Shape("far pane", Parallelogram((50, -5, 50), (0, 0, 1), (1, 0, 0)), 1)
+    return replace(scene, shapes=(*scene.shapes, far))
+
+
 def fresnel(degrees, eta):
     """Reflectance of a face for unpolarised light, by its two polarisations."""
     i = math.radians(degrees)
@@ -71,7 +85,7 @@ def fresnel(degrees, eta):
 def test_an_ignored_pane_is_not_there(method):
     """Solution A: pixel by pixel the picture without it."""
     groups = {"render": {"method": method}, "photons": {"N": 2000}}
-    without = image_of(floor_below(pane("")), **groups)
+    without = image_of(without_panes(pane("ignored")), **groups)
     assert without.mean() > 0.1
     np.testing.assert_allclose(image_of(floor_below(pane("ignored"), sheet(1.0)), **groups), without, rtol=1e-5)
 
@@ -80,7 +94,7 @@ def test_an_ignored_pane_is_not_there(method):
 def test_light_behind_a_tinted_pane_is_tint_times_light(rule):
     """Solution B, with glass that bends and reflects nothing: exactly its colour times the light without it, and its
     colour squared behind two."""
-    without = image_of(floor_below(pane("")), photons={"N": 2000})
+    without = image_of(without_panes(pane(rule)), photons={"N": 2000})
     for panes in (1, 2):
         sheets = [sheet(1.0 + 0.1 * i) for i in range(panes)]
         image = image_of(floor_below(pane(rule, eta=1.0), *sheets), photons={"N": 2000})
@@ -91,15 +105,12 @@ def test_a_pane_reflects_as_much_as_its_two_faces():
     """A thin pane lets (1 − R)/(1 + R) of its colour through, R of one face; a slab of two faces that is passed
     straight (1 − R)², its colour once a face."""
     R = fresnel(DEGREES, 1.5)
-    without = image_of(floor_below(pane(""), light=FAR), photons={"N": 200})
+    without = image_of(without_panes(pane("tinted"), light=FAR), photons={"N": 200})
     thin = image_of(floor_below(pane("tinted"), sheet(1.0), light=FAR), photons={"N": 200})
     np.testing.assert_allclose(thin, without * np.array(TINT) * (1 - R) / (1 + R), rtol=2e-3)
     glass = pane("tinted", kind="dielectric")
     both = floor_below(glass, sheet(1.0), sheet(0.9, upwards=False), light=FAR)
     assert both.materials[1].thin_rule == "tinted"
-    # A scene of plain glass alone has kernels of its own: a thin pane that nobody meets keeps those of the others.
-    rich = Shape("far pane", Parallelogram((50, -5, 50), (0, 0, 1), (1, 0, 0)), 2)
-    both = replace(both, shapes=(*both.shapes, rich), materials=(*both.materials, pane("tinted")))
     slab = image_of(both, photons={"N": 200})
     np.testing.assert_allclose(slab, without * np.array(TINT) ** 2 * (1 - R) ** 2, rtol=2e-3)
 
@@ -108,7 +119,7 @@ def test_an_absorbing_slab_weakens_by_the_way_straight_through():
     """Beer and Lambert's law, over the length of the straight ray in the glass."""
     sigma = np.array([3.0, 1.0, 0.2])
     glass = replace(pane("tinted", eta=1.0, kind="dielectric"), transmittance=(1.0,) * 3, absorption=tuple(sigma))
-    without = image_of(floor_below(pane(""), light=FAR), photons={"N": 200})
+    without = image_of(without_panes(pane("tinted"), light=FAR), photons={"N": 200})
     slab = image_of(floor_below(glass, sheet(1.0), sheet(0.9, upwards=False), light=FAR), photons={"N": 200})
     length = 0.1 / math.cos(math.radians(DEGREES))
     np.testing.assert_allclose(slab, without * np.exp(-sigma * length), rtol=3e-3)
@@ -117,7 +128,7 @@ def test_an_absorbing_slab_weakens_by_the_way_straight_through():
 def test_exact_caustics_bring_the_same_light():
     """What the caustic map shows behind a thin pane is, in the mean, what rays straight through it find."""
     straight = image_of(floor_below(pane("tinted"), sheet(1.0)), photons={"N": 200})
-    exact = image_of(floor_below(pane("exact"), sheet(1.0)), passes=4, photons={"N": 150_000})
+    exact = image_by_other_kernels(floor_below(pane("exact"), sheet(1.0)), passes=4, photons={"N": 150_000})
     np.testing.assert_allclose(exact.mean(axis=(0, 1)), straight.mean(axis=(0, 1)), rtol=0.03)
 
 
@@ -155,13 +166,11 @@ def test_replayed_gather_rays_bring_what_the_picture_has():
 def test_a_pane_that_shines_is_seen_by_light_samples_and_rays():
     """A lamp of tinted glass is no pane: its light is the same as if its glass were exact."""
     images = []
-    for rule in ("exact", "tinted"):
+    for rule, shown in (("exact", image_by_other_kernels), ("tinted", image_of)):
         lamp = Shape("lamp", Parallelogram((-0.5, 1.0, -0.5), (1, 0, 0), (0, 0, 1)), 1, (1.0,) * 3)
         scene = floor_below(pane(rule))
         unseen = Shape("pane", Parallelogram((50, -5, 50), (0, 0, 1), (1, 0, 0)), 1)
-        images.append(
-            image_of(replace(scene, shapes=(*scene.shapes, lamp, unseen), lights=()), 16, photons={"N": 2000})
-        )
+        images.append(shown(replace(scene, shapes=(*scene.shapes, lamp, unseen), lights=()), 16, photons={"N": 2000}))
     assert images[0].mean() > 0.05
     assert images[1].mean() == pytest.approx(images[0].mean(), rel=0.01)
 
@@ -173,8 +182,8 @@ def test_rough_mirrors_see_panes_as_they_are():
     rough = Material("rough", "rough conductor", (0.9,) * 3, two_sided=True, alpha=(0.2, 0.2))
     scene = replace(scene, materials=(rough, scene.materials[1]))
     photons = {"N": 200, "glossy": 0.3}
-    path = image_of(scene, 400, render={"method": "path"}, photons=photons)
-    ours = image_of(scene, 400, photons=photons)
+    path = image_by_other_kernels(scene, 150, render={"method": "path"}, photons=photons)
+    ours = image_of(scene, 150, photons=photons)
     assert path.mean() > 0.2
     assert ours.mean(axis=(0, 1)) == pytest.approx(path.mean(axis=(0, 1)), rel=0.02)
 
@@ -190,9 +199,7 @@ def divided_box(rule, size=60):
 @pytest.fixture(scope="module")
 def divided_path():
     """Mean of the picture by path tracing."""
-    with pytest.MonkeyPatch.context() as patch:
-        kinds.every_surface(patch)
-        return image_of(divided_box("tinted"), 60, render={"method": "path"}).mean(axis=(0, 1))
+    return image_by_other_kernels(divided_box("tinted"), 60, render={"method": "path"}).mean(axis=(0, 1))
 
 
 @pytest.mark.slow

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.opened import open_scene
-from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.renderer import Renderer
-from pmviewer.engine.store import StageStore
 from pmviewer.maps.virtual_lights import W_A, W_C, W_F, W_G
 from pmviewer.render.planes import CHANNELS
 from pmviewer.scene.description import Camera, Scene
+from tests.support import kinds
 from tests.support.naive_virtual import Box, shoot, sums, walks
 from tests.support.scenes import (
     box_walls,
@@ -156,19 +154,17 @@ def test_passes_reach_the_path_tracer_in_an_open_scene(estimator, normalisation,
     assert image[inside].mean() == pytest.approx(reference[inside].mean(), rel=0.03)
 
 
-@pytest.mark.usefixtures("every_surface")
 def test_passes_reach_the_path_tracer_where_virtual_lights_are_glossy():
-    """They stand for photons around them, which blurs less from pass to pass. Within 3 %, twice the noise."""
-    opened = open_scene("glossy_room")
+    """They stand for photons around them, which blurs less from pass to pass. Within 3 %, twice the noise. Paths have
+    the kernels that other tests have."""
 
     def mean(size, passes, **groups):
         settings = settings_of(camera={"width": size, "height": size}, **groups)
-        renderer = Renderer(opened, settings, WorkPool(1), StageStore(0))
-        for _ in range(passes):
-            renderer.step()
-        return (renderer.frame(0).image("indirect") @ LUMINANCE).mean()
+        return (rendered(open_scene("glossy_room"), settings, passes).frame(0).image("indirect") @ LUMINANCE).mean()
 
-    truth = mean(96, 24, render={"method": "path"})
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.every_surface(patch)
+        truth = mean(96, 24, render={"method": "path"})
     found = mean(24, 60, render={"method": "virtual lights"}, virtual={"number": 200, "photons": 8000})
     print(f"glossy room: {found / truth:.4f}")
     assert found == pytest.approx(truth, rel=0.03)

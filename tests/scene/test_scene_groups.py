@@ -9,6 +9,7 @@ from pmviewer.errors import SceneError
 from pmviewer.scene.arrays.flatten import bounding_sphere, flatten
 from pmviewer.scene.arrays.tessellate import tessellate
 from pmviewer.scene.describe import describe
+from pmviewer.scene.formats.mitsuba import displacement
 from pmviewer.scene.load import load_scene
 from pmviewer.scene.meshes.displacement import Fractal
 from tests.scene.helpers import CAMERA, load, xml_file
@@ -194,13 +195,12 @@ def test_displacement_opens_no_cracks(tmp_path, kind):
     assert volume == pytest.approx(8.0 if kind == "cube" else 4 / 3 * np.pi, rel=0.2)
 
 
-def test_displaced_triangles_are_limited_in_all(tmp_path):
-    """The third of these would be the one too many: 2 · 600² triangles each."""
-    scene = load(tmp_path, *[rectangle(FRACTAL, '<integer name="subdivision" value="600"/>')] * 3)
+def test_displaced_triangles_are_limited_in_all(tmp_path, monkeypatch):
+    """The third of these would be the one too many: 2 · 60² triangles each."""
+    monkeypatch.setattr(displacement, "MOST_TRIANGLES", 20_000)
+    scene = load(tmp_path, *[rectangle(FRACTAL, '<integer name="subdivision" value="60"/>')] * 3)
     assert len(scene.shapes) == 2
-    assert (
-        "would make 720,000 triangles, at most 2,000,000 in all are made. The shape is left out." in scene.warnings[0]
-    )
+    assert "would make 7,200 triangles, at most 20,000 in all are made. The shape is left out." in scene.warnings[0]
 
 
 def test_noise_has_the_heights_it_always_had(tmp_path):

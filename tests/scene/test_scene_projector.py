@@ -18,6 +18,7 @@ from pmviewer.scene.description import ProjectorLight, Scene
 from pmviewer.scene.editing.apply import edited
 from pmviewer.scene.editing.own import own_numbers
 from pmviewer.scene.emission import emitted_power
+from pmviewer.scene.formats.mitsuba import projector as projector_file
 from pmviewer.scene.light_places import light_places
 from pmviewer.scene.meshes.recentre import recentred
 from pmviewer.scene.miniature import miniature
@@ -146,11 +147,12 @@ def test_fields_with_edges_are_exact(tmp_path: Path) -> None:
     assert emitted_power(near, 1.0) == pytest.approx(math.pi * 2 * CORNERS.mean(axis=(0, 1)))
 
 
-def test_a_picture_that_is_turned_is_sampled(tmp_path: Path) -> None:
+def test_a_picture_that_is_turned_is_sampled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(projector_file, "REPLACED", 256)
     turned = bitmap('<transform name="to_uv"><rotate z="1" angle="90"/></transform>')
     scene, light = projector(tmp_path, turned, FOV)
-    assert "2048 × 2048" in scene.warnings[0]
-    assert light.pixels.shape == (2049, 2049, 3)
+    assert "256 × 256" in scene.warnings[0]
+    assert light.pixels.shape == (257, 257, 3)
     assert emitted_power(light, 1.0) == pytest.approx(math.pi * 2 * CORNERS.mean(axis=(0, 1)), rel=1e-2)
 
 

@@ -6,9 +6,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from pmviewer.engine import method
+from pmviewer.engine.stages import pass_data
 from pmviewer.scene.arrays import flatten
 
-EVERY_SURFACE = (*flatten.SURFACES, "colours")
+EVERY_SURFACE = (*flatten.SURFACES, "projectors", "colours")
 """For `flatten`'s `features_at_least`."""
 
 
@@ -18,8 +19,14 @@ def every_surface(monkeypatch):
 
 
 def any_light_in_media(monkeypatch):
-    """As if every kind of light were in scenes with media."""
-    _open_as_if(monkeypatch, "media", "lights")
+    """As if lattices and every kind of light were in scenes with media."""
+    _open_as_if(monkeypatch, "media", "lights", "grids")
+
+
+def any_bsdf(monkeypatch):
+    """As if rough surfaces were in all scenes: for kernels that only some tests need, which so take two thirds of the
+    time to compile."""
+    _open_as_if(monkeypatch, "", "bsdfs")
 
 
 def _open_as_if(monkeypatch, where, *features):
@@ -46,3 +53,18 @@ def _as_if_mirrors_and_glass(decide):
     return lambda settings, traits, plan: decide(
         settings, replace(traits, has_smooth_glass=True, has_specular=True), plan
     )
+
+
+def room_for_split_paths(monkeypatch):
+    """Records of photon methods have the fields of split paths and of several samples a pixel whatever is asked for,
+    which may be none and one: the kernels of `may_always_split` serve where pixels have one path."""
+    record_of = pass_data.eye_record
+
+    def widened(camera, settings, index, evaluation):
+        if settings.render.method == "path":
+            return record_of(camera, settings, index, evaluation)
+        record = record_of(camera, settings, index, replace(evaluation, splits=1, mirror_rays=2))
+        record["splits"], record["mirror_rays"] = evaluation.splits, evaluation.mirror_rays
+        return record
+
+    monkeypatch.setattr(pass_data, "eye_record", widened)

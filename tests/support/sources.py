@@ -1,5 +1,5 @@
-"""The package's sources, parsed once a process: the garbage collector rests meanwhile, for it would search the hundred
-thousands of nodes, which all live, again and again, for two thirds of the time."""
+"""The package's sources, parsed once a process: the garbage collector rests meanwhile and leaves them alone afterwards,
+for it would search the hundred thousands of nodes, which all live, again and again, for two thirds of the time."""
 
 from __future__ import annotations
 
@@ -15,15 +15,20 @@ PACKAGE = Path(pmviewer.__file__).parent
 
 
 @functools.cache
-def parsed(file: Path) -> ast.Module:
-    """The syntax tree of one of the package's files; nobody may change it."""
+def _trees() -> dict[Path, ast.Module]:
     was_on = gc.isenabled()
     gc.disable()
     try:
-        return ast.parse(file.read_text(encoding="utf-8"))
+        return {file: ast.parse(file.read_text(encoding="utf-8")) for file in package_files()}
     finally:
+        gc.freeze()
         if was_on:
             gc.enable()
+
+
+def parsed(file: Path) -> ast.Module:
+    """The syntax tree of one of the package's files; nobody may change it."""
+    return _trees()[file]
 
 
 def package_files() -> list[Path]:

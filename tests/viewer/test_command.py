@@ -14,7 +14,7 @@ import pytest
 
 from pmviewer.output.png import read_png
 
-SIZE = ["--set", "camera.width=48", "--set", "camera.height=48", "--set", "photons.N=1000"]
+SIZE = ["--set=camera.width=48", "--set=camera.height=48", "--set=photons.N=1000", "--set=render.passes=4"]
 PATIENCE = 480.0
 """Seconds: a cold start compiles everything first."""
 

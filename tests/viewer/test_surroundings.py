@@ -46,16 +46,12 @@ def room(open_side: int | None = None) -> Geometry:
 
 
 def nearest_of_all(corners, origin, direction):
-    """Distance to the first triangle, by solving for each one alone."""
-    best = np.inf
-    for a, b, c in corners:
-        matrix = np.stack([b - a, c - a, -direction], axis=1)
-        if abs(np.linalg.det(matrix)) < 1e-12:
-            continue
-        u, v, t = np.linalg.solve(matrix, origin - a)
-        if u >= 0 and v >= 0 and u + v <= 1 and 0 < t < best:
-            best = t
-    return best
+    """Distance to the first triangle (n, 3, 3), by solving for each one alone."""
+    a, b, c = corners.swapaxes(0, 1)
+    matrices = np.stack([b - a, c - a, np.broadcast_to(-direction, a.shape)], axis=2)
+    seen = np.abs(np.linalg.det(matrices)) >= 1e-12
+    u, v, t = np.linalg.solve(matrices[seen], (origin - a[seen])[:, :, None])[:, :, 0].T
+    return t[(u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)].min(initial=np.inf)
 
 
 def test_rays_meet_what_solving_for_every_triangle_finds():

@@ -37,7 +37,7 @@ from pmviewer.kernels.vector import along, basis, dot, largest, luminance, scale
 from pmviewer.kernels.warp import square_to_disk, square_to_sphere
 from pmviewer.maps.variant import ABSENT
 from pmviewer.photons.emission.scattered import emit_scattered
-from pmviewer.photons.emission.strata import emit_stratified
+from pmviewer.photons.emission.stratified import emit_stratified
 
 WHOLE, DIRECTIONS, PLACES, WORLD, DISC = range(5)
 ROWS, COLUMNS = 64, 64

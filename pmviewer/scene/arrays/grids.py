@@ -29,7 +29,8 @@ def numbers_of_grids(media: tuple[Medium, ...], more: Sequence[Grid] = ()) -> di
 
 
 def grid_arrays(media: tuple[Medium, ...], more: Sequence[Grid] = ()) -> dict[str, NDArray]:
-    """The fields of `pmviewer.kernels.scene.GRID_FIELDS`, with `more` grids behind those of the media."""
+    """The fields of `pmviewer.kernels.scene.GRID_FIELDS`, with `more` grids behind those of the media; there may be
+    none."""
     number = numbers_of_grids(media, more)
     found = {id(g): g for g in (*(g for medium in media for g in grids_of(medium) if g is not None), *more)}
     rows = [[-1 if g is None else number[id(g)] for g in grids_of(medium)] for medium in media]
@@ -48,8 +49,8 @@ def grid_arrays(media: tuple[Medium, ...], more: Sequence[Grid] = ()) -> dict[st
         "medium_grids": np.array(rows, np.int32).reshape(-1, GRID_NUMBERS),
         "grid_frames": np.array(frames, np.float64),
         "grid_sizes": np.array(sizes, np.int64),
-        "voxels": np.concatenate(voxels),
-        "grid_blocks": np.concatenate(blocks),
+        "voxels": np.concatenate([np.zeros(0, np.float32), *voxels]),
+        "grid_blocks": np.concatenate([np.zeros(0, np.float32), *blocks]),
     }
 
 

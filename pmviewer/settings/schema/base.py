@@ -54,8 +54,9 @@ class Group(BaseModel):
     @classmethod
     def _in_bounds(cls, value: Any, field: ValidationInfo) -> Any:
         """Bounds live in the schema's extras, not in pydantic's own constraints, which "auto" would not pass."""
-        extra: Any = cls.model_fields[field.field_name or ""].json_schema_extra
-        if extra and isinstance(value, int | float) and not isinstance(value, bool):
-            if (extra["ge"] is not None and value < extra["ge"]) or (extra["le"] is not None and value > extra["le"]):
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            extra: Any = cls.__pydantic_fields__[field.field_name or ""].json_schema_extra
+            low, high = (extra["ge"], extra["le"]) if extra else (None, None)
+            if (low is not None and value < low) or (high is not None and value > high):
                 raise ValueError("out of bounds")
         return value
