@@ -78,6 +78,9 @@ VIRTUAL_DTYPE = np.dtype(
         ("estimator", "i4"),
         ("normalised", "i4"),  # whether walks are made
         ("walks", "i4"),
+        ("gather_rays", "i4"),  # those of glossy surfaces that bring light
+        ("k", "i4"),  # photons of the disc where a gather ray ends, 0 where there is no map of them
+        ("reach", "f4"),  # its largest radius
         ("clamp", "f4"),  # largest cosθ_x·cosθ_y/|x − y|²
         ("max_bounces", "i4"),
         ("objects", "i8"),  # int32: the object of each stored primitive

@@ -39,8 +39,9 @@ from pmviewer.render.pixel import INDIRECT, SPECULAR, weighed
 from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS
 from pmviewer.render.straight import let_through
 from pmviewer.render.virtual_lights.descent import CUT_WORDS, ask_cut, descend
+from pmviewer.render.virtual_lights.gathered import IN_A_LOBE
 from pmviewer.render.virtual_lights.light import facing_of, sent, towards, weight_of
-from pmviewer.render.virtual_lights.walk import normalisation
+from pmviewer.render.virtual_lights.walk import gather_rays, normalisation
 
 _f4 = np.float32
 _f8 = np.float64
@@ -176,7 +177,15 @@ def from_virtual_lights(given, si, beta, pixel, whole):
         film[pixel.number, target + 2] += weighed(pixel, _f8(F[2]))
     film[pixel.number, sums + W_LIGHTS] += _f8(asked[0])
     if weighted:
-        albedo, counted = normalisation(given, si, pixel)
+        albedo, counted, light = normalisation(given, si, pixel)
+        share = _f4(gather_rays(given, si)) / _f4(IN_A_LOBE)
+        if share > _f4(0.0):
+            light = scale(mul(beta, light), share)
+            if is_good(light):
+                film[pixel.number, base + W_G] += _f8(share * throughput * counted)
+                film[pixel.number, base + W_F] += weighed(pixel, _f8(light[0]))
+                film[pixel.number, base + W_F + 1] += weighed(pixel, _f8(light[1]))
+                film[pixel.number, base + W_F + 2] += weighed(pixel, _f8(light[2]))
         if virtual.estimator == PRINTED_FULL:
             albedo = _f4(1.0)
         film[pixel.number, base + W_A] += _f8(throughput * albedo)
