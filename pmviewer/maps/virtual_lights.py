@@ -67,6 +67,9 @@ OF_MEDIUM = np.uint32(0xFFFFFFFF)
 """In place of the primitive's number: the light has no surface, it is a collision in the medium whose number stands in
 V_U. Normals are the direction that the photon came from, the power is what is scattered, and q is 0."""
 
+FLATNESS = np.float32(0.2)
+"""Half-thickness of the disc of photons that tells their density, relative to its radius."""
+
 VIRTUAL_DTYPE = np.dtype(
     [
         ("virtual", "i4"),  # tells the record from NO_VIRTUAL

@@ -29,12 +29,10 @@ from pmviewer.kernels.vector import along, basis, dot, scale, sub
 from pmviewer.maps.search.disc import Facing
 from pmviewer.maps.search.k_nearest import KEYS, nearest
 from pmviewer.maps.search.stored import ALL_CLASSES
-from pmviewer.maps.virtual_lights import V_GAP, V_N, V_P, V_WI
+from pmviewer.maps.virtual_lights import FLATNESS, V_GAP, V_N, V_P, V_WI
 
 RAYS = 32
 """Places of a disc that tell how much of it lies on the surface."""
-FLATNESS = np.float32(0.2)
-"""Half-thickness of the disc relative to its radius."""
 SAME_SIDE = np.float32(0.5)
 """Least cosine between the normals of a light and of what belongs to its surface."""
 

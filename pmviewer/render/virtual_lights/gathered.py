@@ -26,7 +26,7 @@ from pmviewer.maps.estimate.glossy import scattered_power
 from pmviewer.maps.search.disc import Facing
 from pmviewer.maps.search.k_nearest import KEYS, nearest
 from pmviewer.maps.search.stored import ALL_CLASSES
-from pmviewer.photons.virtual.density import FLATNESS
+from pmviewer.maps.virtual_lights import FLATNESS
 from pmviewer.render.chain import BLACK
 
 IN_A_LOBE = 4
