@@ -33,11 +33,12 @@ METHODS: Mapping[str, Mapping[str, object]] = {
         "gather.reprojection": "on",
     },
     "virtual": {"virtual.estimator": "unweighted", **_LIGHTS},
-    "single step": {"virtual.estimator": "single step", **_LIGHTS},
+    "single step": {"virtual.estimator": "single step", "virtual.gather_rays": 0, **_LIGHTS},
     "every vertex": {"virtual.estimator": "every vertex", **_LIGHTS},
 }
 """Settings by method; "nearest" is `progressive` with the other look-up, "estimation" the gather by few pixels, with
-reprojection, on a grid that fits the small pictures; the last three are virtual lights by estimator."""
+reprojection, on a grid that fits the small pictures; the last three are virtual lights by estimator, without gather
+rays, whose discs lose light at edges."""
 VIRTUAL = ("virtual", "single step", "every vertex")
 WEIGHTED = ("single step", "every vertex")
 """Those that divide sums. What is compared of them is not divided: the quotient of means has a bias, they have none."""

@@ -2,9 +2,8 @@
 
 A narrow lobe holds few virtual lights, and ΣF/ΣG is the radiance of these few. The gather rays that normalise the sums
 follow the lobe. Each is as good as a virtual light at its end that was chosen with the very density that weights divide
-by: it adds the radiance there to ΣF, and to ΣG what it counts. However much gather rays count beside the lights, the
-means of both sums keep their quotient, to which the picture converges. They count as the lights would if a lobe held
-IN_A_LOBE of them: more gather rays, more weight.
+by: it adds the radiance there to ΣF, and to ΣG what it counts. Whatever share n gather rays have in both sums, and the
+lights the rest, the sums keep their means. It is n/(n + IN_A_LOBE), as if so many lights lay in a lobe.
 
 The radiance is the density estimate of the nearest photons on that side, the farthest left out, in a disc that shrinks
 as that of the lights does. Where no photon lies within the largest radius, the ray counts nothing: there the lights

@@ -39,9 +39,8 @@ from pmviewer.render.pixel import INDIRECT, SPECULAR, weighed
 from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS
 from pmviewer.render.straight import let_through
 from pmviewer.render.virtual_lights.descent import CUT_WORDS, ask_cut, descend
-from pmviewer.render.virtual_lights.gathered import IN_A_LOBE
 from pmviewer.render.virtual_lights.light import facing_of, sent, towards, weight_of
-from pmviewer.render.virtual_lights.walk import gather_rays, normalisation
+from pmviewer.render.virtual_lights.walk import normalisation, share_of_rays
 
 _f4 = np.float32
 _f8 = np.float64
@@ -145,7 +144,8 @@ def from_virtual_lights(given, si, beta, pixel, whole):
     sums = sums_at(scene)
     base = sums + (W_INDIRECT if whole else W_SPECULAR)
     plane = _i8(INDIRECT if whole else SPECULAR)
-    throughput = luminance(beta)
+    throughput, rays = luminance(beta), share_of_rays(given, si)
+    lights = _f4(1.0) - rays
     for i in range(asked[0]):
         j, each = asked_light(given, si, i, asked, cut)
         if j < 0:
@@ -170,19 +170,18 @@ def from_virtual_lights(given, si, beta, pixel, whole):
             film[pixel.number, sums + W_LOST] += Y - _f8(luminance(F))
         target = _i8(plane)
         if weighted and _f4(0.0) < G:
-            target = _i8(base + W_F)
-            film[pixel.number, base + W_G] += _f8(throughput * each * G)
+            target, F = _i8(base + W_F), scale(F, lights)
+            film[pixel.number, base + W_G] += _f8(lights * throughput * each * G)
         film[pixel.number, target] += weighed(pixel, _f8(F[0]))
         film[pixel.number, target + 1] += weighed(pixel, _f8(F[1]))
         film[pixel.number, target + 2] += weighed(pixel, _f8(F[2]))
     film[pixel.number, sums + W_LIGHTS] += _f8(asked[0])
     if weighted:
         albedo, counted, light = normalisation(given, si, pixel)
-        share = _f4(gather_rays(given, si)) / _f4(IN_A_LOBE)
-        if share > _f4(0.0):
-            light = scale(mul(beta, light), share)
+        if rays > _f4(0.0):
+            light = scale(mul(beta, light), rays)
             if is_good(light):
-                film[pixel.number, base + W_G] += _f8(share * throughput * counted)
+                film[pixel.number, base + W_G] += _f8(rays * throughput * counted)
                 film[pixel.number, base + W_F] += weighed(pixel, _f8(light[0]))
                 film[pixel.number, base + W_F + 1] += weighed(pixel, _f8(light[1]))
                 film[pixel.number, base + W_F + 2] += weighed(pixel, _f8(light[2]))

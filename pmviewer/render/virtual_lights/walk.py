@@ -33,7 +33,7 @@ from pmviewer.render.cast import cast, leaving
 from pmviewer.render.chain import BLACK, WHITE, arrive, scatter
 from pmviewer.render.counts import C_RAYS, C_SHADOW_RAYS
 from pmviewer.render.straight import visible
-from pmviewer.render.virtual_lights.gathered import lit_by_photons
+from pmviewer.render.virtual_lights.gathered import IN_A_LOBE, lit_by_photons
 from pmviewer.render.virtual_lights.light import LEAST_ALBEDO
 
 _f4 = np.float32
@@ -123,6 +123,13 @@ def gather_rays(given, si):
     if is_lambertian(si.bsdf) or given.virtual.normalised == 0:
         return np.int32(0)
     return given.virtual.gather_rays
+
+
+@device
+def share_of_rays(given, si):
+    """The share that gather rays have in the sums of a surface; its weighted lights have the rest."""
+    n = _f4(gather_rays(given, si))
+    return n / (n + _f4(IN_A_LOBE))
 
 
 @device
