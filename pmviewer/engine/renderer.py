@@ -311,7 +311,7 @@ class Renderer:
         cache = virtual = estimates = None
         if plan.virtual:
             virtual = tally.timed(pool, "virtual lights", lambda: self.virtual.run(index))
-            given = given._replace(virtual=virtual.record)
+            given = given._replace(virtual=virtual.record, virtual_map=virtual.photons)
         if plan.cache:
             record = recipe(settings.gather, camera, index)
             cache, counts = tally.timed(pool, "irradiance cache", lambda: fill_cache(given, record, pool))

@@ -67,6 +67,9 @@ OF_MEDIUM = np.uint32(0xFFFFFFFF)
 """In place of the primitive's number: the light has no surface, it is a collision in the medium whose number stands in
 V_U. Normals are the direction that the photon came from, the power is what is scattered, and q is 0."""
 
+FLATNESS = np.float32(0.2)
+"""Half-thickness of the disc of photons that tells their density, relative to its radius."""
+
 VIRTUAL_DTYPE = np.dtype(
     [
         ("virtual", "i4"),  # tells the record from NO_VIRTUAL
@@ -78,6 +81,9 @@ VIRTUAL_DTYPE = np.dtype(
         ("estimator", "i4"),
         ("normalised", "i4"),  # whether walks are made
         ("walks", "i4"),
+        ("gather_rays", "i4"),  # those of glossy surfaces that bring light
+        ("k", "i4"),  # photons of the disc where a gather ray ends, 0 where there is no map of them
+        ("reach", "f4"),  # its largest radius
         ("clamp", "f4"),  # largest cosθ_x·cosθ_y/|x − y|²
         ("max_bounces", "i4"),
         ("objects", "i8"),  # int32: the object of each stored primitive

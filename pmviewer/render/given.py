@@ -19,7 +19,8 @@ class PassData(NamedTuple):
     photons that choose lights; radiance: of the radiance photons, or NO_RADIANCE_PHOTONS; cache: of the irradiance
     cache, or of estimates (`pmviewer.render.gather.estimation.ESTIMATES`), or NO_CACHE; shadows: of the shadow photons,
     or NO_SHADOWS; guides: of the photons that guide gather rays, or NO_GUIDES; corner: CORNERS or NO_CORNERS; virtual:
-    of the virtual lights, or NO_VIRTUAL; volume_map: of the grid of photons in media, or NO_VOLUME.
+    of the virtual lights, or NO_VIRTUAL; volume_map: of the grid of photons in media, or NO_VOLUME; virtual_map: of a
+    kd-tree of the photons that virtual lights are chosen from, or NO_VIRTUAL where their weights never ask for it.
     """
 
     scene: Any
@@ -34,6 +35,7 @@ class PassData(NamedTuple):
     corner: Any
     virtual: Any = NO_VIRTUAL
     volume_map: Any = NO_VOLUME
+    virtual_map: Any = NO_VIRTUAL
 
 
 class SurfaceInteraction(NamedTuple):
@@ -99,4 +101,5 @@ def opened(given):
         given.corner[0],
         given.virtual[0],
         given.volume_map[0],
+        given.virtual_map[0],
     )

@@ -42,7 +42,7 @@ MOST: Mapping[str, float] = {
     "importance.tests": 2000, "estimate.k": 200, "gather.rays": 8, "gather.cache_samples": 32, "direct.samples": 8,
     "direct.con_samples": 8, "direct.noncon_samples": 8, "direct.shadow_N": 5000, "render.outline_rays": 16,
     "render.max_depth": 60, "virtual.number": 500, "virtual.per_pixel": 100, "virtual.photons": 5000,
-    "virtual.walks": 8, "compare.passes": 4,
+    "virtual.walks": 8, "virtual.gather_rays": 16, "compare.passes": 4,
 }  # fmt: skip
 """Upper ends where higher ones take only time, and memory that is asked for."""
 LEFT_ALONE = (

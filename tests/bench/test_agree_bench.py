@@ -18,9 +18,11 @@ from pmviewer.bench import peer
 from pmviewer.bench.agree import bench, results, triage, trial
 from pmviewer.bench.agree.generate import needs_particles, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
+from pmviewer.bench.agree.media import has_media
+from pmviewer.bench.agree.ours import Rendered
 from pmviewer.bench.agree.statistics import Outcome
 from pmviewer.bench.agree.tree import from_json
-from pmviewer.bench.agree.trial import FIRST, STAGES, Question, has_panes, methods_of, questions
+from pmviewer.bench.agree.trial import FIRST, STAGES, Question, asked_methods, has_panes, methods_of, questions
 from pmviewer.bench.agree.verdict import DIED, Comparison, Verdict
 from pmviewer.bench.agree.workers import try_scenes
 from pmviewer.bench.registry import run_bench
@@ -73,7 +75,7 @@ def test_stages_that_add_look_at_the_runs_of_the_one_before_and_others_have_seed
 
     def our_runs(opened, method, effort, seeds, pool, **more):
         drawn.extend(seeds)
-        return np.reshape(np.array(seeds, np.float32), (-1, 1, 1, 1))
+        return Rendered(np.reshape(np.array(seeds, np.float32), (-1, 1, 1, 1)))
 
     monkeypatch.setattr(trial, "our_runs", our_runs)
     runs = trial.Runs(scene_of(1, 0), tmp_path, None, None, (1, 0))
@@ -93,6 +95,16 @@ def test_photon_methods_are_forgiven_what_goes_with_the_radius():
     assert question([1.3] * 4, [], "gather").asked(len(STAGES)).p < 1e-6
 
 
+def test_each_scene_has_a_weighted_estimator_in_media_the_single_step():
+    asked = {i: set(asked_methods(scene_of(1, i))) for i in range(78)}
+    assert all({"virtual", "estimation"} <= methods for methods in asked.values())
+    assert all(("single step" in methods) != ("every vertex" in methods) for methods in asked.values())
+    in_media = [i for i in asked if has_media(scene_of(1, i))]
+    assert in_media
+    assert all("single step" in asked[i] for i in in_media)
+    assert 25 < sum("single step" in methods for methods in asked.values()) < 60
+
+
 class FakeRuns:
     """Pictures that are one everywhere, but for ours of a method: that is what `wrong` says."""
 
@@ -104,6 +116,11 @@ class FakeRuns:
 
     def ours(self, method: str, stage: int, max_depth: int = 0) -> np.ndarray:
         return np.full((STAGES[stage].runs, 32, 32, 15), 0.25 if method == self.wrong else 0.2, np.float32)
+
+    def weights(self, method: str, stage: int) -> np.ndarray:
+        """ΣG is too large where `wrong` says "weights"."""
+        C = np.full((STAGES[stage].runs, 32, 32, 2), 0.5)
+        return np.concatenate([1.3 * C if self.wrong == "weights" else C, C], axis=-1)
 
     def theirs(self, mode: str, stage: int, max_depth: int = 0) -> np.ndarray:
         self.modes.add(mode)
@@ -126,13 +143,16 @@ def test_every_method_is_compared_in_every_scene_and_a_wrong_one_is_found(partic
     scene = next(s for i in range(100) if needs_particles(s := scene_of(1, i)) == particles)
     runs = FakeRuns(scene, plain=plain)
     found = [q.asked(len(STAGES)) for q in questions(runs)]
-    everywhere = {"path", "gather", "progressive", "nearest"}
+    everywhere = {"path", "gather", "progressive", "nearest", "estimation", "virtual"}
+    everywhere |= set(asked_methods(scene)) & {"single step", "every vertex"}
     assert methods_of(Verdict(found)) == everywhere | ({"thin glass"} if has_panes(scene) else set())
     assert all(c.outcome.p > 0.5 for c in found)
     assert ("ptracer" in runs.modes) == (particles and plain > 0)
-    for wrong in ("path", "gather", "progressive", "nearest"):
+    for wrong in sorted(everywhere):
         found = [q.asked(len(STAGES)) for q in questions(FakeRuns(scene, wrong, plain))]
         assert any(c.p == pytest.approx(0) and wrong in (c.method, c.peer) for c in found)
+    (off,) = (c for q in questions(FakeRuns(scene, "weights", plain)) if (c := q.asked(len(STAGES))).p < 1e-6)
+    assert (off.what, off.peer) == ("weights", "its walks")
 
 
 def test_what_goes_with_the_radius_is_no_disagreement():
@@ -180,7 +200,7 @@ def test_a_disagreement_is_saved_and_reported_and_chance_is_not(tmp_path, monkey
     assert (target.value, target.ok) == (2, False)
     rows = {row[0]: row for row in result.rows}
     assert rows["all"][1] == 4
-    assert rows["all"][3:8] == [2, 1, 1, 2, 1]
+    assert rows["all"][3:12] == [2, 1, 1, 2, 1, 1, 1, 1, 1]
     assert any(file in note for note in result.notes)
     assert all(any(d.name in note for note in result.notes) for d in DEVIATIONS)
     agreed = bench.report(7, {0: verdicts[0]}, [], "abc (1)", 1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.bench.agree.statistics import compared, negligible, rejected, summaries
+from pmviewer.bench.agree.statistics import SPIKES, TAIL, compared, negligible, rejected, summaries
 from pmviewer.bench.agree.trial import LEAST_LIGHT, unseen_in
 
 PIXELS = (32, 32, 3)
@@ -45,6 +45,31 @@ def test_rare_bright_paths_are_no_disagreement():
     """One side with a heavy tail: Welch's test alone rejects far too often."""
     p = np.array([p_of(runs(2 * i, 12, 16, tail=3000.0), runs(2 * i + 1, 12, 64)) for i in range(100)])
     assert (p < 1e-4).sum() == 0
+
+
+def spiky(seed: int, count: int, samples: int, mean: float = 1.0) -> np.ndarray:
+    """(count, 32, 32, 3) means of `samples` of a pixel, one in a hundred of them 1/d² of a d whose third power is
+    uniform: point lights beside an edge. Half of the light comes so, and has no variance."""
+    rng = np.random.default_rng(seed)
+    shape = (count, *PIXELS)
+    rare = rng.binomial(samples, 0.01, shape)
+    spikes = (1 - rng.random(int(rare.sum()))) ** (-2 / 3) / 3  # of mean 1
+    sums = np.bincount(np.repeat(np.arange(rare.size), rare.ravel()), spikes, rare.size).reshape(shape)
+    return mean / samples * (50 * sums + 0.5 * rng.standard_gamma(samples, shape))
+
+
+@pytest.mark.parametrize(("samples", "missing"), [(2, 0.5), (16, 0.2)])
+def test_spikes_of_point_lights_are_no_disagreement_and_missing_light_is(samples, missing):
+    """Few samples, whose brightest spikes have not come, and many, which find a lesser error."""
+
+    def found(mean: float, count: int = 100) -> np.ndarray:
+        pairs = ((spiky(2 * i, 12, samples, mean), runs(2 * i + 1, 12, 64)) for i in range(count))
+        return np.array([p_of(ours, theirs, tails=(SPIKES, TAIL)) for ours, theirs in pairs])
+
+    p = found(1.0)
+    assert (p < 1e-4).sum() == 0
+    assert (p < 0.1).sum() <= 18
+    assert np.median(found(1 - missing, 10)) < 1e-4
 
 
 def test_tolerance_is_a_share_of_the_second():

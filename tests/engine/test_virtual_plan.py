@@ -80,6 +80,14 @@ def test_a_setting_that_does_nothing_says_why(path, does, does_not):
     assert inactive_reason(path, without, traits)
 
 
+def test_gather_rays_bring_light_to_gloss_alone():
+    glossy, diffuse = open_scene("glossy_room").traits, open_scene(diffuse_box(size=4)).traits
+    assert inactive_reason("virtual.gather_rays", settings(), glossy) is None
+    assert "glossy" in inactive_reason("virtual.gather_rays", settings(), diffuse)
+    for other in ({"estimator": "every vertex"}, {"density": "virtual lights"}, {"normalisation": "none"}):
+        assert inactive_reason("virtual.gather_rays", settings(**other), glossy)
+
+
 @pytest.mark.parametrize(
     ("values", "word"),
     [

@@ -11,6 +11,7 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.kernels.lights.start import spread_over
 from pmviewer.maps.record import unpack
 from pmviewer.maps.virtual_lights import V_BEAMS, V_LAMBERTIAN, V_P, V_PHI, V_Q, V_WI
+from pmviewer.photons.virtual import lights
 from pmviewer.photons.virtual.choice import as_photons, chosen
 from pmviewer.photons.virtual.lights import neighbours, trajectories, virtual_lights
 from pmviewer.scene.description import SpotLight
@@ -41,6 +42,16 @@ def test_areas_of_the_lights_add_up_to_that_of_the_surface(density, k):
     assert np.mean(floor) == pytest.approx(4.0, rel=0.06)
 
 
+@pytest.mark.parametrize("expected", [0.3, 1.5, 6.0])
+@pytest.mark.parametrize("k", [2, 8])
+def test_areas_add_up_to_what_lies_near_photons_where_discs_end(expected, k, monkeypatch):
+    """On a sphere of radius 1 the largest disc expects PER_DISC photons: a place has none with probability e^−μ."""
+    monkeypatch.setattr(lights, "PER_DISC", expected)
+    radius = open_scene(closed_sphere()).flat.radius
+    areas = [made(closed_sphere(), i, number=1000, k=k).rows[:, V_Q].sum() for i in range(6)]
+    assert np.mean(areas) == pytest.approx(4 * np.pi * (1 - np.exp(-expected * radius**2)), rel=0.04)
+
+
 @pytest.mark.parametrize("estimator", ["unweighted", "single step", "full path", "printed single step"])
 def test_power_of_the_lights_is_what_arrives_on_surfaces(estimator):
     """In a closed box of albedo ½ twice the power of the light arrives."""
@@ -51,8 +62,8 @@ def test_power_of_the_lights_is_what_arrives_on_surfaces(estimator):
 
 def test_a_glossy_light_stands_for_the_photons_around_it_and_for_itself():
     flat = open_scene("glossy_room").flat
-    lights = virtual_lights(flat, Virtual(photons=4000), Photons(), 1, 0, serial)
-    rows, beams = lights.rows, lights.beams
+    found = virtual_lights(flat, Virtual(photons=4000), Photons(), 1, 0, serial)
+    rows, beams = found.rows, found.beams
     glossy = rows[:, V_LAMBERTIAN] == 0
     assert 10 < glossy.sum() < len(rows)
     assert set(rows[glossy, V_BEAMS]) == {9}  # k and itself
@@ -73,9 +84,9 @@ def norms(vectors):
 
 @pytest.mark.parametrize("values", [{"estimator": "every vertex"}, {"density": "virtual lights"}])
 def test_where_the_map_does_not_weigh_them_lights_stand_for_themselves(values):
-    lights = virtual_lights(open_scene("glossy_room").flat, Virtual(photons=4000, **values), Photons(), 1, 0, serial)
-    assert not lights.rows[:, V_BEAMS].any()
-    assert lights.beams.shape[1] == 0
+    found = virtual_lights(open_scene("glossy_room").flat, Virtual(photons=4000, **values), Photons(), 1, 0, serial)
+    assert not found.rows[:, V_BEAMS].any()
+    assert found.beams.shape[1] == 0
 
 
 def test_every_candidate_is_chosen_as_often_as_its_probability_says():

@@ -14,7 +14,7 @@ from pmviewer.bench import peer
 from pmviewer.bench.agree.features import GROUPS, features
 from pmviewer.bench.agree.generate import DENSE_FROM, GLOWING_FROM, PROJECTED_FROM, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
-from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH
+from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH, VIRTUAL
 from pmviewer.bench.agree.results import Results
 from pmviewer.bench.agree.statistics import LEVEL, rejected
 from pmviewer.bench.agree.triage import save, saved, smallest, without_all
@@ -29,6 +29,8 @@ SCENES, QUICK_SCENES, SEED = 500, 12, 1
 EXTRA = ((12, GLOWING_FROM), (12, DENSE_FROM), (12, PROJECTED_FROM))
 """How many scenes from which number on a whole run adds: media that emit, dense ones, and projectors."""
 SHRINK_TRIES, MOST_SHRUNK = 120, 20
+OTHERS = ("estimation", *VIRTUAL)
+"""Methods whose settings the notes tell."""
 
 
 @dataclass(frozen=True)
@@ -188,10 +190,13 @@ def _settings_notes() -> list[str]:
         f"{SIZE}² pixels; stages, with fresh seeds where not said otherwise, as long as there is doubt: {stages}",
         f"photon methods may be off by {FORGIVEN:g} × this radius, {FORGIVEN * STAGES[-1].radius:.0%} of a block in "
         "the last stage: look-ups lose light at edges, in proportion to the radius",
+        "weighted virtual lights: sums of light and of weights are compared before one is divided by the other, these "
+        "with what gathering walks count",
         f"each scene whose number {OWN_KERNELS} divides runs kernels for what is in it alone, the others those for all "
         "kinds of materials, textures and lights",
         "Mitsuba renders every scene at scale 1: its rays leave surfaces by 9e-5 of a unit at least",
         f"nearest: estimate.lookup=nearest with k = 10 within {NEAREST_REACH:g} of these radii",
+        *(f"{name}: {', '.join(f'{k}={v}' for k, v in METHODS[name].items())}" for name in OTHERS),
         f"a disagreement is one by Holm's correction at {LEVEL:g} over all comparisons of the run",
         "where point, spot or directional lights or projectors meet smooth mirrors, glass or coats, photon methods are "
         "compared with Mitsuba's particle tracer in the pixels that see none of these, or with each other if there are "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +16,32 @@ from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.render.planes import PLANES, terms_of
+from pmviewer.render.virtual_lights.film import WeightedFilm
 from pmviewer.settings.access import Settings, with_values
 
+_LIGHTS = {"render.method": "virtual lights", "virtual.number": 400, "virtual.per_pixel": 25}
+"""Each pixel asks for others, so that blocks of pixels know their mean by many lights."""
 METHODS: Mapping[str, Mapping[str, object]] = {
     "path": {"render.method": "path"},
     "gather": {"render.method": "gather"},
     "progressive": {"render.method": "progressive"},
     "nearest": {"render.method": "progressive", "estimate.lookup": "nearest", "estimate.k": 10},
+    "estimation": {
+        "render.method": "gather",
+        "gather.estimation": "on",
+        "gather.estimation_spacing": 8,
+        "gather.reprojection": "on",
+    },
+    "virtual": {"virtual.estimator": "unweighted", **_LIGHTS},
+    "single step": {"virtual.estimator": "single step", "virtual.gather_rays": 0, **_LIGHTS},
+    "every vertex": {"virtual.estimator": "every vertex", **_LIGHTS},
 }
-"""Settings by method; "nearest" is `progressive` with the other look-up."""
+"""Settings by method; "nearest" is `progressive` with the other look-up, "estimation" the gather by few pixels, with
+reprojection, on a grid that fits the small pictures; the last three are virtual lights by estimator, without gather
+rays, whose discs lose light at edges."""
+VIRTUAL = ("virtual", "single step", "every vertex")
+WEIGHTED = ("single step", "every vertex")
+"""Those that divide sums. What is compared of them is not divided: the quotient of means has a bias, they have none."""
 THIN_GLASS: Mapping[str, Mapping[str, object]] = {
     "thin glass": {"render.method": "gather", "render.thin_glass": "tinted and reflecting"},
 }
@@ -47,26 +65,37 @@ class Effort:
     adds: bool = False
 
 
+class Rendered(NamedTuple):
+    """`terms`, (runs, h, w, 15) of `pmviewer.render.planes`, a run a seed; with media 21, theirs behind. `weights`, of
+    weighted virtual lights, (runs, h, w, 4): ΣG and then ΣC of light as it is and in mirrors."""
+
+    terms: NDArray[np.float32]
+    weights: NDArray[np.float64] | None = None
+
+
 def our_runs(
     opened: OpenScene, method: str, effort: Effort, seeds: list[int], pool: WorkPool, max_depth: int = MAX_DEPTH
-) -> NDArray[np.float32]:
-    """(runs, h, w, 15): the terms of `pmviewer.render.planes`, a run a seed; with media 21, theirs behind."""
+) -> Rendered:
+    """What independent runs of a method give, one with each seed."""
     values: dict[str, object] = {**DEPTH, **{**METHODS, **THIN_GLASS}[method], "render.max_depth": max_depth}
     passes = effort.spp
     if method != "path":
         passes = effort.passes
         values |= {"photons.N": effort.photons, "estimate.radius": effort.radius}
         values["estimate.max_radius"] = NEAREST_REACH * effort.radius
-    images = []
+    images, weights = [], []
     prepare(opened, with_values(Settings(), values), pool, lambda text, share: None)
     for seed in seeds:
         renderer = Renderer(opened, with_values(Settings(), values | {"render.seed": seed}), pool, StageStore(0))
         for _ in range(passes):
             renderer.step()
-        planes = renderer.film.planes()
+        film = renderer.film
+        planes = film.undivided() if isinstance(film, WeightedFilm) else film.planes()
+        if method in WEIGHTED and isinstance(film, WeightedFilm):
+            weights.append(np.concatenate(film.sums_of_weights(), axis=-1))
         parts = [planes[..., PLANES[name]] for name in terms_of(planes.shape[-1])]
         images.append(np.concatenate(parts, axis=-1))
-    return np.array(images)
+    return Rendered(np.array(images), np.array(weights) if weights else None)
 
 
 def picture(terms: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -33,6 +33,10 @@ NO_LIGHT, BLACK = 1e-12, 1e-18
 whose probability is below 1e-20 are none for Mitsuba, here they are; a block that sees a lamp in such alone is black in
 one picture and at 1e-24 in the other, and so is a whole picture that sees nothing else."""
 TAIL = 2.0
+SPIKES = 3.0
+"""The same where light comes as 1/d² from points: of virtual light and surface point on both sides of an edge, or in
+media, those closer than d are a share d³, and what one brings falls with its x⁻⁵ᐟ²: no variance, and ∫ₘ beyond the
+brightest of n is 3m/n."""
 NEGLIGIBLE = 1e-4
 """Share of the picture's light that one of its terms may be off by. Photons that bring less come so rarely, and count
 so much where a camera ray meets their small discs, that in most sets of runs none has come at all."""
@@ -81,12 +85,13 @@ def compared(
     tolerance: float = 0.0,
     sparse: bool = False,
     floor: NDArray[np.float64] | None = None,
+    tails: tuple[float, float] = (TAIL, TAIL),
 ) -> Outcome:
     """Test that (n, k) and (m, k) runs have the same k expectations, but for `tolerance` times the second's and for
     `floor` (k,).
 
     `sparse`: light may come as single photons, so that a block that none has met in any run says nothing about its
-    mean. Such blocks are left to the test of the whole picture.
+    mean. Such blocks are left to the test of the whole picture. `tails`: of both sides, TAIL or SPIKES.
     """
     if not (np.isfinite(ours).all() and np.isfinite(theirs).all()):
         return Outcome(0.0, math.nan, math.nan, ours.shape[1])
@@ -102,8 +107,10 @@ def compared(
     freedom = variance**2 / np.maximum(var_a**2 / (n - 1) + var_b**2 / (m - 1), variance**2 / (n + m - 2))
     sizes = np.abs(mean_a) + np.abs(mean_b)
     rounding = ROUNDING * sizes + NO_LIGHT * sizes.max(initial=0.0) + BLACK
-    unseen = np.where(mean_a < mean_b, _unseen(ours), _unseen(theirs)) * np.maximum(mean_a, mean_b)
-    error = np.sqrt(variance + rounding**2 + (unseen / TAIL) ** 2)
+    tail = np.where(mean_a < mean_b, *tails)
+    one_more = np.where(mean_a < mean_b, _brightest(ours), _brightest(theirs)) * np.maximum(mean_a, mean_b)
+    unseen = tail * one_more
+    error = np.sqrt(variance + rounding**2 + one_more**2)
     beyond = np.maximum(np.abs(mean_a - mean_b) - unseen - tolerance * np.abs(mean_b) - rounding - small, 0.0)
     p = 2 * student.sf(beyond / error, np.maximum(freedom, 1.0))
     worst = int(p.argmin())
@@ -114,12 +121,12 @@ def compared(
     return Outcome(sidak, ratio, noise, p.size)
 
 
-def _unseen(runs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The share that a mean may lack because the brightest paths have not come yet. For a block it is the largest of
-    all blocks, since none at all of these paths may have come to this one."""
-    lack = TAIL * (runs.max(axis=0) - np.median(runs, axis=0)) / len(runs)
+def _brightest(runs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The share that the brightest path has in a mean. For a block it is the largest of all blocks, since none at all
+    of these paths may have come to this one."""
+    brightest = (runs.max(axis=0) - np.median(runs, axis=0)) / len(runs)
     mean = runs.mean(axis=0)
-    share = np.divide(lack, mean, out=np.zeros_like(mean), where=mean > 0)
+    share = np.divide(brightest, mean, out=np.zeros_like(mean), where=mean > 0)
     share[CHANNELS:] = share[CHANNELS:].max(initial=0.0)
     return np.asarray(share)
 

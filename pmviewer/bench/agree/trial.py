@@ -17,6 +17,12 @@ edge loses on average a fifth of its light in a strip r wide; of a surface as wi
 edges, that is some 0.4 r/R, of one a tenth as wide 4 r/R, which is forgiven. The radius is halved for each stage of
 fresh seeds, so that a true error stays and what is forgiven goes. Where more is left in the last stage, as in a block
 where a bright and a dark surface meet, the limit for r = 0 counts, twice the last stage less the one before.
+
+Virtual lights are photon methods, too: their caustics are looked up. Their plain sum has no other bias; its spikes have
+no variance, which the test allows for (SPIKES). Weighted light is a quotient C·ΣF/ΣG, whose bias falls slowly where
+single lights rule ΣG, too slowly for a test. What it is made of has none: ΣF is compared as a picture, and ΣG with ΣC,
+which gathering walks count: both have the same mean, whatever the scene. Of these estimators a scene has one; whole
+paths weigh nothing in media.
 """
 
 from __future__ import annotations
@@ -33,8 +39,18 @@ from pmviewer.bench.agree.generate import disperses, has_distant_lights, needs_p
 from pmviewer.bench.agree.materials import is_mapped
 from pmviewer.bench.agree.media import emits, has_media
 from pmviewer.bench.agree.mitsuba_client import Mitsuba, MitsubaError
-from pmviewer.bench.agree.ours import METHODS, PHOTON_METHODS, THIN_GLASS, Effort, our_runs, picture, term
-from pmviewer.bench.agree.statistics import CHANNELS, Outcome, compared, negligible, summaries
+from pmviewer.bench.agree.ours import (
+    METHODS,
+    PHOTON_METHODS,
+    THIN_GLASS,
+    VIRTUAL,
+    WEIGHTED,
+    Effort,
+    our_runs,
+    picture,
+    term,
+)
+from pmviewer.bench.agree.statistics import CHANNELS, SPIKES, TAIL, Outcome, compared, negligible, summaries
 from pmviewer.bench.agree.tree import Node, innermost, shapes_of
 from pmviewer.bench.agree.verdict import Comparison, Verdict
 from pmviewer.bench.agree.xml import write_scene
@@ -97,6 +113,7 @@ class Runs:
             flat = flatten(self.opened.scene, features_at_least=SURFACES)
             self.opened = replace(self.opened, flat=flat)
         self._ours: dict[tuple[str, int, int], NDArray[np.float32]] = {}
+        self._weights: dict[tuple[str, int], NDArray[np.float64]] = {}
         self._theirs: dict[tuple[str, int, int], NDArray[np.float64]] = {}
 
     def _seeds(self, who: str, stage: int, runs: int) -> list[int]:
@@ -112,8 +129,17 @@ class Runs:
             more = {"max_depth": max_depth} if max_depth else {}
             found = our_runs(self.opened, method, effort, seeds, self.pool, **more)
             before = [self.ours(method, stage - 1, max_depth)] if effort.adds else []
-            self._ours[key] = np.concatenate([*before, found])
+            self._ours[key] = np.concatenate([*before, found.terms])
+            if found.weights is not None:
+                of_before = [self._weights[method, stage - 1]] if effort.adds else []
+                self._weights[method, stage] = np.concatenate([*of_before, found.weights])
         return self._ours[key]
+
+    def weights(self, method: str, stage: int) -> NDArray[np.float64]:
+        """(runs, h, w, 4) of a weighted method: ΣG and ΣC, as `pmviewer.bench.agree.ours.Rendered` has them; nothing
+        but zeros where no surface holds virtual lights."""
+        terms = self.ours(method, stage)
+        return self._weights.get((method, stage), np.zeros((*terms.shape[:3], 4)))
 
     def theirs(self, mode: str, stage: int, max_depth: int = 0) -> NDArray[np.float64]:
         """(runs, h, w, 3)"""
@@ -154,14 +180,15 @@ class Question:
         if self.method == "path":
             return compared(*self.pair(stage))
         forgiven, floor = FORGIVEN * STAGES[stage].radius, self.floor()
+        tails = SPIKES if self.method in VIRTUAL else TAIL, TAIL
         ours, theirs = self.pair(stage)
-        found = compared(ours, theirs, forgiven, sparse=True, floor=floor)
+        found = compared(ours, theirs, forgiven, sparse=True, floor=floor, tails=tails)
         if stage < len(STAGES) - 1 or found.p >= SUSPICIOUS[-1]:
             return found
         ours_before, theirs_before = self.pair(stage - 1)
         if self.peer in PHOTON_METHODS:
             theirs = _limit(theirs, theirs_before)
-        limit = compared(_limit(ours, ours_before), theirs, forgiven, sparse=True, floor=floor)
+        limit = compared(_limit(ours, ours_before), theirs, forgiven, sparse=True, floor=floor, tails=tails)
         return max(found, limit, key=lambda o: o.p)
 
     def asked(self, stages: int) -> Comparison:
@@ -180,11 +207,25 @@ def _limit(runs: NDArray[np.float64], before: NDArray[np.float64]) -> NDArray[np
     return 2 * runs[:n] - before[:n]
 
 
+def asked_methods(scene: Node) -> Iterator[str]:
+    """The methods other than `path` that a scene is rendered by: of the weighted estimators one, by the last digit of
+    its camera's field of view, which nobody chose and simpler scenes keep."""
+    weighted = "single step" if has_media(scene) else WEIGHTED[round(1e4 * scene["camera"]["fov"]) % len(WEIGHTED)]
+    yield from (m for m in PHOTON_METHODS if m not in WEIGHTED or m == weighted)
+    if has_panes(scene) and not (disperses(scene) or emits(scene)):
+        yield from THIN_GLASS
+
+
 def unseen_in(ours: NDArray[np.float64]) -> NDArray[np.float64]:
     """Differences of a term that are none: `negligible` ones, and all in a picture that is as good as black here, where
     the light at the edges of a lamp that shines inwards is all there is. It is compared with Mitsuba's as a whole."""
     black = ours[:, :CHANNELS].mean() < LEAST_LIGHT
     return np.full(ours.shape[1], np.inf) if black else negligible(ours)
+
+
+def _with_sum(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(runs, h, w, 3) of (runs, h, w, 2): both, and their sum, in place of channels."""
+    return np.concatenate([weights, weights.sum(axis=-1, keepdims=True)], axis=-1)
 
 
 def particles_hold(runs: Runs) -> bool:
@@ -222,7 +263,7 @@ def questions(runs: Runs) -> Iterator[Question]:
     if not alone:
         yield Question("path", "Mitsuba path", "picture", lambda s: (whole("path", s), paths(s)))
         yield Question("path", "Mitsuba path", "one scattering", one_scattering)
-    for method in (*PHOTON_METHODS, *(THIN_GLASS if has_panes(runs.scene) and not alone else ())):
+    for method in asked_methods(runs.scene):
 
         def by_particles(stage: int, method: str = method) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
             seen = runs.seen_plainly
@@ -249,6 +290,13 @@ def questions(runs: Runs) -> Iterator[Question]:
             yield Question(method, "progressive", "picture", by_other)
         if method in THIN_GLASS:
             continue
+        if method in WEIGHTED:
+
+            def by_walks(stage: int, method: str = method) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+                G, C = np.split(runs.weights(method, stage), 2, axis=-1)
+                return summaries(_with_sum(G)), summaries(_with_sum(C))
+
+            yield Question(method, "its walks", "weights", by_walks)
         for name in SAFE_TERMS if particles else OF_FIRST_SURFACE if alone and not glows else TERMS:
 
             def by_term(

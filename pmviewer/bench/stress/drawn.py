@@ -68,6 +68,7 @@ MOST = {
     "virtual.per_pixel": 100,
     "virtual.photons": 1000,
     "virtual.walks": 8,
+    "virtual.gather_rays": 8,
     "virtual.window": 8.0,
 }
 """Upper ends where the schema's only cost time."""

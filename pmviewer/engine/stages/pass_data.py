@@ -13,7 +13,7 @@ from pmviewer.engine.stages.estimation import Estimates, blank_estimates
 from pmviewer.engine.stages.gather_guides import gather_records
 from pmviewer.engine.stages.pass_maps import LookUpMap, PassMaps, Structure, blank_grid, blank_maps
 from pmviewer.engine.stages.shadow_photons import ShadowMap
-from pmviewer.engine.stages.virtual_lights import VirtualMap, virtual_dtype
+from pmviewer.engine.stages.virtual_lights import VirtualMap, blank_photons, virtual_dtype
 from pmviewer.maps.irradiance_cache import NO_CACHE, IrradianceCache
 from pmviewer.maps.irradiance_cache import RECORD as CACHE_RECORD
 from pmviewer.maps.search.kdtree import PhotonKdTree
@@ -161,7 +161,8 @@ def blank_pass(scene: NDArray[np.void], settings: Settings, plan: Plan) -> PassD
     shadows = shadow_record(blank_grid(), 1) if plan.shadows else None
     given = pass_data(scene, blank_eye(settings, plan), settings, plan, blank_maps(settings, plan), shadows)
     if plan.virtual:
-        given = given._replace(virtual=np.zeros(1, virtual_dtype(settings.virtual)))
+        dtype = virtual_dtype(settings.virtual)
+        given = given._replace(virtual=np.zeros(1, dtype), virtual_map=blank_photons(dtype))
     if plan.estimation:
         return given._replace(cache=blank_estimates())
     return given._replace(cache=np.zeros(1, CACHE_RECORD)) if plan.cache else given

@@ -13,10 +13,12 @@ from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
+from pmviewer.maps.search.kdtree import RECORD as TREE_RECORD
 from pmviewer.maps.variant import with_mark
 from pmviewer.maps.virtual_lights import (
     CLAMPED,
     ESTIMATORS,
+    NO_VIRTUAL,
     OF_PATHS,
     PATHS_DTYPE,
     PRINTED,
@@ -26,7 +28,7 @@ from pmviewer.maps.virtual_lights import (
     VIRTUAL_DTYPE,
 )
 from pmviewer.photons.bounces import most_bounces
-from pmviewer.photons.virtual.lights import VirtualLights, virtual_lights
+from pmviewer.photons.virtual.lights import VirtualLights, neighbours, virtual_lights
 from pmviewer.photons.virtual.tree import light_tree
 from pmviewer.render.film import Film
 from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS
@@ -62,6 +64,11 @@ class VirtualMap:
     record: NDArray[np.void]
     tree: NDArray[np.float32] | None = None
     """Of `pmviewer.photons.virtual.tree`, where pixels choose by it."""
+
+    @property
+    def photons(self) -> NDArray[np.void]:
+        """The record (1,) for kernels of the photons that the lights are chosen from, as `blank_photons` without."""
+        return self.lights.tree.record if self.lights.tree is not None else blank_photons(self.record.dtype)
 
     @property
     def bytes(self) -> int:
@@ -104,13 +111,23 @@ class VirtualStage:
             tree = self.pool.run([lambda: light_tree(lights.rows, ESTIMATORS.index(s.virtual.estimator), flat.radius)])[
                 0
             ]
-        return VirtualMap(lights, virtual_record(flat, s, lights.rows, tree, lights.beams), tree)
+        record = virtual_record(flat, s, lights.rows, tree, lights.beams)
+        if lights.tree is not None:
+            record["k"], record["reach"] = neighbours(s.virtual, index) + 1, lights.reach
+            record["gather_rays"] = 0 if flat.has_media else s.virtual.gather_rays
+        return VirtualMap(lights, record, tree)
 
 
 def virtual_dtype(virtual: Virtual) -> np.dtype:
     """Type of the record of virtual lights for that estimator and choice."""
     dtype = PATHS_DTYPE if ESTIMATORS.index(virtual.estimator) in OF_PATHS else VIRTUAL_DTYPE
     return with_mark(dtype, "descent", TREE_FIELDS) if virtual.choice == "light tree" else dtype
+
+
+def blank_photons(dtype: np.dtype) -> NDArray[np.void]:
+    """The record (1,) of no photons of the type that goes with a record of virtual lights: one for all estimators that
+    are compiled alike."""
+    return NO_VIRTUAL if "paths" in (dtype.names or ()) else np.zeros(1, TREE_RECORD)
 
 
 def by_tree(virtual: Virtual) -> bool:

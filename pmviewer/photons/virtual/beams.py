@@ -17,8 +17,7 @@ from pmviewer.kernels.surface import face
 from pmviewer.maps.search.disc import Facing
 from pmviewer.maps.search.k_nearest import KEYS, nearest
 from pmviewer.maps.search.stored import ALL_CLASSES
-from pmviewer.maps.virtual_lights import V_BEAMS, V_LAMBERTIAN, V_N, V_P, V_PHI, V_WI
-from pmviewer.photons.virtual.density import FLATNESS
+from pmviewer.maps.virtual_lights import FLATNESS, V_BEAMS, V_LAMBERTIAN, V_N, V_P, V_PHI, V_WI
 
 _f4 = np.float32
 _i4 = np.int32

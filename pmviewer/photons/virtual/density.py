@@ -4,6 +4,12 @@
 side. The mean of A/n over evenly dense photons is 1/D for any n; counting the light itself, photons of other walls, or
 what the disc has beyond an edge is not (the paper's form does all three). What of the disc lies on the surface is
 found by rays: along the surface to places spread over the disc, and there down onto it.
+
+Discs end at a largest radius R. Where m < n others lie within it, the light stands for A/(m + 1), A the part of that
+disc. Then the mean of D·(area) is the probability that any photon lies within R, exactly. With μ expected there it is
+Σ_{m<n} e^−μ μ^m/m!·μ/(m + 1) + ∫₀^μ (a/n)·a^(n−1)e^−a/(n−1)! da = P(1 … n) + P(more than n). So gather rays count where
+photons lie within R (`pmviewer.render.virtual_lights.gathered`), and weights are right with any R. Without R, a surface
+that one photon in many passes reaches would count for gather rays in every pass, and weigh in that one alone.
 """
 
 from __future__ import annotations
@@ -23,12 +29,10 @@ from pmviewer.kernels.vector import along, basis, dot, scale, sub
 from pmviewer.maps.search.disc import Facing
 from pmviewer.maps.search.k_nearest import KEYS, nearest
 from pmviewer.maps.search.stored import ALL_CLASSES
-from pmviewer.maps.virtual_lights import V_GAP, V_N, V_P, V_WI
+from pmviewer.maps.virtual_lights import FLATNESS, V_GAP, V_N, V_P, V_WI
 
 RAYS = 32
 """Places of a disc that tell how much of it lies on the surface."""
-FLATNESS = np.float32(0.2)
-"""Half-thickness of the disc relative to its radius."""
 SAME_SIDE = np.float32(0.5)
 """Least cosine between the normals of a light and of what belongs to its surface."""
 
@@ -74,7 +78,7 @@ def lit_areas(scenes, trees, lights, own, k, reach, whole, out, first, last):
     """Area that each of the lights first … last−1 stands for among the photons of a map, in square scene units.
 
     trees: record (1,) of a kd-tree of photons; lights: float32 (n, COLUMNS); own: how many of the nearest photons of
-    the map are the light itself, 1 or 0; k: others that are searched; reach: largest radius; whole: 1 for the paper's
+    the map are the light itself, 1 or 0; k: others that are searched; reach: largest radius R; whole: 1 for the paper's
     form: the whole disc out to the k-th of all photons, itself counted, whatever surface they lie on; out: float32
     (n,).
     """
@@ -89,7 +93,9 @@ def lit_areas(scenes, trees, lights, own, k, reach, whole, out, first, last):
             continue
         steepness = _f4(1.0) / (FLATNESS * FLATNESS)
         count, r2 = nearest(tree, p, k + own, reach * reach, keys, Facing(n, steepness, _i4(ALL_CLASSES)))
-        others = max(count - own, _i8(1))
+        others = count - own
+        if others < k:
+            others += _i8(1)
         turn = unit_float(hash3(_u4(i), _u4(k), _u4(DISC_SALT)))
         share = share_on_surface(scene, p, n, row[V_GAP], _f4(math.sqrt(r2)), turn)
         out[i] = _f4(math.pi) * r2 * share / _f4(others)

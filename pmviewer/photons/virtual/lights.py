@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -46,6 +47,8 @@ SPARE = 2
 """Trajectories for each light where nobody asks for their density: chosen among more, they are less of a family."""
 MOST = 500_000
 """Most trajectories that passes grow to of their own accord."""
+PER_DISC = 32
+"""Photons of a disc of the largest radius, see `reach_of`: dark places have none, and weigh nothing."""
 FEWEST = 2
 """Fewest photons of a disc that passes shrink to."""
 
@@ -55,12 +58,15 @@ class VirtualLights:
     """`rows` (n, COLUMNS) float32, see `pmviewer.maps.virtual_lights`, with power in watts and q complete but for what
     depends on the point that is lit; `photons` (n, 6) float32 the same as photon records in units of `power_unit`;
     `beams` (n, k, BEAM) of those that stand for photons around them (`pmviewer.photons.virtual.beams`), k may be 0;
+    `tree` of the photons that tell their density, None where they do so themselves, in discs of up to `reach`;
     `candidates` that they were chosen from, of `emitted` trajectories; `rays` cast, candidates `dropped`."""
 
     rows: Float
     photons: Float
     beams: Float
     power_unit: float
+    tree: PhotonKdTree | None
+    reach: float
     candidates: int
     emitted: int
     rays: int
@@ -74,7 +80,7 @@ class VirtualLights:
     @property
     def bytes(self) -> int:
         """For the stage store."""
-        return self.rows.nbytes + self.photons.nbytes + self.beams.nbytes
+        return self.rows.nbytes + self.photons.nbytes + self.beams.nbytes + (self.tree.bytes if self.tree else 0)
 
 
 def trajectories(virtual: Virtual, index: int) -> int:
@@ -127,27 +133,32 @@ def virtual_lights(
     lights = np.ascontiguousarray(rows[kept])
     unit = scene.total_luminance / N
     lights[:, V_PHI : V_PHI + 3] *= (unit * share)[:, None]
-    beams = np.empty((len(lights), 0, BEAM), np.float32)
+    beams, tree, reach = np.empty((len(lights), 0, BEAM), np.float32), None, 2 * scene.radius
     if estimator in OF_PATHS:
         lights[:, V_Q] *= share / np.float32(N)
     elif estimator in OF_DENSITY and not in_media(lights).all():
         lie = ~in_media(lights)
         whole, some = estimator == PRINTED_SINGLE, np.ascontiguousarray(lights[lie])
         among = found[~in_media(rows)] if of_map else np.ascontiguousarray(found[kept][lie])
-        tree = run([lambda: build_kdtree(among)])[0]
+        tree = run([lambda: build_kdtree(among, unit)])[0]
         k = neighbours(virtual, index)
-        q = areas_of(scene, tree, some, k, whole, run)
+        if of_map:
+            reach = reach_of(scene.radius, len(among))
+        q = areas_of(scene, tree, some, (k, reach), whole, run)
         if of_map:
             q *= share[lie]
             candidates = rows[~in_media(rows)]
             beams = np.zeros((len(lights), k + 1, BEAM), np.float32)
-            beams[lie], lights[lie, V_BEAMS] = beams_of(scene, tree, candidates, some, unit * share[lie], k + 1, run)
+            around = k + 1, reach
+            beams[lie], lights[lie, V_BEAMS] = beams_of(scene, tree, candidates, some, unit * share[lie], around, run)
         lights[lie, V_Q] = q if whole else q * some[:, V_OPACITY]
     return VirtualLights(
         rows=lights,
         photons=as_photons(found[kept], share),
         beams=beams,
         power_unit=unit,
+        tree=tree if of_map else None,
+        reach=reach,
         candidates=len(rows),
         emitted=N,
         rays=int(counts[C_RAYS]),
@@ -155,12 +166,18 @@ def virtual_lights(
     )
 
 
-def areas_of(scene: FlatScene, tree: PhotonKdTree, lights: Float, k: int, whole: bool, run: Runner) -> Float:
+def reach_of(scene_radius: float, n: int) -> float:
+    """Largest radius of a disc among n photons: with PER_DISC of them were they spread over the scene's sphere."""
+    return scene_radius * min(2.0, math.sqrt(4 * PER_DISC / max(n, 1)))
+
+
+def areas_of(
+    scene: FlatScene, tree: PhotonKdTree, lights: Float, disc: tuple[int, float], whole: bool, run: Runner
+) -> Float:
     """Area (n,) that each of the lights stands for among the photons of a tree, which hold the lights themselves
-    (`pmviewer.photons.virtual.density`)."""
+    (`pmviewer.photons.virtual.density`); disc: photons that it has at most, and its largest radius."""
     areas = np.empty(len(lights), np.float32)
-    reach = np.float32(2 * scene.radius)
-    most = max(1, min(k, tree.n - 1))
+    most, reach = max(1, min(disc[0], tree.n - 1)), np.float32(disc[1])
 
     def some(first: int) -> None:
         last = min(first + AREAS, len(lights))
@@ -171,13 +188,20 @@ def areas_of(scene: FlatScene, tree: PhotonKdTree, lights: Float, k: int, whole:
 
 
 def beams_of(
-    scene: FlatScene, tree: PhotonKdTree, candidates: Float, lights: Float, share: Float, k: int, run: Runner
+    scene: FlatScene,
+    tree: PhotonKdTree,
+    candidates: Float,
+    lights: Float,
+    share: Float,
+    disc: tuple[int, float],
+    run: Runner,
 ) -> tuple[Float, Float]:
-    """Up to k photons (n, k, BEAM) that each of the lights stands for among the candidates, and how many (n,)."""
-    lights, beams = lights.copy(), np.zeros((len(lights), k, BEAM), np.float32)
+    """Up to k photons (n, k, BEAM) that each of the lights stands for among the candidates, and how many (n,); disc: k
+    and its largest radius."""
+    lights, beams = lights.copy(), np.zeros((len(lights), disc[0], BEAM), np.float32)
     if "bsdfs" not in (scene.record.dtype.names or ()):  # all scatter evenly
         return beams, lights[:, V_BEAMS]
-    share, reach = share.astype(np.float32), np.float32(2 * scene.radius)
+    share, reach = share.astype(np.float32), np.float32(disc[1])
 
     def some(first: int) -> None:
         beams_at(tree.record, candidates, lights, reach, share, beams, first, min(first + AREAS, len(lights)))

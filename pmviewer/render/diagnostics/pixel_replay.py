@@ -26,6 +26,7 @@ from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_pat
 from pmviewer.render.straight import let_through
 from pmviewer.render.virtual_lights.descent import CUT_WORDS
 from pmviewer.render.virtual_lights.lit import asked_for, asked_light, one_light
+from pmviewer.render.virtual_lights.walk import share_of_rays
 
 OF_CAUSTICS, AS_INDIRECT, AS_DIRECT, AS_CAUSTICS, NOT_FOUND, GATHERED = range(6)
 """What a look-up is for: the caustic map; the global map as indirect light, as direct light, as caustics; the caustic
@@ -126,7 +127,7 @@ def _lit(given, si, beta, seed, numbers, lights, n):
 def _each_light(given, si, beta, seed, numbers, lights, n):
     virtual = given.virtual
     cut = stack_i4(CUT_WORDS)
-    asked = asked_for(given, si, seed, cut)
+    asked, own = asked_for(given, si, seed, cut), _f4(1.0) - share_of_rays(given, si)
     for i in range(asked[0]):
         j, each = asked_light(given, si, i, asked, cut)
         if j < 0 or n >= len(lights):
@@ -136,6 +137,8 @@ def _each_light(given, si, beta, seed, numbers, lights, n):
             continue
         T = let_through(given.scene, si, wi, end)
         seen = largest(T) > _f4(0.0)
+        if _f4(0.0) < G:
+            F, G = scale(F, own), G * own
         F = scale(mul(beta, mul(F, T) if seen else F), each)
         if virtual.estimator == CLAMPED and geometry > virtual.clamp:
             F = scale(F, virtual.clamp / geometry)

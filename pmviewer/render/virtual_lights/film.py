@@ -14,6 +14,7 @@ Where ΣG is 0 nothing has arrived, and L is 0. What lights without a weight sen
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -111,13 +112,32 @@ class WeightedFilm(Film):
 
     def planes(self) -> NDArray[np.float32]:
         """Means (height, width, channels) float32, weighted light included."""
+        return self._planes(self._light)
+
+    def undivided(self) -> NDArray[np.float32]:
+        """The same with ΣF for weighted light: the plain sum of what the lights send, unbiased and with its spikes."""
+
+        def plain(base: int) -> F8:
+            return np.asarray(self.sums[:, base + W_F : base + W_F + 3] / max(self.passes, 1))
+
+        return self._planes(plain)
+
+    def _planes(self, light_of: Callable[[int], F8]) -> NDArray[np.float32]:
         planes = super().planes()
         if self.weighted:
-            for term, base in (("indirect", W_INDIRECT), ("specular", W_SPECULAR)):
+            for term, base in _TERMS.items():
                 light = np.zeros_like(planes)
-                light[..., PLANES[term]] = self._light(self.channels + base).reshape(self.height, self.width, 3)
+                light[..., PLANES[term]] = light_of(self.channels + base).reshape(self.height, self.width, 3)
                 planes += self.weighed(light)
         return planes
+
+    def sums_of_weights(self) -> tuple[F8, F8]:
+        """ΣG and ΣC over the passes, (h, w, 2) each: of indirect light and of light in mirrors. Their expectations are
+        the same, whatever the estimator."""
+        columns = [self.channels + base for base in _TERMS.values()]
+        both = (self.sums[:, [c + w for c in columns]] / max(self.passes, 1) for w in (W_G, W_C))
+        G, C = (part.reshape(self.height, self.width, 2) for part in both)
+        return G, C
 
     def _light(self, base: int) -> F8:
         """Weighted light (n, 3) of the term whose sums begin at that column."""
@@ -133,7 +153,7 @@ class WeightedFilm(Film):
 
     def quotient(self, pixel: int, term: str) -> float:
         """ΣA·c/ΣG of one pixel, which weighted light of that term ("indirect", "specular") is multiplied by."""
-        base = self.channels + {"indirect": W_INDIRECT, "specular": W_SPECULAR}[term]
+        base = self.channels + _TERMS[term]
         return float(self._quotient(base, (pixel, pixel + 1))[0])
 
     def normalisation(self, base: int, rows: tuple[int, int] | None = None) -> F8:
@@ -170,9 +190,9 @@ class WeightedFilm(Film):
             base = np.where(sums[:, self.channels + W_INDIRECT + W_A] > 0, W_INDIRECT, W_SPECULAR)
             picked = {
                 "sum of weights": [
-                    ratio(sums[:, self.channels + b + W_G], sums[:, self.channels + b + W_A]) for b in _TERMS
+                    ratio(sums[:, self.channels + b + W_G], sums[:, self.channels + b + W_A]) for b in _TERMS.values()
                 ],
-                "normalisation": [self.normalisation(self.channels + b) for b in _TERMS],
+                "normalisation": [self.normalisation(self.channels + b) for b in _TERMS.values()],
             }
             lit = (sums[:, self.channels + W_INDIRECT + W_A] > 0) | (sums[:, self.channels + W_SPECULAR + W_A] > 0)
             for view, (whole, chained) in picked.items():
@@ -180,4 +200,4 @@ class WeightedFilm(Film):
         return {name: view.reshape(self.height, self.width, 1).astype(np.float32) for name, view in made.items()}
 
 
-_TERMS = (W_INDIRECT, W_SPECULAR)
+_TERMS = {"indirect": W_INDIRECT, "specular": W_SPECULAR}

@@ -40,7 +40,7 @@ from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS
 from pmviewer.render.straight import let_through
 from pmviewer.render.virtual_lights.descent import CUT_WORDS, ask_cut, descend
 from pmviewer.render.virtual_lights.light import facing_of, sent, towards, weight_of
-from pmviewer.render.virtual_lights.walk import normalisation
+from pmviewer.render.virtual_lights.walk import normalisation, share_of_rays
 
 _f4 = np.float32
 _f8 = np.float64
@@ -144,7 +144,8 @@ def from_virtual_lights(given, si, beta, pixel, whole):
     sums = sums_at(scene)
     base = sums + (W_INDIRECT if whole else W_SPECULAR)
     plane = _i8(INDIRECT if whole else SPECULAR)
-    throughput = luminance(beta)
+    throughput, rays = luminance(beta), share_of_rays(given, si)
+    lights = _f4(1.0) - rays
     for i in range(asked[0]):
         j, each = asked_light(given, si, i, asked, cut)
         if j < 0:
@@ -169,14 +170,21 @@ def from_virtual_lights(given, si, beta, pixel, whole):
             film[sums + W_LOST] += Y - _f8(luminance(F))
         target = _i8(plane)
         if weighted and _f4(0.0) < G:
-            target = _i8(base + W_F)
-            film[base + W_G] += _f8(throughput * each * G)
+            target, F = _i8(base + W_F), scale(F, lights)
+            film[base + W_G] += _f8(lights * throughput * each * G)
         film[target] += weighed(pixel, _f8(F[0]))
         film[target + 1] += weighed(pixel, _f8(F[1]))
         film[target + 2] += weighed(pixel, _f8(F[2]))
     film[sums + W_LIGHTS] += _f8(asked[0])
     if weighted:
-        albedo, counted = normalisation(given, si, pixel)
+        albedo, counted, light = normalisation(given, si, pixel)
+        if rays > _f4(0.0):
+            light = scale(mul(beta, light), rays)
+            if is_good(light):
+                film[base + W_G] += _f8(rays * throughput * counted)
+                film[base + W_F] += weighed(pixel, _f8(light[0]))
+                film[base + W_F + 1] += weighed(pixel, _f8(light[1]))
+                film[base + W_F + 2] += weighed(pixel, _f8(light[2]))
         if virtual.estimator == PRINTED_FULL:
             albedo = _f4(1.0)
         film[base + W_A] += _f8(throughput * albedo)

@@ -38,6 +38,10 @@ WINDOWED = Need(
 )
 
 
+WALKING = Need(lambda f: f.settings.virtual.normalisation != "none", "Nothing is gathered without a normalisation.")
+GLOSS = Need(
+    lambda f: f.traits.rich and not f.traits.has_media, "Only with glossy surfaces, and not in scenes with media."
+)
 SOME = Need(
     lambda f: 0 < f.settings.virtual.per_pixel < f.settings.virtual.number,
     "A pixel asks for all virtual lights (virtual.per_pixel).",
@@ -119,6 +123,18 @@ class Virtual(Group):
         ge=1.0,
         le=64.0,
         needs=(WEIGHTED, NORMALISED, WINDOWED),
+    )
+    gather_rays: int = setting(
+        16,
+        "Gather rays of a glossy surface in a pass that bring light themselves, of the photons where they end, besides "
+        "normalising: few virtual lights lie in a narrow lobe. 0: virtual lights alone.",
+        title="gather rays of gloss",
+        stage="image",
+        scale="integer",
+        unit="rays",
+        ge=0,
+        le=256,
+        needs=(SINGLE_STEP, BY_THE_MAP, WALKING, GLOSS),
     )
     clamp: float = setting(
         15.0,
