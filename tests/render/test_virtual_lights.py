@@ -182,11 +182,7 @@ def test_surfaces_that_hardly_any_photon_reaches_do_not_count_as_lit(tmp_path):
     opened = open_scene(write_scene(scene_of(1, 4), tmp_path, "scene")[0])
 
     def mean(passes, **groups):
-        settings = settings_of(**groups)
-        renderer = Renderer(opened, settings, WorkPool(1), StageStore(0))
-        for _ in range(passes):
-            renderer.step()
-        return renderer.frame(0).image("indirect").mean()
+        return rendered(opened, settings_of(**groups), passes).frame(0).image("indirect").mean()
 
     truth = mean(48, render={"method": "path"})
     virtual = {"number": 200, "per_pixel": 40}
