@@ -25,6 +25,7 @@ from pmviewer.kernels.dimensions import STRATUM
 from pmviewer.kernels.lights.light import emit_from
 from pmviewer.kernels.memory import load_f4, load_f8, load_i4
 from pmviewer.kernels.random import INDEPENDENT, draw1
+from pmviewer.photons.emission.window import WINDOW_FIELDS, Window, fill_window
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.scene.description import LUMINANCE
 
@@ -37,6 +38,7 @@ STRATA_DTYPE = np.dtype(
         ("first", "i8"),  # int32 (n_lights,): each light's first stratum
         ("cells", "i8"),  # int32 (n_lights, 4): divisions of the place's two numbers and of the direction's
         ("weight", "i8"),  # float32 (strata,): power of their photons in units of the map's
+        *WINDOW_FIELDS,
     ],
     align=True,
 )
@@ -74,6 +76,7 @@ class StrataTable:
 
     records: NDArray[np.void]
     arrays: tuple[NDArray, ...]
+    window: Window | None = None
 
 
 def strata_of(scene: FlatScene, most: int) -> Strata | None:
@@ -105,7 +108,13 @@ def _divisions(kind: int, n: int) -> tuple[int, int, int, int]:
     return 2, 2, root, root
 
 
-def table_of(strata: Strata, share: NDArray[np.float64] | None, weight: NDArray[np.float64] | None) -> StrataTable:
+def table_of(
+    strata: Strata,
+    share: NDArray[np.float64] | None,
+    weight: NDArray[np.float64] | None,
+    window: Window | None = None,
+    pieces_of: float = 0.0,
+) -> StrataTable:
     """The table by which photons start in stratum s with probability ∝ share[s] and power weight[s], in units of the
     map's; (n,) both. With None for them that of test photons: each stratum in turn, of power 1."""
     even = share is None
@@ -122,7 +131,8 @@ def table_of(strata: Strata, share: NDArray[np.float64] | None, weight: NDArray[
     records["strata"], records["tests"] = strata.n, even
     for name, array in zip(("cdf", "light", "first", "cells", "weight"), arrays, strict=True):
         records[name] = array.ctypes.data
-    return StrataTable(records, arrays)
+    fill_window(records, window, pieces_of)
+    return StrataTable(records, arrays, window)
 
 
 @device
