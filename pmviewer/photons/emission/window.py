@@ -36,7 +36,7 @@ MOST_PIECES = 16
 """Of one trajectory."""
 MOST_AT_ONCE = 8
 """Of one photon where it arrives."""
-BOXES = 1 << 18
+BOXES = 1 << 15
 """Boxes of the grid, about."""
 
 Float = NDArray[np.float32]
