@@ -161,7 +161,7 @@ def test_boxes_hold_every_place_that_an_importon_reaches():
     """By brute force, for reaches from next to nothing to most of the scene; and far places are told apart."""
     rng = np.random.default_rng(8)
     positions = (rng.random((300, 3)) * [10, 1, 4]).astype(np.float32)
-    reach = (10 ** rng.uniform(-3, 0.1, 300)).astype(np.float32)
+    reach = (10 ** rng.uniform(-3, -0.1, 300)).astype(np.float32)
     boxes = reached_boxes(positions, reach)
     places = (rng.random((4000, 3)) * [14, 3, 8] - [2, 1, 2]).astype(np.float32)
     distance = np.linalg.norm(places[:, None].astype(float) - positions, axis=2)
