@@ -25,8 +25,8 @@ W_s·N/(n·p_s).
 In both no photon has more power than test photons do, those of refined strata have less the more they matter, and what
 arrives at one place from strata of different importance differs by the root of that.
 
-**Splitting.** With κ = Σ q√I·N/n the power of a photon is about κ/√I of its stratum. The more important places that it
-comes to by chance, through a door, ask for less: there it goes on in pieces (`pmviewer.photons.emission.window`).
+**Splitting.** A photon's power is about κ/√I, I being that of its stratum. More important places that it comes to
+by chance, through a door, ask for less: there it goes on in pieces (`pmviewer.photons.emission.window`).
 
 **Bias.** What decides about a photon's power must not know where that photon went. Peter-Pietrek's test photons, those
 of earlier passes, and in Christensen keep those of the other set, are independent of it: both are exact in the mean.
@@ -171,7 +171,7 @@ def guided_emission(
             f"Guided emission: none of {tested:,} test photons met an important place, so photons leave the lights by "
             "power. More photons (photons.N) may find a way.",
         )
-    used, kappa = weight[share > 0], float((strata.power * np.sqrt(estimated(strata, known))).sum()) * N / n
+    used, kappa = weight[share > 0], _kappa(strata, known, weight)
     return Guided(
         table=table_of(
             strata,
@@ -191,6 +191,14 @@ def guided_emission(
         known=known,
         notes=notes,
     )
+
+
+def _kappa(strata: Strata, known: Known, weight: Float) -> float:
+    """κ: the mean of power × √I over what strata bring to the picture, so that those that bring little, whose power is
+    bounded, don't tell. 0 where nothing was met."""
+    met = np.where(weight > 0, estimated(strata, known), 0.0)
+    brought = strata.power * met
+    return float((brought * weight * np.sqrt(met)).sum() / brought.sum()) if brought.any() else 0.0
 
 
 def _asked_of_tests(guidance: Guidance) -> list[Sought]:

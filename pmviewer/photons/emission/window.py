@@ -1,8 +1,8 @@
 """Splitting (I6): a photon that comes to a more important place than it was sent for goes on as several.
 
 Photons that leave a stratum of importance I have the power κ/√I (`pmviewer.photons.emission.guided`). One that arrives
-where photons that go on have the importance J ought to have κ/√J; with m times that it goes on as ⌈m⌉ pieces of equal
-power, as particles do in the weight windows of neutron transport. It is stored once, whole, where it arrives; the
+where photons that go on have the importance J ought to have κ/√J; with m times that it goes on as ⌊m + ½⌋ pieces of
+equal power, as particles do in the weight windows of neutron transport. It is stored once, whole, where it arrives; the
 pieces scatter each by themselves. Nothing is biased: how many there are depends on what was before alone.
 
 J is known on a grid of boxes, for each of six directions of normals: what is on the other side of a wall is another
@@ -11,7 +11,6 @@ box's. It decides how many pieces there are and never what they count, so that b
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -111,7 +110,7 @@ def pieces(strata, p, ng, factor, number):
             face += _i8(1)
         at = ((i * _i8(strata.boxes_y) + j) * _i8(strata.boxes_z) + k) * _i8(6) + face
         m = factor * strata.pieces_of * load_f4(strata.window, at)
-        return max(min(_i8(math.ceil(m)), _i8(MOST_AT_ONCE), _i8(MOST_PIECES) - number), _i8(1))
+        return max(min(_i8(m + _f4(0.5)), _i8(MOST_AT_ONCE), _i8(MOST_PIECES) - number), _i8(1))
 
     return by_importance
 
