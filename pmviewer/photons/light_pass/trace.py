@@ -139,8 +139,7 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
     scene, pass_ = scenes[0], passes[0]
     most = most_pieces(projections[0]) * pass_.max_bounces * (MOST_COPIES if pass_.roulette == EQUAL else 1)
     for i in range(i0, i1):
-        full = counts[C_GLOBAL] + most > len(global_out) or counts[C_CAUSTIC] + most > len(caustic_out)
-        if full or is_full(volume_out, counts, most):
+        if _are_full(global_out, caustic_out, counts, most) or is_full(volume_out, counts, most):
             return i
         to_global = i < pass_.global_trajectories
         kind = 0 if to_global else 1
@@ -175,8 +174,7 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 wi = (-d[0], -d[1], -d[2])
                 b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy, wave)
                 wave, beta = _met(scene, b, wave, beta, whole, ledgers, kind)
-                kept = keeps(scene, material, b, ng, wi, pass_.glossy)
-                before = luminance(beta)
+                kept, before = keeps(scene, material, b, ng, wi, pass_.glossy), luminance(beta)
                 if b.groups | kept == NOTHING or not before > _f4(0.0):
                     ledgers[kind, E_ABSORBED] += _f8(before * factor)
                     break
@@ -229,6 +227,12 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 photon, factor, deltas = split
                 seed, whole = hash3(seed, _u4(piece), _u4(PIECE_SALT)), _f4(0.0)
     return i1
+
+
+@inlined
+def _are_full(global_out, caustic_out, counts, most):
+    """Whether one of both maps' rows may not hold `most` more."""
+    return counts[C_GLOBAL] + most > len(global_out) or counts[C_CAUSTIC] + most > len(caustic_out)
 
 
 @inlined
