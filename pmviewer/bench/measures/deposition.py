@@ -148,9 +148,9 @@ def _row(scene: str, method: str, rule: str, n: int, made: Measured, all_: Measu
     off, mean = made.images - all_.images, (all_.images @ LUMINANCE).mean()
     differs = 100 * float(np.abs(off @ LUMINANCE).mean() / mean)
     variance = made.indirect_variance(target) if len(made.images) > 1 else math.nan
-    row = [scene, method, rule, n, round(made.held), made.held / all_.held, made.error(target), variance, differs,
-           100 * float((off @ LUMINANCE).mean() / mean), 100 * made.discarded, made.light / all_.light,
-           made.cpu / all_.cpu]  # fmt: skip
+    row: list[Any] = [scene, method, rule, n, round(made.held), made.held / all_.held, made.error(target), variance,
+                      differs, 100 * float((off @ LUMINANCE).mean() / mean), 100 * made.discarded,
+                      made.light / all_.light, made.cpu / all_.cpu]  # fmt: skip
     _tell(", ".join(f"{name} {format_cell(cell)}" for name, cell in zip(COLUMNS, row, strict=True)))
     return row
 
