@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from pmviewer.maps.density.growing_tree import M
 from pmviewer.maps.importance.importance_map import ImportanceMap, required_density
-from pmviewer.maps.importance.look_up import importance_sums, importances, nearest_importances
-from pmviewer.maps.importance.reached import reached_boxes
+from pmviewer.maps.importance.look_up import importance_sums, nearest_importances
+from pmviewer.maps.importance.reached import importances_within, reached_boxes
 from pmviewer.maps.record import decode_directions
 
 Float = NDArray[np.float32]
@@ -39,14 +39,11 @@ def _evaluated(kernel: Any, importance: ImportanceMap, positions: Float, normals
 
 
 def _gamma_of(importance: ImportanceMap) -> Evaluate:
-    """Γ in pixels per unit area. It is looked up where an importon's reach may go alone: elsewhere it is 0, and a
-    search would visit all the importons that face another way, as far as the farthest reach of any."""
-    reached = reached_boxes(importance.positions, importance.reach)
+    """Γ in pixels per unit area, searched for no farther than it has to be."""
+    boxes = reached_boxes(importance.positions, importance.reach)
 
     def evaluate(positions: Float, normals: Codes) -> Float:
-        out, near = np.zeros(len(positions), np.float32), np.flatnonzero(reached.at(positions))
-        out[near] = _evaluated(importances, importance, positions[near], normals[near])
-        return out
+        return _evaluated(importances_within, importance, positions, normals, boxes.at(positions))
 
     return evaluate
 

@@ -165,10 +165,11 @@ def test_boxes_hold_every_place_that_an_importon_reaches():
     boxes = reached_boxes(positions, reach)
     places = (rng.random((4000, 3)) * [14, 3, 8] - [2, 1, 2]).astype(np.float32)
     distance = np.linalg.norm(places[:, None].astype(float) - positions, axis=2)
-    within = (distance <= reach).any(axis=1)
+    touched = np.where(distance <= reach, reach, 0).max(axis=1)
+    within = touched > 0
     assert 0.02 < within.mean() < 0.5
-    assert boxes.at(places)[within].all()
-    assert boxes.at(places).mean() < 0.6
+    assert (boxes.at(places) >= touched).all()
+    assert (boxes.at(places) > 0).mean() < 0.6
     assert not boxes.at(np.full((1, 3), np.nan, np.float32)).any()
     assert not reached_boxes(positions[:0], reach[:0]).at(places).any()
 
