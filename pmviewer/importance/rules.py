@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from pmviewer.maps.density.growing_tree import M
 from pmviewer.maps.importance.importance_map import ImportanceMap, required_density
-from pmviewer.maps.importance.look_up import importance_sums, importances, nearest_importances
+from pmviewer.maps.importance.look_up import importance_sums, nearest_importances
+from pmviewer.maps.importance.reached import importances_within, reached_boxes
 from pmviewer.maps.record import decode_directions
 
 Float = NDArray[np.float32]
@@ -37,6 +38,16 @@ def _evaluated(kernel: Any, importance: ImportanceMap, positions: Float, normals
     return out
 
 
+def _gamma_of(importance: ImportanceMap) -> Evaluate:
+    """Γ in pixels per unit area, searched for no farther than it has to be."""
+    boxes = reached_boxes(importance.positions, importance.reach)
+
+    def evaluate(positions: Float, normals: Codes) -> Float:
+        return _evaluated(importances_within, importance, positions, normals, boxes.at(positions))
+
+    return evaluate
+
+
 def important_weight(importance: ImportanceMap, positions: Float, normals: Codes) -> Float:
     """ΣW in pixels at positions (n, 3) with normal codes (n,)."""
     return _evaluated(importance_sums, importance, positions, normals, np.int32(NEAREST))
@@ -53,10 +64,10 @@ def probability_of(importance: ImportanceMap, f: float) -> Evaluate:
 
 def density_of(importance: ImportanceMap, M_r: float) -> Evaluate:
     """D_r in photons per unit area, 0 where nothing looks; M_r photons a pixel."""
+    gamma = _gamma_of(importance)
 
     def evaluate(positions: Float, normals: Codes) -> Float:
-        gamma = _evaluated(importances, importance, positions, normals)
-        return np.asarray(required_density(gamma, M_r), np.float32)
+        return np.asarray(required_density(gamma(positions, normals), M_r), np.float32)
 
     return evaluate
 
@@ -104,10 +115,11 @@ def full_importance(importance: ImportanceMap) -> float:
 
 def relative_importance(importance: ImportanceMap, full: float, most: float = 1.0) -> Evaluate:
     """Γ relative to `full`, at most `most`; 0 everywhere if `full` is."""
+    gamma = _gamma_of(importance)
 
     def evaluate(positions: Float, normals: Codes) -> Float:
         if not full > 0:
             return np.zeros(len(positions), np.float32)
-        return np.minimum(_evaluated(importances, importance, positions, normals) / np.float32(full), np.float32(most))
+        return np.minimum(gamma(positions, normals) / np.float32(full), np.float32(most))
 
     return evaluate

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from pmviewer.bench.measures.emission_bound import Seen, best_saving
+from pmviewer.bench.measures.emission_bound import Seen, best_saving, saving_of
 from pmviewer.photons.emission.strata import Strata
 from tests.support.naive_maps import pack
 
@@ -22,6 +22,20 @@ def test_saving_of_the_best_table():
     tables = np.random.default_rng(1).dirichlet(np.ones(3), 20_000)
     tried = (q * V).sum() / (q * q * V / tables).sum(axis=1)
     assert tried.max() <= best_saving(strata(q), V) <= 1.01 * tried.max()
+
+
+def test_saving_of_a_known_table():
+    """By hand for two strata, and never more than that of the best table, however noisy what is known."""
+    two = strata([0.5, 0.5])
+    share = np.array([0.9 * 0.75 + 0.05, 0.9 * 0.25 + 0.05])
+    by_hand = 4 / (0.75 / share[0] + 1.25 / share[1])
+    assert saving_of(two, np.array([9.0, 1.0]), np.array([3.0, 5.0])) == pytest.approx(by_hand)
+    rng = np.random.default_rng(2)
+    q, V = rng.dirichlet(np.ones(50)), rng.exponential(size=50) ** 3
+    noisy = [saving_of(strata(q), V * rng.exponential(size=50), V) for _ in range(200)]
+    assert max(noisy) <= saving_of(strata(q), V, V) * 1.02
+    assert max(noisy) <= best_saving(strata(q), V)
+    assert saving_of(two, np.zeros(2), np.ones(2)) == 1
 
 
 def test_value_of_photons():

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pmviewer.importance.rules import density_beyond
+from pmviewer.importance.rules import density_beyond, density_of
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.importance.build import build_importance
 from pmviewer.maps.importance.importance_map import NO_IMPORTANCE, Importons, required_density
 from pmviewer.maps.importance.look_up import importance_sums, importances
+from pmviewer.maps.importance.reached import reached_boxes
 from pmviewer.maps.photon_words import encode_direction
 from pmviewer.maps.record import unpack
 
@@ -154,3 +155,34 @@ def test_density_beyond_keeps_power_from_important_places():
     assert 0 < np.count_nonzero(expected < far) < 300
     none = build_importance(importons(places[:0]), "screen", 2.0)
     assert np.all(density_beyond(none, 7.0, 0.5)(points) == 0)
+
+
+def test_boxes_hold_every_place_that_an_importon_reaches():
+    """By brute force, for reaches from next to nothing to most of the scene; and far places are told apart."""
+    rng = np.random.default_rng(8)
+    positions = (rng.random((300, 3)) * [10, 1, 4]).astype(np.float32)
+    reach = (10 ** rng.uniform(-3, -0.1, 300)).astype(np.float32)
+    boxes = reached_boxes(positions, reach)
+    places = (rng.random((4000, 3)) * [14, 3, 8] - [2, 1, 2]).astype(np.float32)
+    distance = np.linalg.norm(places[:, None].astype(float) - positions, axis=2)
+    touched = np.where(distance <= reach, reach, 0).max(axis=1)
+    within = touched > 0
+    assert 0.02 < within.mean() < 0.5
+    assert (boxes.at(places) >= touched).all()
+    assert (boxes.at(places) > 0).mean() < 0.6
+    assert not boxes.at(np.full((1, 3), np.nan, np.float32)).any()
+    assert not reached_boxes(positions[:0], reach[:0]).at(places).any()
+
+
+def test_importance_is_the_same_by_boxes():
+    """What rules ask for is what the look-up says, on both sides and far away."""
+    built = build_importance(importons(on_square()), "screen", 1.0)
+    rng = np.random.default_rng(3)
+    places = rng.uniform(-2, 2, (3000, 3)).astype(np.float32)
+    places[::2, 2] *= np.float32(0.01)
+    for normal in (UP, tuple(-x for x in UP)):
+        codes = np.empty(len(places), np.uint32)
+        _codes(np.tile(np.array([normal], np.float32), (len(places), 1)), codes)
+        plain = looked_up(built, places, normal)
+        np.testing.assert_array_equal(density_of(built, 3.0)(places, codes), required_density(plain, 3.0))
+        assert (plain > 0).any() == (normal == UP)

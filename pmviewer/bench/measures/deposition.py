@@ -21,6 +21,7 @@ having fewer photons: beside it stands how much two pictures with all photons di
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench.measures.error import reference
-from pmviewer.bench.report import BenchResult, Target
+from pmviewer.bench.report import BenchResult, Target, format_cell
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
@@ -147,9 +148,16 @@ def _row(scene: str, method: str, rule: str, n: int, made: Measured, all_: Measu
     off, mean = made.images - all_.images, (all_.images @ LUMINANCE).mean()
     differs = 100 * float(np.abs(off @ LUMINANCE).mean() / mean)
     variance = made.indirect_variance(target) if len(made.images) > 1 else math.nan
-    return [scene, method, rule, n, round(made.held), made.held / all_.held, made.error(target), variance, differs,
-            100 * float((off @ LUMINANCE).mean() / mean), 100 * made.discarded, made.light / all_.light,
-            made.cpu / all_.cpu]  # fmt: skip
+    row: list[Any] = [scene, method, rule, n, round(made.held), made.held / all_.held, made.error(target), variance,
+                      differs, 100 * float((off @ LUMINANCE).mean() / mean), 100 * made.discarded,
+                      made.light / all_.light, made.cpu / all_.cpu]  # fmt: skip
+    _tell(", ".join(f"{name} {format_cell(cell)}" for name, cell in zip(COLUMNS, row, strict=True)))
+    return row
+
+
+def _tell(line: str) -> None:
+    """What is known so far, while the rest is measured."""
+    print(line, file=sys.stderr, flush=True)
 
 
 def rooms(quick: bool, pool: WorkPool) -> tuple[list[list[Any]], list[Target]]:
@@ -198,11 +206,14 @@ def unbiased(method: str, pool: WorkPool) -> list[Target]:
     blocks = z_test(a.mean(axis=0), variances[0], b.mean(axis=0), variances[1], block=1)
     setup = f"{said({'render.method': method} | KELLER_WALD)}, {Z_SIZE} × {Z_SIZE} pixels"
     note = f"{ROOMS}, {setup}, {Z_SEEDS} seeds: against storing all"
-    return [
+    targets = [
         Target("I4", abs(z), 3.0, "σ", False, f"{note}, mean luminance"),
         Target("I4", blocks.p_value, 0.01, "", True, f"{note}, p-value of {blocks.blocks} blocks, max z "
                f"{blocks.max_z:.2f}"),
     ]  # fmt: skip
+    for target in targets:
+        _tell(target.line())
+    return targets
 
 
 def said(values: dict[str, Any]) -> str:

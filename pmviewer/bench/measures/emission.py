@@ -3,20 +3,22 @@
 A hundred rooms with a light in each, seen by the scene's camera, which looks through doors into others, and by one in
 the corner room that sees this room alone. The error is the mean squared error of the indirect term over many seeds,
 relative to the squared mean; the truth is the mean of the unbiased variants, which all have the same expectation: z
-tells how far their means are apart in standard errors. All trajectories count, those of test photons too.
+tells how far their means are apart in standard errors. All trajectories count, those of test photons too, and so do
+the pieces that photons are split into: each is traced as a photon is.
 
 Without guiding the error is measured for several numbers of photons (MORE), and read off at the error of each variant:
 so many photons over those of the variant are the gain. The ratio of errors at one number of photons is not, since a
 part of the error is that of camera rays, which photons do not mend.
 
-Beside each gain stands what the best emission could gain in that view, with the strata that a pass has
-(`pmviewer.bench.measures.emission_bound`).
+Beside each gain stands what the best table of emission could gain in that view by itself, with the strata that a pass
+has and without splitting (`pmviewer.bench.measures.emission_bound`).
 
 Weights are those of the photons that are stored in important places.
 """
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,11 +55,11 @@ DARK = 0.01
 
 @dataclass(frozen=True)
 class Measured:
-    """One variant: indirect images (seeds, h, w, 3) after all passes; trajectories and stored photons of a run; weights
-    of stored photons in important places, all seeds together."""
+    """One variant: indirect images (seeds, h, w, 3) after all passes; trajectories, and pieces of others, of a run, and
+    stored photons; weights of stored photons in important places, all seeds together."""
 
     images: NDArray[np.float64]
-    traced: int
+    traced: float
     stored: int
     weights: NDArray[np.float64]
 
@@ -74,7 +76,7 @@ def measure(
     """Render with every seed."""
     images: list[NDArray[np.float64]] = []
     weights: list[NDArray[np.float64]] = []
-    traced = stored = 0
+    traced, stored = 0.0, 0
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
         chosen = {"importance.emission": variant, "importance.map": "average", "render.seed": seed}
         settings = with_values(Settings(), values | chosen)
@@ -83,12 +85,18 @@ def measure(
         renderer = Renderer(opened, settings, pool, StageStore(0))
         for _ in range(passes):
             renderer.step()
+            assert renderer.light.photons is not None
+            traced += renderer.light.photons.pieces / seeds
         frame = renderer.frame(0)
         images.append(frame.image("indirect").astype(np.float64))
-        traced, stored = frame.statistics.emitted, frame.statistics.stored["global"]
+        traced += frame.statistics.emitted / seeds
+        stored = frame.statistics.stored["global"]
         if len(weights) < 4:
             weights.append(important_weights(renderer))
-    return Measured(np.array(images), traced, stored, np.concatenate(weights))
+    made = Measured(np.array(images), traced, stored, np.concatenate(weights))
+    what = f"{variant}, {round(traced):,} traced, {seeds} seeds: mean {made.mean[0]:.5g} ± {made.mean[1]:.2g}"
+    print(what, file=sys.stderr, flush=True)
+    return made
 
 
 def important_weights(renderer: Renderer) -> NDArray[np.float64]:
@@ -126,12 +134,12 @@ def compare(
         error[variant] = float(spread + (max(bias, 0.0) if variant not in UNBIASED else 0.0))
     rows: list[list[str | float | int]] = []
     targets = []
-    errors, traced = [error["off"]], [float(made["off"].traced)]
+    errors, traced = [error["off"]], [made["off"].traced]
     for more in MORE:
         some = measure(opened, values | VIEWS[view] | {"photons.N": more * N}, "off", passes, pool, seeds // 3)
         errors.append(float((some.images.var(axis=0, ddof=1) * weight).mean()))
-        traced.append(float(some.traced))
-        rows.append([view, "off", some.traced, some.stored, errors[-1], 1.0, 0.0, 0.0, 1.0, 1.0])
+        traced.append(some.traced)
+        rows.append([view, "off", round(some.traced), some.stored, errors[-1], 1.0, 0.0, 0.0, 1.0, 1.0])
     bound = _bound(view, opened, values, weight, pool, trajectories)
     for variant, m in made.items():
         gain, z, spread = held_for(error[variant], errors, traced) / m.traced, 0.0, [1.0, 1.0]
@@ -143,13 +151,13 @@ def compare(
             spread = [high / low, largest / median]
             changed = ", ".join(f"{path}={value}" for path, value in (values | VIEWS[view]).items())
             what = f"{view}, importance.emission={variant}, importance.map=average, {changed}, {passes} passes"
-            best = f"; the best table of {bound.n} strata gains at most {bound.of_strata:.3g}"
+            best = f"; without splitting the best table of {bound.n} strata gains {bound.least:.3g} to {bound.most:.3g}"
             targets.append(Target("I6", gain, 8.0, "× fewer traced photons", True, what + best))
             targets.append(Target("I6", spread[1], MOST_SPREAD, "× the median is the largest weight", False, what))
             if variant in UNBIASED:
                 targets.append(Target("I6", abs(z), 3.0, "standard errors off in the mean", False, what))
         bias = 100 * (m.mean[0] / float(truth.mean()) - 1)
-        rows.append([view, variant, m.traced, m.stored, error[variant], gain, bias, z, *spread])
+        rows.append([view, variant, round(m.traced), m.stored, error[variant], gain, bias, z, *spread])
     columns = ["view", "emission", "traced", "stored", "error", "gain", "mean %", "z", "weights 99/1", "largest/median"]
     return BenchResult("Guided emission", columns, rows, targets)
 

@@ -1,4 +1,4 @@
-"""How much any emission of photons could save in a view: the least error that the best one could have (I6).
+"""How much any table of emission could save in a view by itself, without splitting (I6).
 
 For photons of a pass's size that start independently of each other, the error of the picture, Σ w_p·Var(pixel p), is
 Σ q_s²·V_s/p_s /N: q_s is the share of stratum s in the power, p_s that in the trajectories, V_s the mean of Σ w_p·f_p²
@@ -7,7 +7,9 @@ over its trajectories, f_p being what one brings to pixel p with power 1. (The s
 
 the best table of strata, perfectly known, has (Σ q_s·√V_s)². V_s from some trajectories is noisy, and by Jensen's
 inequality its root too small: the saving seems larger than it is. The figure is a bound from above for these strata,
-the closer the more trajectories. Finer strata could do more, if the test photons of a pass sufficed to know them.
+the closer the more trajectories. A bound from below is what the table by one half of the trajectories saves as the
+other half judges it, with a share DEFENSIVE by power as guided emission has it: the best table is not worse. Finer
+strata could do more, if the test photons of a pass sufficed to know them.
 
 All is measured with photons of the light pass at points seen through the middles of pixels: V of a photon is the sum
 over the pixels with it in their look-up disc. A trajectory's photons in one disc are counted apart (few are), and the
@@ -24,6 +26,7 @@ from scipy.spatial import cKDTree
 
 from pmviewer.engine.renderer import Renderer
 from pmviewer.maps.record import decode_directions, in_classes, unpack
+from pmviewer.photons.emission.guided import DEFENSIVE
 from pmviewer.photons.emission.strata import Strata, strata_of
 from pmviewer.photons.emission.tested import Batch, trace_tests
 from pmviewer.photons.light_pass.batch import BATCH
@@ -38,10 +41,11 @@ SEED = 0xB0D1
 
 @dataclass(frozen=True)
 class Bound:
-    """Photons by power over those of the best emission for the same error, of `n` strata."""
+    """Photons by power over those of the best table of `n` strata for the same error: at least and at most."""
 
     n: int
-    of_strata: float
+    least: float
+    most: float
 
 
 @dataclass(frozen=True)
@@ -80,8 +84,8 @@ def seen_of(renderer: Renderer, weight: Float) -> Seen:
     return Seen(cKDTree(points[found]), decode_directions(codes[found]), weights, radius)
 
 
-def value_of_strata(renderer: Renderer, seen: Seen, strata: Strata, each: int) -> Float:
-    """V_s (strata,) from `each` trajectories of every stratum."""
+def value_of_strata(renderer: Renderer, seen: Seen, strata: Strata, each: int, first_fold: int) -> Float:
+    """V_s (strata,) from `each` trajectories of every stratum, others for each `first_fold`."""
     plan, settings = renderer.plan, renderer.settings
     trace = testing(renderer.scene.flat, settings.photons, 0, bool(plan.caustic_mask))
     total = np.zeros(strata.n)
@@ -94,7 +98,8 @@ def value_of_strata(renderer: Renderer, seen: Seen, strata: Strata, each: int) -
         return np.asarray(np.bincount(number % strata.n, seen.value(photons), strata.n), np.float64)
 
     for first in range(0, each, 4):  # in parts: all photons together would need much memory
-        tests = trace_tests(strata, min(4, each - first), first, SEED, BATCH, trace, (), renderer.pool.run)
+        fold, number = first_fold + first, min(4, each - first)
+        tests = trace_tests(strata, number, fold, SEED, BATCH, trace, (), renderer.pool.run)
         total += np.sum([add(batch) for batch in tests.batches], axis=0)
     return total / each
 
@@ -105,9 +110,20 @@ def best_saving(strata: Strata, value: Float) -> float:
     return float((strata.power * value).sum()) / best if best > 0 else 1.0
 
 
+def saving_of(strata: Strata, known: Float, judged: Float) -> float:
+    """Error by power over that of the table by V_s `known`, for strata of V_s `judged`."""
+    table = strata.power * np.sqrt(known)
+    if not table.any():
+        return 1.0
+    share = (1 - DEFENSIVE) * table / table.sum() + DEFENSIVE * strata.power
+    return float((strata.power * judged).sum() / (strata.power**2 * judged / share).sum())
+
+
 def bound_of(renderer: Renderer, weight: Float, most: int, trajectories: int) -> Bound:
     """For the view of a renderer and at most so many strata. weight: see `seen_of`."""
     strata = strata_of(renderer.scene.flat, most)
     assert strata is not None
-    value = value_of_strata(renderer, seen_of(renderer, weight), strata, max(trajectories // strata.n, 4))
-    return Bound(strata.n, best_saving(strata, value))
+    seen, each = seen_of(renderer, weight), max(trajectories // strata.n // 2, 4)
+    a, b = (value_of_strata(renderer, seen, strata, each, half << 20) for half in (0, 1))
+    inverse = [1 / saving_of(strata, known, judged) for known, judged in ((a, b), (b, a))]
+    return Bound(strata.n, 2 / sum(inverse), best_saving(strata, (a + b) / 2))

@@ -16,6 +16,11 @@ from pmviewer.scene.spectrum import of_bands
 GONE = "The pass that stored this photon is over, and with guided emission it can't be traced again: choose one anew."
 NOT_TRACED = "This photon is one of the test photons of guided emission, whose paths aren't traced again."
 
+OF_A_PIECE = (
+    "Guided emission split this photon off another one where it came to an important place; the ways of such pieces "
+    "aren't traced again."
+)
+
 
 def life_of(tracer: Tracer, maps: PassMaps, photon: PhotonAt) -> PhotonLife:
     """Traced by one light pass more, less what comes after the photon. Passes that are over are traced as well, but
@@ -31,6 +36,8 @@ def life_of(tracer: Tracer, maps: PassMaps, photon: PhotonAt) -> PhotonLife:
     paths = path_of(tracer.flat, plan, trajectory, tracer.run)
     vertices = paths.vertices[0, : paths.counts[0]].copy()
     at = np.flatnonzero((vertices[:, :3] == place).all(axis=1))
+    if not len(at) and guided is not None:
+        return PhotonLife(photon, note=OF_A_PIECE)
     light = int(vertices[:1].view(np.uint32)[0, 5] >> 16) if len(vertices) else 0
     names = tracer.flat.light_names
     name = names[light] if light < len(names) else str(light + 1)

@@ -20,6 +20,7 @@ from pmviewer.photons.deposition.rules import Deposition, Homogeneous, Rule
 from pmviewer.photons.emission.guided import Guidance, Guided, Known
 from pmviewer.photons.emission.scattered import FIRST
 from pmviewer.photons.emission.tested import Sought
+from pmviewer.photons.emission.window import Window, window_of
 from pmviewer.photons.light_pass.light_pass import scattered_photons
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.settings.access import Settings
@@ -48,7 +49,7 @@ def guidance_of(settings: Settings, plan: Plan, importance: ImportanceStage) -> 
     maps, asked = importance.latest, settings.importance
     if plan.emission == "off" or maps is None or maps.n == 0:
         return None
-    sought, first = [], 1 << DIRECT | 1 << CAUSTIC
+    sought, window, first = [], None, 1 << DIRECT | 1 << CAUSTIC
     if classes := plan.caustic_classes:
         made = importance_of(maps, "caustic")
         weight = asked.caustic_M_r / asked.M_r if plan.global_classes else 1.0
@@ -59,7 +60,21 @@ def guidance_of(settings: Settings, plan: Plan, importance: ImportanceStage) -> 
         full, further = full_importance(made), _scattered(settings, importance, made)
         sought.append(Sought("global", relative_importance(made, full), classes & first, classes))
         sought.append(Sought("global", relative_importance(further, full, np.inf), first, 0))
-    return Guidance(plan.emission, sought, asked.tests, asked.important)
+        window = _window(importance, further, full)
+    return Guidance(plan.emission, sought, asked.tests, asked.important, window)
+
+
+def _window(importance: ImportanceStage, further: ImportanceMap, full: float) -> Window | None:
+    """Importance to photons that go on, by boxes: relative to `full`, as test photons meet it."""
+    assert importance.latest is not None
+    if not (further.n and full > 0):
+        return None
+
+    def make() -> Window:
+        return window_of(further.positions, further.normals, further.gamma / np.float32(full))
+
+    key = "importance by boxes", importance.key, importance.settings.photons, importance.latest.traced
+    return importance.store.get(key, make, lambda made: made.bytes)
 
 
 def _scattered(settings: Settings, importance: ImportanceStage, made: ImportanceMap) -> ImportanceMap:

@@ -25,6 +25,9 @@ W_s·N/(n·p_s).
 In both no photon has more power than test photons do, those of refined strata have less the more they matter, and what
 arrives at one place from strata of different importance differs by the root of that.
 
+**Splitting.** A photon's power is about κ/√I, I being that of its stratum. More important places that it comes to
+by chance, through a door, ask for less: there it goes on in pieces (`pmviewer.photons.emission.window`).
+
 **Bias.** What decides about a photon's power must not know where that photon went. Peter-Pietrek's test photons, those
 of earlier passes, and in Christensen keep those of the other set, are independent of it: both are exact in the mean.
 The price is a rare photon of high power that reaches an important place though no test photon did. In Christensen
@@ -37,7 +40,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -46,6 +49,7 @@ from numpy.typing import NDArray
 from pmviewer.photons.emission.light_importance import LightImportance
 from pmviewer.photons.emission.strata import Strata, StrataTable, strata_of, table_of
 from pmviewer.photons.emission.tested import Runner, Sought, Tested, TraceBatch, trace_tests, weighed
+from pmviewer.photons.emission.window import Window
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.state import State
 
@@ -61,7 +65,7 @@ MOST_WEIGHT = 4.0
 where nothing is known to matter for that; the test photons alone, an eighth, would have 8."""
 SCALES = (4, 1)
 """Blurs of growing sharpness in which importance is estimated, between the whole light and the stratum itself."""
-PRIOR = 4.0
+PRIOR = 2.0
 """Test photons that the coarser estimate counts for in the finer one."""
 TEST_SHARE = {"Peter-Pietrek": 1 / 16, "Christensen discard": 1 / 8, "Christensen keep": 1 / 8}
 """Most test photons of a pass relative to all its photons."""
@@ -70,12 +74,14 @@ TEST_SHARE = {"Peter-Pietrek": 1 / 16, "Christensen discard": 1 / 8, "Christense
 @dataclass(frozen=True)
 class Guidance:
     """What guided emission is asked for: at least `tests` test photons a stratum, and `important`, the importance
-    (0 … 1) from which a place is important to the discard variant."""
+    (0 … 1) from which a place is important to the discard variant. `window` is the importance of places to photons that
+    go on from there, by which they are split (`pmviewer.photons.emission.window`)."""
 
     variant: Variant
     sought: Sequence[Sought]
     tests: int
     important: float
+    window: Window | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +146,8 @@ def guided_emission(
     if strata is None:
         return None
     each = most // strata.n // 2 * 2
-    folds = [trace_tests(strata, each // 2, fold, seed, size, trace, guidance.sought, run) for fold in (0, 1)]
+    sought = _asked_of_tests(guidance)
+    folds = [trace_tests(strata, each // 2, fold, seed, size, trace, sought, run) for fold in (0, 1)]
     nothing = Known(*np.zeros((3, strata.n)))
     sets = [known_of(strata, tests, guidance.important) for tests in folds]
     tested, before = each * strata.n, before or nothing
@@ -164,9 +171,15 @@ def guided_emission(
             f"Guided emission: none of {tested:,} test photons met an important place, so photons leave the lights by "
             "power. More photons (photons.N) may find a way.",
         )
-    used = weight[share > 0]
+    used, kappa = weight[share > 0], _kappa(strata, known, weight)
     return Guided(
-        table=table_of(strata, share if share.any() else strata.power, weight),
+        table=table_of(
+            strata,
+            share if share.any() else strata.power,
+            weight,
+            guidance.window if kappa > 0 else None,
+            1 / kappa if kappa > 0 else 0.0,
+        ),
         n=n if share.any() else 0,
         N=N,
         tested=tested,
@@ -178,6 +191,22 @@ def guided_emission(
         known=known,
         notes=notes,
     )
+
+
+def _kappa(strata: Strata, known: Known, weight: Float) -> float:
+    """κ: the mean of power × √I over what strata bring to the picture, so that those that bring little, whose power is
+    bounded, don't tell. 0 where nothing was met."""
+    met = np.where(weight > 0, estimated(strata, known), 0.0)
+    brought = strata.power * met
+    return float((brought * weight * np.sqrt(met)).sum() / brought.sum()) if brought.any() else 0.0
+
+
+def _asked_of_tests(guidance: Guidance) -> list[Sought]:
+    """What test photons are asked for: which places are important concerns the discard variant alone, and look-ups of
+    importance where there is none are dear."""
+    if guidance.variant == "Christensen discard":
+        return list(guidance.sought)
+    return [replace(goal, places=0) for goal in guidance.sought if goal.classes]
 
 
 Decision = tuple[Float, Float, tuple[Float, Float]]

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels import scene as K
 from pmviewer.photons.emission.stratified import STRATA_DTYPE
+from pmviewer.photons.emission.window import Window, fill_window
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.scene.description import LUMINANCE
 
@@ -53,6 +54,7 @@ class StrataTable:
 
     records: NDArray[np.void]
     arrays: tuple[NDArray, ...]
+    window: Window | None = None
 
 
 def strata_of(scene: FlatScene, most: int) -> Strata | None:
@@ -84,7 +86,13 @@ def _divisions(kind: int, n: int) -> tuple[int, int, int, int]:
     return 2, 2, root, root
 
 
-def table_of(strata: Strata, share: NDArray[np.float64] | None, weight: NDArray[np.float64] | None) -> StrataTable:
+def table_of(
+    strata: Strata,
+    share: NDArray[np.float64] | None,
+    weight: NDArray[np.float64] | None,
+    window: Window | None = None,
+    pieces_of: float = 0.0,
+) -> StrataTable:
     """The table by which photons start in stratum s with probability ∝ share[s] and power weight[s], in units of the
     map's; (n,) both. With None for them that of test photons: each stratum in turn, of power 1."""
     even = share is None
@@ -101,4 +109,5 @@ def table_of(strata: Strata, share: NDArray[np.float64] | None, weight: NDArray[
     records["strata"], records["tests"] = strata.n, even
     for name, array in zip(("cdf", "light", "first", "cells", "weight"), arrays, strict=True):
         records[name] = array.ctypes.data
-    return StrataTable(records, arrays)
+    fill_window(records, window, pieces_of)
+    return StrataTable(records, arrays, window)

@@ -10,6 +10,7 @@ from pmviewer.kernels.dimensions import STRATUM
 from pmviewer.kernels.lights.light import emit_from
 from pmviewer.kernels.memory import load_f4, load_f8, load_i4
 from pmviewer.kernels.random import INDEPENDENT, draw1
+from pmviewer.photons.emission.window import WINDOW_FIELDS
 
 STRATA_DTYPE = np.dtype(
     [
@@ -20,6 +21,7 @@ STRATA_DTYPE = np.dtype(
         ("first", "i8"),  # int32 (n_lights,): each light's first stratum
         ("cells", "i8"),  # int32 (n_lights, 4): divisions of the place's two numbers and of the direction's
         ("weight", "i8"),  # float32 (strata,): power of their photons in units of the map's
+        *WINDOW_FIELDS,
     ],
     align=True,
 )

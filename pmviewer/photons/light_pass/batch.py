@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.errors import SettingError
+from pmviewer.photons.emission.window import MOST_PIECES
 from pmviewer.photons.light_pass.ledger import C_CAUSTIC, C_GLOBAL, C_VOLUME, N_COUNTS, empty_ledger
 from pmviewer.photons.light_pass.paths import PhotonPaths
 from pmviewer.photons.light_pass.roulette import EQUAL, MOST_COPIES
@@ -75,6 +76,8 @@ def trace_batch(
     most = int(pass_["max_bounces"])
     if pass_["roulette"] == EQUAL:
         most *= MOST_COPIES
+    if "pieces_of" in (emission.dtype.names or ()) and emission["pieces_of"][0] > 0:
+        most *= MOST_PIECES
     counts, ledgers = np.zeros(N_COUNTS, np.int64), empty_ledger()
     parts: list[tuple[Float, Float, Codes, Codes, Float]] = []
     while i0 < i1:

@@ -15,7 +15,7 @@ from pmviewer.photons.deposition.depositor import Depositor, Judged
 from pmviewer.photons.deposition.fates import Fates
 from pmviewer.photons.deposition.rules import Deposition, rounds
 from pmviewer.photons.light_pass.batch import BATCH, Codes, Float, Numbered, joined
-from pmviewer.photons.light_pass.ledger import C_DROPPED, C_RAYS, N_COUNTS, empty_ledger
+from pmviewer.photons.light_pass.ledger import C_DROPPED, C_PIECES, C_RAYS, N_COUNTS, empty_ledger
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.photons.light_pass.plan import PassPlan
 from pmviewer.tasks import Runner
@@ -83,6 +83,7 @@ def deposit(
         global_unit=in_global[2],
         emitted=last,
         rays=int(counts[C_RAYS]),
+        pieces=int(counts[C_PIECES]),
         dropped=int(counts[C_DROPPED]),
         ledgers=ledgers,
         energy=plan.energy(ledgers),

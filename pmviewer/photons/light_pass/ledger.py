@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-N_COUNTS = 5
-C_GLOBAL, C_CAUSTIC, C_RAYS, C_DROPPED, C_VOLUME = range(N_COUNTS)
+N_COUNTS = 6
+C_GLOBAL, C_CAUSTIC, C_RAYS, C_DROPPED, C_VOLUME, C_PIECES = range(N_COUNTS)
 N_LEDGER = 6
 E_EMITTED, E_STORED, E_ABSORBED, E_ESCAPED, E_TERMINATED, E_DROPPED = range(N_LEDGER)
 """Energy ledger: luminance of power in units of the map's. What roulette gives a survivor or takes from a victim counts

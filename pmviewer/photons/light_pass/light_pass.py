@@ -32,7 +32,7 @@ from pmviewer.photons.light_pass.batch import (
     trace_batch,
 )
 from pmviewer.photons.light_pass.deposit import deposit
-from pmviewer.photons.light_pass.ledger import C_DROPPED, C_RAYS
+from pmviewer.photons.light_pass.ledger import C_DROPPED, C_PIECES, C_RAYS
 from pmviewer.photons.light_pass.parts import cuts_of
 from pmviewer.photons.light_pass.paths import PhotonPaths
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
@@ -119,6 +119,7 @@ def _joined(plan: PassPlan, results: Sequence[Batch], last: int, run: Runner) ->
         global_unit=plan.global_unit,
         emitted=last,
         rays=int(whole.counts[C_RAYS]),
+        pieces=int(whole.counts[C_PIECES]),
         dropped=int(whole.counts[C_DROPPED]),
         ledgers=whole.ledgers,
         energy=plan.energy(whole.ledgers),

@@ -48,6 +48,8 @@ class PhotonMaps:
     """Photons (n, 6) that collided in media after they were scattered, with the power that they were scattered with, in
     units of `volume_unit`."""
     volume_unit: float = 0.0
+    pieces: int = 0
+    """Photons that others were split into on their way, beside themselves (`pmviewer.photons.emission.window`)."""
     cuts: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
     """Of a pass in M parts: (M + 1,) rows between which the photons of each part are, in the caustic and the global
     map."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
 from pmviewer.photons.bounces import most_bounces
 from pmviewer.photons.emission.guided import Guided
+from pmviewer.photons.emission.window import MOST_PIECES
 from pmviewer.photons.light_pass.ledger import E_ABSORBED, E_DROPPED, E_EMITTED, E_ESCAPED, E_TERMINATED
 from pmviewer.photons.light_pass.roulette import MOST_COPIES, RULES
 from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE
@@ -145,7 +146,9 @@ def plan_pass(
         surface_power=surface_power,
         caustic_power=caustic_power,
         direct_scale=direct_scale,
-        most_stored=most_bounces(settings, scene.has_media) * (MOST_COPIES if settings.roulette == "equal" else 1),
+        most_stored=most_bounces(settings, scene.has_media)
+        * (MOST_COPIES if settings.roulette == "equal" else 1)
+        * (MOST_PIECES if guided is not None else 1),
         projected=projection is not None,
         guided=guided,
         media=scene.has_media,

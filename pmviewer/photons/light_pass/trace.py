@@ -32,7 +32,16 @@ from pmviewer.kernels.bsdf.scattering import (
 from pmviewer.kernels.bsdf.thin_glass import is_ignored, keeps_class
 from pmviewer.kernels.compile.jit import inlined, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
-from pmviewer.kernels.dimensions import COPIES, EMISSION, EMITTER, FURTHER_PHOTONS_SALT, PHOTON_SCATTER, STORE, WAVE
+from pmviewer.kernels.dimensions import (
+    COPIES,
+    EMISSION,
+    EMITTER,
+    FURTHER_PHOTONS_SALT,
+    PHOTON_SCATTER,
+    PIECE_SALT,
+    STORE,
+    WAVE,
+)
 from pmviewer.kernels.lights.light import is_delta_light
 from pmviewer.kernels.media.medium import has_media, light_medium
 from pmviewer.kernels.memory import row_of
@@ -42,12 +51,14 @@ from pmviewer.kernels.surface import STRAIGHT, adjoint_cosines, face, leave, sur
 from pmviewer.kernels.vector import dot, is_good, largest, luminance, mul, scale
 from pmviewer.maps.photon_words import encode_direction
 from pmviewer.maps.record import BOUNCES, CAUSTIC, HAD_DIFFUSE, INDIRECT_CAUSTIC, LAST_SPECULAR, UNFOUND
+from pmviewer.photons.emission.window import most_pieces, pieces
 from pmviewer.photons.light_pass.banded import write_of_wave
 from pmviewer.photons.light_pass.flight import Photon, Trajectory, is_full, medium_after, to_surface
 from pmviewer.photons.light_pass.ledger import (
     C_CAUSTIC,
     C_DROPPED,
     C_GLOBAL,
+    C_PIECES,
     E_ABSORBED,
     E_DROPPED,
     E_EMITTED,
@@ -63,6 +74,9 @@ _f4 = np.float32
 _f8 = np.float64
 _u4 = np.uint32
 _i8 = np.int64
+
+_UNSHOWN = _i8(1 << 32)
+"""Added to a trajectory's number for each piece, whose ways are not written down."""
 
 LIGHT_PASS_DTYPE = np.dtype(
     [
@@ -125,95 +139,102 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
     scene, pass_, ledgers, volume_out = scenes[0], passes[0], out.ledgers, out.volume_out
     counts = row_of(out.counts, 0)
     into_global, into_caustic = _room(out.global_out, out.global_normals), _room(out.caustic_out, out.caustic_normals)
-    most = pass_.max_bounces if pass_.roulette != EQUAL else MOST_COPIES * pass_.max_bounces
+    most = most_pieces(projections[0]) * pass_.max_bounces * (MOST_COPIES if pass_.roulette == EQUAL else 1)
     for i in range(i0, i1):
-        full = counts[C_GLOBAL] + most > into_global[3] or counts[C_CAUSTIC] + most > into_caustic[3]
-        if full or is_full(volume_out, counts, most):
+        if _are_full(into_global, into_caustic, counts, most) or is_full(volume_out, counts, most):
             return i
         to_global = i < pass_.global_trajectories
         kind = 0 if to_global else 1
         seed, index = _stream(pass_, i)
         p, d, beta, light, starts, factor = _emitted(scene, pass_, projections[kind], i, seed, index)
-        ledgers[kind, E_EMITTED] += _f8(factor)  # its luminance is 1
-        if not (is_good(beta) and starts):
-            counts[C_DROPPED] += 0 if is_good(beta) else 1
-            ledgers[kind, _of_no_start(scene, beta) if is_good(beta) else E_DROPPED] += _f8(factor)
+        if not _sets_out(scene, beta, starts, factor, counts, ledgers, kind):
             continue
-        _book_start(scene, beta, factor, ledgers, kind)
         begin_path(paths, i, p, d, scale(beta, factor), light)
         of = Trajectory(i, seed, index, light, factor, to_global)
         photon = Photon(p, d, light_medium(scene, light), beta, _u4(0), 0, _wave(scene, pass_, seed, index))
         deltas = pass_.unfound != 0 and is_delta_light(scene, light)  # and nothing but deltas since the light
-        while True:
-            alive, flown, prim, u, v, t = to_surface(scene, pass_, photon, of, volume_out, counts, ledgers, paths)
-            if not alive:
-                break
-            deltas = deltas and flown.bounces == photon.bounces  # no collision on the way
-            o, d, medium, beta, flags, bounces, wave = flown
-            word = _u4(flags | _u4(min(bounces, BOUNCES)))
-            if prim < 0:
-                extend_path(paths, i, prim, o, d, scale(beta, factor), word, light, wave)
-                ledgers[kind, E_ESCAPED] += _f8(luminance(beta) * factor)
-                break
-            p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
-            material = material_of(scene, prim)
-            if is_ignored(scene, prim, material):
+        left, piece, whole, split = _i8(0), _i8(0), factor, (photon, factor, deltas)
+        while left >= 0:  # the photon, then what it was split into
+            while True:
+                alive, flown, prim, u, v, t = to_surface(scene, pass_, photon, of, volume_out, counts, ledgers, paths)
+                if not alive:
+                    break
+                deltas = deltas and flown.bounces == photon.bounces  # no collision on the way
+                o, d, medium, beta, flags, bounces, wave = flown
+                word = _u4(flags | _u4(min(bounces, BOUNCES)))
+                if prim < 0:
+                    extend_path(paths, i + piece * _UNSHOWN, prim, o, d, scale(beta, factor), word, light, wave)
+                    ledgers[kind, E_ESCAPED] += _f8(luminance(beta) * factor)
+                    break
+                p, ng, ns, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
+                material = material_of(scene, prim)
+                if is_ignored(scene, prim, material):
+                    photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces, wave)
+                    continue
+                beta = _on_the_way(scene, material, ng, d, t, beta, whole, counts, ledgers, kind)
+                extend_path(paths, i + piece * _UNSHOWN, prim, p, d, scale(beta, factor), word, light, wave)
+                wi = (-d[0], -d[1], -d[2])
+                b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy, wave)
+                wave, beta = _met(scene, b, wave, beta, whole, ledgers, kind)
+                kept, before = keeps(scene, material, b, ng, wi, pass_.glossy), luminance(beta)
+                if b.groups | kept == NOTHING or not before > _f4(0.0):
+                    ledgers[kind, E_ABSORBED] += _f8(before * factor)
+                    break
+                outward, ng = ng, face(ng, wi)
+                u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, PHOTON_SCATTER + bounces)
+                unfound = deltas and flags != 0 and kept & FOLLOWED != 0
+                if whole > _f4(0.0) and (kept & STORED != 0 or unfound):
+                    times, stored = _copies(pass_, beta, seed, index, bounces)
+                    # As many photons as the opacity says meet the surface; looked up, it is taken to be there.
+                    stored = over_opacity(scene, prim, u, v, p, scale(stored, factor))
+                    arrival = Arrival(p, wi, ng, _u4(word | _u4(UNFOUND)) if unfound else word, light, wave)
+                    _store_caustic(pass_, into_caustic, counts, arrival, word, stored, times)
+                    if to_global and kept & STORED != 0 and _is_chosen(pass_, seed, index, bounces):
+                        _store(into_global, counts, C_GLOBAL, arrival, stored, times)
+                    ledgers[kind, E_STORED] += _f8(before * factor)
+                if left == 0 and whole > _f4(0.0) and kept & STORED != 0:
+                    left = pieces(projections[kind], p, ng, factor, piece) - _i8(1)
+                    if left > 0:
+                        factor, counts[C_PIECES] = factor / _f4(left + _i8(1)), counts[C_PIECES] + left
+                        split = photon, factor, deltas
+                whole = factor
+                if b.groups == NOTHING:  # a part of a blend that others keep photons for
+                    ledgers[kind, E_ABSORBED] += _f8(before * factor)
+                    break
+                group, share, u_lobe = pick_group(b, wi, u_lobe)
+                deltas = deltas and group == FOLLOWED and is_delta(b)
+                if group != FOLLOWED and not to_global and pass_.only_direct != 0:
+                    ledgers[kind, E_TERMINATED] += _f8(before * factor)
+                    break
+                d, weight = _scattered(scene, b, group, wi, ng, u_lobe, (u0, u1))
+                flags = _flags_after(scene, group, prim, material, ng, d, flags)
+                after = scale(mul(beta, weight), share)
+                good, survival = is_good(after), survival_probability(pass_.roulette, before, beta, after)
+                if not (good and u2 < survival):
+                    counts[C_DROPPED] += 0 if good else 1
+                    ledgers[kind, E_ABSORBED if good else E_DROPPED] += _f8(before * factor)
+                    break
+                beta = scale(after, _f4(1.0) / survival)
+                if pass_.roulette != BY_LUMINANCE or not survival < _f4(1.0):  # else it stays
+                    ledgers[kind, E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * factor)
+                wave, beta = _split(scene, b, wave, d, beta, factor, ledgers, kind)
+                bounces += 1
+                if bounces >= pass_.max_bounces:
+                    ledgers[kind, E_TERMINATED] += _f8(luminance(beta) * factor)
+                    break
+                medium = medium_after(scene, prim, outward, wi, d, medium)
                 photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces, wave)
-                continue
-            beta = _on_the_way(scene, material, ng, d, t, beta, factor, counts, ledgers, kind)
-            extend_path(paths, i, prim, p, d, scale(beta, factor), word, light, wave)
-            wi = (-d[0], -d[1], -d[2])
-            b = bsdf_at(scene, prim, material, u, v, p, ng, ns, wi, pass_.glossy, wave)
-            wave, beta = _met(scene, b, wave, beta, factor, ledgers, kind)
-            kept = keeps(scene, material, b, ng, wi, pass_.glossy)
-            before = luminance(beta)
-            if b.groups | kept == NOTHING or not before > _f4(0.0):
-                ledgers[kind, E_ABSORBED] += _f8(before * factor)
-                break
-            outward, ng = ng, face(ng, wi)
-            u0, u1, u2, u_lobe = draw4(pass_.sequence, seed, index, PHOTON_SCATTER + bounces)
-            unfound = deltas and flags != 0 and kept & FOLLOWED != 0
-            if kept & STORED != 0 or unfound:
-                times, stored = _copies(pass_, beta, seed, index, bounces)
-                # As many photons as the opacity says meet the surface; looked up, it is taken to be there.
-                stored = over_opacity(scene, prim, u, v, p, scale(stored, factor))
-                arrival = Arrival(p, wi, ng, _u4(word | _u4(UNFOUND)) if unfound else word, light, wave)
-                if _is_caustic(pass_, word):
-                    in_caustic = _in_caustic(pass_, word, stored)
-                    _store(into_caustic, counts, C_CAUSTIC, arrival, in_caustic, times)
-                if to_global and kept & STORED != 0 and _is_chosen(pass_, seed, index, bounces):
-                    _store(into_global, counts, C_GLOBAL, arrival, stored, times)
-                ledgers[kind, E_STORED] += _f8(before * factor)
-            if b.groups == NOTHING:  # a part of a blend that others keep photons for
-                ledgers[kind, E_ABSORBED] += _f8(before * factor)
-                break
-            group, share, u_lobe = pick_group(b, wi, u_lobe)
-            deltas = deltas and group == FOLLOWED and is_delta(b)
-            if group != FOLLOWED and not to_global and pass_.only_direct != 0:
-                ledgers[kind, E_TERMINATED] += _f8(before * factor)
-                break
-            d, weight = _scattered(scene, b, group, wi, ng, u_lobe, (u0, u1))
-            flags = _flags_after(scene, group, prim, material, ng, d, flags)
-            after = scale(mul(beta, weight), share)
-            if not is_good(after):
-                counts[C_DROPPED] += 1
-                ledgers[kind, E_DROPPED] += _f8(before * factor)
-                break
-            survival = survival_probability(pass_.roulette, before, beta, after)
-            if not u2 < survival:
-                ledgers[kind, E_ABSORBED] += _f8(before * factor)
-                break
-            beta = scale(after, _f4(1.0) / survival)
-            if pass_.roulette != BY_LUMINANCE or not survival < _f4(1.0):  # else it stays
-                ledgers[kind, E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * factor)
-            wave, beta = _split(scene, b, wave, d, beta, factor, ledgers, kind)
-            bounces += 1
-            if bounces >= pass_.max_bounces:
-                ledgers[kind, E_TERMINATED] += _f8(luminance(beta) * factor)
-                break
-            medium = medium_after(scene, prim, outward, wi, d, medium)
-            photon = Photon(leave(p, ng, gap, d[0], d[1], d[2]), d, medium, beta, flags, bounces, wave)
+            left, piece = left - 1, piece + 1
+            if left >= 0:  # it arrives where all of it has arrived already
+                photon, factor, deltas = split
+                seed, whole = hash3(seed, _u4(piece), _u4(PIECE_SALT)), _f4(0.0)
     return i1
+
+
+@inlined
+def _are_full(into_global, into_caustic, counts, most):
+    """Whether the room of one of both maps may not hold `most` more."""
+    return counts[C_GLOBAL] + most > into_global[3] or counts[C_CAUSTIC] + most > into_caustic[3]
 
 
 @inlined
@@ -222,6 +243,19 @@ def _emitted(scene, pass_, projection, i, seed, index):
     u0, u1, u2, u3 = draw4(pass_.sequence, seed, index, EMISSION)
     u_pick = draw1(pass_.sequence, seed, index, EMITTER)
     return emission(scene, projection, i, pass_.sequence, seed, index, u_pick, (u2, u3), (u0, u1))
+
+
+@inlined
+def _sets_out(scene, beta, starts, factor, counts, ledgers, kind):
+    """Whether a photon is to be traced; its emission is booked, and what becomes of one that is not."""
+    ledgers[kind, E_EMITTED] += _f8(factor)  # its luminance is 1
+    good = is_good(beta)
+    if good and starts:
+        _book_start(scene, beta, factor, ledgers, kind)
+        return True
+    counts[C_DROPPED] += 0 if good else 1
+    ledgers[kind, _of_no_start(scene, beta) if good else E_DROPPED] += _f8(factor)
+    return False
 
 
 @specialised
@@ -347,6 +381,13 @@ def _in_caustic(pass_, flags, power):
 
 
 @inlined
+def _store_caustic(pass_, into, counts, arrival, word, power, times):
+    """Keep a photon with flags `word` in the caustic map, if it is one for it."""
+    if _is_caustic(pass_, word):
+        _store(into, counts, C_CAUSTIC, arrival, _in_caustic(pass_, word, power), times)
+
+
+@inlined
 def _room(rows, normals):
     """Pointers to rows (capacity, 6) and to normals (capacity,), whether there are normals, and the capacity."""
     return row_of(rows, 0), row_of(normals, 0), len(normals) > 0, len(rows)
@@ -354,7 +395,7 @@ def _room(rows, normals):
 
 @inlined
 def _store(into, counts, which, arrival, power, times):
-    """Keep a photon `times` times in these `_room`; counts[which] rows are filled."""
+    """Keep a photon `times` times in that `_room`; counts[which] rows are filled."""
     rows, normals, with_normals, _ = into
     ng = arrival.ng
     for _ in range(times):

@@ -257,7 +257,8 @@ class Importance(Group):
         "Where photons leave the lights, by what test photons meet. Peter-Pietrek: as often as they met importance. "
         "Christensen discard: strata whose test photons met nothing important keep them, others get many weaker ones "
         "instead; light that test photons miss is lost. Christensen keep: test photons stay and are topped up, which "
-        "is unbiased. Both store photons in unimportant places by roulette.",
+        "is unbiased. Both store photons in unimportant places by roulette. Photons that come to a more important "
+        "place than they were sent for go on in pieces.",
         stage="photons",
         scale="choice",
         title="guided emission",
