@@ -136,8 +136,7 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
     `PhotonBuffers`; paths: None, or where to write whole paths (`pmviewer.photons.light_pass.paths`).
     """
     # Taken apart outside of the loop: counting references to arrays for each photon would take a quarter of the time.
-    scene, pass_, ledgers, volume_out = scenes[0], passes[0], out.ledgers, out.volume_out
-    counts = row_of(out.counts, 0)
+    scene, pass_, counts, ledgers, volume_out = scenes[0], passes[0], row_of(out.counts, 0), out.ledgers, out.volume_out
     into_global, into_caustic = _room(out.global_out, out.global_normals), _room(out.caustic_out, out.caustic_normals)
     most = most_pieces(projections[0]) * pass_.max_bounces * (MOST_COPIES if pass_.roulette == EQUAL else 1)
     for i in range(i0, i1):
