@@ -9,12 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.sobol import SOBOL_TABLE, scrambled_point
+from pmviewer.kernels.sobol import SCRAMBLE, SOBOL_TABLE, UNIT, scrambled_point
 
 INDEPENDENT, SOBOL = 0, 1
 
 _u4 = np.uint32
 _f4 = np.float32
+_FACTORS = tuple(map(np.uint32, SCRAMBLE))
+_UNIT = np.float32(UNIT)
 
 
 @device
@@ -34,7 +36,7 @@ def hash3(a, b, c):
 @device
 def unit_float(bits):
     """uint32 to a float32 in [0, 1)."""
-    return _f4(_u4(bits) >> _u4(8)) * _f4(5.9604645e-08)
+    return _f4(_u4(bits) >> _u4(8)) * _UNIT
 
 
 @device
@@ -51,10 +53,10 @@ def reverse_bits(x):
 def owen_reversed(x, seed):
     """Owen scramble of bit-reversed x (Laine and Karras 2011, constants by Vegdahl); the result is bit-reversed too."""
     x = _u4(x + _u4(seed))
-    x = _u4(x ^ _u4(x * _u4(0x6C50B47C)))
-    x = _u4(x ^ _u4(x * _u4(0xB82F1E52)))
-    x = _u4(x ^ _u4(x * _u4(0xC7AFE638)))
-    return _u4(x ^ _u4(x * _u4(0x8D22F6E6)))
+    x = _u4(x ^ _u4(x * _FACTORS[0]))
+    x = _u4(x ^ _u4(x * _FACTORS[1]))
+    x = _u4(x ^ _u4(x * _FACTORS[2]))
+    return _u4(x ^ _u4(x * _FACTORS[3]))
 
 
 @device

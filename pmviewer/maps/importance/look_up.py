@@ -27,15 +27,16 @@ _u4 = np.uint32
 
 
 @device
-def _nearest_importon(importance, p, n):
-    """Place in the tree of the nearest importon on the side of the normal n, and its squared distance; −1 without."""
+def importance_within(importance, p, n, r):
+    """`importance_at`, searched for within r alone: right where no importon on that side reaches p from farther off."""
     keys = stack_i4(KEYS)
-    r = importance.farthest
     count, _ = nearest(importance, p, _i4(1), r * r, keys, Facing(n, STEEPNESS, _i4(ALL_CLASSES)))
     if count == 0:
-        return _i8(-1), _f4(0.0)
+        return _f4(0.0)
     key = stack_get_i8(keys, _i8(0))
-    return key & _i8(0xFFFFFFFF), float_of_bits(_u4(key >> 32))
+    i, d2 = key & _i8(0xFFFFFFFF), float_of_bits(_u4(key >> 32))
+    reach = load_f4(importance.reach, i)
+    return load_f4(importance.payload, 3 * i + 1) if d2 <= reach * reach else _f4(0.0)
 
 
 @specialised
@@ -47,15 +48,7 @@ def importance_at(importance, p, n):
     """
     if absent(importance):
         return lambda importance, p, n: _f4(1.0)
-
-    def at(importance, p, n):
-        i, d2 = _nearest_importon(importance, p, n)
-        if i < 0:
-            return _f4(0.0)
-        reach = load_f4(importance.reach, i)
-        return load_f4(importance.payload, 3 * i + 1) if d2 <= reach * reach else _f4(0.0)
-
-    return at
+    return lambda importance, p, n: importance_within(importance, p, n, importance.farthest)
 
 
 @specialised

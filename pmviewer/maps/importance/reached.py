@@ -15,19 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.kernels.memory import float_of_bits, load_f4, stack_get_i8, stack_i4
-from pmviewer.maps.importance.look_up import STEEPNESS
-from pmviewer.maps.search.disc import Facing
-from pmviewer.maps.search.k_nearest import KEYS, nearest
-from pmviewer.maps.search.stored import ALL_CLASSES
+from pmviewer.maps.importance.look_up import importance_within
 
 BOXES = 1 << 17
 """About so many."""
-
-_f4 = np.float32
-_i4 = np.int32
-_i8 = np.int64
-_u4 = np.uint32
 
 Float = NDArray[np.float32]
 
@@ -91,17 +82,8 @@ def _widened(boxes: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
 def importances_within(maps, points, normals, farthest, out, i0, i1):
     """Γ at points[i0:i1] (m, 3) float32 with unit normals (m, 3), into out (m,) float32, by importons no farther than
     `farthest` (m,)."""
-    importance = maps[0]
-    keys = stack_i4(KEYS)
     for i in range(i0, i1):
-        out[i], r = _f4(0.0), farthest[i]
-        if not r > _f4(0.0):
-            continue
-        side = Facing((normals[i, 0], normals[i, 1], normals[i, 2]), STEEPNESS, _i4(ALL_CLASSES))
-        count, _ = nearest(importance, (points[i, 0], points[i, 1], points[i, 2]), _i4(1), r * r, keys, side)
-        if count > 0:
-            key = stack_get_i8(keys, _i8(0))
-            j, d2 = key & _i8(0xFFFFFFFF), float_of_bits(_u4(key >> 32))
-            reach = load_f4(importance.reach, j)
-            if d2 <= reach * reach:
-                out[i] = load_f4(importance.payload, 3 * j + 1)
+        out[i] = np.float32(0.0)
+        if farthest[i] > np.float32(0.0):
+            p, n = (points[i, 0], points[i, 1], points[i, 2]), (normals[i, 0], normals[i, 1], normals[i, 2])
+            out[i] = importance_within(maps[0], p, n, farthest[i])
