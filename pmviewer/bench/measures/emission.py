@@ -47,6 +47,8 @@ UNBIASED = ("off", "Peter-Pietrek", "Christensen keep")
 SEEDS, QUICK_SEEDS, FIRST_SEED = 20, 12, 100
 MORE = (4, 12)
 """How many times as many photons without guiding, with a third of the seeds."""
+CHOSEN = "; how photons split, and what test photons count, was chosen by the scene's camera"
+"""Of `pmviewer.photons.emission.window` and PRIOR, said in the targets' own line."""
 MOST_SPREAD = 100.0
 """Bound for the largest weight over the median."""
 DARK = 0.01
@@ -151,7 +153,7 @@ def compare(
             spread = [high / low, largest / median]
             changed = ", ".join(f"{path}={value}" for path, value in (values | VIEWS[view]).items())
             what = f"{view}, importance.emission={variant}, importance.map=average, {changed}, {passes} passes"
-            best = f"; without splitting the best table of {bound.n} strata gains {bound.least:.3g} to {bound.most:.3g}"
+            best = f"; without splitting the best table of {bound.n} strata gains {bound.least:.3g} to {bound.most:.3g}{CHOSEN}"
             targets.append(Target("I6", gain, 8.0, "× fewer traced photons", True, what + best))
             targets.append(Target("I6", spread[1], MOST_SPREAD, "× the median is the largest weight", False, what))
             if variant in UNBIASED:
