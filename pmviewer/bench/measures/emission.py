@@ -153,8 +153,8 @@ def compare(
             spread = [high / low, largest / median]
             changed = ", ".join(f"{path}={value}" for path, value in (values | VIEWS[view]).items())
             what = f"{view}, importance.emission={variant}, importance.map=average, {changed}, {passes} passes"
-            best = f"; without splitting the best table of {bound.n} strata gains {bound.least:.3g} to {bound.most:.3g}{CHOSEN}"
-            targets.append(Target("I6", gain, 8.0, "× fewer traced photons", True, what + best))
+            best = f"; without splitting the best table of {bound.n} strata gains {bound.least:.3g} to {bound.most:.3g}"
+            targets.append(Target("I6", gain, 8.0, "× fewer traced photons", True, what + best + CHOSEN))
             targets.append(Target("I6", spread[1], MOST_SPREAD, "× the median is the largest weight", False, what))
             if variant in UNBIASED:
                 targets.append(Target("I6", abs(z), 3.0, "standard errors off in the mean", False, what))
