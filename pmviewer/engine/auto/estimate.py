@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.auto.bias import Bias
+from pmviewer.engine.auto.relative import part_means
 from pmviewer.engine.method import Plan
 from pmviewer.engine.remaining import Remaining
 from pmviewer.output.metric import EPSILON
@@ -147,7 +148,7 @@ def _level(first: F8, total: F8, m: int, run: Runner) -> _Level:
         return plane
 
     plane = np.concatenate(run([partial(of_band, begin) for begin in range(0, rows, BAND)]))
-    blocks = _block_means(plane)
+    blocks = part_means(plane, BLOCKS)
     D = float(plane.mean())
     return _Level(m, D, float(blocks.std()) / math.sqrt(blocks.size) / D if D > 0 else 0.0)
 
@@ -177,9 +178,3 @@ def _power(levels: list[_Level]) -> float:
 def _of_mean(c: float, p: float) -> float:
     """The factor v of V(n) = v·n⁻ᵖ that belongs to D(m) = c·m⁻ᵖ."""
     return c * 2**p / (2 * (2**p - 1))
-
-
-def _block_means(plane: F8) -> F8:
-    h, w = plane.shape
-    rows = [band.mean(axis=0) for band in np.array_split(plane, min(BLOCKS, h), axis=0)]
-    return np.array([[part.mean() for part in np.array_split(row, min(BLOCKS, w))] for row in rows])

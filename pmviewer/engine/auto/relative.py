@@ -14,26 +14,41 @@ OUTLIERS = 0.0005
 """Share of the noisiest pixels that say nothing in two passes."""
 CERTAIN = 2.0
 """Standard errors from which a bias stands out of the noise."""
+PARTS = 8
+"""Parts along each side of the picture whose noise is independent, more or less."""
 
 
 def variance(images: list[F8], mean: F8) -> float:
     """Relative variance of a pass, from those of two seeds, without the noisiest pixels. Images (h, w, 3)."""
-    each = np.sort(_relative((images[0] - images[1]) ** 2 / 2, mean), axis=None)
+    plane = (images[0] - images[1]) ** 2 / 2 / (mean**2 + EPSILON)
+    each = np.sort(plane.mean(axis=-1), axis=None)
     return float(each[: each.size - round(each.size * OUTLIERS)].mean())
 
 
 def squared(images: list[F8], against: list[F8], mean: F8, size: int = 1) -> float:
     """Squared relative difference of what two ways show in the mean, in blocks of size² pixels; 0 where it does not
-    stand out of the noise. The product of the differences of two independent pairs of passes has it as its mean,
-    without the noise of either."""
-    first, second = (_blocks(a - b, size) for a, b in zip(images, against, strict=True))
-    products = _relative(first * second, _blocks(mean, size))
-    found, error = float(products.mean()), float(products.std()) / math.sqrt(products.size)
+    stand out of the noise."""
+    found, error = difference(images, against, [mean], size)
     return found if found > CERTAIN * error else 0.0
 
 
-def _relative(squares: F8, mean: F8) -> F8:
-    return (squares / (mean**2 + EPSILON)).mean(axis=-1)
+def difference(images: list[F8], against: list[F8], means: list[F8], size: int = 1) -> tuple[float, float]:
+    """Likewise as it comes out, and its standard error. The product of the differences d₁, d₂ of two independent pairs
+    of passes has it as its mean, without the noise of either. (d₁² − d₂²)/2 has the product's noise (the variances are
+    equal for normal numbers) and none of what is looked for; neighbouring pixels share photons, so that it is summed up
+    by larger parts of the picture. What it is relative to may have been made by either pair, but in equal shares by
+    several `means`: d₁ is then compared with what is independent of d₂."""
+    first, second = (_blocks(a - b, size) for a, b in zip(images, against, strict=True))
+    weight = np.mean([1 / (_blocks(mean, size) ** 2 + EPSILON) for mean in means], axis=0)
+    noise = part_means(((first**2 - second**2) / 2 * weight).mean(axis=-1), PARTS)
+    return float((first * second * weight).mean()), math.sqrt(float((noise**2).sum())) / noise.size
+
+
+def part_means(plane: F8, count: int) -> F8:
+    """Means of so many parts along each side of a plane (h, w), or as many as it has pixels: (count, count)."""
+    h, w = plane.shape
+    rows = [band.mean(axis=0) for band in np.array_split(plane, min(count, h), axis=0)]
+    return np.array([[part.mean() for part in np.array_split(row, min(count, w))] for row in rows])
 
 
 def _blocks(image: F8, size: int) -> F8:

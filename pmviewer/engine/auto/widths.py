@@ -7,7 +7,7 @@ With F(x) = (arccos x − x·√(1 − x²))/π, the part of a disc that lies be
 squared bias is r·2∫F² per length of line, and from the radius r to 2r it grows by 2.16 times the squared difference of
 both. In bundled scenes with a reference (museum, corner_room, cornell_lights, glossy_room, glass_egg, cornell_diffuse,
 cornell_caustic, ring_caustic) it grew by 2.0 to 2.9 times that. With bias b ∝ r^p both differences have the quotient
-2^p, which is noisy, so that p is taken half way between it and the usual one.
+2^p: the less certain that is, the nearer p is taken to the usual one.
 """
 
 from __future__ import annotations
@@ -15,17 +15,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from pmviewer.engine.auto.bias import ORDER, Blur
-from pmviewer.engine.auto.relative import F8, squared, variance
+from pmviewer.engine.auto.relative import CERTAIN, F8, difference, variance
 
 WIDER = 2.0
 """Radii that are tried besides are wider and narrower by this."""
-GROWTH = 2.16
-"""Of the squared bias from a radius to one WIDER times as wide, over the squared difference of what both show."""
-ORDERS = 0.5, 1.5
+OUTLINES, OPEN = (0.5, 2.16), (2.0, 5 / 3)
+"""p, and how much the squared bias grows from a radius to one WIDER times as wide, over the squared difference of what
+both show: where light ends at an outline, and where it varies smoothly, b ∝ r² everywhere: (4² − 1)/(4 − 1)²."""
+ORDERS = OUTLINES[0], OPEN[0]
 """The least and the greatest p that a trial believes in."""
+SPREAD = 0.3
+"""Standard deviation of p over bundled scenes, around `ORDER`."""
 
 
 @dataclass(frozen=True)
@@ -55,20 +56,30 @@ NONE = Widened(Blur(), 0.0, 0.0)
 
 
 def told_by(wide: Tried, usual: Tried, narrow: Tried, mean: F8) -> Widened:
-    """From passes with radii of WIDER and 1/WIDER times the usual one, and with that. mean: the picture that errors are
-    relative to."""
+    """From passes with radii of WIDER and 1/WIDER times the usual one, and with that. mean: the picture that variance
+    is relative to. Biases are relative to what the narrow radius shows, which is blurred least: where light leaks into
+    the dark, the others are brighter than the truth, and the more so the wider they are; by each seed for itself, as
+    where few photons happen to be both seeds' differences are large."""
     span = WIDER**2 - 1 / WIDER**2
     noise = max(variance(narrow.images, mean) - variance(wide.images, mean), 0.0) / span
-    return Widened(_blur(wide, usual, narrow, mean), noise, max(wide.seconds - narrow.seconds, 0.0) / span)
+    above = difference(wide.images, usual.images, narrow.images)
+    below = difference(usual.images, narrow.images, narrow.images)
+    return Widened(_blur(above, below), noise, max(wide.seconds - narrow.seconds, 0.0) / span)
 
 
-def _blur(wide: Tried, usual: Tried, narrow: Tried, mean: F8) -> Blur:
-    """The power is told by errors relative to what the narrow radius shows, which is blurred least: where light has
-    leaked into the dark, the others are brighter than the truth, and the more so the wider they are."""
-    sharp = np.mean(narrow.images, axis=0)
-    above, below = squared(wide.images, usual.images, sharp), squared(usual.images, narrow.images, sharp)
+def _blur(above: tuple[float, float], below: tuple[float, float]) -> Blur:
+    """From the squared differences of the wide and the usual radius, and of that and the narrow one, with their
+    standard errors."""
     order = ORDER
-    if above > 0 and below > 0:
-        seen = 0.5 * math.log(above / below) / math.log(WIDER)
-        order = min(max((ORDER + seen) / 2, ORDERS[0]), ORDERS[1])
-    return Blur(GROWTH * squared(wide.images, usual.images, mean) / (WIDER ** (2 * order) - 1), order)
+    if above[0] > 0 and below[0] > 0:
+        seen = 0.5 * math.log(above[0] / below[0]) / math.log(WIDER)
+        error = 0.5 * math.hypot(above[1] / above[0], below[1] / below[0]) / math.log(WIDER)
+        order += (seen - ORDER) / (1 + (error / SPREAD) ** 2)
+        order = min(max(order, ORDERS[0]), ORDERS[1])
+    certain = above[0] if above[0] > CERTAIN * above[1] else 0.0
+    return Blur(_growth(order) * certain / (WIDER ** (2 * order) - 1), order)
+
+
+def _growth(order: float) -> float:
+    """Between that of outlines and that of the open."""
+    return OUTLINES[1] + (order - OUTLINES[0]) / (OPEN[0] - OUTLINES[0]) * (OPEN[1] - OUTLINES[1])
