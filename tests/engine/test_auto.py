@@ -13,7 +13,7 @@ from pmviewer.engine.auto.bias import Bias, Blur, mean_over
 from pmviewer.engine.auto.candidates import CACHE, GATHER, PATH, PROGRESSIVE, assignments, candidates, given
 from pmviewer.engine.auto.choose import Goal, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
-from pmviewer.engine.auto.model import error_after, seconds_to
+from pmviewer.engine.auto.model import error_after, to_error
 from pmviewer.engine.auto.relative import squared
 from pmviewer.engine.auto.trial import RARE, Costs, Measured, Widths, trial
 from pmviewer.engine.auto.widths import Tried, told_by
@@ -68,7 +68,17 @@ def test_what_the_model_promises_is_what_sums_over_passes_say():
     blurred += 3e-4 / 4 * (sum(a**0.5 for a in areas) / 20) ** 2
     assert error_after(m, 50_000, widths, 20) == pytest.approx(noise + blurred, rel=1e-6)
     seconds = 20 * (0.1 + 50_000 * (1e-6 + 4 * 2e-6))
-    assert seconds_to(m, 50_000, widths, noise + blurred) == pytest.approx(seconds, rel=1e-3)
+    assert to_error(m, 50_000, widths, noise + blurred).seconds == pytest.approx(seconds, rel=1e-3)
+
+
+def test_a_radius_that_may_never_get_there_is_expected_to_take_longer():
+    """Of two radii of the same promise, the one whose bias alone comes near the error."""
+    blur = Bias(caustic=Blur(8e-3, 0.65))
+    m = Measured(PROGRESSIVE, Costs(0.05, 1e-6), eye=0.01, caustic=300.0, bias=blur)
+    every = [to_error(m, 200_000, Widths(caustic=width), 5e-3) for width in (0.7, 0.35)]
+    assert every[0].seconds < 2 * every[1].seconds
+    wide, narrow = (option.expected / option.seconds for option in every)
+    assert narrow < 1.1 < 1.4 < wide
 
 
 def test_a_bias_is_known_where_a_rendering_goes_on(cornell):

@@ -121,10 +121,10 @@ def _by_time(tried: Trial, seconds: float) -> Option:
 
 
 def _by_error(tried: Trial, error: float) -> Option:
-    """The least time to that error; where none reaches it, what comes nearest in a long time."""
+    """The least time that is expected to that error; where none reaches it, what comes nearest in a long time."""
     every = [to_error(m, N, widths, error) for m in tried.measured for N, widths in numbers(m)]
     reached = [o for o in every if math.isfinite(o.seconds)]
-    return _picked(reached, lambda option: option.seconds) if reached else _by_time(tried, 1000.0)
+    return _picked(reached, lambda option: option.expected) if reached else _by_time(tried, 1000.0)
 
 
 def _picked(found: list[Option], of: Callable[[Option], float]) -> Option:
