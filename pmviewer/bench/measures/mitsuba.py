@@ -133,7 +133,7 @@ def compare(
 
 def run(quick: bool = False) -> BenchResult:
     """Test every method on every scene. Raises PmviewerError without Mitsuba."""
-    runs = 12 if quick else 16
+    runs = 8 if quick else 16
     started = time.perf_counter()
     variant = peer.variant()
     rows: list[list[Cell]] = []
