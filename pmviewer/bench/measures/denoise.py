@@ -1,8 +1,13 @@
-"""Error against time of denoised pictures, the denoiser's own time included (P16)."""
+"""Error against time of denoised pictures, the denoiser's own time included (P16).
+
+By the large network, which makes the view and the layer of files, and, where a pass costs little, by the small one of
+the window's preview.
+"""
 
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,8 +19,10 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.renderer import Renderer
 from pmviewer.output.denoise import denoised
 
+FAST = "progressive, small network"
 METHODS: dict[str, dict[str, Any]] = {
     "progressive": {},
+    FAST: {},
     "gather": {},
     "gather, cache": {"gather.cache": "on"},
 }
@@ -33,11 +40,11 @@ BUDGETS = {"cornell_diffuse": 3.0, "cornell_caustic": 8.0, "ring_caustic": 3.0, 
 QUICK_SHARE = 0.25
 
 
-def picture(renderer: Renderer) -> tuple[NDArray[np.float32], float]:
+def picture(renderer: Renderer, fast: bool = False) -> tuple[NDArray[np.float32], float]:
     """The renderer's picture without its noise, and the CPU seconds that the denoiser took for it."""
     frame = renderer.frame(0)
     start = time.process_time()
-    image = denoised(frame.image(), frame.image("albedo"), frame.image("normal"), renderer.pool.threads)
+    image = denoised(frame.image(), frame.image("albedo"), frame.image("normal"), renderer.pool.threads, fast=fast)
     return image, time.process_time() - start
 
 
@@ -45,15 +52,17 @@ def run(quick: bool = False) -> BenchResult:
     """Curves of the photon methods on every scene of `bench error`, denoised after 1, 2, 4 … passes. Raises OutputError
     without Open Image Denoise."""
     nothing = np.zeros((16, 16, 3), np.float32)
-    denoised(nothing, nothing, nothing)  # its weights are unpacked with the first picture
+    for fast in (False, True):
+        denoised(nothing, nothing, nothing, fast=fast)  # its weights are unpacked with the first picture
     curves: dict[tuple[str, str], Curve] = {}
     rows: list[list[Cell]] = []
     for scene in SCENES:
         budget = BUDGETS[scene] * (QUICK_SHARE if quick else 1.0)
         for name, values in METHODS.items():
-            opened = open_scene(scene)
-            plain = measure(opened, name.split(",")[0], budget, values=values)
-            curve = curves[scene, name] = measure(opened, name.split(",")[0], budget, values=values, show=picture)
+            opened, method = open_scene(scene), name.split(",")[0]
+            plain = measure(opened, method, budget, values=values)
+            show = partial(picture, fast=name == FAST)
+            curve = curves[scene, name] = measure(opened, method, budget, values=values, show=show)
             for i, passes in enumerate(curve.passes):
                 before = plain.error[plain.passes.index(passes)] if passes in plain.passes else ""
                 rows.append([scene, name, passes, curve.cpu[i], before, curve.error[i], f"{curve.ratio[i]:.4f}"])
