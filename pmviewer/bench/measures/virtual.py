@@ -9,6 +9,7 @@ each estimator renders as many passes as fit into the same CPU seconds, those of
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -170,6 +171,7 @@ def measured(lab: Lab, name: str) -> tuple[list[list[str | float | int]], list[T
             timed / plain[2],
         ]
         rows.append([name, estimator, seconds, *cells, f"{off:+.2f}" if np.isfinite(off) else "–"])
+        print(*rows[-1], file=sys.stderr, flush=True)
     return rows, targets_of(found, name)
 
 
