@@ -7,8 +7,9 @@ import itertools
 import os
 import threading
 import time
+import weakref
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from queue import SimpleQueue
 from typing import Any, NoReturn
 
 from pmviewer.progress import Cancelled as Cancelled
@@ -33,7 +34,8 @@ def lower_priority() -> None:
 
 
 class _Batch:
-    """Tasks that threads share: `numbers` gives each out once, `through` are those that ended."""
+    """Tasks that threads share: `numbers` gives each out once, `through` are those that ended. `ended` is free once no
+    thread is at work on them any more."""
 
     def __init__(self, tasks: Sequence[Task]) -> None:
         self.tasks = tasks
@@ -42,6 +44,27 @@ class _Batch:
         self.through: list[int] = []
         self.errors: dict[int, BaseException] = {}
         self.stopped = False
+        self.working = 0
+        self.ended = threading.Lock()
+
+
+_Queue = SimpleQueue[tuple[Callable[[_Batch], None], _Batch] | None]
+
+
+def _serve(queue: _Queue, behind_window: bool) -> None:
+    """A thread's life. It knows nothing of its pool while it waits, so that a pool that nobody closed can go."""
+    if behind_window:
+        lower_priority()
+    while (job := queue.get()) is not None:
+        work, batch = job
+        work(batch)
+        del job, work, batch
+
+
+def _dismiss(queue: _Queue, threads: list[threading.Thread]) -> None:
+    """Let the threads end once they have done what they were given."""
+    for _ in threads:
+        queue.put(None)
 
 
 def _raise_of(batch: _Batch) -> NoReturn:
@@ -72,9 +95,9 @@ class WorkPool:
         self.on_progress: Callable[[str, float | None], None] | None = None
         self._lock = threading.Lock()
         self._behind_window = behind_window
-        self._executor = ThreadPoolExecutor(
-            self.threads, "pmviewer", initializer=lower_priority if behind_window else None
-        )
+        self._queue: _Queue = SimpleQueue()
+        self._serving: list[threading.Thread] = []
+        self._dismiss = weakref.finalize(self, _dismiss, self._queue, self._serving)
 
     def run(self, tasks: Sequence[Task]) -> list[Any]:
         """Results in the order of the tasks.
@@ -83,6 +106,8 @@ class WorkPool:
         """
         batch = _Batch(tasks)
         if min(self.threads, len(tasks)) < 2 and self.on_progress is None and not self._behind_window:
+            batch.working = 1
+            batch.ended.acquire()
             self._work(batch)
         else:
             self._share(batch)
@@ -94,14 +119,29 @@ class WorkPool:
 
     def _share(self, batch: _Batch) -> None:
         """Have threads do it, and wait for them."""
-        workers = [self._executor.submit(self._work, batch) for _ in range(min(self.threads, len(batch.tasks)))]
+        count = batch.working = min(self.threads, len(batch.tasks))
+        if not count:
+            return
+        batch.ended.acquire()
+        with self._lock:
+            if not self._dismiss.alive:  # closed meanwhile
+                return
+            while len(self._serving) < count:
+                name = f"pmviewer_{len(self._serving)}"
+                arguments = self._queue, self._behind_window
+                self._serving.append(threading.Thread(target=_serve, args=arguments, name=name, daemon=True))
+                self._serving[-1].start()
+            for _ in range(count):
+                self._queue.put((self._work, batch))
+        ended = False
         try:
-            while wait(workers, REPORT_SECONDS if self.on_progress is not None else None).not_done:
+            while not (ended := batch.ended.acquire(timeout=REPORT_SECONDS if self.on_progress is not None else -1)):
                 self._report(batch)
             self._report(batch)
         finally:
             batch.stopped = True
-            wait(workers)
+            if not ended:
+                batch.ended.acquire()
 
     def _work(self, batch: _Batch) -> None:
         """On one thread: the next task that nobody has begun, until there is none. Threads fetch their tasks
@@ -122,6 +162,9 @@ class WorkPool:
             spent = time.thread_time() - start
             with self._lock:
                 self.cpu_seconds += spent
+                batch.working -= 1
+                if batch.working == 0:
+                    batch.ended.release()
 
     def _report(self, batch: _Batch) -> None:
         if self.on_progress is not None and batch.tasks:
@@ -129,6 +172,9 @@ class WorkPool:
             self.on_progress(self.stage, len(batch.through) / count if count >= FEW_TASKS else None)
 
     def close(self) -> None:
-        """Drop what has not started and wait for the rest."""
+        """Let what runs come to its end, begin nothing more, and wait for the threads."""
         self.cancel.set()
-        self._executor.shutdown(wait=True, cancel_futures=True)
+        with self._lock:
+            self._dismiss()
+        for thread in self._serving:
+            thread.join()

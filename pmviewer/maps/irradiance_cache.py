@@ -43,8 +43,6 @@ OFF_PLANE = np.float32(0.1)
 """A point farther than so many ρ off a record's plane is on another surface."""
 NEAREST = np.float32(1e-3)
 """Errors below this weigh the same."""
-SWEEPS = 16
-"""Most rounds of limiting radii by neighbours; the later ones ask few records."""
 FEWEST_OF_PART, MOST_PARTS = 512, 32
 """Records of a task, and tasks."""
 
@@ -99,12 +97,12 @@ class IrradianceCache:
 
 
 @device
-def _bucket(mask, level, cx, cy, cz):
+def bucket_of(mask, level, cx, cy, cz):
     return _i8(hash3(_u4(cx), _u4(cy), _u4(_u4(cz) * _u4(MOST_LEVELS + 1)) + _u4(level)) & mask)
 
 
 @device
-def _cell_of(x, width):
+def cell_of(x, width):
     return _i8(math.floor(x / width))
 
 
@@ -115,10 +113,10 @@ def _find_buckets(rows, cell, mask, buckets, counts):
         level, reach = _i8(rows[i, LEVEL]), rows[i, REACH]
         width = cell * _f4(_i8(1) << level)
         n = 0
-        for cx in range(_cell_of(rows[i, 0] - reach, width), _cell_of(rows[i, 0] + reach, width) + 1):
-            for cy in range(_cell_of(rows[i, 1] - reach, width), _cell_of(rows[i, 1] + reach, width) + 1):
-                for cz in range(_cell_of(rows[i, 2] - reach, width), _cell_of(rows[i, 2] + reach, width) + 1):
-                    bucket = _i4(_bucket(mask, level, cx, cy, cz))
+        for cx in range(cell_of(rows[i, 0] - reach, width), cell_of(rows[i, 0] + reach, width) + 1):
+            for cy in range(cell_of(rows[i, 1] - reach, width), cell_of(rows[i, 1] + reach, width) + 1):
+                for cz in range(cell_of(rows[i, 2] - reach, width), cell_of(rows[i, 2] + reach, width) + 1):
+                    bucket = _i4(bucket_of(mask, level, cx, cy, cz))
                     known = False
                     for j in range(n):
                         known = known or buckets[i, j] == bucket
@@ -144,7 +142,23 @@ def _list_entries(buckets, counts, starts, entries):
             place[buckets[i, j]] += 1
 
 
-def _parts_of(n: int) -> list[slice]:
+@kernel
+def _choose_levels(rows, cell):
+    """The level of each record into its row: cells are at least twice as wide as what it reaches, which is cut off
+    where there is no such level. Returns the levels as bits; `cell`, the width at level 0, is a power of two."""
+    levels = _u4(0)
+    for i in range(len(rows)):
+        level, width = _i8(0), cell
+        while level < MOST_LEVELS - 1 and width < _f4(2.0) * rows[i, REACH]:
+            level += 1
+            width = width * _f4(2.0)
+        rows[i, LEVEL] = _f4(level)
+        rows[i, REACH] = min(rows[i, REACH], _f4(0.5) * width)
+        levels = _u4(levels | _u4(_u4(1) << _u4(level)))
+    return levels
+
+
+def parts_of(n: int) -> list[slice]:
     """So many records in parts for tasks, at least one."""
     parts = max(1, min(MOST_PARTS, n // FEWEST_OF_PART))
     return [slice(n * k // parts, n * (k + 1) // parts) for k in range(parts)]
@@ -156,25 +170,19 @@ def build_cache(rows: NDArray[np.float32], like: NDArray[np.void], run: Runner =
     rows = np.ascontiguousarray(rows, np.float32)
     record = like.copy()
     n = len(rows)
-    cell, levels = 1.0, np.zeros(0, np.int64)
-    if n:
-        cell = 2.0 ** math.ceil(math.log2(2.0 * float(rows[:, REACH].min())))
-        # Float32 widths are exact powers of two, and so is the comparison.
-        levels = np.ceil(np.log2(np.maximum(2.0 * rows[:, REACH].astype(np.float64) / cell, 1.0))).astype(np.int64)
-        levels = np.minimum(levels, MOST_LEVELS - 1)
-        rows[:, LEVEL] = levels
-        rows[:, REACH] = np.minimum(rows[:, REACH], 0.5 * cell * 2.0**levels)
+    cell = 2.0 ** math.ceil(math.log2(2.0 * float(rows[:, REACH].min()))) if n else 1.0
+    levels = _choose_levels(rows, _f4(cell))
     mask = (1 << max(4, (4 * n).bit_length())) - 1
     buckets, counts = np.empty((n, MOST_CELLS), np.int32), np.empty(n, np.int32)
     tasks: list[Callable[[], Any]] = [
-        partial(_find_buckets, rows[part], _f4(cell), _u4(mask), buckets[part], counts[part]) for part in _parts_of(n)
+        partial(_find_buckets, rows[part], _f4(cell), _u4(mask), buckets[part], counts[part]) for part in parts_of(n)
     ]
     (run if len(tasks) > 1 else in_turn)(tasks)
     starts, entries = np.zeros(mask + 2, np.int32), np.empty(int(counts.sum()), np.int32)
     _list_entries(buckets, counts, starts, entries)
     record["rows"], record["starts"], record["entries"] = rows.ctypes.data, starts.ctypes.data, entries.ctypes.data
     record["n"], record["mask"], record["cell"] = n, mask, cell
-    record["levels"] = int(np.bitwise_or.reduce(1 << levels)) if n else 0
+    record["levels"] = levels
     return IrradianceCache(rows, starts, entries, record)
 
 
@@ -194,7 +202,7 @@ def interpolate(cache, p, n):
     level = _i8(0)
     while levels != _u4(0):
         if levels & _u4(1) != _u4(0):
-            bucket = _bucket(cache.mask, level, _cell_of(p[0], width), _cell_of(p[1], width), _cell_of(p[2], width))
+            bucket = bucket_of(cache.mask, level, cell_of(p[0], width), cell_of(p[1], width), cell_of(p[2], width))
             for at in range(load_i4(cache.starts, bucket), load_i4(cache.starts, bucket + 1)):
                 row = cache.rows + _i8(load_i4(cache.entries, at)) * _i8(4 * ROW)
                 if load_f4(row, LEVEL) != _f4(level):
@@ -247,59 +255,6 @@ def interpolate_all(caches, points, normals, E, weights):
 def reach_of(harmonic, footprint, error, least, most):
     """ρ of a record: a·R between `least` and `most` pixel footprints."""
     return min(max(error * harmonic, least * footprint), most * footprint)
-
-
-def limit_by_neighbours(cache: IrradianceCache, run: Runner = in_turn) -> None:
-    """Enforce R_i ≤ R_j + |x_i − x_j| for each record j that lies within the reach of record i (Křivánek and others
-    2006): a detail that one record found is news to those around it. The cache's rows are changed; its index stays
-    valid, for reaches only shrink.
-
-    All records look at once, at what the sweep before has left, and later sweeps ask only those that it lowered: the
-    result does not depend on how `run` shares the tasks.
-    """
-    rows, record = cache.rows, cache.record[0]
-    asked = np.arange(cache.n, dtype=np.int32)
-    for _ in range(SWEEPS):
-        parts = [asked[part] for part in _parts_of(len(asked))]
-        lowest = np.full((len(parts), cache.n), np.inf, np.float32)
-        tasks: list[Callable[[], Any]] = [
-            partial(_lower, cache.record, rows, *given) for given in zip(parts, lowest, strict=True)
-        ]
-        (run if len(tasks) > 1 else in_turn)(tasks)
-        harmonic = lowest.min(axis=0)
-        asked = np.flatnonzero(harmonic < rows[:, HARMONIC]).astype(np.int32)
-        if not len(asked):
-            break
-        footprint = rows[asked, FOOTPRINT]
-        reach = np.maximum(record["error"] * harmonic[asked], record["least"] * footprint)
-        reach = np.minimum(reach, record["most"] * footprint)
-        rows[asked, HARMONIC] = harmonic[asked]
-        rows[asked, REACH] = np.minimum(rows[asked, REACH], reach)
-
-
-@kernel
-def _lower(caches, rows, asked, lowest):
-    """The least R_j + |x_i − x_j| of the records j of `asked` within the reach of each record i, where it is less than
-    R_i, into lowest (n,) float32."""
-    cache = caches[0]
-    for j in asked:
-        p = (rows[j, 0], rows[j, 1], rows[j, 2])
-        levels, width = cache.levels, cache.cell
-        level = _i8(0)
-        while levels != _u4(0):
-            if levels & _u4(1) != _u4(0):
-                bucket = _bucket(cache.mask, level, _cell_of(p[0], width), _cell_of(p[1], width), _cell_of(p[2], width))
-                for at in range(load_i4(cache.starts, bucket), load_i4(cache.starts, bucket + 1)):
-                    i = load_i4(cache.entries, at)
-                    d = sub(p, (rows[i, 0], rows[i, 1], rows[i, 2]))
-                    distance = _f4(math.sqrt(dot(d, d)))
-                    if distance < rows[i, REACH]:
-                        harmonic = rows[j, HARMONIC] + distance
-                        if harmonic < rows[i, HARMONIC] and harmonic < lowest[i]:
-                            lowest[i] = harmonic
-            levels = _u4(levels >> _u4(1))
-            level += 1
-            width = width * _f4(2.0)
 
 
 @kernel

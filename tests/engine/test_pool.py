@@ -1,15 +1,18 @@
-"""The pool gives way to a window, and to nobody where there is none."""
+"""The pool does its tasks, ends when it is told to, and gives way to a window, and to nobody where there is none."""
 
 import os
 import subprocess
 import sys
 import threading
+from functools import partial
+from threading import Event, Thread, current_thread
 
 import pytest
 
 from pmviewer.engine.pool import WorkPool
+from pmviewer.progress import Cancelled
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "getpriority"), reason="the system has no priority per thread")
+has_priorities = pytest.mark.skipif(not hasattr(os, "getpriority"), reason="the system has no priority per thread")
 
 
 def niceness() -> int:
@@ -24,14 +27,17 @@ def of_pool(**how) -> set[int]:
         pool.close()
 
 
+@has_priorities
 def test_threads_keep_the_priority_of_the_process_without_a_window():
     assert of_pool() == {niceness()}
 
 
+@has_priorities
 def test_threads_go_behind_a_window():
     assert of_pool(behind_window=True) == {max(10, niceness())}
 
 
+@has_priorities
 def test_a_process_that_is_nicer_than_that_stays_so():
     code = "import os; os.nice(15); from tests.engine.test_pool import of_pool, niceness; "
     code += "print(niceness(), *of_pool(behind_window=True), *of_pool())"
@@ -41,6 +47,7 @@ def test_a_process_that_is_nicer_than_that_stays_so():
     assert set(of_pools) == {own}
 
 
+@has_priorities
 def test_rendering_to_a_file_makes_a_pool_of_normal_priority(monkeypatch, tmp_path):
     """What `pmviewer render` runs its tasks at, asked of the tasks themselves."""
     from pmviewer.commands import cli
@@ -55,3 +62,52 @@ def test_rendering_to_a_file_makes_a_pool_of_normal_priority(monkeypatch, tmp_pa
     monkeypatch.setattr(WorkPool, "_work", watched)
     cli.render("cornell_diffuse", [tmp_path / "a.png"], passes=1, size="8x8", threads=1)
     assert seen == {niceness()}
+
+
+def test_results_come_in_the_order_of_tasks_and_the_first_error_is_raised():
+    pool = WorkPool(3)
+    try:
+        assert pool.run([partial(divmod, number, 7) for number in range(100)]) == [divmod(n, 7) for n in range(100)]
+        with pytest.raises(ZeroDivisionError):
+            pool.run([partial(divmod, 1, number) for number in (2, 1, 0, 3)])
+        assert pool.run([partial(divmod, 8, 7)] * 2) == [(1, 1)] * 2
+    finally:
+        pool.close()
+
+
+def test_closing_ends_what_another_thread_waits_for():
+    """Tasks that have begun come to their end; no other begins."""
+    pool, begun, may_end, ended, raised = WorkPool(2), Event(), Event(), [], []
+
+    def task() -> None:
+        begun.set()
+        may_end.wait(10)
+        ended.append(1)
+
+    def caller() -> None:
+        try:
+            pool.run([task] * 50)
+        except Cancelled as error:
+            raised.append(error)
+
+    thread, closing = Thread(target=caller), Thread(target=pool.close)
+    thread.start()
+    assert begun.wait(10)
+    closing.start()
+    assert pool.cancel.wait(10)
+    may_end.set()
+    thread.join(10)
+    closing.join(10)
+    assert raised
+    assert 1 <= len(ended) <= 2
+    with pytest.raises(Cancelled):
+        pool.run([task] * 2)
+
+
+def test_threads_of_a_pool_that_nobody_closes_end_with_it():
+    pool = WorkPool(2)
+    serving = pool.run([current_thread] * 50)
+    del pool
+    for thread in serving:
+        thread.join(10)
+        assert not thread.is_alive()

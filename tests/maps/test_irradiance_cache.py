@@ -19,8 +19,8 @@ from pmviewer.maps.irradiance_cache import (
     build_cache,
     encode_records,
     interpolate_all,
-    limit_by_neighbours,
 )
+from pmviewer.maps.irradiance_limits import limit_by_neighbours
 from pmviewer.maps.record import unpack
 
 

@@ -27,8 +27,8 @@ from pmviewer.maps.irradiance_cache import (
     IrradianceCache,
     build_cache,
     encode_records,
-    limit_by_neighbours,
 )
+from pmviewer.maps.irradiance_limits import limit_by_neighbours
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.counts import N_COUNTS
 from pmviewer.render.gather.cache_fill import fill_records
