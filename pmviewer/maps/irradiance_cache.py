@@ -98,11 +98,13 @@ class IrradianceCache:
 
 @device
 def bucket_of(mask, level, cx, cy, cz):
+    """The bucket, an index into the cache's `starts`, of that cell of a level."""
     return _i8(hash3(_u4(cx), _u4(cy), _u4(_u4(cz) * _u4(MOST_LEVELS + 1)) + _u4(level)) & mask)
 
 
 @device
 def cell_of(x, width):
+    """The number along one axis of the cell that x lies in."""
     return _i8(math.floor(x / width))
 
 
