@@ -22,6 +22,7 @@ from numba.core.typing import npydecl
 from numba.np import numpy_support
 
 from pmviewer.kernels.compile import jit, quicker
+from tests.support import fresh
 
 
 def test_it_is_installed():
@@ -57,12 +58,7 @@ def test_records_have_names_of_their_own_in_every_process():
         "records = [from_dtype(np.dtype([('a', 'f4'), (name, 'i8')])) for name in 'bc'];"
         "print(*[cpu_target.target_context.mangler('a.f', (record,)) for record in records])"
     )
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-    found = []
-    for before in ("0", "7"):
-        done = subprocess.run([sys.executable, "-c", script, before], capture_output=True, text=True, env=environment)
-        assert done.returncode == 0, done.stderr
-        found.append(done.stdout.split())
+    found = [fresh.python(script, before).stdout.split() for before in ("0", "7")]
     assert found[0] == found[1]
     assert len(set(found[0])) == 2
 
