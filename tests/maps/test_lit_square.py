@@ -15,7 +15,7 @@ from tests.support import naive_maps as naive
 
 SIDE = 200
 N = SIDE * SIDE
-SQUARES = {"independent": 8, "stratified": 3}
+SQUARES = {"independent": 8, "stratified": 4}
 """How many there are: the noise of stratified photons is small."""
 DISTRIBUTIONS = tuple(SQUARES)
 SPHERE, FLAT = 1.0, 0.2

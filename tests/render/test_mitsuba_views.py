@@ -20,7 +20,13 @@ from pmviewer.engine.store import StageStore
 from tests.render.mitsuba_views.scenes import VIEWS, description
 from tests.support.scenes import settings_of
 
-pytestmark = pytest.mark.usefixtures("every_surface")
+
+@pytest.fixture(autouse=True)
+def kernels(request):
+    """Those of scenes with anything, and for hidden lights those of `test_hidden_lights`."""
+    if "hid" not in request.node.name:
+        request.getfixturevalue("every_surface")
+
 
 EXPECTED = json.loads((Path(__file__).parent / "mitsuba_views" / "expected.json").read_text("utf-8"))
 PATH = (16, 4)
