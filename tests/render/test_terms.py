@@ -17,7 +17,7 @@ from tests.support.scenes import cornell_box, diffuse, panel, rendered, settings
 def pass_means(method, passes=24, **groups):
     """(passes, terms) means of the image's terms, pass by pass: their scatter gives the standard error."""
     values = {"render": {"method": method}, "photons": {"N": 16_000, "q": 0.5}} | groups
-    opened = open_scene(cornell_box(size=64, light=0.75))
+    opened = open_scene(cornell_box(size=48, light=0.75))
     totals = []
     pool = WorkPool(1)
     renderer = Renderer(opened, settings_of(**values), pool, StageStore(0))
