@@ -87,9 +87,9 @@ def test_records_lie_where_the_eye_pass_ended():
         )
         renderers.append(Renderer(opened, settings, pool, StageStore(0)))
         renderers[-1].step()
-    pool.close()
     plain, renderer = renderers
     points = [plain.gather_points(x, y) for y in range(size) for x in range(size)]
+    pool.close()
     ends = np.array([of[0, :3] if len(of) else (np.inf,) * 3 for of in points])
     over_chain = plain.frame(1).image("specular").max(axis=-1).reshape(-1) > 0
     records = renderer.latest.cache.rows[:, :3]
