@@ -114,7 +114,8 @@ def test_E2_all_kernels_have_the_same_mean(squares, distribution):
 @pytest.mark.parametrize("estimator", ["disc", "hull", "differential"])
 def test_E6_any_part_of_the_disc_of_the_nearest_has_the_same_mean(squares, estimator):
     """Independent photons, so exactly, whatever the kernel; a third of the photons or a fiftieth. Of that a look-up
-    sees a third of a photon, so that it takes many and one kernel is enough; of the others' discs 5000 cover a square twice or more."""
+    sees a third of a photon, so that it takes many and one kernel is enough; of the others' discs 5000 cover a square
+    twice or more."""
     kinds = FILTERS if estimator == "disc" else ("constant",)
     for k, share, places in ((100, 0.3, 5000), (16, 0.3, 5000), (16, 0.02, 20_000)):
         look = middle if places < 10_000 else anywhere
