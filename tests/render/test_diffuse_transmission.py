@@ -29,7 +29,7 @@ def test_a_sheet_lights_the_floor_below_it(method):
     grey = Material("grey", "diffuse", (REFLECTANCE,) * 3)
     camera = Camera((0, 0.5, 0), (0, 0, 0), (0, 0, 1), 10.0, near=0.0, far=np.inf)
     scene = Scene("sheet", None, shapes, (PAPER, grey), SKY, camera, 24, 24)
-    settings = settings_of(render={"method": method}, photons={"N": 200_000}, estimate={"radius": 0.15})
+    settings = settings_of(render={"method": method}, photons={"N": 400_000}, estimate={"radius": 0.15})
     found = rendered(scene, settings, passes=32).frame(1).image().mean((0, 1))
     covered = RADIUS**2 / (RADIUS**2 + HEIGHT**2)
     assert found == pytest.approx(REFLECTANCE * (np.array(T) * covered + 1 - covered), rel=0.02)

@@ -43,8 +43,8 @@ def test_all_methods_show_the_same_room() -> None:
         means[name] = image.astype(np.float64).mean(axis=(0, 1))
         print(name, means[name])
     assert means["path"].min() > 0
-    assert means["progressive"] == pytest.approx(means["path"], rel=0.01)
-    assert means["gather"] == pytest.approx(means["path"], rel=0.01)
+    assert means["progressive"] == pytest.approx(means["path"], rel=0.015)
+    assert means["gather"] == pytest.approx(means["path"], rel=0.015)
 
 
 def test_projection_maps_let_all_of_its_photons_go() -> None:
