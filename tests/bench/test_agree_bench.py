@@ -149,7 +149,7 @@ def test_every_method_is_compared_in_every_scene_and_a_wrong_one_is_found(partic
     assert all(c.outcome.p > 0.5 for c in found)
     assert ("ptracer" in runs.modes) == (particles and plain > 0)
     for wrong in sorted(everywhere):
-        found = [q.asked(len(STAGES)) for q in questions(FakeRuns(scene, wrong, plain))]
+        found = (q.asked(len(STAGES)) for q in questions(FakeRuns(scene, wrong, plain)))
         assert any(c.p == pytest.approx(0) and wrong in (c.method, c.peer) for c in found)
     (off,) = (c for q in questions(FakeRuns(scene, "weights", plain)) if (c := q.asked(len(STAGES))).p < 1e-6)
     assert (off.what, off.peer) == ("weights", "its walks")

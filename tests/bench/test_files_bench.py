@@ -186,6 +186,7 @@ def test_results_hold_as_long_as_the_file_the_effort_and_the_sources_are_the_sam
 def test_a_folder_of_files_is_opened_looked_at_and_reported(tmp_path, monkeypatch):
     """Real processes, from the survey to the sheet; Mitsuba too where it is installed."""
     monkeypatch.setattr(bench, "NICE", 0)
+    monkeypatch.setattr(bench, "available_threads", lambda: 1)
     folder = tmp_path / "files"
     write(folder, "good.xml", scene())
     write(folder, "bad.xml", '<scene version="3.0.0"><shape type="sdfgrid"/></scene>')

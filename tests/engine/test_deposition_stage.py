@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -13,6 +10,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.scene.arrays.flatten import LUMINANCE
+from tests.support import fresh
 from tests.support.scenes import cornell_box, rendered, settings_of
 
 SEEDS, PASSES = 12, 3
@@ -115,7 +113,6 @@ print("nothing of it")
 
 def test_nothing_is_compiled_or_computed_while_off():
     """In a program of its own, because other tests of this one compile the rules."""
-    done = subprocess.run([sys.executable, "-c", OFF], capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 0, done.stderr
+    done = fresh.python(OFF)
     assert "nothing of it" in done.stdout
     assert not [line for line in done.stdout.splitlines() if "importance" in line or "deposition" in line]

@@ -119,6 +119,7 @@ def test_the_nearest_photons_in_several_maps(pool, combine):
                 assert look_up.found.n <= look_up.k
 
 
+@pytest.mark.usefixtures("room_for_split_paths")
 def test_look_ups_over_mirrors_and_through_glass(pool):
     """They are of the last surface of the way, and what their photons add is seen through what is before it."""
     renderer = renderer_of(pool, render={**PASS["render"], "mirror_rays": 1})
@@ -136,6 +137,7 @@ def test_look_ups_over_mirrors_and_through_glass(pool):
     assert sum(look_up.value for look_up in told.look_ups)[0] < told.terms[2, 0]
 
 
+@pytest.mark.usefixtures("room_for_split_paths")
 def test_of_several_samples_all_look_ups_are_told(pool):
     """Of a pixel on a mirror whose light is all of maps: with their shares they add up to what the film has."""
     for samples in (1, 3):

@@ -9,8 +9,8 @@ from scipy import stats
 from pmviewer.scene.description import Material
 from tests.support.bsdf_probe import EVERYTHING_FOLLOWED, EVERYTHING_STORED, FOLLOWED, STORED, Grid, Probe
 
-N = 200_000
-"""χ² over some 600 cells at p = 1e-4 finds densities that are wrong by 3 % (3 %² · N = 180 on 600 ± 35)."""
+N = 100_000
+"""χ² over some 600 cells at p = 1e-4 finds densities that are wrong by 4 % (4 %² · N = 160 on 600 ± 35)."""
 WHITE = (1.0, 1.0, 1.0)
 GOLD = ((0.143, 0.375, 1.442), (3.983, 2.386, 1.603))
 

@@ -1,9 +1,6 @@
 """Device functions can't be called from Python: they say so instead of crashing."""
 
-import os
 import shutil
-import subprocess
-import sys
 import weakref
 
 import pytest
@@ -11,6 +8,7 @@ import pytest
 from pmviewer.kernels.compile import sources
 from pmviewer.kernels.compile.jit import CACHE_FOLDER, _OneFileEach, loaded, user_cache_root
 from pmviewer.kernels.vector import dot
+from tests.support import fresh
 
 
 def test_device_function_called_from_python_is_an_error():
@@ -39,16 +37,7 @@ def test_an_edit_in_an_imported_source_makes_compiled_code_stale(tmp_path):
     )
 
     def stamps() -> list[str]:
-        run = subprocess.run(
-            [sys.executable, "-c", code],
-            env={**os.environ, "PYTHONPATH": str(tmp_path)},
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=120,
-        )
-        return run.stdout.split()
+        return fresh.python(code, env={"PYTHONPATH": str(tmp_path)}).stdout.split()
 
     before = stamps()
     (package / "maps" / "search" / "grid.py").open("a").write("# edited\n")
@@ -59,13 +48,9 @@ def test_an_edit_in_an_imported_source_makes_compiled_code_stale(tmp_path):
 def test_unwritable_cache_falls_back_to_the_temporary_folder(tmp_path):
     blocked = tmp_path / "file"
     blocked.touch()
-    run = subprocess.run(
-        [sys.executable, "-c", "from pmviewer.kernels.compile.jit import CACHE_FOLDER as c; print(c)"],
-        env={**os.environ, "PMVIEWER_CACHE": str(blocked), "TMPDIR": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=120,
+    run = fresh.python(
+        "from pmviewer.kernels.compile.jit import CACHE_FOLDER as c; print(c)",
+        env={"PMVIEWER_CACHE": str(blocked), "TMPDIR": str(tmp_path)},
     )
     assert run.stdout.startswith(str(tmp_path / "pmviewer-kernels-"))
 
@@ -76,11 +61,7 @@ def test_a_copy_of_the_package_elsewhere_shares_compiled_code(tmp_path):
     code = "from pmviewer.kernels.vector import dot; print(dot._cache.cache_path)"
 
     def folder(path) -> str:
-        env = {**os.environ, "PYTHONPATH": str(path)}
-        run = subprocess.run(
-            [sys.executable, "-c", code], env=env, cwd=path, capture_output=True, text=True, check=True, timeout=120
-        )
-        return run.stdout
+        return fresh.python(code, env={"PYTHONPATH": str(path)}).stdout
 
     assert folder(tmp_path) == folder(sources.PACKAGE.parent)
 

@@ -1,9 +1,7 @@
 """Kernels compiled by another process: this one loads them, knows nothing of how they were made, and compiles by itself
 what the other can't."""
 
-import os
-import subprocess
-import sys
+from tests.support import fresh
 
 LOADED = """
 import numpy as np
@@ -19,11 +17,7 @@ print(count_words(data, 0), compiler.count, sum(count_words.stats.cache_hits.val
 
 
 def run(folder, before=""):
-    environment = {**os.environ, "PMVIEWER_CACHE": str(folder)}
-    script = LOADED.format(before=before)
-    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.split()
+    return fresh.python(LOADED.format(before=before), env={"PMVIEWER_CACHE": str(folder)}).stdout.split()
 
 
 def test_a_kernel_is_compiled_by_the_other_process_and_loaded_here(tmp_path):

@@ -47,10 +47,10 @@ def sky(flat, directions):
 
 
 def test_emitted_power_of_all_lights_together():
-    """2^20 photons: each light's power within 0.1 % of the analytic value, of each kind that is not an area light."""
+    """2^19 photons: each light's power within 0.1 % of the analytic value, of each kind that is not an area light."""
     lights = (*MORE.values(), LIGHTS["point"])
     flat = flat_of(*lights)
-    n = 2**20
+    n = 2**19
     _, _, beta, light = emit(flat, n)
     for index, described in enumerate(lights):
         expected = emitted_power(described, flat.radius)
@@ -179,8 +179,8 @@ def test_an_even_image_is_a_constant_sky():
     flat = flat_of(image)
     assert flat.light_power[0] == pytest.approx(4 * math.pi**2 * flat.radius**2 * 0.8, rel=1e-6)
     wi, _, radiance, pdf, _, _ = sample(flat, (0.0, 0.01, 0.0), 100_000)
-    assert pdf == pytest.approx(1 / (4 * math.pi), rel=1e-5)
-    assert radiance == pytest.approx(0.8, rel=1e-6)
+    np.testing.assert_allclose(pdf, 1 / (4 * math.pi), rtol=1e-5)
+    np.testing.assert_allclose(radiance, 0.8, rtol=1e-6)
     assert p_uniform((wi[:, 2] + 1) / 2) > 1e-3
 
 

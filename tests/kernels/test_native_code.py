@@ -1,10 +1,8 @@
 """Only what Python calls becomes machine code, and what comes back from disk does the same as what was compiled."""
 
-import os
-import subprocess
-import sys
-
 import pytest
+
+from tests.support import fresh
 
 MODULE = """
 import sys
@@ -62,9 +60,8 @@ for dispatcher in (squared, length, lengths, twice):
 
 def run(folder, *functions):
     (folder / "lengths.py").write_text(MODULE)
-    env = {**os.environ, "PMVIEWER_CACHE": str(folder / "cache"), "PYTHONPATH": os.getcwd()}
-    command = [sys.executable, str(folder / "lengths.py"), *functions]
-    return subprocess.run(command, env=env, capture_output=True, text=True, check=True, timeout=300).stdout.splitlines()
+    done = fresh.python(folder / "lengths.py", *functions, env={"PMVIEWER_CACHE": str(folder / "cache")})
+    return done.stdout.splitlines()
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import mmap
-import os
 import pickle
-import subprocess
 import sys
 from pathlib import Path
 from typing import NamedTuple
@@ -15,6 +13,7 @@ import llvmlite.binding as llvm
 import pytest
 
 from pmviewer.kernels.compile import image
+from tests.support import fresh
 
 pytestmark = pytest.mark.skipif(not image.is_possible(), reason="object files are of another kind here")
 
@@ -107,9 +106,8 @@ STATEMENTS = "\n    ".join(f"x = step(x, {i}, out)" for i in range(40))
 
 def run(folder: Path, module: str, *words: str) -> list[str]:
     (folder / "placed_lengths.py").write_text(module)
-    env = {**os.environ, "PMVIEWER_CACHE": str(folder / "cache"), "PYTHONPATH": os.getcwd()}
-    command = [sys.executable, str(folder / "placed_lengths.py"), *words]
-    return subprocess.run(command, env=env, capture_output=True, text=True, check=True, timeout=300).stdout.splitlines()
+    done = fresh.python(folder / "placed_lengths.py", *words, env={"PMVIEWER_CACHE": str(folder / "cache")})
+    return done.stdout.splitlines()
 
 
 class Told(NamedTuple):

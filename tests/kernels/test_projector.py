@@ -157,7 +157,7 @@ def test_several_projectors_and_other_lights_keep_their_own_pictures() -> None:
     last = replace(projector("last"), pixels=3 * picture(seed=9), half=(0.3, 0.6))
     lights = (small, MORE["spot"], LIGHTS["turned"], MORE["directional"], PointLight("p", (0, 1, 0), (1, 1, 1)), last)
     flat = flatten(scene_of(*lights))
-    n = 2**20
+    n = 2**19
     _, _, beta, light = emit(flat, n)
     for index, described in enumerate(lights):
         expected = emitted_power(described, flat.radius)

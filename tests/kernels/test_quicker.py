@@ -21,7 +21,11 @@ from numba.core.runtime.context import NRTContext
 from numba.core.typing import npydecl
 from numba.np import numpy_support
 
+from pmviewer.engine.opened import open_scene
 from pmviewer.kernels.compile import jit, quicker
+from pmviewer.settings.access import Settings, with_values
+from tests.support import fresh
+from tests.support.scenes import rendered
 
 
 def test_it_is_installed():
@@ -57,12 +61,7 @@ def test_records_have_names_of_their_own_in_every_process():
         "records = [from_dtype(np.dtype([('a', 'f4'), (name, 'i8')])) for name in 'bc'];"
         "print(*[cpu_target.target_context.mangler('a.f', (record,)) for record in records])"
     )
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-    found = []
-    for before in ("0", "7"):
-        done = subprocess.run([sys.executable, "-c", script, before], capture_output=True, text=True, env=environment)
-        assert done.returncode == 0, done.stderr
-        found.append(done.stdout.split())
+    found = [fresh.python(script, before).stdout.split() for before in ("0", "7")]
     assert found[0] == found[1]
     assert len(set(found[0])) == 2
 
@@ -231,14 +230,15 @@ for i in range(6):
 
 def test_what_another_process_has_compiled_is_loaded_once():
     """Types are saved with kernels, and have to be found again where strings have other hashes."""
-    for seed in ("1", "2"):
-        told = subprocess.run(
-            [sys.executable, "-c", LOADED_ONCE],
-            env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
+    values = with_values(Settings(), {"photons.N": 1000, "camera.width": 16, "camera.height": 16})
+    rendered(open_scene("cornell_caustic"), values, 6)  # by a process whose strings have hashes of its own
+    told = subprocess.run(
+        [sys.executable, "-c", LOADED_ONCE],
+        env={**os.environ, "PYTHONHASHSEED": "2", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
     counts = [int(line) for line in told.split()]
     assert counts[0] > 5
     assert counts[-1] == counts[-2]

@@ -116,7 +116,7 @@ def test_barycentrics_give_the_hit_point():
 def test_no_ray_leaves_a_closed_mesh(scale):
     generator = np.random.default_rng(4)
     tracer = Tracer(sphere_mesh(6, scale))
-    rays = 500_000
+    rays = 200_000
     origins = scale * 0.5 * unit(generator.normal(size=(rays, 3)))
     directions = unit(generator.normal(size=(rays, 3)))
     assert (tracer.closest(origins, directions)[1] >= 0).all()

@@ -65,7 +65,7 @@ def inward_rays(n, distance, radius, seed=1):
     return origins, d / np.linalg.norm(d, axis=1, keepdims=True)
 
 
-N = 200_000
+N = 100_000
 
 
 @pytest.mark.parametrize("scale", SCALES)

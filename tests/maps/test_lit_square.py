@@ -15,8 +15,9 @@ from tests.support import naive_maps as naive
 
 SIDE = 200
 N = SIDE * SIDE
-SQUARES = 8
-DISTRIBUTIONS = ("independent", "stratified")
+SQUARES = {"independent": 8, "stratified": 4}
+"""How many there are: the noise of stratified photons is small."""
+DISTRIBUTIONS = tuple(SQUARES)
 SPHERE, FLAT = 1.0, 0.2
 BOUNDARY = {"independent": 0.0, "stratified": 0.2}
 WIDEST = 0.0631
@@ -42,7 +43,7 @@ def photons(seed, distribution):
 
 @pytest.fixture(scope="module")
 def squares():
-    clouds = {d: [photons(seed, d) for seed in range(SQUARES)] for d in DISTRIBUTIONS}
+    clouds = {d: [photons(seed, d) for seed in range(SQUARES[d])] for d in DISTRIBUTIONS}
     trees = {d: [build_kdtree(cloud, 1 / N) for cloud in clouds[d]] for d in DISTRIBUTIONS}
     grids = {d: [build_grid(cloud, WIDEST, 1 / N) for cloud in clouds[d]] for d in DISTRIBUTIONS}
     return {"nearest": trees, "radius": grids}
@@ -113,11 +114,12 @@ def test_E2_all_kernels_have_the_same_mean(squares, distribution):
 @pytest.mark.parametrize("estimator", ["disc", "hull", "differential"])
 def test_E6_any_part_of_the_disc_of_the_nearest_has_the_same_mean(squares, estimator):
     """Independent photons, so exactly, whatever the kernel; a third of the photons or a fiftieth. Of that a look-up
-    sees a third of a photon, so that it takes many; of the others' discs 5000 cover a square twice or more."""
+    sees a third of a photon, so that it takes many and one kernel is enough; of the others' discs 5000 cover a square
+    twice or more."""
     kinds = FILTERS if estimator == "disc" else ("constant",)
     for k, share, places in ((100, 0.3, 5000), (16, 0.3, 5000), (16, 0.02, 20_000)):
         look = middle if places < 10_000 else anywhere
-        for kind in kinds:
+        for kind in kinds if share > 0.1 else kinds[:1]:
             chosen = {"share": share, "kind": kind, "estimator": estimator, "rim": RIM_LEFT_OUT}
             found = np.mean(
                 [

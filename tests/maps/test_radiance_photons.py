@@ -208,7 +208,7 @@ def test_light_does_not_leak_through_a_thin_wall(share):
     assert renderer.frame(1).image("normal")[..., 1].max() == 1  # the floor is in the picture
 
 
-@pytest.mark.parametrize("lookup", ["radius", "nearest"])
+@pytest.mark.parametrize("lookup", ["radius", pytest.param("nearest", marks=pytest.mark.extensive)])
 def test_threads_change_nothing(lookup):
     settings = settings_of(
         render={"method": "gather"},

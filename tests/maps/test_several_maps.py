@@ -79,7 +79,7 @@ def square_maps(M, n, trial, combine, places):
     return Combined(parts, 1 / (M * n), combine), points
 
 
-def moments(M, in_each, rim, combine, share=1.0, trials=60, places=400, n=1600, **fields):
+def moments(M, in_each, rim, combine, share=1.0, trials=30, places=400, n=1600, **fields):
     """Mean, its standard error, and relative variance of look-ups in the middle of squares of M·n photons."""
     means, variances = [], []
     for trial in range(trials):
@@ -122,7 +122,7 @@ def test_parts_of_discs_and_kernels_have_the_same_mean(fields):
 
 def test_at_an_edge_it_is_as_dark_as_one_map():
     """What half a disc off the surface takes is the same: of k/M photons of an M-th of them, or of k of all."""
-    M, in_each, n, trials = 5, 4, 1000, 80
+    M, in_each, n, trials = 5, 4, 1000, 40
     several, single = [], []
     for trial in range(trials):
         rng = np.random.default_rng(trial)
@@ -141,7 +141,7 @@ def test_few_photons_within_the_largest_radius():
     """Where the search ends before k photons the mean stays: in all parts exactly, in some within half a percent."""
     for radius, in_each in ((0.03, 6), (0.02, 12)):  # 4.5 photons of 6; 2 of 12
         means = []
-        for trial in range(60):
+        for trial in range(30):
             rng = np.random.default_rng(trial)
             parts = [unit_square(rng, 1600) for _ in range(4)]
             points = np.c_[rng.uniform(0.2, 0.8, (400, 2)), np.zeros(400)]

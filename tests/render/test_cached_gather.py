@@ -73,6 +73,32 @@ def test_neither_coarse_frames_nor_other_cameras_change_the_picture():
     assert np.array_equal(renderer.frame(3).planes, cached(opened, 2).frame(1).planes)
 
 
+@pytest.mark.usefixtures("room_for_split_paths")
+def test_records_lie_where_the_eye_pass_ended():
+    """Over mirrors and through glass, too: where the plain gather's rays of the same samples start, which
+    `test_replays` compares with the picture. Pixels lie 0.06 apart or more."""
+    pool = WorkPool(1)
+    opened, size, renderers = open_scene(cornell_box(size=24)), 24, []
+    for gather in ({"rays": 2}, {"rays": 2, "cache": "on", "cache_error": 0.05}):
+        settings = settings_of(
+            render={"method": "gather", "outline_rays": 0, "splits": 0, "mirror_rays": 1},
+            photons={"N": 2000},
+            gather=gather,
+        )
+        renderers.append(Renderer(opened, settings, pool, StageStore(0)))
+        renderers[-1].step()
+    plain, renderer = renderers
+    points = [plain.gather_points(x, y) for y in range(size) for x in range(size)]
+    pool.close()
+    ends = np.array([of[0, :3] if len(of) else (np.inf,) * 3 for of in points])
+    over_chain = plain.frame(1).image("specular").max(axis=-1).reshape(-1) > 0
+    records = renderer.latest.cache.rows[:, :3]
+    distance = np.abs(records[:, None, :] - ends).max(axis=-1)
+    assert len(records) > 20
+    assert distance.min(axis=1).max() < 0.02
+    assert over_chain[distance.argmin(axis=1)].any()
+
+
 def test_a_coarse_frame_has_few_records():
     opened, pool = open_scene(diffuse_box(size=256)), WorkPool(2)
     settings = settings_of(render={"method": "gather"}, photons={"N": 20_000}, gather=ON)

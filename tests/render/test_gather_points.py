@@ -20,9 +20,11 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=[pytest.mark.extensive] if case == "grid" else []) for case in CASES]
+)
 def test_points_add_up_to_the_pixel(case):
-    """One pass: what the rays of a pixel bring is its indirect light."""
+    """One pass: what the rays of a pixel bring is its indirect light. A grid guides rays as cones do."""
     pool = WorkPool(1)
     scene = open_scene(cornell_box(size=16))
     settings = settings_of(render={"method": "gather"}, photons={"N": 20_000}, gather={"rays": 6, **CASES[case]})

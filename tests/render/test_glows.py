@@ -59,9 +59,8 @@ def irradiance(emission, x, n=200_000, sigma=0.0):
     return 8 * (emission(y) * (np.exp(-sigma * np.minimum(leaves, r)) * d[:, 1] / r**2)[:, None]).mean(axis=0)
 
 
-def seen_on_floor(expected_at, image):
-    """Mean over four pixels in the middle and four at the sides of the picture, found and expected."""
-    size = len(image)
+def seen_on_floor(expected_at, size=12):
+    """Pixels in the middle and at the sides of the picture, four each, and the mean that is expected over them."""
     half = np.tan(np.radians(35)) * 7.3
     middle, side = [(5, 5), (5, 6), (6, 5), (6, 6)], [(0, 5), (5, 0), (11, 6), (6, 11)]
     for pixels in (middle, side):
@@ -73,21 +72,16 @@ def seen_on_floor(expected_at, image):
                 for b in (0.17, 0.5, 0.83)
             ]
             sums.append(np.mean([expected_at(p) for p in places], axis=0))
-        yield np.mean([image[row, column] for row, column in pixels], axis=0), np.mean(sums, axis=0)
+        yield pixels, np.mean(sums, axis=0)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("method", METHODS)
-def test_a_flame_lights_the_floor_under_it(method):
-    """Radiance 0.5/π · E of a floor of albedo 0.5, near the flame and off it, against a sum by NumPy; what is seen of
-    the flame itself, by the method's own view, apart. Within 4 %, the noise of path and gather near the flame."""
-    albedo = (0, 0, 0) if method == "path" else BARELY
-    medium = Medium("flame", (0.4,) * 3, albedo, (2.0, 1.0, 0.5), density=Grid(np.ones((1,) * 4, np.float32), TO_CUBE))
-    medium = replace(medium, emission_grid=flame())
-    passes = {"path": 600, "progressive": 600, "gather": 150}[method]
-    scene = over_floor(medium)
-    image = picture(scene, method, passes, "direct", gather={"rays": 8}, photons={"N": 500})
-    emission = np.array(medium.emission)
+EMISSION, SIGMA = (2.0, 1.0, 0.5), 0.4
+
+
+@pytest.fixture(scope="module")
+def lit_by_the_flame():
+    """What `seen_on_floor` tells of a floor of albedo 0.5, by a sum with NumPy."""
+    lattice = flame()
 
     def at(x):
         # The floor is seen from above through the cube: dimmed where the camera's ray meets it.
@@ -95,10 +89,26 @@ def test_a_flame_lights_the_floor_under_it(method):
         way = np.array(x) - eye
         near = ((np.where(way < 0, 1, -1) - eye) / way).max()
         far = ((np.where(way < 0, -1, 1) - eye) / way).min()
-        T = np.exp(-0.4 * max(far - near, 0) * np.linalg.norm(way))
-        return 0.5 / np.pi * T * irradiance(lambda y: interpolated(medium.emission_grid, y) * emission, x, 20_000, 0.4)
+        T = np.exp(-SIGMA * max(far - near, 0) * np.linalg.norm(way))
+        E = irradiance(lambda y: interpolated(lattice, y) * np.array(EMISSION), x, 20_000, SIGMA)
+        return 0.5 / np.pi * T * E
 
-    for found, expected in seen_on_floor(at, image):
+    return list(seen_on_floor(at))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", METHODS)
+def test_a_flame_lights_the_floor_under_it(method, lit_by_the_flame):
+    """Radiance 0.5/π · E of a floor of albedo 0.5, near the flame and off it, against a sum by NumPy; what is seen of
+    the flame itself, by the method's own view, apart. Within 4 %, the noise of path and gather near the flame."""
+    albedo = (0, 0, 0) if method == "path" else BARELY
+    medium = Medium("flame", (SIGMA,) * 3, albedo, EMISSION, density=Grid(np.ones((1,) * 4, np.float32), TO_CUBE))
+    medium = replace(medium, emission_grid=flame())
+    passes = {"path": 600, "progressive": 600, "gather": 150}[method]
+    scene = over_floor(medium)
+    image = picture(scene, method, passes, "direct", gather={"rays": 8}, photons={"N": 500})
+    for pixels, expected in lit_by_the_flame:
+        found = np.mean([image[row, column] for row, column in pixels], axis=0)
         np.testing.assert_allclose(found, expected, rtol=0.04)
 
 

@@ -20,8 +20,6 @@ from pmviewer.scene.description import ConstantEnvironment
 from pmviewer.scene.load import load_scene
 from tests.support.scenes import cornell_box, rendered, settings_of
 
-pytestmark = pytest.mark.usefixtures("every_surface")
-
 METHODS = ("path", "progressive", "gather")
 
 

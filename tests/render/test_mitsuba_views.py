@@ -20,12 +20,18 @@ from pmviewer.engine.store import StageStore
 from tests.render.mitsuba_views.scenes import VIEWS, description
 from tests.support.scenes import settings_of
 
-pytestmark = pytest.mark.usefixtures("every_surface")
+
+@pytest.fixture(autouse=True)
+def kernels(request):
+    """Those of scenes with anything, and for hidden lights those of `test_hidden_lights`."""
+    if "hid" not in request.node.name:
+        request.getfixturevalue("every_surface")
+
 
 EXPECTED = json.loads((Path(__file__).parent / "mitsuba_views" / "expected.json").read_text("utf-8"))
-PATH = (16, 8)
+PATH = (16, 4)
 """Runs and passes: of few runs the spread is known badly, and Student's t has to be large before a block counts as
-wrong. Half of the blocks may be off by no more than 1.3 % (vertex_colours) to 6 % (veils_area)."""
+wrong. Half of the blocks may be off by no more than 1.8 % (vertex_colours) to 8 % (veils_area)."""
 SIGNIFICANCE = 1e-4
 
 

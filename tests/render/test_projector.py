@@ -15,8 +15,8 @@ pytestmark = pytest.mark.usefixtures("every_surface")
 DOWN = np.array([[-1.0, 0, 0], [0, 0, -1], [0, -1, 0]])
 """Looks down, its top towards −z."""
 METHODS = {"path": {}, "progressive": {"estimate": {"radius": 0.01}}, "gather": {"estimate": {"radius": 0.02}}}
-PASSES = {"path": 144, "progressive": 24, "gather": 24}
-"""So many that a run knows the mean to a third of a percent; radii are small, since they darken corners."""
+PASSES = {"path": 72, "progressive": 12, "gather": 12}
+"""So many that a run knows the mean to half a percent; radii are small, since they darken corners."""
 
 
 def room(size: int = 48) -> Scene:
@@ -43,8 +43,8 @@ def test_all_methods_show_the_same_room() -> None:
         means[name] = image.astype(np.float64).mean(axis=(0, 1))
         print(name, means[name])
     assert means["path"].min() > 0
-    assert means["progressive"] == pytest.approx(means["path"], rel=0.01)
-    assert means["gather"] == pytest.approx(means["path"], rel=0.01)
+    assert means["progressive"] == pytest.approx(means["path"], rel=0.015)
+    assert means["gather"] == pytest.approx(means["path"], rel=0.015)
 
 
 def test_projection_maps_let_all_of_its_photons_go() -> None:

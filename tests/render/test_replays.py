@@ -46,12 +46,12 @@ def box() -> Scene:
     return Scene("positions", None, (*walls, *spheres), materials, (), box_camera(), SIZE, SIZE)
 
 
-def rendered(mirror_rays=1, **gather):
+def rendered(mirror_rays=1):
     pool = WorkPool(1)
     settings = settings_of(
         render={"method": "gather", "outline_rays": 0, "splits": 0, "mirror_rays": mirror_rays},
         photons={"N": 2000},
-        gather={"rays": 2, **gather},
+        gather={"rays": 2},
     )
     renderer = Renderer(open_scene(box()), settings, pool, StageStore(0))
     renderer.step()
@@ -87,13 +87,3 @@ def test_of_two_samples_each_gathers_where_it_ended():
                 checked += samples == 2 and over_chain[y, x]
     pool.close()
     assert checked > 60
-
-
-def test_records_of_the_irradiance_cache_lie_where_the_eye_pass_ended():
-    renderer, met, over_chain, pool = rendered(cache="on", cache_error=0.05)
-    pool.close()
-    records = renderer.latest.cache.rows[:, :3]
-    distance = np.abs(records[:, None, :] - met.reshape(1, -1, 3)).max(axis=-1)
-    assert len(records) > 20
-    assert distance.min(axis=1).max() < NEAR
-    assert over_chain.reshape(-1)[distance.argmin(axis=1)].any()

@@ -188,7 +188,7 @@ def test_rough_mirrors_see_panes_as_they_are():
     assert ours.mean(axis=(0, 1)) == pytest.approx(path.mean(axis=(0, 1)), rel=0.02)
 
 
-def divided_box(rule, size=60):
+def divided_box(rule, size=44):
     """A closed box, lit above a pane and seen below it."""
     materials = (diffuse(albedo=(0.7,) * 3), replace(pane(rule), transmittance=(0.9, 0.8, 0.6)))
     glass = Shape("pane", Parallelogram((-1, 0.3, -1), (0, 0, 2), (2, 0, 0)), 1)

@@ -13,7 +13,6 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.maps.virtual_lights import W_A, W_C, W_F, W_G
 from pmviewer.render.planes import CHANNELS
 from pmviewer.scene.description import Camera, Scene
-from tests.support import kinds
 from tests.support.naive_virtual import Box, shoot, sums, walks
 from tests.support.scenes import (
     box_walls,
@@ -135,7 +134,7 @@ def open_box(size=12):
 @pytest.fixture(scope="module")
 def reference():
     """Of `open_box`, of many pixels in few passes: each pass has its fixed cost."""
-    fine = rendered(open_box(12 * FINE), settings_of(render={"method": "path"}), 40).frame(0).image("indirect")
+    fine = rendered(open_box(12 * FINE), settings_of(render={"method": "path"}), 16).frame(0).image("indirect")
     return fine.reshape(12, FINE, 12, FINE, 3).mean(axis=(1, 3)) @ LUMINANCE
 
 
@@ -149,27 +148,28 @@ def reference():
 )
 def test_passes_reach_the_path_tracer_in_an_open_scene(estimator, normalisation, reference):
     """Per pixel, the twin knows all of them at a point."""
-    renderer = lit(open_box(), passes=100, estimator=estimator, normalisation=normalisation)
+    passes = 60 if estimator == "single step" else 100  # which traces all photons for its density
+    renderer = lit(open_box(), passes, estimator=estimator, normalisation=normalisation)
     image = renderer.frame(0).image("indirect") @ LUMINANCE
     inside = np.s_[2:-2, 2:-2]
     print(f"{estimator}, {normalisation}: {image[inside].mean() / reference[inside].mean():.4f}")
     assert image[inside].mean() == pytest.approx(reference[inside].mean(), rel=0.03)
 
 
+@pytest.mark.usefixtures("every_surface")
 @pytest.mark.parametrize("gather_rays", [64, pytest.param(0, marks=pytest.mark.extensive)])
 def test_passes_reach_the_path_tracer_where_virtual_lights_are_glossy(gather_rays):
     """They stand for photons around them, which blurs less from pass to pass; 64 gather rays bring nearly all of the
-    light to glossy surfaces. Within 3 %, twice the noise. Paths have the kernels that other tests have."""
+    light to glossy surfaces. Within 3 %: over three seeds 24 passes miss 1.5 % of it, 60 none, with noise of half a
+    percent. Most of a pass is its lights, so that the picture may be small."""
 
     def mean(size, passes, **groups):
         settings = settings_of(camera={"width": size, "height": size}, **groups)
         return (rendered(open_scene("glossy_room"), settings, passes).frame(0).image("indirect") @ LUMINANCE).mean()
 
-    with pytest.MonkeyPatch.context() as patch:
-        kinds.every_surface(patch)
-        truth = mean(96, 24, render={"method": "path"})
+    truth = mean(48, 24, render={"method": "path"})
     virtual = {"number": 200, "photons": 8000, "gather_rays": gather_rays}
-    found = mean(24, 60, render={"method": "virtual lights"}, virtual=virtual)
+    found = mean(12, 36, render={"method": "virtual lights"}, virtual=virtual)
     print(f"glossy room: {found / truth:.4f}")
     assert found == pytest.approx(truth, rel=0.03)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -210,6 +211,12 @@ class Grid:
         return np.bincount(cell, minlength=self.CELLS[0] * self.CELLS[1])
 
 
+@functools.cache
+def _gauss(n):
+    """Nodes and weights in [−1, 1]."""
+    return np.polynomial.legendre.leggauss(n)
+
+
 class _Warp:
     """An interval cut into cells that are fine, `width`, around the centre and grow away from it."""
 
@@ -221,7 +228,7 @@ class _Warp:
             self.borders[1 + np.argmin(np.abs(self.borders[1:-1] - at))] = at
 
     def nodes(self, n):
-        x, w = np.polynomial.legendre.leggauss(n)
+        x, w = _gauss(n)
         step = np.diff(self.borders)[:, None]
         y = self.borders[:-1, None] + step * (x + 1) / 2
         return self.centre + self.width * np.sinh(y), w * step / 2 * self.width * np.cosh(y)
