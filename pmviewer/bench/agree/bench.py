@@ -16,6 +16,7 @@ from pmviewer.bench.agree.generate import DENSE_FROM, GLOWING_FROM, PROJECTED_FR
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH, VIRTUAL
 from pmviewer.bench.agree.results import Results
+from pmviewer.bench.agree.shares import LOTS, MAIN, PANES, SCATTERING
 from pmviewer.bench.agree.statistics import LEVEL, rejected
 from pmviewer.bench.agree.triage import save, saved, smallest, without_all
 from pmviewer.bench.agree.trial import FIRST, FORGIVEN, STAGES
@@ -188,6 +189,9 @@ def _settings_notes() -> list[str]:
     )
     return [
         f"{SIZE}² pixels; stages, with fresh seeds where not said otherwise, as long as there is doubt: {stages}",
+        f"each scene is rendered by path, {', '.join(MAIN)} and one of {', '.join(LOTS)} (single step or every vertex), "
+        f"drawn by lot, those with media by all; one in {PANES} with panes by thin glass, one in {SCATTERING} with paths "
+        "of one scattering",
         f"photon methods may be off by {FORGIVEN:g} × this radius, {FORGIVEN * STAGES[-1].radius:.0%} of a block in "
         "the last stage: look-ups lose light at edges, in proportion to the radius",
         "weighted virtual lights: sums of light and of weights are compared before one is divided by the other, these "
