@@ -15,6 +15,7 @@ from pmviewer.bench.agree.features import GROUPS, features
 from pmviewer.bench.agree.generate import DENSE_FROM, GLOWING_FROM, PROJECTED_FROM, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH, VIRTUAL
+from pmviewer.bench.agree.pooled import pooled
 from pmviewer.bench.agree.results import Results
 from pmviewer.bench.agree.shares import LOTS, MAIN, PANES, SCATTERING
 from pmviewer.bench.agree.statistics import LEVEL, rejected
@@ -150,6 +151,11 @@ def report(
     notes = [f"scene {d.index}: {d.text}{f'; known: {d.known}' if d.known else ''}{f'; {d.file}' if d.file else ''}"
              for d in found]  # fmt: skip
     notes += [f"known deviation, {d.name}: {d.reason}" for d in DEVIATIONS]
+    notes += [
+        f"over {p.scenes} scenes without known deviations, {p.method} against {p.peer}, {p.what}: median ratio of "
+        f"means {p.ratio:.4f} ± {p.error:.4f}"
+        for p in pooled(seed, verdicts)
+    ]
     notes += _settings_notes()
     notes.append(
         f"{len(comparisons)} comparisons of {sum(c.outcome.tests for c in comparisons)} tests; this run took "
@@ -189,9 +195,9 @@ def _settings_notes() -> list[str]:
     )
     return [
         f"{SIZE}² pixels; stages, with fresh seeds where not said otherwise, as long as there is doubt: {stages}",
-        f"each scene is rendered by path, {', '.join(MAIN)} and one of {', '.join(LOTS)} (single step or every vertex), "
-        f"drawn by lot, those with media by all; one in {PANES} with panes by thin glass, one in {SCATTERING} with paths "
-        "of one scattering",
+        f"each scene is rendered by path, {', '.join(MAIN)} and, drawn by lot, one of {', '.join(LOTS)} (single step "
+        f"or every vertex), those with media by all; one in {PANES} with panes by thin glass; one in {SCATTERING} is "
+        "compared in paths of one scattering, too",
         f"photon methods may be off by {FORGIVEN:g} × this radius, {FORGIVEN * STAGES[-1].radius:.0%} of a block in "
         "the last stage: look-ups lose light at edges, in proportion to the radius",
         "weighted virtual lights: sums of light and of weights are compared before one is divided by the other, these "
