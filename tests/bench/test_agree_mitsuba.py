@@ -20,9 +20,8 @@ pytestmark = pytest.mark.skipif(not peer.installed(), reason="Mitsuba 3 is not i
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="processors can't be taken away here")
 def test_mitsuba_reads_a_sky_where_there_is_one_processor(tmp_path):
     """It waited for ever."""
-    scene = next(
-        s for i in range(200) if any(light["type"] == "envmap" for light in (s := scene_of(1, i))["lights"])
-    )  # fmt: skip
+    scenes = (scene_of(1, i) for i in range(200))
+    scene = next(s for s in scenes if any(light["type"] == "envmap" for light in s["lights"]))
     _, path = write_scene(scene, tmp_path, "scene")
     assert list(tmp_path.glob("*.exr"))
     request = {
