@@ -8,7 +8,7 @@ what the runs say of themselves. Scenes with what a known deviation takes are le
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,12 @@ OF_MAD = 1.4826
 """Standard deviation of normal values to their median absolute deviation."""
 
 
+LEAST_SCENES = 20
+"""From which the spread of the ratios is known well enough to judge by it."""
+SURE = 3.0
+"""Standard errors that chance is granted."""
+
+
 @dataclass(frozen=True)
 class Pooled:
     """`method` against `peer` in `what` over so many `scenes`: the median ratio of means and its standard error."""
@@ -36,6 +42,22 @@ class Pooled:
     scenes: int
     ratio: float
     error: float
+
+    @property
+    def off(self) -> float:
+        """By how much it is off for sure."""
+        return max(abs(self.ratio - 1) - SURE * self.error, 0.0)
+
+    def __str__(self) -> str:
+        return (
+            f"over {self.scenes} scenes without known deviations, {self.method} against {self.peer}, {self.what}: "
+            f"median ratio of means {self.ratio:.4f} ± {self.error:.4f}"
+        )
+
+
+def farthest_off(all_: Sequence[Pooled]) -> Pooled | None:
+    """Of those with scenes enough, the one that is off most; None where there is none of them."""
+    return max((p for p in all_ if p.scenes >= LEAST_SCENES), key=lambda p: p.off, default=None)
 
 
 def pooled(seed: int, verdicts: Mapping[int, Verdict]) -> list[Pooled]:
