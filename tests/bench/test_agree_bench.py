@@ -222,6 +222,29 @@ def test_wrong_weights_of_virtual_lights_are_found(method):
     assert (off.method, off.what, off.peer) == (method, "weights", "its walks")
 
 
+def test_weights_that_no_walk_has_met_are_no_disagreement_and_lacking_walks_are():
+    """Scene 54 of seed 2026: metal that a lobe's far end lights, where a walk counts once in ten thousand runs."""
+    scene = next(s for i in range(100) if "single step" in asked_methods(s := scene_of(1, i)))
+    rng = np.random.default_rng(1)
+
+    def asked(G: float) -> Comparison:
+        class Rare(FakeRuns):
+            def weights(self, method: str, stage: int) -> np.ndarray:
+                found = np.zeros((STAGES[stage].runs, 32, 32, 4))
+                found[..., :2] = G * rng.uniform(0.9, 1.1, found[..., :2].shape)
+                return found
+
+        return next(c for q in questions(Rare(scene)) if q.what == "weights" and (c := q.asked(len(STAGES))))
+
+    assert asked(3e-9).p == 1
+    assert asked(3e-2).p < 1e-6
+
+
+def test_nothing_known_excuses_weights():
+    assert not any(d.concerns("its walks") for d in DEVIATIONS)
+    assert any(d.concerns("our path") for d in DEVIATIONS)
+
+
 def test_what_goes_with_the_radius_is_no_disagreement():
     rng = np.random.default_rng(5)
 

@@ -27,6 +27,7 @@ paths weigh nothing in media.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -36,6 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench.agree.generate import disperses, has_distant_lights, needs_particles
+from pmviewer.bench.agree.known import WALKS
 from pmviewer.bench.agree.media import emits, has_media
 from pmviewer.bench.agree.mitsuba_client import Mitsuba, MitsubaError
 from pmviewer.bench.agree.ours import (
@@ -58,6 +60,7 @@ from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.errors import PmviewerError
 from pmviewer.scene.arrays.flatten import SURFACES, flatten
+from pmviewer.settings.access import Settings
 
 STAGES = (
     Effort(runs=6, spp=8, passes=2, photons=8_000, radius=0.01),
@@ -84,6 +87,8 @@ LEAST_OF_PATHS = 0.98
 LEAST_LIGHT = 1e-5
 """Mean radiance below which nothing is compared: lights have from 0.2 to 20, and what comes of a light that shines into
 its own closed shape goes by rays that slip through its edges."""
+FEW_WALKS = 20
+"""If so many walks are expected to count, none does with a probability of 2e-9."""
 HARMLESS = ("axis of <rotate> is not of unit length", "lean from their faces")
 """The warnings that are wanted: both programs stretch by such an axis, and what leaning normals do is known."""
 TERMS = {"emission": ("emission",), "direct": ("direct",), "specular": ("specular",),
@@ -177,14 +182,14 @@ class Question:
     peer: str
     what: str
     pair: Pair
-    floor: Callable[[], NDArray[np.float64] | None] = lambda: None
-    """What the difference of each test may be, see `negligible`."""
+    floor: Callable[[int], NDArray[np.float64] | None] = lambda stage: None
+    """What the difference of each test may be at a stage, see `negligible`."""
 
     def answer(self, stage: int) -> Outcome:
         """The outcome of one stage."""
         if self.method == "path":
             return compared(*self.pair(stage))
-        forgiven, floor = FORGIVEN * STAGES[stage].radius, self.floor()
+        forgiven, floor = FORGIVEN * STAGES[stage].radius, self.floor(stage)
         tails = SPIKES if self.method in VIRTUAL else TAIL, TAIL
         ours, theirs = self.pair(stage)
         found = compared(ours, theirs, forgiven, sparse=True, floor=floor, tails=tails)
@@ -226,6 +231,14 @@ def unseen_in(ours: NDArray[np.float64]) -> NDArray[np.float64]:
 def _with_sum(weights: NDArray[np.float64]) -> NDArray[np.float64]:
     """(runs, h, w, 3) of (runs, h, w, 2): both, and their sum, in place of channels."""
     return np.concatenate([weights, weights.sum(axis=-1, keepdims=True)], axis=-1)
+
+
+def unmet_by(weights: NDArray[np.float64], passes: int) -> NDArray[np.float64]:
+    """The difference of sums of weights (runs, h, w, 4) that is none, in the picture and in each block: what FEW_WALKS
+    of all walks would count, of which none may have met anything yet."""
+    blocks = summaries(weights).shape[1] // weights.shape[3] - 1
+    walks = Settings().virtual.walks * passes * math.prod(weights.shape[:3])
+    return FEW_WALKS / walks * np.concatenate([np.ones(CHANNELS), np.full(CHANNELS * blocks, float(blocks))])
 
 
 def particles_hold(runs: Runs) -> bool:
@@ -290,7 +303,10 @@ def questions(runs: Runs) -> Iterator[Question]:
                 G, C = np.split(runs.weights(method, stage), 2, axis=-1)
                 return summaries(_with_sum(G)), summaries(_with_sum(C))
 
-            yield Question(method, "its walks", "weights", by_walks)
+            def unmet(stage: int, method: str = method) -> NDArray[np.float64]:
+                return unmet_by(runs.weights(method, stage), STAGES[stage].passes)
+
+            yield Question(method, WALKS, "weights", by_walks, unmet)
         for name in SAFE_TERMS if particles else OF_FIRST_SURFACE if alone and not glows else TERMS:
 
             def by_term(
@@ -298,7 +314,7 @@ def questions(runs: Runs) -> Iterator[Question]:
             ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
                 return part(method, name, stage), part("path", name, stage)
 
-            yield Question(method, "our path", name, by_term, lambda: unseen_in(whole("path", 0)))
+            yield Question(method, "our path", name, by_term, lambda s: unseen_in(whole("path", 0)))
 
 
 def tried(
