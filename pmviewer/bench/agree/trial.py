@@ -21,8 +21,8 @@ where a bright and a dark surface meet, the limit for r = 0 counts, twice the la
 Virtual lights are photon methods, too: their caustics are looked up. Their plain sum has no other bias; its spikes have
 no variance, which the test allows for (SPIKES). Weighted light is a quotient C·ΣF/ΣG, whose bias falls slowly where
 single lights rule ΣG, too slowly for a test. What it is made of has none: ΣF is compared as a picture, and ΣG with ΣC,
-which gathering walks count: both have the same mean, whatever the scene. Of these estimators a scene has one; whole
-paths weigh nothing in media.
+which gathering walks count: both have the same mean, of a single step with many photons (docs/virtual.md). Of these
+estimators a scene has at most one; whole paths weigh nothing in media.
 """
 
 from __future__ import annotations
