@@ -15,7 +15,9 @@ from pmviewer.bench.agree.features import GROUPS, features
 from pmviewer.bench.agree.generate import DENSE_FROM, GLOWING_FROM, PROJECTED_FROM, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH, VIRTUAL
+from pmviewer.bench.agree.pooled import SURE, Pooled, farthest_off, pooled
 from pmviewer.bench.agree.results import Results
+from pmviewer.bench.agree.shares import LOTS, MAIN, PANES, SCATTERING
 from pmviewer.bench.agree.statistics import LEVEL, rejected
 from pmviewer.bench.agree.triage import save, saved, smallest, without_all
 from pmviewer.bench.agree.trial import FIRST, FORGIVEN, STAGES
@@ -149,20 +151,31 @@ def report(
     notes = [f"scene {d.index}: {d.text}{f'; known: {d.known}' if d.known else ''}{f'; {d.file}' if d.file else ''}"
              for d in found]  # fmt: skip
     notes += [f"known deviation, {d.name}: {d.reason}" for d in DEVIATIONS]
+    over_all = pooled(seed, verdicts)
+    notes += map(str, over_all)
     notes += _settings_notes()
     notes.append(
         f"{len(comparisons)} comparisons of {sum(c.outcome.tests for c in comparisons)} tests; this run took "
         f"{seconds:.0f} s"
     )
     notes.append(f"scenes by revision: {revisions}")
-    target = Target(
+    agreement = Target(
         "agreement", len(open_), 0, "scenes", False,
         f"scenes of seed {seed} that disagree, of {len(verdicts)} from {min(verdicts)} on; "
         f"{len(found) - len(open_)} more by known deviations; "
         f"at radius {STAGES[0].radius:g}–{STAGES[-1].radius:g} of the scene, N = {STAGES[0].photons:,}–"
         f"{STAGES[-1].photons:,}, max_depth {MAX_DEPTH}",
     )  # fmt: skip
-    return BenchResult("Agreement on random scenes", COLUMNS, rows, [target], notes)
+    return BenchResult("Agreement on random scenes", COLUMNS, rows, [agreement, *_bias(over_all)], notes)
+
+
+def _bias(over_all: list[Pooled]) -> list[Target]:
+    """What no single scene shows; nothing where the scenes are too few to tell."""
+    worst = farthest_off(over_all)
+    if worst is None:
+        return []
+    note = f"the farthest off beyond {SURE:g} standard errors, {worst}"
+    return [Target("agreement over scenes", 100 * worst.off, 100 * FORGIVEN * STAGES[-1].radius, "%", False, note)]
 
 
 COLUMNS = ("feature", "scenes", "lit", *(f"{m} differs" for m in METHODS), "by known", "noise", "in doubt")
@@ -188,6 +201,9 @@ def _settings_notes() -> list[str]:
     )
     return [
         f"{SIZE}² pixels; stages, with fresh seeds where not said otherwise, as long as there is doubt: {stages}",
+        f"each scene is rendered by path, {', '.join(MAIN)} and, drawn by lot, one of {', '.join(LOTS)} (single step "
+        f"or every vertex), those with media by all; one in {PANES} with panes by thin glass; one in {SCATTERING} is "
+        "compared in paths of one scattering, too",
         f"photon methods may be off by {FORGIVEN:g} × this radius, {FORGIVEN * STAGES[-1].radius:.0%} of a block in "
         "the last stage: look-ups lose light at edges, in proportion to the radius",
         "weighted virtual lights: sums of light and of weights are compared before one is divided by the other, these "

@@ -21,6 +21,8 @@ from scipy.spatial.transform import Rotation
 from pmviewer.bench.agree.materials import TRANSPARENT
 from pmviewer.bench.agree.tree import MAPS, Node, innermost, nodes
 
+WALKS = "its walks"
+"""Whom weights of virtual lights are compared with."""
 GREY = [0.5, 0.5, 0.5]
 SEEN_THROUGH = (*TRANSPARENT, "mask", "null", "difftrans")
 Place = NDArray[np.float64]
@@ -42,8 +44,9 @@ class Deviation:
     peer: str = "Mitsuba"
 
     def concerns(self, peer: str) -> bool:
-        """Whether a comparison with `peer` can come from it."""
-        return self.among_ours or peer.startswith(self.peer)
+        """Whether a comparison with `peer` can come from it. Virtual lights and the walks that normalise them ask the
+        same BSDFs the same questions: nothing excuses these."""
+        return (self.among_ours and peer != WALKS) or peer.startswith(self.peer)
 
 
 def _changed(change: Callable[[Node], None]) -> Callable[[Node], Node | None]:

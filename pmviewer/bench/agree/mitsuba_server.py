@@ -1,8 +1,8 @@
 """Mitsuba 3 for many small scenes: `python -m pmviewer.bench.agree.mitsuba_server` answers requests line by line.
 
 A request is a line of JSON on standard input, the answer one on standard output; pictures go through files. The variant
-is `scalar_rgb`, on one thread: nothing is compiled for a scene, which pays for tiny pictures. The program is a process
-of its own, because a Mitsuba that gives up takes its process along.
+is `scalar_rgb`: nothing is compiled for a scene, which pays for tiny pictures. The program is a process of its own,
+because a Mitsuba that gives up takes its process along.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 
 RR_DEPTH = 8
+THREADS = 2
+"""With one alone, as where a process may use one processor, Mitsuba 3.9.1 waits for ever when it reads an EXR file."""
 GRID = 2
 """Rays along a pixel's edge that look for smooth mirrors and glass."""
 
@@ -23,9 +25,11 @@ def main() -> None:
     """Answer {"path", "mode", …} until standard input ends. `mode` is an integrator or "mask"."""
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # what Mitsuba prints is no answer
+    import drjit
     import mitsuba as mi
 
     mi.set_variant("scalar_rgb")
+    drjit.set_thread_count(THREADS)
     mi.set_log_level(mi.LogLevel.Error)
     loaded: tuple[str, Any] = ("", None)
     for line in sys.stdin:

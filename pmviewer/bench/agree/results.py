@@ -18,6 +18,7 @@ from typing import Any
 from pmviewer.bench.agree.generate import scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.ours import METHODS
+from pmviewer.bench.agree.shares import LOTS, MAIN, PANES, SCATTERING
 from pmviewer.bench.agree.statistics import BLOCK, Outcome
 from pmviewer.bench.agree.tree import to_json
 from pmviewer.bench.agree.trial import FORGIVEN, STAGES, SUSPICIOUS
@@ -38,7 +39,8 @@ class Entry:
 
 def effort() -> str:
     """Changes with whatever decides by which methods and how well a scene is looked at."""
-    return _digest(repr((STAGES, SUSPICIOUS, FORGIVEN, SIZE, BLOCK, MAX_DEPTH, METHODS)))
+    shares = MAIN, LOTS, PANES, SCATTERING
+    return _digest(repr((STAGES, SUSPICIOUS, FORGIVEN, SIZE, BLOCK, MAX_DEPTH, METHODS, shares)))
 
 
 def _digest(text: str) -> str:

@@ -47,12 +47,14 @@ LEVEL = 0.01
 @dataclass(frozen=True)
 class Outcome:
     """p: chance of so large a difference where there is none (Šidák over the tests). ratio: ours to theirs where the
-    difference shows most. noise: the median standard error of a test relative to its value. tests: how many."""
+    difference shows most. noise: the median standard error of a test relative to its value. tests: how many. whole:
+    ours to theirs over the whole picture and all channels, NaN where nobody told or theirs is black."""
 
     p: float
     ratio: float
     noise: float
     tests: int
+    whole: float = math.nan
 
 
 def summaries(images: NDArray[Any], seen: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
@@ -118,7 +120,9 @@ def compared(
     lit = mean_b > 0
     noise = float(np.median(error[lit] / mean_b[lit])) if lit.any() else 0.0
     ratio = float(mean_a[worst] / mean_b[worst]) if mean_b[worst] else (math.inf if mean_a[worst] else 1.0)
-    return Outcome(sidak, ratio, noise, p.size)
+    total = float(mean_b[:CHANNELS].sum())
+    whole = float(mean_a[:CHANNELS].sum()) / total if total > 0 else math.nan
+    return Outcome(sidak, ratio, noise, p.size, whole)
 
 
 def _brightest(runs: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from pmviewer.bench.agree.process import tools
 from pmviewer.bench.agree.shrink import shrunk
 from pmviewer.bench.agree.statistics import Outcome
 from pmviewer.bench.agree.tree import Node, from_json, to_json
-from pmviewer.bench.agree.trial import STAGES, Comparison, Question, Runs, questions
+from pmviewer.bench.agree.trial import STAGES, Comparison, Explain, Question, Runs, questions
 from pmviewer.bench.agree.xml import write_scene
 from pmviewer.errors import PmviewerError
 
@@ -67,11 +67,25 @@ def all_explained(
     """The comparisons with the known deviation that each comes from, if it may be a disagreement and does."""
     found: list[Comparison] = []
     for comparison in comparisons:
-        if comparison.p <= DOUBTFUL:
+        if comparison.p <= DOUBTFUL and not comparison.known:
             before = tuple(dict.fromkeys(c.known for c in found if c.known))
             comparison = replace(comparison, known=explanation(scene, comparison, salt, shared_kernels, before))
         found.append(comparison)
     return found
+
+
+def explainer(scene: Node, salt: tuple[int, ...], shared_kernels: bool = False) -> Explain:
+    """What `Question.asked` asks of a scene: `explanation` of what may be a disagreement, reasons found before
+    first."""
+    said: dict[str, None] = {}
+
+    def explain(comparison: Comparison) -> str:
+        known = "" if comparison.p > DOUBTFUL else explanation(scene, comparison, salt, shared_kernels, tuple(said))
+        if known:
+            said[known] = None
+        return known
+
+    return explain
 
 
 def explanation(

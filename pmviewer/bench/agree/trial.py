@@ -21,12 +21,13 @@ where a bright and a dark surface meet, the limit for r = 0 counts, twice the la
 Virtual lights are photon methods, too: their caustics are looked up. Their plain sum has no other bias; its spikes have
 no variance, which the test allows for (SPIKES). Weighted light is a quotient C·ΣF/ΣG, whose bias falls slowly where
 single lights rule ΣG, too slowly for a test. What it is made of has none: ΣF is compared as a picture, and ΣG with ΣC,
-which gathering walks count: both have the same mean, whatever the scene. Of these estimators a scene has one; whole
-paths weigh nothing in media.
+which gathering walks count: both have the same mean, of a single step with many photons (docs/virtual.md). Of these
+estimators a scene has at most one; whole paths weigh nothing in media.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -36,7 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench.agree.generate import disperses, has_distant_lights, needs_particles
-from pmviewer.bench.agree.materials import is_mapped
+from pmviewer.bench.agree.known import WALKS
 from pmviewer.bench.agree.media import emits, has_media
 from pmviewer.bench.agree.mitsuba_client import Mitsuba, MitsubaError
 from pmviewer.bench.agree.ours import (
@@ -50,27 +51,30 @@ from pmviewer.bench.agree.ours import (
     picture,
     term,
 )
+from pmviewer.bench.agree.shares import asked_methods, asks_one_scattering
 from pmviewer.bench.agree.statistics import CHANNELS, SPIKES, TAIL, Outcome, compared, negligible, summaries
-from pmviewer.bench.agree.tree import Node, innermost, shapes_of
+from pmviewer.bench.agree.tree import Node
 from pmviewer.bench.agree.verdict import Comparison, Verdict
 from pmviewer.bench.agree.xml import write_scene
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.errors import PmviewerError
 from pmviewer.scene.arrays.flatten import SURFACES, flatten
+from pmviewer.settings.access import Settings
 
 STAGES = (
-    Effort(runs=12, spp=8, passes=2, photons=8_000, radius=0.01),
+    Effort(runs=6, spp=8, passes=2, photons=8_000, radius=0.01),
+    Effort(runs=6, spp=8, passes=2, photons=8_000, radius=0.01, adds=True),
     Effort(runs=12, spp=8, passes=2, photons=8_000, radius=0.01, adds=True),
     Effort(runs=16, spp=32, passes=6, photons=20_000, radius=0.005),
     Effort(runs=24, spp=64, passes=10, photons=60_000, radius=0.0025),
 )
-"""Most agree at the first look. What the second misses is lost, so that the others need no more than to tell what it
-may find: it has an even chance to find 4.1 of its standard errors, which are 7 of the path tracers' third and 12 of
-their last."""
-FIRST = 1
+"""Nearly all agree at the first look. It and the second pass on whatever is not plainly equal, so that the third, which
+has all runs of the three, decides what is found: it has an even chance to find 4.1 of its standard errors, which are 7
+of the path tracers' fourth and 12 of their last. The others need no more than to tell that."""
+FIRST = 2
 """The last stage of those that look at the same runs; those behind it have fresh seeds."""
-SUSPICIOUS = (0.5, 0.01, 0.01)
+SUSPICIOUS = (0.97, 0.5, 0.01, 0.01)
 """Below this p the next stage decides."""
 BEYOND_DOUBT = 1e-10
 """p of a stage of fresh seeds that spares the last for path tracers, which have no radius to shrink."""
@@ -83,6 +87,8 @@ LEAST_OF_PATHS = 0.98
 LEAST_LIGHT = 1e-5
 """Mean radiance below which nothing is compared: lights have from 0.2 to 20, and what comes of a light that shines into
 its own closed shape goes by rays that slip through its edges."""
+FEW_WALKS = 20
+"""If so many walks are expected to count, none does with a probability of 2e-9."""
 HARMLESS = ("axis of <rotate> is not of unit length", "lean from their faces")
 """The warnings that are wanted: both programs stretch by such an axis, and what leaning normals do is known."""
 TERMS = {"emission": ("emission",), "direct": ("direct",), "specular": ("specular",),
@@ -164,6 +170,10 @@ Pair = Callable[[int], tuple[NDArray[np.float64], NDArray[np.float64]]]
 """Summaries of both sides at a stage."""
 
 
+Explain = Callable[[Comparison], str]
+"""The known deviation that a disagreement comes from; empty if it is none of them."""
+
+
 @dataclass(frozen=True)
 class Question:
     """What may agree or not: `method` against `peer` in `what`."""
@@ -172,14 +182,14 @@ class Question:
     peer: str
     what: str
     pair: Pair
-    floor: Callable[[], NDArray[np.float64] | None] = lambda: None
-    """What the difference of each test may be, see `negligible`."""
+    floor: Callable[[int], NDArray[np.float64] | None] = lambda stage: None
+    """What the difference of each test may be at a stage, see `negligible`."""
 
     def answer(self, stage: int) -> Outcome:
         """The outcome of one stage."""
         if self.method == "path":
             return compared(*self.pair(stage))
-        forgiven, floor = FORGIVEN * STAGES[stage].radius, self.floor()
+        forgiven, floor = FORGIVEN * STAGES[stage].radius, self.floor(stage)
         tails = SPIKES if self.method in VIRTUAL else TAIL, TAIL
         ours, theirs = self.pair(stage)
         found = compared(ours, theirs, forgiven, sparse=True, floor=floor, tails=tails)
@@ -191,13 +201,17 @@ class Question:
         limit = compared(_limit(ours, ours_before), theirs, forgiven, sparse=True, floor=floor, tails=tails)
         return max(found, limit, key=lambda o: o.p)
 
-    def asked(self, stages: int) -> Comparison:
-        """Stage after stage while the answer is suspicious, at most `stages` of them."""
+    def asked(self, stages: int, explain: Explain = lambda comparison: "") -> Comparison:
+        """Stage after stage while the answer is suspicious, at most `stages` of them. What fresh seeds confirm and
+        `explain` knows needs no more."""
         for stage in range(stages):
             outcome = self.answer(stage)
             final = stage == len(STAGES) - 1 or (self.method == "path" and stage > FIRST and outcome.p < BEYOND_DOUBT)
             if final or outcome.p >= SUSPICIOUS[stage]:
                 break
+            found = Comparison(self.method, self.peer, self.what, outcome, stage + 1, final=True)
+            if stage > FIRST and (known := explain(found)):
+                return replace(found, known=known)
         return Comparison(self.method, self.peer, self.what, outcome, stage + 1, final)
 
 
@@ -205,15 +219,6 @@ def _limit(runs: NDArray[np.float64], before: NDArray[np.float64]) -> NDArray[np
     """Runs (n, k) less the part of their error that goes with the radius; `before`, (m, k), have twice the radius."""
     n = min(len(runs), len(before))
     return 2 * runs[:n] - before[:n]
-
-
-def asked_methods(scene: Node) -> Iterator[str]:
-    """The methods other than `path` that a scene is rendered by: of the weighted estimators one, by the last digit of
-    its camera's field of view, which nobody chose and simpler scenes keep."""
-    weighted = "single step" if has_media(scene) else WEIGHTED[round(1e4 * scene["camera"]["fov"]) % len(WEIGHTED)]
-    yield from (m for m in PHOTON_METHODS if m not in WEIGHTED or m == weighted)
-    if has_panes(scene) and not (disperses(scene) or emits(scene)):
-        yield from THIN_GLASS
 
 
 def unseen_in(ours: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -228,19 +233,20 @@ def _with_sum(weights: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([weights, weights.sum(axis=-1, keepdims=True)], axis=-1)
 
 
+def unmet_by(weights: NDArray[np.float64], passes: int) -> NDArray[np.float64]:
+    """The difference of sums of weights (runs, h, w, 4) that is none, in the picture and in each block: what FEW_WALKS
+    of all walks would count, of which none may have met anything yet."""
+    blocks = summaries(weights).shape[1] // weights.shape[3] - 1
+    walks = Settings().virtual.walks * passes * math.prod(weights.shape[:3])
+    return FEW_WALKS / walks * np.concatenate([np.ones(CHANNELS), np.full(CHANNELS * blocks, float(blocks))])
+
+
 def particles_hold(runs: Runs) -> bool:
     """Whether Mitsuba's particles bring at least what its own paths bring, which lack caustics: in some scenes with
     glass or mapped normals they lose light, and say nothing then."""
     plain = runs.seen_plainly
     particles, paths = (runs.theirs(mode, 0).mean(axis=0)[plain].mean() for mode in ("ptracer", "path"))
     return bool(particles >= LEAST_OF_PATHS * paths)
-
-
-def has_panes(scene: Node) -> bool:
-    """Whether there is thin glass; a map around it tilts what it reflects, which rays straight through don't see."""
-    bsdfs = [shape["bsdf"] for shape in shapes_of(scene) if "bsdf" in shape]
-    panes = [bsdf for bsdf in bsdfs if innermost(bsdf)["type"] == "thindielectric"]
-    return bool(panes) and not any(map(is_mapped, panes))
 
 
 def questions(runs: Runs) -> Iterator[Question]:
@@ -262,7 +268,8 @@ def questions(runs: Runs) -> Iterator[Question]:
     particles, alone = needs_particles(runs.scene), disperses(runs.scene) or glows
     if not alone:
         yield Question("path", "Mitsuba path", "picture", lambda s: (whole("path", s), paths(s)))
-        yield Question("path", "Mitsuba path", "one scattering", one_scattering)
+        if asks_one_scattering(runs.scene):
+            yield Question("path", "Mitsuba path", "one scattering", one_scattering)
     for method in asked_methods(runs.scene):
 
         def by_particles(stage: int, method: str = method) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -296,7 +303,10 @@ def questions(runs: Runs) -> Iterator[Question]:
                 G, C = np.split(runs.weights(method, stage), 2, axis=-1)
                 return summaries(_with_sum(G)), summaries(_with_sum(C))
 
-            yield Question(method, "its walks", "weights", by_walks)
+            def unmet(stage: int, method: str = method) -> NDArray[np.float64]:
+                return unmet_by(runs.weights(method, stage), STAGES[stage].passes)
+
+            yield Question(method, WALKS, "weights", by_walks, unmet)
         for name in SAFE_TERMS if particles else OF_FIRST_SURFACE if alone and not glows else TERMS:
 
             def by_term(
@@ -304,7 +314,7 @@ def questions(runs: Runs) -> Iterator[Question]:
             ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
                 return part(method, name, stage), part("path", name, stage)
 
-            yield Question(method, "our path", name, by_term, lambda: unseen_in(whole("path", 0)))
+            yield Question(method, "our path", name, by_term, lambda s: unseen_in(whole("path", 0)))
 
 
 def tried(
@@ -315,8 +325,10 @@ def tried(
     salt: tuple[int, ...],
     stages: int = len(STAGES),
     shared_kernels: bool = False,
+    explain: Explain = lambda comparison: "",
 ) -> Verdict:
-    """Ask all questions about a scene; its files go into `folder`. `shared_kernels` as for `Runs`."""
+    """Ask all questions about a scene; its files go into `folder`. `shared_kernels` as for `Runs`, `explain` as for
+    `Question.asked`."""
     try:
         runs = Runs(scene, folder, mitsuba, pool, salt, shared_kernels)
         for warning in runs.opened.scene.warnings:
@@ -326,7 +338,7 @@ def tried(
         shown = (picture(runs.ours("path", 0)) if alone else runs.theirs("path", 0)).mean(axis=0)
         if shown.mean() < LEAST_LIGHT:
             return Verdict()
-        comparisons = [question.asked(stages) for question in questions(runs)]
+        comparisons = [question.asked(stages, explain) for question in questions(runs)]
     except MitsubaError as error:
         return Verdict(refused=str(error))
     except PmviewerError as error:

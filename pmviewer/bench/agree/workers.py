@@ -17,7 +17,7 @@ from pathlib import Path
 
 from pmviewer.bench.agree.generate import scene_of
 from pmviewer.bench.agree.process import end_with, tools
-from pmviewer.bench.agree.triage import all_explained
+from pmviewer.bench.agree.triage import all_explained, explainer
 from pmviewer.bench.agree.trial import tried
 from pmviewer.bench.agree.verdict import DIED, Verdict
 from pmviewer.engine.pool import available_threads
@@ -32,7 +32,8 @@ def try_scene(seed: int, index: int) -> Verdict:
     folder, mitsuba, pool = tools()
     scene, salt, shared = scene_of(seed, index), (seed, index), index % OWN_KERNELS > 0
     with tempfile.TemporaryDirectory(dir=folder) as place:
-        verdict = tried(scene, Path(place), mitsuba, pool, salt, shared_kernels=shared)
+        explain = explainer(scene, salt, shared)
+        verdict = tried(scene, Path(place), mitsuba, pool, salt, shared_kernels=shared, explain=explain)
     return replace(verdict, comparisons=all_explained(scene, verdict.comparisons, salt, shared))
 
 
