@@ -132,8 +132,8 @@ class WeightedFilm(Film):
         return planes
 
     def sums_of_weights(self) -> tuple[F8, F8]:
-        """ΣG and ΣC over the passes, (h, w, 2) each: of indirect light and of light in mirrors. Their expectations are
-        the same, whatever the estimator."""
+        """ΣG and ΣC over the passes, (h, w, 2) each: of indirect light and of light in mirrors. With many photons their
+        expectations are the same, whatever the estimator."""
         columns = [self.channels + base for base in _TERMS.values()]
         both = (self.sums[:, [c + w for c in columns]] / max(self.passes, 1) for w in (W_G, W_C))
         G, C = (part.reshape(self.height, self.width, 2) for part in both)
