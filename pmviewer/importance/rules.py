@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from pmviewer.maps.density.growing_tree import M
 from pmviewer.maps.importance.facets import Facets, facets_of, importances_on, sums_on
 from pmviewer.maps.importance.importance_map import ImportanceMap, required_density
-from pmviewer.maps.importance.look_up import importance_sums, nearest_importances
+from pmviewer.maps.importance.look_up import importance_sums
+from pmviewer.maps.importance.nearest_of_all import nearest_importances, node_boxes
 from pmviewer.maps.record import decode_directions
 
 Float = NDArray[np.float32]
@@ -114,11 +115,13 @@ def density_beyond(importance: ImportanceMap, M_r: float, reach: float) -> Calla
     near important places: M photons within `reach` times the distance of the nearest importon, or what that one asks
     for, if that is less. 0 without importons."""
 
+    boxes = node_boxes(importance)
+
     def evaluate(positions: Float) -> Float:
         gamma, distances = np.zeros(len(positions), np.float32), np.full(len(positions), np.inf, np.float32)
         if importance.n and len(positions):
             points = np.ascontiguousarray(positions, np.float32)
-            nearest_importances(importance.record, points, gamma, distances, 0, len(points))
+            nearest_importances(importance.record, boxes, points, gamma, distances, 0, len(points))
         with np.errstate(divide="ignore"):
             near = M / (np.pi * (np.float32(reach) * distances) ** 2)
         return np.asarray(np.minimum(required_density(gamma, M_r), near), np.float32)

@@ -1,11 +1,12 @@
 """Importance of many places: importons by the surfaces that they lie on, so that a search meets no others.
 
 A place has the importance of the nearest importon on its side, if that one reaches so far
-(`pmviewer.maps.importance.look_up`). Of the importons within the farthest reach most face another way or lie on another
-plane, and a search among all of them visits thousands for nothing. So importons of one normal and plane are a facet with
-a tree of its own; those of small and curved surfaces together are the last one. A cone about its normals, its box and
-the reaches of its importons (`pmviewer.maps.importance.reached`) tell whether a facet may count at a place. They may say
-too much, never too little, so that the importance found is the same.
+(`pmviewer.maps.importance.look_up`). Of the importons within the farthest reach most face another way or lie on
+another plane, and a search among all of them visits thousands for nothing. So importons of one normal and plane are a
+facet with a tree of its own; those of small and curved surfaces together are the last one. A cone about its normals,
+its box and the reaches of its importons (`pmviewer.maps.importance.reached`) tell whether a facet may count at a place.
+They may say too much, never too little, so that the importance found is the same, but for which of several equally far
+importons it is.
 """
 
 from __future__ import annotations

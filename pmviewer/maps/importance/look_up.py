@@ -4,8 +4,6 @@ none would be missing by chance, since what lies in the shadow of the view is no
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device, kernel
@@ -80,22 +78,6 @@ def importances(maps, points, normals, out, i0, i1):
     for i in range(i0, i1):
         p = (points[i, 0], points[i, 1], points[i, 2])
         out[i] = importance_at(importance, p, (normals[i, 0], normals[i, 1], normals[i, 2]))
-
-
-@kernel
-def nearest_importances(maps, points, gamma, distances, i0, i1):
-    """Γ of the importons nearest to points[i0:i1] (m, 3) float32, whatever their side and reach, into gamma (m,)
-    float32, and how far they are into distances (m,) float32; 0 and infinite without any."""
-    importance = maps[0]
-    keys, zero = stack_i4(KEYS), _f4(0.0)
-    for i in range(i0, i1):
-        p = (points[i, 0], points[i, 1], points[i, 2])
-        count, _ = nearest(importance, p, _i4(1), _f4(np.inf), keys, None)
-        gamma[i], distances[i] = zero, _f4(np.inf)
-        if count > 0:
-            key = stack_get_i8(keys, _i8(0))
-            gamma[i] = load_f4(importance.payload, 3 * (key & _i8(0xFFFFFFFF)) + 1)
-            distances[i] = _f4(math.sqrt(float_of_bits(_u4(key >> 32))))
 
 
 @kernel

@@ -71,4 +71,3 @@ def _widened(boxes: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
         first, end = np.maximum(np.arange(n) - width, 0), np.minimum(np.arange(n) + width + 1, n)
         boxes = sums.take(end, axis) > sums.take(first, axis)
     return boxes
-
