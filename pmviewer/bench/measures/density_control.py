@@ -37,9 +37,8 @@ CONTROLS: dict[str, dict[str, Any]] = {
 OTHERS = "all, other seeds"
 SOURCES = {f"{rule}, nearest": changes | {"importance.around": "nearest"} for rule, changes in CONTROLS.items()}
 PASSES = 4
-SEEDS, QUICK, FEW = 8, 5, 2
-"""Of the default rule, which decides the target; in a quick run; and of the others."""
-QUICK_RULES = ("density control, step", "constant density")
+SEEDS, QUICK, FEW = 8, 5, 1
+"""Of the default rule, which decides the target; in a quick run, of that rule alone; and of the others."""
 
 DENSITY = 40.0
 """Constant density in photons per m² that stores about as many photons as importance does."""
@@ -76,12 +75,12 @@ def office(quick: bool, pool: WorkPool) -> tuple[list[list[Any]], list[Target]]:
     opened, target = open_scene(OFFICE), reference(OFFICE)
     seeds, passes = (QUICK, CLASSICAL_QUICK) if quick else (SEEDS, CLASSICAL_PASSES)
     cases = [Case({"render.method": method}, CONTROLS | SOURCES, seeds, PASSES) for method in METHODS]
-    cases.append(Case({"render.method": "gather"} | CLASSICAL, CLASSICAL_RULES, FEW, passes))
+    cases.append(Case({"render.method": "gather"} | CLASSICAL, CLASSICAL_RULES, 2, passes))
     rows: list[list[Any]] = []
     targets: list[Target] = []
     for case in cases:
         if quick:
-            case = replace(case, rules={rule: case.rules[rule] for rule in QUICK_RULES if rule in case.rules})
+            case = replace(case, rules={STEP: case.rules[STEP]})
         more = _compared(opened, target, case, pool)
         rows += more[0]
         targets += more[1]
@@ -101,7 +100,7 @@ def _compared(opened: OpenScene, target: Image, case: Case, pool: WorkPool) -> t
     rows[1][COLUMNS.index("in the mean %")] = math.nan  # the same pictures, whose mean is the same
     targets: list[Target] = []
     for rule, changes in case.rules.items():
-        thinned = made(changes, seeds if rule == STEP else seeds[:FEW])
+        thinned = made(changes, seeds[:1] if case.one_map else seeds if rule == STEP else seeds[:FEW])
         rows.append(row(OFFICE, method, rule, n, thinned, all_, target))
         note = f"{OFFICE}, {said(case.base | changes)}"
         targets.append(Target("I5", 100 * thinned.power_off, 0.01, "% of the power", False, note))
