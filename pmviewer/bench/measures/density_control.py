@@ -36,9 +36,12 @@ CONTROLS: dict[str, dict[str, Any]] = {
 }
 OTHERS = "all, other seeds"
 SOURCES = {f"{rule}, nearest": changes | {"importance.around": "nearest"} for rule, changes in CONTROLS.items()}
-PASSES = 4
-SEEDS, QUICK, FEW = 8, 5, 1
-"""Of the default rule, which decides the target; in a quick run, of that rule alone; and of the others."""
+PASSES, SEEDS = 8, 4
+"""Required densities grow from pass to pass (`importance.M_r`), so that later passes save fewer photons."""
+QUICK_PASSES, QUICK_SEEDS = 4, 5
+"""Of the default rule alone."""
+FEW = 1
+"""Seeds of the other rules, which decide no difference."""
 
 DENSITY = 40.0
 """Constant density in photons per m² that stores about as many photons as importance does."""
@@ -73,8 +76,9 @@ class Case:
 def office(quick: bool, pool: WorkPool) -> tuple[list[list[Any]], list[Target]]:
     """Rows and targets of density control."""
     opened, target = open_scene(OFFICE), reference(OFFICE)
-    seeds, passes = (QUICK, CLASSICAL_QUICK) if quick else (SEEDS, CLASSICAL_PASSES)
-    cases = [Case({"render.method": method}, CONTROLS | SOURCES, seeds, PASSES) for method in METHODS]
+    seeds, passes = (QUICK_SEEDS, QUICK_PASSES) if quick else (SEEDS, PASSES)
+    cases = [Case({"render.method": method}, CONTROLS | SOURCES, seeds, passes) for method in METHODS]
+    passes = CLASSICAL_QUICK if quick else CLASSICAL_PASSES
     cases.append(Case({"render.method": "gather"} | CLASSICAL, CLASSICAL_RULES, 2, passes))
     rows: list[list[Any]] = []
     targets: list[Target] = []

@@ -160,16 +160,16 @@ def importances_on(maps, shapes, boxes, reached, points, normals, out, i0, i1):
     for i in range(i0, i1):
         p, n = (points[i, 0], points[i, 1], points[i, 2]), (normals[i, 0], normals[i, 1], normals[i, 2])
         r2, gamma, reach, first = zero, zero, zero, _i8(0)
-        for g in range(len(maps)):
+        for facet in range(len(maps)):
+            g = _i8(facet)
             far = _farness(shapes, g, p, n)
             stack_put_f4(farness, g, far)
             if far < _f4(np.inf):
                 within = _reached(shapes, boxes, reached, g, p)
                 if far < within * within:
                     r2 = max(r2, within * within)
-        for g in range(len(maps)):
-            if stack_get_f4(farness, g) < stack_get_f4(farness, first):
-                first = _i8(g)
+            if far < stack_get_f4(farness, first):
+                first = g
         for at in range(len(maps) if r2 > zero else 0):  # the one that p lies on, then the others
             g = first if at == 0 else _i8(at) - _i8(at <= first)
             if stack_get_f4(farness, g) < r2:
