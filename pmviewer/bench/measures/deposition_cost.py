@@ -1,7 +1,7 @@
 """What a pass by deposition rules costs, over one that stores all photons (P20).
 
-Passes are compared once all importons are traced: the first four trace them, and are in the table's 'CPU all' of other
-scenes. The rules take turns, so that what else the machine does meets all of them.
+Passes are compared once all importons are traced. The first four trace them and cost more: 'CPU all' of the bench's
+table has them. The rules take turns, so that what else the machine does meets all of them.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.compile.specialise import absent, specialised
 from pmviewer.kernels.memory import float_of_bits, load_f4, stack_get_i8, stack_i4
 from pmviewer.maps.search.disc import Facing
@@ -24,19 +24,6 @@ _i8 = np.int64
 _u4 = np.uint32
 
 
-@device
-def importance_within(importance, p, n, r):
-    """`importance_at`, searched for within r alone: right where no importon on that side reaches p from farther off."""
-    keys = stack_i4(KEYS)
-    count, _ = nearest(importance, p, _i4(1), r * r, keys, Facing(n, STEEPNESS, _i4(ALL_CLASSES)))
-    if count == 0:
-        return _f4(0.0)
-    key = stack_get_i8(keys, _i8(0))
-    i, d2 = key & _i8(0xFFFFFFFF), float_of_bits(_u4(key >> 32))
-    reach = load_f4(importance.reach, i)
-    return load_f4(importance.payload, 3 * i + 1) if d2 <= reach * reach else _f4(0.0)
-
-
 @specialised
 def importance_at(importance, p, n):
     """Importance Γ (float32, pixels per unit area) at the point p with unit normal n, for the normal's side.
@@ -46,7 +33,18 @@ def importance_at(importance, p, n):
     """
     if absent(importance):
         return lambda importance, p, n: _f4(1.0)
-    return lambda importance, p, n: importance_within(importance, p, n, importance.farthest)
+
+    def of_nearest(importance, p, n):
+        keys, r = stack_i4(KEYS), importance.farthest
+        count, _ = nearest(importance, p, _i4(1), r * r, keys, Facing(n, STEEPNESS, _i4(ALL_CLASSES)))
+        if count == 0:
+            return _f4(0.0)
+        key = stack_get_i8(keys, _i8(0))
+        i, d2 = key & _i8(0xFFFFFFFF), float_of_bits(_u4(key >> 32))
+        reach = load_f4(importance.reach, i)
+        return load_f4(importance.payload, 3 * i + 1) if d2 <= reach * reach else _f4(0.0)
+
+    return of_nearest
 
 
 @specialised
