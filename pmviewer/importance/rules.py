@@ -7,16 +7,20 @@ Density control wants D_r = Γ·M_r/A_pix photons per unit area (course guide, e
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from threading import Lock
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.maps.density.growing_tree import M
+from pmviewer.maps.importance.facets import Facets, facets_of, importances_on, sums_on
 from pmviewer.maps.importance.importance_map import ImportanceMap, required_density
-from pmviewer.maps.importance.look_up import importance_sums, nearest_importances
-from pmviewer.maps.importance.reached import importances_within, reached_boxes
+from pmviewer.maps.importance.look_up import importance_sums
+from pmviewer.maps.importance.nearest_of_all import nearest_importances, node_boxes
 from pmviewer.maps.record import decode_directions
 
 Float = NDArray[np.float32]
@@ -29,6 +33,9 @@ which sets f; summing more would not change p."""
 TESTS = 1024
 """Test rays."""
 
+_made: WeakKeyDictionary[ImportanceMap, Facets] = WeakKeyDictionary()
+_making = Lock()
+
 
 def _evaluated(kernel: Any, importance: ImportanceMap, positions: Float, normals: Codes, *more: Any) -> Float:
     out = np.zeros(len(positions), np.float32)
@@ -38,12 +45,27 @@ def _evaluated(kernel: Any, importance: ImportanceMap, positions: Float, normals
     return out
 
 
+def _facets(importance: ImportanceMap) -> Facets:
+    """The map's facets, made once."""
+    with _making:
+        found = _made.get(importance)
+        if found is None:
+            found = _made[importance] = facets_of(importance)
+        return found
+
+
 def _gamma_of(importance: ImportanceMap) -> Evaluate:
-    """Γ in pixels per unit area, searched for no farther than it has to be."""
-    boxes = reached_boxes(importance.positions, importance.reach)
+    """Γ in pixels per unit area."""
+    if not importance.n:
+        return lambda positions, normals: np.zeros(len(positions), np.float32)
+    facets = _facets(importance)
 
     def evaluate(positions: Float, normals: Codes) -> Float:
-        return _evaluated(importances_within, importance, positions, normals, boxes.at(positions))
+        out = np.zeros(len(positions), np.float32)
+        points, directions = np.ascontiguousarray(positions, np.float32), decode_directions(normals)
+        on = facets.maps, facets.shapes, facets.boxes, facets.reached
+        importances_on(*on, points, directions, out, 0, len(points))
+        return out
 
     return evaluate
 
@@ -54,12 +76,28 @@ def important_weight(importance: ImportanceMap, positions: Float, normals: Codes
 
 
 def probability_of(importance: ImportanceMap, f: float) -> Evaluate:
-    """f·ΣW: the probability of storing a photon where it is below 1."""
+    """f·ΣW: the probability of storing a photon where it is below 1.
 
-    def evaluate(positions: Float, normals: Codes) -> Float:
-        return np.float32(f) * important_weight(importance, positions, normals)
+    Once importons found add up to 1/f, others are not searched for.
+    """
+    least = f * float(importance.weights.min()) if importance.n else 0.0
+    enough = math.ceil(1.001 / least) if least > 0 else NEAREST + 1
+    if enough > NEAREST:  # which ones are the nearest decides
 
-    return evaluate
+        def evaluate(positions: Float, normals: Codes) -> Float:
+            return np.float32(f) * important_weight(importance, positions, normals)
+
+        return evaluate
+
+    facets = _facets(importance)
+
+    def soon(positions: Float, normals: Codes) -> Float:
+        out = np.zeros(len(positions), np.float32)
+        points, directions = np.ascontiguousarray(positions, np.float32), decode_directions(normals)
+        sums_on(facets.maps, facets.shapes, points, directions, np.int32(enough), out, 0, len(points))
+        return np.float32(f) * out
+
+    return soon
 
 
 def density_of(importance: ImportanceMap, M_r: float) -> Evaluate:
@@ -77,11 +115,13 @@ def density_beyond(importance: ImportanceMap, M_r: float, reach: float) -> Calla
     near important places: M photons within `reach` times the distance of the nearest importon, or what that one asks
     for, if that is less. 0 without importons."""
 
+    boxes = node_boxes(importance)
+
     def evaluate(positions: Float) -> Float:
         gamma, distances = np.zeros(len(positions), np.float32), np.full(len(positions), np.inf, np.float32)
         if importance.n and len(positions):
             points = np.ascontiguousarray(positions, np.float32)
-            nearest_importances(importance.record, points, gamma, distances, 0, len(points))
+            nearest_importances(importance.record, boxes, points, gamma, distances, 0, len(points))
         with np.errstate(divide="ignore"):
             near = M / (np.pi * (np.float32(reach) * distances) ** 2)
         return np.asarray(np.minimum(required_density(gamma, M_r), near), np.float32)

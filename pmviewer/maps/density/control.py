@@ -33,9 +33,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.memory import load_u4, stack_get_i8, stack_i4, stack_put_i8
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.vector import dot, normalize
-from pmviewer.maps.density.growing_tree import Limits, M, Tree, grown, insert, reserved, search, search_scratch
+from pmviewer.maps.density.growing_tree import (
+    CAPACITY,
+    KEYS,
+    LEAF_WORDS,
+    WAITING,
+    GrowingTree,
+    Limits,
+    M,
+    SearchScratch,
+    grown,
+    insert,
+    reserved,
+    search,
+)
 from pmviewer.maps.photon_words import decode_direction, decode_powers
 from pmviewer.tasks import Runner
 
@@ -72,8 +86,7 @@ class Around:
     @property
     def limits(self) -> Limits:
         """For kernels."""
-        steepness, cosine = (1 / FLATNESS**2, 0.0) if self.guarded else (0.0, -math.inf)
-        return Limits(_f4(steepness), _f4(cosine), _f4(self.contrast))
+        return Limits(self.guarded, _f4(1 / FLATNESS**2 if self.guarded else 0.0), _f4(self.contrast))
 
 
 NEAREST = Around()
@@ -100,10 +113,11 @@ class Arrivals(NamedTuple):
 
 
 class Stored(NamedTuple):
-    """The photons stored, in order: rows (capacity, 6) uint32, powers (capacity, 3) float64; size int64 (3,): nodes and
-    leaves of the tree, photons stored."""
+    """The photons stored, in order: rows (capacity, 6) uint32, needs (capacity,) float32, powers (capacity, 3) float64;
+    size int64 (3,): nodes and leaves of the tree, photons stored."""
 
     rows: Any
+    needs: Any
     powers: Any
     size: Any
 
@@ -118,24 +132,26 @@ def _rejected(density, need, rule, u):
 
 
 @device
-def _sharers(tree, control, arrivals, i, scratch):
-    """How many stored photons share the power of photon i, in scratch 0; 0 where it is stored itself."""
-    photons, need = arrivals.photons, arrivals.needs[i]
-    p = (photons[i, 0], photons[i, 1], photons[i, 2])
-    n = normalize(decode_direction(arrivals.normals[i]))
-    u = _random(control.seed, _i8(arrivals.first) + _i8(i))
+def _sharers(tree, control, p, normal, need, index, rows, scratch):
+    """How many stored photons share the power of photon `index`, their keys first in `scratch.keys`; 0 where it is
+    stored itself. p, normal, need: its place, normal code and required density; rows: address of the stored rows."""
+    n = normalize(decode_direction(normal))
     r2 = _f4(np.inf)
     if control.rule == STEP:  # M of them nearer than the disc of M at the required density
         r2 = _f4(_f8(M) / (_PI * _f8(need)))
     count, r2 = search(tree, p, n, need, control.limits, r2, scratch)
     if count < M:
         return _i8(0)
+    u = _random(control.seed, index)
     if r2 > _f4(0.0) and not _rejected(_f8(M) / (_PI * _f8(r2)), need, control.rule, u):
         return _i8(0)
-    sharing, found = _i8(0), scratch[0]
+    if control.limits.one_side:
+        return count
+    sharing = _i8(0)
     for j in range(count):
-        if dot(n, decode_direction(tree.words[found[j]])) > _f4(0.0):
-            found[sharing] = found[j]
+        key = stack_get_i8(scratch.keys, j)
+        if dot(n, decode_direction(load_u4(rows, 6 * (key & _i8(0xFFFFFFFF)) + 3))) > _f4(0.0):
+            stack_put_i8(scratch.keys, sharing, key)
             sharing += 1
     return sharing
 
@@ -146,53 +162,56 @@ def _random(seed, index):
 
 
 @kernel
-def _compare(tree, control, arrivals, i0, i1, counts, neighbours):
+def _compare(trees, control, arrivals, rows, i0, i1, counts, neighbours):
     """Photons i0 … i1−1 against the tree as it is: counts[i] neighbours that share the power of photon i, which is not
-    stored, or UNDECIDED."""
-    scratch = search_scratch()
+    stored, or UNDECIDED. rows: address of the stored rows."""
+    tree, photons = trees[0], arrivals.photons
+    scratch = SearchScratch(stack_i4(KEYS), stack_i4(WAITING), stack_i4(4), stack_i4(4), stack_i4(8))
     for i in range(i0, i1):
-        count = _sharers(tree, control, arrivals, i, scratch)
+        p, index = (photons[i, 0], photons[i, 1], photons[i, 2]), _i8(arrivals.first) + _i8(i)
+        count = _sharers(tree, control, p, arrivals.normals[i], arrivals.needs[i], index, rows, scratch)
         counts[i] = count if count > 0 else UNDECIDED
         for j in range(count):
-            neighbours[i, j] = scratch[0][j]
+            neighbours[i, j] = _i4(stack_get_i8(scratch.keys, j) & _i8(0xFFFFFFFF))
 
 
 @kernel
-def _settle(tree, control, arrivals, stored, counts, neighbours, kept):
+def _settle(trees, control, arrivals, stored, rows, counts, neighbours, kept):
     """Decide the photons that `_compare` left open, in order, and hand out the power of the others.
 
-    stored: a `Stored`, filled; kept: bool, receives which of these are stored. Returns how many were rejected.
+    stored: a `Stored`, filled, whose rows are at the address `rows`; kept: bool, receives which of these are stored.
+    Returns how many were rejected.
     """
-    scratch = search_scratch()
-    found, words, size = scratch[0], arrivals.words, stored.size
+    tree, photons, words, size, powers = trees[0], arrivals.photons, arrivals.words, stored.size, stored.powers
+    scratch = SearchScratch(stack_i4(KEYS), stack_i4(WAITING), stack_i4(4), stack_i4(4), stack_i4(8))
+    leaf_scratch = stack_i4(LEAF_WORDS), stack_i4(CAPACITY)
     rejected = _i8(0)
     for i in range(len(words)):
         red, green, blue = decode_powers(words[i, 4], words[i, 5])
         count = _i8(counts[i])
-        if count != UNDECIDED:
-            for j in range(count):
-                found[j] = neighbours[i, j]
-        else:
-            count = _sharers(tree, control, arrivals, i, scratch)
+        if count == UNDECIDED:
+            p, index, need = (photons[i, 0], photons[i, 1], photons[i, 2]), _i8(arrivals.first) + i, arrivals.needs[i]
+            count = _sharers(tree, control, p, arrivals.normals[i], need, index, rows, scratch)
             if count == 0:
                 new = size[2]
                 for w in range(6):
                     stored.rows[new, w] = words[i, w]
-                tree.words[new], tree.needs[new] = words[i, 3], arrivals.needs[i]
-                stored.powers[new, 0], stored.powers[new, 1], stored.powers[new, 2] = _f8(red), _f8(green), _f8(blue)
-                photons = arrivals.photons
-                insert(tree, size, (photons[i, 0], photons[i, 1], photons[i, 2]), _i4(new))
+                stored.needs[new] = need
+                powers[new, 0], powers[new, 1], powers[new, 2] = _f8(red), _f8(green), _f8(blue)
+                insert(tree, size, p, need, words[i, 3], _i4(new), leaf_scratch)
                 size[2] += 1
                 kept[i] = True
                 continue
+            for j in range(count):
+                neighbours[i, j] = _i4(stack_get_i8(scratch.keys, j) & _i8(0xFFFFFFFF))
         kept[i] = False
         rejected += 1
         share = _f8(1.0) / _f8(count)
         for j in range(count):
-            k = found[j]
-            stored.powers[k, 0] += _f8(red) * share
-            stored.powers[k, 1] += _f8(green) * share
-            stored.powers[k, 2] += _f8(blue) * share
+            k = neighbours[i, j]
+            powers[k, 0] += _f8(red) * share
+            powers[k, 1] += _f8(green) * share
+            powers[k, 2] += _f8(blue) * share
     return rejected
 
 
@@ -231,7 +250,8 @@ class DensityControl:
         self._rows = np.empty((0, 6), np.uint32)
         self._normals: list[NDArray[np.uint32]] = []
         self._powers = np.empty((0, 3), np.float64)
-        self._tree: Tree | None = None
+        self._needs = np.empty(0, np.float32)
+        self._tree: GrowingTree | None = None
 
     @property
     def stored(self) -> int:
@@ -250,16 +270,17 @@ class DensityControl:
         photons = np.ascontiguousarray(photons, np.float32)
         arrivals = Arrivals(photons, photons.view(np.uint32), normals, needs_of(required), np.int64(self.arrived))
         tree = self._reserve(self.stored + n)
+        rows = self._rows.ctypes.data
         counts, neighbours = np.full(n, UNDECIDED, np.int32), np.empty((n, M), np.int32)
 
         def compare(i0: int) -> Callable[[], None]:
             i1 = min(i0 + CHUNK, n)
-            return lambda: _compare(tree, self.control, arrivals, i0, i1, counts, neighbours)
+            return lambda: _compare(tree.record, self.control, arrivals, rows, i0, i1, counts, neighbours)
 
         if self.stored:
             run([compare(i0) for i0 in range(0, n, CHUNK)])
-        before, stored = self.stored, Stored(self._rows, self._powers, self.size)
-        rejected = run([lambda: _settle(tree, self.control, arrivals, stored, counts, neighbours, kept)])
+        before, stored = self.stored, Stored(self._rows, self._needs, self._powers, self.size)
+        rejected = run([lambda: _settle(tree.record, self.control, arrivals, stored, rows, counts, neighbours, kept)])
         self.redistributed += rejected[0]
         self.arrived += n
         self._normals.append(normals[kept])
@@ -272,15 +293,15 @@ class DensityControl:
             photons=self._rows[:n].view(np.float32),
             normals=np.concatenate([np.empty(0, np.uint32), *self._normals]),
             powers=self._powers[:n],
-            required=np.empty(0, np.float32) if self._tree is None else self._tree.needs[:n],
+            required=self._needs[:n],
             redistributed=self.redistributed,
         )
 
-    def _reserve(self, photons: int) -> Tree:
+    def _reserve(self, photons: int) -> GrowingTree:
         """The tree, with room for so many photons, and a half more, so that copying stays rare."""
         room = len(self._rows)
         if self._tree is None or photons > room:
             photons = max(photons, room + room // 2)
             self._tree = reserved(self._tree, photons)
-            self._rows, self._powers = grown(self._rows, photons), grown(self._powers, photons)
+            self._rows, self._needs, self._powers = (grown(a, photons) for a in (self._rows, self._needs, self._powers))
         return self._tree

@@ -1,206 +1,317 @@
 """A kd-tree that grows photon by photon, for density control: leaves of CAPACITY photons, split at the median of their
 longer side when full; and its M nearest neighbours, told apart by normal, side and required density.
+
+All that a search asks of a leaf's photons lies in the leaf, eight to a vector. Kernels see the tree as one record of
+addresses: tuples of arrays would count references in every search.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.compile.jit import device, inlined
-from pmviewer.maps.photon_words import decode_direction
+from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.memory import (
+    aligned_empty,
+    bits_of_float,
+    count_trailing_zeros,
+    load_f4,
+    load_i4,
+    stack_get_f4,
+    stack_get_i4,
+    stack_put_f4,
+    stack_put_i4,
+    stack_put_i8,
+    store_f4,
+    store_i4,
+)
+from pmviewer.maps.search.k_nearest import _nearest_k
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, facing8, within8
+from pmviewer.maps.search.stored import ALL_CLASSES
 
 M = 20
 """Neighbours that measure the density and share the power of a rejected photon."""
 CAPACITY = 16
 DEEPEST = 250
 """Subtrees that wait in a search; a tree that is deeper is searched in part."""
-LEAF = np.int8(-1)
-"""In place of the axis of a node that is a leaf."""
+
+KEYS = 2 * (2 * M + CAPACITY)
+WAITING = 5 * DEEPEST
+"""int32 elements of scratch of a search for its neighbours and for subtrees: node, bound and offsets of each."""
+NODE_WORDS = 4
+PLANE, AXIS, CHILD, LEAST = range(NODE_WORDS)
+"""Words of a node: the dividing plane float32, of a leaf how many photons it has; its axis, or LEAF; its left child,
+which the right one follows, of a leaf its number; and the float32 that no photon of the subtree needs less than."""
+LEAF = np.int32(-1)
+ROWS = 6
+LEAF_WORDS = ROWS * CAPACITY
+X, Y, Z, WORD, NEED, MEMBER = range(ROWS)
+"""A leaf is made of blocks of eight photons, like a grid's (`pmviewer.maps.search.simd`), with six words each in turn:
+coordinates, direction, required density and number. What is not taken is infinitely far."""
 
 _f4 = np.float32
 _i4 = np.int32
 _i8 = np.int64
+_u4 = np.uint32
 
-
-class Tree(NamedTuple):
-    """Of nodes: axes int8 or LEAF, planes float32, children int32 (the left one, the right one follows; of a leaf its
-    number), least float32 (no photon of the subtree needs less). Of leaves: counts int32, members int32
-    (leaves, CAPACITY), places float32 (leaves, CAPACITY, 3). Of photons: words uint32 (direction and flags), needs
-    float32 (required density)."""
-
-    axes: Any
-    planes: Any
-    children: Any
-    least: Any
-    counts: Any
-    members: Any
-    places: Any
-    words: Any
-    needs: Any
+TREE = np.dtype([("nodes", np.int64), ("leaves", np.int64)])
+"""What kernels see of a tree: addresses of nodes, int32 (nodes, NODE_WORDS), and leaves, float32
+(leaves, LEAF_WORDS)."""
 
 
 class Limits(NamedTuple):
-    """Which photons are neighbours: float32 weight of the squared height over the surface, what cosines
-    of directions exceed, and how many times the density needed at the place a neighbour may need."""
+    """Which photons are neighbours: whether only those on the place's side of the surface, and float32 weight of the
+    squared height over the surface, and how many times the density needed at the place a neighbour may need."""
 
+    one_side: Any
     steepness: Any
-    cosine: Any
     contrast: Any
 
 
-@inlined
-def search_scratch():
-    """Room for a search: numbers and squared distances of neighbours, nodes and bounds of waiting subtrees."""
-    return (
-        np.empty(M, np.int32),
-        np.empty(M, np.float32),
-        np.empty(DEEPEST, np.int64),
-        np.empty(DEEPEST, np.float32),
-    )
+class SearchScratch(NamedTuple):
+    """Pointers to KEYS, WAITING, 4, 4 and 8 int32 on the stack."""
+
+    keys: Any
+    stack: Any
+    point: Any
+    offsets: Any
+    squared: Any
+
+
+@device
+def _at(row, j):
+    """Where in a leaf a word of photon j is."""
+    return _i8(ROWS * WIDTH) * (j // WIDTH) + _i8(WIDTH) * row + j % WIDTH
+
+
+@device
+def _flat(n, limits):
+    """The axis along which the surface with normal n is flattest, and the largest square of an offset along it that a
+    disc of the squared radius 1 has."""
+    if not limits.steepness > _f4(0.0):
+        return _i8(0), _f4(np.inf)
+    axis = _i8(0)
+    for a in range(1, 3):
+        if abs(n[a]) > abs(n[axis]):
+            axis = _i8(a)
+    # Along n the disc reaches up to 1/√steepness, along the surface up to 1.
+    along = abs(n[axis])
+    tilt = _f4(np.sqrt(max(_f4(1.0) - along * along, _f4(0.0))))
+    most = (tilt + _f4(1.0) / _f4(np.sqrt(limits.steepness))) / along
+    return axis, _f4(1.001) * most * most
 
 
 @device
 def search(tree, p, n, need, limits, r2, scratch):
-    """Up to M nearest neighbours of a place p with normal n that needs the density `need`, closer than sqrt(r2): their
-    numbers and squared distances go into `scratch`, of `search_scratch`. Returns how many they are and the squared
-    distance of the farthest. limits: `Limits`."""
-    axes, planes, children, least, counts, members, places, words, needs = tree
-    found, distances, stack_nodes, stack_bounds = scratch
+    """Up to M nearest neighbours of a place p with normal n that needs the density `need`, closer than sqrt(r2): keys
+    of squared distance (high) and number (low half) in `scratch.keys`. Returns how many they are and, of M, the squared
+    distance of the farthest. limits: `Limits`; scratch: `SearchScratch`."""
     ceiling = limits.contrast * need
-    count = _i8(0)
-    farthest = _i8(0)
-    waiting = _i8(0)
-    node = _i8(0)
-    while True:
-        while axes[node] >= 0:
-            side = p[_i8(axes[node])] - planes[node]
-            near = _i8(children[node]) + _i8(side >= _f4(0.0))
-            other = _i8(2) * _i8(children[node]) + _i8(1) - near
-            if side * side < r2 and least[other] <= ceiling and waiting < DEEPEST:
-                stack_nodes[waiting] = other
-                stack_bounds[waiting] = side * side
-                waiting += 1
-            node = near
-        leaf = _i8(children[node])
-        for j in range(_i8(counts[leaf]) if least[node] <= ceiling else 0):
-            dx, dy, dz = places[leaf, j, 0] - p[0], places[leaf, j, 1] - p[1], places[leaf, j, 2] - p[2]
-            h = n[0] * dx + n[1] * dy + n[2] * dz
-            d2 = max(dx * dx + dy * dy + dz * dz, limits.steepness * h * h)
-            if d2 < r2:
-                i = members[leaf, j]
-                w = decode_direction(words[i])
-                if n[0] * w[0] + n[1] * w[1] + n[2] * w[2] > limits.cosine and needs[i] <= ceiling:
-                    if count < M:
-                        found[count], distances[count] = i, d2
-                        if d2 > distances[farthest]:
-                            farthest = count
-                        count += 1
-                    else:
-                        found[farthest], distances[farthest] = i, d2
-                        for k in range(count):
-                            if distances[k] > distances[farthest]:
-                                farthest = _i8(k)
-                    if count == M:
-                        r2 = distances[farthest]
-        node = _i8(-1)
-        while waiting > 0 and node < 0:
-            waiting -= 1
-            if stack_bounds[waiting] < r2:
-                node = stack_nodes[waiting]
-        if node < 0:
-            break
-    if count == 0:
-        return count, _f4(0.0)
-    return count, distances[farthest]
+    flat = _flat(n, limits)
+    for axis in range(3):
+        stack_put_f4(scratch.point, axis, p[axis])
+        stack_put_f4(scratch.offsets, axis, _f4(0.0))
+    count, waiting = _i8(0), _i8(0)
+    node, bound = _i8(0), _f4(0.0)
+    while node >= 0:
+        node, waiting = _descend(tree, node, bound, r2, ceiling, flat, scratch, waiting)
+        if load_f4(tree.nodes, NODE_WORDS * node + LEAST) <= ceiling:
+            leaf = tree.leaves + 4 * LEAF_WORDS * _i8(load_i4(tree.nodes, NODE_WORDS * node + CHILD))
+            count = _of_leaf(leaf, p, n, ceiling, limits, r2, scratch, count)
+            if count >= 2 * M:
+                r2 = _nearest_k(scratch.keys, count, _i4(M), r2)
+                count = _i8(M)
+        node, bound, waiting = _next_subtree(r2, scratch, waiting)
+    if count >= M:
+        r2 = _nearest_k(scratch.keys, count, _i4(M), r2)
+        count = _i8(M)
+    return count, r2
 
 
 @device
-def insert(tree, size, p, i):
-    """Put photon i into its leaf; size: (nodes, leaves, _) of the tree, grows by a split."""
-    need = tree.needs[i]
-    axes, planes, children, least, counts, members, places, _, _ = tree
+def _descend(tree, node, bound, r2, ceiling, flat, scratch, waiting):
+    """From a node down to the leaf that the place is in; subtrees on the way that may hold a neighbour go on the stack.
+    Returns the leaf's node and how many subtrees wait. flat: of `_flat`."""
+    thin, most = flat[0], flat[1] * r2
+    axis = _i8(load_i4(tree.nodes, NODE_WORDS * node + AXIS))
+    while axis >= 0:
+        side = stack_get_f4(scratch.point, axis) - load_f4(tree.nodes, NODE_WORDS * node + PLANE)
+        child = _i8(load_i4(tree.nodes, NODE_WORDS * node + CHILD))
+        near = child + _i8(side >= _f4(0.0))
+        other = _i8(2) * child + _i8(1) - near
+        offset = stack_get_f4(scratch.offsets, axis)
+        far = bound - offset * offset + side * side
+        if (
+            far < r2
+            and (axis != thin or side * side < most)
+            and load_f4(tree.nodes, NODE_WORDS * other + LEAST) <= ceiling
+            and waiting < DEEPEST
+        ):
+            base = 5 * waiting
+            stack_put_i4(scratch.stack, base, _i4(other))
+            stack_put_f4(scratch.stack, base + 1, far)
+            for a in range(3):
+                stack_put_f4(scratch.stack, base + 2 + a, stack_get_f4(scratch.offsets, a))
+            stack_put_f4(scratch.stack, base + 2 + axis, side)
+            waiting += 1
+        node = near
+        axis = _i8(load_i4(tree.nodes, NODE_WORDS * node + AXIS))
+    return node, waiting
+
+
+@device
+def _next_subtree(r2, scratch, waiting):
+    """The latest subtree on the stack that is near enough, its bound, and how many still wait; node −1 without one."""
+    while waiting > 0:
+        waiting -= 1
+        base = 5 * waiting
+        bound = stack_get_f4(scratch.stack, base + 1)
+        if bound < r2:
+            for a in range(3):
+                stack_put_f4(scratch.offsets, a, stack_get_f4(scratch.stack, base + 2 + a))
+            return _i8(stack_get_i4(scratch.stack, base)), bound, waiting
+    return _i8(-1), _f4(0.0), waiting
+
+
+@device
+def _of_leaf(leaf, p, n, ceiling, limits, r2, scratch, count):
+    """Add the neighbours among the photons of a leaf, at its address, to the keys; returns how many there are then."""
+    for first in range(0, CAPACITY, WIDTH):
+        block = leaf + (first // WIDTH) * BLOCK_BYTES
+        x, y, z = block, block + ROW_BYTES, block + 2 * ROW_BYTES
+        mask = within8(x, y, z, p[0], p[1], p[2], r2, scratch.squared)
+        if mask != 0 and limits.one_side:
+            height = _f4(1.001) * _f4(np.sqrt(r2 / limits.steepness))
+            mask &= facing8(block, p, n, height, _i4(ALL_CLASSES))
+        while mask != 0:
+            lane = _i8(count_trailing_zeros(mask))
+            mask &= mask - _i4(1)
+            if load_f4(block, WIDTH * NEED + lane) <= ceiling:
+                dx, dy, dz = load_f4(x, lane) - p[0], load_f4(y, lane) - p[1], load_f4(z, lane) - p[2]
+                h = n[0] * dx + n[1] * dy + n[2] * dz
+                d2 = max(stack_get_f4(scratch.squared, lane), limits.steepness * h * h)
+                if d2 < r2:
+                    number = _i8(load_i4(block, WIDTH * MEMBER + lane))
+                    stack_put_i8(scratch.keys, count, _i8(bits_of_float(d2)) << 32 | number)
+                    count += 1
+    return count
+
+
+@device
+def insert(tree, size, p, need, word, i, scratch):
+    """Put photon i, which has that place, required density and direction code, into its leaf; size: (nodes, leaves, _)
+    of the tree, grows by a split. scratch: LEAF_WORDS and CAPACITY int32."""
     node = _i8(0)
     while True:
-        while axes[node] >= 0:
-            least[node] = min(least[node], need)
-            node = _i8(children[node]) + _i8(p[_i8(axes[node])] >= planes[node])
-        leaf = _i8(children[node])
-        if counts[leaf] < CAPACITY:
-            least[node] = min(least[node], need) if counts[leaf] > 0 else need
-            j = _i8(counts[leaf])
-            members[leaf, j] = i
-            places[leaf, j, 0], places[leaf, j, 1], places[leaf, j, 2] = p
-            counts[leaf] += _i4(1)
+        at = tree.nodes + 4 * NODE_WORDS * node
+        axis = _i8(load_i4(at, AXIS))
+        while axis >= 0:
+            store_f4(at, LEAST, min(load_f4(at, LEAST), need))
+            node = _i8(load_i4(at, CHILD)) + _i8(p[axis] >= load_f4(at, PLANE))
+            at = tree.nodes + 4 * NODE_WORDS * node
+            axis = _i8(load_i4(at, AXIS))
+        count = _i8(load_i4(at, PLANE))
+        if count < CAPACITY:
+            leaf = tree.leaves + 4 * LEAF_WORDS * _i8(load_i4(at, CHILD))
+            store_f4(leaf, _at(X, count), p[0])
+            store_f4(leaf, _at(Y, count), p[1])
+            store_f4(leaf, _at(Z, count), p[2])
+            store_f4(leaf, _at(NEED, count), need)
+            store_i4(leaf, _at(WORD, count), _i4(word))
+            store_i4(leaf, _at(MEMBER, count), i)
+            store_f4(at, LEAST, min(load_f4(at, LEAST), need))
+            store_i4(at, PLANE, _i4(count + 1))
             return
-        _halve(tree, size, node)
+        _halve(tree, size, node, scratch)
 
 
 @device
-def _halve(tree, size, node):
+def _halve(tree, size, node, scratch):
     """Split a full leaf at the median of its longest side."""
-    axes, planes, children, least, counts, members, places, _, needs = tree
-    leaf = _i8(children[node])
+    old, order = scratch
+    at = tree.nodes + 4 * NODE_WORDS * node
+    number, new = _i8(load_i4(at, CHILD)), size[1]
+    leaf = tree.leaves + 4 * LEAF_WORDS * number
+    for w in range(LEAF_WORDS):
+        stack_put_i4(old, w, load_i4(leaf, w))
+    axis = _longest(old)
+    for j in range(CAPACITY):  # insertion sort along the axis
+        k, x = _i8(j), stack_get_f4(old, _at(axis, _i8(j)))
+        while k > 0 and stack_get_f4(old, _at(axis, _i8(stack_get_i4(order, k - 1)))) > x:
+            stack_put_i4(order, k, stack_get_i4(order, k - 1))
+            k -= 1
+        stack_put_i4(order, k, _i4(j))
+    half = CAPACITY // 2
+    plane = stack_get_f4(old, _at(axis, _i8(stack_get_i4(order, half))))
+    left = size[0]
+    _fill(tree, left, number, 0, half, old, order)
+    _fill(tree, left + 1, new, half, CAPACITY, old, order)
+    size[0] += 2
+    size[1] += 1
+    store_f4(at, PLANE, plane)
+    store_i4(at, AXIS, _i4(axis))
+    store_i4(at, CHILD, _i4(left))
+
+
+@device
+def _longest(old):
+    """The axis along which the photons of a full leaf reach farthest."""
     axis, extent = _i8(0), _f4(-1.0)
     for a in range(3):
-        low, high = places[leaf, 0, a], places[leaf, 0, a]
+        low = high = stack_get_f4(old, _at(a, _i8(0)))
         for j in range(1, CAPACITY):
-            low, high = min(low, places[leaf, j, a]), max(high, places[leaf, j, a])
+            x = stack_get_f4(old, _at(a, _i8(j)))
+            low, high = min(low, x), max(high, x)
         if high - low > extent:
             axis, extent = _i8(a), high - low
-    for j in range(1, CAPACITY):  # insertion sort along the axis
-        k = _i8(j)
-        while k > 0 and places[leaf, k - 1, axis] > places[leaf, k, axis]:
-            for a in range(3):
-                x = places[leaf, k, a]
-                places[leaf, k, a] = places[leaf, k - 1, a]
-                places[leaf, k - 1, a] = x
-            x = members[leaf, k]
-            members[leaf, k] = members[leaf, k - 1]
-            members[leaf, k - 1] = x
-            k -= 1
-    half = CAPACITY // 2
-    new = _i8(size[1])
-    size[1] += 1
-    for j in range(half, CAPACITY):
-        members[new, j - half] = members[leaf, j]
-        for a in range(3):
-            places[new, j - half, a] = places[leaf, j, a]
-    counts[leaf], counts[new] = _i4(half), _i4(CAPACITY - half)
-    left = _i8(size[0])
-    size[0] += 2
-    least[left], least[left + 1] = _f4(np.inf), _f4(np.inf)
-    for j in range(half):
-        least[left] = min(least[left], needs[members[leaf, j]])
-    for j in range(CAPACITY - half):
-        least[left + 1] = min(least[left + 1], needs[members[new, j]])
-    axes[left], axes[left + 1] = LEAF, LEAF
-    children[left], children[left + 1] = _i4(leaf), _i4(new)
-    axes[node], planes[node], children[node] = np.int8(axis), places[new, 0, axis], _i4(left)
+    return axis
 
 
-def reserved(tree: Tree | None, photons: int) -> Tree:
+@device
+def _fill(tree, node, number, begin, end, old, order):
+    """Make a node the leaf of that number, with photons order[begin:end] of an old one."""
+    leaf = tree.leaves + 4 * LEAF_WORDS * number
+    least, far = _f4(np.inf), _f4(np.inf)
+    for j in range(CAPACITY):
+        if j < end - begin:
+            i = _i8(stack_get_i4(order, begin + j))
+            for row in range(ROWS):
+                store_i4(leaf, _at(row, _i8(j)), stack_get_i4(old, _at(row, i)))
+            least = min(least, stack_get_f4(old, _at(NEED, i)))
+        else:
+            store_f4(leaf, _at(X, _i8(j)), far)
+    at = tree.nodes + 4 * NODE_WORDS * node
+    store_i4(at, PLANE, _i4(end - begin))
+    store_i4(at, AXIS, LEAF)
+    store_i4(at, CHILD, _i4(number))
+    store_f4(at, LEAST, least)
+
+
+@dataclass(frozen=True, eq=False)
+class GrowingTree:
+    """`nodes` int32 (nodes, NODE_WORDS), `leaves` float32 (leaves, LEAF_WORDS), and `record` (1,) of TREE, valid while
+    this lives."""
+
+    nodes: NDArray[np.int32]
+    leaves: NDArray[np.float32]
+    record: NDArray[np.void]
+
+
+def reserved(tree: GrowingTree | None, photons: int) -> GrowingTree:
     """A copy of the tree with room for so many photons, or an empty one."""
-    leaves = 2 + photons // (CAPACITY // 2)  # halves of a split leaf are never emptier than this
-    axes, planes, children, least, counts, members, places, words, needs = tree or Tree(
-        np.full(1, LEAF, np.int8),
-        np.zeros(1, np.float32),
-        np.zeros(1, np.int32),
-        np.zeros(1, np.float32),
-        np.zeros(1, np.int32),
-        np.zeros((1, CAPACITY), np.int32),
-        np.zeros((1, CAPACITY, 3), np.float32),
-        np.zeros(0, np.uint32),
-        np.zeros(0, np.float32),
-    )
-    nodes = 2 * leaves
-    return Tree(
-        *(grown(a, nodes) for a in (axes, planes, children, least)),
-        *(grown(a, leaves) for a in (counts, members, places)),
-        *(grown(a, photons) for a in (words, needs)),
-    )
+    n = 2 + photons // (CAPACITY // 2)  # halves of a split leaf are never emptier than this
+    nodes, leaves = aligned_empty((2 * n, NODE_WORDS), np.int32), aligned_empty((n, LEAF_WORDS), np.float32)
+    if tree is None:
+        nodes[0] = (0, LEAF, 0, np.float32(np.inf).view(np.int32))
+        leaves[0] = np.inf
+    else:
+        nodes[: len(tree.nodes)], leaves[: len(tree.leaves)] = tree.nodes, tree.leaves
+    record = np.zeros(1, TREE)
+    record[0] = (nodes.ctypes.data, leaves.ctypes.data)
+    return GrowingTree(nodes, leaves, record)
 
 
 def grown(array: NDArray[Any], n: int) -> NDArray[Any]:

@@ -4,11 +4,9 @@ none would be missing by chance, since what lies in the shadow of the view is no
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.compile.specialise import absent, specialised
 from pmviewer.kernels.memory import float_of_bits, load_f4, stack_get_i8, stack_i4
 from pmviewer.maps.search.disc import Facing
@@ -26,19 +24,6 @@ _i8 = np.int64
 _u4 = np.uint32
 
 
-@device
-def importance_within(importance, p, n, r):
-    """`importance_at`, searched for within r alone: right where no importon on that side reaches p from farther off."""
-    keys = stack_i4(KEYS)
-    count, _ = nearest(importance, p, _i4(1), r * r, keys, Facing(n, STEEPNESS, _i4(ALL_CLASSES)))
-    if count == 0:
-        return _f4(0.0)
-    key = stack_get_i8(keys, _i8(0))
-    i, d2 = key & _i8(0xFFFFFFFF), float_of_bits(_u4(key >> 32))
-    reach = load_f4(importance.reach, i)
-    return load_f4(importance.payload, 3 * i + 1) if d2 <= reach * reach else _f4(0.0)
-
-
 @specialised
 def importance_at(importance, p, n):
     """Importance Γ (float32, pixels per unit area) at the point p with unit normal n, for the normal's side.
@@ -48,7 +33,18 @@ def importance_at(importance, p, n):
     """
     if absent(importance):
         return lambda importance, p, n: _f4(1.0)
-    return lambda importance, p, n: importance_within(importance, p, n, importance.farthest)
+
+    def of_nearest(importance, p, n):
+        keys, r = stack_i4(KEYS), importance.farthest
+        count, _ = nearest(importance, p, _i4(1), r * r, keys, Facing(n, STEEPNESS, _i4(ALL_CLASSES)))
+        if count == 0:
+            return _f4(0.0)
+        key = stack_get_i8(keys, _i8(0))
+        i, d2 = key & _i8(0xFFFFFFFF), float_of_bits(_u4(key >> 32))
+        reach = load_f4(importance.reach, i)
+        return load_f4(importance.payload, 3 * i + 1) if d2 <= reach * reach else _f4(0.0)
+
+    return of_nearest
 
 
 @specialised
@@ -80,22 +76,6 @@ def importances(maps, points, normals, out, i0, i1):
     for i in range(i0, i1):
         p = (points[i, 0], points[i, 1], points[i, 2])
         out[i] = importance_at(importance, p, (normals[i, 0], normals[i, 1], normals[i, 2]))
-
-
-@kernel
-def nearest_importances(maps, points, gamma, distances, i0, i1):
-    """Γ of the importons nearest to points[i0:i1] (m, 3) float32, whatever their side and reach, into gamma (m,)
-    float32, and how far they are into distances (m,) float32; 0 and infinite without any."""
-    importance = maps[0]
-    keys, zero = stack_i4(KEYS), _f4(0.0)
-    for i in range(i0, i1):
-        p = (points[i, 0], points[i, 1], points[i, 2])
-        count, _ = nearest(importance, p, _i4(1), _f4(np.inf), keys, None)
-        gamma[i], distances[i] = zero, _f4(np.inf)
-        if count > 0:
-            key = stack_get_i8(keys, _i8(0))
-            gamma[i] = load_f4(importance.payload, 3 * (key & _i8(0xFFFFFFFF)) + 1)
-            distances[i] = _f4(math.sqrt(float_of_bits(_u4(key >> 32))))
 
 
 @kernel

@@ -1,9 +1,7 @@
 """How far importance has to be searched for: boxes that know the farthest reach of the importons that touch them.
 
-A place has the importance of the nearest importon, if that one reaches so far (`pmviewer.maps.importance.look_up`). A
-search as far as the farthest reach of any visits thousands of importons that face another way; in a box that no reach
-touches there is nothing to be searched for, and elsewhere no farther than those that do. Boxes may say too much, never
-too little, so that the importance found is the same.
+In a box that no reach touches there is nothing to be searched for, and elsewhere no farther than those that do. Boxes
+may say too much, never too little.
 """
 
 from __future__ import annotations
@@ -13,9 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-
-from pmviewer.kernels.compile.jit import kernel
-from pmviewer.maps.importance.look_up import importance_within
 
 BOXES = 1 << 17
 """About so many."""
@@ -43,14 +38,14 @@ class ReachedBoxes:
         return out
 
 
-def reached_boxes(positions: Float, reach: Float) -> ReachedBoxes:
-    """Of importons at positions (n, 3) with `reach` (n,)."""
+def reached_boxes(positions: Float, reach: Float, boxes: int = BOXES) -> ReachedBoxes:
+    """Of importons at positions (n, 3) with `reach` (n,): about so many boxes."""
     if not len(positions):
         return ReachedBoxes(np.zeros(3), 1.0, np.zeros((0, 0, 0), np.float32))
     farthest = float(reach.max())
     low, high = (positions.min(axis=0) - farthest).astype(np.float64), (positions.max(axis=0) + farthest).astype(float)
     size = np.maximum(high - low, 1e-3 * float((high - low).max()) + 1e-30)
-    edge = float(size.prod() / BOXES) ** (1 / 3)
+    edge = float(size.prod() / boxes) ** (1 / 3)
     shape = tuple(int(n) for n in np.floor(size / edge).astype(int) + 1)
     where = np.ravel_multi_index(tuple(np.floor((positions - low) / edge).astype(np.int64).T), shape)
     most = np.zeros(math.prod(shape), np.float32)
@@ -76,14 +71,3 @@ def _widened(boxes: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
         first, end = np.maximum(np.arange(n) - width, 0), np.minimum(np.arange(n) + width + 1, n)
         boxes = sums.take(end, axis) > sums.take(first, axis)
     return boxes
-
-
-@kernel
-def importances_within(maps, points, normals, farthest, out, i0, i1):
-    """Γ at points[i0:i1] (m, 3) float32 with unit normals (m, 3), into out (m,) float32, by importons no farther than
-    `farthest` (m,)."""
-    for i in range(i0, i1):
-        out[i] = np.float32(0.0)
-        if farthest[i] > np.float32(0.0):
-            p, n = (points[i, 0], points[i, 1], points[i, 2]), (normals[i, 0], normals[i, 1], normals[i, 2])
-            out[i] = importance_within(maps[0], p, n, farthest[i])
