@@ -13,6 +13,7 @@ import gc
 import json
 import os
 import runpy
+import signal
 import subprocess
 import sys
 import tempfile
@@ -21,6 +22,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
+LONGEST = 300
+"""Seconds that a script may take."""
 spent = 0.0
 """CPU seconds of all that were run, for `--costs`: they are not this process's children."""
 
@@ -66,7 +69,7 @@ def _forked(folder: Path, arguments: list[str], environment: dict[str, str]) -> 
 def _started(folder: Path, arguments: list[str], environment: dict[str, str]) -> Done:
     """Where processes can't be forked."""
     done = subprocess.run(
-        [sys.executable, *arguments], env=environment, capture_output=True, text=True, check=False, timeout=300
+        [sys.executable, *arguments], env=environment, capture_output=True, text=True, check=False, timeout=LONGEST
     )
     return Done(done.stdout, done.stderr, done.returncode)
 
@@ -75,7 +78,9 @@ def _started(folder: Path, arguments: list[str], environment: dict[str, str]) ->
 def _server() -> subprocess.Popen[str]:
     """One for this process, which it ends with: its standard input is closed then."""
     command = [sys.executable, "-P", __file__]
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    atexit.register(server.communicate)
+    return server
 
 
 def _serve() -> dict[str, Any] | None:
@@ -88,6 +93,7 @@ def _serve() -> dict[str, Any] | None:
     for line in sys.stdin:
         child = os.fork()
         if child == 0:
+            signal.alarm(LONGEST)
             return json.loads(line)
         _, status, usage = os.wait4(child, 0)
         answer = {"status": os.waitstatus_to_exitcode(status), "seconds": usage.ru_utime + usage.ru_stime}
