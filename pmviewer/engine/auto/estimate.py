@@ -46,6 +46,8 @@ BLOCKS = 8
 """Blocks along each side of the picture whose differences tell how well D is known."""
 BAND = 32
 """Rows of the picture a task."""
+TRUE_BIAS = 1 / 3, 2.0
+"""The least and the most of the squared bias that a trial tells which it may be."""
 WIDTH = 1.645
 """Standard errors of an interval that is to cover 90 %."""
 F8 = NDArray[np.float64]
@@ -120,7 +122,8 @@ class ErrorEstimate:
         bias = float(self.bias(self._passes)) if self.bias is not None else None
         added = bias or 0.0
         factor = math.exp(WIDTH * spread)
-        return Remaining(value + added, bias, value / factor + 0.5 * added, value * factor + 2 * added)
+        low, high = (share * added for share in TRUE_BIAS)
+        return Remaining(value + added, bias, value / factor + low, value * factor + high)
 
 
 def _is_level(n: int) -> bool:
