@@ -12,8 +12,6 @@ from pmviewer.output.metric import EPSILON
 F8 = NDArray[np.float64]
 OUTLIERS = 0.0005
 """Share of the noisiest pixels that say nothing in two passes."""
-CERTAIN = 2.0
-"""Standard errors from which a bias stands out of the noise."""
 PARTS = 8
 """Parts along each side of the picture whose noise is independent, more or less."""
 
@@ -26,10 +24,15 @@ def variance(images: list[F8], mean: F8) -> float:
 
 
 def squared(images: list[F8], against: list[F8], mean: F8, size: int = 1) -> float:
-    """Squared relative difference of what two ways show in the mean, in blocks of size² pixels; 0 where it does not
-    stand out of the noise."""
-    found, error = difference(images, against, [mean], size)
-    return found if found > CERTAIN * error else 0.0
+    """Squared relative difference of what two ways show in the mean, in blocks of size² pixels, as far as it is
+    certain."""
+    return certain(*difference(images, against, [mean], size))
+
+
+def certain(found: float, error: float) -> float:
+    """What is left of a difference with that standard error: its square less that of the error, over itself (James and
+    Stein). A bound that it must pass would make those too large that happen to."""
+    return found - error**2 / found if found > error else 0.0
 
 
 def difference(images: list[F8], against: list[F8], means: list[F8], size: int = 1) -> tuple[float, float]:

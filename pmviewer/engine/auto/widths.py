@@ -16,7 +16,7 @@ import math
 from dataclasses import dataclass, replace
 
 from pmviewer.engine.auto.bias import ORDER, Blur
-from pmviewer.engine.auto.relative import CERTAIN, F8, difference, variance
+from pmviewer.engine.auto.relative import F8, certain, difference, variance
 
 WIDER = 2.0
 """Radii that are tried besides are wider and narrower by this."""
@@ -76,8 +76,7 @@ def _blur(above: tuple[float, float], below: tuple[float, float]) -> Blur:
         error = 0.5 * math.hypot(above[1] / above[0], below[1] / below[0]) / math.log(WIDER)
         order += (seen - ORDER) / (1 + (error / SPREAD) ** 2)
         order = min(max(order, ORDERS[0]), ORDERS[1])
-    certain = above[0] if above[0] > CERTAIN * above[1] else 0.0
-    return Blur(_growth(order) * certain / (WIDER ** (2 * order) - 1), order)
+    return Blur(_growth(order) * certain(*above) / (WIDER ** (2 * order) - 1), order)
 
 
 def _growth(order: float) -> float:
