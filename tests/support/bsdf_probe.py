@@ -9,7 +9,7 @@ import numpy as np
 
 from pmviewer.kernels.bsdf import lobes
 from pmviewer.kernels.bsdf import principled as principled_bsdf
-from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.scene import M_METALLIC, MATERIAL_COLUMNS
 from pmviewer.scene.arrays.flatten import flatten
@@ -22,10 +22,16 @@ Z = np.array([0, 0, 1], np.float32)
 X = np.array([1, 0, 0], np.float32)
 
 
+@device
+def _vectors(frame):
+    ng, ns, tangent = frame
+    return (ng[0], ng[1], ng[2]), (ns[0], ns[1], ns[2]), (tangent[0], tangent[1], tangent[2])
+
+
 @kernel
-def _evaluate(scenes, material, glossy, group, ng, ns, tangent, wo, wi, f, pdf, compression):
+def _evaluate(scenes, material, glossy, group, frame, wo, wi, f, pdf, compression):
     p = lobes.material_params(scenes[0], material)
-    n, s, t = (ng[0], ng[1], ng[2]), (ns[0], ns[1], ns[2]), (tangent[0], tangent[1], tangent[2])
+    n, s, t = _vectors(frame)
     for k in range(len(wo)):
         o, i = (wo[k, 0], wo[k, 1], wo[k, 2]), (wi[k, 0], wi[k, 1], wi[k, 2])
         b = lobes.bsdf_at(scenes[0], material, p, n, s, t, o, glossy)
@@ -37,9 +43,9 @@ def _evaluate(scenes, material, glossy, group, ng, ns, tangent, wo, wi, f, pdf, 
 
 
 @kernel
-def _sample(scenes, material, glossy, group, ng, ns, tangent, wo, u, wi, weight, pdf, compression):
+def _sample(scenes, material, glossy, group, frame, wo, u, wi, weight, pdf, compression):
     p = lobes.material_params(scenes[0], material)
-    n, s, t = (ng[0], ng[1], ng[2]), (ns[0], ns[1], ns[2]), (tangent[0], tangent[1], tangent[2])
+    n, s, t = _vectors(frame)
     for k in range(len(u)):
         o = (wo[k, 0], wo[k, 1], wo[k, 2])
         b = lobes.bsdf_at(scenes[0], material, p, n, s, t, o, glossy)
@@ -69,10 +75,10 @@ def _describe(scenes, material, glossy, ng, ns, wo, groups, share, albedo, flags
 
 
 @kernel
-def _evaluate_principled(scenes, material, glossy, group, ng, ns, tangent, wo, wi, f, pdf, compression):
+def _evaluate_principled(scenes, material, glossy, group, frame, wo, wi, f, pdf, compression):
     p = lobes.material_params(scenes[0], material)
     metallic = load_f4(scenes[0].materials, material * MATERIAL_COLUMNS + M_METALLIC)
-    n, s, t = (ng[0], ng[1], ng[2]), (ns[0], ns[1], ns[2]), (tangent[0], tangent[1], tangent[2])
+    n, s, t = _vectors(frame)
     for k in range(len(wo)):
         o, i = (wo[k, 0], wo[k, 1], wo[k, 2]), (wi[k, 0], wi[k, 1], wi[k, 2])
         b = principled_bsdf.bsdf_at(scenes[0], material, p, metallic, n, s, t, o, glossy)
@@ -84,10 +90,10 @@ def _evaluate_principled(scenes, material, glossy, group, ng, ns, tangent, wo, w
 
 
 @kernel
-def _sample_principled(scenes, material, glossy, group, ng, ns, tangent, wo, u, wi, weight, pdf, compression):
+def _sample_principled(scenes, material, glossy, group, frame, wo, u, wi, weight, pdf, compression):
     p = lobes.material_params(scenes[0], material)
     metallic = load_f4(scenes[0].materials, material * MATERIAL_COLUMNS + M_METALLIC)
-    n, s, t = (ng[0], ng[1], ng[2]), (ns[0], ns[1], ns[2]), (tangent[0], tangent[1], tangent[2])
+    n, s, t = _vectors(frame)
     for k in range(len(u)):
         o = (wo[k, 0], wo[k, 1], wo[k, 2])
         b = principled_bsdf.bsdf_at(scenes[0], material, p, metallic, n, s, t, o, glossy)
@@ -142,7 +148,7 @@ class Probe:
         wo = np.ascontiguousarray(np.broadcast_to(wo, wi.shape), np.float32)
         f, pdf, compression = np.empty_like(wi), np.empty(len(wi), np.float32), np.empty(len(wi), np.float32)
         frame = (self.ng, self.ns, self.tangent)
-        self.kernels[0](self.record, self.index(material), glossy, group, *frame, wo, wi, f, pdf, compression)
+        self.kernels[0](self.record, self.index(material), glossy, group, frame, wo, wi, f, pdf, compression)
         return f.astype(float), pdf.astype(float), compression.astype(float)
 
     def sample(self, material, group, wo, u, glossy=EVERYTHING_STORED):
@@ -152,7 +158,7 @@ class Probe:
         wi, weight = np.empty_like(u), np.empty_like(u)
         pdf, compression = np.empty(len(u), np.float32), np.empty(len(u), np.float32)
         frame = (self.ng, self.ns, self.tangent)
-        self.kernels[1](self.record, self.index(material), glossy, group, *frame, wo, u, wi, weight, pdf, compression)
+        self.kernels[1](self.record, self.index(material), glossy, group, frame, wo, u, wi, weight, pdf, compression)
         return wi, weight.astype(float), pdf.astype(float), compression.astype(float)
 
     def describe(self, material, wo, glossy=EVERYTHING_STORED):
