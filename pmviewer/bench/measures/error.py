@@ -48,6 +48,10 @@ PEER_BUDGET = 2.5
 """Mitsuba's budget over ours: its time to a target must be found where it is twice ours."""
 PEER = "Mitsuba 3 path"
 AUTOMATIC, TRIAL_APART = "automatic", ", its trial not counted"
+CHOSEN = "; how far a trial trusts what it sees of bias was chosen with this scene among others"
+CHOSEN_WITH = ("ring_caustic", "cornell_caustic")
+"""Scenes by which SPREAD of `pmviewer.engine.auto.widths`, and UNSURE and MISSED of `pmviewer.engine.auto.model`, were
+chosen: said in their targets' lines."""
 AUTOMATIC_BUDGET = 8.0
 """Of the curves by what automatic mode chooses, over their target's seconds."""
 
@@ -189,6 +193,7 @@ def run(quick: bool = False) -> BenchResult:
     for target, scene, error, bound, _ in TARGETS:
         best = min((c for c in curves if c.scene == scene), key=lambda c: c.time_to(error))
         apart = TRIAL_APART if best.method.startswith(AUTOMATIC) else ""
+        apart += CHOSEN if apart and scene in CHOSEN_WITH else ""
         note = f"{scene} to relMSE {error:g}, best: {best.method}{apart}"
         targets.append(Target(target, best.time_to(error), bound, "CPU s", False, note))
     if peers:
