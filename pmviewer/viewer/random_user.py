@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import signal
 import sys
 import tempfile
 import time
@@ -289,6 +290,13 @@ def resident() -> float:
         return int(statm.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
+def ignore_broken_pipes() -> None:
+    """As Python does. The test engine takes the signal for a crash, and itself crashes in telling of it once the window
+    is closed. On the main thread, while a window with a test engine is open."""
+    if hasattr(signal, "SIGPIPE"):
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+
+
 @contextmanager
 def window(scene: str, folder: Path) -> Iterator[ViewerApp]:
     """A window on the engine with that scene, small, which leaves the user's configuration alone."""
@@ -304,6 +312,13 @@ def window(scene: str, folder: Path) -> Iterator[ViewerApp]:
     session = Session(settings=with_values(Settings(), START))
     recent = RecentFiles(folder / "recent.txt")
     app = ViewerApp(session, recent=recent, remember=False, inactive_reason=inactive_reason)
+    before = app.params.callbacks.pre_new_frame
+
+    def pre_new_frame() -> None:
+        ignore_broken_pipes()
+        before()
+
+    app.params.callbacks.pre_new_frame = pre_new_frame
     app.state.open(scene, keep_camera=True)
     try:
         yield app

@@ -18,6 +18,7 @@ from pmviewer.engine.session import Session
 from pmviewer.settings.access import Settings, with_values
 from pmviewer.viewer.app import ViewerApp
 from pmviewer.viewer.dialogs.recent import RecentFiles
+from pmviewer.viewer.random_user import ignore_broken_pipes
 
 # Who opens a window is asked for the sake of imgui_bundle's tutorials: by all modules' sources, 25 ms a window.
 runners._get_caller_filename = lambda depth: ""
@@ -33,6 +34,7 @@ def make_app(session: Any, folder: Path, **options: Any) -> ViewerApp:
     before = app.params.callbacks.pre_new_frame
 
     def pre_new_frame() -> None:
+        ignore_broken_pipes()
         before()
         while _work:
             _work.pop(0)()

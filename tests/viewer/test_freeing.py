@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import signal
 import threading
 
 import glfw
@@ -140,3 +141,10 @@ def test_everything_is_freed_before_the_window_closes(app):
     assert alive[0] > 8
     assert alive[1] == 0
     assert names["before"]["VertexArray"] - names["after"]["VertexArray"] >= 4, "OpenGL agrees"
+
+
+def test_a_broken_pipe_is_no_crash_after_the_test_engine(app):
+    drive(app, lambda c: c.yield_(1))
+    with open("/proc/self/status", encoding="ascii") as status:
+        ignored = next(int(line.split()[1], 16) for line in status if line.startswith("SigIgn"))
+    assert ignored & 1 << (signal.SIGPIPE - 1), "a closed connection would end the tests of this process"
