@@ -63,7 +63,8 @@ METHODS: dict[str, dict[str, object]] = {
     "gather": {},
     "path": {},
 }
-OWN_SPP, QUICK_OWN_SPP, OWN_SEED = 256, 64, 100_000
+QUICK_METHODS = ("progressive, beam", "path")
+OWN_SPP, QUICK_OWN_SPP, OWN_SEED = 256, 32, 100_000
 """Samples per pixel of the picture of Mitsuba's that its error is measured against, and the first of its seeds."""
 BUDGET, QUICK_BUDGET, PEER_BUDGET = 60.0, 6.0, 2.5
 DEPTH = 1000
@@ -190,7 +191,7 @@ def by_formula(quick: bool, pool: WorkPool) -> Iterator[tuple[list[Cell], Target
 
 def against_mitsuba(quick: bool, pool: WorkPool) -> Iterator[tuple[list[Cell], Target | None]]:
     """A row and a target for each file and method, and of the whole bench a row for each radius."""
-    runs = 8 if quick else 16
+    runs = 4 if quick else 16
     with tempfile.TemporaryDirectory() as folder:
         sides = uneven().shape[2::-1]
         head = struct.pack("<3sB5i6f", b"VOL", 3, 1, *sides, 1, 0, 0, 0, 1, 1, 1)
@@ -244,6 +245,8 @@ def over_time(scene: str, goal: float, share: float, crossed: bool, quick: bool)
     other = converged if crossed else None
     curves = []
     for name, values in METHODS.items():
+        if quick and name not in QUICK_METHODS:
+            continue
         method = name.partition(",")[0]
         second = None if method == "path" else other
         curves.append(replace(measure(open_scene(scene), method, budget, values=values, other=second), method=name))

@@ -74,7 +74,7 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
         why = "nothing else suits the scene" if len(found) == 1 else f"{seconds:.3g} CPU s are too few for a trial"
         return Choice(name.name, assignments(name.values), math.nan, 0.0, (f"{name.name}: {why}", *said))
     (width, height), N = planned
-    tried = trial(opened, with_values(base, {"photons.N": N}), found, pool, (width, height), tell)
+    tried = trial(opened, with_values(base, {"photons.N": N}), found, pool, (width, height), SHARE * seconds, tell)
     picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, seconds - tried.cpu_seconds)
     values, bias = assignments(_values(picked, base)), bias_of(picked.measured, picked.widths)
     opened.biases[way_of(with_values(base, values))] = bias  # whoever renders so knows it
@@ -193,5 +193,5 @@ def _table(tried: Trial, picked: Option) -> list[str]:
             every = [in_time(m, N, widths, picked.seconds) for N, widths in numbers(m)]
             best = min((o for o in every if o.passes >= 1), default=every[0], key=lambda o: o.error)
             lines.append(f"tried {m.candidate.name}: relMSE {best.error:.2g} with N = {best.N:,} in that time")
-    lines.append(f"trial: {tried.pixels:,} pixels, {tried.cpu_seconds:.2g} CPU s")
+    lines.append(f"trial: {tried.pixels:,} pixels, {tried.seeds} seeds, {tried.cpu_seconds:.2g} CPU s")
     return lines

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,8 @@ PARTS = 8
 
 
 def variance(images: list[F8], mean: F8) -> float:
-    """Relative variance of a pass, from those of two seeds, without the noisiest pixels. Images (h, w, 3)."""
-    plane = (images[0] - images[1]) ** 2 / 2 / (mean**2 + EPSILON)
+    """Relative variance of a pass, from those of several seeds, without the noisiest pixels. Images (h, w, 3)."""
+    plane = np.var(images, axis=0, ddof=1) / (mean**2 + EPSILON)
     each = np.sort(plane.mean(axis=-1), axis=None)
     return float(each[: each.size - round(each.size * OUTLIERS)].mean())
 
@@ -36,15 +37,25 @@ def certain(found: float, error: float) -> float:
 
 
 def difference(images: list[F8], against: list[F8], means: list[F8], size: int = 1) -> tuple[float, float]:
-    """Likewise as it comes out, and its standard error. The product of the differences d₁, d₂ of two independent pairs
-    of passes has it as its mean, without the noise of either. (d₁² − d₂²)/2 has the product's noise (the variances are
-    equal for normal numbers) and none of what is looked for; neighbouring pixels share photons, so that it is summed up
-    by larger parts of the picture. What it is relative to may have been made by either pair, but in equal shares by
-    several `means`: d₁ is then compared with what is independent of d₂."""
-    first, second = (_blocks(a - b, size) for a, b in zip(images, against, strict=True))
+    """Likewise as it comes out, and its standard error; an even number of seeds.
+
+    The products of the differences dᵢ, dⱼ of two seeds' passes have it as their mean, without the noise of either: it
+    is their mean over all pairs. Its noise is that of what has none of it in the mean, the squares of the sums of
+    either half of the seeds, (S² − T²)·2/n² (with two seeds just as much, with more a little too much); neighbouring
+    pixels share photons, so that it is summed up by larger parts of the picture. What it is relative to may have been
+    made by either seed, but in equal shares by several `means`: d₁ is then compared with what is independent of d₂.
+    """
+    d = np.stack([_blocks(a - b, size) for a, b in zip(images, against, strict=True)])
     weight = np.mean([1 / (_blocks(mean, size) ** 2 + EPSILON) for mean in means], axis=0)
-    noise = part_means(((first**2 - second**2) / 2 * weight).mean(axis=-1), PARTS)
-    return float((first * second * weight).mean()), math.sqrt(float((noise**2).sum())) / noise.size
+    n, total = len(d), d.sum(axis=0)
+    found = float(((total**2 - (d**2).sum(axis=0)) * weight).mean()) / (n * (n - 1))
+    errors2 = []
+    for half in combinations(range(1, n), n // 2 - 1):
+        first = d[[0, *half]].sum(axis=0)
+        apart = (first**2 - (total - first) ** 2) * 2 / n**2
+        noise = part_means((apart * weight).mean(axis=-1), PARTS)
+        errors2.append(float((noise**2).sum()) / noise.size**2)
+    return found, math.sqrt(sum(errors2) / len(errors2))
 
 
 def part_means(plane: F8, count: int) -> F8:

@@ -1,10 +1,10 @@
 """The measured trial: what a pass of each candidate costs, how much passes differ by chance, and by how much they are
 wrong.
 
-A pass is rendered with two seeds and two numbers of photons, of pixels that are spread over the picture, each as large
-as it will be: larger ones would average the bias of what is narrower than they are away. Half the squared difference of
-two seeds is the variance of a pass. What of it falls with N is the photons' part, what doesn't the camera pass's; the
-times of the stages fall apart in the same way. What either radius does, that of caustics and that of the global map
+A pass is rendered with two numbers of photons and two seeds, or more as the time allows, of pixels that are spread over
+the picture, each as large as it will be: larger ones would average the bias of what is narrower than they are away. The
+variance over the seeds is that of a pass. What of it falls with N is the photons' part, what doesn't the camera pass's;
+the times of the stages fall apart in the same way. What either radius does, that of caustics and that of the global map
 where it is shown, is told by passes with twice and half of it (`pmviewer.engine.auto.widths`).
 """
 
@@ -44,8 +44,8 @@ museum, office). Maps that are shown have none: different radii tell their part 
 BLOCK = 4
 """What interpolation does is compared in blocks of so many pixels squared: its bias is smooth, noise is not. Pictures
 with two radii have the same photons and camera rays, and little noise in their difference."""
-SEEDS = (7_919, 104_729)
-"""Added to the picture's seed."""
+SEEDS = ((7_919, 104_729), (1_299_709, 15_485_863), (32_452_843, 49_979_687))
+"""Added to the picture's seed; the second pair where a trial that is twice as long still fits, and so on."""
 STORE = 1 << 28
 
 
@@ -114,21 +114,27 @@ class Measured:
 
 @dataclass
 class Trial:
-    """What was measured, by candidate; `cpu_seconds` and `seconds` that it took, without compiling."""
+    """What was measured, by candidate, with so many seeds; `cpu_seconds` and `seconds` that it took, without
+    compiling."""
 
     measured: list[Measured] = field(default_factory=list)
     cpu_seconds: float = 0.0
     seconds: float = 0.0
     pixels: int = 0
+    seeds: int = 0
 
 
 @dataclass
 class _Run:
-    """Pictures of the two seeds with one N, and the CPU seconds by stage of the quicker one."""
+    """Pictures of the seeds with such settings, and the CPU seconds by stage of the quickest one."""
 
-    N: int
-    images: list[F8]
-    stages: dict[str, float]
+    settings: Settings
+    images: list[F8] = field(default_factory=list)
+    stages: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def N(self) -> int:
+        return self.settings.photons.N
 
 
 @dataclass
@@ -138,7 +144,7 @@ class _Tried:
     candidate: Candidate
     plan: Plan
     radius: float
-    runs: list[_Run] = field(default_factory=list)
+    runs: list[_Run]
     caustic: list[_Run] = field(default_factory=list)
     shown: list[_Run] = field(default_factory=list)
 
@@ -157,8 +163,8 @@ class _Trier:
     def settings_of(self, candidate: Candidate) -> Settings:
         return with_values(self._settings, assignments(candidate.values))
 
-    def tried(self, candidate: Candidate) -> _Tried:
-        """All its passes."""
+    def planned(self, candidate: Candidate) -> _Tried:
+        """All its runs, with no pictures yet."""
         chosen = self.settings_of(candidate)
         plan = plan_of(chosen, self._opened.traits)
         radius = first_radius(self._opened.flat, self._full, chosen.estimate, plan.gather) / self._opened.flat.radius
@@ -173,30 +179,32 @@ class _Trier:
                 "gather.cache_max": max(chosen.gather.cache_max * self._side, 1.0),
             },
         )
-        found, N = _Tried(candidate, plan, radius), chosen.photons.N
-        found.runs = [self._run(small, count) for count in ((N, N // FEWER) if plan.photons else (N,))]
+        N = chosen.photons.N
+        counts = (N, N // FEWER) if plan.photons else (N,)
+        found = _Tried(candidate, plan, radius, [_Run(with_values(small, {"photons.N": count})) for count in counts])
         if plan.shown_directly:
-            found.shown = [self._run(with_values(small, w.values(chosen, radius)), N) for w in _either("shown")]
+            found.shown = [_Run(with_values(small, w.values(chosen, radius))) for w in _either("shown")]
         if plan.caustic_mask and not plan.gather:  # beside a gather they are the same
-            found.caustic = [self._run(with_values(small, w.values(chosen, radius)), N) for w in _either("caustic")]
+            found.caustic = [_Run(with_values(small, w.values(chosen, radius))) for w in _either("caustic")]
         return found
 
-    def _run(self, settings: Settings, N: int) -> _Run:
-        """A pass with each seed."""
-        images: list[F8] = []
-        stages: dict[str, float] = {}
-        guided = settings.importance.emission != "off"
-        for seed in SEEDS:
-            chosen = with_values(settings, {"photons.N": N, "render.seed": (settings.render.seed + seed) % 2**31})
-            renderer = Renderer(self._opened, chosen, self._pool, self._store)
-            renderer.camera = replace(renderer.camera, pixel_side=min(self._side, 1.0))
-            renderer.step()
-            images.append(beauty_of(renderer.film.planes()).astype(np.float64))
-            for name, spent in renderer.tally.stage_seconds.items():
-                stages[name] = min(stages.get(name, math.inf), spent)
-        if "light pass" in stages and not guided:
-            self._light[N] = stages["light pass"] = max(stages["light pass"], self._light.get(N, 0.0))
-        return _Run(N, images, stages)
+    def render(self, tried: _Tried, seeds: tuple[int, int]) -> None:
+        """A pass with each seed of each of its runs."""
+        for run in (*tried.runs, *tried.shown, *tried.caustic):
+            for seed in seeds:
+                self._pass(run, seed)
+            if "light pass" in run.stages and run.settings.importance.emission == "off":
+                light = max(run.stages["light pass"], self._light.get(run.N, 0.0))
+                self._light[run.N] = run.stages["light pass"] = light
+
+    def _pass(self, run: _Run, seed: int) -> None:
+        chosen = with_values(run.settings, {"render.seed": (run.settings.render.seed + seed) % 2**31})
+        renderer = Renderer(self._opened, chosen, self._pool, self._store)
+        renderer.camera = replace(renderer.camera, pixel_side=min(self._side, 1.0))
+        renderer.step()
+        run.images.append(beauty_of(renderer.film.planes()).astype(np.float64))
+        for name, seconds in renderer.tally.stage_seconds.items():
+            run.stages[name] = min(run.stages.get(name, math.inf), seconds)
 
 
 def trial(
@@ -205,17 +213,22 @@ def trial(
     candidates: list[Candidate],
     pool: WorkPool,
     size: tuple[int, int],
+    seconds: float,
     tell: Tell,
 ) -> Trial:
-    """Measure the candidates on that many columns and rows of pixels. Raises Cancelled when the pool is cancelled."""
+    """Measure the candidates on that many columns and rows of pixels, with as many pairs of seeds as fit into those CPU
+    seconds, one at least. Raises Cancelled when the pool is cancelled."""
     result, trier = Trial(pixels=size[0] * size[1]), _Trier(opened, settings, pool, size)
     for candidate in candidates:
         prepare(opened, trier.settings_of(candidate), pool, tell)
     started, before = time.perf_counter(), pool.cpu_seconds
-    every: list[_Tried] = []
-    for number, candidate in enumerate(candidates):
-        tell(f"trying {candidate.name}", number / len(candidates))
-        every.append(trier.tried(candidate))
+    every = [trier.planned(candidate) for candidate in candidates]
+    for done, seeds in enumerate(SEEDS):
+        if done and (pool.cpu_seconds - before) * (done + 1) / done > seconds:
+            break
+        for number, tried in enumerate(every):
+            tell(f"trying {tried.candidate.name}", number / len(every))
+            trier.render(tried, seeds)
     mean = np.mean([image for tried in every for run in tried.runs for image in run.images], axis=0)
     gathers = next((tried for tried in every if tried.candidate is GATHER), None)
     with_caustics = next((tried for tried in every if tried.caustic), None)
@@ -230,6 +243,7 @@ def trial(
         shown = _widened(tried, "shown", mean, trier.scale)
         bias = Bias(caustic.blur, shown.blur, interpolated)
         result.measured.append(_measured(tried, (caustic, shown), bias, mean, trier.scale))
+    result.seeds = len(every[0].runs[0].images)
     result.seconds, result.cpu_seconds = time.perf_counter() - started, pool.cpu_seconds - before
     return result
 

@@ -31,7 +31,7 @@ SPREAD = 0.2
 
 @dataclass(frozen=True)
 class Tried:
-    """Pictures (h, w, 3) of the two seeds, and the CPU seconds of their camera pass."""
+    """Pictures (h, w, 3) of the seeds, and the CPU seconds of their camera pass."""
 
     images: list[F8]
     seconds: float
@@ -59,7 +59,7 @@ def told_by(wide: Tried, usual: Tried, narrow: Tried, mean: F8) -> Widened:
     """From passes with radii of WIDER and 1/WIDER times the usual one, and with that. mean: the picture that variance
     is relative to. Biases are relative to what the narrow radius shows, which is blurred least: where light leaks into
     the dark, the others are brighter than the truth, and the more so the wider they are; by each seed for itself, as
-    where few photons happen to be both seeds' differences are large."""
+    where few photons happen to be all seeds' differences are large."""
     span = WIDER**2 - 1 / WIDER**2
     noise = max(variance(narrow.images, mean) - variance(wide.images, mean), 0.0) / span
     above = difference(wide.images, usual.images, narrow.images)
