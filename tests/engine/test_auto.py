@@ -14,7 +14,7 @@ from pmviewer.engine.auto.candidates import CACHE, GATHER, PATH, PROGRESSIVE, as
 from pmviewer.engine.auto.choose import Goal, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.auto.model import error_after, to_error
-from pmviewer.engine.auto.relative import squared
+from pmviewer.engine.auto.relative import difference, squared
 from pmviewer.engine.auto.trial import RARE, Costs, Measured, Widths, trial
 from pmviewer.engine.auto.widths import Tried, told_by
 from pmviewer.engine.method import plan_of
@@ -104,15 +104,16 @@ def beyond(x: np.ndarray) -> np.ndarray:
     return (np.arccos(inside) - inside * np.sqrt(1 - inside**2)) / np.pi
 
 
+@pytest.mark.parametrize("seeds", [2, 4])
 @pytest.mark.parametrize("kind", ["outline", "open"])
-def test_radii_are_told_by_passes_with_others(kind):
+def test_radii_are_told_by_passes_with_others(kind, seeds):
     """Made-up pictures of light that ends at a straight line, blurred by discs, or is wrong by the square of the radius
     everywhere, and noise of photons that is less in wider ones."""
     rng = np.random.default_rng(5)
     across = np.tile(np.arange(-100, 100) + 0.5, (60, 1))[:, :, None].repeat(3, axis=2)
     truth = 0.6 + 0.4 * (across < 0) if kind == "outline" else np.full(across.shape, 0.8)
-    camera = [rng.normal(0, 0.01, truth.shape) for _ in range(2)]
-    photons = [rng.normal(0, 0.01, truth.shape) for _ in range(2)]
+    camera = [rng.normal(0, 0.01, truth.shape) for _ in range(seeds)]
+    photons = [rng.normal(0, 0.01, truth.shape) for _ in range(seeds)]
 
     def blurred(width: float) -> np.ndarray:
         if kind == "outline":
@@ -140,7 +141,7 @@ def test_a_trial_sees_bias_that_is_narrower_than_its_pixels_are_apart(pool):
     picture's, as it shows in the picture itself against the scene's reference."""
     scene = open_scene("ring_caustic")
     camera = {"camera.width": 128, "camera.height": 128}
-    tried = trial(scene, with_values(Settings(), camera), [PROGRESSIVE], pool, (48, 48), lambda text, share: None)
+    tried = trial(scene, with_values(Settings(), camera), [PROGRESSIVE], pool, (48, 48), 0.0, lambda text, share: None)
     layers, _ = read_exr(data_folder("scenes") / "ring_caustic" / "reference.exr")
     reference = layers[""].astype(float).reshape(128, 2, 128, 2, 3).mean(axis=(1, 3))
     images = []
@@ -158,7 +159,7 @@ def test_a_trial_of_few_pixels_has_the_records_of_the_whole_picture(pool):
     """Noise of a pass with the irradiance cache, by the trial and by four passes of the picture itself."""
     scene, N = open_scene("cornell_diffuse"), 20_000
     settings = with_values(Settings(), {"camera.width": 128, "camera.height": 128, "photons.N": N})
-    tried = trial(scene, settings, [GATHER, CACHE], pool, (32, 32), lambda text, share: None)
+    tried = trial(scene, settings, [GATHER, CACHE], pool, (32, 32), 0.0, lambda text, share: None)
     cached = next(m for m in tried.measured if m.candidate is CACHE)
     images = []
     for seed in range(4):
@@ -167,6 +168,29 @@ def test_a_trial_of_few_pixels_has_the_records_of_the_whole_picture(pool):
         images.append(beauty_of(renderer.film.planes()).astype(float))
     noise = (np.var(images, axis=0, ddof=1) / (np.mean(images, axis=0) ** 2 + EPSILON)).mean()
     assert 0.6 < (cached.eye + cached.gathered / RARE / N) / noise < 1.7
+
+
+@pytest.mark.parametrize("seeds", [2, 4, 6])
+def test_a_difference_knows_its_noise(seeds):
+    """Of made-up pictures that differ by a third of their noise: 400 times, with seeds of their own."""
+    rng = np.random.default_rng(seeds)
+    true, found = 0.04, []
+    for _ in range(400):
+        images = list(rng.normal(1 + true, 3 * true, (seeds, 16, 16, 3)))
+        found.append(difference(images, [np.ones((16, 16, 3))] * seeds, np.ones((16, 16, 3))))
+    values, errors = np.array(found).T
+    assert values.mean() == pytest.approx(true**2 / (1 + EPSILON), abs=3 * values.std() / 20)
+    assert 0.9 < math.sqrt((errors**2).mean()) / values.std() < 1.35
+
+
+def test_a_trial_takes_more_seeds_where_time_is_left(pool):
+    scene = open_scene("cornell_diffuse")
+    settings = with_values(Settings(), {"camera.width": 32, "camera.height": 32, "photons.N": 2000})
+    short, long = (
+        trial(scene, settings, [PROGRESSIVE], pool, (16, 16), seconds, lambda text, share: None)
+        for seconds in (0.0, 100.0)
+    )
+    assert (short.seeds, long.seeds) == (2, 6)
 
 
 def test_radii_are_settings():

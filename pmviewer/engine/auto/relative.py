@@ -27,7 +27,7 @@ def variance(images: list[F8], mean: F8) -> float:
 def squared(images: list[F8], against: list[F8], mean: F8, size: int = 1) -> float:
     """Squared relative difference of what two ways show in the mean, in blocks of size² pixels, as far as it is
     certain."""
-    return certain(*difference(images, against, [mean], size))
+    return certain(*difference(images, against, mean, size))
 
 
 def certain(found: float, error: float) -> float:
@@ -36,17 +36,17 @@ def certain(found: float, error: float) -> float:
     return found - error**2 / found if found > error else 0.0
 
 
-def difference(images: list[F8], against: list[F8], means: list[F8], size: int = 1) -> tuple[float, float]:
+def difference(images: list[F8], against: list[F8], mean: F8, size: int = 1) -> tuple[float, float]:
     """Likewise as it comes out, and its standard error; an even number of seeds.
 
     The products of the differences dᵢ, dⱼ of two seeds' passes have it as their mean, without the noise of either: it
     is their mean over all pairs. Its noise is that of what has none of it in the mean, the squares of the sums of
     either half of the seeds, (S² − T²)·2/n² (with two seeds just as much, with more a little too much); neighbouring
-    pixels share photons, so that it is summed up by larger parts of the picture. What it is relative to may have been
-    made by either seed, but in equal shares by several `means`: d₁ is then compared with what is independent of d₂.
+    pixels share photons, so that it is summed up by larger parts of the picture. What it is relative to, `mean`, may
+    have been made by these seeds, but by all of them in equal shares.
     """
     d = np.stack([_blocks(a - b, size) for a, b in zip(images, against, strict=True)])
-    weight = np.mean([1 / (_blocks(mean, size) ** 2 + EPSILON) for mean in means], axis=0)
+    weight = 1 / (_blocks(mean, size) ** 2 + EPSILON)
     n, total = len(d), d.sum(axis=0)
     found = float(((total**2 - (d**2).sum(axis=0)) * weight).mean()) / (n * (n - 1))
     errors2 = []
