@@ -88,3 +88,11 @@ def independent_images(
     """(runs, h, w, 3) images of a bundled scene or a file with different seeds, from `first` on; those of
     `error_images` are small. Raises PmviewerError as above."""
     return _run(scene, parameters, mode="runs", runs=runs, spp=spp, first=first)["images"]
+
+
+def file_images(path: Path, longest: int, depth: int, budget: float, references: float) -> dict[str, NDArray[Any]]:
+    """Of a file that somebody wrote, with sides of at most so many pixels and paths of at most `depth` scatterings:
+    `spp`, `cpu` and `images` as from `error_images`, and two `references` (2, h, w, 3) of that many CPU seconds each.
+    Raises PmviewerError as above."""
+    request = {"longest": longest, "max_depth": depth + 1, "media_depth": depth + 1}
+    return _run(path, {}, mode="file", budget=budget, references=references, request=request)

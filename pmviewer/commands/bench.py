@@ -10,14 +10,16 @@ import typer
 
 def bench(
     name: Annotated[str, typer.Argument(help="A bench's name, or list.")] = "list",
-    folder: Annotated[Path | None, typer.Argument(help="Of files: of scene files; of report: of results.")] = None,
+    folder: Annotated[
+        Path | None, typer.Argument(help="Of files and auto: of scene files; of report: of results.")
+    ] = None,
     quick: Annotated[bool, typer.Option(help="Fewer rounds and smaller inputs.")] = False,
     csv: Annotated[Path | None, typer.Option(help="Also write the table as CSV.")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Also write the table as Markdown.")] = None,
     scenes: Annotated[
-        int | None, typer.Option(min=1, help="Of agree, files and hostile: how many scenes or files.")
+        int | None, typer.Option(min=1, help="Of agree, auto, files and hostile: how many scenes or files.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Of agree, files and hostile: which ones.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of agree, auto, files and hostile: which ones.")] = None,
     first: Annotated[int | None, typer.Option(min=0, help="Of agree: the number to begin with.")] = None,
     keep: Annotated[
         Path | None,

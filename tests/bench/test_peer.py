@@ -24,7 +24,7 @@ def set_variant(name):
 def load_file(path, **parameters):
     assert path.endswith("scene.xml"), path
     return int(parameters.get("res", 4))
-def render(scene, spp, seed):
+def render(scene, spp, seed, integrator=None):
     return np.full((scene, scene, 3), 1 + 1e-3 * seed)
 """
 

@@ -41,6 +41,16 @@ def answer(mi: Any, request: dict[str, Any]) -> dict[str, Any]:
 
     # Several of these work side by side. One thread would not do: Mitsuba waits for ever for some textures then.
     drjit.set_thread_count(2)
+    try:
+        scene, integrator, about = small_scene(mi, request)
+    except ValueError as error:
+        return {"error": str(error)}
+    return {**about, "means": _means(mi, scene, integrator, request)}
+
+
+def small_scene(mi: Any, request: dict[str, Any]) -> tuple[Any, Any, dict[str, Any]]:
+    """The file's scene at another size, the integrator for it, and "size", "file_size", "adapted", "media" as above.
+    `request`: "path", "longest", "max_depth", "media_depth". Raises ValueError, in one line."""
     adapted = ""
     try:
         scene, about = _scene(mi, request, lenient=False)
@@ -48,10 +58,10 @@ def answer(mi: Any, request: dict[str, Any]) -> dict[str, Any]:
         try:
             scene, about = _scene(mi, request, lenient=True)
         except (RuntimeError, TypeError, ValueError) as error:
-            return {"error": _one_line(error)}
+            raise ValueError(_one_line(error)) from None
         adapted = _one_line(refused)
     if about["camera"] not in PROJECTIVE:
-        return {"error": f"the camera '{about['camera']}' takes no picture to compare"}
+        raise ValueError(f"the camera '{about['camera']}' takes no picture to compare")
     # Its path tracer multiplies light samples on masked surfaces by the opacity twice, and leaves out media.
     masked = any(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null) for shape in scene.shapes() if shape.bsdf())
     media = any(shape.is_medium_transition() for shape in scene.shapes())
@@ -64,7 +74,7 @@ def answer(mi: Any, request: dict[str, Any]) -> dict[str, Any]:
             "hide_emitters": about["hidden"],
         }
     )
-    return {**about, "adapted": adapted, "media": media, "means": _means(mi, scene, integrator, request)}
+    return scene, integrator, {**about, "adapted": adapted, "media": media}
 
 
 def _one_line(error: BaseException) -> str:
@@ -169,7 +179,11 @@ def _resized(mi: Any, node: Any, longest: int) -> dict[str, Any]:
         film["width"], film["height"] = round(whole[0] * size[0] / width), round(whole[1] * size[1] / height)
         film["crop_offset_x"], film["crop_offset_y"] = round(left * size[0] / width), round(top * size[1] / height)
         film["crop_width"], film["crop_height"] = size
-    # The filter stays: it is the node's child, which the new properties have to name again.
+    kept = [k for k in node.props.keys() if node.props.type(k) == mi.Properties.Type.ResolvedReference]  # noqa: SIM118
+    for name in kept:  # the filter
+        film[name] = node.props[name]
+    if not kept:  # Mitsuba takes a Gaussian, and this program the box
+        film["rfilter"] = mi.load_dict({"type": "box"})
     node.props = film
     return {"size": list(size), "file_size": [width, height]}
 

@@ -6,15 +6,17 @@ from __future__ import annotations
 import contextlib
 import math
 import sys
-from collections.abc import Iterable
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench import peer
-from pmviewer.bench.measures.error import PEER, Curve, measure_peer, reference
+from pmviewer.bench.measures.auto_files import on_files
+from pmviewer.bench.measures.error import PEER, measure_peer, reference
+from pmviewer.bench.measures.timed import error_at, geometric_mean, name_of, picture, rendered, silent
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.engine.auto.choose import Choice, Goal, choose
+from pmviewer.engine.auto.choose import Goal, choose
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
@@ -22,7 +24,6 @@ from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.errors import PmviewerError
 from pmviewer.output.metric import relmse
-from pmviewer.render.planes import beauty_of
 from pmviewer.settings.access import Settings, with_values
 
 QUICK = ("cornell_caustic", "cornell_diffuse", "cornell_glossy", "rooms_10x10", "ring_caustic", "museum", "office")
@@ -44,60 +45,24 @@ CHOSEN_BIAS = "; the least and most that the bias may be were chosen with cornel
 """TRUE_BIAS of `pmviewer.engine.auto.estimate`, likewise."""
 
 
-def _picture(renderer: Renderer) -> NDArray[np.float64]:
-    return beauty_of(renderer.film.planes()).astype(np.float64)
-
-
-def _silent(text: str, share: float | None) -> None:
-    """Nobody listens."""
-
-
-def _until(renderer: Renderer, seconds: float) -> None:
-    """Passes for that many CPU seconds, at least one."""
-    while renderer.passes == 0 or (renderer.tally.cpu_seconds < seconds and not renderer.finished):
-        renderer.step()
-
-
-def _rendered(opened: OpenScene, settings: Settings, seconds: float, pool: WorkPool) -> tuple[float, Renderer]:
-    """relMSE after that many CPU seconds, with kernels compiled and warm."""
-    settings = with_values(settings, {"render.passes": 1_000_000})
-    prepare(opened, settings, pool, _silent)
-    renderer = Renderer(opened, settings, pool, StageStore(0))
-    _until(renderer, seconds)
-    return relmse(_picture(renderer), reference(opened.scene.name)), renderer
-
-
-def _at(curve: Curve, seconds: float) -> float:
-    """Error of a curve after that many seconds, by log-log interpolation, going on with slope −1."""
-    x, y = np.log(curve.cpu), np.log(curve.error)
-    if seconds >= curve.cpu[-1]:
-        return float(curve.error[-1]) * curve.cpu[-1] / seconds
-    return float(math.exp(np.interp(math.log(seconds), x, y)))
-
-
 def _against(scene: str, seconds: float, pool: WorkPool) -> tuple[list[str | float | int], float]:
     """A row of the table, and the error over Mitsuba's, NaN without it."""
     opened, base = open_scene(scene), Settings()
-    choice = choose(opened, base, Goal(seconds=seconds), pool, _silent)
+    choice = choose(opened, base, Goal(seconds=seconds), pool, silent)
     chosen = with_values(base, dict(choice.values))
-    error, renderer = _rendered(opened, chosen, seconds - choice.trial.cpu_seconds, pool)
-    default, _ = _rendered(opened, base, seconds, pool)
+    renderer = rendered(opened, chosen, seconds - choice.trial.cpu_seconds, pool)
+    error, default = (
+        relmse(picture(each), reference(scene)) for each in (renderer, rendered(opened, base, seconds, pool))
+    )
     ratio = math.nan
     if peer.installed():
         with contextlib.suppress(PmviewerError):  # materials that Mitsuba does not have
-            ratio = error / _at(measure_peer(scene, seconds), seconds)
+            curve = measure_peer(scene, seconds)
+            ratio = error / error_at(curve.cpu, curve.error, seconds)
     share = choice.trial.cpu_seconds / seconds
     said = renderer.error.latest
     found = said.relmse if said is not None else math.nan
-    return [scene, _name(choice), share, error, choice.expected, found, default, error / default, ratio], ratio
-
-
-def _name(choice: Choice) -> str:
-    short = choice.name.replace("gather with irradiance cache", "cache")
-    changed = choice.changed
-    N = f", N {changed['photons.N']:,}" if "photons.N" in changed else ""
-    radii = {"estimate.radius": ", radius", "estimate.caustic_radius": ", caustic radius"}
-    return short + N + "".join(said for path, said in radii.items() if path in changed)
+    return [scene, name_of(choice), share, error, choice.expected, found, default, error / default, ratio], ratio
 
 
 def _runs(scene: str, runs: int, pool: WorkPool) -> tuple[list[str | float | int], list[float], list[bool]]:
@@ -110,13 +75,13 @@ def _runs(scene: str, runs: int, pool: WorkPool) -> tuple[list[str | float | int
     for run in range(runs):
         asked = ASKED[run % len(ASKED)]
         settings = with_values(small, {"render.seed": 1000 + run, "render.error": asked})
-        choice = choose(opened, settings, Goal(error=asked), pool, _silent)
+        choice = choose(opened, settings, Goal(error=asked), pool, silent)
         renderer = Renderer(opened, with_values(settings, dict(choice.values)), pool, StageStore(0))
         renderer.error.bias = choice.bias
-        prepare(opened, renderer.settings, pool, _silent)
+        prepare(opened, renderer.settings, pool, silent)
         while not renderer.finished:
             renderer.step()
-        error, said = relmse(_picture(renderer), truth), renderer.error.latest
+        error, said = relmse(picture(renderer), truth), renderer.error.latest
         assert said is not None
         ratios.append(error / asked)
         covered.append(said.low <= error <= said.high)
@@ -131,21 +96,18 @@ def _truth(opened: OpenScene, small: Settings, pool: WorkPool) -> NDArray[np.flo
     """A long picture of another seed by plain gathers, small radii."""
     long = with_values(small, {"render.method": "gather", "render.seed": 77, "render.passes": TRUTH_PASSES})
     renderer = Renderer(opened, long, pool, StageStore(0))
-    prepare(opened, long, pool, _silent)
+    prepare(opened, long, pool, silent)
     while not renderer.finished:
         renderer.step()
-    return _picture(renderer)
+    return picture(renderer)
 
 
-def _mean(values: Iterable[float]) -> float:
-    """Geometric."""
-    logs = [math.log(value) for value in values if value > 0 and math.isfinite(value)]
-    return math.exp(sum(logs) / len(logs)) if logs else math.nan
-
-
-def run(quick: bool = False, scenes: int | None = None) -> BenchResult:
-    """Both tables in one: scenes at equal time, then runs that were asked for an error."""
+def run(quick: bool = False, scenes: int | None = None, folder: Path | None = None, seed: int = 1) -> BenchResult:
+    """Both tables in one: scenes at equal time, then runs that were asked for an error. With a `folder` the Mitsuba
+    files below it instead, or so many `scenes` of them, drawn by `seed`, at equal time."""
     seconds = QUICK_SECONDS if quick else SECONDS
+    if folder is not None:
+        return on_files(folder, seconds, scenes, seed)
     names = (QUICK if quick else (*QUICK, *REST))[:scenes]
     pool = WorkPool()
     rows: list[list[str | float | int]] = []
@@ -168,7 +130,9 @@ def run(quick: bool = False, scenes: int | None = None) -> BenchResult:
         pool.close()
     gains = [float(row[7]) for row in rows[: len(names)]]
     targets = [
-        Target("auto", _mean(gains), 1.0, "", False, f"relMSE over the default's after {seconds:g} CPU s, mean"),
+        Target(
+            "auto", geometric_mean(gains), 1.0, "", False, f"relMSE over the default's after {seconds:g} CPU s, mean"
+        ),
         Target("auto", max(gains), 1.15, "", False, "the worst scene"),
         Target("P21", _median(reached), 1 + NEAR, "", False, f"error reached over asked, median{CHOSEN}"),
         Target("P21", _median(reached), 1 - NEAR, "", True, "likewise"),
@@ -184,7 +148,7 @@ def run(quick: bool = False, scenes: int | None = None) -> BenchResult:
     if any(map(math.isfinite, ratios)):
         known = sum(map(math.isfinite, ratios))
         note = f"relMSE over {PEER}, {peer.variant()}, at {seconds:g} CPU s, the trial counted"
-        targets.insert(0, Target("P17", _mean(ratios), 0.08, "", False, f"{note}, geometric mean of {known}"))
+        targets.insert(0, Target("P17", geometric_mean(ratios), 0.08, "", False, f"{note}, geometric mean of {known}"))
         targets.insert(
             1, Target("P17", max(r for r in ratios if math.isfinite(r)), 0.3, "", False, f"{note}, worst scene")
         )

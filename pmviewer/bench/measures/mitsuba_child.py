@@ -37,17 +37,34 @@ def main() -> None:
 
     mi.set_variant(job["variant"])
     mi.set_log_level(mi.LogLevel.Error)
-    scene = mi.load_file(job["path"], **job["parameters"])
+    integrator = None
+    if job["mode"] == "file":
+        from pmviewer.bench.files.mitsuba_file import small_scene
+
+        scene, integrator, _ = small_scene(mi, {"path": job["path"], **job["request"]})
+    else:
+        scene = mi.load_file(job["path"], **job["parameters"])
 
     def render(spp: int, seed: int) -> Any:
-        return np.array(mi.render(scene, spp=spp, seed=seed), np.float64)[..., :3]
+        return np.array(mi.render(scene, spp=spp, seed=seed, integrator=integrator), np.float64)[..., :3]
 
-    arrays = (
-        curve(render, job["budget"])
-        if job["mode"] == "curve"
-        else runs(render, job["runs"], job["spp"], job.get("first", 1))
-    )
+    if job["mode"] == "runs":
+        arrays = runs(render, job["runs"], job["spp"], job.get("first", 1))
+    else:
+        arrays = curve(render, job["budget"])
+    if job["mode"] == "file":
+        both = [averaged(render, job["references"], first) for first in (1_000_000, 2_000_000)]
+        arrays["references"] = np.array(both, np.float32)
     np.savez(job["out"], **arrays)
+
+
+def averaged(render: Any, budget: float, first: int) -> Any:
+    """The mean image of that many CPU seconds, with seeds from `first` on."""
+    total, count, end = 0.0, 0, time.process_time() + budget
+    while count == 0 or time.process_time() < end:
+        total = total + render(CHUNK, first + count)
+        count += 1
+    return total / count
 
 
 def curve(render: Any, budget: float) -> dict[str, Any]:
