@@ -43,10 +43,12 @@ def error_against(image: NDArray[Any], references: NDArray[np.float64]) -> float
 
 
 def _on_file(path: Path, name: str, seconds: float, pool: WorkPool) -> tuple[list[str | float | int], float]:
-    """A row, and our error over Mitsuba's. Raises PmviewerError where either does not open it."""
+    """A row, and our error over Mitsuba's. Raises PmviewerError where either does not open it or shows nothing."""
     depth = Settings().render.max_depth
     theirs = peer.file_images(path, LONGEST, depth, seconds, REFERENCE * seconds)
     references = theirs["references"].astype(np.float64)
+    if not (np.isfinite(references).all() and references.mean() > 0):
+        raise PmviewerError("Mitsuba's picture is black or has no numbers: nothing to compare with.")
     curve = [error_against(image, references) for image in theirs["images"]]
     opened = open_scene(str(path))
     height, width = references.shape[1:3]
