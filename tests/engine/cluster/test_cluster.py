@@ -148,11 +148,11 @@ def test_nobody_answers():
 def test_a_cluster_is_borrowed_and_given_back_in_an_open_session(borrowed):
     expected, session = alone().frame(0).planes, Session(1, with_values(Settings(), SMALL))
 
-    def all_come_from_workers():
+    def some_come_from_workers():
         """On a busy machine they are not heard at once, and passes are rendered here."""
         session.restart()
         assert session.wait(timeout=100)
-        return sum(passes for _, passes in session.frame.statistics.workers.values()) == 6
+        return session.frame.statistics.workers
 
     try:
         with pytest.raises(SettingError, match="is no cluster"):
@@ -162,7 +162,8 @@ def test_a_cluster_is_borrowed_and_given_back_in_an_open_session(borrowed):
         until(lambda: session.workers._cluster is not None and session.workers._cluster.members.ready)
         session.open("cornell_caustic")
         assert session.wait(timeout=100)
-        until(all_come_from_workers)
+        until(some_come_from_workers)
+        np.testing.assert_array_equal(session.frame.planes, expected)
         session.workers.borrow(None)
         said = []
         until(lambda: said.extend(session.take_messages()) or any("given back" in message.text for message in said))
