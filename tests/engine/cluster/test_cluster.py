@@ -9,8 +9,10 @@ import sys
 import threading
 from dataclasses import replace
 
+import dask
 import numpy as np
 import pytest
+from distributed.utils import get_mp_context
 
 from pmviewer.bench.measures.cluster import until, workers
 from pmviewer.engine.cluster import cluster as module
@@ -34,9 +36,14 @@ SMALL = {"camera.width": 20, "camera.height": 16, "photons.N": 3000, "gather.ray
 
 @pytest.fixture(scope="module")
 def borrowed():
-    """Two workers of one thread each: Dask's cluster, and ours."""
-    with workers(2) as both:
-        yield both
+    """Two workers of one thread each: Dask's cluster, and ours. They are forked from a process that has imported what
+    they need, which otherwise takes most of their time; how one starts on its own is seen where a command does it."""
+    forked = {"distributed.worker.multiprocessing-method": "forkserver" if sys.platform == "linux" else "spawn"}
+    with dask.config.set(forked):
+        if sys.platform == "linux":
+            get_mp_context().set_forkserver_preload(["distributed", "pmviewer.engine.cluster.worker"])
+        with workers(2) as both:
+            yield both
 
 
 def renderer(scene="cornell_caustic", **values):
