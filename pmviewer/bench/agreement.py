@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 from pmviewer.output.metric import block_means
 
@@ -59,7 +59,7 @@ def agreement(ours: NDArray[Any], theirs: NDArray[Any], block: int, tolerance: f
     t = beyond / error
     if not np.all(np.isfinite(t)):
         return Agreement(0.0, float("inf"), float("nan"), float("nan"), t.size)
-    smallest = float(2 * student.sf(t, np.maximum(freedom, 1.0)).min())
+    smallest = float(2 * stdtr(np.maximum(freedom, 1.0), -t).min())
     p_value = -np.expm1(t.size * np.log1p(-min(smallest, 1 - 1e-16)))
     lit = mean_b > 0
     noise = float(np.median(error[lit] / mean_b[lit])) if lit.any() else 0.0

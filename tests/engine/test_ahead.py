@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 import time
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ import pytest
 from pmviewer.commands import compiling
 from pmviewer.engine import prepare
 from pmviewer.engine.ahead import ahead as ahead_module
+from pmviewer.engine.ahead import child
 from pmviewer.engine.ahead.ahead import Ahead
 from pmviewer.engine.ahead.beside import compile_beside
 from pmviewer.engine.ahead.clicks import clicks, other_kinds
@@ -124,11 +126,10 @@ def test_a_helper_tells_how_far_it_is(box, at_the_start):
     assert heard[-1] is None
 
 
-def test_a_stand_in_that_compiles_something_else_is_refused(box):
-    helper = Helper()
-    helper.ask(Clicks(box.scene, np.dtype([("other", "i8")]), Settings()))
-    helper.wait()
-    assert not helper.finished
+def test_a_stand_in_that_compiles_something_else_is_refused(box, capsys):
+    """In this process, without a start: a helper is finished when it has said "done"."""
+    child.all_clicks(Clicks(box.scene, np.dtype([("other", "i8")]), Settings()))
+    assert [list(json.loads(line)) for line in capsys.readouterr().out.splitlines()] == [["failed"]]
 
 
 def test_a_helper_ends_with_its_parent_and_at_once_when_stopped():

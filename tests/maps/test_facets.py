@@ -68,11 +68,11 @@ def places(rng, n=1500):
     return at, decode_directions(codes), codes
 
 
-def counted(room, p, n):
+def counted(positions, normals, p, n):
     """Squared distances (importons,) by which importons count at p, infinite for those of other sides."""
-    d = room.positions.astype(float) - p
+    d = positions - p
     squared = np.maximum((d**2).sum(axis=1), (d @ n / FLATNESS) ** 2)
-    return np.where(room.normals @ n > 0.5, squared, np.inf)
+    return np.where(normals @ n > 0.5, squared, np.inf)
 
 
 def test_importance_on_facets_is_that_of_the_nearest_importon(room):
@@ -83,9 +83,9 @@ def test_importance_on_facets_is_that_of_the_nearest_importon(room):
     found = np.full(len(at), -1, f4)
     importances_on(facets.maps, facets.shapes, facets.boxes, facets.reached, at, normals, found, 0, len(at))
     some = np.random.default_rng(7).choice(len(at), 1500, replace=False)
-    wrong = 0
+    wrong, of_importons = 0, (room.positions.astype(float), room.normals)
     for i in some:
-        squared = counted(room, at[i], normals[i])
+        squared = counted(*of_importons, at[i], normals[i])
         nearest = squared <= squared.min() * (1 + 1e-5)  # equally far, but for rounding
         expected = np.where(squared[nearest] <= room.reach[nearest].astype(float) ** 2, room.gamma[nearest], 0)
         wrong += found[i] not in expected

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 from pmviewer.output.metric import block_means
 
@@ -114,7 +114,7 @@ def compared(
     unseen = tail * one_more
     error = np.sqrt(variance + rounding**2 + one_more**2)
     beyond = np.maximum(np.abs(mean_a - mean_b) - unseen - tolerance * np.abs(mean_b) - rounding - small, 0.0)
-    p = 2 * student.sf(beyond / error, np.maximum(freedom, 1.0))
+    p = 2 * stdtr(np.maximum(freedom, 1.0), -beyond / error)
     worst = int(p.argmin())
     sidak = -math.expm1(p.size * math.log1p(-min(float(p[worst]), 1 - 1e-16)))
     lit = mean_b > 0

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 from pmviewer.engine.frame import Frame
 from pmviewer.engine.opened import OpenScene, open_scene
@@ -61,7 +61,7 @@ class Outcome:
         if not off > 0:
             return bool(np.isfinite(self.value))
         spread = float(np.hypot(self.error, self.expected_error))
-        return bool(spread > 0 and 2 * student.sf(off / spread, self.samples - 1) > SIGNIFICANCE)
+        return bool(spread > 0 and 2 * stdtr(self.samples - 1, -off / spread) > SIGNIFICANCE)
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,10 @@ import sys
 import threading
 from dataclasses import replace
 
+import dask
 import numpy as np
 import pytest
+from distributed.utils import get_mp_context
 
 from pmviewer.bench.measures.cluster import until, workers
 from pmviewer.engine.cluster import cluster as module
@@ -34,9 +36,14 @@ SMALL = {"camera.width": 20, "camera.height": 16, "photons.N": 3000, "gather.ray
 
 @pytest.fixture(scope="module")
 def borrowed():
-    """Two workers of one thread each: Dask's cluster, and ours."""
-    with workers(2) as both:
-        yield both
+    """Two workers of one thread each: Dask's cluster, and ours. They are forked from a process that has imported what
+    they need, which otherwise takes most of their time; how one starts on its own is seen where a command does it."""
+    forked = {"distributed.worker.multiprocessing-method": "forkserver" if sys.platform == "linux" else "spawn"}
+    with dask.config.set(forked):
+        if sys.platform == "linux":
+            get_mp_context().set_forkserver_preload(["distributed", "pmviewer.engine.cluster.worker"])
+        with workers(2) as both:
+            yield both
 
 
 def renderer(scene="cornell_caustic", **values):
@@ -148,11 +155,11 @@ def test_nobody_answers():
 def test_a_cluster_is_borrowed_and_given_back_in_an_open_session(borrowed):
     expected, session = alone().frame(0).planes, Session(1, with_values(Settings(), SMALL))
 
-    def all_come_from_workers():
+    def some_come_from_workers():
         """On a busy machine they are not heard at once, and passes are rendered here."""
         session.restart()
         assert session.wait(timeout=100)
-        return sum(passes for _, passes in session.frame.statistics.workers.values()) == 6
+        return session.frame.statistics.workers
 
     try:
         with pytest.raises(SettingError, match="is no cluster"):
@@ -162,7 +169,8 @@ def test_a_cluster_is_borrowed_and_given_back_in_an_open_session(borrowed):
         until(lambda: session.workers._cluster is not None and session.workers._cluster.members.ready)
         session.open("cornell_caustic")
         assert session.wait(timeout=100)
-        until(all_come_from_workers)
+        until(some_come_from_workers)
+        np.testing.assert_array_equal(session.frame.planes, expected)
         session.workers.borrow(None)
         said = []
         until(lambda: said.extend(session.take_messages()) or any("given back" in message.text for message in said))
