@@ -62,9 +62,8 @@ def _gamma_of(importance: ImportanceMap) -> Evaluate:
 
     def evaluate(positions: Float, normals: Codes) -> Float:
         out = np.zeros(len(positions), np.float32)
-        points, directions = np.ascontiguousarray(positions, np.float32), decode_directions(normals)
         on = facets.maps, facets.shapes, facets.boxes, facets.reached
-        importances_on(*on, points, directions, out, 0, len(points))
+        importances_on(*on, np.ascontiguousarray(positions, np.float32), normals, out, 0, len(out))
         return out
 
     return evaluate

@@ -79,15 +79,16 @@ from pmviewer.engine.prepare import prepare
 from pmviewer.engine.opened import open_scene
 from pmviewer.viewer.panels.statistics_panel import photon_rows
 from tests.support.scenes import cornell_box, rendered, settings_of
-import pmviewer.importance.trace, pmviewer.importance.view, pmviewer.maps.convergence, pmviewer.maps.density.control
+import pmviewer.importance.trace, pmviewer.importance.view, pmviewer.maps.convergence, pmviewer.maps.density.compare
+import pmviewer.maps.density.control, pmviewer.maps.density.groups, pmviewer.maps.importance.facets
 import pmviewer.maps.density.growing_tree, pmviewer.maps.importance.build, pmviewer.maps.importance.importance_map
 import pmviewer.maps.importance.look_up, pmviewer.photons.deposition.depositor, pmviewer.photons.deposition.fates
 from pmviewer import importance, maps, photons
 
 MODULES = [
-    importance.trace, importance.view, maps.convergence, maps.density.control, maps.density.growing_tree,
-    maps.importance.build, maps.importance.importance_map, maps.importance.look_up, photons.deposition.depositor,
-    photons.deposition.fates,
+    importance.trace, importance.view, maps.convergence, maps.density.compare, maps.density.control,
+    maps.density.groups, maps.density.growing_tree, maps.importance.build, maps.importance.facets,
+    maps.importance.importance_map, maps.importance.look_up, photons.deposition.depositor, photons.deposition.fates,
 ]
 
 scene = open_scene(cornell_box(size=8))

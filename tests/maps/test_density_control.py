@@ -6,9 +6,11 @@ import pytest
 from pmviewer.engine.pool import WorkPool
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.random import hash3, unit_float
-from pmviewer.maps.density.control import COSINE, NEAREST, STEP, Around, DensityControl
+from pmviewer.maps.density.control import NEAREST, Around, DensityControl
+from pmviewer.maps.density.decide import COSINE, STEP
 from pmviewer.maps.density.growing_tree import CAPACITY, M
-from pmviewer.maps.record import unpack
+from pmviewer.maps.record import decode_directions, unpack
+from tests.maps.test_importance import _codes
 from tests.support.naive_maps import pack
 
 f4, f8, u4 = np.float32, np.float64, np.uint32
@@ -150,6 +152,50 @@ def test_stored_set_is_that_of_one_photon_after_another(rounds):
     photons = plane(3000, 5)
     places = control(photons, 600, rounds=rounds).result().photons
     np.testing.assert_array_equal(places[:, :3], photons[naive_step(photons, 600), :3])
+
+
+def on_many_surfaces(n, seed):
+    """Photons on a floor, a wall, a slope and a ball, from all over their sides; normals, and densities required that
+    differ a thousandfold."""
+    rng = np.random.default_rng(seed)
+    at, of = rng.random((n, 3)), np.arange(n) % 4
+    at[of == 0, 2], at[of == 1, 0] = 0, 0
+    at[of == 2, 2] = 0.5 * at[of == 2, 0]
+    ball = rng.normal(size=(np.count_nonzero(of == 3), 3))
+    ball /= np.linalg.norm(ball, axis=1)[:, None]
+    at[of == 3] = [0.5, 0.5, 0.4] + 0.2 * ball
+    normals = np.array([[0, 0, 1], [1, 0, 0], [-0.4472136, 0, 0.8944272], [0, 0, 0]])[of]
+    normals[of == 3] = ball
+    photons, codes = pack(at.astype(f4)), np.empty(n, u4)
+    _codes(normals.astype(f4), codes)
+    from_side = normals + 0.9 * rng.uniform(-1, 1, (n, 3))
+    from_side /= np.linalg.norm(from_side, axis=1)[:, None]
+    _codes(from_side.astype(f4), photons.view(u4)[:, 3])
+    photons.view(u4)[:, 4:] = 47 << 10
+    return photons, codes, (100 * 1000 ** at[:, 1]).astype(f4)
+
+
+def naive_guarded(photons, normals, required):
+    """Which photons are stored by the step and guarded neighbours, one after another."""
+    wi, kept = unpack(photons, 1.0)["wi"].astype(f8), []
+    places = photons[:, :3].astype(f8)
+    for i, n in enumerate(normals):
+        off = places[kept] - places[i]
+        counted = np.maximum((off**2).sum(axis=1), 25 * (off @ n) ** 2)
+        near = (counted < M / (np.pi * required[i])) & (wi[kept] @ n > 0) & (required[kept] <= 4 * required[i])
+        if np.count_nonzero(near) < M:
+            kept.append(i)
+    return kept
+
+
+@pytest.mark.parametrize("rounds", [2500, 10_000])
+def test_stored_set_on_many_surfaces_is_that_of_plain_searches(rounds):
+    """Whether photons look for neighbours alone or many together."""
+    photons, codes, required = on_many_surfaces(10_000, 30)
+    kept = naive_guarded(photons, decode_directions(codes).astype(f8), required)
+    made = control(photons, required, rounds=rounds, normals=codes)
+    np.testing.assert_array_equal(made.result().photons[:, :3], photons[kept, :3])
+    assert 0.2 < len(kept) / len(photons) < 0.8
 
 
 def test_threads_do_not_matter():

@@ -79,9 +79,9 @@ def test_importance_on_facets_is_that_of_the_nearest_importon(room):
     facets = facets_of(room)
     assert 6 <= len(facets.maps) <= MOST
     assert facets.maps["n"].sum() == room.n
-    at, normals, _ = places(np.random.default_rng(6))
+    at, normals, codes = places(np.random.default_rng(6))
     found = np.full(len(at), -1, f4)
-    importances_on(facets.maps, facets.shapes, facets.boxes, facets.reached, at, normals, found, 0, len(at))
+    importances_on(facets.maps, facets.shapes, facets.boxes, facets.reached, at, codes, found, 0, len(at))
     some = np.random.default_rng(7).choice(len(at), 1500, replace=False)
     wrong, of_importons = 0, (room.positions.astype(float), room.normals)
     for i in some:
@@ -96,7 +96,7 @@ def test_importance_on_facets_is_that_of_the_nearest_importon(room):
 def test_no_importance_at_no_place(room):
     facets, out = facets_of(room), np.ones(2, f4)
     nowhere = np.array([[np.nan, 0, 0], [np.inf, 0, 0]], f4)
-    up = np.array([UP, UP], f4)
+    up = codes_of(np.array([UP, UP], f4))
     importances_on(facets.maps, facets.shapes, facets.boxes, facets.reached, nowhere, up, out, 0, 2)
     assert not out.any()
 

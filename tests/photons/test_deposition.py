@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.pool import WorkPool
-from pmviewer.maps.density.control import COSINE, STEP
+from pmviewer.maps.density.decide import COSINE, STEP
 from pmviewer.maps.power import LARGEST, encode_powers
 from pmviewer.maps.record import unpack
 from pmviewer.photons.deposition.deposited import FIRST_WEIGHT, weight_histogram

@@ -15,7 +15,8 @@ from pmviewer.importance.importons import trace
 from pmviewer.importance.rules import TESTS, automatic_f, density_beyond, density_of, probability_of
 from pmviewer.kernels.dimensions import ROUNDING_SALT, TEST_RAY_SALT
 from pmviewer.maps.convergence import Criterion
-from pmviewer.maps.density.control import ACCEPTANCE, NEAREST, Around
+from pmviewer.maps.density.control import NEAREST, Around
+from pmviewer.maps.density.decide import ACCEPTANCE
 from pmviewer.maps.density.growing_tree import M
 from pmviewer.maps.importance.importance_map import ImportanceMap
 from pmviewer.maps.record import DIRECT

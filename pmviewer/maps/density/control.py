@@ -25,17 +25,19 @@ Powers are float64 sums; they become 16-bit codes when everything is stored (`pm
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.compile.jit import device, kernel
-from pmviewer.kernels.memory import load_u4, stack_get_i8, stack_i4, stack_put_i8
-from pmviewer.kernels.random import hash3, unit_float
-from pmviewer.kernels.vector import dot, normalize
+from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.memory import aligned_empty, stack_get_i8, stack_i4
+from pmviewer.kernels.vector import normalize
+from pmviewer.maps.density.compare import UNDECIDED, Placed, compare, place
+from pmviewer.maps.density.decide import Control, farthest, sharing
+from pmviewer.maps.density.groups import Groups, groups_of
 from pmviewer.maps.density.growing_tree import (
     CAPACITY,
     KEYS,
@@ -50,6 +52,7 @@ from pmviewer.maps.density.growing_tree import (
     reserved,
     search,
 )
+from pmviewer.maps.density.together import CANDIDATE_WORDS
 from pmviewer.maps.photon_words import decode_direction, decode_powers
 from pmviewer.tasks import Runner
 
@@ -58,17 +61,10 @@ FLATNESS = np.float32(0.2)
 CHUNK = 4096
 """Photons a task."""
 
-STEP, COSINE = 0, 1
-ACCEPTANCE = ("step", "cosine")
-
 _f4 = np.float32
 _f8 = np.float64
 _i4 = np.int32
 _i8 = np.int64
-_u4 = np.uint32
-_PI = _f8(np.pi)
-UNDECIDED = _i4(-1)
-"""In place of the number of those who share a photon's power."""
 
 
 @dataclass(frozen=True)
@@ -93,14 +89,6 @@ NEAREST = Around()
 """The source's: the M nearest in space."""
 
 
-class Control(NamedTuple):
-    """What is constant for a map: rule, int32, STEP or COSINE; seed, uint32; limits, of the tree's search."""
-
-    rule: Any
-    seed: Any
-    limits: Any
-
-
 class Arrivals(NamedTuple):
     """The photons of a round: (n, 6) float32 and the same as uint32 `words`; normals (n,) uint32 codes; needs (n,)
     float32, required densities; first, int64, photons that arrived before."""
@@ -122,67 +110,14 @@ class Stored(NamedTuple):
     size: Any
 
 
-@device
-def _rejected(density, need, rule, u):
-    """Whether a photon is not stored at D_cur, where `need` is D_r; u: a random number."""
-    rho = density / _f8(need)
-    if rule == STEP:
-        return not rho < _f8(1.0)
-    return not (rho < _f8(2.0) and _f8(u) < _f8(0.5) * (_f8(1.0) + np.cos(_PI * rho * _f8(0.5))))
-
-
-@device
-def _sharers(tree, control, p, normal, need, index, rows, scratch):
-    """How many stored photons share the power of photon `index`, their keys first in `scratch.keys`; 0 where it is
-    stored itself. p, normal, need: its place, normal code and required density; rows: address of the stored rows."""
-    n = normalize(decode_direction(normal))
-    r2 = _f4(np.inf)
-    if control.rule == STEP:  # M of them nearer than the disc of M at the required density
-        r2 = _f4(_f8(M) / (_PI * _f8(need)))
-    count, r2 = search(tree, p, n, need, control.limits, r2, scratch)
-    if count < M:
-        return _i8(0)
-    u = _random(control.seed, index)
-    if r2 > _f4(0.0) and not _rejected(_f8(M) / (_PI * _f8(r2)), need, control.rule, u):
-        return _i8(0)
-    if control.limits.one_side:
-        return count
-    sharing = _i8(0)
-    for j in range(count):
-        key = stack_get_i8(scratch.keys, j)
-        if dot(n, decode_direction(load_u4(rows, 6 * (key & _i8(0xFFFFFFFF)) + 3))) > _f4(0.0):
-            stack_put_i8(scratch.keys, sharing, key)
-            sharing += 1
-    return sharing
-
-
-@device
-def _random(seed, index):
-    return unit_float(hash3(seed, _u4(index), _u4(index >> 32)))
-
-
-@kernel
-def _compare(trees, control, arrivals, rows, i0, i1, counts, neighbours):
-    """Photons i0 … i1−1 against the tree as it is: counts[i] neighbours that share the power of photon i, which is not
-    stored, or UNDECIDED. rows: address of the stored rows."""
-    tree, photons = trees[0], arrivals.photons
-    scratch = SearchScratch(stack_i4(KEYS), stack_i4(WAITING), stack_i4(4), stack_i4(4), stack_i4(8))
-    for i in range(i0, i1):
-        p, index = (photons[i, 0], photons[i, 1], photons[i, 2]), _i8(arrivals.first) + _i8(i)
-        count = _sharers(tree, control, p, arrivals.normals[i], arrivals.needs[i], index, rows, scratch)
-        counts[i] = count if count > 0 else UNDECIDED
-        for j in range(count):
-            neighbours[i, j] = _i4(stack_get_i8(scratch.keys, j) & _i8(0xFFFFFFFF))
-
-
 @kernel
 def _settle(trees, control, arrivals, stored, rows, counts, neighbours, kept):
-    """Decide the photons that `_compare` left open, in order, and hand out the power of the others.
+    """Decide the photons that `compare` left open, in order, and hand out the power of the others.
 
     stored: a `Stored`, filled, whose rows are at the address `rows`; kept: bool, receives which of these are stored.
     Returns how many were rejected.
     """
-    tree, photons, words, size, powers = trees[0], arrivals.photons, arrivals.words, stored.size, stored.powers
+    tree, words, size, powers = trees[0], arrivals.words, stored.size, stored.powers
     scratch = SearchScratch(stack_i4(KEYS), stack_i4(WAITING), stack_i4(4), stack_i4(4), stack_i4(8))
     leaf_scratch = stack_i4(LEAF_WORDS), stack_i4(CAPACITY)
     rejected = _i8(0)
@@ -190,8 +125,10 @@ def _settle(trees, control, arrivals, stored, rows, counts, neighbours, kept):
         red, green, blue = decode_powers(words[i, 4], words[i, 5])
         count = _i8(counts[i])
         if count == UNDECIDED:
-            p, index, need = (photons[i, 0], photons[i, 1], photons[i, 2]), _i8(arrivals.first) + i, arrivals.needs[i]
-            count = _sharers(tree, control, p, arrivals.normals[i], need, index, rows, scratch)
+            p, need, index = place(arrivals, i), arrivals.needs[i], _i8(arrivals.first) + i
+            n, r2 = normalize(decode_direction(arrivals.normals[i])), farthest(control, need, index)
+            count, r2 = search(tree, p, n, need, control.limits, r2, scratch)
+            count = sharing(control, n, need, index, rows, count, r2, scratch)
             if count == 0:
                 new = size[2]
                 for w in range(6):
@@ -241,7 +178,7 @@ class DensityControl:
     (see above), and not at all on threads."""
 
     def __init__(self, rule: int, around: Around, seed: int) -> None:
-        """rule: STEP or COSINE."""
+        """rule: STEP or COSINE of `pmviewer.maps.density.decide`."""
         self.control = Control(np.int32(rule), np.uint32(seed & 0xFFFFFFFF), around.limits)
         self.size = np.array([1, 1, 0], np.int64)
         self.arrived = self.redistributed = 0
@@ -258,11 +195,20 @@ class DensityControl:
         """Photons in the map so far."""
         return int(self.size[2])
 
+    def groups(self, photons: NDArray[np.float32], normals: NDArray[np.uint32], run: Runner) -> Groups:
+        """Photons (n, 6) of a round with their normal codes (n,) by places among those stored: near ones together."""
+        return groups_of(self._reserve(self.stored + len(photons)), int(self.size[1]), photons, normals, CHUNK, run)
+
     def add(
-        self, photons: NDArray[np.float32], normals: NDArray[np.uint32], required: NDArray[np.float32], run: Runner
+        self,
+        photons: NDArray[np.float32],
+        normals: NDArray[np.uint32],
+        required: NDArray[np.float32],
+        run: Runner,
+        groups: Groups | None = None,
     ) -> None:
         """One round: photons (n, 6) with normal codes (n,) and the densities required at them (n,), in photons per unit
-        area; what is not a number counts as 0."""
+        area; what is not a number counts as 0. `groups` of them, if they are known."""
         n = len(photons)
         self.kept = kept = np.zeros(n, bool)
         if n == 0:
@@ -273,18 +219,35 @@ class DensityControl:
         rows = self._rows.ctypes.data
         counts, neighbours = np.full(n, UNDECIDED, np.int32), np.empty((n, M), np.int32)
 
-        def compare(i0: int) -> Callable[[], None]:
-            i1 = min(i0 + CHUNK, n)
-            return lambda: _compare(tree.record, self.control, arrivals, rows, i0, i1, counts, neighbours)
-
         if self.stored:
-            run([compare(i0) for i0 in range(0, n, CHUNK)])
+            groups = groups or self.groups(photons, normals, run)
+            self._compared(tree, arrivals, groups, counts, neighbours, run)
         before, stored = self.stored, Stored(self._rows, self._needs, self._powers, self.size)
         rejected = run([lambda: _settle(tree.record, self.control, arrivals, stored, rows, counts, neighbours, kept)])
         self.redistributed += rejected[0]
         self.arrived += n
         self._normals.append(normals[kept])
         assert self.stored - before == int(kept.sum())
+
+    def _compared(
+        self,
+        tree: GrowingTree,
+        arrivals: Arrivals,
+        groups: Groups,
+        counts: NDArray[np.int32],
+        neighbours: NDArray[np.int32],
+        run: Runner,
+    ) -> None:
+        """Compare a round's photons with what was stored before it."""
+        rows, order = self._rows.ctypes.data, groups.order
+        placed = Placed(order, groups.photons, groups.normals, arrivals.needs[order], arrivals.first)
+
+        def some(g0: int, g1: int) -> None:
+            candidates = aligned_empty((CANDIDATE_WORDS,), np.float32)
+            at = candidates.ctypes.data
+            compare(tree.record, self.control, placed, groups.starts, rows, g0, g1, at, counts, neighbours)
+
+        run([partial(some, *part) for part in groups.parts(CHUNK)])
 
     def result(self) -> Controlled:
         """The map as it stands; the arrays are this object's own."""

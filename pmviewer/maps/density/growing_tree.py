@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.memory import (
     aligned_empty,
-    bits_of_float,
     count_trailing_zeros,
     load_f4,
     load_i4,
@@ -28,8 +27,9 @@ from pmviewer.kernels.memory import (
     store_f4,
     store_i4,
 )
+from pmviewer.maps.density.neighbours8 import neighbours8
 from pmviewer.maps.search.k_nearest import _nearest_k
-from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, facing8, within8
+from pmviewer.maps.search.simd import BLOCK_BYTES, WIDTH, facing8
 from pmviewer.maps.search.stored import ALL_CLASSES
 
 M = 20
@@ -181,22 +181,23 @@ def _of_leaf(leaf, p, n, ceiling, limits, r2, scratch, count):
     """Add the neighbours among the photons of a leaf, at its address, to the keys; returns how many there are then."""
     for first in range(0, CAPACITY, WIDTH):
         block = leaf + (first // WIDTH) * BLOCK_BYTES
-        x, y, z = block, block + ROW_BYTES, block + 2 * ROW_BYTES
-        mask = within8(x, y, z, p[0], p[1], p[2], r2, scratch.squared)
+        mask = neighbours8(block, p, n, limits.steepness, r2, ceiling, scratch.squared)
         if mask != 0 and limits.one_side:
-            height = _f4(1.001) * _f4(np.sqrt(r2 / limits.steepness))
-            mask &= facing8(block, p, n, height, _i4(ALL_CLASSES))
-        while mask != 0:
-            lane = _i8(count_trailing_zeros(mask))
-            mask &= mask - _i4(1)
-            if load_f4(block, WIDTH * NEED + lane) <= ceiling:
-                dx, dy, dz = load_f4(x, lane) - p[0], load_f4(y, lane) - p[1], load_f4(z, lane) - p[2]
-                h = n[0] * dx + n[1] * dy + n[2] * dz
-                d2 = max(stack_get_f4(scratch.squared, lane), limits.steepness * h * h)
-                if d2 < r2:
-                    number = _i8(load_i4(block, WIDTH * MEMBER + lane))
-                    stack_put_i8(scratch.keys, count, _i8(bits_of_float(d2)) << 32 | number)
-                    count += 1
+            mask &= facing8(block, p, n, _f4(np.inf), _i4(ALL_CLASSES))
+        count = add_keys(block, mask, scratch, count)
+    return count
+
+
+@device
+def add_keys(block, mask, scratch, count):
+    """Add the photons of a block, at its address, whose bit is set in `mask` to the keys, at the distances that
+    `scratch.squared` has; returns how many there are then."""
+    while mask != 0:
+        lane = _i8(count_trailing_zeros(mask))
+        mask &= mask - _i4(1)
+        number = _i8(load_i4(block, WIDTH * MEMBER + lane))
+        stack_put_i8(scratch.keys, count, _i8(stack_get_i4(scratch.squared, lane)) << 32 | number)
+        count += 1
     return count
 
 

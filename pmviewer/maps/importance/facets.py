@@ -3,10 +3,9 @@
 A place has the importance of the nearest importon on its side, if that one reaches so far
 (`pmviewer.maps.importance.look_up`). Of the importons within the farthest reach most face another way or lie on
 another plane, and a search among all of them visits thousands for nothing. So importons of one normal and plane are a
-facet with a tree of its own; those of small and curved surfaces together are the last one. A cone about its normals,
-its box and the reaches of its importons (`pmviewer.maps.importance.reached`) tell whether a facet may count at a place.
-They may say too much, never too little, so that the importance found is the same, but for which of several equally far
-importons it is.
+facet with a tree of its own; those of small surfaces along each axis are one together, those of all others the last
+one. A cone about its normals, its box and the reaches of its importons (`pmviewer.maps.importance.reached`) tell
+whether a facet may count at a place. They may say too much, never too little, so that the importance found is the same.
 """
 
 from __future__ import annotations
@@ -18,23 +17,30 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import (
-    float_of_bits,
     load_f4,
     stack_get_f4,
+    stack_get_i4,
     stack_get_i8,
     stack_i4,
     stack_put_f4,
+    stack_put_i4,
 )
+from pmviewer.kernels.vector import normalize
 from pmviewer.maps.importance.importance_map import IMPORTON_DTYPE, ImportanceMap
 from pmviewer.maps.importance.look_up import STEEPNESS
+from pmviewer.maps.importance.nearest_one import nearest_one, squared_distance
 from pmviewer.maps.importance.reached import BOXES, ReachedBoxes, reached_boxes
+from pmviewer.maps.photon_words import decode_direction
 from pmviewer.maps.search.disc import Facing
 from pmviewer.maps.search.k_nearest import KEYS, nearest
 from pmviewer.maps.search.kdtree import RECORD, PhotonKdTree, build_kdtree
 from pmviewer.maps.search.stored import ALL_CLASSES
 
-MOST = 16
-"""Facets at most, a multiple of four."""
+FLAT = 13
+MOST = FLAT + 7
+"""Facets of one plane, and all, at most; the latter a multiple of four."""
+ALONG = 0.97
+"""Cosine from which a normal is along an axis."""
 SMALLEST = 1 / 128
 """Facets have at least this share of the importons."""
 NORMALS, PLANES = 16, 256
@@ -100,17 +106,21 @@ def facets_of(importance: ImportanceMap) -> Facets:
 
 
 def _parts(positions: Float, normals: Float) -> list[NDArray[np.int64]]:
-    """Importons by facet, the largest first, and the others."""
+    """Importons by facet: of one plane, the largest first; of others those along each axis; the rest."""
     extent = float(np.ptp(positions, axis=0).max()) or 1.0
     along = (positions * normals).sum(axis=1) / extent
     keys = np.column_stack([np.rint(normals * NORMALS), np.rint(along * PLANES)]).astype(np.int64)
     number = keys @ np.array([1, 64, 4096, 1 << 18])
     _, which, counts = np.unique(number, return_inverse=True, return_counts=True)
-    largest = np.argsort(-counts, kind="stable")[: MOST - 1]
-    facet = np.full(len(counts), MOST - 1)
-    facet[largest] = np.where(counts[largest] >= SMALLEST * len(positions), np.arange(len(largest)), MOST - 1)
-    order = np.argsort(facet[which], kind="stable")
-    ends = np.bincount(facet[which], minlength=MOST).cumsum()
+    largest = np.argsort(-counts, kind="stable")[:FLAT]
+    of_plane = np.full(len(counts), FLAT)
+    of_plane[largest] = np.where(counts[largest] >= SMALLEST * len(positions), np.arange(len(largest)), FLAT)
+    axis = np.abs(normals).argmax(axis=1)
+    towards = np.take_along_axis(normals, axis[:, None], axis=1)[:, 0]
+    others = FLAT + np.where(np.abs(towards) > ALONG, 2 * axis + (towards > 0), 6)
+    part = np.where(of_plane[which] < FLAT, of_plane[which], others)
+    order = np.argsort(part, kind="stable")
+    ends = np.bincount(part, minlength=MOST).cumsum()
     return [part for part in np.split(order, ends[:-1]) if len(part)]
 
 
@@ -125,11 +135,15 @@ def _shape(positions: Float, normals: Float, boxes: ReachedBoxes) -> NDArray[np.
 
 
 @device
+def _faces(shapes, g, n):
+    """Whether importons of facet g may count at places with unit normal n."""
+    cosine = shapes[g, AXIS] * _f8(n[0]) + shapes[g, AXIS + 1] * _f8(n[1]) + shapes[g, AXIS + 2] * _f8(n[2])
+    return cosine >= shapes[g, COSINE]
+
+
+@device
 def _farness(shapes, g, p, n):
     """No importon of facet g counts at p, with unit normal n, as nearer than the square root of this."""
-    cosine = shapes[g, AXIS] * _f8(n[0]) + shapes[g, AXIS + 1] * _f8(n[1]) + shapes[g, AXIS + 2] * _f8(n[2])
-    if not cosine >= shapes[g, COSINE]:
-        return _f4(np.inf)
     d2, h, thickness = _f8(0.0), _f8(0.0), _f8(0.0)
     for a in range(3):
         off, half = shapes[g, MIDDLE + a] - _f8(p[a]), shapes[g, HALF + a]
@@ -154,30 +168,44 @@ def _reached(shapes, boxes, reached, g, p):
 
 
 @kernel
-def importances_on(maps, shapes, boxes, reached, points, normals, out, i0, i1):
-    """Γ at points[i0:i1] (m, 3) float32 with unit normals (m, 3), into out (m,) float32, as `importance_at` has it."""
-    keys, farness, zero = stack_i4(KEYS), stack_i4(MOST), _f4(0.0)
+def importances_on(maps, shapes, boxes, reached, points, codes, out, i0, i1):
+    """Γ at points[i0:i1] (m, 3) float32 with normal codes (m,) uint32, into out (m,) float32, as `importance_at` has
+    it. Places that are near the one before and have its normal cost least: the same importons are near."""
+    facing, farness, latest, zero = stack_i4(MOST), stack_i4(MOST), stack_i4(MOST), _f4(0.0)
+    for facet in range(len(maps)):
+        stack_put_i4(latest, facet, _i4(0))
+    count, n = _i8(0), (zero, zero, zero)
     for i in range(i0, i1):
-        p, n = (points[i, 0], points[i, 1], points[i, 2]), (normals[i, 0], normals[i, 1], normals[i, 2])
-        r2, gamma, reach, first = zero, zero, zero, _i8(0)
-        for facet in range(len(maps)):
-            g = _i8(facet)
+        p = (points[i, 0], points[i, 1], points[i, 2])
+        if i == i0 or codes[i] != codes[i - 1]:
+            count, n = _i8(0), normalize(decode_direction(codes[i]))
+            for facet in range(len(maps)):
+                stack_put_i4(facing, count, _i4(facet))
+                count += _i8(_faces(shapes, facet, n))
+        r2, gamma, reach, first, least = zero, zero, zero, _i8(0), _f4(np.inf)
+        for place in range(count):
+            at = _i8(place)
+            g = _i8(stack_get_i4(facing, at))
             far = _farness(shapes, g, p, n)
-            stack_put_f4(farness, g, far)
-            if far < _f4(np.inf):
-                within = _reached(shapes, boxes, reached, g, p)
-                if far < within * within:
-                    r2 = max(r2, within * within)
-            if far < stack_get_f4(farness, first):
-                first = g
-        for at in range(len(maps) if r2 > zero else 0):  # the one that p lies on, then the others
-            g = first if at == 0 else _i8(at) - _i8(at <= first)
-            if stack_get_f4(farness, g) < r2:
-                count, _ = nearest(maps[g], p, _i4(1), r2, keys, Facing(n, STEEPNESS, _i4(ALL_CLASSES)))
-                if count > 0:
-                    key = stack_get_i8(keys, _i8(0))
-                    j, r2 = key & _i8(0xFFFFFFFF), float_of_bits(_u4(key >> 32))
+            stack_put_f4(farness, at, far)
+            within = _reached(shapes, boxes, reached, g, p)
+            if far < within * within:
+                r2 = max(r2, within * within)
+            if far < least:
+                least, first = far, at
+        e2 = _f4(np.inf)
+        for turn in range(count if r2 > zero else 0):  # the one that p lies on, then the others
+            at = first if turn == 0 else _i8(turn) - _i8(turn <= first)
+            if stack_get_f4(farness, at) < r2:
+                g, j = _i8(stack_get_i4(facing, at)), _i8(-1)
+                before = _i8(stack_get_i4(latest, g))
+                d2, e = squared_distance(maps[g], before, p, n, STEEPNESS)
+                if d2 < r2 or (d2 == r2 and e < e2):
+                    r2, e2, j = d2, e, before
+                j, r2, e2 = nearest_one(maps[g], p, n, STEEPNESS, j, r2, e2)
+                if j >= 0:
                     gamma, reach = load_f4(maps[g].payload, 3 * j + 1), load_f4(maps[g].reach, j)
+                    stack_put_i4(latest, g, _i4(j))
         out[i] = gamma if r2 <= reach * reach else zero
 
 
@@ -191,7 +219,7 @@ def sums_on(maps, shapes, points, normals, k, out, i0, i1):
         missing, total = _i8(k), _f8(0.0)
         for g in range(len(maps)):
             r2 = maps[g].sum_radius * maps[g].sum_radius
-            if missing > 0 and _farness(shapes, g, p, n) < r2:
+            if missing > 0 and _faces(shapes, g, n) and _farness(shapes, g, p, n) < r2:
                 count, _ = nearest(maps[g], p, _i4(missing), r2, keys, Facing(n, STEEPNESS, _i4(ALL_CLASSES)))
                 for j in range(count):
                     total += _f8(load_f4(maps[g].weight, stack_get_i8(keys, j) & _i8(0xFFFFFFFF)))

@@ -8,7 +8,8 @@ import numpy as np
 
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.compile.specialise import absent, specialised
-from pmviewer.kernels.memory import float_of_bits, load_f4, stack_get_i8, stack_i4
+from pmviewer.kernels.memory import load_f4, stack_get_i8, stack_i4
+from pmviewer.maps.importance.nearest_one import nearest_one
 from pmviewer.maps.search.disc import Facing
 from pmviewer.maps.search.k_nearest import KEYS, nearest
 from pmviewer.maps.search.stored import ALL_CLASSES
@@ -21,26 +22,26 @@ _f4 = np.float32
 _f8 = np.float64
 _i4 = np.int32
 _i8 = np.int64
-_u4 = np.uint32
 
 
 @specialised
 def importance_at(importance, p, n):
     """Importance Γ (float32, pixels per unit area) at the point p with unit normal n, for the normal's side.
 
-    That of the nearest importon on this side, 0 outside of its reach: where nothing looks. `importance` is the record
+    That of the nearest importon on this side, of those equally far as discs go the one nearest in space, 0 outside of
+    its reach: where nothing looks. `importance` is the record
     of an ImportanceMap, or that of NO_IMPORTANCE, which makes everything equally important (1).
     """
     if absent(importance):
         return lambda importance, p, n: _f4(1.0)
 
     def of_nearest(importance, p, n):
-        keys, r = stack_i4(KEYS), importance.farthest
-        count, _ = nearest(importance, p, _i4(1), r * r, keys, Facing(n, STEEPNESS, _i4(ALL_CLASSES)))
-        if count == 0:
+        r, inf = importance.farthest, _f4(np.inf)
+        if importance.n == 0 or not abs(p[0]) + abs(p[1]) + abs(p[2]) < inf:
             return _f4(0.0)
-        key = stack_get_i8(keys, _i8(0))
-        i, d2 = key & _i8(0xFFFFFFFF), float_of_bits(_u4(key >> 32))
+        i, d2, _ = nearest_one(importance, p, n, STEEPNESS, _i8(-1), r * r, inf)
+        if i < 0:
+            return _f4(0.0)
         reach = load_f4(importance.reach, i)
         return load_f4(importance.payload, 3 * i + 1) if d2 <= reach * reach else _f4(0.0)
 

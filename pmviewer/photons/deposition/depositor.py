@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from pmviewer.kernels.dimensions import REWEIGHT_SALT, STORING_SALT
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.vector import luminance
 from pmviewer.maps.convergence import Converged, Convergence, Criterion
-from pmviewer.maps.density.control import Controlled, DensityControl
+from pmviewer.maps.density.control import CHUNK, Controlled, DensityControl
 from pmviewer.maps.photon_words import decode_powers
 from pmviewer.maps.power import encode_powers, luminances, write_power
 from pmviewer.maps.search.kdtree import PhotonKdTree
@@ -101,8 +102,7 @@ class Depositor:
         if rule is None:
             return photons, normals, n, np.append(_power_of(photons), n)
         if isinstance(rule, Density):
-            required, important = rule.wanted(photons, normals) if n else (np.empty(0, np.float32), 0)
-            return photons, normals, n, np.append(_power_of(photons), important), required
+            return photons, normals, n, np.append(_power_of(photons), 0)
         p, epsilon, discard, seed = probabilities(rule, photons, normals, index)
         kept, kept_normals, powers = np.empty((n, 6), np.uint32), np.empty(n, np.uint32), np.zeros(3)
         count = _thin(photons.view(np.uint32), normals, p, epsilon, discard, seed, kept, kept_normals, powers)
@@ -126,8 +126,25 @@ class Depositor:
             self._parts += [batch[0] for batch in judged]
             self._normals += [batch[1] for batch in judged]
             return
-        photons, normals, required = (np.concatenate([batch[i] for batch in judged]) for i in (0, 1, 4))
-        self._control.add(photons, normals, required, run)
+        photons, normals = (np.concatenate([batch[i] for batch in judged]) for i in (0, 1))
+        self._take_round(photons, normals, run)
+
+    def _take_round(self, photons: Float, normals: Codes, run: Runner) -> None:
+        """Photons (n, 6) with normal codes (n,) that density control decides about together. Near ones are asked
+        together what is required of them: that is quicker."""
+        assert self._control is not None
+        assert isinstance(self.rule, Density)
+        rule, groups = self.rule, self._control.groups(photons, normals, run)
+        n, near, near_normals = len(photons), groups.photons, groups.normals
+
+        def wanted(i0: int) -> tuple[Float, int]:
+            return rule.wanted(near[i0 : i0 + CHUNK], near_normals[i0 : i0 + CHUNK])
+
+        parts = run([partial(wanted, i0) for i0 in range(0, n, CHUNK)])
+        self.important += sum(important for _, important in parts)
+        required = np.empty(n, np.float32)
+        required[groups.order] = np.concatenate([np.empty(0, np.float32), *(density for density, _ in parts)])
+        self._control.add(photons, normals, required, run, groups)
 
     def converged(self, criterion: Criterion, others: PhotonKdTree, unit: float, run: Runner) -> Converged:
         """How much of the map, as it stands, needs no more photons by the criterion; `others` is the light that is not

@@ -1,0 +1,101 @@
+"""Photons of a round by where they are among those stored, for density control: near ones together, which have nearly
+the same neighbours and nearly the same importance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.memory import load_f4, load_i4
+from pmviewer.maps.density.growing_tree import AXIS, CHILD, NODE_WORDS, PLANE, GrowingTree
+from pmviewer.tasks import Runner
+
+PIECE = 256
+"""Photons of a group at most: comparing their normals takes the square of it."""
+
+_i8 = np.int64
+
+
+@kernel
+def leaves_at(trees, photons, leaves, i0, i1):
+    """The numbers of the leaves that photons i0 … i1−1 of (n, 6) lie in, into leaves (n,) int32."""
+    tree = trees[0]
+    for i in range(i0, i1):
+        node = _i8(0)
+        axis = _i8(load_i4(tree.nodes, AXIS))
+        while axis >= 0:
+            side = _i8(photons[i, axis] >= load_f4(tree.nodes, NODE_WORDS * node + PLANE))
+            node = _i8(load_i4(tree.nodes, NODE_WORDS * node + CHILD)) + side
+            axis = _i8(load_i4(tree.nodes, NODE_WORDS * node + AXIS))
+        leaves[i] = load_i4(tree.nodes, NODE_WORDS * node + CHILD)
+
+
+@kernel
+def sort_by_leaf(leaves, begins, order):
+    """Numbers of photons by their leaves (n,), in order, into order (n,) int32; those of leaf l are begins[l] …
+    begins[l + 1] − 1. begins: int64, zero, for all leaves and two more."""
+    for i in range(len(leaves)):
+        begins[_i8(leaves[i]) + 2] += 1
+    for leaf in range(2, len(begins)):
+        begins[leaf] += begins[leaf - 1]
+    for i in range(len(leaves)):
+        after = _i8(leaves[i]) + 1
+        order[begins[after]] = i
+        begins[after] += 1
+
+
+@kernel
+def sort_by_normal(begins, normals, order, starts):
+    """Bring photons of one leaf that have the same normal code together in `order`, in PIECE of them at most. starts:
+    (n + 1,) int64, receives where each such group begins, and n; returns how many they are."""
+    groups = _i8(0)
+    for leaf in range(len(begins) - 2):
+        begin = begins[leaf]
+        while begin < begins[leaf + 1]:
+            end = min(begin + PIECE, begins[leaf + 1])
+            while begin < end:
+                starts[groups] = begin
+                groups += 1
+                normal, stop = normals[order[begin]], begin
+                for at in range(begin, end):
+                    if normals[order[at]] == normal:
+                        order[at], order[stop] = order[stop], order[at]
+                        stop += 1
+                begin = stop
+    starts[groups] = len(order)
+    return groups
+
+
+@dataclass(frozen=True, eq=False)
+class Groups:
+    """Photons by where they are: those of group g lie in one leaf and have one normal, and their numbers are
+    order[starts[g]:starts[g + 1]]. order: (n,) int32; starts: (groups + 1,) int64; photons (n, 6) and normals (n,):
+    in that order."""
+
+    order: NDArray[np.int32]
+    starts: NDArray[np.int64]
+    photons: NDArray[np.float32]
+    normals: NDArray[np.uint32]
+
+    def parts(self, size: int) -> list[tuple[int, int]]:
+        """First and last + 1 of the groups of tasks of about so many photons."""
+        cuts = np.searchsorted(self.starts, np.arange(0, len(self.order), size))
+        return list(pairwise(np.unique([*cuts, len(self.starts) - 1]).tolist()))
+
+
+def groups_of(
+    tree: GrowingTree, leaves: int, photons: NDArray[np.float32], normals: NDArray[np.uint32], size: int, run: Runner
+) -> Groups:
+    """Of photons (n, 6) with normal codes (n,) in a tree of so many leaves, found in tasks of `size`."""
+    n = len(photons)
+    of_leaf, begins, order = np.empty(n, np.int32), np.zeros(leaves + 2, np.int64), np.empty(n, np.int32)
+    run([partial(leaves_at, tree.record, photons, of_leaf, i0, min(i0 + size, n)) for i0 in range(0, n, size)])
+    sort_by_leaf(of_leaf, begins, order)
+    starts = np.empty(n + 1, np.int64)
+    groups = sort_by_normal(begins, normals, order, starts)
+    return Groups(order, starts[: groups + 1], photons[order], normals[order])

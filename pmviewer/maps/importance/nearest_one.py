@@ -1,0 +1,81 @@
+"""The nearest importon that counts at a place: what `pmviewer.maps.search.k_nearest.nearest` finds for k = 1.
+
+With one neighbour there is nothing to select: each importon that is nearer than all before shrinks the search at once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.memory import (
+    count_trailing_zeros,
+    load_f4,
+    load_i4,
+    stack_get_f4,
+    stack_get_i4,
+    stack_i4,
+    stack_put_f4,
+    stack_put_i4,
+)
+from pmviewer.maps.search.simd import WIDTH, within8
+from pmviewer.maps.search.stored import ALL_CLASSES, arrives, height_above
+
+_f4 = np.float32
+_i4 = np.int32
+_i8 = np.int64
+
+
+@device
+def squared_distance(tree, i, p, n, steepness):
+    """Squared distance by which importon i counts at a place p with unit normal n, infinite where it does not; and that
+    in space."""
+    dx, dy, dz = load_f4(tree.x, i) - p[0], load_f4(tree.y, i) - p[1], load_f4(tree.z, i) - p[2]
+    e2 = dx * dx + dy * dy + dz * dz
+    if not arrives(tree, i, n, _i4(ALL_CLASSES)):
+        return _f4(np.inf), e2
+    h = height_above(tree, i, p, n)
+    return max(e2, steepness * h * h), e2
+
+
+@device
+def nearest_one(tree, p, n, steepness, best, r2, e2):
+    """The importon nearest to a finite place p with unit normal n, closer than sqrt(r2), and its squared distance;
+    `best` and r2 without one. tree: record of an importance map, not empty; steepness: weight of the squared height
+    over the surface."""
+    squared, point, stack = stack_i4(8), stack_i4(4), stack_i4(128)
+    for axis in range(3):
+        stack_put_f4(point, axis, p[axis])
+    leaves = _i8(1) << tree.depth
+    node, waiting = _i8(1), _i8(0)
+    while node > 0:
+        while node < leaves:
+            side = stack_get_f4(point, _i8(load_i4(tree.planes, 2 * node + 1))) - load_f4(tree.planes, 2 * node)
+            near = 2 * node + _i8(side >= _f4(0.0))
+            if side * side < r2:
+                stack_put_i4(stack, 2 * waiting, _i4(near ^ 1))
+                stack_put_f4(stack, 2 * waiting + 1, side * side)
+                waiting += 1
+            node = near
+        j, end = (tree.n * (node - leaves)) >> tree.depth, (tree.n * (node - leaves + 1)) >> tree.depth
+        while j < end:
+            mask = within8(tree.x + 4 * j, tree.y + 4 * j, tree.z + 4 * j, p[0], p[1], p[2], r2, squared)
+            if end - j < WIDTH:
+                mask &= _i4((1 << (end - j)) - 1)
+            while mask != 0:
+                lane = count_trailing_zeros(mask)
+                mask &= mask - _i4(1)
+                e = stack_get_f4(squared, lane)
+                if e < r2:
+                    h = height_above(tree, j + lane, p, n)
+                    d2 = max(e, steepness * h * h)
+                    if d2 < r2 or (d2 == r2 and e < e2):
+                        if arrives(tree, j + lane, n, _i4(ALL_CLASSES)):
+                            r2, e2, best = d2, e, j + lane
+            j += WIDTH
+        node = _i8(0)
+        while waiting > 0 and node == 0:
+            waiting -= 1
+            if stack_get_f4(stack, 2 * waiting + 1) < r2:
+                node = _i8(stack_get_i4(stack, 2 * waiting))
+    return best, r2, e2
