@@ -33,7 +33,7 @@ from pmviewer.maps.search.k_nearest import KEYS, nearest
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.maps.virtual_lights import FLATNESS, V_GAP, V_N, V_P, V_WI
 
-PLACES = 32
+PLACES = 16
 """Places that a cell is measured by."""
 LAYERS = 4
 """Surfaces one behind the other that are found at a place."""

@@ -58,11 +58,13 @@ def weigh_by_density(
     some, share = np.ascontiguousarray(lights[lie]), share[lie]
     beams = np.zeros((len(lights), order + 1 if of_map else 0, BEAM), np.float32)
     if of_map:
-        surfaces = ~in_media(rows)
-        among, rows = np.ascontiguousarray(found[surfaces]), np.ascontiguousarray(rows[surfaces])
-        numbers, reach = (np.cumsum(surfaces) - 1)[kept][lie], reach_of(scene.radius, len(among))
+        among, numbers = found, kept[lie]
+        if scene.has_media:
+            surfaces = ~in_media(rows)
+            among, rows, numbers = found[surfaces], rows[surfaces], (np.cumsum(surfaces) - 1)[kept][lie]
+        reach = reach_of(scene.radius, len(among))
     else:
-        among, rows = np.ascontiguousarray(found[kept][lie]), some
+        among, rows = found[kept][lie], some
         numbers, reach = np.arange(len(some)), 2 * scene.radius
     tree = run([lambda: sided_tree(among, rows, unit)])[0]
     q = cells_of(scene, tree, some, numbers.astype(np.int32), (order, reach), run)
