@@ -23,7 +23,7 @@ Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 
 LIGHTS = 128
 """Lights a task whose cells are measured."""
-PER_DISC = 32
+PER_DISC = 8
 """Photons of a disc of the largest radius, see `reach_of`: dark places have none, and weigh nothing."""
 
 
