@@ -66,7 +66,7 @@ def striped():
 def test_areas_add_up_to_that_of_the_surface_beside_a_shadow_too(k):
     """All of the strip lies near photons, so that gather rays count there: it belongs to those along its rims. By discs
     out to the k-th photon the areas added up to 72 % of the floor."""
-    areas = [made(striped(), i, number=1500, photons=6000, k=k).rows[:, V_Q].sum() for i in range(6)]
+    areas = [made(striped(), i, number=1500, photons=3000, k=k).rows[:, V_Q].sum() for i in range(8)]
     print(np.mean(areas) / 16)
     assert np.mean(areas) == pytest.approx(16.0, rel=0.03)
 
@@ -100,7 +100,7 @@ def test_a_glossy_light_stands_for_the_photons_around_it_and_for_itself():
     assert rows[glossy, V_BEAMS].max() == 9  # k and itself
     assert rows[glossy, V_BEAMS].min() >= 1  # in the dark there are fewer
     lonely = glossy & (rows[:, V_BEAMS] < 9)
-    assert lonely.sum() < 0.1 * glossy.sum()
+    assert lonely.sum() < 0.5 * glossy.sum()
     glossy &= ~lonely
     assert beams[glossy][..., :3] == pytest.approx(beams[glossy][..., :3] / norms(beams[glossy][..., :3]), abs=1e-6)
     own = norms(beams[glossy][..., :3] - rows[glossy, None, V_WI : V_WI + 3])
@@ -151,7 +151,7 @@ def test_maps_sharpen_from_pass_to_pass():
     assert [trajectories(how, i) for i in (0, 7, 63)] == [20_000, 40_000, 80_000]
     assert [neighbours(how, i) for i in (0, 7, 63, 100_000)] == [8, 4, 2, 2]
     own = Virtual(density="virtual lights")
-    assert trajectories(own, 63) == trajectories(own, 0)
+    assert trajectories(own, 63) == 2 * own.number
     assert neighbours(own, 63) == own.k
 
 

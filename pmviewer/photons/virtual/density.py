@@ -10,7 +10,7 @@ Places belong to photons closer than a largest radius R alone: with m < n of the
 that one photon in many passes reaches would count for gather rays in every pass, and weigh in that one alone.
 
 A cell is measured by places around the photon, chosen in its tangent plane, denser near it, and from there along the
-normal on the surfaces that lie near the plane; those that something hides from the photon are left out. Whether a place
+normal on the first surface near the plane; places that something hides from the photon are left out. Whether a place
 belongs to the photon is asked as gather rays ask it (`pmviewer.render.virtual_lights.gathered`).
 """
 
@@ -35,8 +35,6 @@ from pmviewer.maps.virtual_lights import FLATNESS, V_GAP, V_N, V_P, V_WI
 
 PLACES = 16
 """Places that a cell is measured by."""
-LAYERS = 4
-"""Surfaces one behind the other that are found at a place."""
 MORE = 3
 """Photons beyond those of a cell's order that tell how wide it will be."""
 SAME_SIDE = np.float32(0.5)
@@ -67,24 +65,19 @@ def share_of(tree, p, n, order, reach, photon, keys):
 
 
 @device
-def _shares_below(scene, tree, top, n, depth, order, reach, photon, keys):
-    """Sum of `share_of` over the surfaces that lie within `depth` below the point `top`, by the area of each over that
-    of the tangent plane with the normal n."""
+def _share_below(scene, tree, top, n, depth, order, reach, photon, keys):
+    """`share_of` where a ray from the point `top` against the normal n meets a surface within `depth`, by the area
+    there over that of the tangent plane."""
     down = scale(n, _f4(-1.0))
-    total, o, left = _f4(0.0), top, depth
-    for _ in range(LAYERS):
-        t, prim, u, v = closest_hit(scene, o[0], o[1], o[2], down[0], down[1], down[2], _f4(0.0), left)
-        if prim < 0:
-            break
-        p, ng, _, gap = surface_at(scene, prim, u, v, o[0], o[1], o[2], down[0], down[1], down[2], t)
-        ng = face(ng, n)
-        cos = dot(ng, n)
-        if cos >= SAME_SIDE:
-            total += share_of(tree, p, ng, order, reach, photon, keys) / cos
-        o, left = along(p, down, gap), left - t - gap
-        if not left > _f4(0.0):
-            break
-    return total
+    t, prim, u, v = closest_hit(scene, top[0], top[1], top[2], down[0], down[1], down[2], _f4(0.0), depth)
+    if prim < 0:
+        return _f4(0.0)
+    p, ng, _, _ = surface_at(scene, prim, u, v, top[0], top[1], top[2], down[0], down[1], down[2], t)
+    ng = face(ng, n)
+    cos = dot(ng, n)
+    if cos < SAME_SIDE:
+        return _f4(0.0)
+    return share_of(tree, p, ng, order, reach, photon, keys) / cos
 
 
 @kernel
@@ -120,7 +113,7 @@ def cells(scenes, trees, lights, photons, order, reach, out, first, last):
             if occluded(scene, over[0], over[1], over[2], way[0], way[1], way[2], _f4(0.0), _f4(1.0)):
                 continue
             sparse = (middle + area) * (middle + area) / middle
-            total += sparse * _shares_below(scene, tree, top, n, _f4(2.0) * height, order, reach, photons[i], keys)
+            total += sparse * _share_below(scene, tree, top, n, _f4(2.0) * height, order, reach, photons[i], keys)
         out[i] = total * (widest / (middle + widest)) / _f4(PLACES)
 
 

@@ -40,8 +40,8 @@ BATCH = 2048
 SPARE = 2
 """Trajectories for each light where nobody asks for their density: chosen among more, they are less of a family."""
 LEAST = 3200
-"""Least trajectories there: ΣG of whole paths is the sum of few where a light is seen at a grazing angle, and these
-become rarer the fewer trajectories there are to choose from."""
+"""Least trajectories that whole paths are chosen from: their weights differ much, as 1/cosθ of the first segment, and a
+choice by weight among few leaves ΣG the noise of those."""
 MOST = 500_000
 """Most trajectories that passes grow to of their own accord."""
 FEWEST = 2
@@ -88,7 +88,8 @@ def trajectories(virtual: Virtual, index: int) -> int:
         return max(
             min(round(virtual.photons * (index + 1) ** (1 / 3)), max(MOST, virtual.photons)), SPARE * virtual.number
         )
-    return max(SPARE * virtual.number, LEAST)
+    few = SPARE * virtual.number
+    return max(few, LEAST) if ESTIMATORS.index(virtual.estimator) in OF_PATHS else few
 
 
 def neighbours(virtual: Virtual, index: int) -> int:
