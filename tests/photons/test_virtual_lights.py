@@ -10,10 +10,23 @@ import pytest
 from pmviewer.engine.opened import open_scene
 from pmviewer.kernels.lights.start import spread_over
 from pmviewer.maps.record import unpack
-from pmviewer.maps.virtual_lights import V_BEAMS, V_LAMBERTIAN, V_P, V_PHI, V_Q, V_WI
+from pmviewer.maps.virtual_lights import (
+    COLUMNS,
+    MODIFIED,
+    V_BEAMS,
+    V_BLOCKED,
+    V_FIRST,
+    V_LAMBERTIAN,
+    V_P,
+    V_PHI,
+    V_Q,
+    V_WI,
+)
 from pmviewer.photons.virtual import single_step
 from pmviewer.photons.virtual.choice import as_photons, chosen
+from pmviewer.photons.virtual.flight import C_STORED, N_COUNTS
 from pmviewer.photons.virtual.lights import neighbours, trajectories, virtual_lights
+from pmviewer.photons.virtual.trace import TRACE_DTYPE, trace_virtual_lights
 from pmviewer.scene.description import Parallelogram, PointLight, Shape, SpotLight
 from pmviewer.settings.access import Photons, Virtual
 from tests.support.device import from_python
@@ -82,12 +95,30 @@ def test_photons_of_another_wall_own_nothing_of_this_one(k):
                 assert np.mean(wall) == pytest.approx(4.0, rel=0.05)
 
 
-@pytest.mark.parametrize("estimator", ["unweighted", "single step", "full path", "printed single step"])
+@pytest.mark.parametrize("estimator", ["unweighted", "single step", "full path", "modified", "printed single step"])
 def test_power_of_the_lights_is_what_arrives_on_surfaces(estimator):
     """In a closed box of albedo ½ twice the power of the light arrives."""
     opened = open_scene(diffuse_box())
     total = [made(diffuse_box(), i, number=300, estimator=estimator).rows[:, V_PHI].sum() for i in range(8)]
     assert np.mean(total) == pytest.approx(2 * opened.flat.light_power[0, 0], rel=0.05)
+
+
+def test_weights_of_modified_paths_do_not_grow_where_they_see_no_light():
+    """Photons go on there as the gathering walk does, surely: in a grey box the weight stays that of the first hit,
+    (1 − s)·q, however often the panel hid its light. With roulette it was 1/s times that each time, for ever fewer."""
+    flat, N = open_scene(diffuse_box(albedo=0.3)).flat, 2000
+    record = np.zeros(1, TRACE_DTYPE)
+    record[0] = (1, 0, 0, 50, 0.2, MODIFIED)
+    photons, rows = np.zeros((20 * N, 6), np.float32), np.zeros((20 * N, COLUMNS), np.float32)
+    counts = np.zeros(N_COUNTS, np.int64)
+    assert trace_virtual_lights(flat.record, record, 0, N, photons, rows, counts) == N
+    rows = rows[: counts[C_STORED]]
+    first = rows[:, V_FIRST] != 0
+    of = np.cumsum(first) - 1
+    weights = rows[:, V_Q] * np.where(first, 1 - 0.3, 0.3 / np.pi)
+    assert weights == pytest.approx(weights[first][of], rel=1e-3)
+    hidden = np.bincount(of, rows[:, V_BLOCKED])
+    assert hidden.max() > 2
 
 
 def test_a_glossy_light_stands_for_the_photons_around_it_and_for_itself():
