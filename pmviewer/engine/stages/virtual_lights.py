@@ -114,7 +114,8 @@ class VirtualStage:
         record = virtual_record(flat, s, lights.rows, tree, lights.beams)
         if lights.tree is not None:
             record["k"], record["reach"] = neighbours(s.virtual, index) + 1, lights.reach
-            record["gather_rays"] = 0 if flat.has_media else s.virtual.gather_rays
+            bring = s.virtual.density == "photon map" and not flat.has_media
+            record["gather_rays"] = s.virtual.gather_rays if bring else 0
         return VirtualMap(lights, record, tree)
 
 

@@ -37,6 +37,9 @@ PLACES = 16
 """Places that a cell is measured by."""
 MORE = 3
 """Photons beyond those of a cell's order that tell how wide it will be."""
+LEAST = np.float32(1 / 64)
+"""Least area of a cell relative to what it is expected to be. No place that was asked may belong to a photon that is
+alone on a small surface, and its light would weigh nothing."""
 SAME_SIDE = np.float32(0.5)
 """Least cosine between the normals of a light and of what belongs to it."""
 
@@ -114,7 +117,7 @@ def cells(scenes, trees, lights, photons, order, reach, out, first, last):
                 continue
             sparse = (middle + area) * (middle + area) / middle
             total += sparse * _share_below(scene, tree, top, n, _f4(2.0) * height, order, reach, photons[i], keys)
-        out[i] = total * (widest / (middle + widest)) / _f4(PLACES)
+        out[i] = max(total * (widest / (middle + widest)) / _f4(PLACES), LEAST * middle / _f4(order))
 
 
 @kernel

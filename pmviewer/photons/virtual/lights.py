@@ -143,7 +143,7 @@ def virtual_lights(
         photons=as_photons(found[kept], share),
         beams=weighed.beams,
         power_unit=unit,
-        tree=weighed.tree if of_map else None,
+        tree=weighed.tree,
         reach=weighed.reach,
         candidates=len(rows),
         emitted=N,

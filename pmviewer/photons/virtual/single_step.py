@@ -62,10 +62,9 @@ def weigh_by_density(
         if scene.has_media:
             surfaces = ~in_media(rows)
             among, rows, numbers = found[surfaces], rows[surfaces], (np.cumsum(surfaces) - 1)[kept][lie]
-        reach = reach_of(scene.radius, len(among))
     else:
-        among, rows = found[kept][lie], some
-        numbers, reach = np.arange(len(some)), 2 * scene.radius
+        among, rows, numbers = found[kept][lie], some, np.arange(len(some))
+    reach = reach_of(scene.radius, len(among))
     tree = run([lambda: sided_tree(among, rows, unit)])[0]
     q = cells_of(scene, tree, some, numbers.astype(np.int32), (order, reach), run)
     if of_map:
