@@ -13,7 +13,6 @@ from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
-from pmviewer.maps.search.kdtree import RECORD as TREE_RECORD
 from pmviewer.maps.variant import with_mark
 from pmviewer.maps.virtual_lights import (
     CLAMPED,
@@ -29,6 +28,7 @@ from pmviewer.maps.virtual_lights import (
 )
 from pmviewer.photons.bounces import most_bounces
 from pmviewer.photons.virtual.lights import VirtualLights, neighbours, virtual_lights
+from pmviewer.photons.virtual.sided import SIDED_RECORD
 from pmviewer.photons.virtual.tree import light_tree
 from pmviewer.render.film import Film
 from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS
@@ -114,7 +114,8 @@ class VirtualStage:
         record = virtual_record(flat, s, lights.rows, tree, lights.beams)
         if lights.tree is not None:
             record["k"], record["reach"] = neighbours(s.virtual, index) + 1, lights.reach
-            record["gather_rays"] = 0 if flat.has_media else s.virtual.gather_rays
+            bring = s.virtual.density == "photon map" and not flat.has_media
+            record["gather_rays"] = s.virtual.gather_rays if bring else 0
         return VirtualMap(lights, record, tree)
 
 
@@ -127,7 +128,7 @@ def virtual_dtype(virtual: Virtual) -> np.dtype:
 def blank_photons(dtype: np.dtype) -> NDArray[np.void]:
     """The record (1,) of no photons of the type that goes with a record of virtual lights: one for all estimators that
     are compiled alike."""
-    return NO_VIRTUAL if "paths" in (dtype.names or ()) else np.zeros(1, TREE_RECORD)
+    return NO_VIRTUAL if "paths" in (dtype.names or ()) else np.zeros(1, SIDED_RECORD)
 
 
 def by_tree(virtual: Virtual) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +12,6 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.dimensions import VIRTUAL_SALT
 from pmviewer.kernels.random import INDEPENDENT, SOBOL
-from pmviewer.maps.search.kdtree import PhotonKdTree, build_kdtree
 from pmviewer.maps.virtual_lights import (
     BEAM,
     COLUMNS,
@@ -22,16 +20,14 @@ from pmviewer.maps.virtual_lights import (
     OF_PATHS,
     PRINTED_SINGLE,
     SINGLE,
-    V_BEAMS,
-    V_OPACITY,
     V_PHI,
     V_Q,
 )
 from pmviewer.photons.bounces import most_bounces
-from pmviewer.photons.virtual.beams import beams_at
 from pmviewer.photons.virtual.choice import as_photons, choice_probabilities, chosen, in_media
-from pmviewer.photons.virtual.density import lit_areas
 from pmviewer.photons.virtual.flight import C_DROPPED, C_RAYS, C_STORED, N_COUNTS
+from pmviewer.photons.virtual.sided import SidedTree
+from pmviewer.photons.virtual.single_step import Candidates, Weighed, weigh_as_printed, weigh_by_density
 from pmviewer.photons.virtual.trace import TRACE_DTYPE, trace_virtual_lights
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import Photons, Virtual
@@ -41,16 +37,15 @@ Runner = Callable[[list[Callable[[], Any]]], list[Any]]
 
 BATCH = 2048
 """Trajectories a task: fixed, so that the result does not depend on the number of threads."""
-AREAS = 128
-"""Lights a task whose areas are found."""
 SPARE = 2
 """Trajectories for each light where nobody asks for their density: chosen among more, they are less of a family."""
+LEAST = 3200
+"""Least trajectories that whole paths are chosen from: their weights differ much, as 1/cosθ of the first segment, and a
+choice by weight among few leaves ΣG the noise of those."""
 MOST = 500_000
 """Most trajectories that passes grow to of their own accord."""
-PER_DISC = 32
-"""Photons of a disc of the largest radius, see `reach_of`: dark places have none, and weigh nothing."""
 FEWEST = 2
-"""Fewest photons of a disc that passes shrink to."""
+"""Least order of cells that passes shrink to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,14 +53,14 @@ class VirtualLights:
     """`rows` (n, COLUMNS) float32, see `pmviewer.maps.virtual_lights`, with power in watts and q complete but for what
     depends on the point that is lit; `photons` (n, 6) float32 the same as photon records in units of `power_unit`;
     `beams` (n, k, BEAM) of those that stand for photons around them (`pmviewer.photons.virtual.beams`), k may be 0;
-    `tree` of the photons that tell their density, None where they do so themselves, in discs of up to `reach`;
+    `tree` of the photons that tell their density, None where they do so themselves, closer than `reach`;
     `candidates` that they were chosen from, of `emitted` trajectories; `rays` cast, candidates `dropped`."""
 
     rows: Float
     photons: Float
     beams: Float
     power_unit: float
-    tree: PhotonKdTree | None
+    tree: SidedTree | None
     reach: float
     candidates: int
     emitted: int
@@ -86,18 +81,19 @@ class VirtualLights:
 def trajectories(virtual: Virtual, index: int) -> int:
     """Trajectories of pass `index`.
 
-    A disc of k photons blurs the density by its area, and no number of passes mends that. So both its k and its area
+    A cell of the order k blurs the density by its area, and no number of passes mends that. So both its k and its area
     shrink: k with the cube root of the passes down to FEWEST, while the map's photons grow with it up to MOST.
     """
     if _grows(virtual):
         return max(
             min(round(virtual.photons * (index + 1) ** (1 / 3)), max(MOST, virtual.photons)), SPARE * virtual.number
         )
-    return SPARE * virtual.number
+    few = SPARE * virtual.number
+    return max(few, LEAST) if ESTIMATORS.index(virtual.estimator) in OF_PATHS else few
 
 
 def neighbours(virtual: Virtual, index: int) -> int:
-    """Photons of the disc that tells the density in pass `index`."""
+    """Photons that a place of a surface belongs to in pass `index` (`pmviewer.photons.virtual.density`)."""
     return max(round(virtual.k / (index + 1) ** (1 / 3)), min(virtual.k, FEWEST)) if _grows(virtual) else virtual.k
 
 
@@ -133,81 +129,27 @@ def virtual_lights(
     lights = np.ascontiguousarray(rows[kept])
     unit = scene.total_luminance / N
     lights[:, V_PHI : V_PHI + 3] *= (unit * share)[:, None]
-    beams, tree, reach = np.empty((len(lights), 0, BEAM), np.float32), None, 2 * scene.radius
+    weighed = Weighed(None, 2 * scene.radius, np.empty((len(lights), 0, BEAM), np.float32))
     if estimator in OF_PATHS:
         lights[:, V_Q] *= share / np.float32(N)
     elif estimator in OF_DENSITY and not in_media(lights).all():
-        lie = ~in_media(lights)
-        whole, some = estimator == PRINTED_SINGLE, np.ascontiguousarray(lights[lie])
-        among = found[~in_media(rows)] if of_map else np.ascontiguousarray(found[kept][lie])
-        tree = run([lambda: build_kdtree(among, unit)])[0]
-        k = neighbours(virtual, index)
-        if of_map:
-            reach = reach_of(scene.radius, len(among))
-        q = areas_of(scene, tree, some, (k, reach), whole, run)
-        if of_map:
-            q *= share[lie]
-            candidates = rows[~in_media(rows)]
-            beams = np.zeros((len(lights), k + 1, BEAM), np.float32)
-            around = k + 1, reach
-            beams[lie], lights[lie, V_BEAMS] = beams_of(scene, tree, candidates, some, unit * share[lie], around, run)
-        lights[lie, V_Q] = q if whole else q * some[:, V_OPACITY]
+        candidates = Candidates(found, rows, kept, share, unit)
+        if estimator == PRINTED_SINGLE:
+            weigh_as_printed(candidates, lights, virtual.k, run)
+        else:
+            weighed = weigh_by_density(scene, candidates, lights, (of_map, neighbours(virtual, index)), run)
     return VirtualLights(
         rows=lights,
         photons=as_photons(found[kept], share),
-        beams=beams,
+        beams=weighed.beams,
         power_unit=unit,
-        tree=tree if of_map else None,
-        reach=reach,
+        tree=weighed.tree,
+        reach=weighed.reach,
         candidates=len(rows),
         emitted=N,
         rays=int(counts[C_RAYS]),
         dropped=int(counts[C_DROPPED]),
     )
-
-
-def reach_of(scene_radius: float, n: int) -> float:
-    """Largest radius of a disc among n photons: with PER_DISC of them were they spread over the scene's sphere."""
-    return scene_radius * min(2.0, math.sqrt(4 * PER_DISC / max(n, 1)))
-
-
-def areas_of(
-    scene: FlatScene, tree: PhotonKdTree, lights: Float, disc: tuple[int, float], whole: bool, run: Runner
-) -> Float:
-    """Area (n,) that each of the lights stands for among the photons of a tree, which hold the lights themselves
-    (`pmviewer.photons.virtual.density`); disc: photons that it has at most, and its largest radius."""
-    areas = np.empty(len(lights), np.float32)
-    most, reach = max(1, min(disc[0], tree.n - 1)), np.float32(disc[1])
-
-    def some(first: int) -> None:
-        last = min(first + AREAS, len(lights))
-        lit_areas(scene.record, tree.record, lights, 1, most, reach, int(whole), areas, first, last)
-
-    run([partial(some, first) for first in range(0, len(lights), AREAS)])
-    return areas
-
-
-def beams_of(
-    scene: FlatScene,
-    tree: PhotonKdTree,
-    candidates: Float,
-    lights: Float,
-    share: Float,
-    disc: tuple[int, float],
-    run: Runner,
-) -> tuple[Float, Float]:
-    """Up to k photons (n, k, BEAM) that each of the lights stands for among the candidates, and how many (n,); disc: k
-    and its largest radius."""
-    lights, beams = lights.copy(), np.zeros((len(lights), disc[0], BEAM), np.float32)
-    if "bsdfs" not in (scene.record.dtype.names or ()):  # all scatter evenly
-        return beams, lights[:, V_BEAMS]
-    share, reach = share.astype(np.float32), np.float32(disc[1])
-
-    def some(first: int) -> None:
-        beams_at(tree.record, candidates, lights, reach, share, beams, first, min(first + AREAS, len(lights)))
-
-    run([partial(some, first) for first in range(0, len(lights), AREAS)])
-    return beams, lights[:, V_BEAMS]
 
 
 def _batch(scene: FlatScene, record: NDArray[np.void], i0: int, i1: int) -> tuple[Float, Float, NDArray[np.int64]]:

@@ -211,7 +211,8 @@ def trace_virtual_lights(scenes, passes, i0, i1, photons_out, lights_out, counts
             if not is_good(after):
                 counts[C_DROPPED] += 1
                 break
-            survival = min(luminance(after) / before, _f4(1.0))
+            # Where it sees no light, a photon of `modified` goes on as the gathering walk does, with less power.
+            survival = _f4(1.0) if blocked else min(luminance(after) / before, _f4(1.0))
             if not s2 < survival:
                 break
             beta = colour_of_split(scene, b, wave, d, scale(after, _f4(1.0) / survival))

@@ -19,12 +19,13 @@ import numpy as np
 from pmviewer.kernels.bsdf.scattering import STORED
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, part, specialised
-from pmviewer.kernels.memory import float_of_bits, stack_get_i8, stack_i4
-from pmviewer.kernels.vector import add, scale
-from pmviewer.maps.estimate.glossy import scattered_power
+from pmviewer.kernels.memory import float_of_bits, load_u4, stack_get_i8, stack_i4
+from pmviewer.kernels.vector import add, mul, normalize, scale
+from pmviewer.maps.estimate.glossy import reflected_share
+from pmviewer.maps.photon_words import decode_direction
 from pmviewer.maps.search.disc import Facing
 from pmviewer.maps.search.k_nearest import KEYS, nearest
-from pmviewer.maps.search.stored import ALL_CLASSES
+from pmviewer.maps.search.stored import ALL_CLASSES, stored_power
 from pmviewer.maps.virtual_lights import FLATNESS
 from pmviewer.render.chain import BLACK
 
@@ -47,6 +48,13 @@ def lit_by_photons(given, si, brings):
 
 
 @device
+def _scattered(tree, place, si):
+    """What a photon of the map adds to the radiance towards wo, in units of the map's power."""
+    wi = normalize(decode_direction(load_u4(tree.arrivals, place)))
+    return mul(reflected_share(si.bsdf, STORED, si.ng, si.wo, wi), stored_power(tree, place))
+
+
+@device
 def _by_nearest(given, si, brings):
     tree, virtual = given.virtual_map, given.virtual
     if virtual.k == 0:
@@ -62,5 +70,5 @@ def _by_nearest(given, si, brings):
         for j in range(count):
             key = stack_get_i8(keys, j)
             if count < k or float_of_bits(_u4(key >> 32)) < r2:
-                total = add(total, scattered_power(tree, key & _i8(0xFFFFFFFF), si.ng, si.bsdf, STORED, _u4(0), si.wo))
+                total = add(total, _scattered(tree, key & _i8(0xFFFFFFFF), si))
     return _f4(1.0), scale(total, _f4(tree.power_unit) / (_f4(math.pi) * r2))

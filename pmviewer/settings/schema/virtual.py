@@ -170,8 +170,9 @@ class Virtual(Group):
     )
     k: int = setting(
         8,
-        "Photons whose disc tells the density at a virtual light in the first pass; by the photon map it shrinks with "
-        "the cube root of the passes.",
+        "Photons that each place of a surface belongs to in the first pass, and that share what a virtual light weighs "
+        "there: more are less noisy and blur more. By the photon map they shrink with the cube root of the passes. "
+        "Printed single step: photons of the disc that tells the density.",
         title="k at a light",
         stage="image",
         scale="integer",
