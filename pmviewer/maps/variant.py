@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels.compile.specialise import has
 
 Estimator = Literal["disc", "hull", "differential"]
-Mark = Literal["hull", "differential", "importons", "fewest", "cones", "cells", "paths", "descent", "march"]
+Mark = Literal["hull", "differential", "normals", "fewest", "cones", "cells", "paths", "descent", "march"]
 
 ABSENT = np.zeros(1, np.dtype([("absent", np.int32)]))
 """Stands for what is not there: `pmviewer.kernels.compile.specialise.absent` tells it from all else."""

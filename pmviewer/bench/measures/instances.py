@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.bench.measures.rays import Rays, _race, _rays
+from pmviewer.bench.measures.rays import Rays, race, rays_from
 from pmviewer.bench.report import BenchResult, Target
 from pmviewer.kernels.accel.occlusion import cast_occluded
 from pmviewer.kernels.accel.raycast import cast_closest
@@ -66,7 +66,7 @@ def random_rays(n: int) -> Rays:
 
 
 def _unit_rays(origins: NDArray, towards: NDArray) -> Rays:
-    return _rays(origins, towards / np.linalg.norm(towards, axis=1, keepdims=True), np.inf)
+    return rays_from(origins, towards / np.linalg.norm(towards, axis=1, keepdims=True), np.inf)
 
 
 def run(quick: bool = False) -> BenchResult:
@@ -101,13 +101,13 @@ def run(quick: bool = False) -> BenchResult:
         def shadow(k: int, flat: FlatScene, limited=limited, blocked=blocked):
             return lambda: cast_occluded(flat.record[0], *limited, blocked[k])
 
-        times = _race([closest(0, ours), closest(1, theirs)], rounds)
+        times = race([closest(0, ours), closest(1, theirs)], rounds)
         either = np.isfinite(t).any(axis=0)
         differs = int(np.logical_not(np.abs(t[0, either] - t[1, either]) <= 1e-3 * t[1, either]).sum())
         rows.append([kind, n / times[0] / 1e6, n / times[1] / 1e6, times[1] / times[0], differs])
         if kind == "camera":
             continue
-        times = _race([shadow(0, ours), shadow(1, theirs)], rounds)
+        times = race([shadow(0, ours), shadow(1, theirs)], rounds)
         differs = int((blocked[0] != blocked[1]).sum())
         rows.append([f"{kind}, shadow", n / times[0] / 1e6, n / times[1] / 1e6, times[1] / times[0], differs])
     targets = [

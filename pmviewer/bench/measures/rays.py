@@ -83,7 +83,8 @@ def _normalize(v: NDArray[np.float64]) -> NDArray[np.float64]:
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
-def _rays(origins: NDArray, directions: NDArray, tmax: NDArray | float) -> Rays:
+def rays_from(origins: NDArray, directions: NDArray, tmax: NDArray | float) -> Rays:
+    """As a record of contiguous float32 arrays, from 1e-5 on; what is given once is the same for all."""
     n = len(directions)
     limit = np.broadcast_to(np.asarray(tmax, np.float32), n)
     contiguous = [np.ascontiguousarray(x, np.float32) for x in (origins, directions, np.full(n, 1e-5), limit)]
@@ -95,7 +96,7 @@ def camera_rays(size: int) -> Rays:
     generator = np.random.default_rng(0)
     y, x = (np.indices((size, size)) + generator.random((2, size, size))) / size * 2.0 - 1.0
     directions = np.stack([0.38 * x.ravel(), -0.38 * y.ravel() - 0.02, np.full(size * size, -1.0)], 1)
-    return _rays(np.broadcast_to((0.0, 1.05, 3.6), directions.shape), _normalize(directions), np.inf)
+    return rays_from(np.broadcast_to((0.0, 1.05, 3.6), directions.shape), _normalize(directions), np.inf)
 
 
 def secondary_rays(triangles: F4, rays: Rays, t: F4, primitive: NDArray[np.int32]) -> tuple[Rays, Rays]:
@@ -110,10 +111,10 @@ def secondary_rays(triangles: F4, rays: Rays, t: F4, primitive: NDArray[np.int32
     bounce = _normalize(normals + 0.9999 * _normalize(generator.normal(size=points.shape)))
     lamp = np.stack([*generator.uniform(-0.25, 0.25, (2, len(points))), np.full(len(points), 1.985)], 1)[:, [0, 2, 1]]
     distance = np.linalg.norm(lamp - points, axis=1)
-    return _rays(points, bounce, np.inf), _rays(points, (lamp - points) / distance[:, None], 0.999 * distance)
+    return rays_from(points, bounce, np.inf), rays_from(points, (lamp - points) / distance[:, None], 0.999 * distance)
 
 
-def _race(contestants: list[Callable[[], None]], rounds: int) -> list[float]:
+def race(contestants: list[Callable[[], None]], rounds: int) -> list[float]:
     """Shortest time of each contestant in seconds; they take turns, so that a busy moment disturbs all alike."""
     times = np.full((rounds + 1, len(contestants)), np.inf)
     for i in range(rounds + 1):
@@ -160,7 +161,7 @@ def _measure(name: str, triangles: F4, size: int, rounds: int) -> tuple[list[lis
         ("diffuse bounce", bounce, closest(bounce)),
         ("shadow", to_lamp, shadow(to_lamp)),
     ):
-        ours, embrees = _race(contestants, rounds)
+        ours, embrees = race(contestants, rounds)
         m = len(rays)
         unequal = (blocked[:m] != theirs_blocked[:m]) if kind == "shadow" else (primitive[:m] < 0) != (theirs[:m] < 0)
         ratio = embrees / ours

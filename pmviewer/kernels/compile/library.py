@@ -116,7 +116,9 @@ def bitcode_of(state: tuple[str, str, Any]) -> bytes:
     return bitcode
 
 
-class _KernelCodegen(JITCPUCodegen):
+class KernelCodegen(JITCPUCodegen):
+    """Numba's, whose libraries are `KernelLibrary`."""
+
     _library_class = KernelLibrary
 
     def set_env(self, env_name: str, env: Any) -> None:
@@ -127,4 +129,4 @@ class _KernelCodegen(JITCPUCodegen):
 
 def install() -> None:
     """From now on all that this process compiles for the processor is compiled so."""
-    cpu_target.target_context.codegen().__class__ = _KernelCodegen
+    cpu_target.target_context.codegen().__class__ = KernelCodegen

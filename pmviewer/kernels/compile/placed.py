@@ -15,7 +15,7 @@ from numba.core.compiler import CompileResult
 from numba.core.registry import cpu_target
 
 from pmviewer.kernels.compile import image, jit  # noqa: F401 - which changes the compiler first
-from pmviewer.kernels.compile.library import KernelLibrary, _KernelCodegen
+from pmviewer.kernels.compile.library import KernelCodegen, KernelLibrary
 
 
 class _Constants(ctypes.c_void_p):
@@ -60,7 +60,7 @@ def _place_of(constants: str) -> int:
     return ctypes.addressof(_constants.setdefault(constants, _Constants()))
 
 
-class _PlacedCodegen(_KernelCodegen):
+class _PlacedCodegen(KernelCodegen):
     _library_class = PlacedLibrary
 
     def address_of(self, name: str) -> int:

@@ -28,7 +28,7 @@ from pmviewer.kernels.memory import (
     store_i4,
 )
 from pmviewer.maps.density.neighbours8 import neighbours8
-from pmviewer.maps.search.k_nearest import _nearest_k
+from pmviewer.maps.search.k_nearest import keep_nearest
 from pmviewer.maps.search.simd import BLOCK_BYTES, WIDTH, facing8
 from pmviewer.maps.search.stored import ALL_CLASSES
 
@@ -122,11 +122,11 @@ def search(tree, p, n, need, limits, r2, scratch):
             leaf = tree.leaves + 4 * LEAF_WORDS * _i8(load_i4(tree.nodes, NODE_WORDS * node + CHILD))
             count = _of_leaf(leaf, p, n, ceiling, limits, r2, scratch, count)
             if count >= 2 * M:
-                r2 = _nearest_k(scratch.keys, count, _i4(M), r2)
+                r2 = keep_nearest(scratch.keys, count, _i4(M), r2)
                 count = _i8(M)
         node, bound, waiting = _next_subtree(r2, scratch, waiting)
     if count >= M:
-        r2 = _nearest_k(scratch.keys, count, _i4(M), r2)
+        r2 = keep_nearest(scratch.keys, count, _i4(M), r2)
         count = _i8(M)
     return count, r2
 

@@ -8,7 +8,18 @@ from numba import types
 from numba.core import cgutils
 
 from pmviewer.kernels.memory import I8, I32, at_address, with_twin
-from pmviewer.maps.search.simd import _FAST, _VECTOR, ROW_BYTES, WIDTH, _bits, _call, _dot, _load, _offsets, _splat
+from pmviewer.maps.search.simd import (
+    FAST,
+    ROW_BYTES,
+    VECTOR,
+    WIDTH,
+    bits_of,
+    dot_of,
+    intrinsic,
+    load_eight,
+    offsets,
+    splat,
+)
 
 NEED_ROW = 4
 """Of a block, that of the required densities."""
@@ -16,11 +27,11 @@ NEED_ROW = 4
 
 def _neighbours8(block, p, n, steepness, r2, ceiling, squared):
     rows = [block + row * ROW_BYTES for row in range(3)]
-    d = _offsets(*rows, *p)
+    d = offsets(*rows, *p)
     height = sum(a * c for a, c in zip(d, n))
     counted = np.maximum(sum(a * a for a in d), steepness * height * height)
     squared.view(np.float32)[:WIDTH] = counted
-    return _bits((counted < r2) & (at_address(block + NEED_ROW * ROW_BYTES, WIDTH, np.float32) <= ceiling))
+    return bits_of((counted < r2) & (at_address(block + NEED_ROW * ROW_BYTES, WIDTH, np.float32) <= ceiling))
 
 
 @with_twin(_neighbours8)
@@ -38,18 +49,18 @@ def neighbours8(typingctx, block, p, n, steepness, r2, ceiling, squared):
     def codegen(context, builder, sig, args):
         block, p, n, steepness, r2, ceiling, out = args
         row = [builder.add(block, ir.Constant(block.type, ROW_BYTES * j)) for j in range(NEED_ROW + 1)]
-        normal = [_splat(builder, x) for x in cgutils.unpack_tuple(builder, n, 3)]
+        normal = [splat(builder, x) for x in cgutils.unpack_tuple(builder, n, 3)]
         d = [
-            builder.fsub(_load(builder, address), _splat(builder, coordinate), flags=_FAST)
+            builder.fsub(load_eight(builder, address), splat(builder, coordinate), flags=FAST)
             for address, coordinate in zip(row, cgutils.unpack_tuple(builder, p, 3))
         ]
-        height = _dot(builder, d, normal)
-        above = builder.fmul(builder.fmul(height, height, flags=_FAST), _splat(builder, steepness), flags=_FAST)
-        counted = _call(builder, "maxnum", _dot(builder, d, d), above)
-        builder.store(counted, builder.bitcast(out, _VECTOR.as_pointer())).align = 4
+        height = dot_of(builder, d, normal)
+        above = builder.fmul(builder.fmul(height, height, flags=FAST), splat(builder, steepness), flags=FAST)
+        counted = intrinsic(builder, "maxnum", dot_of(builder, d, d), above)
+        builder.store(counted, builder.bitcast(out, VECTOR.as_pointer())).align = 4
         mask = builder.and_(
-            builder.fcmp_ordered("<", counted, _splat(builder, r2)),
-            builder.fcmp_ordered("<=", _load(builder, row[NEED_ROW]), _splat(builder, ceiling)),
+            builder.fcmp_ordered("<", counted, splat(builder, r2)),
+            builder.fcmp_ordered("<=", load_eight(builder, row[NEED_ROW]), splat(builder, ceiling)),
         )
         return builder.zext(builder.bitcast(mask, I8), I32)
 
@@ -58,7 +69,7 @@ def neighbours8(typingctx, block, p, n, steepness, r2, ceiling, squared):
 
 def _inside8(block, low, high):
     rows = (at_address(block + row * ROW_BYTES, WIDTH, np.float32) for row in range(3))
-    return _bits(np.all([(x >= a) & (x <= b) for x, a, b in zip(rows, low, high)], axis=0))
+    return bits_of(np.all([(x >= a) & (x <= b) for x, a, b in zip(rows, low, high)], axis=0))
 
 
 @with_twin(_inside8)
@@ -72,9 +83,9 @@ def inside8(typingctx, block, low, high):
         block, low, high = args
         mask = None
         for row, (a, b) in enumerate(zip(*(cgutils.unpack_tuple(builder, corner, 3) for corner in (low, high)))):
-            x = _load(builder, builder.add(block, ir.Constant(block.type, ROW_BYTES * row)))
-            above = builder.fcmp_ordered(">=", x, _splat(builder, a))
-            inside = builder.and_(above, builder.fcmp_ordered("<=", x, _splat(builder, b)))
+            x = load_eight(builder, builder.add(block, ir.Constant(block.type, ROW_BYTES * row)))
+            above = builder.fcmp_ordered(">=", x, splat(builder, a))
+            inside = builder.and_(above, builder.fcmp_ordered("<=", x, splat(builder, b)))
             mask = inside if mask is None else builder.and_(mask, inside)
         return builder.zext(builder.bitcast(mask, I8), I32)
 

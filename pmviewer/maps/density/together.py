@@ -35,7 +35,7 @@ from pmviewer.maps.density.growing_tree import (
     add_keys,
 )
 from pmviewer.maps.density.neighbours8 import inside8, neighbours8
-from pmviewer.maps.search.k_nearest import _nearest_k
+from pmviewer.maps.search.k_nearest import keep_nearest
 from pmviewer.maps.search.simd import BLOCK_BYTES, WIDTH, facing8
 from pmviewer.maps.search.stored import ALL_CLASSES
 
@@ -139,9 +139,9 @@ def search_among(candidates, blocks, p, n, need, limits, r2, scratch):
         mask = neighbours8(block, p, n, limits.steepness, r2, ceiling, scratch.squared)
         count = add_keys(block, mask, scratch, count)
         if count >= 2 * M:
-            r2 = _nearest_k(scratch.keys, count, _i4(M), r2)
+            r2 = keep_nearest(scratch.keys, count, _i4(M), r2)
             count = _i8(M)
     if count >= M:
-        r2 = _nearest_k(scratch.keys, count, _i4(M), r2)
+        r2 = keep_nearest(scratch.keys, count, _i4(M), r2)
         count = _i8(M)
     return count, r2

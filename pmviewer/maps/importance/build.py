@@ -202,7 +202,7 @@ def build_importance(
     record = np.zeros(1, IMPORTON_DTYPE)
     for name in RECORD.names or ():
         record[name] = tree.record[name]
-    record["importons"] = 1
+    record["normals"] = 1
     record["reach"], record["weight"] = reach.ctypes.data, weights.ctypes.data
     widest = np.float32(WIDEST * scene_radius)
     leaves = 1 << int(tree.record["depth"][0]) if n else 0

@@ -93,7 +93,7 @@ def facets_of(importance: ImportanceMap) -> Facets:
         reach, weights = importance.reach[chosen][tree.index], importance.weights[chosen][tree.index]
         for name in RECORD.names or ():
             maps[g][name] = tree.record[0][name]
-        maps[g]["importons"], maps[g]["farthest"] = 1, reach.max()
+        maps[g]["normals"], maps[g]["farthest"] = 1, reach.max()
         maps[g]["reach"], maps[g]["weight"] = reach.ctypes.data, weights.ctypes.data
         maps[g]["sum_radius"] = importance.record[0]["sum_radius"]
         kept += [tree, reach, weights]

@@ -38,7 +38,7 @@ OF_TWIN = np.float32(-1.0)
 
 IMPORTON_DTYPE = with_mark(
     RECORD,
-    "importons",
+    "normals",
     [
         ("reach", np.int64),  # float32 (n,): how far the importance at an importon is used
         ("weight", np.int64),  # float32 (n,): Ψ

@@ -91,7 +91,7 @@ def _select(keys, count, k, smallest, largest):
 
 
 @device
-def _nearest_k(keys, count, k, r2):
+def keep_nearest(keys, count, k, r2):
     """Keeps the nearest k of `count` ≥ k keys; returns the squared distance of the k-th."""
     if count > k:
         _select(keys, count, k, _i8(0), _i8(bits_of_float(r2)) << 32 | _i8(0xFFFFFFFF))
@@ -202,11 +202,11 @@ def nearest(tree, p, k, r2, keys, facing):
                     count += 1
             j += WIDTH
             if count >= capacity:
-                r2 = _nearest_k(keys, count, k, r2)
+                r2 = keep_nearest(keys, count, k, r2)
                 count = _i8(k)
         node, bound, waiting = _next_subtree(stack, waiting, r2, offsets)
     if count >= k:
-        r2 = _nearest_k(keys, count, k, r2)
+        r2 = keep_nearest(keys, count, k, r2)
         count = _i8(k)
     return count, r2
 

@@ -19,55 +19,60 @@ WIDTH = 8
 ROW_BYTES = 4 * WIDTH
 BLOCK_BYTES = 6 * ROW_BYTES
 """A grid keeps eight photons in a block: the six words of their records in turn, eight to a row."""
-_VECTOR = ir.VectorType(F32, WIDTH)
+VECTOR = ir.VectorType(F32, WIDTH)
 _WORDS = ir.VectorType(I32, WIDTH)
 _BITS = ir.VectorType(ir.IntType(1), WIDTH)
-_FAST = ("contract", "reassoc", "nsz")
+FAST = ("contract", "reassoc", "nsz")
 
 
 def _constant(vector, value):
     return ir.Constant(vector, [value] * WIDTH)
 
 
-def _splat(builder, scalar, vector=_VECTOR):
+def splat(builder, scalar, vector=VECTOR):
+    """Eight times the same number, in LLVM's builder."""
     undefined = ir.Constant(vector, ir.Undefined)
     first = builder.insert_element(undefined, scalar, ir.Constant(I32, 0))
     return builder.shuffle_vector(first, undefined, _constant(_WORDS, 0))
 
 
-def _load(builder, address, vector=_VECTOR):
+def load_eight(builder, address, vector=VECTOR):
+    """Eight numbers at an int64 address, in LLVM's builder."""
     values = builder.load(builder.inttoptr(address, vector.as_pointer()))
     values.align = 4
     return values
 
 
-def _call(builder, name, *vectors):
+def intrinsic(builder, name, *vectors):
     """An LLVM intrinsic on `<8 x float>`, such as fabs."""
-    function_type = ir.FunctionType(_VECTOR, [_VECTOR] * len(vectors))
+    function_type = ir.FunctionType(VECTOR, [VECTOR] * len(vectors))
     function = cgutils.get_or_insert_function(builder.module, function_type, f"llvm.{name}.v{WIDTH}f32")
     return builder.call(function, vectors)
 
 
-def _dot(builder, a, b):
+def dot_of(builder, a, b):
+    """Sum of the products of vectors a and b, pair by pair, in LLVM's builder."""
     total = None
     for p, q in zip(a, b):
-        product = builder.fmul(p, q, flags=_FAST)
-        total = product if total is None else builder.fadd(total, product, flags=_FAST)
+        product = builder.fmul(p, q, flags=FAST)
+        total = product if total is None else builder.fadd(total, product, flags=FAST)
     return total
 
 
-def _offsets(x_address, y_address, z_address, x, y, z):
+def offsets(x_address, y_address, z_address, x, y, z):
+    """In plain Python: of eight points at three addresses from (x, y, z), three float32 (8,)."""
     return [at_address(a, WIDTH, np.float32) - c for a, c in ((x_address, x), (y_address, y), (z_address, z))]
 
 
-def _bits(lanes):
+def bits_of(lanes):
+    """In plain Python: int32 with bit j set where lane j of eight is."""
     return np.int32(np.packbits(lanes, bitorder="little")[0])
 
 
 def _within8(x_address, y_address, z_address, x, y, z, r2, squared):
-    total = sum(d * d for d in _offsets(x_address, y_address, z_address, x, y, z))
+    total = sum(d * d for d in offsets(x_address, y_address, z_address, x, y, z))
     squared.view(np.float32)[:WIDTH] = total
-    return _bits(total < r2)
+    return bits_of(total < r2)
 
 
 @with_twin(_within8)
@@ -90,12 +95,12 @@ def within8(typingctx, x_address, y_address, z_address, x, y, z, r2, squared):
     def codegen(context, builder, sig, args):
         *addresses, x, y, z, limit, out = args
         d = [
-            builder.fsub(_load(builder, address), _splat(builder, coordinate), flags=_FAST)
+            builder.fsub(load_eight(builder, address), splat(builder, coordinate), flags=FAST)
             for address, coordinate in zip(addresses, (x, y, z))
         ]
-        total = _dot(builder, d, d)
-        builder.store(total, builder.bitcast(out, _VECTOR.as_pointer())).align = 4
-        mask = builder.fcmp_ordered("<", total, _splat(builder, limit))
+        total = dot_of(builder, d, d)
+        builder.store(total, builder.bitcast(out, VECTOR.as_pointer())).align = 4
+        mask = builder.fcmp_ordered("<", total, splat(builder, limit))
         return builder.zext(builder.bitcast(mask, I8), I32)
 
     return signature, codegen
@@ -114,11 +119,11 @@ def count_bits(typingctx, mask):
 
 def _facing8(block, p, n, height, class_mask):
     coordinates = [block + row * ROW_BYTES for row in range(3)]
-    above = sum(d * c for d, c in zip(_offsets(*coordinates, *p), n))
+    above = sum(d * c for d, c in zip(offsets(*coordinates, *p), n))
     word = at_address(block + 3 * ROW_BYTES, WIDTH, np.uint32)
     wanted = (int(class_mask) >> (word >> 6 & 3).astype(np.int64)) & 1
     front = [sum(d * c for d, c in zip(decode_direction(w), n)) > 0 for w in word]
-    return _bits((np.abs(above) <= height) & (wanted == 1) & front)
+    return bits_of((np.abs(above) <= height) & (wanted == 1) & front)
 
 
 @with_twin(_facing8)
@@ -136,27 +141,29 @@ def facing8(typingctx, block, p, n, height, class_mask):
         block, p, n, height, class_mask = args
         row = [builder.add(block, ir.Constant(I64, ROW_BYTES * j)) for j in range(4)]
         words = row[3]
-        normal = [_splat(builder, x) for x in cgutils.unpack_tuple(builder, n, 3)]
+        normal = [splat(builder, x) for x in cgutils.unpack_tuple(builder, n, 3)]
         d = [
-            builder.fsub(_load(builder, address), _splat(builder, coordinate), flags=_FAST)
+            builder.fsub(load_eight(builder, address), splat(builder, coordinate), flags=FAST)
             for address, coordinate in zip(row, cgutils.unpack_tuple(builder, p, 3))
         ]
-        inside = builder.fcmp_ordered("<=", _call(builder, "fabs", _dot(builder, d, normal)), _splat(builder, height))
+        inside = builder.fcmp_ordered(
+            "<=", intrinsic(builder, "fabs", dot_of(builder, d, normal)), splat(builder, height)
+        )
 
-        word = _load(builder, words, _WORDS)
+        word = load_eight(builder, words, _WORDS)
         path_class = builder.and_(builder.lshr(word, _constant(_WORDS, 6)), _constant(_WORDS, 3))
-        wanted = builder.trunc(builder.lshr(_splat(builder, class_mask, _WORDS), path_class), _BITS)
+        wanted = builder.trunc(builder.lshr(splat(builder, class_mask, _WORDS), path_class), _BITS)
 
         # The octahedral direction as in record.decode_direction, 2047 times as long: only the sign of n·wi matters.
-        half = _constant(_VECTOR, 2047.0)
-        u = builder.fsub(builder.sitofp(builder.lshr(word, _constant(_WORDS, 20)), _VECTOR), half)
+        half = _constant(VECTOR, 2047.0)
+        u = builder.fsub(builder.sitofp(builder.lshr(word, _constant(_WORDS, 20)), VECTOR), half)
         low = builder.and_(builder.lshr(word, _constant(_WORDS, 8)), _constant(_WORDS, 0xFFF))
-        v = builder.fsub(builder.sitofp(low, _VECTOR), half)
-        wz = builder.fsub(builder.fsub(half, _call(builder, "fabs", u)), _call(builder, "fabs", v))
-        fold = _call(builder, "maxnum", builder.fneg(wz), _constant(_VECTOR, 0.0))
-        wx = builder.fsub(u, _call(builder, "copysign", fold, u))
-        wy = builder.fsub(v, _call(builder, "copysign", fold, v))
-        front = builder.fcmp_ordered(">", _dot(builder, (wx, wy, wz), normal), _constant(_VECTOR, 0.0))
+        v = builder.fsub(builder.sitofp(low, VECTOR), half)
+        wz = builder.fsub(builder.fsub(half, intrinsic(builder, "fabs", u)), intrinsic(builder, "fabs", v))
+        fold = intrinsic(builder, "maxnum", builder.fneg(wz), _constant(VECTOR, 0.0))
+        wx = builder.fsub(u, intrinsic(builder, "copysign", fold, u))
+        wy = builder.fsub(v, intrinsic(builder, "copysign", fold, v))
+        front = builder.fcmp_ordered(">", dot_of(builder, (wx, wy, wz), normal), _constant(VECTOR, 0.0))
 
         mask = builder.and_(builder.and_(inside, wanted), front)
         return builder.zext(builder.bitcast(mask, I8), I32)
@@ -187,22 +194,22 @@ def add_power8(typingctx, rg_words, b_words, mask, weights, sums):
     def codegen(context, builder, sig, args):
         rg_words, b_words, mask, weights, sums = args
         chosen = builder.bitcast(builder.trunc(mask, I8), _BITS)
-        weight = builder.load(builder.bitcast(weights, _VECTOR.as_pointer()))
+        weight = builder.load(builder.bitcast(weights, VECTOR.as_pointer()))
         weight.align = 4
-        weight = builder.select(chosen, weight, _constant(_VECTOR, 0.0))
-        rg, b = _load(builder, rg_words, _WORDS), _load(builder, b_words, _WORDS)
+        weight = builder.select(chosen, weight, _constant(VECTOR, 0.0))
+        rg, b = load_eight(builder, rg_words, _WORDS), load_eight(builder, b_words, _WORDS)
         low = _constant(_WORDS, 0xFFFF)
         channels = builder.and_(rg, low), builder.lshr(rg, _constant(_WORDS, 16)), builder.and_(b, low)
         for channel, code in enumerate(channels):
             # record.decode_power
             bits = builder.add(builder.shl(code, _constant(_WORDS, 13)), _constant(_WORDS, EXPONENT_BASE))
-            power = builder.bitcast(bits, _VECTOR)
+            power = builder.bitcast(bits, VECTOR)
             zero = builder.icmp_unsigned("==", code, _constant(_WORDS, 0))
-            power = builder.select(zero, _constant(_VECTOR, 0.0), power)
-            place = builder.gep(builder.bitcast(sums, _VECTOR.as_pointer()), [ir.Constant(I32, channel)])
+            power = builder.select(zero, _constant(VECTOR, 0.0), power)
+            place = builder.gep(builder.bitcast(sums, VECTOR.as_pointer()), [ir.Constant(I32, channel)])
             total = builder.load(place)
             total.align = 4
-            total = builder.fadd(total, builder.fmul(power, weight, flags=_FAST), flags=_FAST)
+            total = builder.fadd(total, builder.fmul(power, weight, flags=FAST), flags=FAST)
             builder.store(total, place).align = 4
         return context.get_dummy_value()
 

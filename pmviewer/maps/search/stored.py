@@ -24,7 +24,7 @@ def arrives(photons, i, n, class_mask):
 
     Importons (`pmviewer.maps.importance`) have their surface's normal for a direction: it has to be similar.
     """
-    if has(photons, "importons"):
+    if has(photons, "normals"):
 
         def similar(photons, i, n, class_mask):
             w = decode_direction(load_u4(photons.payload, 3 * i))

@@ -19,7 +19,7 @@ from pmviewer.maps.search.kdtree import RECORD, PhotonKdTree, build_kdtree
 from pmviewer.maps.variant import with_mark
 from pmviewer.maps.virtual_lights import V_N, V_WI
 
-SIDED_RECORD = with_mark(RECORD, "importons", [("arrivals", "i8")])
+SIDED_RECORD = with_mark(RECORD, "normals", [("arrivals", "i8")])
 """Of a kd-tree whose photons have their surface's normal for a direction; the words with their directions, uint32 (n,)
 in the tree's order, are at the address `arrivals`."""
 
@@ -62,5 +62,5 @@ def sided_tree(photons: NDArray[np.float32], rows: NDArray[np.float32], power_un
     record = np.zeros(1, SIDED_RECORD)
     for name in tree.record.dtype.names or ():
         record[name] = tree.record[name]
-    record["importons"], record["arrivals"] = 1, arrivals.ctypes.data
+    record["normals"], record["arrivals"] = 1, arrivals.ctypes.data
     return SidedTree(tree, arrivals, record)
