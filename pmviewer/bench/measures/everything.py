@@ -26,7 +26,7 @@ NEED_MORE = ("files",)
 """Benches of files that somebody has to name."""
 LONG = (
     "actions", "agree", "auto", "checkpoint", "cluster", "deposition", "emission", "estimation", "gather", "hostile",
-    "importance", "lens", "load", "media", "mitsuba", "preview", "stress", "thin-glass", "unused", "virtual",
+    "importance", "lens", "load", "media", "mitsuba", "preview", "series", "stress", "thin-glass", "unused", "virtual",
     "virtual-many",
 )  # fmt: skip
 """Benches that take many minutes whole: all of them together are run quick, and the page says so."""
