@@ -69,7 +69,7 @@ def test_a_paused_session_shows_the_film(session, film):
     session.pause()
     session.open("cornell_diffuse", SMALL, film=film)
     assert session.wait(passes=3, timeout=PATIENCE)
-    assert session.status.state == "paused"
+    until(lambda: session.status.state == "paused")  # told once the film is shown
     assert session.frame.statistics.passes == 3
 
 
