@@ -179,7 +179,8 @@ def _resized(mi: Any, node: Any, longest: int) -> dict[str, Any]:
         film["width"], film["height"] = round(whole[0] * size[0] / width), round(whole[1] * size[1] / height)
         film["crop_offset_x"], film["crop_offset_y"] = round(left * size[0] / width), round(top * size[1] / height)
         film["crop_width"], film["crop_height"] = size
-    kept = [k for k in node.props.keys() if node.props.type(k) == mi.Properties.Type.ResolvedReference]  # noqa: SIM118
+    names = node.props.keys()
+    kept = [name for name in names if node.props.type(name) == mi.Properties.Type.ResolvedReference]
     for name in kept:  # the filter
         film[name] = node.props[name]
     if not kept:  # Mitsuba takes a Gaussian, and this program the box

@@ -39,8 +39,8 @@ TRUTH_PASSES = 600
 NEAR = 0.3
 """How far from the error that was asked for the one reached may be."""
 MOST_PASSES = 3000
-CHOSEN = "; how far a trial trusts what it sees of bias was chosen with cornell_caustic among others"
-"""SPREAD of `pmviewer.engine.auto.widths`, said in the target's own line."""
+CHOSEN = "; what a trial takes bias relative to, and how far it trusts it, was chosen with cornell_caustic too"
+"""The denominator and SPREAD of `pmviewer.engine.auto.widths`, said in the target's own line."""
 CHOSEN_BIAS = "; the least and most that the bias may be were chosen with cornell_caustic"
 """TRUE_BIAS of `pmviewer.engine.auto.estimate`, likewise."""
 

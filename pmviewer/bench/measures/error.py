@@ -48,10 +48,10 @@ PEER_BUDGET = 2.5
 """Mitsuba's budget over ours: its time to a target must be found where it is twice ours."""
 PEER = "Mitsuba 3 path"
 AUTOMATIC, TRIAL_APART = "automatic", ", its trial not counted"
-CHOSEN = "; how far a trial trusts what it sees of bias was chosen with this scene among others"
+CHOSEN = "; what a trial takes bias relative to, and how far it trusts it, was chosen with this scene among others"
 CHOSEN_WITH = ("ring_caustic", "cornell_caustic")
-"""Scenes by which SPREAD of `pmviewer.engine.auto.widths`, and UNSURE and MISSED of `pmviewer.engine.auto.model`, were
-chosen: said in their targets' lines."""
+"""Scenes by which the denominator and SPREAD of `pmviewer.engine.auto.widths`, and UNSURE and MISSED of
+`pmviewer.engine.auto.model`, were chosen: said in their targets' lines."""
 AUTOMATIC_BUDGET = 8.0
 """Of the curves by what automatic mode chooses, over their target's seconds."""
 

@@ -64,6 +64,7 @@ METHODS: dict[str, dict[str, object]] = {
     "path": {},
 }
 QUICK_METHODS = ("progressive, beam", "path")
+"""The default, and the path tracer."""
 OWN_SPP, QUICK_OWN_SPP, OWN_SEED = 256, 32, 100_000
 """Samples per pixel of the picture of Mitsuba's that its error is measured against, and the first of its seeds."""
 BUDGET, QUICK_BUDGET, PEER_BUDGET = 60.0, 6.0, 2.5
@@ -244,9 +245,8 @@ def over_time(scene: str, goal: float, share: float, crossed: bool, quick: bool)
     converged = peer.independent_images(scene, {}, 1, N, OWN_SEED).astype(np.float64)[0]
     other = converged if crossed else None
     curves = []
-    for name, values in METHODS.items():
-        if quick and name not in QUICK_METHODS:
-            continue
+    for name in QUICK_METHODS if quick else METHODS:
+        values = METHODS[name]
         method = name.partition(",")[0]
         second = None if method == "path" else other
         curves.append(replace(measure(open_scene(scene), method, budget, values=values, other=second), method=name))

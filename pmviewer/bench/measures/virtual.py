@@ -46,6 +46,11 @@ MIDDLES: Mapping[str, Any] = {"render.filter": "box", "render.filter_radius": 0.
 """Settings by which a pixel looks at its middle fifth."""
 CHOSEN = "; the share of gather rays on gloss was chosen in glossy_room"
 """IN_A_LOBE of `pmviewer.render.virtual_lights.gathered`, said in the target's own line."""
+CHOSEN_WITH = "corner_room"
+"""Scene by which two numbers were chosen, said in its targets' lines: PER_DISC of
+`pmviewer.photons.virtual.single_step`, and LEAST of `pmviewer.photons.virtual.lights`."""
+CHOSEN_RADIUS = "; the largest radius of cells was chosen with this scene among others"
+CHOSEN_LEAST = "; the least number of trajectories was chosen with this scene"
 AS_SEEN = ", ".join(f"{name}={value}" for name, value in MIDDLES.items())
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 F8 = NDArray[np.float64]
@@ -180,21 +185,25 @@ def targets_of(found: Mapping[str, tuple[float, float, float, float]], name: str
     error, percentile, timed, _ = found["unweighted"]
     single, full, every = found["single step"], found["full path"], found["every vertex"]
     equal, seen = "relMSE at equal number of lights", f"; {AS_SEEN}"
+    radius, least = (CHOSEN_RADIUS, CHOSEN_LEAST) if name == CHOSEN_WITH else ("", "")
+    chosen = {"unweighted": "", "single step": radius}  # all others are by whole paths
     targets = [
-        Target("R10", single[0] / error, 0.05, "", False, f"{name}: single step, {equal}{seen}"),
-        Target("R10", single[2] / timed, 0.1, "", False, f"{name}: single step, relMSE at equal CPU time{seen}"),
-        Target("R10", full[0] / error, 0.1, "", False, f"{name}: full path, {equal}{seen}"),
-        Target("R10", every[0] / error, 0.1, "", False, f"{name}: every vertex, {equal}{seen}"),
+        Target("R10", single[0] / error, 0.05, "", False, f"{name}: single step, {equal}{seen}{radius}"),
+        Target(
+            "R10", single[2] / timed, 0.1, "", False, f"{name}: single step, relMSE at equal CPU time{seen}{radius}"
+        ),
+        Target("R10", full[0] / error, 0.1, "", False, f"{name}: full path, {equal}{seen}{least}"),
+        Target("R10", every[0] / error, 0.1, "", False, f"{name}: every vertex, {equal}{seen}{least}"),
         Target(
             "R10",
             percentile / single[1],
             5.0,
             "×",
             True,
-            f"{name}: single step, 99.9th percentile of the error{seen}{CHOSEN}",
+            f"{name}: single step, 99.9th percentile of the error{seen}{radius}{CHOSEN}",
         ),
     ]
     for estimator in CONVERGING:
-        note = f"{name}: {estimator}, mean of the picture after many passes; {AS_SEEN}"
+        note = f"{name}: {estimator}, mean of the picture after many passes{seen}{chosen.get(estimator, least)}"
         targets.append(Target("R10", abs(found[estimator][3]), 0.5, "%", False, note))
     return targets

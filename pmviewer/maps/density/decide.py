@@ -75,8 +75,3 @@ def sharing(control, n, need, index, rows, count, r2, scratch):
 @device
 def _random(seed, index):
     return unit_float(hash3(seed, _u4(index), _u4(index >> 32)))
-
-
-@device
-def _place(arrivals, i):
-    return (arrivals.photons[i, 0], arrivals.photons[i, 1], arrivals.photons[i, 2])

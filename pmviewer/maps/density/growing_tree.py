@@ -27,7 +27,7 @@ from pmviewer.kernels.memory import (
     store_f4,
     store_i4,
 )
-from pmviewer.maps.density.neighbours8 import neighbours8
+from pmviewer.maps.density.neighbours8 import MEMBER, NEED, ROWS, WORD, X, Y, Z, neighbours8
 from pmviewer.maps.search.k_nearest import keep_nearest
 from pmviewer.maps.search.simd import BLOCK_BYTES, WIDTH, facing8
 from pmviewer.maps.search.stored import ALL_CLASSES
@@ -46,11 +46,8 @@ PLANE, AXIS, CHILD, LEAST = range(NODE_WORDS)
 """Words of a node: the dividing plane float32, of a leaf how many photons it has; its axis, or LEAF; its left child,
 which the right one follows, of a leaf its number; and the float32 that no photon of the subtree needs less than."""
 LEAF = np.int32(-1)
-ROWS = 6
 LEAF_WORDS = ROWS * CAPACITY
-X, Y, Z, WORD, NEED, MEMBER = range(ROWS)
-"""A leaf is made of blocks of eight photons, like a grid's (`pmviewer.maps.search.simd`), with six words each in turn:
-coordinates, direction, required density and number. What is not taken is infinitely far."""
+"""A leaf is made of blocks of eight photons (`pmviewer.maps.density.neighbours8`)."""
 
 _f4 = np.float32
 _i4 = np.int32

@@ -21,8 +21,10 @@ from pmviewer.maps.search.simd import (
     splat,
 )
 
-NEED_ROW = 4
-"""Of a block, that of the required densities."""
+ROWS = 6
+X, Y, Z, WORD, NEED, MEMBER = range(ROWS)
+"""Rows of a block of eight photons, like a grid's (`pmviewer.maps.search.simd`): coordinates, direction, required
+density and number. What is not taken is infinitely far."""
 
 
 def _neighbours8(block, p, n, steepness, r2, ceiling, squared):
@@ -31,7 +33,7 @@ def _neighbours8(block, p, n, steepness, r2, ceiling, squared):
     height = sum(a * c for a, c in zip(d, n))
     counted = np.maximum(sum(a * a for a in d), steepness * height * height)
     squared.view(np.float32)[:WIDTH] = counted
-    return bits_of((counted < r2) & (at_address(block + NEED_ROW * ROW_BYTES, WIDTH, np.float32) <= ceiling))
+    return bits_of((counted < r2) & (at_address(block + NEED * ROW_BYTES, WIDTH, np.float32) <= ceiling))
 
 
 @with_twin(_neighbours8)
@@ -48,7 +50,7 @@ def neighbours8(typingctx, block, p, n, steepness, r2, ceiling, squared):
 
     def codegen(context, builder, sig, args):
         block, p, n, steepness, r2, ceiling, out = args
-        row = [builder.add(block, ir.Constant(block.type, ROW_BYTES * j)) for j in range(NEED_ROW + 1)]
+        row = [builder.add(block, ir.Constant(block.type, ROW_BYTES * j)) for j in range(NEED + 1)]
         normal = [splat(builder, x) for x in cgutils.unpack_tuple(builder, n, 3)]
         d = [
             builder.fsub(load_eight(builder, address), splat(builder, coordinate), flags=FAST)
@@ -60,7 +62,7 @@ def neighbours8(typingctx, block, p, n, steepness, r2, ceiling, squared):
         builder.store(counted, builder.bitcast(out, VECTOR.as_pointer())).align = 4
         mask = builder.and_(
             builder.fcmp_ordered("<", counted, splat(builder, r2)),
-            builder.fcmp_ordered("<=", load_eight(builder, row[NEED_ROW]), splat(builder, ceiling)),
+            builder.fcmp_ordered("<=", load_eight(builder, row[NEED]), splat(builder, ceiling)),
         )
         return builder.zext(builder.bitcast(mask, I8), I32)
 

@@ -27,14 +27,12 @@ from pmviewer.maps.density.growing_tree import (
     CHILD,
     LEAF_WORDS,
     LEAST,
-    NEED,
     NODE_WORDS,
     PLANE,
-    ROWS,
     M,
     add_keys,
 )
-from pmviewer.maps.density.neighbours8 import inside8, neighbours8
+from pmviewer.maps.density.neighbours8 import NEED, ROWS, inside8, neighbours8
 from pmviewer.maps.search.k_nearest import keep_nearest
 from pmviewer.maps.search.simd import BLOCK_BYTES, WIDTH, facing8
 from pmviewer.maps.search.stored import ALL_CLASSES

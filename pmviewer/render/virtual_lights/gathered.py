@@ -4,6 +4,7 @@ A narrow lobe holds few virtual lights, and ΣF/ΣG is the radiance of these few
 follow the lobe. Each is as good as a virtual light at its end that was chosen with the very density that weights divide
 by: it adds the radiance there to ΣF, and to ΣG what it counts. Whatever share n gather rays have in both sums, and the
 lights the rest, the sums keep their means. It is n/(n + IN_A_LOBE), as if so many lights lay in a lobe.
+The mean of ΣF is a little too small beside edges: discs are taken whole there (docs/virtual.md).
 
 The radiance is the density estimate of the nearest photons on that side, the farthest left out, in a disc that shrinks
 as that of the lights does. Where no photon lies within the largest radius, the ray counts nothing: there the lights
