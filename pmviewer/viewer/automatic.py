@@ -44,7 +44,6 @@ class AutomaticRun:
         self.at_start = False
         """Whether scenes that are opened get a trial by themselves, where `display.automatic` is on."""
         self._expected = False
-        self._before: Any = None
 
     @property
     def running(self) -> bool:
@@ -54,7 +53,6 @@ class AutomaticRun:
     def opening(self, *, chosen: bool) -> None:
         """A scene is being opened; `chosen`: with settings that somebody has kept for it."""
         self._expected = self.at_start and not chosen
-        self._before = self._session.opened_scene if self._expected else None
 
     def start(self) -> None:
         """Begin a trial of the open scene, or cancel the one that runs."""
@@ -66,7 +64,7 @@ class AutomaticRun:
         if opened is None:
             self._say("warning", "Open a scene first: automatic mode tries ways of rendering it.")
             return
-        self._expected, self._before = False, None
+        self._expected = False
         self._start(opened, asked=True)
 
     def _start(self, opened: Any, *, asked: bool) -> None:
@@ -116,16 +114,20 @@ class AutomaticRun:
         self._change(dict(choice.values))
 
     def _begin_by_itself(self) -> None:
+        """Frames and states of the scene before may still arrive after it is opened, and a scene that is opened again
+        has their name: only the newest scene's count."""
+        if not self._expected or self.running or not self._session.is_newest:
+            return
         opened, frame, settings = self._session.opened_scene, self._session.frame, self._session.settings
-        if not self._expected or self.running or opened is None or opened is self._before or frame is None:
+        if opened is None or frame is None or frame.coarse or frame.statistics.passes < SEEN:
             return
-        self._before = None  # it would stay in memory
-        if frame.coarse or frame.statistics.passes < SEEN or frame.scene_name != opened.scene.name:
-            return
-        self._expected = False
         from pmviewer.engine.auto.candidates import given
 
-        if settings.display.automatic and not given(settings) and self._session.status.state == "rendering":
+        state = self._session.status.state
+        if state in ("finished", "failed") or not settings.display.automatic or given(settings):
+            self._expected = False
+        elif state == "rendering":
+            self._expected = False
             self._start(opened, asked=False)
 
 

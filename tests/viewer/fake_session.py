@@ -94,6 +94,7 @@ class FakeSession:
         self.traits: SceneTraits | None = None
         self.geometry: Triangles | None = None
         self.frame: Frame | None = None
+        self.is_newest = True
         self.status = Status()
         self.opened_scene = None
         self.loading = ""

@@ -83,13 +83,18 @@ def waiting():
     run = Run(session, None, lambda level, text: None, lambda values: None)
     run.begun, run.at_start = [], True
 
-    def shown(chosen=False, passes=3, **settings):
+    def shown(chosen=False, passes=3, before=(), **settings):
+        """`before`: states while the frame is still the one of the scene before."""
         run.opening(chosen=chosen)
         session.settings = with_values(Settings(), settings)
         session.opened_scene = SimpleNamespace(scene=SimpleNamespace(name="box"))
         statistics = SimpleNamespace(passes=passes)
         session.frame = SimpleNamespace(coarse=False, statistics=statistics, scene_name="box")
-        session.status = Status("rendering", "")
+        session.is_newest = False
+        for state in before:
+            session.status = Status(state, "")
+            run.poll()
+        session.is_newest, session.status = True, Status("rendering", "")
         run.poll()
         return run.begun
 
@@ -99,6 +104,10 @@ def waiting():
 def test_a_trial_begins_once_by_itself(waiting):
     assert waiting() == [False]
     assert waiting() == [False, False]  # another scene
+
+
+def test_what_is_left_of_a_scene_before_begins_no_trial_and_takes_none_away(waiting):
+    assert waiting(before=("finished", "loading", "preparing")) == [False]
 
 
 @pytest.mark.parametrize(
