@@ -10,7 +10,18 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.auto.bias import Bias, Blur, mean_over
-from pmviewer.engine.auto.candidates import CACHE, GATHER, PATH, PROGRESSIVE, assignments, candidates, given
+from pmviewer.engine.auto.candidates import (
+    AIMED,
+    CACHE,
+    GATHER,
+    LIGHTS_CAUSTICS,
+    PATH,
+    PROGRESSIVE,
+    THICKER,
+    assignments,
+    candidates,
+    given,
+)
 from pmviewer.engine.auto.choose import Goal, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.auto.model import error_after, to_error
@@ -38,13 +49,31 @@ PLAIN = SceneTraits(False, True, False, False, 1)
 
 def test_what_traits_rule_out_is_not_tried():
     def names(traits: SceneTraits) -> list[str]:
-        return [c.name for c in candidates(traits, 0.2, 10.0)[0]]
+        return [c.name for c in candidates(traits, Settings(), 10.0)[0]]
 
     assert names(PLAIN) == [PROGRESSIVE.name, GATHER.name, CACHE.name, PATH.name]
     assert PATH.name not in names(replace(PLAIN, has_specular=True))
     assert PATH.name not in names(replace(PLAIN, has_findable_lights=False))
     assert CACHE.name not in names(replace(PLAIN, has_media=True))
     assert names(replace(PLAIN, has_diffuse=False)) == [PROGRESSIVE.name, PATH.name]
+
+
+def test_caustics_are_those_of_lights_unless_that_would_miss_light():
+    """Beside a gather half of the photons are for them, where no medium needs the others. Gather rays go straight
+    through panes that reflect, and would miss what these do with light from diffuse surfaces."""
+
+    def caustics(traits: SceneTraits, glass: str = "exact") -> list[dict[str, object]]:
+        found, _ = candidates(traits, with_values(Settings(), {"render.thin_glass": glass}), 10.0)
+        chosen = [c for c in found if c.name in (PROGRESSIVE.name, GATHER.name)]
+        return [{path: c.values[path] for path in (*LIGHTS_CAUSTICS, *AIMED) if path in c.values} for c in chosen]
+
+    mirrors = replace(PLAIN, has_specular=True)
+    assert caustics(PLAIN) == [{}, {}]
+    assert caustics(mirrors) == [LIGHTS_CAUSTICS, LIGHTS_CAUSTICS | AIMED]
+    assert caustics(replace(mirrors, has_media=True)) == [LIGHTS_CAUSTICS, LIGHTS_CAUSTICS]
+    panes = replace(mirrors, thin_glass=("by setting",))
+    assert caustics(panes, "tinted and reflecting") == [{}, {}]
+    assert caustics(panes, "tinted") == caustics(mirrors)
 
 
 def test_a_user_s_own_settings_of_the_method_are_told():
@@ -208,7 +237,7 @@ def test_without_time_for_a_trial_traits_choose(cornell):
         choice = choose(cornell, Settings(), Goal(seconds=0.01), pool, lambda text, share: None)
     finally:
         pool.close()
-    assert choice.changed == CACHE.values
+    assert choice.changed == {**CACHE.values, **THICKER}
     assert math.isnan(choice.expected)
     assert "too few" in choice.sentences[0]
 

@@ -65,14 +65,14 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     sets itself does not count. Raises Cancelled when the pool is cancelled."""
     base = with_values(settings, assignments({}))
     seconds = goal.seconds or USUAL
-    found, left_out = candidates(opened.traits, base.photons.glossy, seconds)
+    found, left_out = candidates(opened.traits, base, seconds)
     said = [f"not tried: {what}, {why}" for what, why in left_out]
     camera = resolve_camera(opened.scene, base.camera)
     planned = _size(SHARE * seconds, len(found), camera.width, camera.height)
     if planned is None or len(found) == 1:
-        name = _by_traits(opened, base)
+        way = _by_traits(opened, base, found)
         why = "nothing else suits the scene" if len(found) == 1 else f"{seconds:.3g} CPU s are too few for a trial"
-        return Choice(name.name, assignments(name.values), math.nan, 0.0, (f"{name.name}: {why}", *said))
+        return Choice(way.name, assignments(way.values), math.nan, 0.0, (f"{way.name}: {why}", *way.said, *said))
     (width, height), N = planned
     tried = trial(opened, with_values(base, {"photons.N": N}), found, pool, (width, height), SHARE * seconds, tell)
     picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, seconds - tried.cpu_seconds)
@@ -83,17 +83,18 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
         values,
         picked.error,
         picked.seconds,
-        (_sentence(picked, goal), *_reason(picked), *_table(tried, picked), *said),
+        (_sentence(picked, goal), *picked.measured.candidate.said, *_reason(picked), *_table(tried, picked), *said),
         tried,
         bias,
     )
 
 
-def _by_traits(opened: OpenScene, base: Settings) -> Candidate:
-    """Without a trial: in scenes without mirrors and glass the irradiance cache, else the default."""
+def _by_traits(opened: OpenScene, base: Settings, found: list[Candidate]) -> Candidate:
+    """Without a trial: in scenes without mirrors and glass the irradiance cache, else the default method."""
     traits = opened.traits
     plain = not traits.follows(base.photons.glossy) and traits.has_diffuse and not traits.has_media
-    return CACHE if plain and not traits.glossy_roughness else PROGRESSIVE
+    suits = CACHE if plain and not traits.glossy_roughness else PROGRESSIVE
+    return next(candidate for candidate in found if candidate.is_like(suits))
 
 
 def _size(budget: float, count: int, width: int, height: int) -> tuple[tuple[int, int], int] | None:
@@ -143,7 +144,7 @@ def _from_default(option: Option) -> float:
 
 
 def _is_default(option: Option) -> bool:
-    default = option.measured.candidate is PROGRESSIVE and option.widths.alike
+    default = option.measured.candidate.is_like(PROGRESSIVE) and option.widths.alike
     return default and SETTINGS["photons.N"].default == option.N
 
 

@@ -11,7 +11,7 @@ from pmviewer.settings.access import Settings, with_values
 
 def ways(opened: OpenScene, settings: Settings) -> list[Settings]:
     """Settings of every way that a trial of usual length would try."""
-    found, _ = candidates(opened.traits, settings.photons.glossy, USUAL)
+    found, _ = candidates(opened.traits, settings, USUAL)
     return [with_values(settings, assignments(candidate.values)) for candidate in found]
 
 

@@ -230,11 +230,11 @@ def trial(
             tell(f"trying {tried.candidate.name}", number / len(every))
             trier.render(tried, seeds)
     mean = np.mean([image for tried in every for run in tried.runs for image in run.images], axis=0)
-    gathers = next((tried for tried in every if tried.candidate is GATHER), None)
+    gathers = next((tried for tried in every if tried.candidate.is_like(GATHER)), None)
     with_caustics = next((tried for tried in every if tried.caustic), None)
     for tried in every:
         interpolated = 0.0
-        if tried.candidate is CACHE and gathers is not None:
+        if tried.candidate.is_like(CACHE) and gathers is not None:
             interpolated = squared(tried.runs[0].images, gathers.runs[0].images, mean, BLOCK)
         source = tried if tried.caustic or not tried.plan.caustic_mask else with_caustics
         caustic = _widened(source, "caustic", mean, trier.scale) if source is not None else NONE
