@@ -20,7 +20,7 @@ from pmviewer.photons.projection.bounds import MOST_SPHERES, enclosing, spheres_
 from pmviewer.photons.projection.projected import concentric_from_polar
 from pmviewer.photons.projection.projection import projection_of
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
-from pmviewer.scene.description import Disk, Parallelogram, PointLight, Shape, Sphere
+from pmviewer.scene.description import Cylinder, Disk, Parallelogram, PointLight, Shape, Sphere
 from pmviewer.settings.access import Photons
 from tests.support.device import from_python
 from tests.support.light_probe import LEANING, MORE, emit
@@ -180,6 +180,45 @@ def test_mesh_spheres_cover_the_mesh():
     assert gap.min(axis=1).max() <= 1e-12
     center, radius = enclosing(spheres)
     assert np.linalg.norm(points - center, axis=1).max() <= radius
+
+
+def leaning(z: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Two axes across an axis that leans, and that one."""
+    axis = np.array([0.48, 0.6, z]) / np.linalg.norm([0.48, 0.6, z])
+    across = np.cross(axis, [0.0, 0.0, 1.0])
+    across /= np.linalg.norm(across)
+    return across, np.cross(axis, across), axis
+
+
+def round_points(kind: str, u: np.ndarray, v: np.ndarray) -> tuple[object, np.ndarray]:
+    """A shape of that kind, and the points on it by two numbers from 0 to 1 each."""
+    x, y, axis = leaning(-0.64)
+    center, u, v = np.array([0.3, -2.0, 5.0]), u[:, None], v[:, None]
+    circle = np.cos(2 * math.pi * u) * x + np.sin(2 * math.pi * u) * y
+    if kind == "disk":
+        return Disk(tuple(center), tuple(axis), 0.7), center + 0.7 * np.sqrt(v) * circle
+    if kind in ("tall cylinder", "flat cylinder"):
+        height = 3.0 if kind.startswith("tall") else 0.05
+        return Cylinder(tuple(center), tuple(center + height * axis), 0.7), center + 0.7 * circle + v * height * axis
+    if kind == "sphere":
+        z = 2 * v - 1
+        return Sphere(tuple(center), 0.7), center + 0.7 * (np.sqrt(1 - z**2) * circle + z * axis)
+    edges = (2.0 * x, 0.1 * y + 0.5 * x)
+    return Parallelogram(tuple(center), *map(tuple, edges)), center + u * edges[0] + v * edges[1]
+
+
+@pytest.mark.parametrize("kind", ["disk", "tall cylinder", "flat cylinder", "sphere", "sheet"])
+def test_spheres_cover_other_shapes_closely(kind):
+    """Points on the shape, its rims among them, lie in a sphere each; and but for the ball, spheres are far smaller
+    than the shape, so that what they don't cover of a ring's or a sheet's surroundings stays off the map."""
+    u, v = np.random.default_rng(2).random((2, 20_000))
+    v[:4000], u[4000:8000] = np.round(v[:4000]), np.round(u[4000:8000])
+    geometry, points = round_points(kind, u, v)
+    spheres = spheres_of(replace(light_scene(), shapes=(Shape(kind, geometry, 0),)))
+    gap = np.linalg.norm(points[:, None] - spheres[None, :, :3], axis=2) - spheres[None, :, 3]
+    assert gap.min(axis=1).max() <= 1e-9
+    size = np.linalg.norm(points - points.mean(axis=0), axis=1).max()
+    assert spheres[:, 3].max() <= (0.25 if kind != "sphere" else 1.01) * size
 
 
 @kernel

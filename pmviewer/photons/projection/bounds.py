@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.scene.arrays.instances import instance_bounds
-from pmviewer.scene.defaults.framing import bounds
-from pmviewer.scene.description import Mesh, Scene, Shape
+from pmviewer.scene.arrays.texture_coordinates import orthonormal
+from pmviewer.scene.description import Cylinder, Disk, Geometry, Mesh, Parallelogram, Scene, Shape
 
 Float = NDArray[np.float64]
 MOST_SPHERES = 256
 """A mesh of more triangles is cut into so many clusters."""
+PATCHES = 64
+"""Of other surfaces than meshes and spheres."""
 
 
 def spheres_of(scene: Scene, caustic: bool = False) -> Float:
@@ -23,7 +27,7 @@ def spheres_of(scene: Scene, caustic: bool = False) -> Float:
     def counts(shape: Shape) -> bool:
         return not caustic or scene.materials[shape.material].kind != "diffuse"
 
-    every = [_shape(s) for s in scene.shapes if counts(s)]
+    every = [_around(s.geometry) for s in scene.shapes if counts(s)]
     shown = [i for i in scene.instances if any(counts(s) for s in i.group.shapes)]
     if len(shown) > MOST_SPHERES:
         every.append(_box(*instance_bounds(tuple(shown))))
@@ -32,8 +36,55 @@ def spheres_of(scene: Scene, caustic: bool = False) -> Float:
     return np.concatenate(every) if every else np.zeros((0, 4))
 
 
-def _shape(shape: Shape) -> Float:
-    return _mesh(shape.geometry) if isinstance(shape.geometry, Mesh) else _box(*bounds([shape]))
+def _around(geometry: Geometry) -> Float:
+    """Spheres around one shape's surface, not around what it encloses: photons may start in there."""
+    if isinstance(geometry, Mesh):
+        return _mesh(geometry)
+    if isinstance(geometry, Parallelogram):
+        return _plane(geometry)
+    if isinstance(geometry, Cylinder):
+        return _cylinder(geometry)
+    if isinstance(geometry, Disk):
+        return _disk(geometry)
+    return np.array([[*geometry.center, geometry.radius]])
+
+
+def _cells(across: float, along: float) -> tuple[int, int]:
+    """How many cells a sheet of that size has either way, about as long as wide."""
+    n = min(max(round(math.sqrt(PATCHES * across / max(along, 1e-300))), 1), PATCHES)
+    return n, max(PATCHES // n, 1)
+
+
+def _plane(g: Parallelogram) -> Float:
+    u, v = np.array(g.edge_u), np.array(g.edge_v)
+    across, along = _cells(float(np.linalg.norm(u)), float(np.linalg.norm(v)))
+    i, j = np.meshgrid((np.arange(across) + 0.5) / across, (np.arange(along) + 0.5) / along, indexing="ij")
+    centers = np.array(g.corner) + i.reshape(-1, 1) * u + j.reshape(-1, 1) * v
+    halves = u / across / 2, v / along / 2
+    reach = max(np.linalg.norm(halves[0] + halves[1]), np.linalg.norm(halves[0] - halves[1]))
+    return np.column_stack([centers, np.full(len(centers), reach)])
+
+
+def _cylinder(g: Cylinder) -> Float:
+    """A patch's middle is off its corners by a chord of a quarter of its angle's double, and half of its height."""
+    axis = np.subtract(g.p1, g.p0)
+    height = float(np.linalg.norm(axis))
+    around, along = _cells(2 * math.pi * g.radius, height)
+    x, y, _ = orthonormal(axis / height)
+    phi, z = np.meshgrid((np.arange(around) + 0.5) * 2 * math.pi / around, (np.arange(along) + 0.5) / along)
+    phi, z = phi.reshape(-1, 1), z.reshape(-1, 1)
+    centers = np.array(g.p0) + z * axis + g.radius * (np.cos(phi) * x + np.sin(phi) * y)
+    reach = math.hypot(2 * g.radius * math.sin(math.pi / around / 2), height / along / 2)
+    return np.column_stack([centers, np.full(len(centers), reach)])
+
+
+def _disk(g: Disk) -> Float:
+    """Those cells of the square around it that it reaches into."""
+    x, y, _ = orthonormal(np.array(g.normal))
+    corner = np.array(g.center) - g.radius * (x + y)
+    cells = _plane(Parallelogram(tuple(corner), tuple(2 * g.radius * x), tuple(2 * g.radius * y)))
+    near = np.linalg.norm(cells[:, :3] - np.array(g.center), axis=1) < g.radius + cells[:, 3]
+    return cells[near]
 
 
 def enclosing(spheres: Float) -> tuple[Float, float]:

@@ -34,6 +34,7 @@ from pmviewer.photons.projection.projected import (
     WORLD,
 )
 from pmviewer.scene.arrays.flatten import FlatScene
+from pmviewer.scene.arrays.texture_coordinates import orthonormal
 from pmviewer.scene.description import LUMINANCE, DirectionalLight, Environment, PointLight, ProjectorLight, SpotLight
 from pmviewer.scene.emission import spot_solid_angle
 
@@ -161,7 +162,7 @@ def _map_of(scene: FlatScene, light: int, spheres: Float) -> tuple[ProjectionMap
         on = np.ones((ROWS, COLUMNS), np.bool_)
         return ProjectionMap(name, MODES[DISC], on, np.sqrt(u) * radius, np.eye(3), center, share), share
     if isinstance(described, DirectionalLight):
-        axes = frame_of(np.array(described.direction))
+        axes = orthonormal(np.array(described.direction))
         edges = np.sqrt(u) * scene.radius
         on = _places(spheres, scene.center, axes, edges, _slack(scene))
         return _celled(scene, light, PLACES, on, edges, axes, scene.center, 1.0)
@@ -176,7 +177,7 @@ def _map_of(scene: FlatScene, light: int, spheres: Float) -> tuple[ProjectionMap
     mode = WORLD if kind in (K.SPHERE, K.CYLINDER, K.MESH) else DIRECTIONS
     if mode == WORLD and _textured(scene, light):
         return _whole(scene, light)
-    axes = frame_of(axis)
+    axes = orthonormal(axis)
     on = _directions(spheres, origin, reach, axes, edges)
     return _celled(scene, light, mode, on, edges, axes, origin, 4.0 if mode == WORLD else 1.0)
 
@@ -234,14 +235,6 @@ def _extent(scene: FlatScene, light: int) -> tuple[Float, float, Float]:
     points = scene.light_corners[first : first + count].reshape(-1, 3).astype(float)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     return middle, float(np.linalg.norm(points - middle, axis=1).max()), z
-
-
-def frame_of(n: Float) -> Float:
-    """Rows: the two axes of `pmviewer.kernels.vector.basis`, and n."""
-    sign = math.copysign(1.0, np.float32(n[2]))
-    a = -1 / (sign + n[2])
-    b = n[0] * n[1] * a
-    return np.array([[1 + sign * n[0] ** 2 * a, sign * b, -sign * n[0]], [b, sign + n[1] ** 2 * a, -n[1]], n])
 
 
 def spot_edges(light: SpotLight, u: Float) -> Float:
