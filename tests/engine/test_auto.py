@@ -11,7 +11,6 @@ import pytest
 
 from pmviewer.engine.auto.bias import Bias, Blur, mean_over
 from pmviewer.engine.auto.candidates import (
-    AIMED,
     CACHE,
     GATHER,
     LIGHTS_CAUSTICS,
@@ -24,9 +23,10 @@ from pmviewer.engine.auto.candidates import (
 )
 from pmviewer.engine.auto.choose import Goal, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
+from pmviewer.engine.auto.measured import Costs, Measured, Numbers, Widths
 from pmviewer.engine.auto.model import error_after, to_error
 from pmviewer.engine.auto.relative import difference, squared
-from pmviewer.engine.auto.trial import RARE, Costs, Measured, Widths, trial
+from pmviewer.engine.auto.trial import RARE, trial
 from pmviewer.engine.auto.widths import Tried, told_by
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
@@ -59,18 +59,18 @@ def test_what_traits_rule_out_is_not_tried():
 
 
 def test_caustics_are_those_of_lights_unless_that_would_miss_light():
-    """Beside a gather half of the photons are for them, where no medium needs the others. Gather rays go straight
-    through panes that reflect, and would miss what these do with light from diffuse surfaces."""
+    """Gather rays go straight through panes that reflect, and would miss what these do with light from diffuse
+    surfaces; in media they find it badly."""
 
     def caustics(traits: SceneTraits, glass: str = "exact") -> list[dict[str, object]]:
         found, _ = candidates(traits, with_values(Settings(), {"render.thin_glass": glass}), 10.0)
         chosen = [c for c in found if c.name in (PROGRESSIVE.name, GATHER.name)]
-        return [{path: c.values[path] for path in (*LIGHTS_CAUSTICS, *AIMED) if path in c.values} for c in chosen]
+        return [{path: c.values[path] for path in LIGHTS_CAUSTICS if path in c.values} for c in chosen]
 
     mirrors = replace(PLAIN, has_specular=True)
     assert caustics(PLAIN) == [{}, {}]
-    assert caustics(mirrors) == [LIGHTS_CAUSTICS, LIGHTS_CAUSTICS | AIMED]
-    assert caustics(replace(mirrors, has_media=True)) == [LIGHTS_CAUSTICS, LIGHTS_CAUSTICS]
+    assert caustics(mirrors) == [LIGHTS_CAUSTICS, LIGHTS_CAUSTICS]
+    assert caustics(replace(mirrors, has_media=True)) == [LIGHTS_CAUSTICS, {}]
     panes = replace(mirrors, thin_glass=("by setting",))
     assert caustics(panes, "tinted and reflecting") == [{}, {}]
     assert caustics(panes, "tinted") == caustics(mirrors)
@@ -95,16 +95,16 @@ def test_what_the_model_promises_is_what_sums_over_passes_say():
     noise = 0.02 / 20**1.25 + (looked_up + 7.0) / 50_000 / 20
     blurred = 1e-4 * 2**3 * (sum(a**0.75 for a in areas) / 20) ** 2
     blurred += 3e-4 / 4 * (sum(a**0.5 for a in areas) / 20) ** 2
-    assert error_after(m, 50_000, widths, 20) == pytest.approx(noise + blurred, rel=1e-6)
+    assert error_after(m, Numbers(50_000, widths), 20) == pytest.approx(noise + blurred, rel=1e-6)
     seconds = 20 * (0.1 + 50_000 * (1e-6 + 4 * 2e-6))
-    assert to_error(m, 50_000, widths, noise + blurred).seconds == pytest.approx(seconds, rel=1e-3)
+    assert to_error(m, Numbers(50_000, widths), noise + blurred).seconds == pytest.approx(seconds, rel=1e-3)
 
 
 def test_a_radius_that_may_never_get_there_is_expected_to_take_longer():
     """Of two radii of the same promise, the one whose bias alone comes near the error."""
     blur = Bias(caustic=Blur(8e-3, 0.65))
     m = Measured(PROGRESSIVE, Costs(0.05, 1e-6), eye=0.01, caustic=300.0, bias=blur)
-    every = [to_error(m, 200_000, Widths(caustic=width), 5e-3) for width in (0.7, 0.35)]
+    every = [to_error(m, Numbers(200_000, Widths(caustic=width)), 5e-3) for width in (0.7, 0.35)]
     assert every[0].seconds < 2 * every[1].seconds
     wide, narrow = (option.expected / option.seconds for option in every)
     assert narrow < 1.1 < 1.4 < wide

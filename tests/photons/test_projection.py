@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pmviewer.engine.auto.measured import Numbers
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.stages.projection import projection_for
 from pmviewer.kernels.compile.jit import kernel
@@ -180,6 +181,21 @@ def test_mesh_spheres_cover_the_mesh():
     assert gap.min(axis=1).max() <= 1e-12
     center, radius = enclosing(spheres)
     assert np.linalg.norm(points - center, axis=1).max() <= radius
+
+
+@pytest.mark.parametrize("q", [0.5, 0.125])
+def test_photons_aimed_at_caustics_are_as_many_as_the_trial_reckons(q):
+    """Squared powers of a light's caustic photons, the variance of a sum of them, fall by what automatic mode expects
+    of q: with all trajectories filling both maps against q of them, by the share of the light that is covered."""
+    flat = flatten(lit("point"))
+    projection = projection_of(flat)
+    everywhere = trace(flat, projection_of(flat, with_caustics=False), N=200_000, q=1.0, sequence="independent")
+    aimed = trace(flat, projection, N=200_000, q=q, sequence="independent", seed=2)
+    (_, before, many), (_, after, more) = (caustic_power(maps, CAUSTIC) for maps in (everywhere, aimed))
+    expected = Numbers(1, q=q).aimed(projection.caustic_power / projection.surface_power)
+    print(f"q {q}: {many} and {more} photons, variance {(before / after) ** 2:.2f} times less, expected {expected:.2f}")
+    assert expected > 5
+    assert (before / after) ** 2 == pytest.approx(expected, rel=0.1)
 
 
 def leaning(z: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

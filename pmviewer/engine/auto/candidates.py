@@ -38,11 +38,8 @@ LIGHTS_CAUSTICS = {"photons.indirect_caustics": False}
 """The caustic map holds light straight from lights over mirrors and glass (Jensen's LS⁺D). What diffuse surfaces send
 there is broad and dim: as caustics it has their small radius, and few bright photons. relMSE after 2.5 CPU s over that
 with all of it in the caustic map, progressive: 0.79 in cornell_caustic, 0.94 in museum, 1.0 in cornell_glossy and
-glass_egg; gather with the cache: 0.45, 0.64, 0.53, 0.87, office 0.81."""
-AIMED = {"photons.q": 0.5}
-"""Beside a gather, whose global map does with fewer photons: half of the trajectories start towards mirrors and glass.
-In the same scenes and order 0.85, 0.85, 0.87, 1.0, office 1.0 of what is left; 0.25 does as well. Where the global map
-is shown it costs more than it brings."""
+glass_egg; gather with the cache: 0.45, 0.64, 0.53, 0.87, office 0.81. Within media a gather does worse: 1.4 in
+marble."""
 THICKER = {"estimate.flatness": 0.3}
 """Beside a gather, whose rays average what they meet: photons of the next wall or facet make up for what a disc has
 beyond the edge. relMSE after 12 passes over that of thin discs: 0.53 in cornell_fractal, 0.97 in cornell_diffuse and
@@ -73,19 +70,21 @@ def candidates(
     reason. `settings` tell what automatic mode does not set."""
     left_out: list[tuple[str, str]] = []
     glossy = SETTINGS["photons.glossy"].default
-    shown, gathered = _caustics(traits, settings, glossy)
-    progressive = PROGRESSIVE.having(shown, *_why(shown))
+    caustics, why = _caustics(traits, settings)
+    progressive = PROGRESSIVE.having(caustics, *why)
     if not traits.stores(glossy):
         left_out.append(("gather", "no surface stores photons"))
         return [progressive, *_paths(traits, left_out)], left_out
-    gathered_too = GATHER.having({**gathered, **THICKER}, *_why(gathered))
-    found = [progressive, gathered_too]
+    gather, cache = (way.having(THICKER) for way in (GATHER, CACHE))
+    if not traits.has_media:
+        gather, cache = (way.having(caustics, *why) for way in (gather, cache))
+    found = [progressive, gather]
     if traits.has_media:
         left_out.append(("irradiance cache", "it does not know of media"))
     elif not traits.has_diffuse:
         left_out.append(("irradiance cache", "no diffuse surface"))
     else:
-        found.append(CACHE.having({**gathered, **THICKER}, *_why(gathered)))
+        found.append(cache)
     if traits.n_lights < MANY_LIGHTS:
         left_out.append(("importance", f"fewer than {MANY_LIGHTS} lights: photons reach what the camera sees"))
     elif seconds < GUIDED_FROM or traits.has_media:
@@ -95,26 +94,17 @@ def candidates(
     return [*found, *_paths(traits, left_out)], left_out
 
 
-def _caustics(traits: SceneTraits, settings: Settings, glossy: float) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-    """What else is set where the global map is shown, and beside a gather, for the sake of caustics."""
-    if not traits.follows(glossy):
-        return {}, {}
+def _caustics(traits: SceneTraits, settings: Settings) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    """What else is set for the sake of caustics, and why."""
+    if not traits.follows(SETTINGS["photons.glossy"].default):
+        return {}, ()
     if REFLECTING in thin_rules(with_values(settings, dict(GATHER.values)), traits):
-        return {}, {}  # gather rays go straight through: only the caustic map has what it reflects
-    return LIGHTS_CAUSTICS, LIGHTS_CAUSTICS if traits.has_media else {**LIGHTS_CAUSTICS, **AIMED}
-
-
-def _why(values: Mapping[str, Any]) -> list[str]:
-    """Sentences on these."""
-    lines = []
-    if LIGHTS_CAUSTICS.items() <= values.items():
-        lines.append(
-            "caustics: straight from lights; what diffuse surfaces send over mirrors and glass is looked up with the "
-            "indirect light (photons.indirect_caustics)"
-        )
-    if AIMED.items() <= values.items():
-        lines.append(f"one of {1 / AIMED['photons.q']:g} photons starts for the caustic map alone (photons.q)")
-    return lines
+        return {}, ()  # gather rays go straight through: only the caustic map has what it reflects
+    why = (
+        "caustics: straight from lights (photons.indirect_caustics off); what diffuse surfaces send over mirrors and "
+        "glass is looked up as indirect light"
+    )
+    return LIGHTS_CAUSTICS, (why,)
 
 
 def _paths(traits: SceneTraits, left_out: list[tuple[str, str]]) -> list[Candidate]:

@@ -9,8 +9,9 @@ from typing import Any
 
 from pmviewer.engine.auto.bias import Bias, way_of
 from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, Candidate, assignments, candidates
-from pmviewer.engine.auto.model import FEWEST, Option, bias_of, in_time, numbers, to_error
-from pmviewer.engine.auto.trial import AUTOMATIC, Tell, Trial, Widths, trial
+from pmviewer.engine.auto.measured import Numbers, Widths
+from pmviewer.engine.auto.model import FEWEST, Option, bias_of, in_time, numbers_for, to_error
+from pmviewer.engine.auto.trial import Tell, Trial, trial
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.render.camera import resolve_camera
@@ -76,7 +77,7 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     (width, height), N = planned
     tried = trial(opened, with_values(base, {"photons.N": N}), found, pool, (width, height), SHARE * seconds, tell)
     picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, seconds - tried.cpu_seconds)
-    values, bias = assignments(_values(picked, base)), bias_of(picked.measured, picked.widths)
+    values, bias = assignments(_values(picked, base)), bias_of(picked.measured, picked.numbers.widths)
     opened.biases[way_of(with_values(base, values))] = bias  # whoever renders so knows it
     return Choice(
         picked.name,
@@ -114,7 +115,7 @@ def _size(budget: float, count: int, width: int, height: int) -> tuple[tuple[int
 
 def _by_time(tried: Trial, seconds: float) -> Option:
     """The least error after that time; the default unless another is clearly better."""
-    every = [in_time(m, N, widths, seconds) for m in tried.measured for N, widths in numbers(m)]
+    every = [in_time(m, numbers, seconds) for m in tried.measured for numbers in numbers_for(m)]
     enough = [option for option in every if option.passes >= FEWEST]
     if not enough:
         return max(every, key=lambda option: option.passes)
@@ -123,7 +124,7 @@ def _by_time(tried: Trial, seconds: float) -> Option:
 
 def _by_error(tried: Trial, error: float) -> Option:
     """The least time that is expected to that error; where none reaches it, what comes nearest in a long time."""
-    every = [to_error(m, N, widths, error) for m in tried.measured for N, widths in numbers(m)]
+    every = [to_error(m, numbers, error) for m in tried.measured for numbers in numbers_for(m)]
     reached = [o for o in every if math.isfinite(o.seconds)]
     return _picked(reached, lambda option: option.expected) if reached else _by_time(tried, 1000.0)
 
@@ -139,27 +140,30 @@ def _picked(found: list[Option], of: Callable[[Option], float]) -> Option:
 
 
 def _from_default(option: Option) -> float:
-    widths = abs(math.log(option.widths.caustic)) + abs(math.log(option.widths.shown))
-    return abs(math.log(option.N / float(SETTINGS["photons.N"].default))) + 2 * widths
+    N, widths, q = option.numbers.N, option.numbers.widths, option.numbers.q
+    off = abs(math.log(N / float(SETTINGS["photons.N"].default))) + abs(math.log(q))
+    return off + 2 * (abs(math.log(widths.caustic)) + abs(math.log(widths.shown)))
 
 
 def _is_default(option: Option) -> bool:
-    default = option.measured.candidate.is_like(PROGRESSIVE) and option.widths.alike
-    return default and SETTINGS["photons.N"].default == option.N
+    usual = Numbers(SETTINGS["photons.N"].default)
+    return option.measured.candidate.is_like(PROGRESSIVE) and option.numbers == usual
 
 
 def _values(picked: Option, base: Settings) -> dict[str, Any]:
     """The settings that the option stands for."""
-    values = dict(picked.measured.candidate.values)
+    values, numbers = dict(picked.measured.candidate.values), picked.numbers
     with_photons = with_values(base, assignments(values))
-    if with_photons.render.method != "path" and SETTINGS["photons.N"].default != picked.N:
-        values["photons.N"] = picked.N
-    return values | picked.widths.values(with_photons, picked.measured.radius)
+    if with_photons.render.method != "path":
+        values |= {"photons.N": numbers.N, "photons.q": numbers.q}
+    return values | numbers.widths.values(with_photons, picked.measured.radius)
 
 
 def _sentence(picked: Option, goal: Goal) -> str:
-    width = "" if picked.widths.alike else f", {_in_words(picked.widths)}"
-    photons = f", N = {picked.N:,}" if picked.measured.photons > 0 else ""
+    numbers = picked.numbers
+    width = "" if numbers.widths.alike else f", {_in_words(numbers.widths)}"
+    photons = f", N = {numbers.N:,}" if picked.measured.photons > 0 else ""
+    photons += f", q = {numbers.q:g}" if numbers.q != 1.0 else ""
     if goal.error and math.isfinite(picked.seconds):
         promise = f"relMSE {goal.error:.2g} expected after {picked.seconds:.3g} CPU s"
     else:
@@ -176,12 +180,12 @@ def _in_words(widths: Widths) -> str:
 
 def _reason(picked: Option) -> list[str]:
     """Why other radii than the automatic ones."""
-    if picked.widths.alike or not math.isfinite(picked.seconds):
+    if picked.numbers.widths.alike or not math.isfinite(picked.seconds):
         return []
     m, lines = picked.measured, list[str]()
-    usual = in_time(m, picked.N, AUTOMATIC, picked.seconds)
+    usual = in_time(m, Numbers(picked.numbers.N, q=picked.numbers.q), picked.seconds)
     for what, option in (("the automatic radius", usual), ("this one", picked)):
-        bias2 = float(bias_of(m, option.widths)(max(option.passes, 1.0)))
+        bias2 = float(bias_of(m, option.numbers.widths)(max(option.passes, 1.0)))
         lines.append(f"{what}: relMSE {option.error:.2g} in that time, {bias2:.2g} of it bias")
     return lines
 
@@ -191,8 +195,8 @@ def _table(tried: Trial, picked: Option) -> list[str]:
     lines = []
     for m in tried.measured:
         if math.isfinite(picked.seconds):
-            every = [in_time(m, N, widths, picked.seconds) for N, widths in numbers(m)]
+            every = [in_time(m, numbers, picked.seconds) for numbers in numbers_for(m)]
             best = min((o for o in every if o.passes >= 1), default=every[0], key=lambda o: o.error)
-            lines.append(f"tried {m.candidate.name}: relMSE {best.error:.2g} with N = {best.N:,} in that time")
+            lines.append(f"tried {m.candidate.name}: relMSE {best.error:.2g} with N = {best.numbers.N:,} in that time")
     lines.append(f"trial: {tried.pixels:,} pixels, {tried.seeds} seeds, {tried.cpu_seconds:.2g} CPU s")
     return lines

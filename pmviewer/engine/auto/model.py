@@ -1,8 +1,9 @@
-"""What the trial's figures promise for a given time: error over N, radii and passes.
+"""What the trial's figures promise for a given time: error over N, radii, q and passes.
 
 The variance of the mean of n passes is that of the camera rays, whose numbers complement one another from pass to pass,
 eye/n^1.25, plus the photons' part, which falls as 1/n. Where look-ups shrink, the photons' variance in pass i goes with
-r²₁/r²ᵢ, as for Knaus & Zwicker 2011, and bias with a power of rᵢ/r₁ that the trial has measured.
+r²₁/r²ᵢ, as for Knaus & Zwicker 2011, and bias with a power of rᵢ/r₁ that the trial has measured. Of N trajectories
+q·N fill both maps and the others the caustic map alone, in the share of the light that projection maps leave them.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from pmviewer.engine.auto.bias import Bias, mean_over
-from pmviewer.engine.auto.trial import AUTOMATIC, Measured, Widths
+from pmviewer.engine.auto.measured import Measured, Numbers, Widths
 
 PHOTONS = (12_500, 25_000, 50_000, 100_000, 150_000, 200_000, 300_000, 600_000, 1_200_000, 2_400_000)
 COMPLEMENT = 1.25
@@ -23,6 +24,8 @@ COMPLEMENT = 1.25
 CAUSTIC_WIDTHS = (0.25, 8**-0.5, 0.5, 2**-0.5, 1.0, 2**0.5, 2.0)
 SHOWN_WIDTHS = (0.5, 2**-0.5, 1.0, 2**0.5, 2.0)
 """Radii that are tried, relative to the automatic one."""
+SHARES = (1.0, 0.5, 0.25, 0.125)
+"""Values of q that are tried where there are caustics."""
 UNSURE = (2 / 3, 1.0), (1 / 6, 0.5), (1 / 6, 2.0)
 """Weights and factors of what the squared bias may be, the likely one first: Gauss and Hermite's three points of
 a logarithm with a standard deviation of 0.4. (Eight trials of ring_caustic said 0.45 to 1 of it, sixteen of
@@ -44,8 +47,7 @@ class Option:
     where they never get there."""
 
     measured: Measured
-    N: int
-    widths: Widths
+    numbers: Numbers
     passes: float
     error: float
     seconds: float
@@ -57,12 +59,12 @@ class Option:
         return self.measured.candidate.name
 
 
-def error_after(m: Measured, N: int, widths: Widths, passes: Any) -> Any:
-    """relMSE after that many passes, a number or an array, of N trajectories with such radii."""
-    n = np.asarray(passes, float)
-    looked_up = m.caustic / widths.caustic**2 + m.shown / widths.shown**2
-    photons = (looked_up * mean_over(n, -2.0) if looked_up else 0.0) + m.gathered
-    return m.eye / n**COMPLEMENT + photons / N / n + bias_of(m, widths)(n)
+def error_after(m: Measured, numbers: Numbers, passes: Any) -> Any:
+    """relMSE after that many passes, a number or an array."""
+    n, widths = np.asarray(passes, float), numbers.widths
+    looked_up = m.caustic / (widths.caustic**2 * numbers.aimed(m.covered)) + m.shown / (widths.shown**2 * numbers.q)
+    photons = (looked_up * mean_over(n, -2.0) if looked_up else 0.0) + m.gathered / numbers.q
+    return m.eye / n**COMPLEMENT + photons / numbers.N / n + bias_of(m, widths)(n)
 
 
 def bias_of(m: Measured, widths: Widths) -> Bias:
@@ -71,38 +73,39 @@ def bias_of(m: Measured, widths: Widths) -> Bias:
     return Bias(bias.caustic.wider(widths.caustic), bias.shown.wider(widths.shown), bias.interpolated)
 
 
-def numbers(m: Measured) -> list[tuple[int, Widths]]:
-    """All N and radii that are worth a thought for one candidate."""
+def numbers_for(m: Measured) -> list[Numbers]:
+    """All that are worth a thought for one candidate."""
     if m.photons <= 0:
-        return [(PHOTONS[4], AUTOMATIC)]
+        return [Numbers(PHOTONS[4])]
     shown = SHOWN_WIDTHS if m.shown > 0 else (1.0,)
     if m.caustic > 0:
         widths = [Widths(c, s) for c, s in itertools.product(CAUSTIC_WIDTHS, shown)]
     else:  # without caustics their radius goes with the other
         widths = [Widths(s, s) for s in shown]
-    return list(itertools.product(PHOTONS, widths))
+    shares = SHARES if m.caustic > 0 and m.covered > 0 else (1.0,)
+    return [Numbers(N, w, q) for N, w, q in itertools.product(PHOTONS, widths, shares)]
 
 
-def in_time(m: Measured, N: int, widths: Widths, seconds: float) -> Option:
+def in_time(m: Measured, numbers: Numbers, seconds: float) -> Option:
     """With the error after that many CPU seconds."""
-    passes = min(seconds / max(m.costs.of(N, widths), 1e-6), float(MOST))
-    return Option(m, N, widths, passes, float(error_after(m, N, widths, max(passes, 1.0))), seconds)
+    passes = min(seconds / max(m.cost(numbers), 1e-6), float(MOST))
+    return Option(m, numbers, passes, float(error_after(m, numbers, max(passes, 1.0))), seconds)
 
 
-def to_error(m: Measured, N: int, widths: Widths, error: float) -> Option:
+def to_error(m: Measured, numbers: Numbers, error: float) -> Option:
     """With the CPU seconds to that error, infinitely many where it is never reached."""
-    seconds = _seconds_to(m, N, widths, error)
+    seconds = _seconds_to(m, numbers, error)
     likely = seconds[0]
-    passes = likely / m.costs.of(N, widths) if math.isfinite(likely) else math.inf
+    passes = likely / m.cost(numbers) if math.isfinite(likely) else math.inf
     expected = sum(w * min(s, MISSED * likely) for (w, _), s in zip(UNSURE, seconds, strict=True))
-    return Option(m, N, widths, passes, error, likely, expected)
+    return Option(m, numbers, passes, error, likely, expected)
 
 
-def _seconds_to(m: Measured, N: int, widths: Widths, error: float) -> list[float]:
+def _seconds_to(m: Measured, numbers: Numbers, error: float) -> list[float]:
     """CPU seconds to that error, for each of the biases that `UNSURE` tells."""
-    bias = bias_of(m, widths)(_PASSES)
-    noise = error_after(m, N, widths, _PASSES) - bias
-    return [m.costs.of(N, widths) * _passes_to(error, noise + factor * bias) for _, factor in UNSURE]
+    bias = bias_of(m, numbers.widths)(_PASSES)
+    noise = error_after(m, numbers, _PASSES) - bias
+    return [m.cost(numbers) * _passes_to(error, noise + factor * bias) for _, factor in UNSURE]
 
 
 def _passes_to(error: float, errors: Any) -> float:

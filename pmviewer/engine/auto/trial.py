@@ -14,12 +14,12 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.candidates import CACHE, GATHER, Candidate, assignments
+from pmviewer.engine.auto.measured import Costs, Measured, Widths
 from pmviewer.engine.auto.relative import F8, squared, variance
 from pmviewer.engine.auto.widths import NONE, WIDER, Tried, Widened, told_by
 from pmviewer.engine.method import Plan, plan_of
@@ -28,6 +28,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.radius import first_radius
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.stages.projection import projection_for
 from pmviewer.engine.store import StageStore
 from pmviewer.render.camera import resolve_camera
 from pmviewer.render.planes import beauty_of
@@ -47,69 +48,6 @@ with two radii have the same photons and camera rays, and little noise in their 
 SEEDS = ((7_919, 104_729), (1_299_709, 15_485_863), (32_452_843, 49_979_687))
 """Added to the picture's seed; the second pair where a trial that is twice as long still fits, and so on."""
 STORE = 1 << 28
-
-
-@dataclass(frozen=True)
-class Widths:
-    """Radii relative to the automatic ones: of look-ups in the caustic map, and in the global one where it is shown."""
-
-    caustic: float = 1.0
-    shown: float = 1.0
-
-    @property
-    def alike(self) -> bool:
-        """Whether they are the automatic ones."""
-        return self.caustic == self.shown == 1.0
-
-    def values(self, settings: Settings, radius: float) -> dict[str, Any]:
-        """The settings that they stand for, where the automatic radius is that, relative to the scene."""
-        found: dict[str, Any] = {}
-        if self.shown != 1.0:
-            found["estimate.radius"] = float(f"{min(max(radius * self.shown, 1e-7), 10.0):.4g}")
-        if self.caustic != self.shown:
-            share = settings.estimate.caustic_radius * self.caustic / self.shown
-            found["estimate.caustic_radius"] = float(f"{min(max(share, 0.05), 2.0):.4g}")
-        return found
-
-
-AUTOMATIC = Widths()
-
-
-@dataclass(frozen=True)
-class Costs:
-    """CPU seconds of a pass of the whole picture: `base`, and `light`, `caustic` and `shown` per trajectory. The latter
-    two, of look-ups, go with their areas."""
-
-    base: float
-    light: float
-    caustic: float = 0.0
-    shown: float = 0.0
-
-    def of(self, N: int, widths: Widths) -> float:
-        """Of a pass of N trajectories."""
-        look_up = self.caustic * widths.caustic**2 + self.shown * widths.shown**2
-        return self.base + N * (self.light + look_up)
-
-
-@dataclass(frozen=True)
-class Measured:
-    """Relative variances of a pass: `eye` what photons don't decide; of one trajectory, `caustic` what look-ups of
-    caustics decide, `shown` those of a global map that is shown, `gathered` the rest. `bias`: of the first pass.
-    `radius`: of the first pass, relative to the scene."""
-
-    candidate: Candidate
-    costs: Costs
-    eye: float
-    caustic: float = 0.0
-    shown: float = 0.0
-    gathered: float = 0.0
-    bias: Bias = field(default_factory=Bias)
-    radius: float = 0.0
-
-    @property
-    def photons(self) -> float:
-        """Variance of one trajectory's."""
-        return self.caustic + self.shown + self.gathered
 
 
 @dataclass
@@ -229,6 +167,7 @@ def trial(
         for number, tried in enumerate(every):
             tell(f"trying {tried.candidate.name}", number / len(every))
             trier.render(tried, seeds)
+    covered = _covered(opened, trier.settings_of(every[0].candidate))
     mean = np.mean([image for tried in every for run in tried.runs for image in run.images], axis=0)
     gathers = next((tried for tried in every if tried.candidate.is_like(GATHER)), None)
     with_caustics = next((tried for tried in every if tried.caustic), None)
@@ -242,10 +181,18 @@ def trial(
             caustic = caustic.wider(tried.radius / source.radius)
         shown = _widened(tried, "shown", mean, trier.scale)
         bias = Bias(caustic.blur, shown.blur, interpolated)
-        result.measured.append(_measured(tried, (caustic, shown), bias, mean, trier.scale))
+        measured = _measured(tried, (caustic, shown), bias, mean, trier.scale)
+        guided = tried.plan.emission != "off"  # all of its photons fill both maps
+        result.measured.append(measured if guided else replace(measured, covered=covered))
     result.seeds = len(every[0].runs[0].images)
     result.seconds, result.cpu_seconds = time.perf_counter() - started, pool.cpu_seconds - before
     return result
+
+
+def _covered(opened: OpenScene, settings: Settings) -> float:
+    """Share of the light that photons for the caustic map alone would start in."""
+    made = projection_for(opened, with_values(settings, {"photons.q": 0.5}))
+    return min(made.caustic_power / made.surface_power, 1.0) if made is not None else 1.0
 
 
 def _either(name: str) -> list[Widths]:
@@ -287,14 +234,16 @@ def _costs(runs: list[_Run], look_ups: tuple[float, float], scale: float) -> Cos
     if len(runs) == 1:
         return Costs(scale * sum(many.stages.values()), 0.0)
     few = runs[1]
-    base = light = in_camera = 0.0
+    base = light = stored = in_camera = 0.0
     for name, spent in many.stages.items():
         slope = min(max(spent - few.stages.get(name, 0.0), 0.0) / (many.N - few.N), spent / many.N)
         fixed = spent - slope * many.N
         if name == "camera pass":
             base, in_camera = base + scale * fixed, in_camera + scale * slope
-        else:
+        elif name == "light pass":
             base, light = base + fixed, light + slope
+        else:
+            base, stored = base + fixed, stored + slope
     fitting = min(1.0, in_camera / sum(look_ups)) if sum(look_ups) > 0 else 0.0
     caustic, shown = (fitting * cost for cost in look_ups)
-    return Costs(base, light + in_camera - caustic - shown, caustic, shown)
+    return Costs(base, light, caustic, shown, stored + in_camera - caustic - shown)

@@ -1,0 +1,96 @@
+"""What a trial has measured of a candidate, and the numbers that it may be rendered with: what a pass costs, how much
+passes differ by chance, and by how much they are wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from pmviewer.engine.auto.bias import Bias
+from pmviewer.engine.auto.candidates import Candidate
+from pmviewer.settings.access import Settings
+
+
+@dataclass(frozen=True)
+class Widths:
+    """Radii relative to the automatic ones: of look-ups in the caustic map, and in the global one where it is shown."""
+
+    caustic: float = 1.0
+    shown: float = 1.0
+
+    @property
+    def alike(self) -> bool:
+        """Whether they are the automatic ones."""
+        return self.caustic == self.shown == 1.0
+
+    def values(self, settings: Settings, radius: float) -> dict[str, Any]:
+        """The settings that they stand for, where the automatic radius is that, relative to the scene."""
+        found: dict[str, Any] = {}
+        if self.shown != 1.0:
+            found["estimate.radius"] = float(f"{min(max(radius * self.shown, 1e-7), 10.0):.4g}")
+        if self.caustic != self.shown:
+            share = settings.estimate.caustic_radius * self.caustic / self.shown
+            found["estimate.caustic_radius"] = float(f"{min(max(share, 0.05), 2.0):.4g}")
+        return found
+
+
+AUTOMATIC = Widths()
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """N trajectories, of which the share q fills the global map, too, and the radii."""
+
+    N: int
+    widths: Widths = AUTOMATIC
+    q: float = 1.0
+
+    def aimed(self, covered: float) -> float:
+        """Light's caustics by so many times as many photons as with q = 1, where those for the caustic map alone start
+        in this share of the light (`pmviewer.photons.light_pass.plan`: a + b)."""
+        return self.q + (1.0 - self.q) / covered if covered > 0 else 1.0
+
+
+@dataclass(frozen=True)
+class Costs:
+    """CPU seconds of a pass of the whole picture: `base`, and per trajectory `light`, `stored`, what goes with the
+    global map's photons, and `caustic` and `shown`, of look-ups, which go with their areas, too."""
+
+    base: float
+    light: float
+    caustic: float = 0.0
+    shown: float = 0.0
+    stored: float = 0.0
+
+    def of(self, numbers: Numbers, covered: float = 0.0) -> float:
+        """Of a pass."""
+        widths, q = numbers.widths, numbers.q
+        look_up = self.caustic * widths.caustic**2 * numbers.aimed(covered) + self.shown * widths.shown**2 * q
+        return self.base + numbers.N * (self.light + self.stored * q + look_up)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Relative variances of a pass: `eye` what photons don't decide; of one trajectory, `caustic` what look-ups of
+    caustics decide, `shown` those of a global map that is shown, `gathered` the rest. `bias`: of the first pass.
+    `radius`: of the first pass, relative to the scene. `covered`: share of the light that photons for the caustic map
+    alone start in, 0 where there are none."""
+
+    candidate: Candidate
+    costs: Costs
+    eye: float
+    caustic: float = 0.0
+    shown: float = 0.0
+    gathered: float = 0.0
+    bias: Bias = field(default_factory=Bias)
+    radius: float = 0.0
+    covered: float = 0.0
+
+    def cost(self, numbers: Numbers) -> float:
+        """CPU seconds of a pass of the whole picture."""
+        return self.costs.of(numbers, self.covered)
+
+    @property
+    def photons(self) -> float:
+        """Variance of one trajectory's."""
+        return self.caustic + self.shown + self.gathered
