@@ -59,6 +59,7 @@ PRESETS: tuple[Preset, ...] = (
         "final gather along the hemisphere grid, projection maps, shadow photons.",
         {
             "render.method": "gather",
+            "photons.indirect_caustics": False,
             "photons.N": 200_000,
             "photons.renew": "once",
             "photons.sequence": "independent",
@@ -77,6 +78,7 @@ PRESETS: tuple[Preset, ...] = (
         "final gather into the nearest of those.",
         {
             "render.method": "gather",
+            "photons.indirect_caustics": False,
             "photons.renew": "once",
             "estimate.lookup": "nearest",
             "estimate.k": 50,
@@ -102,6 +104,7 @@ PRESETS: tuple[Preset, ...] = (
         "power of others redistributed; M_r 2 for the global and 25 for the caustic map.",
         {
             "render.method": "gather",
+            "photons.indirect_caustics": False,
             "importance.map": "average",
             "importance.deposition": "density control",
             "importance.around": "nearest",
@@ -132,6 +135,7 @@ PRESETS: tuple[Preset, ...] = (
         "eight, gather rays guided by cones around photons.",
         {
             "render.method": "gather",
+            "photons.indirect_caustics": False,
             "photons.renew": "once",
             "estimate.lookup": "nearest",
             "estimate.k": 50,
