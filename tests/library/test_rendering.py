@@ -247,6 +247,7 @@ def test_a_saved_session_opens_to_the_same_picture(tmp_path):
         s.render(passes=1).save(tmp_path / "other.toml")
 
 
+@pytest.mark.usefixtures("every_path_may_split")
 def test_frames_are_written_with_all_layers(box, tmp_path):
     frame = box.render(passes=1)
     frame.save(tmp_path / "box.exr")
