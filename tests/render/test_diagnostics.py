@@ -136,7 +136,7 @@ def test_radiance_photons_are_the_nearest_and_nothing_is_filled_in(box, pool):
 def test_skipped_shadow_rays_are_those_that_the_pass_skips(box, pool):
     """Over all pixels the shares agree with the counts of the passes; all is skipped far from the shadow's edge, where
     the lamp does not graze the walls and photons are enough."""
-    values = {**GATHER, "direct.shadow_photons": True, "direct.shadow_N": 20_000, "photons.N": 500}
+    values = {"direct.shadow_photons": True, "direct.shadow_N": 20_000, "photons.N": 500}
     renderer = stepped(box, pool, values, passes=16)
     share = renderer.frame(1, Wanted("shadow rays")).image("shadow rays skipped").reshape(-1)
     told = share[share >= 0]

@@ -13,7 +13,6 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.maps.virtual_lights import W_A, W_C, W_F, W_G
 from pmviewer.render.planes import CHANNELS
 from pmviewer.scene.description import Camera, Scene
-from tests.support import kinds
 from tests.support.naive_virtual import Box, shoot, sums, walks
 from tests.support.scenes import (
     box_walls,
@@ -157,14 +156,7 @@ def test_passes_reach_the_path_tracer_in_an_open_scene(estimator, normalisation,
     assert image[inside].mean() == pytest.approx(reference[inside].mean(), rel=0.03)
 
 
-def by_paths(render):
-    """What a function renders with paths, for which other tests have the kernels of any surface."""
-    with pytest.MonkeyPatch.context() as patch:
-        kinds.every_surface(patch)
-        return render()
-
-
-@pytest.mark.usefixtures("any_bsdf_and_light")
+@pytest.mark.usefixtures("every_surface")
 @pytest.mark.parametrize("gather_rays", [64, pytest.param(0, marks=pytest.mark.extensive)])
 def test_passes_reach_the_path_tracer_where_virtual_lights_are_glossy(gather_rays):
     """They stand for photons around them, which blurs less from pass to pass; 64 gather rays bring nearly all of the
@@ -175,7 +167,7 @@ def test_passes_reach_the_path_tracer_where_virtual_lights_are_glossy(gather_ray
         settings = settings_of(camera={"width": size, "height": size}, **groups)
         return (rendered(open_scene("glossy_room"), settings, passes).frame(0).image("indirect") @ LUMINANCE).mean()
 
-    truth = by_paths(lambda: mean(48, 24, render={"method": "path"}))
+    truth = mean(48, 24, render={"method": "path"})
     virtual = {"number": 200, "photons": 8000, "gather_rays": gather_rays}
     found = mean(8, 36, render={"method": "virtual lights"}, virtual=virtual)
     print(f"glossy room: {found / truth:.4f}")
@@ -183,17 +175,17 @@ def test_passes_reach_the_path_tracer_where_virtual_lights_are_glossy(gather_ray
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("any_bsdf_and_light")
+@pytest.mark.usefixtures("every_surface")
 def test_surfaces_that_hardly_any_photon_reaches_do_not_count_as_lit(tmp_path):
     """Scene 4 of seed 1 of `bench agree`, open and of metal: gather rays to its dark sides counted in every pass, their
     lights weighed in few passes, and the single step was 16 % too bright after four."""
-    file = write_scene(scene_of(1, 4), tmp_path, "scene")[0]
+    opened = open_scene(write_scene(scene_of(1, 4), tmp_path, "scene")[0])
 
     def mean(passes, **groups):
         settings = settings_of(camera={"width": 32, "height": 32}, **groups)
-        return rendered(open_scene(file), settings, passes).frame(0).image("indirect").mean()
+        return rendered(opened, settings, passes).frame(0).image("indirect").mean()
 
-    truth = by_paths(lambda: mean(48, render={"method": "path"}))
+    truth = mean(48, render={"method": "path"})
     virtual = {"number": 200, "per_pixel": 40}
     found = [mean(4, render={"method": "virtual lights", "seed": seed}, virtual=virtual) for seed in range(3)]
     print(f"open metal: {np.array(found) / truth}")
