@@ -64,6 +64,16 @@ def any_bsdf() -> Iterator[None]:
 
 
 @pytest.fixture
+def any_bsdf_and_light() -> Iterator[None]:
+    """Scenes are opened as if rough surfaces and every kind of light were in them."""
+    from tests.support import kinds
+
+    with pytest.MonkeyPatch.context() as patch:
+        kinds.any_bsdf_and_light(patch)
+        yield
+
+
+@pytest.fixture
 def every_path_may_split() -> Iterator[None]:
     """Kernels are those of scenes with mirrors and smooth glass."""
     from tests.support import kinds

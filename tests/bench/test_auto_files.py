@@ -28,6 +28,7 @@ def test_errors_are_without_the_noise_of_the_references():
     assert float(((image - references[0]) ** 2).mean()) > 5 * expected
 
 
+@pytest.mark.usefixtures("every_path_may_split")
 def test_a_file_is_rendered_at_the_size_of_mitsubas_picture_and_measured_against_it(tmp_path, monkeypatch):
     """Mitsuba's part is made up: a sphere under a white sky, all white, and pictures that are wrong by so much."""
     asked = {}

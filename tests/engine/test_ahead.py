@@ -17,7 +17,7 @@ from pmviewer.engine.ahead import ahead as ahead_module
 from pmviewer.engine.ahead import child
 from pmviewer.engine.ahead.ahead import Ahead
 from pmviewer.engine.ahead.beside import compile_beside
-from pmviewer.engine.ahead.clicks import clicks, other_kinds
+from pmviewer.engine.ahead.clicks import clicks, other_kinds, type_of_record
 from pmviewer.engine.ahead.helper import Helper
 from pmviewer.engine.ahead.requests import Clicks, NextSteps
 from pmviewer.engine.opened import open_scene
@@ -94,7 +94,9 @@ def jit_misses() -> int:
 
 @pytest.mark.extensive
 def test_other_kinds_of_scenes_have_other_records(box):
-    kinds = [click.opened.flat.record.dtype for click in other_kinds(box.flat.record.dtype, Settings())]
+    found = other_kinds(box.flat.record.dtype, Settings())
+    kinds = [open_scene(each.scene).flat.record.dtype for each in found]
+    assert kinds == [type_of_record(each.scene) for each in found]
     assert len({str(kind) for kind in kinds}) == len(kinds) >= 2
     assert box.flat.record.dtype not in kinds
 

@@ -111,6 +111,7 @@ def test_paths_of_guided_photons():
     assert (paths.counts > 1).all()
 
 
+@pytest.mark.usefixtures("every_path_may_split")
 def test_a_camera_that_sees_mirrors_alone():
     """Nothing is important: photons leave by power, and a sentence says so."""
     box, shown = cornell_box(), box_walls(materials=(1,) * 6)

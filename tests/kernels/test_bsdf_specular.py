@@ -49,9 +49,9 @@ def fresnel(cosines, eta):
 
 def scatter(flat, material, normals, directions, u):
     n = len(directions)
-    normals = np.ascontiguousarray(np.broadcast_to(normals, (n, 3)), np.float32)
+    normals = np.array(np.broadcast_to(normals, (n, 3)), np.float32, order="C")
     out, weights, compression = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32), np.empty(n, np.float32)
-    u = np.ascontiguousarray(np.broadcast_to(u, n), np.float32)
+    u = np.array(np.broadcast_to(u, n), np.float32)
     directions = np.ascontiguousarray(directions, np.float32)
     _scatter_many(flat.record, MATERIALS.index(material), normals, directions, u, out, weights, compression)
     return out.astype(float), weights.astype(float), compression.astype(float)

@@ -11,6 +11,7 @@ import pytest
 from pmviewer.kernels.random import INDEPENDENT
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.scene.description import Shape
+from tests.support.kinds import EVERY_SURFACE
 from tests.support.light_probe import AREA, CORNERS, LEANING, NG, NORMALS, emit, look, sample, uniform_sphere
 from tests.support.scenes import light_scene
 
@@ -21,7 +22,7 @@ POINTS = {"below": (0.1, 0.2, 0.1), "beside": (1.6, 1.2, 0.3), "above": (0.2, 2.
 @pytest.fixture(scope="module")
 def flat():
     scene = light_scene(floor=False)
-    return flatten(replace(scene, shapes=(Shape("light", LEANING, 1, RADIANCE),)))
+    return flatten(replace(scene, shapes=(Shape("light", LEANING, 1, RADIANCE),)), features_at_least=EVERY_SURFACE)
 
 
 def on_the_light(n, seed=7):

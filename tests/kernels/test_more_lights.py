@@ -15,6 +15,7 @@ from pmviewer.kernels.random import INDEPENDENT
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.scene.description import ImageEnvironment
 from pmviewer.scene.emission import emitted_power
+from tests.support.kinds import EVERY_SURFACE
 from tests.support.light_probe import MORE, TURN, axes_of, emit, p_uniform, sample, turn
 from tests.support.scenes import LIGHTS, light_scene
 
@@ -26,8 +27,8 @@ def scene_of(*lights, floor=True):
 
 
 def flat_of(*lights):
-    """Flattened as if there were projectors, too: the kernels of tests of those."""
-    return flatten(scene_of(*lights), features_at_least=("lights", "projectors"))
+    """Flattened as if there were every kind of light: the kernels of other tests, too."""
+    return flatten(scene_of(*lights), features_at_least=EVERY_SURFACE)
 
 
 @kernel

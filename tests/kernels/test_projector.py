@@ -12,9 +12,10 @@ from scipy import stats
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.lights.start import spread_over
 from pmviewer.kernels.random import INDEPENDENT
-from pmviewer.scene.arrays.flatten import flatten
+from pmviewer.scene.arrays.flatten import FlatScene, flatten
 from pmviewer.scene.description import LUMINANCE, PointLight, ProjectorLight, Scene
 from pmviewer.scene.emission import emitted_power
+from tests.support.kinds import EVERY_SURFACE
 from tests.support.light_probe import MORE, TURN, emit, sample
 from tests.support.scenes import light_scene
 
@@ -43,6 +44,11 @@ LIGHTS = {"turned": projector(), "mirrored": projector("mirrored", TURN @ MIRROR
 
 def scene_of(*lights: object) -> Scene:
     return replace(light_scene(floor=True), lights=lights)
+
+
+def flat_of(*lights: object) -> FlatScene:
+    """With the kernels of other tests of lights."""
+    return flatten(scene_of(*lights), features_at_least=EVERY_SURFACE)
 
 
 def irradiance(light: ProjectorLight, u: float, v: float) -> np.ndarray:
@@ -81,7 +87,7 @@ def test_power_is_the_integral_over_the_plane(name: str) -> None:
 def test_photons_have_the_density_of_the_intensity(name: str) -> None:
     """Chi-square over fields of the plane at distance 1, where the intensity's density is the irradiance's."""
     light = LIGHTS[name]
-    position, direction, beta, _ = emit(flatten(scene_of(light)), MANY, INDEPENDENT)
+    position, direction, beta, _ = emit(flat_of(light), MANY, INDEPENDENT)
     assert np.abs(position - light.position).max() < 1e-6
     np.testing.assert_allclose(np.linalg.norm(direction, axis=1), 1, rtol=1e-5)
     np.testing.assert_allclose(beta @ LUMINANCE, 1, rtol=1e-5)
@@ -106,7 +112,7 @@ def test_photons_have_the_density_of_the_intensity(name: str) -> None:
 def test_direct_light_at_points_by_hand(name: str) -> None:
     """L/pdf is E(x, y)/(cos³θ·distance²) towards 40 places; 0 beside the picture and behind the projector."""
     light = LIGHTS[name]
-    flat = flatten(scene_of(light))
+    flat = flat_of(light)
     rng = np.random.default_rng(4)
     for u, v, depth in zip(rng.uniform(0.01, 0.99, 40), rng.uniform(0.01, 0.99, 40), rng.uniform(0.3, 2, 40)):
         local = depth * np.array([light.half[0] * (1 - 2 * u), light.half[1] * (1 - 2 * v), 1.0])
@@ -136,7 +142,7 @@ def test_photons_spread_as_their_density_says() -> None:
     """1/p of a direction; the mean of it over photons that have the density p is the pyramid's solid angle where it
     is lit."""
     light = replace(projector(), pixels=picture() + np.float32(0.1))
-    flat = flatten(scene_of(light))
+    flat = flat_of(light)
     _, direction, _, _ = emit(flat, MANY, INDEPENDENT)
     out = np.zeros(MANY, np.float32)
     _spreads(flat.record, np.ascontiguousarray(direction, np.float32), out)
@@ -156,7 +162,7 @@ def test_several_projectors_and_other_lights_keep_their_own_pictures() -> None:
                     rows=np.array([0.0, 1.0]), position=(0.0, 1.5, 0.0), to_world=np.eye(3))  # fmt: skip
     last = replace(projector("last"), pixels=3 * picture(seed=9), half=(0.3, 0.6))
     lights = (small, MORE["spot"], LIGHTS["turned"], MORE["directional"], PointLight("p", (0, 1, 0), (1, 1, 1)), last)
-    flat = flatten(scene_of(*lights))
+    flat = flat_of(*lights)
     n = 2**19
     _, _, beta, light = emit(flat, n)
     for index, described in enumerate(lights):
@@ -177,7 +183,7 @@ def test_only_scenes_with_projectors_have_their_record() -> None:
 
 def test_a_black_projector_beside_a_lamp_sends_nothing() -> None:
     black = replace(projector(), pixels=np.zeros((5, 7, 3), np.float32))
-    flat = flatten(scene_of(black, PointLight("lamp", (0.0, 1.0, 0.0), (1.0, 1.0, 1.0))))
+    flat = flat_of(black, PointLight("lamp", (0.0, 1.0, 0.0), (1.0, 1.0, 1.0)))
     _, _, beta, light = emit(flat, 1000)
     assert set(light) == {1}
     assert np.isfinite(beta).all()

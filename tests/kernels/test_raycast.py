@@ -41,8 +41,8 @@ class Tracer:
     def _rays(origins, directions, tmin, tmax):
         directions = np.ascontiguousarray(np.atleast_2d(directions), np.float32)
         n = len(directions)
-        origins = np.ascontiguousarray(np.broadcast_to(np.asarray(origins, np.float32), (n, 3)))
-        limits = [np.ascontiguousarray(np.broadcast_to(np.asarray(x, np.float32), n)) for x in (tmin, tmax)]
+        origins = np.array(np.broadcast_to(origins, (n, 3)), np.float32, order="C")
+        limits = [np.array(np.broadcast_to(x, n), np.float32) for x in (tmin, tmax)]
         return origins, directions, *limits
 
 

@@ -189,7 +189,7 @@ def test_what_the_picture_does_not_show_is_a_warning_once(tmp_path):
         '<scene version="3.0.0"><shape type="sphere"/><shape type="unheard"/><emitter type="constant"/></scene>'
     )
     with pytest.warns(PictureWarning) as said:
-        pmviewer.open(file).close()
+        pmviewer.open(file, threads=1).close()  # one thread compiles nothing beside
     assert sum("unheard" in str(warning.message) for warning in said) == 1
     assert {warning.filename for warning in said} == {__file__}
 
@@ -214,7 +214,7 @@ def test_parameters_and_search_paths_reach_the_scene(tmp_path):
         '<integer name="width" value="$res"/><integer name="height" value="$res"/></film></sensor>'
         '<shape type="obj"><string name="filename" value="t.obj"/></shape><emitter type="constant"/></scene>'
     )
-    with pmviewer.open(file, parameters={"res": 12}, search_paths=[str(meshes)]) as s:
+    with pmviewer.open(file, parameters={"res": 12}, search_paths=[str(meshes)], threads=1) as s:
         assert (s.scene.width, s.scene.height) == (12, 12)
         assert len(s.scene.shapes) == 1
 
@@ -247,6 +247,7 @@ def test_a_saved_session_opens_to_the_same_picture(tmp_path):
         s.render(passes=1).save(tmp_path / "other.toml")
 
 
+@pytest.mark.usefixtures("every_path_may_split")
 def test_frames_are_written_with_all_layers(box, tmp_path):
     frame = box.render(passes=1)
     frame.save(tmp_path / "box.exr")

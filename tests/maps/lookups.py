@@ -40,7 +40,7 @@ def estimate(
     }.items():
         eye[name] = value
     points = np.ascontiguousarray(points, np.float32)
-    normals = np.ascontiguousarray(np.broadcast_to(normals, points.shape), np.float32)
+    normals = np.array(np.broadcast_to(normals, points.shape), np.float32, order="C")
     E = np.full(points.shape, np.nan, np.float32)
     look_up(looked_up_by(structure.record, estimator), eye, np.float32(radius), points, normals, np.int32(classes), E)
     return E

@@ -188,11 +188,17 @@ def naive_guarded(photons, normals, required):
     return kept
 
 
-@pytest.mark.parametrize("rounds", [2500, 10_000])
-def test_stored_set_on_many_surfaces_is_that_of_plain_searches(rounds):
-    """Whether photons look for neighbours alone or many together."""
+@pytest.fixture(scope="module")
+def many_surfaces():
+    """`on_many_surfaces` of 10,000 photons, and which of them are stored by plain searches."""
     photons, codes, required = on_many_surfaces(10_000, 30)
-    kept = naive_guarded(photons, decode_directions(codes).astype(f8), required)
+    return photons, codes, required, naive_guarded(photons, decode_directions(codes).astype(f8), required)
+
+
+@pytest.mark.parametrize("rounds", [2500, 10_000])
+def test_stored_set_on_many_surfaces_is_that_of_plain_searches(rounds, many_surfaces):
+    """Whether photons look for neighbours alone or many together."""
+    photons, codes, required, kept = many_surfaces
     made = control(photons, required, rounds=rounds, normals=codes)
     np.testing.assert_array_equal(made.result().photons[:, :3], photons[kept, :3])
     assert 0.2 < len(kept) / len(photons) < 0.8

@@ -107,9 +107,9 @@ def test_sums_count_importons_near():
     built = build_importance(importons(on_square()), "screen", 1.0)
     points = np.array([[0.5, 0.5, 0.0], [3.0, 0.0, 0.0]], np.float32)
     out = np.zeros(2, np.float32)
-    importance_sums(built.record, points, np.array([UP, UP], np.float32), 50, out, 0, 2)
+    importance_sums(built.record, points, np.array([UP, UP], np.float32), np.int32(50), out, 0, 2)
     assert out.tolist() == [50 * WEIGHT, 0.0]
-    importance_sums(NO_IMPORTANCE, points, np.array([UP, UP], np.float32), 50, out, 0, 2)
+    importance_sums(NO_IMPORTANCE, points, np.array([UP, UP], np.float32), np.int32(50), out, 0, 2)
     assert out.tolist() == [1.0, 1.0]
     assert looked_up(None, points).tolist() == [1.0, 1.0]
 

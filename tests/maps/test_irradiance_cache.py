@@ -41,7 +41,7 @@ def rows_at(points, normals, reach, E=1.0, error=0.4):
 
 def looked_up(cache, points, normals):
     points = np.ascontiguousarray(np.atleast_2d(points), np.float32)
-    normals = np.ascontiguousarray(np.broadcast_to(normals, points.shape), np.float32)
+    normals = np.array(np.broadcast_to(normals, points.shape), np.float32, order="C")
     E, weights = np.empty((len(points), 3), np.float32), np.empty(len(points), np.float32)
     interpolate_all(cache.record, points, normals, E, weights)
     return E, weights

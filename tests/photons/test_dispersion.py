@@ -18,7 +18,7 @@ from pmviewer.scene.dispersion import GLASSES
 from pmviewer.settings.access import Photons
 from tests.support.dispersive import SCHOTT, lit_sphere
 
-pytestmark = pytest.mark.usefixtures("any_bsdf")
+pytestmark = pytest.mark.usefixtures("any_bsdf_and_light")
 
 INCIDENCE = 60.0
 """Of the light on the prism's first face, in degrees; its angle is 60°."""

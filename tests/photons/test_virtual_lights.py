@@ -121,6 +121,7 @@ def test_weights_of_modified_paths_do_not_grow_where_they_see_no_light():
     assert hidden.max() > 2
 
 
+@pytest.mark.usefixtures("every_surface")
 def test_a_glossy_light_stands_for_the_photons_around_it_and_for_itself():
     flat = open_scene("glossy_room").flat
     found = virtual_lights(flat, Virtual(photons=4000), Photons(), 1, 0, serial)
@@ -147,6 +148,7 @@ def norms(vectors):
     return np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
+@pytest.mark.usefixtures("every_surface")
 @pytest.mark.parametrize("values", [{"estimator": "every vertex"}, {"density": "virtual lights"}])
 def test_where_the_map_does_not_weigh_them_lights_stand_for_themselves(values):
     found = virtual_lights(open_scene("glossy_room").flat, Virtual(photons=4000, **values), Photons(), 1, 0, serial)

@@ -33,8 +33,15 @@ def renderer_of(scene: str, pool: WorkPool, **settings: object) -> Renderer:
     return Renderer(open_scene(scene), with_values(Settings(), values), pool, StageStore(0))
 
 
-@pytest.mark.parametrize("method", ["progressive", "gather"])
-@pytest.mark.parametrize("scene", ["cornell_diffuse", "cornell_caustic"])
+@pytest.mark.parametrize(
+    ("scene", "method"),
+    [
+        ("cornell_diffuse", "progressive"),
+        pytest.param("cornell_diffuse", "gather", marks=pytest.mark.extensive),
+        ("cornell_caustic", "progressive"),
+        ("cornell_caustic", "gather"),
+    ],
+)
 def test_error_falls_below_a_thousandth(scene, method, pool):
     target = reference(scene)
     smaller = scene == "cornell_caustic"  # the other has its thousandth so soon that its rims are dark still
@@ -76,7 +83,9 @@ def test_radiance_photons_keep_the_mean(pool):
         assert plain == pytest.approx(1, abs=5e-4)
 
 
-@pytest.mark.parametrize(("scene", "block"), [("cornell_diffuse", 8), ("cornell_caustic", 32)])
+@pytest.mark.parametrize(
+    ("scene", "block"), [pytest.param("cornell_diffuse", 8, marks=pytest.mark.extensive), ("cornell_caustic", 32)]
+)
 def test_path_tracer_agrees_with_the_reference(scene, block, pool):
     """Blocks are averaged before testing: a pixel of a caustic is lit by few, bright paths and far from Gaussian."""
     whole = reference(scene)

@@ -13,7 +13,7 @@ from pmviewer.scene.dispersion import GLASSES, Dispersion
 from tests.support.dispersive import lit_sphere
 from tests.support.scenes import rendered, settings_of
 
-pytestmark = pytest.mark.usefixtures("any_bsdf")
+pytestmark = pytest.mark.usefixtures("any_bsdf_and_light")
 
 FLAT = Dispersion("cauchy", (1.5, 0.0))
 """An index that is the same for all light: the same kernels, and nothing to see."""

@@ -197,7 +197,7 @@ def test_a_full_gather_knows_irradiance_and_harmonic_mean_distance():
     given = renderer.latest.given
     pixels = given.eye[0]["width"] * given.eye[0]["height"]
     samples, counts = np.empty((pixels, SAMPLE), np.float32), np.zeros(N_COUNTS, np.int64)
-    trace_samples(given, samples, counts, 0, pixels)
+    trace_samples(given, samples, counts, 0, int(pixels))
     p, n = samples[:, POINT : POINT + 3], samples[:, NORMAL : NORMAL + 3]
     np.testing.assert_allclose(p, -n, atol=1e-3)
     chosen = np.arange(0, pixels, 16, dtype=np.int32)

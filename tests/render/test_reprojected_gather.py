@@ -37,6 +37,7 @@ from pmviewer.render.gather.zbuffer import (
     resolve,
 )
 from pmviewer.scene.analysis import analyse
+from pmviewer.scene.load import load_scene
 from tests.support.scenes import cornell_box, diffuse_box, rendered, settings_of
 
 ON = {"estimation": "on", "estimation_samples": 32, "reprojection": "on"}
@@ -313,6 +314,6 @@ def test_what_it_is_for_and_why_it_has_no_effect():
         without = settings_of(render={"method": "gather"}, gather=gather)
         assert not plan_of(without, diffuse).reprojection
         assert "gather.estimation" in inactive_reason("gather.reprojection", without, diffuse)
-    fog = open_scene("fog_sphere").traits
+    fog = analyse(load_scene("fog_sphere"))
     assert not plan_of(on, fog).reprojection
     assert inactive_reason("gather.reprojection", on, fog)

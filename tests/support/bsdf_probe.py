@@ -145,7 +145,7 @@ class Probe:
     def evaluate(self, material, group, wo, wi, glossy=EVERYTHING_STORED):
         """f (n, 3) and pdf (n,) in float64, and the compression."""
         wi = np.ascontiguousarray(wi, np.float32)
-        wo = np.ascontiguousarray(np.broadcast_to(wo, wi.shape), np.float32)
+        wo = np.array(np.broadcast_to(wo, wi.shape), np.float32, order="C")
         f, pdf, compression = np.empty_like(wi), np.empty(len(wi), np.float32), np.empty(len(wi), np.float32)
         frame = (self.ng, self.ns, self.tangent)
         self.kernels[0](self.record, self.index(material), glossy, group, frame, wo, wi, f, pdf, compression)
@@ -154,7 +154,7 @@ class Probe:
     def sample(self, material, group, wo, u, glossy=EVERYTHING_STORED):
         """wi, weight, pdf, compression for numbers u (n, 3)."""
         u = np.ascontiguousarray(u, np.float32)
-        wo = np.ascontiguousarray(np.broadcast_to(wo, u.shape), np.float32)
+        wo = np.array(np.broadcast_to(wo, u.shape), np.float32, order="C")
         wi, weight = np.empty_like(u), np.empty_like(u)
         pdf, compression = np.empty(len(u), np.float32), np.empty(len(u), np.float32)
         frame = (self.ng, self.ns, self.tangent)

@@ -29,6 +29,11 @@ def any_bsdf(monkeypatch):
     _open_as_if(monkeypatch, "", "bsdfs")
 
 
+def any_bsdf_and_light(monkeypatch):
+    """The same, and every kind of light: for kernels that two or three files need, some of them with such lights."""
+    _open_as_if(monkeypatch, "", "bsdfs", "lights")
+
+
 def _open_as_if(monkeypatch, where, *features):
     """These are in all scenes, or in those that have the feature `where`."""
     features_of = flatten._features

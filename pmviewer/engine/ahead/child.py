@@ -54,7 +54,8 @@ def next_steps(request: NextSteps) -> None:
 
 def all_clicks(request: Clicks) -> None:
     """Try every click on the miniature."""
-    from pmviewer.engine.ahead.clicks import clicks, other_kinds  # the renderer, which the eye pass doesn't wait for
+    # The renderer, which the eye pass does not wait for.
+    from pmviewer.engine.ahead.clicks import Click, OtherKind, clicks, other_kinds
     from pmviewer.engine.opened import open_scene
     from pmviewer.engine.pool import WorkPool
     from pmviewer.errors import PmviewerError
@@ -65,7 +66,8 @@ def all_clicks(request: Clicks) -> None:
         return
     pool = WorkPool(1)
     try:
-        todo = [*clicks(opened, request.settings), *other_kinds(request.record, request.settings)]
+        todo: list[Click | OtherKind] = [*clicks(opened, request.settings)]
+        todo += other_kinds(request.record, request.settings)
         todo = todo[request.offset :: request.every]
         for i, click in enumerate(todo):
             _say(part=i + 1, of=len(todo), text=click.text)

@@ -21,6 +21,8 @@ from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.wanted import wanted_of
 from pmviewer.errors import PmviewerError
+from pmviewer.scene.analysis import SceneTraits
+from pmviewer.scene.description import Scene
 from pmviewer.scene.load import bundled_scenes, load_scene
 from pmviewer.scene.miniature import miniature
 from pmviewer.settings.access import SETTINGS, SettingInfo, Settings, get, with_values
@@ -85,15 +87,46 @@ def _looks_up(click: Click) -> bool:
     return click.text.split(".")[0] in PINNED
 
 
-def other_kinds(of_record: np.dtype, settings: Settings) -> list[Click]:
+@dataclass(frozen=True, eq=False)
+class OtherKind:
+    """A first picture of another kind of scene, which is opened no sooner: that compiles, too."""
+
+    text: str
+    scene: Scene
+    settings: Settings
+
+    def run(self, pool: WorkPool) -> None:
+        """Open the scene and render one small picture of it."""
+        Click(self.text, open_scene(self.scene), self.settings).run(pool)
+
+
+def other_kinds(of_record: np.dtype, settings: Settings) -> list[OtherKind]:
     """A bundled scene's miniature for every other type of record that bundled scenes have."""
     seen, found = {of_record}, []
     for bundled in bundled_scenes():
-        opened = open_scene(miniature(load_scene(bundled.name)))
-        if opened.flat.record.dtype not in seen:
-            seen.add(opened.flat.record.dtype)
-            found.append(Click(f"scenes like {bundled.name}", opened, settings))
+        scene = miniature(load_scene(bundled.name))
+        kind = type_of_record(scene)
+        if kind not in seen:
+            seen.add(kind)
+            found.append(OtherKind(f"scenes like {bundled.name}", scene, settings))
     return found
+
+
+class _Known(Exception):
+    """The type of a scene's record is known, and nothing else is wanted."""
+
+
+def type_of_record(scene: Scene) -> np.dtype:
+    """Of what type the scene's record is when it is opened, without that."""
+
+    def known(of_record: np.dtype, traits: SceneTraits) -> None:
+        raise _Known(of_record)
+
+    try:
+        return open_scene(scene, on_type=known).flat.record.dtype
+    except _Known as told:
+        kind: np.dtype = told.args[0]
+        return kind
 
 
 def _needs(opened: OpenScene, settings: Settings) -> Hashable:
