@@ -95,6 +95,18 @@ def test_photons_of_another_wall_own_nothing_of_this_one(k):
                 assert np.mean(wall) == pytest.approx(4.0, rel=0.05)
 
 
+@pytest.mark.parametrize("opacity", [0.5, 0.8])
+def test_surfaces_that_rays_pass_in_part_weigh_by_their_opacity_once(opacity):
+    """A gather ray stops on the floor as often: all lights there weigh opacity times area. Places of a cell are found
+    by rays that pass it as well, which weighed the floor by its opacity once more."""
+    box = diffuse_box()
+    shapes = [replace(s, material=1) if s.name == "floor" else s for s in box.shapes]
+    box = replace(box, shapes=tuple(shapes), materials=(diffuse(), replace(diffuse("veil"), opacity=opacity)))
+    areas = [made(box, i, number=2000).rows for i in range(8)]
+    floor = [rows[rows[:, V_P + 1] < -1 + 1e-4, V_Q].sum() for rows in areas]
+    assert np.mean(floor) == pytest.approx(4.0 * opacity, rel=0.06)
+
+
 @pytest.mark.parametrize("estimator", ["unweighted", "single step", "full path", "modified", "printed single step"])
 def test_power_of_the_lights_is_what_arrives_on_surfaces(estimator):
     """In a closed box of albedo ½ twice the power of the light arrives."""

@@ -21,6 +21,7 @@ import math
 import numpy as np
 
 from pmviewer.kernels.accel.occlusion import occluded
+from pmviewer.kernels.accel.opacity import over_opacity
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import DISC_SALT
@@ -70,7 +71,7 @@ def share_of(tree, p, n, order, reach, photon, keys):
 @device
 def _share_below(scene, tree, top, n, depth, order, reach, photon, keys):
     """`share_of` where a ray from the point `top` against the normal n meets a surface within `depth`, by the area
-    there over that of the tangent plane."""
+    there over that of the tangent plane, and over the opacity of what rays pass in part."""
     down = scale(n, _f4(-1.0))
     t, prim, u, v = closest_hit(scene, top[0], top[1], top[2], down[0], down[1], down[2], _f4(0.0), depth)
     if prim < 0:
@@ -80,7 +81,8 @@ def _share_below(scene, tree, top, n, depth, order, reach, photon, keys):
     cos = dot(ng, n)
     if cos < SAME_SIDE:
         return _f4(0.0)
-    return share_of(tree, p, ng, order, reach, photon, keys) / cos
+    share = share_of(tree, p, ng, order, reach, photon, keys) / cos
+    return over_opacity(scene, prim, u, v, p, (share, share, share))[0]
 
 
 @kernel
