@@ -32,8 +32,8 @@ a logarithm with a standard deviation of 0.4. (Eight trials of ring_caustic said
 cornell_caustic at 64² mostly 1 to 2 times as much.)"""
 MISSED = 4.0
 """What an error that is never reached costs, in the time to it."""
-FEWEST = 4
-"""Passes: a picture of fewer says nothing of its own error."""
+FEWEST = 3
+"""Passes: a picture of fewer says little of its own error."""
 MOST = 1 << 20
 _PASSES = 2.0 ** np.arange(0, 20.01, 0.125)
 """Passes between which errors are interpolated."""
@@ -82,8 +82,16 @@ def numbers_for(m: Measured) -> list[Numbers]:
         widths = [Widths(c, s) for c, s in itertools.product(CAUSTIC_WIDTHS, shown)]
     else:  # without caustics their radius goes with the other
         widths = [Widths(s, s) for s in shown]
-    shares = SHARES if m.caustic > 0 and m.covered > 0 else (1.0,)
-    return [Numbers(N, w, q) for N, w, q in itertools.product(PHOTONS, widths, shares)]
+    return [Numbers(N, w, q) for N, w, q in itertools.product(PHOTONS, widths, _shares(m))]
+
+
+def _shares(m: Measured) -> tuple[float, ...]:
+    """Caustics that a trial has not met may be there, rare and bright: a gather does with half of the photons."""
+    if m.covered <= 0:
+        return SHARES[:1]
+    if m.candidate.values.get("render.method") == "gather":
+        return SHARES[1:] if m.caustic > 0 else SHARES[1:2]
+    return SHARES if m.caustic > 0 else SHARES[:1]
 
 
 def in_time(m: Measured, numbers: Numbers, seconds: float) -> Option:

@@ -182,11 +182,17 @@ def trial(
         shown = _widened(tried, "shown", mean, trier.scale)
         bias = Bias(caustic.blur, shown.blur, interpolated)
         measured = _measured(tried, (caustic, shown), bias, mean, trier.scale)
-        guided = tried.plan.emission != "off"  # all of its photons fill both maps
-        result.measured.append(measured if guided else replace(measured, covered=covered))
+        result.measured.append(replace(measured, covered=covered if _aims(tried) else 0.0))
     result.seeds = len(every[0].runs[0].images)
     result.seconds, result.cpu_seconds = time.perf_counter() - started, pool.cpu_seconds - before
     return result
+
+
+def _aims(tried: _Tried) -> bool:
+    """Whether photons may start for the caustic map alone: guided ones fill both maps, and where it holds light from
+    diffuse surfaces, too, fewer of the others make that worse."""
+    photons = tried.runs[0].settings.photons
+    return bool(tried.plan.caustic_mask) and tried.plan.emission == "off" and not photons.indirect_caustics
 
 
 def _covered(opened: OpenScene, settings: Settings) -> float:
