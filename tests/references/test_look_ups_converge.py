@@ -89,7 +89,7 @@ def test_radii_converge_by_pass_and_by_pixel(pool, rule):
 
 
 def test_without_shrinking_they_would_not(pool):
-    found, slope = floor_errors(pool, **NEAREST, alpha=1.0)
+    found, slope = floor_errors(pool, **NEAREST | {"k": 200, "alpha": 1.0})
     assert abs(slope) < 0.05
     assert found[-1].relmse_all > 5e-3
 
