@@ -130,19 +130,21 @@ def _by_error(tried: Trial, error: float) -> Option:
 
 
 def _picked(found: list[Option], of: Callable[[Option], float]) -> Option:
-    """The one with the least value. Of its candidate the numbers nearest to the defaults that are hardly worse: those
-    of two trials are then the same more often. The default unless another is clearly better."""
+    """The one with the least value. Of its candidate the numbers that `_preference` likes best among those that are
+    hardly worse: those of two trials are then the same more often. The default unless another is clearly better."""
     best = min(found, key=of)
     near = [o for o in found if o.measured is best.measured and of(o) <= NEARLY * of(best)]
-    best = min(near, key=_from_default)
+    best = min(near, key=_preference)
     usual = next((o for o in found if _is_default(o)), None)
     return usual if usual is not None and of(best) > BETTER * of(usual) else best
 
 
-def _from_default(option: Option) -> float:
+def _preference(option: Option) -> float:
+    """The less, the sooner among what promises the same: N and q near the defaults, and narrow radii. Bias is what a
+    trial knows least, and no pass takes it away."""
     N, widths, q = option.numbers.N, option.numbers.widths, option.numbers.q
     off = abs(math.log(N / float(SETTINGS["photons.N"].default))) + abs(math.log(q))
-    return off + 2 * (abs(math.log(widths.caustic)) + abs(math.log(widths.shown)))
+    return off + 2 * (math.log(widths.caustic) + math.log(widths.shown))
 
 
 def _is_default(option: Option) -> bool:
