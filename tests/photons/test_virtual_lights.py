@@ -27,7 +27,7 @@ from pmviewer.photons.virtual.choice import as_photons, chosen
 from pmviewer.photons.virtual.flight import C_STORED, N_COUNTS
 from pmviewer.photons.virtual.lights import neighbours, trajectories, virtual_lights
 from pmviewer.photons.virtual.trace import TRACE_DTYPE, trace_virtual_lights
-from pmviewer.scene.description import Parallelogram, PointLight, Shape, SpotLight
+from pmviewer.scene.description import Material, Parallelogram, PointLight, Shape, SpotLight
 from pmviewer.settings.access import Photons, Virtual
 from tests.support.device import from_python
 from tests.support.scenes import closed_sphere, diffuse, diffuse_box, light_scene
@@ -105,6 +105,20 @@ def test_surfaces_that_rays_pass_in_part_weigh_by_their_opacity_once(opacity):
     areas = [made(box, i, number=2000).rows for i in range(8)]
     floor = [rows[rows[:, V_P + 1] < -1 + 1e-4, V_Q].sum() for rows in areas]
     assert np.mean(floor) == pytest.approx(4.0 * opacity, rel=0.06)
+
+
+def test_places_that_hold_no_photons_belong_to_no_light():
+    """Half of the floor is a mirror: lights of the other half weigh their own half alone, where gather rays count."""
+    box = diffuse_box()
+    mirror = Material("mirror", "conductor", (1.0,) * 3)
+    left = Parallelogram((-1.0, -1.0, 1.0), (1.0, 0.0, 0.0), (0.0, 0.0, -2.0))
+    right = Parallelogram((0.0, -1.0, 1.0), (1.0, 0.0, 0.0), (0.0, 0.0, -2.0))
+    shapes = [s for s in box.shapes if s.name != "floor"]
+    shapes += [Shape("left", left, 0), Shape("right", right, 1)]
+    box = replace(box, shapes=tuple(shapes), materials=(diffuse(), mirror))
+    areas = [made(box, i, number=2000).rows for i in range(8)]
+    floor = [rows[rows[:, V_P + 1] < -1 + 1e-4, V_Q].sum() for rows in areas]
+    assert np.mean(floor) == pytest.approx(2.0, rel=0.06)
 
 
 @pytest.mark.parametrize("estimator", ["unweighted", "single step", "full path", "modified", "printed single step"])

@@ -23,10 +23,12 @@ import numpy as np
 from pmviewer.kernels.accel.occlusion import occluded
 from pmviewer.kernels.accel.opacity import over_opacity
 from pmviewer.kernels.accel.raycast import closest_hit
+from pmviewer.kernels.bsdf.scattering import STORED, bsdf_at, keeps
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import DISC_SALT
 from pmviewer.kernels.memory import load_i4, stack_get_i8, stack_i4
 from pmviewer.kernels.random import hash3, unit_float
+from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face, surface_at
 from pmviewer.kernels.vector import along, basis, dot, scale, sub
 from pmviewer.maps.search.disc import Facing
@@ -69,29 +71,35 @@ def share_of(tree, p, n, order, reach, photon, keys):
 
 
 @device
-def _share_below(scene, tree, top, n, depth, order, reach, photon, keys):
-    """`share_of` where a ray from the point `top` against the normal n meets a surface within `depth`, by the area
-    there over that of the tangent plane, and over the opacity of what rays pass in part."""
+def _share_below(scene, tree, top, n, depth, order, reach, glossy, photon, keys):
+    """`share_of` where a ray from the point `top` against the normal n meets a surface within `depth` that photons are
+    stored on, by the area there over that of the tangent plane, and over the opacity of what rays pass in part."""
     down = scale(n, _f4(-1.0))
     t, prim, u, v = closest_hit(scene, top[0], top[1], top[2], down[0], down[1], down[2], _f4(0.0), depth)
     if prim < 0:
         return _f4(0.0)
-    p, ng, _, _ = surface_at(scene, prim, u, v, top[0], top[1], top[2], down[0], down[1], down[2], t)
-    ng = face(ng, n)
+    p, outwards, ns, _ = surface_at(scene, prim, u, v, top[0], top[1], top[2], down[0], down[1], down[2], t)
+    ng = face(outwards, n)
     cos = dot(ng, n)
     if cos < SAME_SIDE:
         return _f4(0.0)
     share = share_of(tree, p, ng, order, reach, photon, keys) / cos
+    if share == _f4(0.0):
+        return share
+    material = material_of(scene, prim)
+    b = bsdf_at(scene, prim, material, u, v, p, outwards, ns, n, glossy, None)
+    if keeps(scene, material, b, outwards, n, glossy) & STORED == 0:
+        return _f4(0.0)
     return over_opacity(scene, prim, u, v, p, (share, share, share))[0]
 
 
 @kernel
-def cells(scenes, trees, lights, photons, order, reach, out, first, last):
+def cells(scenes, trees, lights, photons, order, reach, glossy, out, first, last):
     """Area of the cell of each of the lights first … last−1 among the photons of a map, in square scene units.
 
     trees: record (1,) of a kd-tree of photons that know their surface's normal; lights: float32 (n, COLUMNS); photons:
-    int32 (n,), the photon of the map that each of them is; order: of the cells, 1 …; reach: largest radius R; out:
-    float32 (n,).
+    int32 (n,), the photon of the map that each of them is; order: of the cells, 1 …; reach: largest radius R;
+    glossy: roughness from which photons are stored for gloss; out: float32 (n,).
     """
     scene, tree = scenes[0], trees[0]
     keys = stack_i4(KEYS)
@@ -118,7 +126,9 @@ def cells(scenes, trees, lights, photons, order, reach, out, first, last):
             if occluded(scene, over[0], over[1], over[2], way[0], way[1], way[2], _f4(0.0), _f4(1.0)):
                 continue
             sparse = (middle + area) * (middle + area) / middle
-            total += sparse * _share_below(scene, tree, top, n, _f4(2.0) * height, order, reach, photons[i], keys)
+            total += sparse * _share_below(
+                scene, tree, top, n, _f4(2.0) * height, order, reach, glossy, photons[i], keys
+            )
         out[i] = max(total * (widest / (middle + widest)) / _f4(PLACES), LEAST * middle / _f4(order))
 
 

@@ -137,7 +137,8 @@ def virtual_lights(
         if estimator == PRINTED_SINGLE:
             weigh_as_printed(candidates, lights, virtual.k, run)
         else:
-            weighed = weigh_by_density(scene, candidates, lights, (of_map, neighbours(virtual, index)), run)
+            density = of_map, neighbours(virtual, index), photons.glossy
+            weighed = weigh_by_density(scene, candidates, lights, density, run)
     return VirtualLights(
         rows=lights,
         photons=as_photons(found[kept], share),

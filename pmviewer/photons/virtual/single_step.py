@@ -48,11 +48,11 @@ class Weighed(NamedTuple):
 
 
 def weigh_by_density(
-    scene: FlatScene, candidates: Candidates, lights: Float, density: tuple[bool, int], run: Runner
+    scene: FlatScene, candidates: Candidates, lights: Float, density: tuple[bool, int, float], run: Runner
 ) -> Weighed:
     """Sets V_Q of the lights (n, COLUMNS), those in media left out, and V_BEAMS. density: whether all candidates tell
-    it or the lights alone, and the order of cells."""
-    of_map, order = density
+    it or the lights alone, the order of cells, and the roughness from which photons are stored for gloss."""
+    of_map, order, glossy = density
     found, rows, kept, share, unit = candidates
     lie = ~in_media(lights)
     some, share = np.ascontiguousarray(lights[lie]), share[lie]
@@ -66,7 +66,7 @@ def weigh_by_density(
         among, rows, numbers = found[kept][lie], some, np.arange(len(some))
     reach = reach_of(scene.radius, len(among))
     tree = run([lambda: sided_tree(among, rows, unit)])[0]
-    q = cells_of(scene, tree, some, numbers.astype(np.int32), (order, reach), run)
+    q = cells_of(scene, tree, some, numbers.astype(np.int32), (order, reach, glossy), run)
     if of_map:
         q *= share
         beams[lie], lights[lie, V_BEAMS] = beams_of(scene, tree, rows, some, unit * share, (order + 1, reach), run)
@@ -90,15 +90,22 @@ def reach_of(scene_radius: float, n: int) -> float:
 
 
 def cells_of(
-    scene: FlatScene, tree: SidedTree, lights: Float, numbers: NDArray[np.int32], cell: tuple[int, float], run: Runner
+    scene: FlatScene,
+    tree: SidedTree,
+    lights: Float,
+    numbers: NDArray[np.int32],
+    cell: tuple[int, float, float],
+    run: Runner,
 ) -> Float:
     """Area (n,) of the cell of each of the lights among the photons of a tree, which hold the lights themselves, by
-    their numbers (`pmviewer.photons.virtual.density`); cell: its order, and its largest radius."""
+    their numbers (`pmviewer.photons.virtual.density`); cell: its order, its largest radius, and
+    from which roughness on photons are stored for gloss."""
     areas = np.empty(len(lights), np.float32)
-    order, reach = cell[0], np.float32(cell[1])
+    order, reach, glossy = cell[0], np.float32(cell[1]), np.float32(cell[2])
 
     def some(first: int) -> None:
-        cells(scene.record, tree.record, lights, numbers, order, reach, areas, first, min(first + LIGHTS, len(lights)))
+        last = min(first + LIGHTS, len(lights))
+        cells(scene.record, tree.record, lights, numbers, order, reach, glossy, areas, first, last)
 
     run([partial(some, first) for first in range(0, len(lights), LIGHTS)])
     return areas
