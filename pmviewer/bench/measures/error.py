@@ -48,7 +48,10 @@ PEER_BUDGET = 2.5
 """Mitsuba's budget over ours: its time to a target must be found where it is twice ours."""
 PEER = "Mitsuba 3 path"
 AUTOMATIC, TRIAL_APART = "automatic", ", its trial not counted"
-CHOSEN = "; what a trial takes bias relative to, and how far it trusts it, was chosen with this scene among others"
+CHOSEN = (
+    "; what a trial takes bias relative to, how far it trusts it, that caustics are those of lights, and that narrow "
+    "radii come first, was chosen with this scene among others"
+)
 CHOSEN_WITH = ("ring_caustic", "cornell_caustic")
 """Scenes by which the denominator and SPREAD of `pmviewer.engine.auto.widths`, and UNSURE and MISSED of
 `pmviewer.engine.auto.model`, were chosen: said in their targets' lines."""
