@@ -53,8 +53,9 @@ CHOSEN = (
     "radii come first, was chosen with this scene among others"
 )
 CHOSEN_WITH = ("ring_caustic", "cornell_caustic")
-"""Scenes by which the denominator and SPREAD of `pmviewer.engine.auto.widths`, and UNSURE and MISSED of
-`pmviewer.engine.auto.model`, were chosen: said in their targets' lines."""
+"""Scenes by which the denominator and SPREAD of `pmviewer.engine.auto.widths`, UNSURE and MISSED of
+`pmviewer.engine.auto.model`, LIGHTS_CAUSTICS of `pmviewer.engine.auto.candidates`, and what
+`pmviewer.engine.auto.choose` prefers were chosen: said in their targets' lines."""
 AUTOMATIC_BUDGET = 8.0
 """Of the curves by what automatic mode chooses, over their target's seconds."""
 

@@ -69,7 +69,7 @@ def candidates(
     """What is worth a trial in such a scene for so many CPU seconds, the default method first, and what isn't with the
     reason. `settings` tell what automatic mode does not set."""
     left_out: list[tuple[str, str]] = []
-    glossy = SETTINGS["photons.glossy"].default
+    glossy = settings.photons.glossy
     caustics, why = _caustics(traits, settings)
     progressive = PROGRESSIVE.having(caustics, *why)
     if not traits.stores(glossy):
@@ -96,7 +96,7 @@ def candidates(
 
 def _caustics(traits: SceneTraits, settings: Settings) -> tuple[Mapping[str, Any], tuple[str, ...]]:
     """What else is set for the sake of caustics, and why."""
-    if not traits.follows(SETTINGS["photons.glossy"].default):
+    if not traits.follows(settings.photons.glossy):
         return {}, ()
     if REFLECTING in thin_rules(with_values(settings, dict(GATHER.values)), traits):
         return {}, ()  # gather rays go straight through: only the caustic map has what it reflects

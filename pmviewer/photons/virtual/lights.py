@@ -27,7 +27,7 @@ from pmviewer.photons.bounces import most_bounces
 from pmviewer.photons.virtual.choice import as_photons, choice_probabilities, chosen, in_media
 from pmviewer.photons.virtual.flight import C_DROPPED, C_RAYS, C_STORED, N_COUNTS
 from pmviewer.photons.virtual.sided import SidedTree
-from pmviewer.photons.virtual.single_step import Candidates, Weighed, weigh_as_printed, weigh_by_density
+from pmviewer.photons.virtual.single_step import Candidates, Density, Weighed, weigh_as_printed, weigh_by_density
 from pmviewer.photons.virtual.trace import TRACE_DTYPE, trace_virtual_lights
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import Photons, Virtual
@@ -137,7 +137,7 @@ def virtual_lights(
         if estimator == PRINTED_SINGLE:
             weigh_as_printed(candidates, lights, virtual.k, run)
         else:
-            density = of_map, neighbours(virtual, index), photons.glossy
+            density = Density(of_map, neighbours(virtual, index), photons.glossy)
             weighed = weigh_by_density(scene, candidates, lights, density, run)
     return VirtualLights(
         rows=lights,

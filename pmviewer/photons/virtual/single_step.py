@@ -47,12 +47,18 @@ class Weighed(NamedTuple):
     beams: Float
 
 
-def weigh_by_density(
-    scene: FlatScene, candidates: Candidates, lights: Float, density: tuple[bool, int, float], run: Runner
-) -> Weighed:
-    """Sets V_Q of the lights (n, COLUMNS), those in media left out, and V_BEAMS. density: whether all candidates tell
-    it or the lights alone, the order of cells, and the roughness from which photons are stored for gloss."""
-    of_map, order, glossy = density
+class Density(NamedTuple):
+    """How it is told: by all candidates (`of_map`) or the lights alone, by cells of that order, on surfaces whose gloss
+    is stored from the roughness `glossy` on."""
+
+    of_map: bool
+    order: int
+    glossy: float
+
+
+def weigh_by_density(scene: FlatScene, candidates: Candidates, lights: Float, density: Density, run: Runner) -> Weighed:
+    """Sets V_Q of the lights (n, COLUMNS), those in media left out, and V_BEAMS."""
+    of_map, order, _ = density
     found, rows, kept, share, unit = candidates
     lie = ~in_media(lights)
     some, share = np.ascontiguousarray(lights[lie]), share[lie]
@@ -66,7 +72,7 @@ def weigh_by_density(
         among, rows, numbers = found[kept][lie], some, np.arange(len(some))
     reach = reach_of(scene.radius, len(among))
     tree = run([lambda: sided_tree(among, rows, unit)])[0]
-    q = cells_of(scene, tree, some, numbers.astype(np.int32), (order, reach, glossy), run)
+    q = cells_of(scene, tree, some, numbers.astype(np.int32), density, reach, run)
     if of_map:
         q *= share
         beams[lie], lights[lie, V_BEAMS] = beams_of(scene, tree, rows, some, unit * share, (order + 1, reach), run)
@@ -94,18 +100,18 @@ def cells_of(
     tree: SidedTree,
     lights: Float,
     numbers: NDArray[np.int32],
-    cell: tuple[int, float, float],
+    density: Density,
+    reach: float,
     run: Runner,
 ) -> Float:
     """Area (n,) of the cell of each of the lights among the photons of a tree, which hold the lights themselves, by
-    their numbers (`pmviewer.photons.virtual.density`); cell: its order, its largest radius, and
-    from which roughness on photons are stored for gloss."""
+    their numbers (`pmviewer.photons.virtual.density`); reach: largest radius of a cell."""
     areas = np.empty(len(lights), np.float32)
-    order, reach, glossy = cell[0], np.float32(cell[1]), np.float32(cell[2])
+    order, glossy, widest = density.order, np.float32(density.glossy), np.float32(reach)
 
     def some(first: int) -> None:
         last = min(first + LIGHTS, len(lights))
-        cells(scene.record, tree.record, lights, numbers, order, reach, glossy, areas, first, last)
+        cells(scene.record, tree.record, lights, numbers, order, widest, glossy, areas, first, last)
 
     run([partial(some, first) for first in range(0, len(lights), LIGHTS)])
     return areas
