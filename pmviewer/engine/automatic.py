@@ -11,7 +11,6 @@ from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.radiance_photons import AUTOMATIC_CUTOFF, AUTOMATIC_CUTOFF_NEAREST
 from pmviewer.maps.search.grid import PhotonGrid
 from pmviewer.photons.bounces import most_bounces
-from pmviewer.render.direct.samples import samples_at_surface
 from pmviewer.settings.access import Settings
 
 
@@ -29,7 +28,7 @@ def automatic_values(looked: Looked, first_radius: float) -> dict[str, Any]:
     if not plan.path:
         found["render.mirror_rays"] = plan.mirror_rays
     found["direct.choice"] = plan.choice
-    found["direct.samples"] = samples_at_surface(settings.direct, plan.path, plan.media)
+    found["direct.samples"] = plan.light_samples
     if looked.latest is not None:
         found |= _of_maps(looked.latest, settings, radius)
     return found

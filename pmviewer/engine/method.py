@@ -9,6 +9,7 @@ from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, THIN, in_media
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
 from pmviewer.render.camera import are_hidden
+from pmviewer.render.direct.samples import samples_at_surface
 from pmviewer.render.filter import BOX, filter_of, is_signed
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.scene.description import PixelFilter
@@ -42,23 +43,23 @@ class Plan:
     `caustic_classes` and `global_classes` are what the maps have to hold, 0 means that the map is not built. `direct`
     is whether direct light is sampled at lobes that photons are stored for, `followed_direct` whether at those that are
     followed; `unfound` whether these look up what no path finds (`pmviewer.render.reflect`). `choice` is how direct
-    light chooses lights, `radiance` whether gather rays use radiance photons, `directions` how they look about: photons
-    of the classes `guide_mask` guide `guided_rays` of them; `corners` is whether short ones gather again, `cache`
-    whether diffuse surfaces gather through an irradiance cache, `estimation` whether pixels that show them are
-    interpolated between sparse gathers, `reprojection` whether these take hit points of one another, `shadows` whether
-    shadow photons save shadow rays, `importance` whether there are importance maps, `deposition` which photons maps
-    store, `emission` how importance guides it, `convergence` the exponent of the caustic map's convergence criterion, 0
-    without; `virtual` is whether virtual lights bring the indirect light; `media` whether the scene has participating
-    media, and `volume` whether photons are stored in them and light that they scatter is looked up, `phase_rays`
-    whether rays by phase functions can meet a light, `looked_for` whether direct light is looked for by rays whatever
-    `direct.mis` says; `dispersion` whether glass splits light into colours; `lens`
-    whether the render camera has one, `filtered` whether the film has another reconstruction filter than the plain box,
-    `moments` whether the film keeps what passes tell of its noise, `split` whether camera paths go both ways at glass,
-    `mirror_rays` how many samples a pass pixels have that show a mirror or glass, and `one_sample` whether something
-    forbids more than one; `hides` whether the picture shows no
-    lights; `thin_glass` are the rules by which light passes panes of glass, ()
-    where all of it is exact; `maps` is how many parts of the light pass have photon maps of their own; `warnings` are
-    sentences for the log about what was asked for and can't be."""
+    light chooses lights, `light_samples` how many of it a surface takes in a pass, `radiance` whether gather rays use
+    radiance photons, `directions` how they look about: photons of the classes `guide_mask` guide `guided_rays` of them;
+    `corners` is whether short ones gather again, `cache` whether diffuse surfaces gather through an irradiance cache,
+    `estimation` whether pixels that show them are interpolated between sparse gathers, `reprojection` whether these
+    take hit points of one another, `shadows` whether shadow photons save shadow rays, `importance` whether there are
+    importance maps, `deposition` which photons maps store, `emission` how importance guides it, `convergence` the
+    exponent of the caustic map's convergence criterion, 0 without; `virtual` is whether virtual lights bring the
+    indirect light; `media` whether the scene has participating media, and `volume` whether photons are stored in them
+    and light that they scatter is looked up, `phase_rays` whether rays by phase functions can meet a light,
+    `looked_for` whether direct light is looked for by rays whatever `direct.mis` says; `dispersion` whether glass
+    splits light into colours; `lens` whether the render camera has one, `filtered` whether the film has another
+    reconstruction filter than the plain box, `moments` whether the film keeps what passes tell of its noise, `split`
+    whether camera paths go both ways at glass, `mirror_rays` how many samples a pass pixels have that show a mirror or
+    glass, and `one_sample` whether something forbids more than one; `hides` whether the picture shows no lights;
+    `thin_glass` are the rules by which light passes panes of glass, () where all of it is exact; `maps` is how many
+    parts of the light pass have photon maps of their own; `warnings` are sentences for the log about what was asked for
+    and can't be."""
 
     path: bool = False
     direct: bool = False
@@ -98,6 +99,7 @@ class Plan:
     global_caustics: int = 0
     global_classes: int = 0
     choice: str = "power"
+    light_samples: int = 1
     maps: int = 1
     skipped: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()
@@ -154,6 +156,12 @@ class Plan:
 
 def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     """The stages that the method needs in this scene."""
+    plan = _in_media_or_none(settings, traits)
+    several = traits.n_lights > 1 or traits.has_environment
+    return replace(plan, light_samples=samples_at_surface(settings.direct, plan.path, plan.media, several))
+
+
+def _in_media_or_none(settings: Settings, traits: SceneTraits) -> Plan:
     if not traits.has_media:
         return _plan_of(settings, traits)
     asked = settings

@@ -24,8 +24,8 @@ from pmviewer.engine.auto.candidates import (
 from pmviewer.engine.auto.choose import Goal, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.auto.measured import Costs, Measured, Numbers, Widths
-from pmviewer.engine.auto.model import error_after, to_error
-from pmviewer.engine.auto.relative import difference, squared
+from pmviewer.engine.auto.model import error_after, samples_for, to_error
+from pmviewer.engine.auto.relative import difference, squared, variance
 from pmviewer.engine.auto.trial import RARE, trial
 from pmviewer.engine.auto.widths import Tried, told_by
 from pmviewer.engine.method import plan_of
@@ -98,6 +98,18 @@ def test_what_the_model_promises_is_what_sums_over_passes_say():
     assert error_after(m, Numbers(50_000, widths), 20) == pytest.approx(noise + blurred, rel=1e-6)
     seconds = 20 * (0.1 + 50_000 * (1e-6 + 4 * 2e-6))
     assert to_error(m, Numbers(50_000, widths), noise + blurred).seconds == pytest.approx(seconds, rel=1e-3)
+
+
+def test_light_samples_divide_their_part_of_the_noise_and_cost_what_they_cost():
+    """In all passes alike; and the number that suits follows from both."""
+    costs = Costs(0.1, 1e-6, sampled=0.02)
+    m = Measured(PROGRESSIVE, costs, eye=0.05, gathered=7.0, lit=0.04)
+    noise = (0.01 + 0.04 / 4) / 20**1.25 + 7.0 / 50_000 / 20
+    assert error_after(m, Numbers(50_000, samples=4), 20) == pytest.approx(noise, rel=1e-6)
+    assert m.cost(Numbers(50_000, samples=4)) == pytest.approx(0.1 + 3 * 0.02 + 0.05)
+    assert samples_for(replace(m, lit=0.0)) == samples_for(replace(m, costs=replace(costs, sampled=1.0))) == 1
+    assert samples_for(replace(m, costs=replace(costs, sampled=0.0))) == 8
+    assert 1 < samples_for(m) < 8
 
 
 def test_a_radius_that_may_never_get_there_is_expected_to_take_longer():
@@ -197,6 +209,30 @@ def test_a_trial_of_few_pixels_has_the_records_of_the_whole_picture(pool):
         images.append(beauty_of(renderer.film.planes()).astype(float))
     noise = (np.var(images, axis=0, ddof=1) / (np.mean(images, axis=0) ** 2 + EPSILON)).mean()
     assert 0.6 < (cached.eye + cached.gathered / RARE / N) / noise < 1.7
+
+
+def test_a_trial_tells_what_light_samples_do(pool):
+    """Noise of passes with few photons, and what of it is left with four times the light samples: by the trial and by
+    pictures. Four lights in a box, where half of it goes, and one."""
+    for name, least in (("cornell_lights", 0.45), ("cornell_diffuse", 0.0)):
+        scene = open_scene(name)
+        settings = with_values(Settings(), {"camera.width": 96, "camera.height": 96, "photons.N": 40_000})
+        tried = trial(scene, settings, [PROGRESSIVE], pool, (48, 48), 100.0, lambda text, share: None)
+        usual = plan_of(settings, scene.traits).light_samples
+        noise = []
+        for samples in (usual, 4 * usual):
+            images = []
+            for seed in range(4):
+                values = {"direct.samples": samples, "photons.N": 10_000, "render.seed": seed}
+                renderer = Renderer(scene, with_values(settings, values), pool, StageStore(0))
+                renderer.step()
+                images.append(beauty_of(renderer.film.planes()).astype(float))
+            noise.append(variance(images, np.mean(images, axis=0)))
+        told = 0.75 * tried.measured[0].lit
+        print(f"{name}: noise {noise[0]:.4f}, {noise[1]:.4f} with four times the samples; the trial: {told:.4f} less")
+        assert told == pytest.approx(noise[0] - noise[1], rel=0.35)
+        assert told > least * noise[0]
+        assert tried.measured[0].costs.sampled > 0
 
 
 @pytest.mark.parametrize("seeds", [2, 4, 6])

@@ -27,6 +27,7 @@ from pmviewer.render.direct.choice import (
     chosen_light,
     expected_samples,
 )
+from pmviewer.render.direct.samples import SAMPLES
 from pmviewer.render.eye import DIRECT
 from pmviewer.render.record import EYE_DTYPE
 from pmviewer.scene.arrays.flatten import flatten
@@ -107,7 +108,8 @@ def test_every_rule_has_the_expectation_of_sampling_by_power(rule, mis, rooms, b
 
 @pytest.mark.parametrize("rule", ["photons", "Keller-Wald, few samples"])
 def test_fewer_samples_by_photons_are_less_noisy(rule, rooms):
-    noise = [direct_light(rooms, "progressive", **direct)[1].mean() for direct in (RULES[rule], {"choice": "power"})]
+    rules = ({"samples": SAMPLES, **RULES[rule]}, {"samples": SAMPLES, "choice": "power"})
+    noise = [direct_light(rooms, "progressive", **direct)[1].mean() for direct in rules]
     print(f"{rule}: variance {noise[0]:.2e}, by power {noise[1]:.2e}")
     assert noise[0] < 0.5 * noise[1]
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from pmviewer.render.direct.samples import SAMPLES, samples_at_surface
+from pmviewer.engine.method import plan_of
+from pmviewer.engine.opened import open_scene
+from pmviewer.render.direct.samples import SAMPLES, SEVERAL, samples_at_surface
 from pmviewer.scene.description import Camera, Parallelogram, Scene, Shape
 from tests.support.scenes import diffuse, panel, rendered, settings_of
 
@@ -31,6 +35,19 @@ def test_samples_of_surfaces_and_passes_complement_each_other():
 
 def test_their_number_follows_from_what_is_rendered():
     direct = settings_of().direct
-    assert samples_at_surface(direct, path=False, media=False) == SAMPLES
-    assert samples_at_surface(direct, path=True, media=False) == samples_at_surface(direct, False, media=True) == 1
-    assert samples_at_surface(settings_of(direct={"samples": 5}).direct, path=True, media=True) == 5
+
+    def number(direct, path=False, media=False, several=False):
+        return samples_at_surface(direct, path, media, several)
+
+    assert number(direct) == SAMPLES < number(direct, several=True) == SEVERAL
+    assert number(direct, path=True, several=True) == number(direct, media=True, several=True) == 1
+    assert number(settings_of(direct={"samples": 5}).direct, path=True, media=True) == 5
+
+
+def test_several_lights_and_skies_get_more():
+    def number(traits):
+        return plan_of(settings_of(), traits).light_samples
+
+    one = open_scene("cornell_diffuse").traits
+    assert number(one) == SAMPLES
+    assert number(replace(one, has_environment=True)) == number(open_scene("cornell_lights").traits) == SEVERAL

@@ -41,8 +41,12 @@ NEAR = 0.3
 MOST_PASSES = 3000
 CHOSEN = "; what a trial takes bias relative to, and how far it trusts it, was chosen with cornell_caustic too"
 """The denominator and SPREAD of `pmviewer.engine.auto.widths`, said in the target's own line."""
-CHOSEN_WAYS = "; what every way of such scenes has, such as caustics of lights alone, was chosen with these scenes too"
-"""LIGHTS_CAUSTICS, THICKER and WIDE_RECORDS of `pmviewer.engine.auto.candidates`, likewise."""
+CHOSEN_WAYS = (
+    "; what every way of such scenes has, such as caustics of lights alone, and light samples with several lights were "
+    "chosen with these scenes too"
+)
+"""LIGHTS_CAUSTICS, THICKER and WIDE_RECORDS of `pmviewer.engine.auto.candidates`, SEVERAL of
+`pmviewer.render.direct.samples`, likewise."""
 CHOSEN_BIAS = "; the least and most that the bias may be were chosen with cornell_caustic"
 """TRUE_BIAS of `pmviewer.engine.auto.estimate`, likewise."""
 

@@ -49,6 +49,7 @@ def name_of(choice: Choice) -> str:
     changed = choice.changed
     N = f", N {changed['photons.N']:,}" if "photons.N" in changed else ""
     N += f", q {changed['photons.q']:g}" if "photons.q" in changed else ""
+    N += f", light samples {changed['direct.samples']}" if "direct.samples" in changed else ""
     radii = {"estimate.radius": ", radius", "estimate.caustic_radius": ", caustic radius"}
     return short + N + "".join(said for path, said in radii.items() if path in changed)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pmviewer.engine.auto.bias import Bias, way_of
@@ -12,6 +12,7 @@ from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, Candidate, assig
 from pmviewer.engine.auto.measured import Numbers, Widths
 from pmviewer.engine.auto.model import FEWEST, Option, bias_of, in_time, numbers_for, to_error
 from pmviewer.engine.auto.trial import Tell, Trial, trial
+from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.render.camera import resolve_camera
@@ -27,8 +28,10 @@ NEARLY = 1.1
 """What of the least error counts as the same."""
 PER_PHOTON, PER_PIXEL = 1.5e-6, 6e-6
 """CPU seconds of a trial by trajectory and by pixel and candidate: what its size is planned by, clock or no clock."""
-OF_RADII = 8
-"""Pictures that are rendered with other radii."""
+OF_OTHERS = 10
+"""Pictures that are rendered with other radii, and with more light samples."""
+MOST_SAMPLES = 64
+"""Of `direct.samples`."""
 LEAST, LARGEST, FEWEST_PHOTONS = 40, 160, 20_000
 """Sides of the trial's picture in pixels, and N."""
 
@@ -77,7 +80,7 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     (width, height), N = planned
     tried = trial(opened, with_values(base, {"photons.N": N}), found, pool, (width, height), SHARE * seconds, tell)
     picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, seconds - tried.cpu_seconds)
-    values, bias = assignments(_values(picked, base)), bias_of(picked.measured, picked.numbers.widths)
+    values, bias = assignments(_values(picked, base, opened)), bias_of(picked.measured, picked.numbers.widths)
     opened.biases[way_of(with_values(base, values))] = bias  # whoever renders so knows it
     return Choice(
         picked.name,
@@ -104,7 +107,7 @@ def _size(budget: float, count: int, width: int, height: int) -> tuple[tuple[int
     N = min(default, int(0.35 * budget / PER_PHOTON / 2))
     if N < FEWEST_PHOTONS:
         return None
-    pixels = 0.65 * budget / (PER_PIXEL * (count * 4 + OF_RADII))
+    pixels = 0.65 * budget / (PER_PIXEL * (count * 4 + OF_OTHERS))
     if pixels < LEAST**2:
         return None
     shrink = math.sqrt(min(pixels, LARGEST**2) / (width * height))
@@ -152,12 +155,15 @@ def _is_default(option: Option) -> bool:
     return option.measured.candidate.is_like(PROGRESSIVE) and option.numbers == usual
 
 
-def _values(picked: Option, base: Settings) -> dict[str, Any]:
+def _values(picked: Option, base: Settings, opened: OpenScene) -> dict[str, Any]:
     """The settings that the option stands for."""
     values, numbers = dict(picked.measured.candidate.values), picked.numbers
     with_photons = with_values(base, assignments(values))
     if with_photons.render.method != "path":
         values |= {"photons.N": numbers.N, "photons.q": numbers.q}
+    if numbers.samples != 1:
+        usual = plan_of(with_photons, opened.traits).light_samples
+        values["direct.samples"] = min(usual * numbers.samples, MOST_SAMPLES)
     return values | numbers.widths.values(with_photons, picked.measured.radius)
 
 
@@ -166,6 +172,7 @@ def _sentence(picked: Option, goal: Goal) -> str:
     width = "" if numbers.widths.alike else f", {_in_words(numbers.widths)}"
     photons = f", N = {numbers.N:,}" if picked.measured.photons > 0 else ""
     photons += f", q = {numbers.q:g}" if numbers.q != 1.0 else ""
+    photons += f", {numbers.samples} times the light samples" if numbers.samples != 1 else ""
     if goal.error and math.isfinite(picked.seconds):
         promise = f"relMSE {goal.error:.2g} expected after {picked.seconds:.3g} CPU s"
     else:
@@ -185,7 +192,7 @@ def _reason(picked: Option) -> list[str]:
     if picked.numbers.widths.alike or not math.isfinite(picked.seconds):
         return []
     m, lines = picked.measured, list[str]()
-    usual = in_time(m, Numbers(picked.numbers.N, q=picked.numbers.q), picked.seconds)
+    usual = in_time(m, replace(picked.numbers, widths=Widths()), picked.seconds)
     for what, option in (("the automatic radius", usual), ("this one", picked)):
         bias2 = float(bias_of(m, option.numbers.widths)(max(option.passes, 1.0)))
         lines.append(f"{what}: relMSE {option.error:.2g} in that time, {bias2:.2g} of it bias")

@@ -39,11 +39,13 @@ AUTOMATIC = Widths()
 
 @dataclass(frozen=True)
 class Numbers:
-    """N trajectories, of which the share q fills the global map, too, and the radii."""
+    """N trajectories, of which the share q fills the global map, too, the radii, and `samples` times the automatic
+    number of light samples."""
 
     N: int
     widths: Widths = AUTOMATIC
     q: float = 1.0
+    samples: int = 1
 
     def aimed(self, covered: float) -> float:
         """Light's caustics by so many times as many photons as with q = 1, where those for the caustic map alone start
@@ -53,25 +55,29 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Costs:
-    """CPU seconds of a pass of the whole picture: `base`, and per trajectory `light`, `stored`, what goes with the
-    global map's photons, and `caustic` and `shown`, of look-ups, which go with their areas, too."""
+    """CPU seconds of a pass of the whole picture: `base`, `sampled`, of as many light samples more as it has
+    automatically, and per trajectory `light`, `stored`, what goes with the global map's photons, and `caustic` and
+    `shown`, of look-ups, which go with their areas, too."""
 
     base: float
     light: float
     caustic: float = 0.0
     shown: float = 0.0
     stored: float = 0.0
+    sampled: float = 0.0
 
     def of(self, numbers: Numbers, covered: float = 0.0) -> float:
         """Of a pass."""
         widths, q = numbers.widths, numbers.q
         look_up = self.caustic * widths.caustic**2 * numbers.aimed(covered) + self.shown * widths.shown**2 * q
-        return self.base + numbers.N * (self.light + self.stored * q + look_up)
+        base = self.base + self.sampled * (numbers.samples - 1)
+        return base + numbers.N * (self.light + self.stored * q + look_up)
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Relative variances of a pass: `eye` what photons don't decide; of one trajectory, `caustic` what look-ups of
+    """Relative variances of a pass: `eye` what photons don't decide, `lit` as much of it as goes with one over the
+    number of light samples; of one trajectory, `caustic` what look-ups of
     caustics decide, `shown` those of a global map that is shown, `gathered` the rest. `bias`: of the first pass.
     `radius`: of the first pass, relative to the scene. `covered`: share of the light that photons for the caustic map
     alone start in, 0 where there are none."""
@@ -85,6 +91,7 @@ class Measured:
     bias: Bias = field(default_factory=Bias)
     radius: float = 0.0
     covered: float = 0.0
+    lit: float = 0.0
 
     def cost(self, numbers: Numbers) -> float:
         """CPU seconds of a pass of the whole picture."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,8 @@ UNSURE = (2 / 3, 1.0), (1 / 6, 0.5), (1 / 6, 2.0)
 """Weights and factors of what the squared bias may be, the likely one first: Gauss and Hermite's three points of
 a logarithm with a standard deviation of 0.4. (Eight trials of ring_caustic said 0.45 to 1 of it, sixteen of
 cornell_caustic at 64² mostly 1 to 2 times as much.)"""
+SAMPLES = (1, 2, 4, 8)
+"""Light samples that are tried, relative to the automatic number."""
 MISSED = 4.0
 """What an error that is never reached costs, in the time to it."""
 FEWEST = 3
@@ -64,7 +66,8 @@ def error_after(m: Measured, numbers: Numbers, passes: Any) -> Any:
     n, widths = np.asarray(passes, float), numbers.widths
     looked_up = m.caustic / (widths.caustic**2 * numbers.aimed(m.covered)) + m.shown / (widths.shown**2 * numbers.q)
     photons = (looked_up * mean_over(n, -2.0) if looked_up else 0.0) + m.gathered / numbers.q
-    return m.eye / n**COMPLEMENT + photons / numbers.N / n + bias_of(m, widths)(n)
+    eye = m.eye - m.lit * (1.0 - 1.0 / numbers.samples)
+    return eye / n**COMPLEMENT + photons / numbers.N / n + bias_of(m, widths)(n)
 
 
 def bias_of(m: Measured, widths: Widths) -> Bias:
@@ -74,15 +77,27 @@ def bias_of(m: Measured, widths: Widths) -> Bias:
 
 
 def numbers_for(m: Measured) -> list[Numbers]:
-    """All that are worth a thought for one candidate."""
+    """All that are worth a thought for one candidate, and the defaults."""
+    samples = samples_for(m)
     if m.photons <= 0:
-        return [Numbers(PHOTONS[4])]
+        return [Numbers(PHOTONS[4], samples=samples)]
     shown = SHOWN_WIDTHS if m.shown > 0 else (1.0,)
     if m.caustic > 0:
         widths = [Widths(c, s) for c, s in itertools.product(CAUSTIC_WIDTHS, shown)]
     else:  # without caustics their radius goes with the other
         widths = [Widths(s, s) for s in shown]
-    return [Numbers(N, w, q) for N, w, q in itertools.product(PHOTONS, widths, _shares(m))]
+    numbers = [Numbers(N, w, q, samples) for N, w, q in itertools.product(PHOTONS, widths, _shares(m))]
+    return numbers if samples == 1 else [*numbers, *(Numbers(N) for N in PHOTONS)]
+
+
+def samples_for(m: Measured) -> int:
+    """How many times the automatic number of light samples suits it best, with whatever number of photons: by the
+    variance of a pass times its time, as more samples do for the camera rays' part what more passes do."""
+    if m.lit <= 0:
+        return 1
+    every = [Numbers(N, samples=samples) for samples, N in itertools.product(SAMPLES, PHOTONS)]
+    noise = replace(m, bias=Bias())
+    return min(every, key=lambda numbers: float(error_after(noise, numbers, 1.0)) * m.cost(numbers)).samples
 
 
 def _shares(m: Measured) -> tuple[float, ...]:

@@ -42,6 +42,8 @@ RARE = 2.0
 """What the variance that gather rays bring from photons is multiplied by: bright ones that few rays find are missing
 in nearly all of a few small pictures (the whole pictures had 1.0 to 4.5 times as much: cornell_diffuse, rooms_10x10,
 museum, office). Maps that are shown have none: different radii tell their part to a tenth, in office to a quarter."""
+MORE = 4
+"""Light samples of the passes that tell what these do, over the usual number."""
 BLOCK = 4
 """What interpolation does is compared in blocks of so many pixels squared: its bias is smooth, noise is not. Pictures
 with two radii have the same photons and camera rays, and little noise in their difference."""
@@ -77,7 +79,7 @@ class _Run:
 
 @dataclass
 class _Tried:
-    """A candidate's runs: with all photons and with fewer, and with other radii."""
+    """A candidate's runs: with all photons and with fewer, with other radii, and with more light samples."""
 
     candidate: Candidate
     plan: Plan
@@ -85,6 +87,7 @@ class _Tried:
     runs: list[_Run]
     caustic: list[_Run] = field(default_factory=list)
     shown: list[_Run] = field(default_factory=list)
+    lit: list[_Run] = field(default_factory=list)
 
 
 class _Trier:
@@ -122,13 +125,16 @@ class _Trier:
         found = _Tried(candidate, plan, radius, [_Run(with_values(small, {"photons.N": count})) for count in counts])
         if plan.shown_directly:
             found.shown = [_Run(with_values(small, w.values(chosen, radius))) for w in _either("shown")]
+        if plan.direct and not plan.gather and plan.choice != "Keller-Wald":  # beside a gather they are the same
+            fewest = found.runs[-1].settings
+            found.lit = [_Run(with_values(fewest, {"direct.samples": MORE * plan.light_samples}))]
         if plan.caustic_mask and not plan.gather:  # beside a gather they are the same
             found.caustic = [_Run(with_values(small, w.values(chosen, radius))) for w in _either("caustic")]
         return found
 
     def render(self, tried: _Tried, seeds: tuple[int, int]) -> None:
         """A pass with each seed of each of its runs."""
-        for run in (*tried.runs, *tried.shown, *tried.caustic):
+        for run in (*tried.runs, *tried.shown, *tried.caustic, *tried.lit):
             for seed in seeds:
                 self._pass(run, seed)
             if "light pass" in run.stages and run.settings.importance.emission == "off":
@@ -170,6 +176,7 @@ def trial(
     covered = _covered(opened, trier.settings_of(every[0].candidate))
     mean = np.mean([image for tried in every for run in tried.runs for image in run.images], axis=0)
     gathers = next((tried for tried in every if tried.candidate.is_like(GATHER)), None)
+    with_samples = next((tried for tried in every if tried.lit), None)
     with_caustics = next((tried for tried in every if tried.caustic), None)
     for tried in every:
         interpolated = 0.0
@@ -182,6 +189,8 @@ def trial(
         shown = _widened(tried, "shown", mean, trier.scale)
         bias = Bias(caustic.blur, shown.blur, interpolated)
         measured = _measured(tried, (caustic, shown), bias, mean, trier.scale)
+        if tried.plan.direct and with_samples is not None:
+            measured = _sampled(measured, with_samples, mean, trier.scale)
         result.measured.append(replace(measured, covered=covered if _aims(tried) else 0.0))
     result.seeds = len(every[0].runs[0].images)
     result.seconds, result.cpu_seconds = time.perf_counter() - started, pool.cpu_seconds - before
@@ -231,6 +240,15 @@ def _measured(tried: _Tried, widened: tuple[Widened, Widened], bias: Bias, mean:
         gathered = max(photons - caustic - shown, 0.0)
     costs = _costs(tried.runs, (widened[0].cost, widened[1].cost), scale)
     return Measured(tried.candidate, costs, eye, caustic, shown, RARE * gathered, bias, tried.radius)
+
+
+def _sampled(measured: Measured, source: _Tried, mean: F8, scale: float) -> Measured:
+    """With what light samples do, told by passes with `MORE` times as many and the same photons and camera rays. Their
+    variance is taken to fall as chance's does; it falls faster (`pmviewer.render.direct.samples`)."""
+    usual, many = source.runs[-1], source.lit[0]
+    lit = max(variance(usual.images, mean) - variance(many.images, mean), 0.0) / (1 - 1 / MORE)
+    spent = max(many.stages["camera pass"] - usual.stages["camera pass"], 0.0) * scale / (MORE - 1)
+    return replace(measured, lit=min(lit, measured.eye), costs=replace(measured.costs, sampled=spent))
 
 
 def _costs(runs: list[_Run], look_ups: tuple[float, float], scale: float) -> Costs:

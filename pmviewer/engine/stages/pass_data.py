@@ -22,7 +22,6 @@ from pmviewer.maps.shadow import shadow_record
 from pmviewer.maps.variant import looked_up_by
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.direct.choice import CHOICES
-from pmviewer.render.direct.samples import samples_at_surface
 from pmviewer.render.direct.shadow import NO_SHADOWS
 from pmviewer.render.given import NO_VOLUME, PassData
 from pmviewer.render.lookup import NO_RADIANCE_PHOTONS
@@ -74,7 +73,7 @@ def _evaluation(settings: Settings, plan: Plan, maps: PassMaps, index: int) -> E
         guide_mask=plan.guide_mask,
         corner=maps.corner,
         choice=CHOICES.index(plan.choice),
-        light_samples=samples_at_surface(settings.direct, plan.path, plan.media),
+        light_samples=plan.light_samples,
         biased=plan.choice != "power" and settings.direct.biased,
         choice_radius=maps.chooser.radius if maps.chooser is not None else 0.0,
         k=maps.neighbours,

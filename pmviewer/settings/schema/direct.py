@@ -33,7 +33,8 @@ class Direct(Group):
 
     samples: int | Auto = setting(
         "auto",
-        "Light samples per surface and pass. Automatic: 2; by the path tracer and in scenes with media 1.",
+        "Light samples per surface and pass. Automatic: 2, with several lights or light from all around 4; by the path "
+        "tracer and in scenes with media 1.",
         stage="image",
         scale="integer",
         unit="samples",
