@@ -24,7 +24,7 @@ from pmviewer.engine.auto.candidates import (
 from pmviewer.engine.auto.choose import Goal, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.auto.measured import Costs, Measured, Numbers, Widths
-from pmviewer.engine.auto.model import error_after, samples_for, to_error
+from pmviewer.engine.auto.model import error_after, in_time, samples_for, to_error
 from pmviewer.engine.auto.relative import difference, squared, variance
 from pmviewer.engine.auto.trial import RARE, trial
 from pmviewer.engine.auto.widths import Tried, told_by
@@ -103,13 +103,19 @@ def test_what_the_model_promises_is_what_sums_over_passes_say():
 def test_light_samples_divide_their_part_of_the_noise_and_cost_what_they_cost():
     """In all passes alike; and the number that suits follows from both."""
     costs = Costs(0.1, 1e-6, sampled=0.02)
-    m = Measured(PROGRESSIVE, costs, eye=0.05, gathered=7.0, lit=0.04)
-    noise = (0.01 + 0.04 / 4) / 20**1.25 + 7.0 / 50_000 / 20
+    m = Measured(PROGRESSIVE, costs, eye=0.05, gathered=7.0, lit=0.04, complement=1.5)
+    noise = 0.01 / 20**1.25 + 0.04 / 4 / 20**1.5 + 7.0 / 50_000 / 20
     assert error_after(m, Numbers(50_000, samples=4), 20) == pytest.approx(noise, rel=1e-6)
     assert m.cost(Numbers(50_000, samples=4)) == pytest.approx(0.1 + 3 * 0.02 + 0.05)
-    assert samples_for(replace(m, lit=0.0)) == samples_for(replace(m, costs=replace(costs, sampled=1.0))) == 1
-    assert samples_for(replace(m, costs=replace(costs, sampled=0.0))) == 8
-    assert 1 < samples_for(m) < 8
+
+    def best(m: Measured, seconds: float) -> int:
+        return samples_for(m, lambda numbers: in_time(m, numbers, seconds).error)
+
+    free, dear = (replace(m, costs=replace(costs, sampled=sampled)) for sampled in (0.0, 1.0))
+    assert best(replace(m, lit=0.0), 1.0) == best(dear, 1.0) == 1
+    assert best(free, 1.0) == 8
+    assert 1 < best(m, 1.0) < 8
+    assert best(m, 1.0) > best(m, 100.0) == 1  # photons make the noise of many passes
 
 
 def test_a_radius_that_may_never_get_there_is_expected_to_take_longer():

@@ -9,8 +9,8 @@ from typing import Any
 
 from pmviewer.engine.auto.bias import Bias, way_of
 from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, Candidate, assignments, candidates
-from pmviewer.engine.auto.measured import Numbers, Widths
-from pmviewer.engine.auto.model import FEWEST, Option, bias_of, in_time, numbers_for, to_error
+from pmviewer.engine.auto.measured import Measured, Numbers, Widths
+from pmviewer.engine.auto.model import BETTER, FEWEST, Option, bias_of, in_time, numbers_for, to_error
 from pmviewer.engine.auto.trial import Tell, Trial, trial
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
@@ -22,8 +22,6 @@ SHARE = 0.1
 """Of the time asked for, what a trial may take."""
 USUAL = 10.0
 """CPU seconds that are planned for where nobody gives any."""
-BETTER = 0.87
-"""What another way must promise of the default's error to be taken: less is within the trial's own noise."""
 NEARLY = 1.1
 """What of the least error counts as the same."""
 PER_PHOTON, PER_PIXEL = 1.5e-6, 6e-6
@@ -118,7 +116,7 @@ def _size(budget: float, count: int, width: int, height: int) -> tuple[tuple[int
 
 def _by_time(tried: Trial, seconds: float) -> Option:
     """The least error after that time; the default unless another is clearly better."""
-    every = [in_time(m, numbers, seconds) for m in tried.measured for numbers in numbers_for(m)]
+    every = [option for m in tried.measured for option in _in_time(m, seconds)]
     enough = [option for option in every if option.passes >= FEWEST]
     if not enough:
         return max(every, key=lambda option: option.passes)
@@ -127,9 +125,17 @@ def _by_time(tried: Trial, seconds: float) -> Option:
 
 def _by_error(tried: Trial, error: float) -> Option:
     """The least time that is expected to that error; where none reaches it, what comes nearest in a long time."""
-    every = [to_error(m, numbers, error) for m in tried.measured for numbers in numbers_for(m)]
+    every = [option for m in tried.measured for option in _to_error(m, error)]
     reached = [o for o in every if math.isfinite(o.seconds)]
     return _picked(reached, lambda option: option.expected) if reached else _by_time(tried, 1000.0)
+
+
+def _in_time(m: Measured, seconds: float) -> list[Option]:
+    return [in_time(m, numbers, seconds) for numbers in numbers_for(m, lambda n: in_time(m, n, seconds).error)]
+
+
+def _to_error(m: Measured, error: float) -> list[Option]:
+    return [to_error(m, numbers, error) for numbers in numbers_for(m, lambda n: to_error(m, n, error).expected)]
 
 
 def _picked(found: list[Option], of: Callable[[Option], float]) -> Option:
@@ -204,7 +210,7 @@ def _table(tried: Trial, picked: Option) -> list[str]:
     lines = []
     for m in tried.measured:
         if math.isfinite(picked.seconds):
-            every = [in_time(m, numbers, picked.seconds) for numbers in numbers_for(m)]
+            every = _in_time(m, picked.seconds)
             best = min((o for o in every if o.passes >= 1), default=every[0], key=lambda o: o.error)
             lines.append(f"tried {m.candidate.name}: relMSE {best.error:.2g} with N = {best.numbers.N:,} in that time")
     lines.append(f"trial: {tried.pixels:,} pixels, {tried.seeds} seeds, {tried.cpu_seconds:.2g} CPU s")

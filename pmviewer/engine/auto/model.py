@@ -1,16 +1,18 @@
 """What the trial's figures promise for a given time: error over N, radii, q and passes.
 
 The variance of the mean of n passes is that of the camera rays, whose numbers complement one another from pass to pass,
-eye/n^1.25, plus the photons' part, which falls as 1/n. Where look-ups shrink, the photons' variance in pass i goes with
-r²₁/r²ᵢ, as for Knaus & Zwicker 2011, and bias with a power of rᵢ/r₁ that the trial has measured. Of N trajectories
-q·N fill both maps and the others the caustic map alone, in the share of the light that projection maps leave them.
+eye/n^1.25, or faster where it is light samples' (`Measured.complement`), plus the photons' part, which falls as 1/n.
+Where look-ups shrink, the photons' variance in pass i goes with r²₁/r²ᵢ, as for Knaus & Zwicker 2011, and bias with a
+power of rᵢ/r₁ that the trial has measured. Of N trajectories q·N fill both maps and the others the caustic map alone,
+in the share of the light that projection maps leave them.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -32,6 +34,10 @@ a logarithm with a standard deviation of 0.4. (Eight trials of ring_caustic said
 cornell_caustic at 64² mostly 1 to 2 times as much.)"""
 SAMPLES = (1, 2, 4, 8)
 """Light samples that are tried, relative to the automatic number."""
+BETTER = 0.87
+"""What another way must promise of the default's error to be taken: less is within the trial's own noise."""
+EVEN = 1.05
+"""What of the least error makes no difference."""
 MISSED = 4.0
 """What an error that is never reached costs, in the time to it."""
 FEWEST = 3
@@ -66,8 +72,8 @@ def error_after(m: Measured, numbers: Numbers, passes: Any) -> Any:
     n, widths = np.asarray(passes, float), numbers.widths
     looked_up = m.caustic / (widths.caustic**2 * numbers.aimed(m.covered)) + m.shown / (widths.shown**2 * numbers.q)
     photons = (looked_up * mean_over(n, -2.0) if looked_up else 0.0) + m.gathered / numbers.q
-    eye = m.eye - m.lit * (1.0 - 1.0 / numbers.samples)
-    return eye / n**COMPLEMENT + photons / numbers.N / n + bias_of(m, widths)(n)
+    eye = (m.eye - m.lit) / n**COMPLEMENT + m.lit / numbers.samples / n**m.complement
+    return eye + photons / numbers.N / n + bias_of(m, widths)(n)
 
 
 def bias_of(m: Measured, widths: Widths) -> Bias:
@@ -76,9 +82,9 @@ def bias_of(m: Measured, widths: Widths) -> Bias:
     return Bias(bias.caustic.wider(widths.caustic), bias.shown.wider(widths.shown), bias.interpolated)
 
 
-def numbers_for(m: Measured) -> list[Numbers]:
-    """All that are worth a thought for one candidate, and the defaults."""
-    samples = samples_for(m)
+def numbers_for(m: Measured, of: Callable[[Numbers], float]) -> list[Numbers]:
+    """All that are worth a thought for one candidate, and the defaults. `of` says what is to be least."""
+    samples = samples_for(m, of)
     if m.photons <= 0:
         return [Numbers(PHOTONS[4], samples=samples)]
     shown = SHOWN_WIDTHS if m.shown > 0 else (1.0,)
@@ -90,14 +96,14 @@ def numbers_for(m: Measured) -> list[Numbers]:
     return numbers if samples == 1 else [*numbers, *(Numbers(N) for N in PHOTONS)]
 
 
-def samples_for(m: Measured) -> int:
-    """How many times the automatic number of light samples suits it best, with whatever number of photons: by the
-    variance of a pass times its time, as more samples do for the camera rays' part what more passes do."""
+def samples_for(m: Measured, of: Callable[[Numbers], float]) -> int:
+    """How many times the automatic number of light samples promises the least `of` numbers, with whatever number of
+    photons: of what is even the least, and once, unless more are clearly better."""
     if m.lit <= 0:
         return 1
-    every = [Numbers(N, samples=samples) for samples, N in itertools.product(SAMPLES, PHOTONS)]
-    noise = replace(m, bias=Bias())
-    return min(every, key=lambda numbers: float(error_after(noise, numbers, 1.0)) * m.cost(numbers)).samples
+    least = {samples: min(of(Numbers(N, samples=samples)) for N in PHOTONS) for samples in SAMPLES}
+    few = next(samples for samples in SAMPLES if least[samples] <= EVEN * min(least.values()))
+    return few if least[few] < BETTER * least[1] else 1
 
 
 def _shares(m: Measured) -> tuple[float, ...]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.candidates import CACHE, GATHER, Candidate, assignments
-from pmviewer.engine.auto.measured import Costs, Measured, Widths
+from pmviewer.engine.auto.measured import CHOSEN, SAMPLED, Costs, Measured, Widths
 from pmviewer.engine.auto.relative import F8, squared, variance
 from pmviewer.engine.auto.widths import NONE, WIDER, Tried, Widened, told_by
 from pmviewer.engine.method import Plan, plan_of
@@ -44,6 +44,8 @@ in nearly all of a few small pictures (the whole pictures had 1.0 to 4.5 times a
 museum, office). Maps that are shown have none: different radii tell their part to a tenth, in office to a quarter."""
 MORE = 4
 """Light samples of the passes that tell what these do, over the usual number."""
+MOST_LIT = 0.9
+"""Most of the camera rays' part that light samples are taken to make: edges and surfaces are some of it."""
 BLOCK = 4
 """What interpolation does is compared in blocks of so many pixels squared: its bias is smooth, noise is not. Pictures
 with two radii have the same photons and camera rays, and little noise in their difference."""
@@ -248,7 +250,9 @@ def _sampled(measured: Measured, source: _Tried, mean: F8, scale: float) -> Meas
     usual, many = source.runs[-1], source.lit[0]
     lit = max(variance(usual.images, mean) - variance(many.images, mean), 0.0) / (1 - 1 / MORE)
     spent = max(many.stages["camera pass"] - usual.stages["camera pass"], 0.0) * scale / (MORE - 1)
-    return replace(measured, lit=min(lit, measured.eye), costs=replace(measured.costs, sampled=spent))
+    complement = SAMPLED if source.plan.choice == "power" else CHOSEN
+    costs = replace(measured.costs, sampled=spent)
+    return replace(measured, lit=min(lit, MOST_LIT * measured.eye), complement=complement, costs=costs)
 
 
 def _costs(runs: list[_Run], look_ups: tuple[float, float], scale: float) -> Costs:
