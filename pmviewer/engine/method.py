@@ -156,12 +156,13 @@ class Plan:
 
 def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     """The stages that the method needs in this scene."""
-    plan = _in_media_or_none(settings, traits)
+    plan = _stages_of(settings, traits)
     several = traits.n_lights > 1 or traits.has_environment
     return replace(plan, light_samples=samples_at_surface(settings.direct, plan.path, plan.media, several))
 
 
-def _in_media_or_none(settings: Settings, traits: SceneTraits) -> Plan:
+def _stages_of(settings: Settings, traits: SceneTraits) -> Plan:
+    """All of the plan but the number of light samples."""
     if not traits.has_media:
         return _plan_of(settings, traits)
     asked = settings
