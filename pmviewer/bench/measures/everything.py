@@ -30,6 +30,8 @@ LONG = (
     "virtual-many",
 )  # fmt: skip
 """Benches that take many minutes whole: all of them together are run quick, and the page says so."""
+LAST = ("stress",)
+"""Most of its time compiles kernels where nobody has before: it takes what the others leave."""
 FOLDER = Path("bench-results")
 
 
@@ -37,7 +39,7 @@ def run(quick: bool = False, keep: Path | None = None) -> BenchResult:
     """Each bench in a process of its own, which ends when it takes too long; results go to the folder `keep`, the page
     of `bench report` too. `LONG` ones run quick; others do where the whole one has taken too long."""
     folder = keep or FOLDER
-    names = [name for name in BENCHES if name not in (*THEMSELVES, *NEED_MORE)]
+    names = sorted((name for name in BENCHES if name not in (*THEMSELVES, *NEED_MORE)), key=LAST.__contains__)
     end = time.monotonic() + (QUICK_LIMIT if quick else LIMIT)
     for number, name in enumerate(names):
         left = end - time.monotonic()
