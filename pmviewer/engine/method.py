@@ -157,7 +157,7 @@ class Plan:
 def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     """The stages that the method needs in this scene."""
     plan = _stages_of(settings, traits)
-    several = traits.n_lights > 1 or traits.has_environment
+    several = traits.many_lights or traits.has_environment
     return replace(plan, light_samples=samples_at_surface(settings.direct, plan.path, plan.media, several))
 
 

@@ -103,7 +103,7 @@ def test_what_the_model_promises_is_what_sums_over_passes_say():
 def test_light_samples_divide_their_part_of_the_noise_and_cost_what_they_cost():
     """In all passes alike; and the number that suits follows from both."""
     costs = Costs(0.1, 1e-6, sampled=0.02)
-    m = Measured(PROGRESSIVE, costs, eye=0.05, gathered=7.0, lit=0.04, complement=1.5)
+    m = Measured(PROGRESSIVE, costs, eye=0.05, gathered=7.0, direct=0.04, complement=1.5)
     noise = 0.01 / 20**1.25 + 0.04 / 4 / 20**1.5 + 7.0 / 50_000 / 20
     assert error_after(m, Numbers(50_000, samples=4), 20) == pytest.approx(noise, rel=1e-6)
     assert m.cost(Numbers(50_000, samples=4)) == pytest.approx(0.1 + 3 * 0.02 + 0.05)
@@ -112,7 +112,7 @@ def test_light_samples_divide_their_part_of_the_noise_and_cost_what_they_cost():
         return samples_for(m, lambda numbers: in_time(m, numbers, seconds).error)
 
     free, dear = (replace(m, costs=replace(costs, sampled=sampled)) for sampled in (0.0, 1.0))
-    assert best(replace(m, lit=0.0), 1.0) == best(dear, 1.0) == 1
+    assert best(replace(m, direct=0.0), 1.0) == best(dear, 1.0) == 1
     assert best(free, 1.0) == 8
     assert 1 < best(m, 1.0) < 8
     assert best(m, 1.0) > best(m, 100.0) == 1  # photons make the noise of many passes
@@ -234,7 +234,7 @@ def test_a_trial_tells_what_light_samples_do(pool):
                 renderer.step()
                 images.append(beauty_of(renderer.film.planes()).astype(float))
             noise.append(variance(images, np.mean(images, axis=0)))
-        told = 0.75 * tried.measured[0].lit
+        told = 0.75 * tried.measured[0].direct
         print(f"{name}: noise {noise[0]:.4f}, {noise[1]:.4f} with four times the samples; the trial: {told:.4f} less")
         assert told == pytest.approx(noise[0] - noise[1], rel=0.35)
         assert told > least * noise[0]

@@ -28,8 +28,6 @@ PER_PHOTON, PER_PIXEL = 1.5e-6, 6e-6
 """CPU seconds of a trial by trajectory and by pixel and candidate: what its size is planned by, clock or no clock."""
 OF_OTHERS = 10
 """Pictures that are rendered with other radii, and with more light samples."""
-MOST_SAMPLES = 64
-"""Of `direct.samples`."""
 LEAST, LARGEST, FEWEST_PHOTONS = 40, 160, 20_000
 """Sides of the trial's picture in pixels, and N."""
 
@@ -168,8 +166,7 @@ def _values(picked: Option, base: Settings, opened: OpenScene) -> dict[str, Any]
     if with_photons.render.method != "path":
         values |= {"photons.N": numbers.N, "photons.q": numbers.q}
     if numbers.samples != 1:
-        usual = plan_of(with_photons, opened.traits).light_samples
-        values["direct.samples"] = min(usual * numbers.samples, MOST_SAMPLES)
+        values["direct.samples"] = numbers.samples * plan_of(with_photons, opened.traits).light_samples
     return values | numbers.widths.values(with_photons, picked.measured.radius)
 
 

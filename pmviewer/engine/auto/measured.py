@@ -10,7 +10,7 @@ from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.candidates import Candidate
 from pmviewer.settings.access import Settings
 
-SAMPLED, CHOSEN = 1.5, 1.1
+BY_POWER, BY_PHOTONS = 1.5, 1.1
 """Powers of the number of passes that the variance of direct light falls with, by light samples over all lights and by
 those that photons choose: from 4 to 32 passes 1.42 to 1.78 in cornell_caustic, cornell_diffuse, cornell_lights,
 colonnade, glass_egg and museum; 1.16 in office and 0.93 in rooms_10x10."""
@@ -81,7 +81,7 @@ class Costs:
 
 @dataclass(frozen=True)
 class Measured:
-    """Relative variances of a pass: `eye` what photons don't decide, `lit` as much of it as goes with one over the
+    """Relative variances of a pass: `eye` what photons don't decide, `direct` as much of it as goes with one over the
     number of light samples, and falls with the power `complement` of the passes; of one trajectory, `caustic` what
     look-ups of caustics decide, `shown` those of a global map that is shown, `gathered` the rest. `bias`: of the first
     pass. `radius`: of the first pass, relative to the scene. `covered`: share of the light that photons for the caustic
@@ -96,8 +96,8 @@ class Measured:
     bias: Bias = field(default_factory=Bias)
     radius: float = 0.0
     covered: float = 0.0
-    lit: float = 0.0
-    complement: float = SAMPLED
+    direct: float = 0.0
+    complement: float = BY_POWER
 
     def cost(self, numbers: Numbers) -> float:
         """CPU seconds of a pass of the whole picture."""

@@ -72,7 +72,7 @@ def error_after(m: Measured, numbers: Numbers, passes: Any) -> Any:
     n, widths = np.asarray(passes, float), numbers.widths
     looked_up = m.caustic / (widths.caustic**2 * numbers.aimed(m.covered)) + m.shown / (widths.shown**2 * numbers.q)
     photons = (looked_up * mean_over(n, -2.0) if looked_up else 0.0) + m.gathered / numbers.q
-    eye = (m.eye - m.lit) / n**COMPLEMENT + m.lit / numbers.samples / n**m.complement
+    eye = (m.eye - m.direct) / n**COMPLEMENT + m.direct / numbers.samples / n**m.complement
     return eye + photons / numbers.N / n + bias_of(m, widths)(n)
 
 
@@ -99,7 +99,7 @@ def numbers_for(m: Measured, of: Callable[[Numbers], float]) -> list[Numbers]:
 def samples_for(m: Measured, of: Callable[[Numbers], float]) -> int:
     """How many times the automatic number of light samples promises the least `of` numbers, with whatever number of
     photons: of what is even the least, and once, unless more are clearly better."""
-    if m.lit <= 0:
+    if m.direct <= 0:
         return 1
     least = {samples: min(of(Numbers(N, samples=samples)) for N in PHOTONS) for samples in SAMPLES}
     few = next(samples for samples in SAMPLES if least[samples] <= EVEN * min(least.values()))

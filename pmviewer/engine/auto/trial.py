@@ -19,7 +19,7 @@ import numpy as np
 
 from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.candidates import CACHE, GATHER, Candidate, assignments
-from pmviewer.engine.auto.measured import CHOSEN, SAMPLED, Costs, Measured, Widths
+from pmviewer.engine.auto.measured import BY_PHOTONS, BY_POWER, Costs, Measured, Widths
 from pmviewer.engine.auto.relative import F8, squared, variance
 from pmviewer.engine.auto.widths import NONE, WIDER, Tried, Widened, told_by
 from pmviewer.engine.method import Plan, plan_of
@@ -44,7 +44,7 @@ in nearly all of a few small pictures (the whole pictures had 1.0 to 4.5 times a
 museum, office). Maps that are shown have none: different radii tell their part to a tenth, in office to a quarter."""
 MORE = 4
 """Light samples of the passes that tell what these do, over the usual number."""
-MOST_LIT = 0.9
+MOST_DIRECT = 0.9
 """Most of the camera rays' part that light samples are taken to make: edges and surfaces are some of it."""
 BLOCK = 4
 """What interpolation does is compared in blocks of so many pixels squared: its bias is smooth, noise is not. Pictures
@@ -89,7 +89,7 @@ class _Tried:
     runs: list[_Run]
     caustic: list[_Run] = field(default_factory=list)
     shown: list[_Run] = field(default_factory=list)
-    lit: list[_Run] = field(default_factory=list)
+    direct: list[_Run] = field(default_factory=list)
 
 
 class _Trier:
@@ -127,16 +127,16 @@ class _Trier:
         found = _Tried(candidate, plan, radius, [_Run(with_values(small, {"photons.N": count})) for count in counts])
         if plan.shown_directly:
             found.shown = [_Run(with_values(small, w.values(chosen, radius))) for w in _either("shown")]
-        if plan.direct and not plan.gather and plan.choice != "Keller-Wald":  # beside a gather they are the same
+        if plan.direct and not plan.gather:  # beside a gather they are the same
             fewest = found.runs[-1].settings
-            found.lit = [_Run(with_values(fewest, {"direct.samples": MORE * plan.light_samples}))]
+            found.direct = [_Run(with_values(fewest, {"direct.samples": MORE * plan.light_samples}))]
         if plan.caustic_mask and not plan.gather:  # beside a gather they are the same
             found.caustic = [_Run(with_values(small, w.values(chosen, radius))) for w in _either("caustic")]
         return found
 
     def render(self, tried: _Tried, seeds: tuple[int, int]) -> None:
         """A pass with each seed of each of its runs."""
-        for run in (*tried.runs, *tried.shown, *tried.caustic, *tried.lit):
+        for run in (*tried.runs, *tried.shown, *tried.caustic, *tried.direct):
             for seed in seeds:
                 self._pass(run, seed)
             if "light pass" in run.stages and run.settings.importance.emission == "off":
@@ -178,7 +178,7 @@ def trial(
     covered = _covered(opened, trier.settings_of(every[0].candidate))
     mean = np.mean([image for tried in every for run in tried.runs for image in run.images], axis=0)
     gathers = next((tried for tried in every if tried.candidate.is_like(GATHER)), None)
-    with_samples = next((tried for tried in every if tried.lit), None)
+    with_samples = next((tried for tried in every if tried.direct), None)
     with_caustics = next((tried for tried in every if tried.caustic), None)
     for tried in every:
         interpolated = 0.0
@@ -247,12 +247,12 @@ def _measured(tried: _Tried, widened: tuple[Widened, Widened], bias: Bias, mean:
 def _sampled(measured: Measured, source: _Tried, mean: F8, scale: float) -> Measured:
     """With what light samples do, told by passes with `MORE` times as many and the same photons and camera rays. Their
     variance is taken to fall as chance's does; it falls faster (`pmviewer.render.direct.samples`)."""
-    usual, many = source.runs[-1], source.lit[0]
-    lit = max(variance(usual.images, mean) - variance(many.images, mean), 0.0) / (1 - 1 / MORE)
+    usual, many = source.runs[-1], source.direct[0]
+    direct = max(variance(usual.images, mean) - variance(many.images, mean), 0.0) / (1 - 1 / MORE)
     spent = max(many.stages["camera pass"] - usual.stages["camera pass"], 0.0) * scale / (MORE - 1)
-    complement = SAMPLED if source.plan.choice == "power" else CHOSEN
+    complement = BY_POWER if source.plan.choice == "power" else BY_PHOTONS
     costs = replace(measured.costs, sampled=spent)
-    return replace(measured, lit=min(lit, MOST_LIT * measured.eye), complement=complement, costs=costs)
+    return replace(measured, direct=min(direct, MOST_DIRECT * measured.eye), complement=complement, costs=costs)
 
 
 def _costs(runs: list[_Run], look_ups: tuple[float, float], scale: float) -> Costs:
