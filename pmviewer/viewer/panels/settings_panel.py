@@ -144,11 +144,16 @@ class SettingsPanel:
 
     @staticmethod
     def _section(heading: str) -> None:
-        """A line over the settings that belong together within a group."""
+        """A line over the settings that belong together within a group, which reaches over all columns."""
         imgui.table_next_row()
         imgui.table_next_column()
         imgui.spacing()
+        drawn = imgui.get_window_draw_list()
+        low, high = drawn.get_clip_rect_min(), drawn.get_clip_rect_max()
+        right = imgui.get_window_pos().x + imgui.get_window_width()
+        imgui.push_clip_rect(low, imgui.ImVec2(right, high.y), False)
         imgui.text_colored(imgui.ImVec4(*theme.ACCENT), theme.drawable(heading))
+        imgui.pop_clip_rect()
 
     def reason(self, path: str) -> str | None:
         """Why the setting has no effect now, or None."""
