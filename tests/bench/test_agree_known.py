@@ -106,7 +106,7 @@ def test_known_deviations_explain_only_what_agrees_without_them(monkeypatch):
     def answers(agreeing: set[str]):
         """A scene agrees when it lacks all that is named."""
 
-        def outcome_of(simpler, like, stage, salt, shared_kernels):
+        def outcome_of(simpler, like, stage, salt, shared_kernels, believed):
             asked.append(simpler)
             assert (stage, shared_kernels) == (len(STAGES) - 1, True)
             lacks = {d.name for d in DEVIATIONS if d.without(simpler) is None}
@@ -118,7 +118,7 @@ def test_known_deviations_explain_only_what_agrees_without_them(monkeypatch):
     assert explanation(found) == names[1]
     monkeypatch.setattr(triage, "outcome_of", answers(set(names[:2])))
     assert explanation(found) == " + ".join(names)
-    monkeypatch.setattr(triage, "outcome_of", lambda *a: Outcome(1e-12, 1.3, 0.01, 51))
+    monkeypatch.setattr(triage, "outcome_of", lambda *a, **k: Outcome(1e-12, 1.3, 0.01, 51))
     assert explanation(found) == ""
     own = comparison("gather", 1e-9, peer_name="our path")
     monkeypatch.setattr(triage, "outcome_of", answers(set()))

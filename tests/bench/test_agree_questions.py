@@ -201,6 +201,21 @@ def test_every_method_is_compared_in_every_scene_and_a_wrong_one_is_found(partic
         assert any(c.p == pytest.approx(0) and wrong in (c.method, c.peer) for c in found)
 
 
+def test_particles_that_lose_light_are_asked_where_a_disagreement_with_them_is_explained_alone():
+    """Scene 30 of seed 77: 2.25 times our light by a normal map, and without it, by the noise of the first samples,
+    less than its own paths bring: the reason that is on the list was not found."""
+
+    class Losing(FakeRuns):
+        def theirs(self, mode: str, stage: int, max_depth: int = 0) -> np.ndarray:
+            return super().theirs(mode, stage, max_depth) * (0.9 if mode == "ptracer" else 1.0)
+
+    scene = next(s for i in range(100) if needs_particles(s := scene_of(1, i)))
+    assert "Mitsuba particles" not in {q.peer for q in questions(Losing(scene))}
+    asked = [q.asked(len(STAGES)) for q in questions(Losing(scene), believed=True) if q.peer == "Mitsuba particles"]
+    assert asked
+    assert all(c.p == pytest.approx(0) for c in asked)
+
+
 @pytest.mark.parametrize("method", ["single step", "every vertex"])
 def test_wrong_weights_of_virtual_lights_are_found(method):
     scene = next(s for i in range(100) if method in asked_methods(s := scene_of(1, i)))

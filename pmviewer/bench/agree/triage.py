@@ -30,8 +30,11 @@ def _shows(outcome: Outcome | None) -> bool:
     return outcome is not None and outcome.p <= CLEAR
 
 
-def _question(runs: Runs, like: Comparison) -> Question | None:
-    return next((q for q in questions(runs) if (q.method, q.peer, q.what) == (like.method, like.peer, like.what)), None)
+def _question(runs: Runs, like: Comparison, believed: bool) -> Question | None:
+    return next(
+        (q for q in questions(runs, believed) if (q.method, q.peer, q.what) == (like.method, like.peer, like.what)),
+        None,
+    )
 
 
 _recent: dict[tuple[str, tuple[int, ...], bool], tuple[Runs, tempfile.TemporaryDirectory[str]]] = {}
@@ -51,11 +54,17 @@ def _runs(scene: Node, salt: tuple[int, ...], shared_kernels: bool) -> Runs:
 
 
 def outcome_of(
-    scene: Node, like: Comparison, stage: int, salt: tuple[int, ...], shared_kernels: bool = False
+    scene: Node,
+    like: Comparison,
+    stage: int,
+    salt: tuple[int, ...],
+    shared_kernels: bool = False,
+    believed: bool = False,
 ) -> Outcome | None:
-    """The same comparison of another scene at a stage; None where it makes no sense or a program refuses the scene."""
+    """The same comparison of another scene at a stage; None where it makes no sense or a program refuses the scene.
+    `believed` as for `questions`."""
     try:
-        question = _question(_runs(scene, salt, shared_kernels), like)
+        question = _question(_runs(scene, salt, shared_kernels), like, believed)
         return None if question is None else question.answer(stage)
     except PmviewerError:
         return None
@@ -98,8 +107,9 @@ def explanation(
     """
 
     def agrees(simpler: Node) -> bool:
-        # With what was enough to find the disagreement, and other seeds.
-        outcome = outcome_of(simpler, found, found.stage - 1, (*salt, 1), shared_kernels)
+        # With what was enough to find the disagreement, and other seeds. Particles that lose light here don't agree;
+        # whether they do, the few of the first stage that are asked otherwise can't tell from their noise.
+        outcome = outcome_of(simpler, found, found.stage - 1, (*salt, 1), shared_kernels, believed=True)
         return outcome is not None and outcome.p > AGREES
 
     may = [d for d in DEVIATIONS if d.concerns(found.peer)]

@@ -249,8 +249,8 @@ def particles_hold(runs: Runs) -> bool:
     return bool(particles >= LEAST_OF_PATHS * paths)
 
 
-def questions(runs: Runs) -> Iterator[Question]:
-    """All that is compared for a scene."""
+def questions(runs: Runs, believed: bool = False) -> Iterator[Question]:
+    """All that is compared for a scene. `believed`: with Mitsuba's particles without asking whether they hold."""
 
     def whole(method: str, stage: int, seen: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
         return summaries(picture(runs.ours(method, stage)), seen)
@@ -291,7 +291,11 @@ def questions(runs: Runs) -> Iterator[Question]:
             pass
         elif not particles:
             yield Question(method, "Mitsuba path", "picture", by_paths)
-        elif not has_distant_lights(runs.scene) and runs.seen_plainly.mean() >= LEAST_SEEN and particles_hold(runs):
+        elif (
+            not has_distant_lights(runs.scene)
+            and runs.seen_plainly.mean() >= LEAST_SEEN
+            and (believed or particles_hold(runs))
+        ):
             yield Question(method, "Mitsuba particles", "plain pixels", by_particles)
         elif method != "progressive":
             yield Question(method, "progressive", "picture", by_other)
