@@ -20,31 +20,31 @@ import math
 
 import numpy as np
 
-from pmviewer.kernels.accel.occlusion import occluded
 from pmviewer.kernels.accel.opacity import over_opacity
 from pmviewer.kernels.accel.raycast import closest_hit
-from pmviewer.kernels.bsdf.scattering import STORED, bsdf_at, keeps
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import DISC_SALT
 from pmviewer.kernels.memory import load_i4, stack_get_i8, stack_i4
 from pmviewer.kernels.random import hash3, unit_float
-from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face, surface_at
-from pmviewer.kernels.vector import along, basis, dot, scale, sub
+from pmviewer.kernels.vector import along, basis, dot, scale
 from pmviewer.maps.search.disc import Facing
 from pmviewer.maps.search.k_nearest import KEYS, nearest
 from pmviewer.maps.search.stored import ALL_CLASSES
+from pmviewer.maps.together import SAME_SIDE, can_hold, see_each_other
 from pmviewer.maps.virtual_lights import FLATNESS, V_GAP, V_N, V_P, V_WI
 
 PLACES = 16
 """Places that a cell is measured by."""
 MORE = 3
 """Photons beyond those of a cell's order that tell how wide it will be."""
+MOST_SURFACES = 16
+"""That a line through a place is followed through."""
+NEXT = np.float32(1e-4)
+"""How far beyond a surface the next one is looked for, relative to half the line's length."""
 LEAST = np.float32(1 / 64)
 """Least area of a cell relative to what it is expected to be. No place that was asked may belong to a photon that is
 alone on a small surface, and its light would weigh nothing."""
-SAME_SIDE = np.float32(0.5)
-"""Least cosine between the normals of a light and of what belongs to it."""
 
 _f4 = np.float32
 _u4 = np.uint32
@@ -71,14 +71,13 @@ def share_of(tree, p, n, order, reach, photon, keys):
 
 
 @device
-def _share_below(scene, tree, top, n, depth, order, reach, glossy, photon, keys):
-    """`share_of` where a ray from the point `top` against the normal n meets a surface within `depth` that photons are
-    stored on, by the area there over that of the tangent plane, and over the opacity of what rays pass in part."""
-    down = scale(n, _f4(-1.0))
-    t, prim, u, v = closest_hit(scene, top[0], top[1], top[2], down[0], down[1], down[2], _f4(0.0), depth)
-    if prim < 0:
-        return _f4(0.0)
-    p, outwards, ns, _ = surface_at(scene, prim, u, v, top[0], top[1], top[2], down[0], down[1], down[2], t)
+def _share_at(scene, tree, hit, light, order, reach, glossy, photon, keys):
+    """`share_of` where a ray against the light's normal has met a surface, `hit` (prim, u, v, origin, direction, t), if
+    photons are stored there and the light can be seen: by the area over that of the tangent plane, and over the opacity
+    of what rays pass in part. `light`: its place, normal and gap."""
+    prim, u, v, o, d, t = hit
+    y, n, gap = light
+    p, outwards, ns, _ = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
     ng = face(outwards, n)
     cos = dot(ng, n)
     if cos < SAME_SIDE:
@@ -86,11 +85,29 @@ def _share_below(scene, tree, top, n, depth, order, reach, glossy, photon, keys)
     share = share_of(tree, p, ng, order, reach, photon, keys) / cos
     if share == _f4(0.0):
         return share
-    material = material_of(scene, prim)
-    b = bsdf_at(scene, prim, material, u, v, p, outwards, ns, n, glossy, None)
-    if keeps(scene, material, b, outwards, n, glossy) & STORED == 0:
+    if not see_each_other(scene, y, n, p, ng, gap):
+        return _f4(0.0)
+    if not can_hold(scene, prim, (u, v), (p, outwards, ns), n, glossy):
         return _f4(0.0)
     return over_opacity(scene, prim, u, v, p, (share, share, share))[0]
+
+
+@device
+def _share_along(scene, tree, o, light, height, order, reach, glossy, photon, keys):
+    """The sum of `_share_at` over all surfaces on the line through o along the light's normal, no farther from o than
+    `height`."""
+    n = light[1]
+    top, down = along(o, n, height), scale(n, _f4(-1.0))
+    total, start = _f4(0.0), _f4(0.0)
+    for _ in range(MOST_SURFACES):
+        t, prim, u, v = closest_hit(
+            scene, top[0], top[1], top[2], down[0], down[1], down[2], start, _f4(2.0) * height
+        )
+        if prim < 0:
+            break
+        total += _share_at(scene, tree, (prim, u, v, top, down, t), light, order, reach, glossy, photon, keys)
+        start = t + NEXT * height
+    return total
 
 
 @kernel
@@ -118,17 +135,11 @@ def cells(scenes, trees, lights, photons, order, reach, glossy, out, first, last
             u = (_f4(j) + shift) / _f4(PLACES) * (widest / (middle + widest))
             area = middle * u / (_f4(1.0) - u)
             radius = _f4(math.sqrt(area / _f4(math.pi)))
-            height = max(FLATNESS * radius, _f4(2.0) * gap)
             phi = _f4(2.0 * math.pi) * turn + _GOLDEN * _f4(j)
             x = along(along(p, s, radius * _f4(math.cos(phi))), t, radius * _f4(math.sin(phi)))
-            over, top = along(p, n, height), along(x, n, height)
-            way = sub(top, over)
-            if occluded(scene, over[0], over[1], over[2], way[0], way[1], way[2], _f4(0.0), _f4(1.0)):
-                continue
+            height = _f4(math.sqrt(max(reach * reach - radius * radius, _f4(0.0)))) + _f4(2.0) * gap
             sparse = (middle + area) * (middle + area) / middle
-            total += sparse * _share_below(
-                scene, tree, top, n, _f4(2.0) * height, order, reach, glossy, photons[i], keys
-            )
+            total += sparse * _share_along(scene, tree, x, (p, n, gap), height, order, reach, glossy, photons[i], keys)
         out[i] = max(total * (widest / (middle + widest)) / _f4(PLACES), LEAST * middle / _f4(order))
 
 

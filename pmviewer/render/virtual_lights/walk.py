@@ -55,7 +55,7 @@ def sees_light(given, si, pixel, index, step):
 
 
 @device
-def step_counts(given, ray, brings):
+def step_counts(given, ray, pixel, index, brings):
     """1 where the ray meets a surface that can hold virtual lights and that photons reach, and if it `brings` light the
     radiance from there."""
     scene, glossy = given.scene, given.eye.glossy
@@ -66,7 +66,7 @@ def step_counts(given, ray, brings):
     kept = keeps(scene, material_of(scene, hit.prim), si.bsdf, hit.ng, si.wo, glossy)
     if kept & STORED == 0:
         return _f4(0.0), BLACK
-    lit, L = lit_by_photons(given, si, brings)
+    lit, L = lit_by_photons(given, si, pixel, index, brings)
     if brings:
         L = over_opacity(scene, hit.prim, hit.u, hit.v, hit.p, mul(beta, L))
     return lit, L
@@ -114,7 +114,7 @@ def walk_counts(given, ray, pixel, index, brings):
     brings, if it does."""
     if has(part(given, "virtual"), "paths"):
         return lambda given, ray, pixel, index, brings: (path_counts(given, ray, pixel, index), BLACK)
-    return lambda given, ray, pixel, index, brings: step_counts(given, ray, brings)
+    return lambda given, ray, pixel, index, brings: step_counts(given, ray, pixel, index, brings)
 
 
 @device
