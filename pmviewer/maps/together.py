@@ -1,4 +1,4 @@
-"""Which photons a place of a surface belongs to (R10, single step): asked by cells of virtual lights and by gather rays.
+"""Which photons a place of a surface belongs to (R10, single step), asked by cells of virtual lights and gather rays.
 
 Both have to ask the same, or weights don't agree in the mean with what normalises them. A place belongs to the nearest
 photons of surfaces that face a like way, unless something stands between: the floor under a crate is no gather ray's

@@ -84,6 +84,42 @@ def test_areas_add_up_to_that_of_the_surface_beside_a_shadow_too(k):
     assert np.mean(areas) == pytest.approx(16.0, rel=0.03)
 
 
+def floor_with(*pieces):
+    """These, each a parallelogram, under a point light over the middle."""
+    light = PointLight("point", (0.0, 2.4, 0.0), (1.0, 1.0, 1.0))
+    shapes = tuple(Shape(f"piece {i}", piece, 0) for i, piece in enumerate(pieces))
+    return replace(light_scene("point"), shapes=shapes, materials=(diffuse(),), lights=(light,))
+
+
+@pytest.mark.parametrize("k", [2, 8])
+def test_areas_add_up_to_that_of_a_surface_that_bends(k):
+    """Ten strips of a floor that rise and fall by 25°, narrower than cells. What lay more than a fifth of its distance
+    below or above a light's tangent plane was left out, a quarter of all."""
+    run, rise = 0.4, 0.4 * np.tan(np.radians(25.0))
+    strips = []
+    for i in range(10):
+        low, high = (0.0, rise) if i % 2 else (rise, 0.0)
+        strips.append(Parallelogram((-2.0 + run * i, low, -2.0), (0.0, 0.0, 4.0), (run, high - low, 0.0)))
+    areas = [made(floor_with(*strips), i, number=400, photons=400, k=k).rows[:, V_Q].sum() for i in range(12)]
+    print(np.mean(areas) / (16 / np.cos(np.radians(25.0))))
+    assert np.mean(areas) == pytest.approx(16 / np.cos(np.radians(25.0)), rel=0.05)
+
+
+def test_what_a_crate_stands_on_belongs_to_no_light():
+    """Few photons, in wide cells that reach under it: no gather ray ends there."""
+    a, h = 0.6, 0.3
+    x, y, z, top = (2 * a, 0.0, 0.0), (0.0, h, 0.0), (0.0, 0.0, 2 * a), (-a, h, -a)
+    corner, other = (-a, 0.0, -a), (a, 0.0, a)
+    back = [tuple(-t for t in side) for side in (x, z)]
+    sides = [(corner, x, y), (other, back[0], y), (corner, y, z), (other, y, back[1]), (top, z, x)]
+    floor = Parallelogram((-2.0, 0.0, -2.0), (0.0, 0.0, 4.0), (4.0, 0.0, 0.0))
+    scene = floor_with(floor, *(Parallelogram(*side) for side in sides))
+    areas = [made(scene, i, number=300, photons=300).rows for i in range(30)]
+    floor = [rows[rows[:, V_P + 1] < 1e-4, V_Q].sum() for rows in areas]
+    print(np.mean(floor), 16 - 4 * a * a)
+    assert np.mean(floor) == pytest.approx(16 - 4 * a * a, rel=0.03)
+
+
 @pytest.mark.parametrize("k", [2, 16])
 def test_photons_of_another_wall_own_nothing_of_this_one(k):
     """Few photons, in wide cells. With those of other walls near the edges walls had 90 to 99 % of their area."""

@@ -9,9 +9,10 @@ photons lie evenly alone: beside a shadow, those of the dark end at the light, a
 Places belong to photons closer than a largest radius R alone: with m < n of these, 1/m to each. Without R, a surface
 that one photon in many passes reaches would count for gather rays in every pass, and weigh in that one alone.
 
-A cell is measured by places around the photon, chosen in its tangent plane, denser near it, and from there along the
-normal on the first surface near the plane; places that something hides from the photon are left out. Whether a place
-belongs to the photon is asked as gather rays ask it (`pmviewer.render.virtual_lights.gathered`).
+A cell is measured by lines through places of the photon's tangent plane, denser near it, along its normal: every
+surface on a line that lies within R counts if it belongs to the photon, asked as gather rays ask it
+(`pmviewer.maps.together`, `pmviewer.render.virtual_lights.gathered`). Places that something hides from the photon
+belong to it for neither.
 """
 
 from __future__ import annotations
@@ -100,9 +101,7 @@ def _share_along(scene, tree, o, light, height, order, reach, glossy, photon, ke
     top, down = along(o, n, height), scale(n, _f4(-1.0))
     total, start = _f4(0.0), _f4(0.0)
     for _ in range(MOST_SURFACES):
-        t, prim, u, v = closest_hit(
-            scene, top[0], top[1], top[2], down[0], down[1], down[2], start, _f4(2.0) * height
-        )
+        t, prim, u, v = closest_hit(scene, top[0], top[1], top[2], down[0], down[1], down[2], start, _f4(2.0) * height)
         if prim < 0:
             break
         total += _share_at(scene, tree, (prim, u, v, top, down, t), light, order, reach, glossy, photon, keys)
