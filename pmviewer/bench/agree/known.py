@@ -8,7 +8,6 @@ docs/scenes.md says the same to users.
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from pmviewer.bench.agree.materials import TRANSPARENT
-from pmviewer.bench.agree.tree import MAPS, Node, innermost, nodes
+from pmviewer.bench.agree.tree import MAPS, Node, copied, innermost, nodes
 
 WALKS = "its walks"
 """Whom weights of virtual lights are compared with."""
@@ -51,7 +50,7 @@ class Deviation:
 
 def _changed(change: Callable[[Node], None]) -> Callable[[Node], Node | None]:
     def without(scene: Node) -> Node | None:
-        found = copy.deepcopy(scene)
+        found = copied(scene)
         change(found)
         return found if found != scene else None
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from pmviewer.bench.agree.tree import TEXTURES, WRAPPERS, Node, emitters_of
+from pmviewer.bench.agree.tree import TEXTURES, WRAPPERS, Node, copied, emitters_of
 
 GREY = [0.5, 0.5, 0.5]
 _COLOURS = ("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance", "radiance",
@@ -117,13 +116,13 @@ def _at(tree: Any, path: Path) -> Any:
 
 
 def _with(scene: Node, path: Path, value: Any) -> Node:
-    found = copy.deepcopy(scene)
-    _at(found, path[:-1])[path[-1]] = copy.deepcopy(value)
+    found = copied(scene)
+    _at(found, path[:-1])[path[-1]] = copied(value)
     return found
 
 
 def _without(scene: Node, path: Path) -> Node:
-    found = copy.deepcopy(scene)
+    found = copied(scene)
     del _at(found, path[:-1])[path[-1]]
     return found
 
