@@ -17,6 +17,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from pmviewer.installing import install_with_pip, install_with_uv
+
 ROOT = Path(__file__).resolve().parent.parent
 MOST_PROCESSES = 4
 """For tests: each grows to some two gigabytes."""
@@ -95,10 +97,9 @@ def install(python: Path, extras: str) -> None:
     stamp = ENVIRONMENT / f"pmviewer-{extras or 'base'}.stamp"
     if stamp.exists() and stamp.read_text() == wanted:
         return
-    print("installing pmviewer and what it needs (about a minute the first time)", flush=True)
+    print("installing pmviewer and what it needs (up to a minute the first time)", flush=True)
     target = f"{ROOT}[{extras}]" if extras else str(ROOT)
-    command = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-e", target]
-    if subprocess.run(command, check=False, cwd=ROOT).returncode != 0:
+    if not install_with_uv(python, target, ROOT, translate=not extras) and not install_with_pip(python, target, ROOT):
         sys.exit("pip could not install pmviewer: see its message above.")
     stamp.write_text(wanted)
 

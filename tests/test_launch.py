@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from pmviewer import launch
+from pmviewer import installing, launch
 
 
 @pytest.fixture
@@ -61,3 +61,51 @@ def test_everything_else_opens_the_window(ran):
         ["python", "-m", "pmviewer", "cornell_caustic"],
         ["python", "-m", "pmviewer", "office", "--set", "photons.N=1000"],
     ]
+
+
+LISTED = """:env:.find-links='elsewhere'
+global.cert='/certificates/all.crt'
+global.constraint='bounds.txt'
+global.extra-index-url='file:///one/simple file:///two/simple'
+global.find-links='wheels'
+list.format='columns'
+install.index-url='https://packages.example/simple'
+"""
+
+
+def test_uv_is_told_what_pip_would_do():
+    """What is set by the environment counts instead of what files say, wherever it stands."""
+    options, environment = installing.as_pip_is_set(LISTED)
+    assert environment == {"SSL_CERT_FILE": "/certificates/all.crt"}
+    assert options == [
+        *("--index-strategy", "unsafe-best-match"),
+        *("--default-index", "https://packages.example/simple"),
+        *("--index", "file:///one/simple", "--index", "file:///two/simple"),
+        *("--find-links", "elsewhere"),
+        *("--constraints", "bounds.txt"),
+    ]
+    assert installing.as_pip_is_set("nonsense\nglobal.cert=unquoted") == (installing.AS_PIP, {})
+    assert installing.as_pip_is_set("global.no-index='true'")[0][-1] == "--no-index"
+
+
+@pytest.mark.parametrize("fails", ["", "uv", "config", "--editable", "all"])
+def test_where_uv_cannot_pip_installs(fails, monkeypatch, tmp_path):
+    """`fails`: the command with that word does, or every one."""
+    ran = []
+
+    def run(command, **options):
+        ran.append(command)
+        return SimpleNamespace(returncode=int(fails == "all" or fails == command[-1] or fails in command), stdout="")
+
+    monkeypatch.setattr(installing.subprocess, "run", run)
+    monkeypatch.setattr(launch, "ENVIRONMENT", tmp_path)
+    if fails == "all":
+        with pytest.raises(SystemExit, match="pip could not install"):
+            launch.install(Path("python"), "test")
+    else:
+        launch.install(Path("python"), "test")
+        launch.install(Path("python"), "test")
+    by_pip = ran[-1][1:3] == ["-m", "pip"]
+    assert by_pip == (fails in ("uv", "--editable", "all"))
+    assert len(ran) == {"": 3, "uv": 2, "config": 3, "--editable": 4, "all": 2}[fails]
+    assert len(list(tmp_path.iterdir())) == (fails != "all")
