@@ -1,7 +1,7 @@
 """Commands that install into an environment, for `pmviewer.launch`. Uses the standard library alone.
 
 uv fetches and unpacks packages side by side, in a fifth of the time of pip. It knows nothing of pip's configuration
-(indexes, constraints, certificates), so that it is told what pip would do. Where it can't be had, or fails, pip installs.
+(indexes, constraints, certificates), and is told what pip would do. Where it can't be had, or fails, pip installs.
 """
 
 from __future__ import annotations
