@@ -64,9 +64,9 @@ def _scattered(tree, place, si):
 
 
 @device
-def _lies(given, si, r2, pixel, index):
-    """(m + 1)/(h + 1) where h of m random places of the disc of squared radius r2 lie on the surface or on one like
-    it."""
+def _over_part(given, si, r2, pixel, index):
+    """1 over the part of the disc of squared radius r2 that lies on the surface and is seen from its middle, but for
+    what the head of this file says: (m + 1)/(h + 1), h of m random places."""
     scene, n = given.scene, si.ng
     radius = _f4(math.sqrt(r2))
     height, down = FLATNESS * radius, scale(n, _f4(-1.0))
@@ -75,7 +75,7 @@ def _lies(given, si, r2, pixel, index):
     where = unit_float(hash3(pixel.seed, index, _u4(GATHERED_SALT) + _u4(1)))
     there = _i4(0)
     for i in range(PLACES):
-        # One place in each ring, opposite each other
+        # One in each ring of the same area, on opposite sides.
         r = radius * _f4(math.sqrt((_f4(i) + where) / _f4(PLACES)))
         angle = _f4(2.0 * math.pi) * (phi + _f4(i) / _f4(PLACES))
         x = along(along(si.p, s, r * _f4(math.cos(angle))), t, r * _f4(math.sin(angle)))
@@ -133,5 +133,5 @@ def _by_nearest(given, si, pixel, index, brings):
                 total = add(total, _scattered(tree, key & _i8(0xFFFFFFFF), si))
     if not luminance(total) > _f4(0.0):
         return _f4(1.0), BLACK
-    around = _lies(given, si, r2, pixel, index)
+    around = _over_part(given, si, r2, pixel, index)
     return _f4(1.0), scale(total, around * _f4(tree.power_unit) / (_f4(math.pi) * r2))
