@@ -176,7 +176,7 @@ def test_passes_reach_the_path_tracer_where_virtual_lights_are_glossy(gather_ray
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("every_surface")
-@pytest.mark.parametrize(("gather_rays", "passes"), [(16, 4), (0, 16)])
+@pytest.mark.parametrize(("gather_rays", "passes"), [(16, 4), pytest.param(0, 16, marks=pytest.mark.extensive)])
 def test_an_open_scene_of_metal_is_as_bright_as_by_paths(tmp_path, gather_rays, passes):
     """Scene 4 of seed 1 of `bench agree`: gather rays to its dark sides counted in every pass, their lights weighed in
     few passes, and the single step was 16 % too bright after four. Then lights alone were 15 % too bright, since cells
