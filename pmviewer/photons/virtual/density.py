@@ -27,12 +27,12 @@ from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import DISC_SALT
 from pmviewer.kernels.memory import load_i4, stack_get_i8, stack_i4
 from pmviewer.kernels.random import hash3, unit_float
-from pmviewer.kernels.surface import face, surface_at
-from pmviewer.kernels.vector import along, basis, dot, scale
+from pmviewer.kernels.surface import face
+from pmviewer.kernels.vector import along, basis, scale
 from pmviewer.maps.search.disc import Facing
 from pmviewer.maps.search.k_nearest import KEYS, nearest
 from pmviewer.maps.search.stored import ALL_CLASSES
-from pmviewer.maps.together import SAME_SIDE, can_hold, see_each_other
+from pmviewer.maps.together import beside
 from pmviewer.maps.virtual_lights import FLATNESS, V_GAP, V_N, V_P, V_WI
 
 PLACES = 16
@@ -72,31 +72,10 @@ def share_of(tree, p, n, order, reach, photon, keys):
 
 
 @device
-def _share_at(scene, tree, hit, light, order, reach, glossy, photon, keys):
-    """`share_of` where a ray against the light's normal has met a surface, `hit` (prim, u, v, origin, direction, t), if
-    photons are stored there and the light can be seen: by the area over that of the tangent plane, and over the opacity
-    of what rays pass in part. `light`: its place, normal and gap."""
-    prim, u, v, o, d, t = hit
-    y, n, gap = light
-    p, outwards, ns, _ = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], t)
-    ng = face(outwards, n)
-    cos = dot(ng, n)
-    if cos < SAME_SIDE:
-        return _f4(0.0)
-    share = share_of(tree, p, ng, order, reach, photon, keys) / cos
-    if share == _f4(0.0):
-        return share
-    if not see_each_other(scene, y, n, p, ng, gap):
-        return _f4(0.0)
-    if not can_hold(scene, prim, (u, v), (p, outwards, ns), n, glossy):
-        return _f4(0.0)
-    return over_opacity(scene, prim, u, v, p, (share, share, share))[0]
-
-
-@device
 def _share_along(scene, tree, o, light, height, order, reach, glossy, photon, keys):
-    """The sum of `_share_at` over all surfaces on the line through o along the light's normal, no farther from o than
-    `height`."""
+    """The sum of `share_of` over all surfaces on the line through o along the normal of the `light` (place, normal,
+    gap), no farther from o than `height`, that lie beside the light: by the area there over that of the tangent plane,
+    and over the opacity of what rays pass in part."""
     n = light[1]
     top, down = along(o, n, height), scale(n, _f4(-1.0))
     total, start = _f4(0.0), _f4(0.0)
@@ -104,7 +83,10 @@ def _share_along(scene, tree, o, light, height, order, reach, glossy, photon, ke
         t, prim, u, v = closest_hit(scene, top[0], top[1], top[2], down[0], down[1], down[2], start, _f4(2.0) * height)
         if prim < 0:
             break
-        total += _share_at(scene, tree, (prim, u, v, top, down, t), light, order, reach, glossy, photon, keys)
+        cos, p, ng = beside(scene, (prim, u, v, top, down, t), light, glossy)
+        if cos > _f4(0.0):
+            share = share_of(tree, p, ng, order, reach, photon, keys) / cos
+            total += over_opacity(scene, prim, u, v, p, (share, share, share))[0]
         start = t + NEXT * height
     return total
 

@@ -9,7 +9,7 @@ The radiance is the density estimate of the nearest photons on that side, the fa
 that lies on the surface. Beside edges that is not all of it: by m places of the disc, h of them on the surface, the
 light of the whole disc counts (m + 1)/(h + 1) times, whose mean is (1 − (1 − c)^(m+1))/c for a part c. Discs shrink as
 those of the lights do. Where no photon lies within the largest radius, the ray counts nothing: there the lights
-weigh nothing, either (`pmviewer.photons.virtual.density`).
+weigh nothing, either (`pmviewer.photons.virtual.density`), nor where the photon hides that its end belongs to.
 """
 
 from __future__ import annotations
@@ -25,14 +25,13 @@ from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.kernels.dimensions import GATHERED_SALT
 from pmviewer.kernels.memory import float_of_bits, load_u4, stack_get_i8, stack_i4
 from pmviewer.kernels.random import hash3, unit_float
-from pmviewer.kernels.surface import face, surface_at
-from pmviewer.kernels.vector import add, along, basis, dot, luminance, mul, normalize, scale
+from pmviewer.kernels.vector import add, along, basis, luminance, mul, normalize, scale
 from pmviewer.maps.estimate.glossy import reflected_share
 from pmviewer.maps.photon_words import decode_direction
 from pmviewer.maps.search.disc import Facing
 from pmviewer.maps.search.k_nearest import KEYS, nearest
 from pmviewer.maps.search.stored import ALL_CLASSES, stored_place, stored_power
-from pmviewer.maps.together import SAME_SIDE, can_hold, see_each_other
+from pmviewer.maps.together import beside, see_each_other
 from pmviewer.maps.virtual_lights import FLATNESS
 from pmviewer.render.chain import BLACK
 
@@ -85,13 +84,8 @@ def _over_part(given, si, r2, pixel, index):
         )
         if prim < 0:
             continue
-        p, outwards, ns, _ = surface_at(scene, prim, u, v, top[0], top[1], top[2], down[0], down[1], down[2], far)
-        ng = face(outwards, n)
-        if (
-            dot(ng, n) >= SAME_SIDE
-            and can_hold(scene, prim, (u, v), (p, outwards, ns), n, given.eye.glossy)
-            and see_each_other(scene, si.p, n, p, ng, si.gap)
-        ):
+        cos, _, _ = beside(scene, (prim, u, v, top, down, far), (si.p, n, si.gap), given.eye.glossy)
+        if cos > _f4(0.0):
             there += _i4(1)
     return _f4(PLACES + 1) / _f4(there + 1)
 
