@@ -10,7 +10,7 @@ from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
 from pmviewer.render.camera import are_hidden
 from pmviewer.render.direct.samples import samples_at_surface
-from pmviewer.render.filter import BOX, filter_of, is_signed
+from pmviewer.render.filter import BOX, filter_of
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.scene.description import PixelFilter
 from pmviewer.settings.access import Settings, needs_of, with_values
@@ -195,7 +195,7 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         split=_splits(settings, traits, plan),
         one_sample=_one_sample(settings, traits, plan),
         hides=hides_lights(settings, traits) and not traits.has_media,
-        moments=not (_divided(settings, plan) or is_signed(_filter(settings, traits))),
+        moments=not _divided(settings, plan),
         thin_glass=thin_rules(settings, traits),
         dispersion=traits.has_dispersion,
         warnings=(*plan.warnings, *_of_thin(settings, traits), *_of_dispersion(plan, traits)),
@@ -255,9 +255,9 @@ def _splits(settings: Settings, traits: SceneTraits, plan: Plan) -> bool:
 
 
 def _one_sample(settings: Settings, traits: SceneTraits, plan: Plan) -> bool:
-    """Whether something counts on one sample a pixel and pass: what is estimated belongs to it, virtual lights and
-    filters with negative parts add up weights, and the photons that pixels find set their radii."""
-    counted = plan.path or plan.virtual or plan.estimation or is_signed(_filter(settings, traits))
+    """Whether something counts on one sample a pixel and pass: what is estimated belongs to it, virtual lights add up
+    weights, and the photons that pixels find set their radii."""
+    counted = plan.path or plan.virtual or plan.estimation
     return counted or radii_of_pixels(Facts(settings, plan, traits))
 
 

@@ -39,7 +39,7 @@ from pmviewer.photons.projection.projected import NO_PROJECTION
 from pmviewer.render.counts import N_COUNTS as N_EYE_COUNTS
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
-from pmviewer.render.filter_samples import add_weights
+from pmviewer.render.filter_samples import OWN_COLUMNS, share_samples, weigh_samples
 from pmviewer.render.mirrored import mark_mirrors
 from pmviewer.render.moments import prepare_moments
 from pmviewer.render.path import path_pass
@@ -149,6 +149,12 @@ def _casting(record: NDArray[np.void]) -> Step:
     return Step("ray casting", cast_closest, (record[0], points, points, ends, ends, *hits))
 
 
+def _filter_steps(eye: NDArray[np.void], marks: NDArray[np.uint8]) -> list[Step]:
+    weights, own = np.zeros((2, 1), np.float32), np.zeros((1, 1 + OWN_COLUMNS))
+    shared = weights, marks, own, np.zeros((1, 1)), (1, 1, False), -1, np.zeros(1), 0, 0
+    return [Step("filter", weigh_samples, (eye, weights)), Step("filter", share_samples, shared)]
+
+
 def grid_step() -> Step:
     """What every light pass ends with."""
     return Step("photon grid", build_grid, (np.zeros((1, 6), np.float32), 1.0, 1.0))
@@ -158,7 +164,7 @@ def eye_steps(record: NDArray[np.void], traits: SceneTraits, settings: Settings,
     """What the eye pass runs for a scene with such a `record`, whose contents don't count."""
     film, counts = np.zeros((1, 1)), np.zeros(N_EYE_COUNTS, np.int64)
     eye, marks = blank_eye(settings, plan), np.zeros(0, np.uint8)
-    steps = [Step("filter", add_weights, (eye, marks, np.zeros((1, 2)), 0, 0))] if plan.filtered else []
+    steps = _filter_steps(eye, marks) if plan.filtered else []
     if plan.mirror_rays > 1:
         none = np.empty(0, np.int32), np.zeros(0, bool), np.zeros(0, np.uint8)
         steps += [_casting(record), Step("mirrors", mark_mirrors, (record, *none))]

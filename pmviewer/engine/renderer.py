@@ -164,7 +164,7 @@ class Renderer:
         self._apart = film if lent else None
         film.passes = index
         self._pass(film, self.camera, index, self.settings.photons.N)
-        return Increment(film.sums, film.weights)
+        return Increment(film.sums)
 
     def told(self) -> Told:
         """What there is to say of the latest pass beyond the tally: of one from elsewhere what was said there."""

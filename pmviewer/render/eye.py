@@ -28,7 +28,7 @@ from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.counts import C_CUT, C_RAYS
 from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose, choose_by_power
 from pmviewer.render.direct.direct import direct_light, found_light, met_light, radiance_of
-from pmviewer.render.filter_samples import place_in_filter
+from pmviewer.render.filter_samples import OWN_COLUMNS, place_of, seen_at, value_at
 from pmviewer.render.gather.cached import cached, surface_rays
 from pmviewer.render.gather.guide import AIM_WORDS, aim
 from pmviewer.render.given import Aim, GatherRays, Sampler, opened
@@ -55,47 +55,88 @@ from pmviewer.render.straight import cast_on
 from pmviewer.render.virtual_lights.lit import note_object, virtual_light
 
 _f4 = np.float32
+_f8 = np.float64
 _i8 = np.int64
 _u4 = np.uint32
 _CAUSTICS = np.int32(1 << CAUSTIC_CLASS)
 
 
 @device
-def _outline_ray(scene, eye, pixel, j):
-    """Radiance that camera ray j for emission meets at a light or the environment, and what it counts."""
-    index = _u4(eye.index * _u4(eye.outline_rays) + _u4(j))
-    ux, uy, a, b = draw4(eye.sequence, pixel.seed, index, OUTLINE)
-    x, y, weight = place_in_filter(eye, ux, uy)
+def _outline_ray(scene, eye, pixel, numbers):
+    """Radiance that a camera ray for emission meets at a light or the environment; numbers: its place in the pixel and
+    on the lens."""
+    x, y, a, b = numbers
     ray = lens_ray(eye, pixel.number, x, y, a, b)
     hit, tint = cast_on(scene, ray, False)
     light = met_light(scene, hit)
     if light >= 0:
-        return mul(tint, radiance_of(scene, light, hit, ray.d)), weight
-    return BLACK, weight
+        return mul(tint, radiance_of(scene, light, hit, ray.d))
+    return BLACK
+
+
+@device
+def _taps(scene, eye, pixel, index):
+    """The filter's light around a place in the pixel, as `pmviewer.render.filter` has it of all pixels, and how many
+    rays that took. index: of random numbers."""
+    u, v, _, _ = draw4(eye.sequence, pixel.seed, index, OUTLINE)
+    x, y, half, reach = place_of(eye, u), place_of(eye, v), _f4(0.5), eye.filter_reach
+    columns, rows = _f4(0.0), _f4(0.0)
+    for k in range(-reach, reach + 1):
+        columns += value_at(eye, _f4(k) + x - half)
+        rows += value_at(eye, _f4(k) + y - half)
+    share = _f4(1.0) / max(abs(columns * rows), _f4(1e-12))
+    total, rays = BLACK, _i8(0)
+    for j in range(-reach, reach + 1):
+        row = value_at(eye, _f4(j) + y - half) * share
+        for i in range(-reach, reach + 1):
+            weight = row * value_at(eye, _f4(i) + x - half)
+            if weight != _f4(0.0):
+                number = _u4(_u4(index * _u4(2 * reach + 1) + _u4(reach + j)) * _u4(2 * reach + 1) + _u4(reach + i))
+                _, _, a, b = draw4(eye.sequence, pixel.seed, number, OUTLINE)
+                place = seen_at(eye, _f4(i) + x), seen_at(eye, _f4(j) + y), a, b
+                total = add(total, scale(_outline_ray(scene, eye, pixel, place), weight))
+                rays += 1
+    return total, rays
 
 
 @specialised
-def outline_emission(scene, eye, pixel):
-    """Deposit the mean radiance that camera rays through the pixel meet at lights and the environment."""
-    if has(eye, "filter_cdf"):
+def outline_emission(scene, eye, pixel, columns):
+    """Add the mean radiance that camera rays through the pixel meet at lights and the environment to its sums, of which
+    there are so many columns. Returns how many rays."""
+    if has(eye, "filter_value"):
 
-        def counted_each(scene, eye, pixel):
-            share = _f4(1.0) / _f4(eye.outline_rays)
-            for j in range(eye.outline_rays):
-                L, weight = _outline_ray(scene, eye, pixel, j)
-                one = Pixel(pixel.number, pixel.seed, pixel.film, pixel.radii, pixel.counts, weight, None)
-                deposit(one, EMISSION, scale(L, share))
+        def by_taps(scene, eye, pixel, columns):
+            side = 2 * eye.filter_reach + 1
+            rounds = max(eye.outline_rays // (side * side), 1)
+            rays, share = _i8(0), _f8(1.0) / _f8(rounds)
+            for j in range(rounds):
+                L, more = _taps(scene, eye, pixel, _u4(eye.filter_pass * _u4(rounds) + _u4(j)))
+                rays += more
+                for k in range(3):
+                    pixel.film[columns - OWN_COLUMNS + k] += _f8(L[k]) * share
+            return rays
 
-        return counted_each
+        return by_taps
 
-    def alike(scene, eye, pixel):
+    def alike(scene, eye, pixel, columns):
         total = BLACK
         for j in range(eye.outline_rays):
-            L, _ = _outline_ray(scene, eye, pixel, j)
-            total = add(total, L)
+            index = _u4(eye.index * _u4(eye.outline_rays) + _u4(j))
+            numbers = draw4(eye.sequence, pixel.seed, index, OUTLINE)
+            total = add(total, _outline_ray(scene, eye, pixel, numbers))
         deposit(pixel, EMISSION, scale(total, _f4(1.0) / _f4(eye.outline_rays)))
+        return _i8(eye.outline_rays)
 
     return alike
+
+
+@specialised
+def seen_by_outline(eye, outlined):
+    """Whether rays of a pixel's own see its emission, so that its samples don't. By a filter they see it for pixels
+    around."""
+    if has(eye, "filter_value"):
+        return lambda eye, outlined: False
+    return lambda eye, outlined: outlined
 
 
 @device
@@ -207,7 +248,8 @@ def eye_pass(given, marks, radii, film, counts, first, last):
     uint8 (pixels,), OUTLINED where emission gets camera rays of its own (`pmviewer.render.direct.outline`) and MIRRORED
     where there are several samples (`pmviewer.render.mirror_rays`), or (0,); radii: float32 (pixels, COLUMNS), look-up
     radii of the pixels (`pmviewer.render.pixel_radius`), or None; film: float64 (pixels, CHANNELS), see
-    `pmviewer.render.planes`; counts: int64 (N_COUNTS,).
+    `pmviewer.render.planes`, or with a filter the samples that pixels share (`pmviewer.render.filter_samples`); counts:
+    int64 (N_COUNTS,).
     """
     given = opened(given)
     scene, eye = given.scene, given.eye
@@ -218,13 +260,14 @@ def eye_pass(given, marks, radii, film, counts, first, last):
         outlined = not hidden and len(marks) > 0 and marks[number] & OUTLINED != 0
         if outlined:
             take_sample(eye, index)
-            outline_emission(scene, eye, Pixel(number, pixel_seed(eye, number), row, own, tally, None, None))
-            tally[C_RAYS] += eye.outline_rays
+            pixel = Pixel(number, pixel_seed(eye, number), row, own, tally, None)
+            tally[C_RAYS] += outline_emission(scene, eye, pixel, film.shape[1])
+        unseen = hidden or seen_by_outline(eye, outlined)
         samples = samples_of(eye, marks, number)
         for sample in range(samples):
             take_sample(eye, index * samples + sample)
-            seed, ray, weight = sampled_ray(scene, eye, number)
-            pixel = Pixel(number, seed, row, own, tally, weight, share_of(eye, samples))
+            seed, ray = sampled_ray(scene, eye, number)
+            pixel = Pixel(number, seed, row, own, tally, share_of(eye, samples))
             way, ways = first_way(ray)
             choice = choose_by_power(lights, eye.light_samples)
             while True:
@@ -237,14 +280,14 @@ def eye_pass(given, marks, radii, film, counts, first, last):
                     whole = depth == 0
                     seen = EMISSION if whole else SPECULAR
                     if hit.prim < 0:
-                        if met_light(scene, hit) >= 0 and not (whole and (outlined or hidden)):
+                        if met_light(scene, hit) >= 0 and not (whole and unseen):
                             deposit(pixel, seen, mul(beta, _emission(scene, eye, left, pdf, choice, hit, ray.d)))
                         break
                     si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
                     if whole:
                         properties(eye, pixel, si)
                         note_object(given, hit.prim, pixel)
-                    if met_light(scene, hit) >= 0 and not (whole and (outlined or hidden)):
+                    if met_light(scene, hit) >= 0 and not (whole and unseen):
                         deposit(pixel, seen, mul(beta, _emission(scene, eye, left, pdf, choice, hit, ray.d)))
                     groups = si.bsdf.groups
                     beta, u_way = thinned(eye, beta, u_way), CERTAIN

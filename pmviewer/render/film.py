@@ -11,18 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
+from pmviewer.render.filter_samples import OWN_COLUMNS
 from pmviewer.render.moments import Moments
-from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS, PLANES, TERMS
+from pmviewer.render.planes import CHANNELS
 from pmviewer.state import State
-
-LEAST_WEIGHT = 0.5
-"""Mean weight from which a pixel's samples are divided by it."""
-_WEIGHED = (
-    (PLANES["emission"], 0),
-    (slice(PLANES["emission"].stop, PLANES[TERMS[-1]].stop), 1),
-    (slice(CHANNELS, MEDIA_CHANNELS), 1),
-)
-"""Channels, and which of the two columns of weights is theirs."""
 
 
 @kernel
@@ -43,10 +35,9 @@ class Addable(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Increment(Addable):
-    """What passes add to pixels of a film: `sums` and `weights` like the film's, weights None where samples count 1."""
+    """What passes add to pixels of a film: `sums` like the film's."""
 
     sums: NDArray[np.float64]
-    weights: NDArray[np.float64] | None
 
     def add_to(self, film: Film) -> None:
         film.add(self)
@@ -56,9 +47,8 @@ class Film:
     """Sums of `passes` samples per pixel: `sums` (height·width, channels + further) float64, `channels` being those of
     `pmviewer.render.planes`, with media MEDIA_CHANNELS, and `further` sums that a method keeps beside the planes;
     `radii` of the pixels' look-ups in the latest pass
-    (`pmviewer.render.pixel_radius`), None where all have that of the pass; `weights` (height·width, 2) float64, sums
-    of what samples count by a filter with negative parts (`pmviewer.render.filter`), in the term emission and in all
-    others, None where each counts 1; `moments`, what passes tell of the noise, None where nobody keeps them.
+    (`pmviewer.render.pixel_radius`), None where all have that of the pass; `moments`, what passes tell of the noise,
+    None where nobody keeps them.
 
     A pass is one addition to each sum, however many samples it has there: passes that are rendered elsewhere and added
     in their order give the same film bit for bit."""
@@ -70,7 +60,7 @@ class Film:
         self.width, self.height, self.channels = width, height, channels
         self.sums: NDArray[np.float64] = np.zeros((width * height, channels + further), np.float64)
         self.radii: NDArray[np.float32] | None = None
-        self.weights: NDArray[np.float64] | None = None
+        self._samples: NDArray[np.float64] | None = None
         self.moments: Moments | None = None
         self.passes = 0
         self.region: tuple[int, int, int, int] | None = None
@@ -96,31 +86,34 @@ class Film:
         part += increment.sums
         if self.numbered is not None:
             part[:, self.numbered] = numbers
-        if increment.weights is not None:
-            if self.weights is None:
-                self.weights = np.zeros((len(self.sums), 2))
-            self.weights[first : first + len(increment.weights)] += increment.weights
+
+    def samples_of(self, first: int, last: int) -> NDArray[np.float64]:
+        """(pixels, columns + OWN_COLUMNS) what the pixels sample in a pass by themselves, empty for pixels first …
+        last−1, before they share it (`pmviewer.render.filter_samples`)."""
+        if self._samples is None:
+            self._samples = np.zeros((len(self.sums), self.sums.shape[1] + OWN_COLUMNS))
+        self._samples[first:last, :-OWN_COLUMNS] = self.blank
+        self._samples[first:last, -OWN_COLUMNS:] = 0.0
+        return self._samples
 
     @contextmanager
     def one_addition(self, first: int, last: int) -> Iterator[None]:
         """While it lasts the sums of pixels first … last−1 are what has been added to them meanwhile, and no more."""
         sums = self.sums[first:last]
-        weights = None if self.weights is None else self.weights[first:last]
-        before = None
-        if not self.latest_alone:
-            before = Increment(sums.copy(), None if weights is None else weights.copy())
+        before = None if self.latest_alone else Increment(sums.copy())
         sums[:] = self.blank
-        if weights is not None:
-            weights[:] = 0.0
         yield
         if before is not None:
             self.add(before, first)
 
-    def spans(self, index: int | None = None) -> list[tuple[int, int]]:
-        """First and last + 1 of the pixels, row by row, that pass `index` renders, the next one without."""
+    def spans(self, index: int | None = None, around: int = 0) -> list[tuple[int, int]]:
+        """First and last + 1 of the pixels, row by row, that pass `index` renders, the next one without; with those so
+        far around them."""
         if self.region is None or (self.passes if index is None else index) == 0:
             return [(0, len(self.sums))]
         x0, y0, x1, y1 = self.region
+        x0, y0 = max(x0 - around, 0), max(y0 - around, 0)
+        x1, y1 = min(x1 + around, self.width), min(y1 + around, self.height)
         return [(y * self.width + x0, y * self.width + x1) for y in range(y0, y1)]
 
     @property
@@ -152,7 +145,6 @@ class Film:
         """What has been added so far, moments included."""
         arrays: dict[str, NDArray[Any]] = {"sums": self.sums}
         arrays |= {"radii": self.radii} if self.radii is not None else {}
-        arrays |= {"weights": self.weights} if self.weights is not None else {}
         size = {"width": self.width, "height": self.height, "passes": self.passes}
         moments = self.moments.state() if self.moments is not None else None
         return State.of_parts({**size, "region": self.region}, arrays, moments=moments)
@@ -166,11 +158,9 @@ class Film:
             raise ValueError("the film has another region")
         pixels, columns = self.sums.shape
         self.sums = state.array("sums", (pixels, columns), np.float64)
-        self.radii = self.weights = None
+        self.radii = None
         if "radii" in state.arrays:
             self.radii = state.array("radii", (pixels, None), np.float32)
-        if "weights" in state.arrays:
-            self.weights = state.array("weights", (pixels, 2), np.float64)
         if self.moments is not None:
             self.moments.restore(state.part("moments"))
         self.passes = int(state.number("passes"))
@@ -181,33 +171,4 @@ class Film:
         resolve(self.sums, float(max(self.passes, 1)), out, 0, len(out))
         planes = out.reshape(self.height, self.width, self.channels)
         self._as_sampled(planes)
-        return self.weighed(planes)
-
-    def weighed(self, planes: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The planes with their terms divided by the mean weight of each pixel's samples in place of 1.
-
-        So that a plain wall is plain after one pass; the mean goes to 1 and both to the same picture. Where weights
-        nearly cancel each other, as they may in the first passes, a pixel has the mean of those around it.
-        """
-        if self.weights is None:
-            return planes
-        means = self.weights.reshape(self.height, self.width, 2) / max(self.passes, 1)
-        self._as_sampled(means)
-        for channels, column in _WEIGHED:
-            weights = means[..., column]
-            known = np.abs(weights) >= LEAST_WEIGHT
-            terms = np.where(known[..., None], planes[..., channels] / np.where(known, weights, 1.0)[..., None], 0.0)
-            planes[..., channels] = terms if known.all() else np.where(known[..., None], terms, _around(terms, known))
         return planes
-
-
-def _around(values: NDArray[np.floating], known: NDArray[np.bool_]) -> NDArray[np.floating]:
-    """Means (h, w, n) of what is known of the pixels beside each."""
-    h, w = known.shape
-    total, count = np.zeros(values.shape), np.zeros((h, w, 1))
-    padded, counted = np.pad(values, ((1, 1), (1, 1), (0, 0))), np.pad(known, 1)
-    for y in range(3):
-        for x in range(3):
-            total += padded[y : y + h, x : x + w]
-            count += counted[y : y + h, x : x + w, None]
-    return total / np.maximum(count, 1)

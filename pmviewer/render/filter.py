@@ -1,12 +1,16 @@
-"""Reconstruction filters, by sampling: a pixel's camera rays go where its filter is, more of them where it is high.
+"""Reconstruction filters: how what lies around a pixel counts in it.
 
-A sample so belongs to one pixel, as it does with the box: tiles and threads share nothing, and no sample is splatted
-over its neighbours (filter importance sampling: Ernst, Stamminger and Greiner 2006). Where the filter is negative a
-sample counts negatively: with f = ±|f| and places x drawn by |f|/∫|f|, weights ±∫|f|/∫f have the mean 1, and the mean
-of weight times light is the filtered picture's. Filters are separable, and so are places and weights. The noise of
-neighbouring pixels stays independent, where splatting would smear it.
+All pixels of a pass are sampled at the same place δ within them, and what was found there is shared: a pixel p is the
+sum over the pixels q around it of f(q + δ − p)·L(q + δ)/S(δ), f having the integral 1 and S(δ) being the sum of these
+f. δ is drawn with the density S, so that the mean over passes is the filtered picture ∫f·L; the weights of a pass add
+up to 1, so that a plain wall is plain after one pass, with negative filters, too. A pixel hears of all samples that its
+filter reaches: for a Gaussian of σ = ½ their noise is that of 4πσ² = 3.1 times as many samples of its own. The price is
+that the noise of neighbours is alike.
 
-Formulas, x in pixels from the pixel's middle, r the radius beyond which they are 0:
+At the picture's border, where samples are missing, the weights that are there are made to add up to 1.
+
+Filters are separable, and so are places and weights. Formulas, x in pixels from the pixel's middle, r the radius beyond
+which they are 0:
 
 ===================  =================================================================  =========
 filter               f(x)                                                               radius
@@ -19,11 +23,13 @@ Catmull-Rom          the same with B = 0, C = ½                                
 Lanczos              sinc(x)·sinc(x/r), sinc(x) = sin(πx)/(πx)                          3
 ===================  =================================================================  =========
 
-Another radius stretches the filter; a Lanczos filter has as many lobes as its radius says, and is not stretched.
+Another radius stretches the filter; a Lanczos filter has as many lobes as its radius says, and is not stretched. The
+plain box is sampled within each pixel at places of its own, and shares nothing.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -31,7 +37,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.render.filter_samples import CELLS
+from pmviewer.render.filter_samples import CELLS, OFFSETS
 from pmviewer.scene.description import PixelFilter
 from pmviewer.settings.schema import Render
 
@@ -68,16 +74,6 @@ def is_own(own: PixelFilter | None, render: Render) -> bool:
     return filter_of(own, render) == (own or BOX)
 
 
-def has_signs(eye: NDArray[np.void]) -> bool:
-    """Whether samples may count negatively by the filter of an eye record (1,)."""
-    return "filter_weight" in (eye.dtype.names or ()) and bool((eye[0]["filter_weight"] < 0).any())
-
-
-def is_signed(chosen: PixelFilter) -> bool:
-    """Whether samples may count negatively by it."""
-    return bool((_table(chosen)[1] < 0).any())
-
-
 def evaluate(chosen: PixelFilter, x: Float) -> Float:
     """f(x), not normalised, at places (n,) in pixels from the pixel's middle."""
     x, r = np.abs(np.asarray(x, float)), chosen.radius
@@ -99,17 +95,43 @@ def _cubic(x: Float, B: float, C: float) -> Float:
     return np.where(x < 1, inner, outer) / 6
 
 
+def reach_of(chosen: PixelFilter, side: float) -> int:
+    """How many pixels to each side a sample counts in, wherever it lies in its own; `side` of the part that is seen."""
+    return math.ceil(chosen.radius * side + 0.5) - 1
+
+
 @cache
-def _table(chosen: PixelFilter) -> tuple[Float, Float]:
-    """`filter_cdf` and `filter_weight`."""
-    x = (np.arange(CELLS * _QUADRATURE) + 0.5) * chosen.radius / (CELLS * _QUADRATURE)
-    cells = evaluate(chosen, x).reshape(CELLS, _QUADRATURE).mean(axis=1)
-    total, size = cells.sum(), np.abs(cells).sum()
-    cdf = np.append(0.0, np.cumsum(np.abs(cells)) / size)
-    return cdf / cdf[-1], np.where(cells < 0, -1.0, 1.0) * size / total
+def _tables(chosen: PixelFilter, side: float) -> tuple[Float, Float]:
+    """`filter_value` and `offset_cdf` where the camera sees parts of pixels of that side."""
+    nodes = evaluate(chosen, np.linspace(0, chosen.radius, CELLS + 1))
+    cell = chosen.radius * side / CELLS
+    nodes /= cell * (2 * nodes.sum() - nodes[0] - nodes[-1])  # of both sides, by trapezoids
+    offsets, reach = (np.arange(OFFSETS * _QUADRATURE) + 0.5) / (OFFSETS * _QUADRATURE) - 0.5, reach_of(chosen, side)
+    distances = np.abs(offsets + np.arange(-reach, reach + 1)[:, None])
+    sums = np.interp(distances, cell * np.arange(CELLS + 1), nodes, right=0.0).sum(axis=0)
+    cdf = np.append(0.0, np.cumsum(np.abs(sums.reshape(OFFSETS, _QUADRATURE).mean(axis=1))))
+    return nodes, cdf / cdf[-1]
 
 
-def set_filter(record: np.void, chosen: PixelFilter) -> None:
-    """Write FILTER_FIELDS."""
-    record["filter_cell"] = chosen.radius / CELLS
-    record["filter_cdf"], record["filter_weight"] = _table(chosen)
+@cache
+def noise_share(chosen: PixelFilter) -> float:
+    """Variance of a pixel over that which samples of its own would leave, where noise differs from pixel to pixel: the
+    mean sum of the squares of what samples count."""
+    if chosen == BOX:
+        return 1.0
+    reach = reach_of(chosen, 1.0)
+    places = np.arange(OFFSETS * _QUADRATURE) / (OFFSETS * _QUADRATURE) - 0.5
+    values = np.array([evaluate(chosen, places + k) for k in range(-reach, reach + 1)])
+    sums = np.abs(values.sum(axis=0))
+    along = np.divide((values**2).sum(axis=0), sums, out=np.zeros_like(sums), where=sums > 0).mean() / sums.mean()
+    return float(along) ** 2
+
+
+def set_filter(record: np.void, chosen: PixelFilter, side: float, index: int) -> None:
+    """Write FILTER_FIELDS of pass `index`. A camera that sees parts of pixels, of that side, samples each for itself:
+    what lies between them is not there to be shared."""
+    if side < 1.0:
+        chosen = BOX
+    record["filter_cell"], record["filter_reach"] = chosen.radius * side / CELLS, reach_of(chosen, side)
+    record["filter_value"], record["offset_cdf"] = _tables(chosen, side)
+    record["filter_pass"] = index & 0xFFFFFFFF

@@ -69,8 +69,8 @@ def path_pass(scenes, eyes, film, counts, first, last):
     scene, eye = scenes[0], eyes[0]
     choice, tally = choose_by_power(stack_i4(LIST_WORDS), eye.light_samples), row_of(counts, 0)
     for number in range(first, last):
-        seed, ray, weight = sampled_ray(scene, eye, number)
-        pixel = Pixel(number, seed, row_of(film, number), None, tally, weight, None)
+        seed, ray = sampled_ray(scene, eye, number)
+        pixel = Pixel(number, seed, row_of(film, number), None, tally, None)
         beta = WHITE
         stored = 0  # how often the path took lobes that photons are stored for
         mirrored = False  # whether it took a followed lobe before the first of these

@@ -10,13 +10,13 @@ from pmviewer.kernels.bsdf.dispersion import new_wave
 from pmviewer.kernels.bsdf.scattering import shading_normal
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
-from pmviewer.kernels.dimensions import PIXEL, PIXEL_SALT, WAVE
-from pmviewer.kernels.random import draw4, hash3
+from pmviewer.kernels.dimensions import PIXEL_SALT, WAVE
+from pmviewer.kernels.random import hash3
 from pmviewer.kernels.surface import face
 from pmviewer.kernels.vector import is_good, normalize
 from pmviewer.render.cast import of_wave, ray_of_camera
 from pmviewer.render.counts import C_DROPPED
-from pmviewer.render.filter_samples import place_in_filter
+from pmviewer.render.filter_samples import place_in_pixel
 from pmviewer.render.hidden_lights import past_lights
 from pmviewer.render.lens import lens_numbers, through_lens
 from pmviewer.render.planes import PLANES
@@ -38,8 +38,7 @@ VOLUME, VOLUME_INDIRECT = PLANES["volume"].start, PLANES["volume indirect"].star
 class Pixel(NamedTuple):
     """A pixel that is sampled: its number and seed, and where its samples go: film, its row of float64
     (pixels, CHANNELS); radii, its row of those of look-ups, or None (`pmviewer.render.pixel_radius`); counts, int64
-    (N_COUNTS,), all three by `row_of`; what its sample counts by the
-    reconstruction filter, None for 1 (`pmviewer.render.filter`), and as one of several of the pass, likewise
+    (N_COUNTS,), all three by `row_of`; what its sample counts as one of several of the pass, None for 1
     (`pmviewer.render.mirror_rays`)."""
 
     number: Any
@@ -47,7 +46,6 @@ class Pixel(NamedTuple):
     film: Any
     radii: Any
     counts: Any
-    weight: Any
     share: Any
 
 
@@ -94,14 +92,12 @@ def lens_ray(eye, pixel, u, v, a, b):
 
 @device
 def sampled_ray(scene, eye, pixel):
-    """The pixel's seed, its camera ray in the pass of the eye record, and what the sample counts (`Pixel.weight`)."""
+    """The pixel's seed, and its camera ray in the pass of the eye record."""
     seed = pixel_seed(eye, pixel)
-    ux, uy, _, _ = draw4(eye.sequence, seed, eye.index, PIXEL)
-    x, y, weight = place_in_filter(eye, ux, uy)
+    x, y = place_in_pixel(eye, seed)
     a, b = lens_numbers(eye, seed)
     ray = past_lights(scene, eye, lens_ray(eye, pixel, x, y, a, b))
-    ray = of_wave(ray, new_wave(scene, eye.sequence, seed, eye.index, WAVE))
-    return seed, ray, weight
+    return seed, of_wave(ray, new_wave(scene, eye.sequence, seed, eye.index, WAVE))
 
 
 @specialised
@@ -112,20 +108,12 @@ def shared(pixel, value):
     return lambda pixel, value: value * _f8(pixel.share)
 
 
-@specialised
-def weighed(pixel, value):
-    """What a float64 of a sample adds to the pixel's film."""
-    if absent(part(pixel, "weight")):
-        return lambda pixel, value: shared(pixel, value)
-    return lambda pixel, value: shared(pixel, value) * _f8(pixel.weight)
-
-
 @device
 def deposit(pixel, plane, value):
     """Add a sample to a plane of the film, or count it when it is not finite or negative."""
     if is_good(value):
         for k in range(3):
-            pixel.film[plane + k] += weighed(pixel, _f8(value[k]))
+            pixel.film[plane + k] += shared(pixel, _f8(value[k]))
     else:
         pixel.counts[C_DROPPED] += 1
 
@@ -133,7 +121,7 @@ def deposit(pixel, plane, value):
 @device
 def properties(eye, pixel, si):
     """Add the properties of the first surface that the pixel sees: albedo, normal towards the eye, distance along the
-    view. They are means over the samples, however the filter counts these: others work with them."""
+    view. They are means over the pixel's own samples, whatever its filter: others work with them."""
     p, albedo, n = si.p, si.bsdf.albedo, face(shading_normal(si.bsdf), si.wo)
     depth = (p[0] - eye.x_eye) * eye.x_forward + (p[1] - eye.y_eye) * eye.y_forward + (p[2] - eye.z_eye) * eye.z_forward
     for k in range(3):

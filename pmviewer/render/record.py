@@ -160,7 +160,7 @@ def eye_record(
     if camera.aperture > 0:
         _set_lens(r, camera)
     if chosen != BOX:
-        set_filter(r, chosen)
+        set_filter(r, chosen, camera.pixel_side, index)
     if hides:
         r["hides"] = 1
     r["sequence"], r["seed"], r["index"] = SOBOL, settings.render.seed & 0xFFFFFFFF, index & 0xFFFFFFFF

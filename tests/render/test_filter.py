@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pmviewer.kernels.compile.jit import kernel
-from pmviewer.render.film import Film
-from pmviewer.render.filter import BOX, DEFAULTS, evaluate, filter_of, has_signs
-from pmviewer.render.filter_samples import place_in_filter
-from pmviewer.render.planes import CHANNELS, PLANES
+from pmviewer.engine.opened import open_scene
+from pmviewer.render.filter import BOX, DEFAULTS, evaluate, filter_of, noise_share, reach_of
+from pmviewer.render.filter_samples import weigh_samples
+from pmviewer.render.planes import PLANES
 from pmviewer.render.record import EYE_DTYPE, eye_record
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.description import Camera, Parallelogram, PixelFilter, Scene, Shape
 from pmviewer.settings.access import Settings
 from tests.render.test_lens import PINHOLE
-from tests.support.scenes import diffuse, rendered, settings_of
+from tests.support.scenes import closed_sphere, diffuse, rendered, settings_of
 
 X = np.array([0, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 1.9, 2.5])
 MITSUBA = {  # mitsuba 3.9.1: load_dict({"type": …}).eval(x) for x in X
@@ -73,38 +73,47 @@ def test_the_box_has_no_part_in_the_record():
     assert record_of().dtype == EYE_DTYPE
     assert record_of(filter="box").dtype == EYE_DTYPE
     assert record_of(filter="tent").dtype != EYE_DTYPE
-    assert [name for name in DEFAULTS if has_signs(record_of(filter=name))] == [
-        "Mitchell-Netravali",
-        "Catmull-Rom",
-        "Lanczos",
-    ]
 
 
-@kernel
-def _places(eyes, out):
-    """Rows of place and weight on a lattice of the unit square, out (n·n, 3)."""
-    n = int(math.sqrt(len(out)))
-    for i in range(len(out)):
-        u, v = np.float32((i % n + 0.5) / n), np.float32((i // n + 0.5) / n)
-        out[i, 0], out[i, 1], out[i, 2] = place_in_filter(eyes[0], u, v)
+def weights_of(chosen, passes, side=1.0, **render):
+    """(passes, 2, taps) what the samples of passes count, of columns and of rows."""
+    out = np.empty((passes, 2, 2 * reach_of(chosen, side) + 1), np.float32)
+    pose = replace(PINHOLE, pixel_side=side)
+    for index in range(passes):
+        weigh_samples(eye_record(pose, Settings(render=render), index), out[index])
+    return out
 
 
 @pytest.mark.parametrize("name", ["box", *NAMED])
-def test_weighted_places_are_distributed_as_the_filter(name):
-    """The weighted share of places left of x is ∫f up to x over all of ∫f, and the weights have the mean 1."""
-    radius = {"box": 0.8}.get(name, DEFAULTS[name].radius)
-    out = np.empty((1000 * 1000, 3))
-    _places(record_of(filter=name, filter_radius=radius), out)
-    fine = (np.arange(50_000) + 0.5) / 25_000 * radius - radius
-    f = evaluate(PixelFilter(name, radius, DEFAULTS[name].shape), fine)
-    integral = np.cumsum(f) / f.sum()
-    assert out[:, 2].mean() == pytest.approx(1, abs=4e-3)
-    for axis in (0, 1):
-        place = out[:, axis] - 0.5
-        assert np.abs(place).max() <= radius * (1 + 1e-6)
-        for x in np.linspace(-radius, radius, 13)[1:-1]:
-            expected = np.interp(x, fine, integral)
-            assert out[place < x, 2].sum() / len(out) == pytest.approx(expected, abs=4e-3), (name, x)
+def test_samples_count_as_the_filter_says_over_the_passes(name):
+    """A pixel's mean weight of the samples of a neighbour is the filter's integral over that neighbour; those of a pass
+    add up to 1."""
+    chosen = PixelFilter(name, {"box": 0.8}.get(name, DEFAULTS[name].radius), DEFAULTS[name].shape)
+    weights = weights_of(chosen, 4096, filter=name, filter_radius=chosen.radius)
+    assert weights.sum(axis=2) == pytest.approx(1, abs=1e-5)
+    fine = (np.arange(400_000) + 0.5) / 200_000 * chosen.radius - chosen.radius
+    f = evaluate(chosen, fine) / evaluate(chosen, fine).sum()
+    reach = reach_of(chosen, 1.0)
+    expected = np.histogram(fine, np.arange(-reach, reach + 2) - 0.5, weights=f)[0]
+    print(f"{name}: deviation {np.abs(weights.mean(axis=0) - expected).max():.4f}")
+    assert weights.mean(axis=0) == pytest.approx(np.tile(expected, (2, 1)), abs=4e-3)
+
+
+def test_parts_of_pixels_share_nothing():
+    weights = weights_of(BOX, 16, 0.2, filter="Lanczos")
+    assert weights.shape == (16, 2, 1)
+    assert (weights == 1).all()
+
+
+@pytest.mark.parametrize("radius", [0.1, 0.3, 0.5, 0.7, 1.0, 1.3, 1.7, 2.0, 2.6, 3.0, 5.0, 8.0])
+@pytest.mark.parametrize("name", DEFAULTS)
+def test_no_radius_lets_weights_explode(name, radius):
+    chosen = filter_of(None, Settings(render={"filter": name, "filter_radius": radius}).render)
+    if chosen == BOX:
+        pytest.skip("the plain box shares nothing")
+    weights = weights_of(chosen, 256, filter=name, filter_radius=radius)
+    assert np.abs(weights.sum(axis=2)) == pytest.approx(1, abs=1e-5)
+    assert np.abs(weights).max() < 4, np.abs(weights).max()
 
 
 EDGE = 15.3
@@ -143,7 +152,7 @@ def test_an_edge_has_the_filters_shape(name, method):
     passes."""
     settings = settings_of(render={"method": method, "filter": name, **small_box(name)}, photons={"N": 100})
     path = method == "path"
-    passes = (64 if path else 16) if name in ("box", "tent", "Gaussian") else (256 if path else 96)
+    passes = 256 if path else 64
     row = rendered(edge_scene(), settings, passes).film.planes()[..., PLANES["emission"]].mean(axis=(0, 2), dtype=float)
     expected = edge_of(name, np.arange(32) + 0.5 - EDGE)
     print(f"{name}, {method}: deviation {np.abs(row - expected).max():.4f}, lowest {row.min():.4f}")
@@ -154,7 +163,6 @@ def test_an_edge_has_the_filters_shape(name, method):
 
 
 def test_a_plain_wall_is_plain_after_one_pass():
-    """Though its samples count ±1.5 each: they are divided by what they count."""
     settings = settings_of(render={"method": "path", "filter": "Lanczos"})
     for passes in (1, 3):
         image = rendered(edge_scene(), settings, passes).film.planes()[..., PLANES["emission"]]
@@ -162,13 +170,35 @@ def test_a_plain_wall_is_plain_after_one_pass():
         assert image[:, 20:].max() < 1.001
 
 
-def test_pixels_whose_weights_cancel_have_the_mean_of_those_around():
-    film = Film(3, 1)
-    film.passes = 2
-    film.sums[:, :3] = [[4.0] * 3, [0.3] * 3, [8.0] * 3]
-    film.weights = np.array([[2.0, 2.0], [0.1, 2.0], [2.0, 2.0]])
-    assert film.planes()[0, :, 0] == pytest.approx([2.0, 3.0, 4.0])
-    assert film.planes().shape == (1, 3, CHANNELS)
+@pytest.mark.parametrize(("name", "share"), [("tent", 4 / 9), ("Gaussian", 1 / math.pi), ("Lanczos", None)])
+def test_pixels_share_their_noise(name, share):
+    """Of what differs from pixel to pixel ∫f² is left: of tents (∫(1 − |x|)² dx)² = (2/3)², of a Gaussian 1/(4πσ²)."""
+    if share is None:
+        fine = np.linspace(-3, 3, 60_001)
+        f = evaluate(DEFAULTS[name], fine)
+        share = ((f / f.sum()) ** 2).sum() ** 2 / (fine[1] - fine[0]) ** 2
+    assert noise_share(DEFAULTS[name]) == pytest.approx(share, rel=0.02)
+
+    scene = open_scene(closed_sphere(size=16))
+
+    def variance(chosen):
+        pictures = []
+        for seed in range(400):  # each has a place of its own, of which weights depend
+            settings = settings_of(render={"method": "path", "filter": chosen, "seed": seed})
+            planes = rendered(scene, settings, 1).film.planes()
+            pictures.append(planes[4:-4, 4:-4, PLANES["indirect"]].astype(float))
+        return np.var(pictures, axis=0, ddof=1).mean()
+
+    found = variance(name) / variance("box")
+    print(f"{name}: {found:.3f} of the variance is left, ∫f² = {share:.3f}")
+    assert found == pytest.approx(share, rel=0.08)
+
+
+@pytest.mark.parametrize("method", ["path", "progressive"])
+def test_at_the_border_what_is_there_counts_whole(method):
+    settings = settings_of(render={"method": method, "filter": "Gaussian"}, photons={"N": 200})
+    image = rendered(closed_sphere(size=12), settings, 2).film.planes()
+    assert image[..., PLANES["emission"]] == pytest.approx(0.5, rel=1e-5)
 
 
 @pytest.mark.usefixtures("room_for_split_paths")
@@ -179,5 +209,4 @@ def test_threads_change_nothing():
     settings = settings_of(camera={"focus": 3.0}, photons={"N": 500})
     one, two = (rendered(scene, settings, 3, threads) for threads in (1, 2))
     assert np.array_equal(one.film.sums, two.film.sums)
-    assert np.array_equal(one.film.weights, two.film.weights)
     assert one.film.planes().tobytes() == two.film.planes().tobytes()

@@ -148,7 +148,7 @@ def test_reconstruction_filters_of_the_film(tmp_path: Path, name: str) -> None:
 
 
 def test_filters_that_can_not_be(tmp_path: Path) -> None:
-    assert sensor(tmp_path, FILM).camera.filter is None
+    assert sensor(tmp_path, FILM).camera.filter == PixelFilter("Gaussian", 2.0, (0.5,)), "Mitsuba's, without one"
     unknown = sensor(tmp_path, FILM.replace("</film>", '<rfilter type="sinc"/></film>'))
     assert unknown.camera.filter is None
     assert "the box filter replaces it" in unknown.warnings[0]

@@ -179,12 +179,9 @@ def _resized(mi: Any, node: Any, longest: int) -> dict[str, Any]:
         film["width"], film["height"] = round(whole[0] * size[0] / width), round(whole[1] * size[1] / height)
         film["crop_offset_x"], film["crop_offset_y"] = round(left * size[0] / width), round(top * size[1] / height)
         film["crop_width"], film["crop_height"] = size
-    names = node.props.keys()
-    kept = [name for name in names if node.props.type(name) == mi.Properties.Type.ResolvedReference]
-    for name in kept:  # the filter
-        film[name] = node.props[name]
-    if not kept:  # Mitsuba takes a Gaussian, and this program the box
-        film["rfilter"] = mi.load_dict({"type": "box"})
+    for name in list(node.props.keys()):
+        if node.props.type(name) == mi.Properties.Type.ResolvedReference:  # the filter
+            film[name] = node.props[name]
     node.props = film
     return {"size": list(size), "file_size": [width, height]}
 

@@ -124,8 +124,7 @@ def scene_file(sensor: str, rfilter: str) -> str:
     <float name="fov" value="36"/>
     <transform name="to_world"><lookat origin="0, 1.1, 4.4" target="0, 0.5, 0" up="0, 1, 0"/></transform>
     <sampler type="independent"/>
-    <film type="hdrfilm"><integer name="width" value="64"/><integer name="height" value="64"/>
-      <boolean name="sample_border" value="true"/>{rfilter}</film>
+    <film type="hdrfilm"><integer name="width" value="64"/><integer name="height" value="64"/>{rfilter}</film>
   </sensor>
   <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="-90"/><scale value="3"/></transform>{checks}
   </shape>

@@ -3,7 +3,7 @@ passes differ by chance, and by how much they are wrong."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pmviewer.engine.auto.bias import Bias
@@ -98,6 +98,11 @@ class Measured:
     covered: float = 0.0
     direct: float = 0.0
     complement: float = BY_POWER
+
+    def shared(self, kept: float) -> Measured:
+        """With pixels that share their samples (`pmviewer.render.filter`), which leaves that share of what differs from
+        pixel to pixel. Photons that are shown are the same for neighbours."""
+        return replace(self, eye=kept * self.eye, direct=kept * self.direct, gathered=kept * self.gathered)
 
     def cost(self, numbers: Numbers) -> float:
         """CPU seconds of a pass of the whole picture."""

@@ -31,6 +31,7 @@ from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.stages.projection import projection_for
 from pmviewer.engine.store import StageStore
 from pmviewer.render.camera import resolve_camera
+from pmviewer.render.filter import filter_of, noise_share
 from pmviewer.render.planes import beauty_of
 from pmviewer.settings.access import Settings, with_values
 
@@ -99,6 +100,9 @@ class _Trier:
         self._opened, self._settings, self._pool = opened, settings, pool
         self._full = resolve_camera(opened.scene, settings.camera)
         self._size, self._side = size, size[0] / self._full.width
+        self.kept = noise_share(filter_of(self._full.filter, settings.render))
+        """Share of the variance of a pixel's samples that is left where pixels share them, which those of a trial are
+        too far apart for."""
         self.scale = self._full.width * self._full.height / (size[0] * size[1])
         self._store = StageStore(STORE)
         self._light: dict[int, float] = {}  # what light passes cost whose photons the store has by now
@@ -193,6 +197,7 @@ def trial(
         measured = _measured(tried, (caustic, shown), bias, mean, trier.scale)
         if tried.plan.direct and with_samples is not None:
             measured = _sampled(measured, with_samples, mean, trier.scale)
+        measured = measured.shared(trier.kept)
         result.measured.append(replace(measured, covered=covered if _aims(tried) else 0.0))
     result.seeds = len(every[0].runs[0].images)
     result.seconds, result.cpu_seconds = time.perf_counter() - started, pool.cpu_seconds - before

@@ -54,16 +54,14 @@ class PackedIncrement(Addable):
     pixels: int
     spans: tuple[Span, ...]
     sums: Columns
-    weights: Columns | None
 
     @property
     def bytes(self) -> int:
         """What travels."""
-        parts = [self.sums] if self.weights is None else [self.sums, self.weights]
-        return sum(part.bytes for part in parts)
+        return self.sums.bytes
 
     def add_to(self, film: Film) -> None:
-        if self.weights is not None or film.numbered is not None:
+        if film.numbered is not None:
             unpack(self, film.blank).add_to(film)
             return
         for names, numbers in self.sums.parts():
@@ -75,30 +73,23 @@ class PackedIncrement(Addable):
 
 def pack(increment: Increment, spans: Sequence[Span]) -> PackedIncrement:
     """Without a loss: every bit comes back. Pixels beyond `spans` are as in an empty film and don't travel."""
-    rows = _rows(spans)
-    weights = None if increment.weights is None else _packed(increment.weights[rows])
-    return PackedIncrement(len(increment.sums), tuple(spans), _packed(increment.sums[rows]), weights)
+    return PackedIncrement(len(increment.sums), tuple(spans), _packed(increment.sums[_rows(spans)]))
 
 
 def unpack(packed: PackedIncrement, blank: NDArray[np.float64]) -> Increment:
     """The increment again; `blank` (columns,) are the sums of a pixel of an empty film, which those have that nothing
     was rendered of."""
-
-    def whole(columns: Columns, empty: NDArray[np.float64]) -> NDArray[np.float64]:
-        out = np.empty((packed.pixels, columns.columns))
-        rows = _rows(packed.spans)
-        if packed.spans != ((0, packed.pixels),):
-            out[:] = empty
-        inside = out[rows] if isinstance(rows, slice) else np.empty((len(rows), columns.columns))
-        inside[:, sorted({*range(columns.columns)}.difference(columns.exact, columns.others))] = 0.0
-        for names, numbers in columns.parts():
-            turned_back(numbers, np.array(names), inside)
-        if not isinstance(rows, slice):
-            out[rows] = inside
-        return out
-
-    weights = None if packed.weights is None else whole(packed.weights, np.zeros(packed.weights.columns))
-    return Increment(whole(packed.sums, blank), weights)
+    columns, rows = packed.sums, _rows(packed.spans)
+    out = np.empty((packed.pixels, columns.columns))
+    if packed.spans != ((0, packed.pixels),):
+        out[:] = blank
+    inside = out[rows] if isinstance(rows, slice) else np.empty((len(rows), columns.columns))
+    inside[:, sorted({*range(columns.columns)}.difference(columns.exact, columns.others))] = 0.0
+    for names, numbers in columns.parts():
+        turned_back(numbers, np.array(names), inside)
+    if not isinstance(rows, slice):
+        out[rows] = inside
+    return Increment(out)
 
 
 def _rows(spans: Sequence[Span]) -> slice | NDArray[np.int64]:

@@ -39,12 +39,10 @@ class Handle:
 
 @dataclass(frozen=True)
 class Written:
-    """What a worker has written there: sums (pixels, columns) float64 and behind them, if `weighed`, weights
-    (pixels, 2)."""
+    """What a worker has written there: sums (pixels, columns) float64."""
 
     pixels: int
     columns: int
-    weighed: bool
 
 
 class Segment:
@@ -77,7 +75,7 @@ class Segments:
 
     def __init__(self, film: Film) -> None:
         pixels, columns = film.sums.shape
-        self._size = pixels * (columns + 2) * 8
+        self._size = pixels * columns * 8
         self._most = MOST_BYTES // self._size if sys.platform == "linux" else 0
         self._free: list[Segment] = []
         self._given = 0
@@ -125,17 +123,14 @@ class Writer:
             self._run = run
             self._open.clear()
         pixels, columns = increment.sums.shape
-        written = Written(pixels, columns, increment.weights is not None)
+        written = Written(pixels, columns)
         try:
             memory = self._opened(handle)
         except OSError:
             return None
-        if memory is None or pixels * (columns + (2 if written.weighed else 0)) * 8 > len(memory):
+        if memory is None or pixels * columns * 8 > len(memory):
             return None
-        there = _increment(memory, written)
-        there.sums[:] = increment.sums
-        if increment.weights is not None and there.weights is not None:
-            there.weights[:] = increment.weights
+        _increment(memory, written).sums[:] = increment.sums
         return written
 
     def _opened(self, handle: Handle) -> mmap.mmap | None:
@@ -158,7 +153,4 @@ class Writer:
 
 def _increment(memory: mmap.mmap, written: Written) -> Increment:
     sums: NDArray[np.float64] = np.frombuffer(memory, np.float64, written.pixels * written.columns)
-    weights: NDArray[np.float64] | None = None
-    if written.weighed:
-        weights = np.frombuffer(memory, np.float64, 2 * written.pixels, sums.nbytes).reshape(written.pixels, 2)
-    return Increment(sums.reshape(written.pixels, written.columns), weights)
+    return Increment(sums.reshape(written.pixels, written.columns))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,8 @@ from pmviewer.render.direct.choice import CHOICES
 from pmviewer.render.direct.outline import outline_pixels
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
-from pmviewer.render.filter import BOX, filter_of, has_signs
-from pmviewer.render.filter_samples import add_weights
+from pmviewer.render.filter import BOX, filter_of
+from pmviewer.render.filter_samples import share_samples, weigh_samples
 from pmviewer.render.gather.gather_points import POINT_COLUMNS, gather_points
 from pmviewer.render.given import PassData
 from pmviewer.render.mirror_rays import own_eye
@@ -31,39 +32,67 @@ from pmviewer.settings.access import Settings
 
 LEAST_TILE = 4
 """Fewest pixels that a task is divided into."""
+SHARED_TILE = 4096
+"""Pixels a task that share samples: some milliseconds."""
 MOST_POINTS = 1024
 """Most gather rays of a pixel that are told of."""
 
 
 def render_into(film: Film, given: PassData, marks: NDArray[np.uint8], plan: Plan, pool: WorkPool) -> NDArray[np.int64]:
     """A pass's samples more, of the path tracer or by maps. Returns the counts of `pmviewer.render.counts`."""
-    pixels = len(film.sums)
-    signed = has_signs(given.eye)
-    if signed and film.weights is None:
-        film.weights = np.zeros((pixels, 2))
     spans = film.spans()
     tile = tile_size(
         sum(last - first for first, last in spans), given.eye[0], pool.threads, lights_asked(given.virtual)
     )
 
-    def task(parts: Sequence[tuple[int, int]]) -> Callable[[], NDArray[np.int64]]:
-        def run() -> NDArray[np.int64]:
-            counts, own = np.zeros(N_COUNTS, np.int64), own_eye(given)
-            for first, last in parts:
-                with film.one_addition(first, last):
-                    if plan.path:
-                        path_pass(given.scene, given.eye, film.sums, counts, first, last)
-                    else:
-                        eye_pass(own, marks, film.radii, film.sums, counts, first, last)
-                    if signed:
-                        add_weights(given.eye, marks, film.weights, first, last)
-                if film.moments is not None:
-                    film.moments.add(film.sums, film.channels, first, last)
-            return counts
+    def traced(own: PassData, sums: NDArray[np.float64], counts: NDArray[np.int64], first: int, last: int) -> None:
+        if plan.path:
+            path_pass(given.scene, given.eye, sums, counts, first, last)
+        else:
+            eye_pass(own, marks, film.radii, sums, counts, first, last)
 
-        return run
+    def alone(parts: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
+        counts, own = np.zeros(N_COUNTS, np.int64), own_eye(given)
+        for first, last in parts:
+            with film.one_addition(first, last):
+                traced(own, film.sums, counts, first, last)
+            if film.moments is not None:
+                film.moments.add(film.sums, film.channels, first, last)
+        return counts
 
-    return sum(pool.run([task(parts) for parts in _tiled(spans, tile)]), np.zeros(N_COUNTS, np.int64))
+    def sampled(parts: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
+        counts, own = np.zeros(N_COUNTS, np.int64), own_eye(given)
+        for first, last in parts:
+            traced(own, film.samples_of(first, last), counts, first, last)
+        return counts
+
+    if not plan.filtered:
+        return sum(pool.run([partial(alone, parts) for parts in _tiled(spans, tile)]), np.zeros(N_COUNTS, np.int64))
+    around = film.spans(around=int(given.eye[0]["filter_reach"]))
+    film.samples_of(0, 0)  # before threads ask for it
+    counts = sum(pool.run([partial(sampled, parts) for parts in _tiled(around, tile)]), np.zeros(N_COUNTS, np.int64))
+    _share(film, given, marks, spans, pool)
+    return counts
+
+
+def _share(
+    film: Film, given: PassData, marks: NDArray[np.uint8], spans: Sequence[tuple[int, int]], pool: WorkPool
+) -> None:
+    """Add what the pixels of the pass have sampled to the film, as its filter shares it."""
+    own = film.samples_of(0, 0)
+    weights = np.empty((2, 2 * int(given.eye[0]["filter_reach"]) + 1), np.float32)
+    weigh_samples(given.eye, weights)
+    sizes = film.width, film.height, film.latest_alone
+    numbered = -1 if film.numbered is None else film.numbered
+
+    def shared(parts: Sequence[tuple[int, int]]) -> None:
+        line = np.empty(film.sums.shape[1])
+        for first, last in parts:
+            share_samples(weights, marks, own, film.sums, sizes, numbered, line, first, last)
+            if film.moments is not None:
+                film.moments.add(film.sums, film.channels, first, last)
+
+    pool.run([partial(shared, parts) for parts in _tiled(spans, SHARED_TILE)])
 
 
 def _tiled(spans: Sequence[tuple[int, int]], tile: int) -> list[list[tuple[int, int]]]:

@@ -196,7 +196,7 @@ def replay_pixel(given, radii, asked, wi, shares, rows, vertices, prims, expecte
     row, points = _i8(0), _i8(1)
     for sample in range(samples):
         take_sample(eye, index * samples + sample)
-        seed, ray, _ = sampled_ray(scene, eye, pixel)
+        seed, ray = sampled_ray(scene, eye, pixel)
         way, ways = first_way(ray)
         if main:
             for k in range(3):

@@ -56,7 +56,7 @@ def uncovered_hit(given, pixel, counts):
     size of a pixel there.
     """
     scene, eye, cache = given.scene, given.eye, given.cache
-    seed, ray, _ = sampled_ray(scene, eye, pixel)
+    seed, ray = sampled_ray(scene, eye, pixel)
     beta = WHITE
     travelled = _f4(0.0)
     for depth in range(eye.max_depth + 1):

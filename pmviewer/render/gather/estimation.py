@@ -70,7 +70,7 @@ def trace_samples(given, samples, counts, first, last):
     for pixel in range(first, last):
         row = samples[pixel]
         row[KIND] = _f4(OTHER)
-        _, ray, _ = sampled_ray(scene, eye, pixel)
+        _, ray = sampled_ray(scene, eye, pixel)
         hit = cast(scene, ray)
         counts[C_RAYS] += 1
         if hit.prim < 0:

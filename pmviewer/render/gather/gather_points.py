@@ -62,7 +62,7 @@ def gather_points(given, pixel, samples, counts, rows):
     index, row, tally = eye.index, _i8(0), row_of(counts, 0)
     for sample in range(samples):
         take_sample(eye, index * samples + sample)
-        seed, ray, _ = sampled_ray(scene, eye, pixel)
+        seed, ray = sampled_ray(scene, eye, pixel)
         way, ways = first_way(ray)
         while True:
             ray, beta, first, splits, u = way

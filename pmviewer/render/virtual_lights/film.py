@@ -128,7 +128,7 @@ class WeightedFilm(Film):
             for term, base in _TERMS.items():
                 light = np.zeros_like(planes)
                 light[..., PLANES[term]] = light_of(self.channels + base).reshape(self.height, self.width, 3)
-                planes += self.weighed(light)
+                planes += light
         return planes
 
     def sums_of_weights(self) -> tuple[F8, F8]:

@@ -35,7 +35,7 @@ from pmviewer.maps.virtual_lights import (
     W_SUM,
 )
 from pmviewer.render.counts import C_DROPPED, C_RAYS, C_SHADOW_RAYS
-from pmviewer.render.pixel import INDIRECT, SPECULAR, weighed
+from pmviewer.render.pixel import INDIRECT, SPECULAR, shared
 from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS
 from pmviewer.render.straight import let_through
 from pmviewer.render.virtual_lights.descent import CUT_WORDS, ask_cut, descend
@@ -172,9 +172,9 @@ def from_virtual_lights(given, si, beta, pixel, whole):
         if weighted and _f4(0.0) < G:
             target, F = _i8(base + W_F), scale(F, lights)
             film[base + W_G] += _f8(lights * throughput * each * G)
-        film[target] += weighed(pixel, _f8(F[0]))
-        film[target + 1] += weighed(pixel, _f8(F[1]))
-        film[target + 2] += weighed(pixel, _f8(F[2]))
+        film[target] += shared(pixel, _f8(F[0]))
+        film[target + 1] += shared(pixel, _f8(F[1]))
+        film[target + 2] += shared(pixel, _f8(F[2]))
     film[sums + W_LIGHTS] += _f8(asked[0])
     if weighted:
         albedo, counted, light = normalisation(given, si, pixel)
@@ -182,9 +182,9 @@ def from_virtual_lights(given, si, beta, pixel, whole):
             light = scale(mul(beta, light), rays)
             if is_good(light):
                 film[base + W_G] += _f8(rays * throughput * counted)
-                film[base + W_F] += weighed(pixel, _f8(light[0]))
-                film[base + W_F + 1] += weighed(pixel, _f8(light[1]))
-                film[base + W_F + 2] += weighed(pixel, _f8(light[2]))
+                film[base + W_F] += shared(pixel, _f8(light[0]))
+                film[base + W_F + 1] += shared(pixel, _f8(light[1]))
+                film[base + W_F + 2] += shared(pixel, _f8(light[2]))
         if virtual.estimator == PRINTED_FULL:
             albedo = _f4(1.0)
         film[base + W_A] += _f8(throughput * albedo)

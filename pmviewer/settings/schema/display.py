@@ -32,7 +32,7 @@ RADIANCE_PHOTONS = Need(
 DENOISER = Need(lambda f: find_spec("pyoidn") is not None, "Needs Open Image Denoise: pip install 'pmviewer[denoise]'.")
 MOMENTS = Need(
     lambda f: f.plan.moments,
-    "Not with weighted virtual lights, nor with filters that have negative parts: their pictures divide sums.",
+    "Not with weighted virtual lights: their pictures divide sums.",
 )
 VIEW_NEEDS: dict[str, Needs] = {
     "denoised": (DENOISER,),

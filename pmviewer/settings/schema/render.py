@@ -31,7 +31,7 @@ SMOOTH_GLASS = Need(lambda f: f.traits.has_smooth_glass, "No smooth glass in thi
 ONE_INDEX = Need(lambda f: not f.plan.dispersion, "Where glass splits light into colours, paths go one way at it.")
 ONE_SAMPLE = Need(
     lambda f: not f.plan.one_sample,
-    "One sample a pixel and pass: with virtual lights, estimated gathers, filters with negative parts, and radii that "
+    "One sample a pixel and pass: with virtual lights, estimated gathers, and radii that "
     "pixels set by the photons they find.",
 )
 SPLIT = Need(

@@ -25,23 +25,15 @@ def awkward(rng, n):
     )
 
 
-@pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("spans", [[(0, 60)], [(12, 15), (22, 25)], [(0, 0)]], ids=["all", "region", "nothing"])
-def test_every_bit_comes_back(spans, weighted):
+def test_every_bit_comes_back(spans):
     rng = np.random.default_rng(1)
     blank = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
     sums = np.tile(blank, (60, 1))
-    weights = np.zeros((60, 2)) if weighted else None
     for first, last in spans:
         sums[first:last] = awkward(rng, 60)[first:last]
-        if weights is not None:
-            weights[first:last] = rng.normal(size=(last - first, 2))
-    back = unpack(pack(Increment(sums, weights), spans), blank)
+    back = unpack(pack(Increment(sums), spans), blank)
     np.testing.assert_array_equal(bits(back.sums), bits(sums))
-    if weights is None:
-        assert back.weights is None
-    else:
-        np.testing.assert_array_equal(bits(back.weights), bits(weights))
 
 
 @pytest.mark.parametrize("region", [None, (2, 1, 5, 4)])
@@ -56,7 +48,7 @@ def test_it_is_added_as_the_increment_is(region):
         for first, last in spans:
             sums[first:last, 4:8] = rng.normal(size=(last - first, 4))
             sums[first:last, :4] = rng.normal(size=(last - first, 4)).astype(np.float32)
-        whole = Increment(sums, None)
+        whole = Increment(sums)
         whole.add_to(films[0])
         pack(whole, spans).add_to(films[1])
     assert films[0].sums.any()
@@ -67,5 +59,5 @@ def test_less_travels_than_there_is():
     rng = np.random.default_rng(2)
     sums = np.zeros((1000, 22))
     sums[:, :4] = rng.normal(size=(1000, 4)).astype(np.float32)
-    assert pack(Increment(sums, None), [(0, 1000)]).bytes < 1000 * 4 * 4.2, "float32 of the columns that aren't empty"
-    assert pack(Increment(sums, None), [(10, 20)]).bytes < 10 * 4 * 4 + 100, "of a region its pixels"
+    assert pack(Increment(sums), [(0, 1000)]).bytes < 1000 * 4 * 4.2, "float32 of the columns that aren't empty"
+    assert pack(Increment(sums), [(10, 20)]).bytes < 10 * 4 * 4 + 100, "of a region its pixels"

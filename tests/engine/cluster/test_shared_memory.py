@@ -24,21 +24,17 @@ def segments():
     made.close()
 
 
-def increment(weighed=False):
+def increment():
     rng = np.random.default_rng(5)
     sums = rng.normal(size=Film(8, 5).sums.shape)
     sums[0, :4] = np.nan, -0.0, np.inf, 5e-324
-    return Increment(sums, rng.normal(size=(40, 2)) if weighed else None)
+    return Increment(sums)
 
 
-@pytest.mark.parametrize("weighed", [False, True])
-def test_every_bit_arrives(segments, weighed):
-    segment, sent = segments.take(), increment(weighed)
+def test_every_bit_arrives(segments):
+    segment, sent = segments.take(), increment()
     found = segment.increment(Writer().write(RUN, segment.handle, sent))
     assert found.sums.tobytes() == sent.sums.tobytes()
-    assert (found.weights is None) != weighed
-    if weighed:
-        assert found.weights.tobytes() == sent.weights.tobytes()
     del found
     segments.give_back(segment)
 
@@ -61,7 +57,7 @@ def test_a_late_writer_spoils_nothing_that_came_after(segments):
     after = segments.take()
     assert after.handle.descriptor == lost.handle.descriptor, "the case that this is about"
     written = writer.write(RUN, after.handle, increment())
-    assert writer.write(RUN, lost.handle, Increment(np.full((40, written.columns), 7.0), None)) is None
+    assert writer.write(RUN, lost.handle, Increment(np.full((40, written.columns), 7.0))) is None
     np.testing.assert_array_equal(after.increment(written).sums, increment().sums)
     segments.give_back(after)
 

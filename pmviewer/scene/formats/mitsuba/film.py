@@ -18,8 +18,8 @@ _KNOWN = ("hdrfilm", "ldrfilm", "tiledhdrfilm", "mfilm", "specfilm")
 
 @dataclass(frozen=True)
 class Film:
-    """`width` × `height` pixels cut out of `full` at the offset `left`, `top`, with a reconstruction filter, None where
-    the file names none."""
+    """`width` × `height` pixels cut out of `full` at the offset `left`, `top`, with a reconstruction filter, None for
+    the box."""
 
     width: int
     height: int
@@ -46,7 +46,7 @@ def read_film(sensor: Properties) -> Film:
     about files and tone curves, which are chosen here by other means."""
     films = sensor.objects("film")
     if not films:
-        return Film(*DEFAULT_SIZE, DEFAULT_SIZE)
+        return Film(*DEFAULT_SIZE, DEFAULT_SIZE, filter=_gaussian(0.5))
     film = Properties(films[0], sensor.document)
     if film.type not in _KNOWN:
         film.document.warn(f"{film.element} is read as an hdrfilm.", film.element)
@@ -62,10 +62,10 @@ def read_film(sensor: Properties) -> Film:
 
 
 def _filter(film: Properties) -> PixelFilter | None:
-    """The film's <rfilter>. Where there is none Mitsuba 3 takes a Gaussian, and this program the box."""
+    """The film's <rfilter>, a Gaussian where there is none."""
     given = film.objects("rfilter")
     if not given:
-        return None
+        return _gaussian(0.5)
     p = Properties(given[0], film.document)
     kinds: dict[str, Callable[[], PixelFilter]] = {
         "box": lambda: PixelFilter("box", _positive(p, "radius", 0.5)),
