@@ -44,8 +44,9 @@ from pmviewer.render.diagnostics.density import WIDEST, counting_eye, counting_t
 from pmviewer.render.diagnostics.diagnostics import FAMILY_CHANNELS, lookup_view, radiance_view, shadow_view
 from pmviewer.render.diagnostics.matter import beam_view, depth_view, slice_view
 from pmviewer.render.film import Film
+from pmviewer.render.filter import filter_of, filtered
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL
-from pmviewer.render.planes import view_of
+from pmviewer.render.planes import PLANES, view_of
 from pmviewer.render.virtual_lights.film import WeightedFilm
 from pmviewer.scene.arrays.media import media_bounds
 from pmviewer.settings.access import Settings, needs_of
@@ -190,10 +191,18 @@ def noise_plane(film: Film) -> dict[str, NDArray[np.float32]]:
 
 
 def _denoised(looked: Looked, pool: WorkPool) -> dict[str, NDArray[np.float32]]:
-    """The picture without its noise."""
-    planes = looked.film.planes()
-    image, albedo, normal = (view_of(planes, view) for view in ("beauty", "albedo", "normal"))
-    return {DENOISED: denoised(image, albedo, normal, pool.threads)}
+    """The picture without its noise. What a filter shares is too much alike for the denoiser to tell it from what is
+    seen: it gets each pixel's own samples, and the filter comes after it. Lights, whose edges it would blur, are as the
+    filter has them."""
+    planes, unshared = looked.film.planes(), looked.film.unshared()
+    own = planes if unshared is None else unshared
+    image, albedo, normal = (view_of(own, view) for view in ("beauty", "albedo", "normal"))
+    smooth = denoised(image, albedo, normal, pool.threads)
+    if unshared is not None:
+        lights, own_lights = planes[..., PLANES["emission"]], unshared[..., PLANES["emission"]]
+        rest = filtered(smooth - own_lights, filter_of(looked.camera.filter, looked.settings.render))
+        smooth = np.maximum(lights + rest, 0.0)
+    return {DENOISED: smooth}
 
 
 def ratio(achieved: NDArray[np.float32], required: NDArray[np.float32]) -> NDArray[np.float32]:

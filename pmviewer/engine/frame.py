@@ -150,6 +150,8 @@ class Frame:
     """What automatic settings came to, by full name (`pmviewer.engine.automatic`)."""
     light_places: NDArray[np.float64] | None = None
     """(n, 3) middles of the lights, NaN where they shine from outside; None without importance."""
+    unshared: NDArray[np.float32] | None = None
+    """Like the planes, with terms of each pixel's own samples where a filter shares them."""
     preview: Preview | None = None
     """What the window shows in place of the beauty, which it is not; None where it shows that."""
 
@@ -157,6 +159,11 @@ class Frame:
     def has_media(self) -> bool:
         """Whether it has the terms of media."""
         return self.planes.shape[-1] >= MEDIA_CHANNELS
+
+    @property
+    def independent(self) -> NDArray[np.float32]:
+        """Planes in which the noise of neighbouring pixels differs, as denoisers want it."""
+        return self.planes if self.unshared is None else self.unshared
 
     @property
     def known_lights(self) -> LightImportance | None:

@@ -28,6 +28,7 @@ def frame_of(looked: Looked, tally: Tally, inspection: Inspection, told: Told) -
         version=0,
         coarse=False,
         planes=looked.film.planes(),
+        unshared=looked.film.unshared(),
         settings=looked.settings,
         camera=looked.camera,
         statistics=_statistics(looked, tally, told),

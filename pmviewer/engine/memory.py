@@ -12,6 +12,9 @@ BYTES_PER_PIXEL = CHANNELS * (8 + 3 * 4) + OF_MOMENTS
 """The film's float64 sums, what it keeps of its noise, and three float32 frames: the one shown, the one being made, the
 one being exported."""
 
+OF_FILTERS = CHANNELS * (2 * 8 + 2 * 4)
+"""With a filter also: float64 sums of each pixel's own samples, of a pass and of all, and float32 frames of these."""
+
 BYTES_PER_TRAJECTORY = 250
 """Some three photons stored, twice while batches are joined, and their map."""
 
@@ -34,12 +37,14 @@ def check_scene_memory(scene: Scene) -> None:
         raise SceneError(what, scene.path, hint="Show repeated meshes by instances, or subdivide less.")
 
 
-def check_memory(width: int, height: int, N: int) -> None:
-    """Raises SettingError when an image of that size with N trajectories a pass can't fit."""
+def check_memory(width: int, height: int, N: int, filtered: bool = False) -> None:
+    """Raises SettingError when an image of that size with N trajectories a pass can't fit, `filtered` by another filter
+    than the plain box."""
     available = available_memory()
     if available is None:
         return
-    image, photons = width * height * BYTES_PER_PIXEL, N * BYTES_PER_TRAJECTORY
+    of_pixel = BYTES_PER_PIXEL + (OF_FILTERS if filtered else 0)
+    image, photons = width * height * of_pixel, N * BYTES_PER_TRAJECTORY
     if image + photons <= available:
         return
     if image >= photons:

@@ -89,8 +89,8 @@ class Renderer:
         bounds = scene.flat.center, scene.flat.radius
         self.render_camera = _settled(scene, clipped(render_camera, settings.camera, *bounds))
         self.camera = _settled(scene, resolve_view(scene.scene, settings, *bounds))
-        check_memory(self.camera.width, self.camera.height, settings.photons.N)
         self.plan: Plan = plan or plan_of(settings, scene.traits)
+        check_memory(self.camera.width, self.camera.height, settings.photons.N, self.plan.filtered)
         self.facts = Facts(settings, self.plan, scene.traits)
         self.film = film_of(settings, self.plan, self.camera.width, self.camera.height)
         if settings.region.on and not self.plan.virtual:

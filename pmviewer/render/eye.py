@@ -99,6 +99,16 @@ def _taps(scene, eye, pixel, index):
     return total, rays
 
 
+@device
+def _within(scene, eye, pixel, index):
+    """Mean radiance that rays through the pixel meet in pass `index`."""
+    total = BLACK
+    for j in range(eye.outline_rays):
+        numbers = draw4(eye.sequence, pixel.seed, _u4(index * _u4(eye.outline_rays) + _u4(j)), OUTLINE)
+        total = add(total, _outline_ray(scene, eye, pixel, numbers))
+    return scale(total, _f4(1.0) / _f4(eye.outline_rays))
+
+
 @specialised
 def outline_emission(scene, eye, pixel, columns):
     """Add the mean radiance that camera rays through the pixel meet at lights and the environment to its sums, of which
@@ -108,26 +118,24 @@ def outline_emission(scene, eye, pixel, columns):
         def by_taps(scene, eye, pixel, columns):
             side = 2 * eye.filter_reach + 1
             rounds = max(eye.outline_rays // (side * side), 1)
-            rays, share = _i8(0), _f8(1.0) / _f8(rounds)
+            rays, share, first = _i8(eye.outline_rays), _f8(1.0) / _f8(rounds), columns - OWN_COLUMNS
             for j in range(rounds):
                 L, more = _taps(scene, eye, pixel, _u4(eye.filter_pass * _u4(rounds) + _u4(j)))
                 rays += more
                 for k in range(3):
-                    pixel.film[columns - OWN_COLUMNS + k] += _f8(L[k]) * share
+                    pixel.film[first + k] += _f8(L[k]) * share
+            L = _within(scene, eye, pixel, eye.filter_pass)
+            for k in range(3):
+                pixel.film[first + 3 + k] += _f8(L[k])
             return rays
 
         return by_taps
 
-    def alike(scene, eye, pixel, columns):
-        total = BLACK
-        for j in range(eye.outline_rays):
-            index = _u4(eye.index * _u4(eye.outline_rays) + _u4(j))
-            numbers = draw4(eye.sequence, pixel.seed, index, OUTLINE)
-            total = add(total, _outline_ray(scene, eye, pixel, numbers))
-        deposit(pixel, EMISSION, scale(total, _f4(1.0) / _f4(eye.outline_rays)))
+    def by_pixel(scene, eye, pixel, columns):
+        deposit(pixel, EMISSION, _within(scene, eye, pixel, eye.index))
         return _i8(eye.outline_rays)
 
-    return alike
+    return by_pixel
 
 
 @specialised

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.render.filter_samples import OWN_COLUMNS
 from pmviewer.render.moments import Moments
-from pmviewer.render.planes import CHANNELS
+from pmviewer.render.planes import CHANNELS, PLANES, TERMS
 from pmviewer.state import State
+
+_TERMS_END = PLANES[TERMS[-1]].stop
 
 
 @kernel
@@ -45,7 +47,8 @@ class Increment(Addable):
 
 class Film:
     """Sums of `passes` samples per pixel: `sums` (height·width, channels + further) float64, `channels` being those of
-    `pmviewer.render.planes`, with media MEDIA_CHANNELS, and `further` sums that a method keeps beside the planes;
+    `pmviewer.render.planes`, with media MEDIA_CHANNELS, and `further` sums that a method keeps beside the planes, and
+    with `unshared` the terms of each pixel's own samples, where a filter shares them;
     `radii` of the pixels' look-ups in the latest pass
     (`pmviewer.render.pixel_radius`), None where all have that of the pass; `moments`, what passes tell of the noise,
     None where nobody keeps them.
@@ -56,9 +59,13 @@ class Film:
     numbered: int | None = None
     """Column of `sums` that is no sum but the highest of the numbers that passes put there, −1 for none."""
 
-    def __init__(self, width: int, height: int, further: int = 0, channels: int = CHANNELS) -> None:
+    def __init__(
+        self, width: int, height: int, further: int = 0, channels: int = CHANNELS, unshared: bool = False
+    ) -> None:
         self.width, self.height, self.channels = width, height, channels
-        self.sums: NDArray[np.float64] = np.zeros((width * height, channels + further), np.float64)
+        self._columns = channels + further
+        terms = _TERMS_END + channels - CHANNELS if unshared else 0
+        self.sums: NDArray[np.float64] = np.zeros((width * height, self._columns + terms), np.float64)
         self.radii: NDArray[np.float32] | None = None
         self._samples: NDArray[np.float64] | None = None
         self.moments: Moments | None = None
@@ -91,9 +98,9 @@ class Film:
         """(pixels, columns + OWN_COLUMNS) what the pixels sample in a pass by themselves, empty for pixels first …
         last−1, before they share it (`pmviewer.render.filter_samples`)."""
         if self._samples is None:
-            self._samples = np.zeros((len(self.sums), self.sums.shape[1] + OWN_COLUMNS))
-        self._samples[first:last, :-OWN_COLUMNS] = self.blank
-        self._samples[first:last, -OWN_COLUMNS:] = 0.0
+            self._samples = np.zeros((len(self.sums), self._columns + OWN_COLUMNS))
+        self._samples[first:last, : self._columns] = self.blank[: self._columns]
+        self._samples[first:last, self._columns :] = 0.0
         return self._samples
 
     @contextmanager
@@ -171,4 +178,15 @@ class Film:
         resolve(self.sums, float(max(self.passes, 1)), out, 0, len(out))
         planes = out.reshape(self.height, self.width, self.channels)
         self._as_sampled(planes)
+        return planes
+
+    def unshared(self) -> NDArray[np.float32] | None:
+        """Planes whose terms are means of each pixel's own samples, so that the noise of neighbours differs; None where
+        `planes` are such or nobody keeps them."""
+        if self.sums.shape[1] == self._columns:
+            return None
+        terms = (self.sums[:, self._columns :] / max(self.passes, 1)).reshape(self.height, self.width, -1)
+        self._as_sampled(terms)
+        planes = self.planes()
+        planes[..., :_TERMS_END], planes[..., CHANNELS:] = terms[..., :_TERMS_END], terms[..., _TERMS_END:]
         return planes

@@ -23,8 +23,9 @@ FILTER_FIELDS: list[tuple] = [
     ("filter_pass", "u4"),  # the pass; `index` counts the samples of mirrors one by one
 ]
 """Of the eye records of all filters but the plain box."""
-OWN_COLUMNS = 3
-"""Columns of a pixel's own samples behind those of the film: emission that pixels on outlines look for themselves."""
+OWN_COLUMNS = 6
+"""Columns of a pixel's own samples behind those of the film: emission that pixels on outlines look for themselves, by
+the filter and within the pixel."""
 FEWEST = 0.1
 """Weights inside the picture from which they stand for all."""
 _EVERY_PIXEL = 0xFFFFFFFF
@@ -136,13 +137,14 @@ def share_samples(weights, marks, own, film, sizes, numbered, line, first, last)
     """Add to the pixels first … last−1 of the film what the samples around them tell.
 
     weights: of `weigh_samples`; marks: uint8 (pixels,) or (0,), where OUTLINED pixels have emission of their own; own:
-    float64 (pixels, columns + OWN_COLUMNS), each pixel's samples of the pass; film: float64 (pixels, columns); sizes:
-    width and height of the picture, and whether the film's sums are replaced; numbered: the column that is no sum but a
-    number of which the highest counts, −1 for none; line: float64 (columns,), room for a pixel's sums. What properties
-    of surfaces the pixel sees is its own.
+    float64 (pixels, columns + OWN_COLUMNS), each pixel's samples of the pass; film: float64 (pixels, columns) or, with
+    the terms of each pixel's own samples behind them, (pixels, columns + terms); sizes: width and height of the
+    picture, and whether the film's sums are replaced; numbered: the column that is no sum but a number of which the
+    highest counts, −1 for none; line: float64 as wide as the film, room for a pixel's sums. What properties of surfaces
+    the pixel sees is its own.
     """
     width, height, anew = sizes
-    columns = film.shape[1]
+    columns = own.shape[1] - OWN_COLUMNS
     reach = (weights.shape[1] - 1) // 2
     for pixel in range(first, last):
         y, x = pixel // width, pixel % width
@@ -163,10 +165,15 @@ def share_samples(weights, marks, own, film, sizes, numbered, line, first, last)
                     line[c] += w * own[there, c]
         if numbered >= 0:
             line[numbered] = own[pixel, numbered]
+        for c in range(columns, film.shape[1]):
+            term = c - columns
+            line[c] = own[pixel, term if term < _TERMS_END else term - _TERMS_END + CHANNELS]
         if len(marks) > 0 and marks[pixel] & OUTLINED != 0:
-            for c in range(OWN_COLUMNS):
+            for c in range(3):
                 line[c] = own[pixel, columns + c]
-        for c in range(columns):
+                if film.shape[1] > columns:
+                    line[columns + c] = own[pixel, columns + 3 + c]
+        for c in range(film.shape[1]):
             if c == numbered:
                 film[pixel, c] = line[c] if anew else max(film[pixel, c], line[c])
             elif anew:

@@ -6,10 +6,12 @@ import threading
 import numpy as np
 import pytest
 
+from pmviewer.engine.inspection import Wanted
 from pmviewer.errors import OutputError
 from pmviewer.heap import give_back
 from pmviewer.output import denoise, oidn
 from pmviewer.output.denoise import denoised
+from tests.support.scenes import closed_sphere, rendered, settings_of
 
 
 def two_walls(noise: float):
@@ -88,3 +90,14 @@ def test_negative_samples_and_small_pictures_are_no_trouble():
     clean = denoised(colour, np.full_like(colour, 2.0), np.zeros_like(colour))
     assert np.isfinite(clean).all()
     assert clean.min() >= 0
+
+
+@pytest.mark.parametrize("name", ["box", "Gaussian"])
+def test_pictures_of_filters_lose_their_noise_too(name):
+    """Radiance is 1 everywhere. Samples that pixels share have noise in common, which a denoiser takes for what is
+    there: it left nine tenths of it."""
+    renderer = rendered(closed_sphere(size=64), settings_of(render={"method": "path", "filter": name}), 2)
+    frame = renderer.frame(1, Wanted(denoised=True))
+    noisy, clean = (float(((frame.image(view) - 1) ** 2).mean()) for view in ("beauty", "denoised"))
+    print(f"{name}: {noisy:.5f}, denoised {clean:.6f}")
+    assert clean < noisy / 10

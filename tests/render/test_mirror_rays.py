@@ -108,7 +108,6 @@ def test_what_has_neither_mirrors_nor_glass_is_compiled_without(pool):
     for values in (
         {"gather": {"estimation": "on"}, "render": {"method": "gather"}},
         {"render": {"method": "virtual lights"}},
-        {"render": {"filter": "Lanczos"}},
         {"estimate": {"radius_rule": "pixel"}},
     ):
         assert "One sample" in inactive_reason("render.mirror_rays", settings_of(**values), box)

@@ -118,7 +118,8 @@ class Previews:
         guides = self._banded(guides_of, GUIDES, planes)
         caption = "a coarse picture drawn out along edges"
         if self._smooths(settings):
-            small, caption = self._denoised(small, frame.planes), "a coarse picture, denoised and drawn out"
+            small = self._denoised(signals_of(frame.independent), frame.independent)
+            caption = "a coarse picture, denoised and drawn out"
         signals = self._drawn_out(small, small_guides, camera, guides, camera.width / frame.planes.shape[1])
         known = self._reprojected(renderer, guides)
         if known is not None:
@@ -128,22 +129,22 @@ class Previews:
         return Preview(self._banded(picture_of, 3, signals, planes), caption)
 
     def _made(self, renderer: Renderer, frame: Frame, smooths: bool) -> Preview:
-        signals, passes, known = self._banded(signals_of, SIGNALS, frame.planes), frame.statistics.passes, self._known
+        planes = frame.independent if smooths else frame.planes
+        signals, passes, known = self._banded(signals_of, SIGNALS, planes), frame.statistics.passes, self._known
         caption = f"{passes} pass" if passes == 1 else f"{passes} passes"
         if known is not None:
             weight = (known.share * (known.passes / passes))[..., None]
             signals[..., :3] = (signals[..., :3] + weight * known.light) / (1.0 + weight)
             caption = f"{caption} with light of the last picture"
         if smooths and renderer.scene.traits.follows(renderer.settings.photons.glossy):
-            albedo = frame.planes[..., PLANES["albedo"]]
-            picture = self._banded(picture_of, 3, signals, frame.planes)
-            return Preview(self._smoothed(picture, albedo, frame.planes), f"{caption}, denoised")
+            picture = self._banded(picture_of, 3, signals, planes)
+            return Preview(self._smoothed(picture, planes[..., PLANES["albedo"]], planes), f"{caption}, denoised")
         if smooths:  # nothing but edges is finer than what light does
-            guides, small = self._banded(guides_of, GUIDES, frame.planes), halved(frame.planes)
+            guides, small = self._banded(guides_of, GUIDES, planes), halved(planes)
             few = self._denoised(halved(signals), small)
             signals = self._drawn_out(few, np.ascontiguousarray(guides[1::2, 1::2]), frame.camera, guides, 2.0)
             caption = f"{caption}, denoised"
-        return Preview(self._banded(picture_of, 3, signals, frame.planes), caption)
+        return Preview(self._banded(picture_of, 3, signals, planes), caption)
 
     def _smooths(self, settings: Settings) -> bool:
         return settings.display.preview == "denoised" and self._denoises

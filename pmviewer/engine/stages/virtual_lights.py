@@ -185,7 +185,7 @@ def film_of(settings: Settings, plan: Plan, width: int, height: int) -> Film:
     channels = MEDIA_CHANNELS if plan.media else CHANNELS
     if plan.virtual:
         return WeightedFilm(width, height, settings.virtual, channels)
-    return Film(width, height, channels=channels)
+    return Film(width, height, channels=channels, unshared=plan.filtered)
 
 
 def bias_of(settings: Settings) -> tuple[str, ...]:
