@@ -25,9 +25,9 @@ THEMSELVES = ("all", "report")
 NEED_MORE = ("files",)
 """Benches of files that somebody has to name."""
 LONG = (
-    "actions", "agree", "auto", "checkpoint", "cluster", "deposition", "emission", "estimation", "gather", "hostile",
-    "importance", "lens", "load", "media", "mitsuba", "preview", "series", "stress", "thin-glass", "unused", "virtual",
-    "virtual-many",
+    "actions", "agree", "auto", "checkpoint", "cluster", "combined", "deposition", "emission", "estimation", "gather",
+    "hostile", "importance", "lens", "load", "media", "mitsuba", "preview", "series", "stress", "thin-glass", "unused",
+    "virtual", "virtual-many",
 )  # fmt: skip
 """Benches that take many minutes whole: all of them together are run quick, and the page says so."""
 LAST = ("stress",)
