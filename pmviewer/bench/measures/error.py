@@ -96,6 +96,12 @@ def reference(scene: str) -> np.ndarray:
     return layers[""].astype(np.float64)
 
 
+def reference_noise(scene: str) -> float:
+    """relMSE of its noise, by two halves of its own (`scenes/make/reference.py`)."""
+    _, said = read_exr(data_folder("scenes") / scene / "reference.exr")
+    return float(said["noise"])
+
+
 def measure(
     opened: OpenScene,
     method: str,
