@@ -78,8 +78,8 @@ def _against(scene: str, seconds: float, pool: WorkPool) -> tuple[list[str | flo
     share = choice.trial.cpu_seconds / seconds
     said = renderer.error.latest
     found = said.relmse if said is not None else math.nan
-    row = [scene, name_of(choice), share, error, choice.expected, found, default, error / default, ratio, noise]
-    return row, ratio
+    row: list[str | float | int] = [scene, name_of(choice), share, error, choice.expected, found, default]
+    return [*row, error / default, ratio, noise], ratio
 
 
 def _runs(scene: str, runs: int, pool: WorkPool) -> tuple[list[str | float | int], list[float], list[bool]]:
@@ -164,9 +164,7 @@ def run(quick: bool = False, scenes: int | None = None, folder: Path | None = No
     ]
     if any(map(math.isfinite, ratios)):
         known = sum(map(math.isfinite, ratios))
-        note = (
-            f"relMSE over {PEER}, {peer.variant()}, at {seconds:g} CPU s, the trial counted, the reference's noise not"
-        )
+        note = f"relMSE over {PEER}, {peer.variant()}, at {seconds:g} CPU s, with the trial, less the reference's noise"
         mean = f"{note}, geometric mean of {known}{CHOSEN_WAYS}"
         targets.insert(0, Target("P17", geometric_mean(ratios), 0.08, "", False, mean))
         targets.insert(
@@ -178,7 +176,7 @@ def run(quick: bool = False, scenes: int | None = None, folder: Path | None = No
     columns = ["scene", "chosen", "trial / near", "relMSE / 5 %", "expected / median", "estimated / 95 %"]
     columns += ["default / passes", "over default / covered", "over Mitsuba", "reference's noise"]
     notes = [
-        "errors of scenes are without the noise of their references, which all pictures of a scene would have in common",
+        "errors of scenes are without the noise of their references, which is the same for all pictures of a scene",
         "scenes: share of the time that the trial took, relMSE, what trial and finished picture promised of it",
         f"runs: share within {NEAR:.0%} of the error asked for, quantiles of reached over asked, passes, share of "
         f"intervals that cover the error; pictures of {SIDE}² against {TRUTH_PASSES} passes of the final gather",
