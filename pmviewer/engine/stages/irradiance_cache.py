@@ -13,7 +13,7 @@ limit the mean is that of the plain gather.
 from __future__ import annotations
 
 import math
-from typing import Any
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,9 @@ COARSEST, FINEST = 16, 4
 SHRINK = 1.0 / 6.0
 """Reaches fall with this power of the pass: as radii do with alpha = 2/3."""
 BATCH_RAYS = 8192
-"""Gather rays a task."""
+"""Gather rays a task, at most."""
+TASKS = 4
+"""A thread and round, at least: the first round has few candidates, and gathers at each."""
 
 _f4 = np.float32
 
@@ -81,24 +83,30 @@ def fill_cache(given: PassData, record: NDArray[np.void], pool: WorkPool) -> tup
     camera = given.eye[0]
     cache = build_cache(np.empty((0, ROW), np.float32), record)
     total = np.zeros(N_COUNTS, np.int64)
-    batch = max(1, BATCH_RAYS // int(record["rings"][0] * record["sectors"][0]))
+    most = max(1, BATCH_RAYS // int(record["rings"][0] * record["sectors"][0]))
     size = int(camera["width"]), int(camera["height"])
     for pixels in lattices(*size, int(camera["seed"]), int(camera["index"]), side):
         rows, made = np.empty((len(pixels), ROW), np.float32), np.empty(len(pixels), bool)
-
-        def task(first: int, rows: Any = rows, made: Any = made, pixels: Any = pixels, cache: Any = cache) -> Any:
-            def run() -> NDArray[np.int64]:
-                counts = np.zeros(N_COUNTS, np.int64)
-                last = min(first + batch, len(pixels))
-                fill_records(given._replace(cache=cache.record), pixels, rows, made, counts, first, last)
-                return counts
-
-            return run
-
-        total += sum(pool.run([task(first) for first in range(0, len(pixels), batch)]), np.zeros(N_COUNTS, np.int64))
+        batch = min(most, -(-len(pixels) // (TASKS * pool.threads)))
+        fill = partial(_filled, given._replace(cache=cache.record), pixels, rows, made)
+        tasks = [partial(fill, first, min(first + batch, len(pixels))) for first in range(0, len(pixels), batch)]
+        total += sum(pool.run(tasks), np.zeros(N_COUNTS, np.int64))
         if made.any():
             cache = _extended(cache, rows[made], pool.run)
     return cache, total
+
+
+def _filled(
+    given: PassData,
+    pixels: NDArray[np.int32],
+    rows: NDArray[np.float32],
+    made: NDArray[np.bool_],
+    first: int,
+    last: int,
+) -> NDArray[np.int64]:
+    counts = np.zeros(N_COUNTS, np.int64)
+    fill_records(given, pixels, rows, made, counts, first, last)
+    return counts
 
 
 def _seeing_all(eye: NDArray[np.void]) -> NDArray[np.void]:
