@@ -131,6 +131,15 @@ def test_statistics_and_cloud():
     assert statistics.map_bytes > renderer.latest.cache.bytes > 128 * statistics.cache_records
 
 
+@pytest.mark.parametrize("size", [1, 2, 5])
+def test_pictures_smaller_than_the_lattice_have_rounds_without_candidates(size):
+    """Such are those of the miniatures that compile ahead."""
+    assert any(not len(pixels) for seed in range(8) for pixels in lattices(size, size, seed, 0))
+    for seed in range(8):
+        planes = cached(closed_sphere(size=size), 1, render={"method": "gather", "seed": seed}).film.planes()
+        assert np.isfinite(planes).all()
+
+
 def test_the_candidates_of_all_rounds_are_a_lattice():
     rounds = lattices(50, 30, 1, 4)
     together = np.concatenate(rounds)

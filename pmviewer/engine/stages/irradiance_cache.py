@@ -87,7 +87,7 @@ def fill_cache(given: PassData, record: NDArray[np.void], pool: WorkPool) -> tup
     size = int(camera["width"]), int(camera["height"])
     for pixels in lattices(*size, int(camera["seed"]), int(camera["index"]), side):
         rows, made = np.empty((len(pixels), ROW), np.float32), np.empty(len(pixels), bool)
-        batch = min(most, -(-len(pixels) // (TASKS * pool.threads)))
+        batch = max(min(most, -(-len(pixels) // (TASKS * pool.threads))), 1)
         fill = partial(_filled, given._replace(cache=cache.record), pixels, rows, made)
         tasks = [partial(fill, first, min(first + batch, len(pixels))) for first in range(0, len(pixels), batch)]
         total += sum(pool.run(tasks), np.zeros(N_COUNTS, np.int64))
