@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
 import sys
 
 import imageio_ffmpeg
@@ -28,10 +30,14 @@ def pictures(count=5, height=33, width=50):
 def read(path):
     """(n, h, w, 3) and seconds."""
     if path.suffix == ".mp4":
-        frames = imageio_ffmpeg.read_frames(str(path))
-        about = next(frames)
-        width, height = about["size"]
-        return np.stack([np.frombuffer(f, np.uint8).reshape(height, width, 3) for f in frames]), about["duration"]
+        # Not by imageio_ffmpeg.read_frames, which leaves pipes of processes that have ended to the garbage collector.
+        command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+        done = subprocess.run(command, capture_output=True, check=True, timeout=60)
+        said = done.stderr.decode()
+        width, height = map(int, re.findall(r"Video: .*?, (\d+)x(\d+)[ ,]", said)[0])
+        hours, minutes, seconds = map(float, re.findall(r"Duration: (\d+):(\d+):([\d.]+)", said)[0])
+        pixels = np.frombuffer(done.stdout, np.uint8).reshape(-1, height, width, 3)
+        return pixels, 3600 * hours + 60 * minutes + seconds
     with Image.open(path) as film:
         shown = [(np.array(f.convert("RGB")), f.info["duration"]) for f in ImageSequence.Iterator(film)]
     return np.stack([pixels for pixels, _ in shown]), sum(duration for _, duration in shown) / 1000
