@@ -39,11 +39,11 @@ from pmviewer.photons.projection.projected import NO_PROJECTION
 from pmviewer.render.counts import N_COUNTS as N_EYE_COUNTS
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
-from pmviewer.render.filter_samples import OWN_COLUMNS, share_samples, weigh_samples
 from pmviewer.render.mirrored import mark_mirrors
 from pmviewer.render.moments import prepare_moments
 from pmviewer.render.path import path_pass
 from pmviewer.render.pixel_radius import first_radii
+from pmviewer.render.share import OWN_COLUMNS, share_samples, weigh_samples
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings
 from pmviewer.settings.needs import Facts

@@ -28,7 +28,7 @@ from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.counts import C_CUT, C_RAYS
 from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose, choose_by_power
 from pmviewer.render.direct.direct import direct_light, found_light, met_light, radiance_of
-from pmviewer.render.filter_samples import OWN_COLUMNS, place_of, seen_at, value_at
+from pmviewer.render.filter_samples import place_of, seen_at, sum_at, value_at
 from pmviewer.render.gather.cached import cached, surface_rays
 from pmviewer.render.gather.guide import AIM_WORDS, aim
 from pmviewer.render.given import Aim, GatherRays, Sampler, opened
@@ -50,6 +50,7 @@ from pmviewer.render.pixel import (
 )
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius, radii_of
 from pmviewer.render.reflect import reflected, unfound
+from pmviewer.render.share import OWN_COLUMNS
 from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import cast_on
 from pmviewer.render.virtual_lights.lit import note_object, virtual_light
@@ -80,11 +81,7 @@ def _taps(scene, eye, pixel, index):
     rays that took. index: of random numbers."""
     u, v, _, _ = draw4(eye.sequence, pixel.seed, index, OUTLINE)
     x, y, half, reach = place_of(eye, u), place_of(eye, v), _f4(0.5), eye.filter_reach
-    columns, rows = _f4(0.0), _f4(0.0)
-    for k in range(-reach, reach + 1):
-        columns += value_at(eye, _f4(k) + x - half)
-        rows += value_at(eye, _f4(k) + y - half)
-    share = _f4(1.0) / max(abs(columns * rows), _f4(1e-12))
+    share = _f4(1.0) / max(abs(sum_at(eye, x) * sum_at(eye, y)), _f4(1e-12))
     total, rays = BLACK, _i8(0)
     for j in range(-reach, reach + 1):
         row = value_at(eye, _f4(j) + y - half) * share
@@ -256,7 +253,7 @@ def eye_pass(given, marks, radii, film, counts, first, last):
     uint8 (pixels,), OUTLINED where emission gets camera rays of its own (`pmviewer.render.direct.outline`) and MIRRORED
     where there are several samples (`pmviewer.render.mirror_rays`), or (0,); radii: float32 (pixels, COLUMNS), look-up
     radii of the pixels (`pmviewer.render.pixel_radius`), or None; film: float64 (pixels, CHANNELS), see
-    `pmviewer.render.planes`, or with a filter the samples that pixels share (`pmviewer.render.filter_samples`); counts:
+    `pmviewer.render.planes`, or with a filter the samples that pixels share (`pmviewer.render.share`); counts:
     int64 (N_COUNTS,).
     """
     given = opened(given)

@@ -11,12 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.render.filter_samples import OWN_COLUMNS
 from pmviewer.render.moments import Moments
-from pmviewer.render.planes import CHANNELS, PLANES, TERMS
+from pmviewer.render.planes import CHANNELS, TERMS_END
+from pmviewer.render.share import OWN_COLUMNS
 from pmviewer.state import State
-
-_TERMS_END = PLANES[TERMS[-1]].stop
 
 
 @kernel
@@ -64,7 +62,7 @@ class Film:
     ) -> None:
         self.width, self.height, self.channels = width, height, channels
         self._columns = channels + further
-        terms = _TERMS_END + channels - CHANNELS if unshared else 0
+        terms = TERMS_END + channels - CHANNELS if unshared else 0
         self.sums: NDArray[np.float64] = np.zeros((width * height, self._columns + terms), np.float64)
         self.radii: NDArray[np.float32] | None = None
         self._samples: NDArray[np.float64] | None = None
@@ -94,14 +92,18 @@ class Film:
         if self.numbered is not None:
             part[:, self.numbered] = numbers
 
-    def samples_of(self, first: int, last: int) -> NDArray[np.float64]:
-        """(pixels, columns + OWN_COLUMNS) what the pixels sample in a pass by themselves, empty for pixels first …
-        last−1, before they share it (`pmviewer.render.filter_samples`)."""
+    @property
+    def own_samples(self) -> NDArray[np.float64]:
+        """(pixels, columns + OWN_COLUMNS) what the pixels sample in a pass by themselves, before they share it
+        (`pmviewer.render.share`): room that is made once, for one thread to ask first."""
         if self._samples is None:
             self._samples = np.zeros((len(self.sums), self._columns + OWN_COLUMNS))
-        self._samples[first:last, : self._columns] = self.blank[: self._columns]
-        self._samples[first:last, self._columns :] = 0.0
         return self._samples
+
+    def clear_own_samples(self, first: int, last: int) -> None:
+        """Those of pixels first … last−1, as before a pass."""
+        self.own_samples[first:last, : self._columns] = self.blank[: self._columns]
+        self.own_samples[first:last, self._columns :] = 0.0
 
     @contextmanager
     def one_addition(self, first: int, last: int) -> Iterator[None]:
@@ -188,5 +190,5 @@ class Film:
         terms = (self.sums[:, self._columns :] / max(self.passes, 1)).reshape(self.height, self.width, -1)
         self._as_sampled(terms)
         planes = self.planes()
-        planes[..., :_TERMS_END], planes[..., CHANNELS:] = terms[..., :_TERMS_END], terms[..., _TERMS_END:]
+        planes[..., :TERMS_END], planes[..., CHANNELS:] = terms[..., :TERMS_END], terms[..., TERMS_END:]
         return planes

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import device, kernel
-from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS, PLANES, TERMS
+from pmviewer.render.planes import CHANNELS, MEDIA_CHANNELS, TERMS_END
 from pmviewer.state import State
 
 EPSILON = 0.01
@@ -29,14 +29,13 @@ EPSILON = 0.01
 FEWEST = 2
 """Passes that tell something."""
 BYTES_PER_PIXEL = 3 * 3 * 8
-_TERMS_END = PLANES[TERMS[-1]].stop
 
 
 @device
 def _image_of(sums, pixel, channels, c):
     """Channel c of the image's sum."""
     total = 0.0
-    for column in range(c, _TERMS_END, 3):
+    for column in range(c, TERMS_END, 3):
         total += sums[pixel, column]
     if channels == MEDIA_CHANNELS:
         for column in range(CHANNELS + c, MEDIA_CHANNELS, 3):

@@ -18,6 +18,8 @@ PLANES: dict[str, slice] = {name: slice(3 * i, 3 * i + 3) for i, name in enumera
     "normal": slice(18, 21),
     "depth": slice(21, 22),
 }
+TERMS_END = PLANES[TERMS[-1]].stop
+"""Columns of the terms that all scenes have."""
 CHANNELS = 22
 VOLUME_TERMS = ("volume", "volume indirect")
 """Terms of scenes with participating media: light that media scatter once on its way from a light to the camera, and

@@ -40,6 +40,7 @@ NEAR = 0.3
 """How far from the error that was asked for the one reached may be."""
 MOST_PASSES = 3000
 LEAST_KNOWN = 0.1
+"""Of the noise of a reference: errors below that are not told by it."""
 CHOSEN = "; what a trial takes bias relative to, and how far it trusts it, was chosen with cornell_caustic too"
 """The denominator and SPREAD of `pmviewer.engine.auto.widths`, said in the target's own line."""
 CHOSEN_WAYS = (

@@ -22,12 +22,12 @@ from pmviewer.render.direct.outline import outline_pixels
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
 from pmviewer.render.filter import BOX, filter_of
-from pmviewer.render.filter_samples import share_samples, weigh_samples
 from pmviewer.render.gather.gather_points import POINT_COLUMNS, gather_points
 from pmviewer.render.given import PassData
 from pmviewer.render.mirror_rays import own_eye
 from pmviewer.render.mirrored import mirrored_pixels
 from pmviewer.render.path import path_pass
+from pmviewer.render.share import share_samples, weigh_samples
 from pmviewer.settings.access import Settings
 
 LEAST_TILE = 4
@@ -63,13 +63,14 @@ def render_into(film: Film, given: PassData, marks: NDArray[np.uint8], plan: Pla
     def sampled(parts: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
         counts, own = np.zeros(N_COUNTS, np.int64), own_eye(given)
         for first, last in parts:
-            traced(own, film.samples_of(first, last), counts, first, last)
+            film.clear_own_samples(first, last)
+            traced(own, samples, counts, first, last)
         return counts
 
     if not plan.filtered:
         return sum(pool.run([partial(alone, parts) for parts in _tiled(spans, tile)]), np.zeros(N_COUNTS, np.int64))
     around = film.spans(around=int(given.eye[0]["filter_reach"]))
-    film.samples_of(0, 0)  # before threads ask for it
+    samples = film.own_samples
     counts = sum(pool.run([partial(sampled, parts) for parts in _tiled(around, tile)]), np.zeros(N_COUNTS, np.int64))
     _share(film, given, marks, spans, pool)
     return counts
@@ -79,7 +80,6 @@ def _share(
     film: Film, given: PassData, marks: NDArray[np.uint8], spans: Sequence[tuple[int, int]], pool: WorkPool
 ) -> None:
     """Add what the pixels of the pass have sampled to the film, as its filter shares it."""
-    own = film.samples_of(0, 0)
     weights = np.empty((2, 2 * int(given.eye[0]["filter_reach"]) + 1), np.float32)
     weigh_samples(given.eye, weights)
     sizes = film.width, film.height, film.latest_alone
@@ -88,7 +88,7 @@ def _share(
     def shared(parts: Sequence[tuple[int, int]]) -> None:
         line = np.empty(film.sums.shape[1])
         for first, last in parts:
-            share_samples(weights, marks, own, film.sums, sizes, numbered, line, first, last)
+            share_samples(weights, marks, film.own_samples, film.sums, sizes, numbered, line, first, last)
             if film.moments is not None:
                 film.moments.add(film.sums, film.channels, first, last)
 
