@@ -78,7 +78,7 @@ def test_verdicts_are_kept_and_a_run_goes_on_from_them(tmp_path, monkeypatch):
     first = run(2)
     assert ran == [0, 1]
     assert first.targets[0].value == 1
-    path.open("a").write('{"seed": 7, "scene": 3, "verdi')
+    path.write_text(path.read_text() + '{"seed": 7, "scene": 3, "verdi')
     monkeypatch.setattr(results, "revision", lambda: "bbb-dirty")
     monkeypatch.setattr(results, "sources_stamp", lambda: "0123456789")
     whole = run(4)
@@ -168,7 +168,8 @@ def test_workers_end_with_a_bench_that_was_killed(tmp_path):
     script.write_text(ORPHAN)
     bench_process = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True)
     assert bench_process.stdout is not None
-    worker = int(bench_process.stdout.readline())
+    with bench_process.stdout as said:
+        worker = int(said.readline())
     bench_process.kill()
     bench_process.wait()
     for _ in range(100):

@@ -48,6 +48,16 @@ def test_a_process_without_an_answer_is_ended_and_started_again(server, do, kind
 
 
 @linux
+@pytest.mark.parametrize("do", ["wait", "die"])
+def test_an_error_that_is_kept_keeps_no_pipe_open(server, do):
+    before = len(os.listdir("/proc/self/fd"))
+    with pytest.raises(Ended) as kept:
+        server.ask({"do": do}, LIMITS)
+    assert len(os.listdir("/proc/self/fd")) == before
+    assert kept.traceback
+
+
+@linux
 def test_a_process_that_holds_too_much_is_replaced_between_requests(server):
     server.renew(0)
     before = server.ask({"do": "answer"}, LIMITS)["pid"]

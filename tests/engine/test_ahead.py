@@ -139,6 +139,7 @@ def test_a_helper_ends_with_its_parent_and_at_once_when_stopped():
     assert helper._process.poll() is None
     helper._process.stdin.close()
     assert helper._process.wait(PATIENCE) != 0  # nobody asked it for anything
+    helper.stop()
     helper = Helper()
     helper.stop()
     assert helper._process.poll() is not None

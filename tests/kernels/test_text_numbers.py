@@ -16,7 +16,7 @@ def read(text: str, n: int) -> np.ndarray:
     return out
 
 
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error", "default::ResourceWarning", "default::pytest.PytestUnraisableExceptionWarning")
 def test_numbers_as_they_are_written() -> None:
     words = ["0", "-0", "+1", "-.5", "5.", "1e3", "1E-3", "1e+22", "123456789012345", "0.1", "00012.50"]
     words += ["2.2250738585072014e-308", "1e308", "-1e400", "1e-400"]

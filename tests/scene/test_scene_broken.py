@@ -86,7 +86,7 @@ def test_every_broken_file_has_its_expectation() -> None:
 
 
 @pytest.mark.timeout(20)
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error", "default::ResourceWarning", "default::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("name", ERRORS)
 def test_broken_file_gives_one_clear_error(name: str) -> None:
     line, words = ERRORS[name]
@@ -98,7 +98,7 @@ def test_broken_file_gives_one_clear_error(name: str) -> None:
 
 
 @pytest.mark.timeout(20)
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error", "default::ResourceWarning", "default::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("name", OPENS)
 def test_odd_file_opens_and_says_so(name: str) -> None:
     words, dropped = OPENS[name]

@@ -146,7 +146,7 @@ def test_broken_textures_are_left_out_and_listed_once(tmp_path: Path) -> None:
         assert words in warning
 
 
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error", "default::ResourceWarning", "default::pytest.PytestUnraisableExceptionWarning")
 def test_every_cut_of_a_picture_opens_or_raises(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
     Image.fromarray(rng.integers(0, 255, (6, 6, 3), dtype=np.uint8)).save(tmp_path / "whole.png")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import subprocess
 import sys
@@ -62,9 +63,7 @@ class Mitsuba:
         except BrokenPipeError:
             line = ""
         if not line:
-            status = self._process.wait()
-            self._process = None
-            raise MitsubaError(f"Mitsuba 3 ended with status {status}.")
+            raise MitsubaError(f"Mitsuba 3 ended with status {self._end()}.")
         answer = json.loads(line)
         if "error" in answer:
             raise MitsubaError(f"Mitsuba 3: {answer['error']}")
@@ -73,7 +72,12 @@ class Mitsuba:
 
     def close(self) -> None:
         """End the process, if there is one."""
-        if self._process is not None and self._process.stdin is not None:
-            self._process.stdin.close()
-            self._process.wait()
-            self._process = None
+        if self._process is not None:
+            self._end()
+
+    def _end(self) -> int:
+        assert self._process is not None
+        process, self._process = self._process, None
+        with contextlib.suppress(BrokenPipeError), process:  # closes its pipes and waits for it
+            pass
+        return process.wait()

@@ -62,6 +62,7 @@ class Helper:
         self._process.kill()
         self._process.wait()
         self.wait()
+        self._close()
 
     def _talk(self, request: Request, on_change: Callable[[], None]) -> None:
         process = self._process
@@ -76,8 +77,12 @@ class Helper:
             self.progress = Progress(said["part"], said["of"], said["text"]) if "part" in said else None
             on_change()
         process.wait()
-        with contextlib.suppress(OSError):
-            process.stdin.close()
-        process.stdout.close()
+        self._close()
         self.progress = None
         on_change()
+
+    def _close(self) -> None:
+        for pipe in (self._process.stdin, self._process.stdout):
+            assert pipe is not None
+            with contextlib.suppress(OSError):  # what was not read any more
+                pipe.close()
