@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -52,6 +53,15 @@ def test_tests_translate_sources_once_where_no_bytecode_is_wanted_beside_them():
     assert launch.with_bytecode({"PYTHONDONTWRITEBYTECODE": "1"}) == kept
     own = {"PYTHONPYCACHEPREFIX": "elsewhere"}
     assert launch.with_bytecode({"PYTHONDONTWRITEBYTECODE": "1", **own}) == own
+
+
+def test_sources_are_translated_even_where_python_is_told_to_write_no_bytecode(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner" / "module.py").write_text("x = 1\n")
+    (tmp_path / "broken.py").write_text("x = \n")
+    launch.translate(Path(sys.executable), tmp_path)
+    assert [path.name.split(".")[0] for path in tmp_path.rglob("*.pyc")] == ["module"]
 
 
 def test_everything_else_opens_the_window(ran):

@@ -15,6 +15,7 @@ from pathlib import Path
 from pmviewer.bench.report import BenchResult, Target
 from pmviewer.bench.screen import probe, screen
 from pmviewer.errors import PmviewerError
+from pmviewer.launch import translate
 from pmviewer.resources import data_folder
 
 SCENE = "cornell_caustic"
@@ -22,12 +23,13 @@ PACKAGE = Path(__file__).resolve().parents[2]
 
 
 def run(quick: bool = False) -> BenchResult:
-    """Start the real window in processes of its own; a cold start gets an empty kernel cache. `quick` leaves out the
-    clicks, which take minutes to compile."""
+    """Start the real window in processes of its own; a cold start gets an empty kernel cache, and the bytecode that
+    `pmviewer.launch` has made of the sources. `quick` leaves out the clicks, which take minutes to compile."""
     rows: list[list[str | float | int]] = []
     warm_window, warm_image = [], []
     with screen() as environment, tempfile.TemporaryDirectory(prefix="pmviewer-bench-") as folder:
         environment["PMVIEWER_CACHE"] = str(Path(folder, "cache"))
+        translate(Path(sys.executable), PACKAGE)
         cold = _start(environment)
         rows.append(["cold", *cold])
         for _ in range(2 if quick else 5):
@@ -63,6 +65,7 @@ def _start(environment: dict[str, str], folder: Path | None = None) -> tuple[flo
 def _clone(folder: Path) -> Path:
     """A second checkout as Python sees one: the package with what it reads."""
     shutil.copytree(PACKAGE, folder / PACKAGE.name, ignore=shutil.ignore_patterns("__pycache__"))
+    translate(Path(sys.executable), folder / PACKAGE.name)
     (folder / "pyproject.toml").touch()  # marks a checkout
     shutil.copytree(data_folder("shaders"), folder / "shaders")
     shutil.copytree(data_folder("scenes") / SCENE, folder / "scenes" / SCENE)
