@@ -108,6 +108,8 @@ def test_where_uv_cannot_pip_installs(fails, monkeypatch, tmp_path):
         return SimpleNamespace(returncode=int(fails == "all" or fails == command[-1] or fails in command), stdout="")
 
     monkeypatch.setattr(installing.subprocess, "run", run)
+    translated = []
+    monkeypatch.setattr(launch, "translate", lambda python, package: translated.append(package.name))
     monkeypatch.setattr(launch, "ENVIRONMENT", tmp_path)
     if fails == "all":
         with pytest.raises(SystemExit, match="pip could not install"):
@@ -119,3 +121,4 @@ def test_where_uv_cannot_pip_installs(fails, monkeypatch, tmp_path):
     assert by_pip == (fails in ("uv", "--editable", "all"))
     assert len(ran) == {"": 3, "uv": 2, "config": 3, "--editable": 4, "all": 2}[fails]
     assert len(list(tmp_path.iterdir())) == (fails != "all")
+    assert translated == ["pmviewer"] * (fails != "all")
