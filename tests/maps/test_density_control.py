@@ -177,15 +177,17 @@ def on_many_surfaces(n, seed):
 
 def naive_guarded(photons, normals, required):
     """Which photons are stored by the step and guarded neighbours, one after another."""
-    wi, kept = unpack(photons, 1.0)["wi"].astype(f8), []
-    places = photons[:, :3].astype(f8)
+    wi, places = unpack(photons, 1.0)["wi"].astype(f8), photons[:, :3].astype(f8)
+    kept = np.zeros(len(photons), int)
+    n_kept, (at, onto, wanted) = 0, (np.empty_like(x) for x in (places, wi, required))
     for i, n in enumerate(normals):
-        off = places[kept] - places[i]
+        off = at[:n_kept] - places[i]
         counted = np.maximum((off**2).sum(axis=1), 25 * (off @ n) ** 2)
-        near = (counted < M / (np.pi * required[i])) & (wi[kept] @ n > 0) & (required[kept] <= 4 * required[i])
+        near = (counted < M / (np.pi * required[i])) & (onto[:n_kept] @ n > 0) & (wanted[:n_kept] <= 4 * required[i])
         if np.count_nonzero(near) < M:
-            kept.append(i)
-    return kept
+            kept[n_kept], at[n_kept], onto[n_kept], wanted[n_kept] = i, places[i], wi[i], required[i]
+            n_kept += 1
+    return kept[:n_kept]
 
 
 @pytest.fixture(scope="module")

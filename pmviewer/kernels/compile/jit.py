@@ -24,6 +24,7 @@ import numpy as np
 from numba import njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime import rtsys
 
 from pmviewer.kernels.compile import collector, elsewhere, library, quicker
 from pmviewer.kernels.compile.cache_folder import claim
@@ -178,7 +179,11 @@ class _KernelCache(FunctionCache):
         return loaded
 
     def _loaded(self, sig: Any, target_context: Any) -> Any:
-        loaded = super().load_overload(sig, target_context)
+        # Not numba's own, which first takes up all that a compiler needs, a fifth of a second: whoever compiles does.
+        rtsys.initialize(target_context)
+        loaded = None
+        with self._guard_against_spurious_io_errors():
+            loaded = self._load_overload(sig, target_context)
         if loaded is not None and isinstance(loaded.library, library.KernelLibrary):
             key = self._index_key(sig, target_context.codegen())
             loaded.library.read_again = functools.partial(self._bitcode, key)

@@ -120,6 +120,13 @@ class KernelCodegen(JITCPUCodegen):
     """Numba's, whose libraries are `KernelLibrary`."""
 
     _library_class = KernelLibrary
+    _described: tuple[Any, ...] | None = None
+
+    def magic_tuple(self) -> tuple[Any, ...]:
+        """What compiled code depends on, part of the name of each file: asked of LLVM once."""
+        if self._described is None:
+            self._described = super().magic_tuple()
+        return self._described
 
     def set_env(self, env_name: str, env: Any) -> None:
         """Give native code its constants; what is not native gets them as a part of what is."""
