@@ -57,6 +57,7 @@ def test_tests_translate_sources_once_where_no_bytecode_is_wanted_beside_them():
 
 def test_sources_are_translated_even_where_python_is_told_to_write_no_bytecode(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    monkeypatch.delenv("PYTHONPYCACHEPREFIX", raising=False)
     (tmp_path / "inner").mkdir()
     (tmp_path / "inner" / "module.py").write_text("x = 1\n")
     (tmp_path / "broken.py").write_text("x = \n")
