@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import replace
 
@@ -170,6 +171,18 @@ def test_a_plain_wall_is_plain_after_one_pass():
         assert image[:, 20:].max() < 1.001
 
 
+@functools.cache
+def variance_in_a_sphere(chosen):
+    """Of indirect light between seeds, the middle pixels' mean; each seed has a place of its own, of which weights
+    depend."""
+    scene, pictures = open_scene(closed_sphere(size=16)), []
+    for seed in range(400):
+        settings = settings_of(render={"method": "path", "filter": chosen, "seed": seed})
+        planes = rendered(scene, settings, 1).film.planes()
+        pictures.append(planes[4:-4, 4:-4, PLANES["indirect"]].astype(float))
+    return np.var(pictures, axis=0, ddof=1).mean()
+
+
 @pytest.mark.parametrize(("name", "share"), [("tent", 4 / 9), ("Gaussian", 1 / math.pi), ("Lanczos", None)])
 def test_pixels_share_their_noise(name, share):
     """Of what differs from pixel to pixel ∫f² is left: of tents (∫(1 − |x|)² dx)² = (2/3)², of a Gaussian 1/(4πσ²)."""
@@ -179,17 +192,7 @@ def test_pixels_share_their_noise(name, share):
         share = ((f / f.sum()) ** 2).sum() ** 2 / (fine[1] - fine[0]) ** 2
     assert noise_share(DEFAULTS[name]) == pytest.approx(share, rel=0.02)
 
-    scene = open_scene(closed_sphere(size=16))
-
-    def variance(chosen):
-        pictures = []
-        for seed in range(400):  # each has a place of its own, of which weights depend
-            settings = settings_of(render={"method": "path", "filter": chosen, "seed": seed})
-            planes = rendered(scene, settings, 1).film.planes()
-            pictures.append(planes[4:-4, 4:-4, PLANES["indirect"]].astype(float))
-        return np.var(pictures, axis=0, ddof=1).mean()
-
-    found = variance(name) / variance("box")
+    found = variance_in_a_sphere(name) / variance_in_a_sphere("box")
     print(f"{name}: {found:.3f} of the variance is left, ∫f² = {share:.3f}")
     assert found == pytest.approx(share, rel=0.08)
 

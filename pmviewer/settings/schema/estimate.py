@@ -239,10 +239,11 @@ class Estimate(Group):
     )
     filter: Literal["constant", "cone", "gaussian", "simpson", "epanechnikov"] = setting(
         "constant",
-        "Kernel that weighs photons by their distance.",
+        "Kernel that weighs photons by their distance (the papers' filter).",
         section="Kernel and area",
         stage="image",
         scale="choice",
+        title="kernel",
         needs=(DISC,),
     )
     cone_k: float = setting(

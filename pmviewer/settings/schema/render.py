@@ -126,6 +126,7 @@ class Render(Group):
         "Automatic: the scene file's, or box.",
         stage="image",
         scale="choice",
+        title="pixel filter",
     )
     filter_radius: float | Auto = setting(
         "auto",
