@@ -63,3 +63,11 @@ def as_pip_is_set(listed: str) -> tuple[list[str], dict[str, str]]:
 def install_with_pip(python: Path, target: str, root: Path) -> bool:
     """Whether pip could; it says itself what is wrong."""
     return subprocess.run([str(python), *PIP, "-e", target], check=False, cwd=root).returncode == 0
+
+
+def to_bytecode(python: Path, package: Path) -> None:
+    """Sources to bytecode, as an installation does that is not editable: three processes work at the first start, and
+    each would translate all that it imports. Where nothing can be written they do."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    command = [str(python), "-m", "compileall", "-q", "-j", "0", str(package)]
+    subprocess.run(command, check=False, env=environment, capture_output=True)

@@ -17,7 +17,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from pmviewer.installing import install_with_pip, install_with_uv
+from pmviewer.installing import install_with_pip, install_with_uv, to_bytecode
 
 ROOT = Path(__file__).resolve().parent.parent
 MOST_PROCESSES = 4
@@ -101,16 +101,8 @@ def install(python: Path, extras: str) -> None:
     target = f"{ROOT}[{extras}]" if extras else str(ROOT)
     if not install_with_uv(python, target, ROOT, translate=not extras) and not install_with_pip(python, target, ROOT):
         sys.exit("pip could not install pmviewer: see its message above.")
-    translate(python, ROOT / "pmviewer")
+    to_bytecode(python, ROOT / "pmviewer")
     stamp.write_text(wanted)
-
-
-def translate(python: Path, package: Path) -> None:
-    """Sources to bytecode, as an installation does that is not editable: three processes work at the first start, and
-    each would translate all that it imports. Where nothing can be written they do."""
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-    command = [str(python), "-m", "compileall", "-q", "-j", "0", str(package)]
-    subprocess.run(command, check=False, cwd=ROOT, env=environment, capture_output=True)
 
 
 def side_by_side(options: list[str]) -> list[str]:

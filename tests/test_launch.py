@@ -61,7 +61,7 @@ def test_sources_are_translated_even_where_python_is_told_to_write_no_bytecode(t
     (tmp_path / "inner").mkdir()
     (tmp_path / "inner" / "module.py").write_text("x = 1\n")
     (tmp_path / "broken.py").write_text("x = \n")
-    launch.translate(Path(sys.executable), tmp_path)
+    installing.to_bytecode(Path(sys.executable), tmp_path)
     assert [path.name.split(".")[0] for path in tmp_path.rglob("*.pyc")] == ["module"]
 
 
@@ -110,7 +110,7 @@ def test_where_uv_cannot_pip_installs(fails, monkeypatch, tmp_path):
 
     monkeypatch.setattr(installing.subprocess, "run", run)
     translated = []
-    monkeypatch.setattr(launch, "translate", lambda python, package: translated.append(package.name))
+    monkeypatch.setattr(launch, "to_bytecode", lambda python, package: translated.append(package.name))
     monkeypatch.setattr(launch, "ENVIRONMENT", tmp_path)
     if fails == "all":
         with pytest.raises(SystemExit, match="pip could not install"):

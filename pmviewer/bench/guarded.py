@@ -133,11 +133,8 @@ class Guarded:
         for reader in self._readers:
             reader.join(5)
         # Whoever keeps an error of this process keeps, by its traceback, the pipes.
-        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
-            assert pipe is not None
-            with contextlib.suppress(OSError):  # what was not read any more
-                pipe.close()
-        self._process = None
+        with contextlib.suppress(OSError), self._process:  # closes them, whatever was not read any more
+            self._process = None
         return status
 
     def renew(self, above: int) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pmviewer.kernels.meshes.text import numbers
+from tests.support.marks import warnings_are_errors
 
 
 def read(text: str, n: int) -> np.ndarray:
@@ -16,7 +17,7 @@ def read(text: str, n: int) -> np.ndarray:
     return out
 
 
-@pytest.mark.filterwarnings("error", "default::ResourceWarning", "default::pytest.PytestUnraisableExceptionWarning")
+@warnings_are_errors
 def test_numbers_as_they_are_written() -> None:
     words = ["0", "-0", "+1", "-.5", "5.", "1e3", "1E-3", "1e+22", "123456789012345", "0.1", "00012.50"]
     words += ["2.2250738585072014e-308", "1e308", "-1e400", "1e-400"]

@@ -9,6 +9,7 @@ import pytest
 from pmviewer.errors import SceneError
 from pmviewer.scene.load import load_scene
 from tests.scene.helpers import CAMERA, SKY, xml_file
+from tests.support.marks import warnings_are_errors
 
 BROKEN = Path(__file__).resolve().parent.parent / "broken"
 
@@ -86,7 +87,7 @@ def test_every_broken_file_has_its_expectation() -> None:
 
 
 @pytest.mark.timeout(20)
-@pytest.mark.filterwarnings("error", "default::ResourceWarning", "default::pytest.PytestUnraisableExceptionWarning")
+@warnings_are_errors
 @pytest.mark.parametrize("name", ERRORS)
 def test_broken_file_gives_one_clear_error(name: str) -> None:
     line, words = ERRORS[name]
@@ -98,7 +99,7 @@ def test_broken_file_gives_one_clear_error(name: str) -> None:
 
 
 @pytest.mark.timeout(20)
-@pytest.mark.filterwarnings("error", "default::ResourceWarning", "default::pytest.PytestUnraisableExceptionWarning")
+@warnings_are_errors
 @pytest.mark.parametrize("name", OPENS)
 def test_odd_file_opens_and_says_so(name: str) -> None:
     words, dropped = OPENS[name]

@@ -17,6 +17,7 @@ from pmviewer.scene.formats.texture_file import linear, read_picture
 from pmviewer.scene.load import load_scene
 from pmviewer.scene.texture import Bitmap, Checkerboard, evaluate
 from tests.scene.helpers import load
+from tests.support.marks import warnings_are_errors
 
 RED = ((188 / 255 + 0.055) / 1.055) ** 2.4
 
@@ -146,7 +147,7 @@ def test_broken_textures_are_left_out_and_listed_once(tmp_path: Path) -> None:
         assert words in warning
 
 
-@pytest.mark.filterwarnings("error", "default::ResourceWarning", "default::pytest.PytestUnraisableExceptionWarning")
+@warnings_are_errors
 def test_every_cut_of_a_picture_opens_or_raises(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
     Image.fromarray(rng.integers(0, 255, (6, 6, 3), dtype=np.uint8)).save(tmp_path / "whole.png")

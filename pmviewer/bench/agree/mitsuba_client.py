@@ -78,6 +78,6 @@ class Mitsuba:
     def _end(self) -> int:
         assert self._process is not None
         process, self._process = self._process, None
-        with contextlib.suppress(BrokenPipeError), process:  # closes its pipes and waits for it
+        with contextlib.suppress(OSError), process:  # closes its pipes, whatever was not read any more, and waits
             pass
         return process.wait()

@@ -76,13 +76,10 @@ class Helper:
             self.finished = self.finished or "done" in said
             self.progress = Progress(said["part"], said["of"], said["text"]) if "part" in said else None
             on_change()
-        process.wait()
         self._close()
         self.progress = None
         on_change()
 
     def _close(self) -> None:
-        for pipe in (self._process.stdin, self._process.stdout):
-            assert pipe is not None
-            with contextlib.suppress(OSError):  # what was not read any more
-                pipe.close()
+        with contextlib.suppress(OSError), self._process:  # closes its pipes, whatever was not read any more
+            pass
