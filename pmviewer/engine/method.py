@@ -9,6 +9,7 @@ from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, THIN, in_media
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
 from pmviewer.render.camera import are_hidden
+from pmviewer.render.direct.choice import LISTED
 from pmviewer.render.direct.samples import samples_at_surface
 from pmviewer.render.filter import BOX, filter_of
 from pmviewer.scene.analysis import SceneTraits
@@ -120,6 +121,11 @@ class Plan:
         return bool(self.caustic_classes or self.global_classes or self.volume)
 
     @property
+    def asks_photons(self) -> bool:
+        """Whether photons tell which lights to sample."""
+        return self.choice in ("photons", "Keller-Wald")
+
+    @property
     def judges(self) -> bool:
         """Whether a rule decides which photons are stored."""
         return self.deposition != "all" or self.emission not in ("off", "Peter-Pietrek")
@@ -143,7 +149,7 @@ class Plan:
             "global map": self.global_classes,
             "volume map": self.volume,
             "direct light": self.direct,
-            "light choice by photons": self.choice != "power",
+            "light choice by photons": self.asks_photons,
             "final gather": self.gather,
             "irradiance cache": self.cache,
             "gather estimation": self.estimation,
@@ -325,7 +331,9 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
     skipped: list[tuple[str, str]] = []
     if method == "path":
         warnings = (UNFOUND_BY_PATHS,) if traits.has_delta_lights and traits.has_delta else ()
-        return Plan(path=True, skipped=(("light pass", "the path tracer uses no photons"),), warnings=warnings)
+        skipped.append(("light pass", "the path tracer uses no photons"))
+        choice = _light_choice(settings, traits, asks=False)[0]
+        return Plan(path=True, choice=choice, skipped=tuple(skipped), warnings=warnings)
     thin = thin_rules(settings, traits)
     if thin and "exact" not in thin and REFLECTING not in thin and not traits.follows_beside_thin(glossy):
         caustics = 0
@@ -351,7 +359,7 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
             skipped.append(("direct light", "all surfaces are smooth mirrors or glass"))
         return Plan(followed_direct=rough, unfound=unfound, skipped=tuple(skipped))
     choice, why = _light_choice(settings, traits)
-    if choice == "power":
+    if why:
         skipped.append(("light choice by photons", why))
     how = _terms(settings)
     shadows = settings.direct.shadow_photons and traits.n_lights > 0 and not thin
@@ -416,7 +424,7 @@ def _virtual_plan(shown: Plan, diffuse: int, caustics: int, skipped: list[tuple[
     """With virtual lights, which can't shine over mirrors: where the caustic map leaves out caustics after a diffuse
     bounce, the global map shows them. `diffuse` are the path classes that are no caustics."""
     mirrored = diffuse & 1 << INDIRECT_CAUSTIC if caustics else 0
-    chooses = 1 << DIRECT if shown.choice != "power" else 0
+    chooses = 1 << DIRECT if shown.asks_photons else 0
     classes = mirrored | shown.direct_mask | shown.global_caustics | chooses
     skipped.append(("final gather", "virtual lights bring the indirect light"))
     if not classes:
@@ -468,12 +476,15 @@ def estimator_of(settings: Settings) -> Estimator:
     return "differential" if settings.estimate.differential else "disc"
 
 
-def _light_choice(settings: Settings, traits: SceneTraits) -> tuple[str, str]:
-    """How lights are chosen, and why photons don't choose where that is by power."""
-    wanted = settings.direct.choice
-    if traits.n_lights <= 1:
+def _light_choice(settings: Settings, traits: SceneTraits, asks: bool = True) -> tuple[str, str]:
+    """How lights are chosen, and why photons don't choose, "" where they do. `asks`: whether there are some to ask."""
+    wanted, n = settings.direct.choice, traits.n_lights
+    if n <= 1:
         return "power", "there is one light"
+    without = "distance" if n <= LISTED else "power"
     if wanted == "auto":
-        few = f"only {traits.n_lights} lights (direct.choice = photons asks for it)"
-        return ("photons", "") if traits.n_lights >= MANY_LIGHTS else ("power", few)
-    return wanted, "direct.choice = power"
+        few = f"only {n} lights (direct.choice = photons asks for it)"
+        return ("photons", "") if asks and n >= MANY_LIGHTS else (without, few)
+    if wanted in ("photons", "Keller-Wald"):
+        return (wanted, "") if asks else (without, "there are none")
+    return ("power" if wanted == "power" else without), f"direct.choice = {wanted}"

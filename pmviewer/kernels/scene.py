@@ -24,6 +24,7 @@ _FIELDS = [
     ("materials", "i8"),  # float32 (n_materials, MATERIAL_COLUMNS)
     ("lights", "i8"),  # float32 (n_lights, LIGHT_COLUMNS)
     ("light_cdf", "i8"),  # float32 (n_lights + 1): distribution over power
+    ("light_places", "i8"),  # float32 (n_lights, PLACE_COLUMNS): where lights are
     ("light_triangles", "i8"),  # int32: triangles of mesh lights
     ("light_triangle_cdf", "i8"),  # float32, per mesh light: cumulative area up to and including the triangle
     ("n_lights", "i8"),
@@ -199,6 +200,10 @@ L_CUTOFF, L_BEAM = _columns[[10, 11]]
 third is −L_B × L_C; L_RADIUS and L_LENGTH half the picture's width and height on the plane at distance 1, L_AREA the
 luminance of the power, L_FIRST its row of `projectors`."""
 PROJECTOR_COLUMNS = 3
+PLACE_COLUMNS = 5
+P_RADIUS, P_AREA = _columns[[3, 4]]
+"""Of a light's place: centre and radius of a ball around it, the radius negative where light comes from all around or
+from far away, and the area that rays may meet, 0 where none can, infinite of an environment."""
 
 BITMAP, CHECKERBOARD = 0, 1
 REPEAT, MIRROR, CLAMP = 0, 1, 2

@@ -18,7 +18,6 @@ from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import BSDF, CHAIN_LIGHT, LIGHT, OUTLINE
-from pmviewer.kernels.lights.reach import samples_suffice
 from pmviewer.kernels.memory import row_of, stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import add, largest, mul, scale
@@ -26,7 +25,7 @@ from pmviewer.maps.record import CAUSTIC as CAUSTIC_CLASS
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.counts import C_CUT, C_RAYS
-from pmviewer.render.direct.choice import BY_POWER, LIST_WORDS, choose, choose_by_power
+from pmviewer.render.direct.choice import LIST_WORDS, choose, choose_anywhere, choose_by_power, samples_do
 from pmviewer.render.direct.direct import direct_light, found_light, met_light, radiance_of
 from pmviewer.render.filter_samples import place_of, seen_at, sum_at, value_at
 from pmviewer.render.gather.cached import cached, surface_rays
@@ -168,15 +167,15 @@ def _from_maps(given, si, beta, pixel, whole):
 
 
 @device
-def _light_rays(given, si, gather, aimed):
+def _light_rays(given, si, choice, gather, aimed):
     """How many rays by the BSDF of a surface look for lights: those that gather unless photons guide them, else one, or
-    none where light samples suffice."""
+    none where light samples by that choice suffice."""
     eye = given.eye
     if eye.mis == 0:
         return _i8(0)
     if gather > 0:
         return max(gather - aimed.rays, _i8(1))
-    if eye.choice == BY_POWER and is_lambertian(si.bsdf) and samples_suffice(given.scene, eye.light_samples, si.p):
+    if is_lambertian(si.bsdf) and samples_do(given.scene, eye, choice, si.p):
         return _i8(0)
     return _i8(1)
 
@@ -190,10 +189,11 @@ def _stored(given, si, beta, pixel, scratch, whole):
     aimed = Aim(scratch[1], _i8(0), _i8(0))
     if gather > 0:
         aimed = aim(given, si, pixel.seed, scratch[1])
-    n_bsdf = _light_rays(given, si, gather, aimed)
     choice = choose_by_power(scratch[0], eye.light_samples)
     if eye.direct != 0:
         choice = choose(given.scene, eye, given.choice_map, si.p, si.ng, scratch[0])
+    n_bsdf = _light_rays(given, si, choice, gather, aimed)
+    if eye.direct != 0:
         sampler = Sampler(eye.sequence, pixel.seed, eye.index, LIGHT)
         L = direct_light(given.scene, given.shadows, si, STORED, choice, n_bsdf, sampler, pixel.counts)
         deposit(pixel, DIRECT if whole else SPECULAR, mul(beta, L))
@@ -229,7 +229,7 @@ def _followed(given, si, beta, pixel, depth, choice, lights):
             count_found(pixel, OF_CAUSTIC, given.caustic_map, eye, r, si, _CAUSTICS)
         deposit(pixel, SPECULAR, mul(beta, L))
     if eye.followed_direct != 0:
-        choice = choose_by_power(lights, eye.light_samples)
+        choice = choose_anywhere(given.scene, eye, si.p, lights)
         sampler = Sampler(eye.sequence, pixel.seed, eye.index, CHAIN_LIGHT + depth)
         L = direct_light(given.scene, given.shadows, si, FOLLOWED, choice, _i8(eye.mis), sampler, pixel.counts)
         deposit(pixel, SPECULAR, mul(beta, L))

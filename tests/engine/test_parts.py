@@ -165,13 +165,21 @@ def test_photons_choose_among_many_lights(method):
 
     def choice(traits, wanted, method=method):
         chosen = plan_of(settings_of(render={"method": method}, direct={"choice": wanted}), traits)
-        assert ("light choice by photons" in dict(chosen.skipped)) == (chosen.direct and chosen.choice == "power")
+        assert ("light choice by photons" in dict(chosen.skipped)) == (chosen.direct and not chosen.asks_photons)
         return chosen.choice
 
-    assert [choice(traits, "auto") for traits in (one, few, many)] == ["power", "power", "photons"]
+    assert [choice(traits, "auto") for traits in (one, few, many)] == ["power", "distance", "photons"]
+    crowd = replace(one, n_lights=1000)
+    assert [choice(traits, "distance") for traits in (one, few, many, crowd)] == [
+        "power",
+        "distance",
+        "distance",
+        "power",
+    ]
     for rule in ("power", "photons", "Keller-Wald"):
         assert [choice(traits, rule) for traits in (one, few, many)] == ["power", rule, rule]
-        assert choice(many, rule, "path") == "power"
+        assert choice(many, rule, "path") == ("power" if rule == "power" else "distance")
+        assert choice(crowd, rule, "path") == "power"
         assert choice(many, rule, "global map") == "power"
 
 
@@ -189,7 +197,7 @@ def test_settings_of_the_light_choice_say_when_they_do_nothing():
     assert active(many) == ["samples", "choice", "choice_radius", "biased"]
     assert active(many, choice="Keller-Wald") == list(names[1:])
     assert active(many, choice="Keller-Wald", biased=True) == ["choice", "choice_radius", "con_samples", "biased"]
-    assert active(many, "path") == ["samples"]
+    assert active(many, "path") == ["samples", "choice"]
     assert active(many, "global map") == []
 
 

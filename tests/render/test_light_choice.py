@@ -1,6 +1,8 @@
-"""Choosing among many lights by photons (R2): unbiased whatever the photons say, and each rule as it is defined."""
+"""Choosing among lights, by distance and by photons (R2): unbiased whatever they say, and each rule as defined."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
@@ -16,29 +18,45 @@ from pmviewer.maps.radius import neighbourhood
 from pmviewer.maps.search.grid import build_grid
 from pmviewer.output.metric import z_test
 from pmviewer.render.direct.choice import (
+    BY_DISTANCE,
     BY_PHOTONS,
     CHOICES,
     DEFENSIVE,
+    DEFENSIVE_FAR,
     KELLER_WALD,
     LIST_WORDS,
     LISTED,
     MOST_CANDIDATES,
-    choose_near,
     chosen_light,
     expected_samples,
 )
+from pmviewer.render.direct.choice import (
+    choose as chosen_at,
+)
 from pmviewer.render.direct.samples import SAMPLES
 from pmviewer.render.eye import DIRECT
+from pmviewer.render.planes import beauty_of
 from pmviewer.render.record import EYE_DTYPE
 from pmviewer.scene.arrays.flatten import flatten
-from pmviewer.scene.description import Camera, Parallelogram, PointLight, Scene, Shape, Sphere
+from pmviewer.scene.description import (
+    Camera,
+    ConstantEnvironment,
+    DirectionalLight,
+    Parallelogram,
+    PointLight,
+    Scene,
+    Shape,
+    Sphere,
+)
 from pmviewer.settings.access import SETTINGS
+from pmviewer.settings.schema.direct import MOST_BY_DISTANCE
 from tests.support.naive_maps import pack
 from tests.support.scenes import box_walls, diffuse, rendered, settings_of
 
 SIZE, SEEDS = 16, 24
 N_LIGHTS = 8
 RULES = {
+    "distance": {"choice": "distance"},
     "photons": {"choice": "photons"},
     "photons, small radius": {"choice": "photons", "choice_radius": 0.02, "samples": 3},
     "Keller-Wald, few samples": {"choice": "Keller-Wald", "con_samples": 1, "noncon_samples": 1},
@@ -106,8 +124,8 @@ def test_every_rule_has_the_expectation_of_sampling_by_power(rule, mis, rooms, b
     assert mean.mean() == pytest.approx(by_power[0].mean(), rel=0.05)
 
 
-@pytest.mark.parametrize("rule", ["photons", "Keller-Wald, few samples"])
-def test_fewer_samples_by_photons_are_less_noisy(rule, rooms):
+@pytest.mark.parametrize("rule", ["distance", "photons", "Keller-Wald, few samples"])
+def test_fewer_samples_by_nearness_are_less_noisy(rule, rooms):
     rules = ({"samples": SAMPLES, **RULES[rule]}, {"samples": SAMPLES, "choice": "power"})
     noise = [direct_light(rooms, "progressive", **direct)[1].mean() for direct in rules]
     print(f"{rule}: variance {noise[0]:.2e}, by power {noise[1]:.2e}")
@@ -166,7 +184,7 @@ def _choose(scenes, eyes, grids, u, m, light, light_m):
     """m: float32 (lights,); light, light_m: (samples, len(u)). Returns known lights and samples."""
     scene, eye = scenes[0], eyes[0]
     zero, one = np.float32(0.0), np.float32(1.0)
-    choice = choose_near(scene, eye, grids[0], (zero, zero, zero), (zero, one, zero), stack_i4(LIST_WORDS))
+    choice = chosen_at(scene, eye, grids[0], (zero, zero, zero), (zero, one, zero), stack_i4(LIST_WORDS))
     for i in range(len(m)):
         m[i] = expected_samples(scene, choice, np.int64(i))
     for s in range(choice[4]):
@@ -189,31 +207,57 @@ def choose(powers, photons, rule, samples=1, con=1, non=1, biased=False, radius=
 
     `photons` are the lights of photons that lie around the origin, facing up.
     """
-    flat = lights_scene(powers)
-    eye = np.zeros(1, EYE_DTYPE)
-    for name, value in {
+    values = {
         "choice": rule,
         "light_samples": samples,
         "con_samples": con,
         "noncon_samples": non,
         "biased": biased,
         "choice_radius": radius,
-    }.items():
-        eye[name] = value
+    }
     photons = np.asarray(photons, int)
     random = np.random.default_rng(3)
     place = np.zeros((len(photons), 3))
     place[:, ::2] = random.uniform(-0.2, 0.2, (len(photons), 2))
     record = pack(place.astype(np.float32), (0.0, 1.0, 0.0), light=photons) if len(photons) else np.empty((0, 6), "f4")
-    grid = build_grid(record, radius)
+    return _chosen(lights_scene(powers), values, record, radius)
+
+
+def _chosen(flat, values, record, radius):
+    """The same of whatever lights, by these values of the eye record and packed photons."""
+    eye = np.zeros(1, EYE_DTYPE)
+    for name, value in values.items():
+        eye[name] = value
+    grid, n = build_grid(record, radius), len(flat.light_power)
     u = (np.arange(4096, dtype=np.float32) + np.float32(0.5)) / np.float32(4096)
-    m = np.zeros(len(powers), np.float32)
+    m = np.zeros(n, np.float32)
     light = np.full((80, len(u)), -1, np.int64)
     light_m = np.zeros((80, len(u)), np.float32)
     known, total = _choose(flat.record, eye, grid.record, u, m, light, light_m)
-    drawn = np.bincount(light[:total].ravel(), minlength=len(powers)) / len(u)
+    drawn = np.bincount(light[:total].ravel(), minlength=n) / len(u)
     assert np.all((light_m[:total] == m[light[:total]]) | (light_m[:total] == 0))
     return m, known, drawn
+
+
+def test_paths_have_the_same_light_by_either_rule_and_less_noise_by_distance(rooms):
+    """In all terms: the rule is used at each of a path's surfaces, and by the weights of lights that it meets."""
+    pool = WorkPool(1)
+
+    def images(choice, first):
+        for seed in range(first, first + 40):
+            settings = settings_of(render={"method": "path", "seed": seed}, direct={"choice": choice})
+            renderer = Renderer(rooms, settings, pool, StageStore(0))
+            renderer.step()
+            yield beauty_of(renderer.film.planes()).astype(float)
+
+    near, power = (np.array(list(images(*how))) for how in (("distance", 1), ("power", 100)))
+    pool.close()
+    moments = [moment for of in (near, power) for moment in (of.mean(0), of.var(0, ddof=1) / len(of))]
+    outcome = z_test(*moments, block=4)
+    print(f"{outcome}; variance {near.var(0).mean():.3g}, by power {power.var(0).mean():.3g}")
+    assert outcome.passes()
+    assert near.mean() == pytest.approx(power.mean(), rel=0.05)
+    assert near.var(0).mean() < 0.85 * power.var(0).mean()
 
 
 POWERS = np.array([1.0, 2.0, 4.0, 1.0, 8.0])
@@ -229,6 +273,40 @@ def test_photons_share_the_samples_but_for_a_defensive_part():
     assert drawn == pytest.approx(m, abs=2e-3)
     m, _, drawn = choose(POWERS, NEAR, BY_PHOTONS, samples=2, biased=True)
     assert m == pytest.approx(2 * photons)
+    assert drawn == pytest.approx(m, abs=2e-3)
+
+
+def test_distances_share_the_samples_but_for_a_defensive_part():
+    """Lights of one power, at heights 1 and 3 above the point and a lamp that it lies in, whose size counts."""
+    floor = Shape("floor", Parallelogram((-1, 0, -1), (0, 0, 2), (2, 0, 0)), 0)
+
+    def square(height, side):
+        corner = (-side / 2, height, -side / 2)
+        return Shape("light", Parallelogram(corner, (side, 0, 0), (0, 0, side)), 0, (1 / side**2,) * 3)
+
+    lights = (square(1.0, 0.1), square(3.0, 0.1), square(0.0, 2 * math.sqrt(2)))
+    camera = Camera((0, 3, 0), (0, 0, 0), (0, 0, 1), 40.0, near=0.0, far=np.inf)
+    flat = flatten(Scene("lights", None, (floor, *lights), (diffuse(),), (), camera, 8, 8))
+    near = np.array([1.0, 1 / 9, 1 / 4])  # a square's ball has half of its diagonal
+    expected = 3 * ((1 - DEFENSIVE_FAR) * near / near.sum() + DEFENSIVE_FAR / 3)
+    m, known, drawn = _chosen(flat, {"choice": BY_DISTANCE, "light_samples": 3}, np.empty((0, 6), "f4"), 0.5)
+    assert known == 3
+    assert m == pytest.approx(expected, rel=1e-4)
+    assert drawn == pytest.approx(m, abs=2e-3)
+
+
+def test_sun_and_sky_count_as_from_the_scene_s_radius():
+    floor = Shape("floor", Parallelogram((-1, 0, -1), (0, 0, 2), (2, 0, 0)), 0)
+    radius = math.sqrt(2)
+    sky, point = ConstantEnvironment("sky", (1.0,) * 3), PointLight("point", (0, 0.5, 0), (1.0,) * 3)
+    sun = DirectionalLight("sun", (0, -1, 0), (1.0,) * 3)
+    camera = Camera((0, 3, 0), (0, 0, 0), (0, 0, 1), 40.0, near=0.0, far=np.inf)
+    flat = flatten(Scene("lights", None, (floor,), (diffuse(),), (sky, point, sun), camera, 8, 8))
+    power = np.array([4 * math.pi**2 * radius**2, 4 * math.pi, math.pi * radius**2])
+    near = power / [radius**2, 0.5**2, radius**2]
+    expected = (1 - DEFENSIVE_FAR) * near / near.sum() + DEFENSIVE_FAR * power / power.sum()
+    m, _, drawn = _chosen(flat, {"choice": BY_DISTANCE, "light_samples": 1}, np.empty((0, 6), "f4"), 0.5)
+    assert m == pytest.approx(expected, rel=1e-4)
     assert drawn == pytest.approx(m, abs=2e-3)
 
 
@@ -306,6 +384,7 @@ def test_a_scene_without_light_is_refused():
 
 def test_rules_are_those_of_the_setting():
     assert SETTINGS["direct.choice"].choices == ("auto", *CHOICES)
+    assert MOST_BY_DISTANCE == LISTED
 
 
 def test_neighbourhood_holds_about_as_many_photons_as_wanted():

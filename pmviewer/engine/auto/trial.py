@@ -255,7 +255,7 @@ def _sampled(measured: Measured, source: _Tried, mean: F8, scale: float) -> Meas
     usual, many = source.runs[-1], source.direct[0]
     direct = max(variance(usual.images, mean) - variance(many.images, mean), 0.0) / (1 - 1 / MORE)
     spent = max(many.stages["camera pass"] - usual.stages["camera pass"], 0.0) * scale / (MORE - 1)
-    complement = BY_POWER if source.plan.choice == "power" else BY_PHOTONS
+    complement = BY_PHOTONS if source.plan.asks_photons else BY_POWER
     costs = replace(measured.costs, sampled=spent)
     return replace(measured, direct=min(direct, MOST_DIRECT * measured.eye), complement=complement, costs=costs)
 

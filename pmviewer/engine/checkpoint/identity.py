@@ -25,7 +25,7 @@ PARTS = {
     "materials": ("materials", "prim_material", "bsdf_tables", "glasses", "spectrum"),
     "textures": ("textures", "texel_starts", "texels"),
     "lights": (
-        *("lights", "light_cdf", "light_triangles", "light_triangle_cdf", "prim_light", "light_power"),
+        *("lights", "light_cdf", "light_places", "light_triangles", "light_triangle_cdf", "prim_light", "light_power"),
         *("light_textures", "light_frames", "light_tables", "sky_texels", "sky_rows", "sky_cells"),
         *("projectors", "projector_numbers"),
     ),

@@ -132,7 +132,7 @@ def rules_of(
 
 def sampled_classes(plan: Plan) -> int:
     """Path classes (bit set) whose photons somebody counts as they arrive."""
-    return (1 << DIRECT if plan.choice != "power" or plan.caustic_classes else 0) | plan.guide_mask
+    return (1 << DIRECT if plan.asks_photons or plan.caustic_classes else 0) | plan.guide_mask
 
 
 def constant_density(settings: Settings, radius: float) -> float:

@@ -47,7 +47,7 @@ class LightStage:
         these photons first."""
         if self.latest is not None or self.settings.photons.renew == "once":
             return False
-        guides, chooser = self.plan.guided_rays > 0, self.plan.choice != "power"
+        guides, chooser = self.plan.guided_rays > 0, self.plan.asks_photons
         carried = self.taken_over
         return self.plan.photons and ((guides and carried.guides is None) or (chooser and carried.chooser is None))
 

@@ -215,14 +215,14 @@ class MapBuilder:
         return self._kept(light, ("guides", traced.key, self.plan.guide_mask, asked, radius), build, _bytes)
 
     def _kept_chooser(self, light: LightPlan, traced: TracedPass, radius: float | None) -> PhotonGrid | None:
-        if self.plan.choice == "power":
+        if not self.plan.asks_photons:
             return None
         make = partial(_in_turn, partial(self._chooser, light, traced, radius))
         return self._kept(light, ("light choice", traced.key, self.settings.direct.choice_radius, radius), make, _bytes)
 
     def _chooser(self, light: LightPlan, traced: TracedPass, radius: float | None) -> Steps[PhotonGrid | None]:
         """The pass's direct photons that choose lights, None where they don't. A small radius would miss lights."""
-        if self.plan.choice == "power":
+        if not self.plan.asks_photons:
             return None
         photons, scene_radius = traced.photons, self.scene.flat.radius
         primary = yield from one_step(lambda: _direct(photons))

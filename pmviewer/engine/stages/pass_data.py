@@ -74,7 +74,7 @@ def _evaluation(settings: Settings, plan: Plan, maps: PassMaps, index: int) -> E
         corner=maps.corner,
         choice=CHOICES.index(plan.choice),
         light_samples=plan.light_samples,
-        biased=plan.choice != "power" and settings.direct.biased,
+        biased=plan.asks_photons and settings.direct.biased,
         choice_radius=maps.chooser.radius if maps.chooser is not None else 0.0,
         k=maps.neighbours,
         share=maps.share,

@@ -160,7 +160,7 @@ def blank_maps(settings: Settings, plan: Plan) -> PassMaps:
         global_=LookUpMap(structure, 0.0) if plan.global_classes else None,
         radiance=RadianceMap(grid) if plan.radiance else None,
         guides=grid if plan.guided_rays else None,
-        chooser=grid if plan.choice != "power" else None,
+        chooser=grid if plan.asks_photons else None,
         volume=LookUpMap(blank_tree() if settings.estimate.in_media == "nearest" else grid, 0.0)
         if plan.volume
         else None,

@@ -20,9 +20,7 @@ from pmviewer.kernels.media.medium import has_media
 _f4 = np.float32
 _LEAST = _f4(1e-20)
 """In place of a smaller component of a direction: its reciprocal is finite, and 0 · inf does not arise."""
-
-
-_LEAST_RATIO = _f4(10.0 / math.pi)
+LEAST_RATIO = _f4(10.0 / math.pi)
 """Ten times the density of a diffuse lobe at its peak: where all light samples are as dense as that, the power
 heuristic leaves at most a hundredth of any light to the BSDF's rays."""
 
@@ -72,6 +70,6 @@ def samples_suffice(scene, n, p):
         x = _outside(p[0], scene.lit_low_x, scene.lit_high_x)
         y = _outside(p[1], scene.lit_low_y, scene.lit_high_y)
         z = _outside(p[2], scene.lit_low_z, scene.lit_high_z)
-        return _f4(n) * (x * x + y * y + z * z) >= _LEAST_RATIO * scene.lit_spread
+        return _f4(n) * (x * x + y * y + z * z) >= LEAST_RATIO * scene.lit_spread
 
     return by_distance

@@ -1,4 +1,4 @@
-"""Which lights direct light is sampled from: many lights, chosen by the photons that arrived near the point (R2).
+"""Which lights direct light is sampled from: few by their distances, many by the photons that arrived near (R2).
 
 A light that is visible from a point has most likely sent photons to its surroundings, and about as many as it lights
 the place (Keller and Wald 2000, §3). Whatever the photons say, direct light is unbiased, because every rule comes down
@@ -10,22 +10,31 @@ photons within the radius and C their sum:
 choice        m of a light with photons near the point    m of any other light
 ============  ==========================================  =====================================
 power         n·Pₗ                                        n·Pₗ
+distance      n·((1 − δ)·wₗ/W + δ·Pₗ), wₗ = Pₗ/dₗ² with   –
+              the distance dₗ of the light, at least its
+              own radius; W: the sum over all lights
 photons       n·((1 − δ)·cₗ/C + δ·Pₗ)                     n·δ·Pₗ
 Keller-Wald   S_con·cₗ/C, or, when there is a sample for  S_non·Pₗ over the sum of these lights'
               every such light, one each and the others   shares
               by cₗ/C in whole numbers
 ============  ==========================================  =====================================
 
+"distance" asks no photons and goes through all lights: for few of them. Sun and sky count as from the scene's radius.
 The biased variants leave out the last column (and δ). Without a photon near, "photons" falls back to power. A list
 holds LISTED lights; photons of further ones are passed over, which puts these into the last column.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.lights.light import light_probability
+from pmviewer.kernels.lights.reach import LEAST_RATIO, samples_suffice
+from pmviewer.kernels.media.medium import has_media
 from pmviewer.kernels.memory import (
     count_trailing_zeros,
     load_f4,
@@ -36,15 +45,17 @@ from pmviewer.kernels.memory import (
     stack_put_f4,
     stack_put_i4,
 )
+from pmviewer.kernels.scene import P_AREA, P_RADIUS, PLACE_COLUMNS, load3
 from pmviewer.kernels.table import find_interval
+from pmviewer.kernels.vector import dot, scale, sub
 from pmviewer.maps.search.disc import Disc
 from pmviewer.maps.search.grid import counted_in_block, grid_ranges
 from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH
 from pmviewer.maps.search.stored import ALL_CLASSES
 
-CHOICES = ("power", "photons", "Keller-Wald")
+CHOICES = ("power", "distance", "photons", "Keller-Wald")
 """Names of the rules; a rule's id is its place here."""
-BY_POWER, BY_PHOTONS, KELLER_WALD = range(len(CHOICES))
+BY_POWER, BY_DISTANCE, BY_PHOTONS, KELLER_WALD = range(len(CHOICES))
 
 LISTED = 64
 """Most lights that a point keeps apart."""
@@ -54,6 +65,10 @@ MOST_CANDIDATES = 2048
 """A look-up in a crowded place visits about this many photons, evenly thinned: more would not tell more."""
 DEFENSIVE = np.float32(0.1)
 """δ, the share of the samples that the rule "photons" spends on lights by power."""
+DEFENSIVE_FAR = np.float32(0.2)
+"""The same of "distance", which knows nothing of what is in between."""
+NEAREST = np.float32(1e-12)
+"""Least square of a distance relative to the scene's radius."""
 
 _f4 = np.float32
 _f8 = np.float64
@@ -131,6 +146,67 @@ def choose_by_power(lights, n):
 
 
 @device
+def _square_of_distance(scene, light, p):
+    """Of p from a light, at least that of its radius, relative to the scene's."""
+    place = light * PLACE_COLUMNS
+    radius, inv = load_f4(scene.light_places, place + P_RADIUS), _f4(1.0) / scene.radius
+    if radius < _f4(0.0):
+        return _f4(1.0)
+    to = scale(sub(load3(scene.light_places, place), p), inv)
+    return max(max(dot(to, to), radius * inv * (radius * inv)), NEAREST)
+
+
+@device
+def choose_by_distance(scene, p, n, lights):
+    """The rule "distance" with n samples at p, for at most LISTED lights; scratch as for `lights_near`."""
+    total = _f4(0.0)
+    for light in range(scene.n_lights):
+        weight = light_probability(scene, light) / _square_of_distance(scene, light, p)
+        stack_put_i4(lights, light, _i4(light))
+        stack_put_f4(lights, LISTED + light, weight)
+        total += weight
+    mass, inv = _f4(0.0), (_f4(1.0) - DEFENSIVE_FAR) / total
+    for light in range(scene.n_lights):
+        share = stack_get_f4(lights, LISTED + light) * inv + DEFENSIVE_FAR * light_probability(scene, light)
+        stack_put_f4(lights, LISTED + light, _f4(n) * share)
+        mass += _f4(n) * share
+    return lights, _i8(scene.n_lights), mass, _f4(0.0), _i8(n)
+
+
+@device
+def choose_anywhere(scene, eye, p, lights):
+    """The choice at p where photons don't tell: by distance where the eye record says so, else by power."""
+    choice = choose_by_power(lights, eye.light_samples)
+    if eye.choice == BY_DISTANCE:
+        choice = choose_by_distance(scene, p, eye.light_samples, lights)
+    return choice
+
+
+@specialised
+def samples_do(scene, eye, choice, p):
+    """Whether the light samples of the choice find direct light at the point p of a Lambertian surface as well without
+    rays by the BSDF (`pmviewer.kernels.lights.reach`). Photons promise nothing; in scenes with media, never."""
+    if has_media(scene):
+        return lambda scene, eye, choice, p: False
+    return _samples_do
+
+
+def _samples_do(scene, eye, choice, p):
+    if eye.choice == BY_POWER:
+        return samples_suffice(scene, eye.light_samples, p)
+    if eye.choice != BY_DISTANCE:
+        return False
+    for light in range(scene.n_lights):
+        place = light * PLACE_COLUMNS
+        radius, area = load_f4(scene.light_places, place + P_RADIUS), load_f4(scene.light_places, place + P_AREA)
+        to = sub(load3(scene.light_places, place), p)
+        gap = max(_f4(math.sqrt(dot(to, to))) - radius, _f4(0.0))
+        if area > _f4(0.0) and not stack_get_f4(choice[0], LISTED + light) * gap * gap >= LEAST_RATIO * area:
+            return False
+    return True
+
+
+@device
 def choose_near(scene, eye, grid, p, n, lights):
     """The choice at the point p with normal n by the rule of the eye record; scratch as for `lights_near`."""
     known, total = lights_near(grid, scene.n_lights, eye.choice_radius, p, n, lights)
@@ -175,9 +251,9 @@ def choose_near(scene, eye, grid, p, n, lights):
 
 @device
 def choose(scene, eye, grid, p, n, lights):
-    """The choice at the point p with normal n, by power or by the photons near; arguments as for `choose_near`."""
-    choice = choose_by_power(lights, eye.light_samples)
-    if eye.choice != BY_POWER:
+    """The choice at the point p with normal n by whatever rule; arguments as for `choose_near`."""
+    choice = choose_anywhere(scene, eye, p, lights)
+    if eye.choice == BY_PHOTONS or eye.choice == KELLER_WALD:
         choice = choose_near(scene, eye, grid, p, n, lights)
     return choice
 

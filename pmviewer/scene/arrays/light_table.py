@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError
 from pmviewer.kernels import scene as K
 from pmviewer.scene.arrays.glows import Glow
+from pmviewer.scene.arrays.shape_bounds import shape_bounds
 from pmviewer.scene.arrays.sky_table import sky_table
 from pmviewer.scene.description import (
     LUMINANCE,
@@ -36,6 +37,23 @@ from pmviewer.scene.projector import brightest_intensity, projector_arrays
 Float = NDArray[np.float32]
 BRIGHTEST = 1e32
 """Radiance or intensity, a factor of a million from the end of float32: squares of small distances divide it."""
+
+
+EVERYWHERE = (0.0, 0.0, 0.0, -1.0, math.inf)
+"""The place of light from all around."""
+
+
+def _ball_around(shape: Shape) -> tuple[float, float, float, float]:
+    """Centre and radius."""
+    low, high = shape_bounds(shape)
+    return *((low + high) / 2).tolist(), float(np.linalg.norm(high - low)) / 2
+
+
+def _place(light: Light) -> tuple[float, ...]:
+    """Of a light without a surface."""
+    if isinstance(light, PointLight | SpotLight | ProjectorLight):
+        return *light.position, 0.0, 0.0
+    return (0.0, 0.0, 0.0, -1.0, 0.0) if isinstance(light, DirectionalLight) else EVERYWHERE
 
 
 def _shines(shape: Shape) -> bool:
@@ -69,6 +87,7 @@ class LightTable:
         rows: list[list[float]] = []
         powers: list[NDArray[np.float64]] = []
         names: list[str] = []
+        places: list[tuple[float, ...]] = []
         triangles: list[NDArray[np.int64]] = [np.zeros(0, np.int64)]
         cdfs: list[NDArray[np.float64]] = [np.zeros(0)]
         listed = 0
@@ -96,6 +115,7 @@ class LightTable:
             row[K.L_AREA] = area
             self.of_shape[index] = len(rows)
             rows.append(row)
+            places.append((*_ball_around(shape), area))
             powers.append(math.pi * area * np.array(shape.radiance))
             names.append(shape.name)
         self.sky: ImageEnvironment | None = None
@@ -107,6 +127,7 @@ class LightTable:
             if isinstance(light, ImageEnvironment):
                 self.sky, self._sky_table = light, sky_table(light.pixels)
             self.more = self.more or isinstance(light, SpotLight | ProjectorLight | DirectionalLight | ImageEnvironment)
+            places.append(_place(light))
             powers.append(emitted_power(light, radius))
             rows.append(self._row(light))
             if isinstance(light, ProjectorLight):
@@ -121,6 +142,7 @@ class LightTable:
             row[K.L_RADIANCE : K.L_RADIANCE + 3] = (glow.power / (4 * math.pi)).tolist()
             row[K.L_A : K.L_A + 3] = glow.center.tolist()
             rows.append(row)
+            places.append(EVERYWHERE)
             powers.append(glow.power)
             names.append(glow.name)
         if not rows or not any(p.max() > 0 for p in powers):
@@ -131,6 +153,7 @@ class LightTable:
                 what = f"The light '{name}' is too bright: {brightest:g}, where {BRIGHTEST:g} is the most."
                 raise SceneError(what, scene.path, hint="Scale all lights down alike.")
         self.rows = np.array(rows, np.float32)
+        self.places = np.array(places, np.float32)
         self.power = np.array(powers)
         self.names = tuple(names)
         self.cdf = self._by_power()
@@ -155,6 +178,16 @@ class LightTable:
         self.power[own] *= shares[:, None]
         self.rows[own, K.L_RADIANCE : K.L_RADIANCE + 3] *= shares[:, None].astype(np.float32)
         self.cdf[:] = self._by_power()
+
+    def arrays(self) -> dict[str, NDArray]:
+        """What all scenes have, by the record's field."""
+        return {
+            "lights": self.rows,
+            "light_cdf": self.cdf,
+            "light_places": self.places,
+            "light_triangles": self.triangles,
+            "light_triangle_cdf": self.triangle_cdf,
+        }
 
     def sky_arrays(self) -> dict[str, NDArray]:
         """The image environment's arrays by the record's field; none without one."""

@@ -15,9 +15,12 @@ ONE_LIGHT_SET = Need(
     lambda f: f.plan.choice != "Keller-Wald", "Keller-Wald sets contributing and other samples instead."
 )
 TWO_LIGHT_SETS = Need(lambda f: f.plan.choice == "Keller-Wald", "Only with the light choice Keller-Wald.")
-CHOOSES_LIGHTS = Need(lambda f: not f.plan.path, "The path tracer chooses lights by power.")
+HAS_PHOTONS = Need(lambda f: not f.plan.path, "The path tracer has no photons to ask.")
 MANY_LIGHTS = Need(lambda f: f.traits.n_lights > 1, "There is one light.")
-CHOICE_BY_PHOTONS = Need(lambda f: f.plan.choice != "power", "No photons choose lights: see direct.choice.")
+MOST_BY_DISTANCE = 64
+"""Lights that the choice by distance goes through: `pmviewer.render.direct.choice.LISTED`."""
+FEW_LIGHTS = Need(lambda f: f.traits.n_lights <= MOST_BY_DISTANCE, f"Only with at most {MOST_BY_DISTANCE} lights.")
+CHOICE_BY_PHOTONS = Need(lambda f: f.plan.asks_photons, "No photons choose lights: see direct.choice.")
 UNBIASED = Need(lambda f: not f.settings.direct.biased, "Lights without photons near are left out.")
 NOTHING_EMITS = Need(
     lambda f: not f.plan.looked_for, "Media emit light in this scene: what is near to them is lit by what rays find."
@@ -51,18 +54,17 @@ class Direct(Group):
         title="MIS",
         needs=(NOTHING_EMITS,),
     )
-    choice: Literal["auto", "power", "photons", "Keller-Wald"] = setting(
+    choice: Literal["auto", "power", "distance", "photons", "Keller-Wald"] = setting(
         "auto",
-        "How light samples are spread over the lights. power: by the lights' power. photons: mostly by the photons "
-        "that arrived from each light near the point. Keller-Wald: some samples for the lights with photons near, some "
-        "for all others (§3). auto: photons with many lights, power otherwise.",
+        "How light samples are spread over the lights. power: by the lights' power. distance: by power and distance "
+        "from the point. photons: mostly by the photons that arrived from each light near the point. Keller-Wald: some "
+        "samples for the lights with photons near, some for all others (§3). auto: photons with 8 lights or more, "
+        "distance otherwise and by the path tracer.",
         section="Many lights",
         stage="image",
         scale="choice",
-        needs=(
-            CHOOSES_LIGHTS,
-            MANY_LIGHTS,
-        ),
+        needs=(MANY_LIGHTS,),
+        choice_needs={"distance": (FEW_LIGHTS,), "photons": (HAS_PHOTONS,), "Keller-Wald": (HAS_PHOTONS,)},
     )
     choice_radius: float | Auto = setting(
         "auto",
