@@ -68,6 +68,7 @@ PATH_FLIGHT = _dimension((PATH,), 3000, "flight through media to a surface or co
 GATHER = _dimension((EYE,), 2000, "gather ray by the BSDF, where all are")
 GATHER_BESIDE = _dimension((EYE,), 2001, "gather ray by the BSDF, beside guided ones")
 GATHER_GUIDED = _dimension((EYE,), 2002, "gather ray guided by photons")
+CROWDED = _dimension((EYE,), 2003, "ray that tells whether something is near where records would be interpolated")
 GATHER_FORK = _dimension((EYE, CACHE_RECORD), 2999, "which chain of a gather ray goes on, after a secondary gather")
 GATHER_CHAIN = _dimension((EYE, CACHE_RECORD), 3000, "lobe that a gather ray follows", DEPTH)
 CHAIN_LIGHT = _dimension((EYE,), 4000, "light samples at followed lobes", DEPTH)

@@ -195,10 +195,10 @@ def _load3(row, at):
 
 @device
 def interpolate(cache, p, n):
-    """Irradiance (red, green, blue) at the point p with unit normal n, and the sum of the weights of the records that
-    it was made from: 0 where there is none."""
+    """Irradiance (red, green, blue) at the point p with unit normal n, the sum of the weights of the records that it
+    was made from, 0 where there is none, and the mean ρ of these."""
     total = (_f4(0.0), _f4(0.0), _f4(0.0))
-    weights = _f4(0.0)
+    weights, reaches = _f4(0.0), _f4(0.0)
     levels, width = cache.levels, cache.cell
     inv_error = _f4(1.0) / cache.error
     level = _i8(0)
@@ -228,12 +228,13 @@ def interpolate(cache, p, n):
                 )
                 total = add(total, scale(E, weight))
                 weights += weight
+                reaches += weight * reach
         levels = _u4(levels >> _u4(1))
         level += 1
         width = width * _f4(2.0)
     if weights > _f4(0.0):
-        total = scale(total, _f4(1.0) / weights)
-    return total, weights
+        total, reaches = scale(total, _f4(1.0) / weights), reaches / weights
+    return total, weights, reaches
 
 
 @device
@@ -250,7 +251,7 @@ def interpolate_all(caches, points, normals, E, weights):
     for i in range(len(points)):
         p = (points[i, 0], points[i, 1], points[i, 2])
         n = (normals[i, 0], normals[i, 1], normals[i, 2])
-        (E[i, 0], E[i, 1], E[i, 2]), weights[i] = interpolate(caches[0], p, n)
+        (E[i, 0], E[i, 1], E[i, 2]), weights[i], _ = interpolate(caches[0], p, n)
 
 
 @device

@@ -68,7 +68,7 @@ def uncovered_hit(given, pixel, counts):
         si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
         if si.bsdf.groups & STORED != 0 and is_lambertian(si.bsdf):
             n = shading_normal(si.bsdf)
-            _, weight = interpolate(cache, si.p, n)
+            _, weight, _ = interpolate(cache, si.p, n)
             if weight < ENOUGH:
                 return True, si.p, si.ng, n, si.gap, cache.pixel_size + travelled * cache.pixel_angle
         if si.bsdf.groups & FOLLOWED == 0 or depth == eye.max_depth:

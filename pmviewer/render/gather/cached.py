@@ -1,6 +1,10 @@
 """The final gather where there is an irradiance cache: interpolated where records say enough, else cast (R6); and
 where gathers are estimated: the pixel's estimate where there is one, else cast (R7).
 
+Records don't know what is narrower than they reach: a lamp just below a ceiling leaves a dark strip that light leaks
+into from both sides. So a short ray looks about before records are believed, and where it meets something the surface
+gathers. That is right whatever the ray's chance, since what is gathered knows nothing of it.
+
 Only irradiance of Lambertian lobes is known, and only indirect light; direct light is sampled everywhere. Kernels are
 compiled for the cache, for estimates or, given NO_CACHE, for the gather alone.
 """
@@ -9,11 +13,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from pmviewer.kernels.accel.occlusion import occluded
 from pmviewer.kernels.bsdf.plain import INV_PI
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_sample, is_lambertian, shading_normal
+from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
+from pmviewer.kernels.dimensions import CROWDED
 from pmviewer.kernels.lights.reach import may_meet_light
-from pmviewer.kernels.vector import dot, largest, mul, scale
+from pmviewer.kernels.random import draw4
+from pmviewer.kernels.surface import leave
+from pmviewer.kernels.vector import dot, from_basis, largest, mul, scale
+from pmviewer.kernels.warp import square_to_cosine_hemisphere
 from pmviewer.maps.irradiance_cache import interpolate
 from pmviewer.render.chain import BLACK
 from pmviewer.render.counts import C_CACHED, C_GATHERED, C_RAYS
@@ -23,6 +33,20 @@ from pmviewer.render.gather.gather import gather_rays
 from pmviewer.render.straight import cast_straight
 
 _f4 = np.float32
+CROWDED_WITHIN = np.float32(0.5)
+"""Of the records' mean reach."""
+
+
+@device
+def is_crowded(given, si, pixel, length):
+    """Whether a ray of that length by the cosine meets something."""
+    eye = given.eye
+    u, v, _, _ = draw4(eye.sequence, pixel.seed, eye.index, CROWDED)
+    x, y, z = square_to_cosine_hemisphere(u, v)
+    wi = from_basis(si.ng, x, y, z)
+    pixel.counts[C_RAYS] += 1
+    o = leave(si.p, si.ng, si.gap, wi[0], wi[1], wi[2])
+    return occluded(given.scene, o[0], o[1], o[2], wi[0], wi[1], wi[2], _f4(0.0), length)
 
 
 @specialised
@@ -46,8 +70,8 @@ def cached(given, si, pixel, whole):
 
     def from_records(given, si, pixel, whole):
         if is_lambertian(si.bsdf):
-            E, weight = interpolate(given.cache, si.p, shading_normal(si.bsdf))
-            if weight > _f4(0.0):
+            E, weight, reach = interpolate(given.cache, si.p, shading_normal(si.bsdf))
+            if weight > _f4(0.0) and not is_crowded(given, si, pixel, CROWDED_WITHIN * reach):
                 pixel.counts[C_CACHED] += 1
                 return E, np.int32(0)
         pixel.counts[C_GATHERED] += 1
