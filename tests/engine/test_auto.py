@@ -219,8 +219,8 @@ def test_a_trial_of_few_pixels_has_the_records_of_the_whole_picture(pool):
 
 def test_a_trial_tells_what_light_samples_do(pool):
     """Noise of passes with few photons, and what of it is left with four times the light samples: by the trial and by
-    pictures. Four lights in a box, where half of it goes, and one."""
-    for name, least in (("cornell_lights", 0.45), ("cornell_diffuse", 0.0)):
+    pictures. Four lights in a box, where a third of it goes, and one."""
+    for name, least in (("cornell_lights", 0.3), ("cornell_diffuse", 0.0)):
         scene = open_scene(name)
         settings = with_values(Settings(), {"camera.width": 96, "camera.height": 96, "photons.N": 40_000})
         tried = trial(scene, settings, [PROGRESSIVE], pool, (48, 48), 100.0, lambda text, share: None)
