@@ -32,6 +32,8 @@ from pmviewer.render.given import SurfaceInteraction
 _f4 = np.float32
 FORKS = 3
 """Chains that fork go on at least so deep before they are thinned out."""
+CERTAIN = _f4(-1.0)
+"""In place of a number for roulette where there is none."""
 BLACK = (_f4(0.0), _f4(0.0), _f4(0.0))
 WHITE = (_f4(1.0), _f4(1.0), _f4(1.0))
 
@@ -75,12 +77,15 @@ def follow(scene, si, beta, u_lobe, u, v):
 
 @device
 def follow_camera_path(scene, eye, si, beta, seed, depth):
-    """`follow` at the surface number `depth` of a path from the camera, which is thinned out where it forks often."""
+    """`follow` at the surface number `depth` of a path from the camera, which is thinned out where it forks often, and
+    the number by which it is beyond the next surface where it forks (`pmviewer.render.split.thinned`), or CERTAIN."""
     u_lobe, u, v, u_end = chain_numbers(scene, eye.sequence, seed, eye.index, CHAIN + depth)
     ray, beta, pdf = follow(scene, si, beta, u_lobe, u, v)
-    if si.bsdf.groups & STORED != 0 and depth >= FORKS:
-        survival = min(largest(beta), _f4(1.0))
-        if not u_end < survival:
-            return ray, BLACK, pdf
-        beta = scale(beta, _f4(1.0) / survival)
-    return ray, beta, pdf
+    if si.bsdf.groups & STORED == 0:
+        return ray, beta, pdf, CERTAIN
+    if depth < FORKS:
+        return ray, beta, pdf, u_end
+    survival = min(largest(beta), _f4(1.0))
+    if not u_end < survival:
+        return ray, BLACK, pdf, CERTAIN
+    return ray, scale(beta, _f4(1.0) / survival), pdf, CERTAIN

@@ -50,7 +50,7 @@ from pmviewer.render.pixel import (
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius, radii_of
 from pmviewer.render.reflect import reflected, unfound
 from pmviewer.render.share import OWN_COLUMNS
-from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
+from pmviewer.render.split import first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import cast_on
 from pmviewer.render.virtual_lights.lit import note_object, virtual_light
 
@@ -295,7 +295,7 @@ def eye_pass(given, marks, radii, film, counts, first, last):
                     if met_light(scene, hit) >= 0 and not (whole and unseen):
                         deposit(pixel, seen, mul(beta, _emission(scene, eye, left, pdf, choice, hit, ray.d)))
                     groups = si.bsdf.groups
-                    beta, u_way = thinned(eye, beta, u_way), CERTAIN
+                    beta = thinned(beta, u_way)
                     if groups == NOTHING or not largest(beta) > _f4(0.0):
                         break
                     if groups & STORED != 0:
@@ -307,7 +307,9 @@ def eye_pass(given, marks, radii, film, counts, first, last):
                         break
                     if not is_delta(si.bsdf):
                         choice = _followed(given, si, beta, pixel, depth, choice, lights)
-                    ray, beta, pdf, splits, ways = split_camera_path(scene, eye, si, beta, seed, depth, splits, ways)
+                    ray, beta, pdf, u_way, splits, ways = split_camera_path(
+                        scene, eye, si, beta, seed, depth, splits, ways
+                    )
                     if eye.followed_direct == 0:
                         pdf = _f4(0.0)
                     if not largest(beta) > _f4(0.0):

@@ -44,7 +44,7 @@ FEWEST, MOST = 15, 150
 
 @dataclass(frozen=True)
 class Needs:
-    """What a scene needs, said by hand: caustic maps, light choice by photons, light samples at a surface, camera rays
+    """What a scene needs, said by hand: caustic maps, the choice of lights, light samples at a surface, camera rays
     along the outline of a light, several of them where mirrors and glass are seen, and the parts of the record that its
     kernels are compiled with (arguments of `scene_dtype`)."""
 
@@ -60,21 +60,21 @@ NEEDS: Mapping[str, Needs] = {
     "cornell_diffuse": Needs(outline=True),
     "cornell_caustic": Needs(caustics=True, mirrors=True, outline=True),
     "cornell_glossy": Needs(caustics=True, mirrors=True, outline=True, fields=("bsdfs",)),
-    "cornell_lights": Needs(samples=4, outline=True),
+    "cornell_lights": Needs(choice="distance", samples=4, outline=True),
     "cornell_water": Needs(caustics=True, mirrors=True, outline=True),
     # Smooth normals on diffuse rock: photons must know them, which the plain kernels don't.
     "cornell_fractal": Needs(outline=True, fields=("bsdfs", "instances")),
     "ring_caustic": Needs(caustics=True, mirrors=True, outline=True),
     "cardioid_010": Needs(caustics=True, mirrors=True, fields=("bsdfs",)),
-    "colonnade": Needs(samples=4, fields=("bsdfs", "lights")),
+    "colonnade": Needs(choice="distance", samples=4, fields=("bsdfs", "lights")),
     "corner_room": Needs(outline=True),
     "glossy_room": Needs(outline=True, fields=("bsdfs",)),
-    "car_cabin": Needs(samples=4, caustics=True, mirrors=True, fields=("bsdfs",)),
+    "car_cabin": Needs(choice="distance", samples=4, caustics=True, mirrors=True, fields=("bsdfs",)),
     "rooms_10x10": Needs(choice="photons", samples=4, outline=True),
     "skylight_room": Needs(),
     "three_glasses": Needs(caustics=True, mirrors=True, fields=("bsdfs",)),
-    "cognac": Needs(samples=4, caustics=True, mirrors=True, fields=("bsdfs",)),
-    "museum": Needs(samples=4, caustics=True, mirrors=True, fields=("bsdfs", "textures")),
+    "cognac": Needs(choice="distance", samples=4, caustics=True, mirrors=True, fields=("bsdfs",)),
+    "museum": Needs(choice="distance", samples=4, caustics=True, mirrors=True, fields=("bsdfs", "textures")),
 }
 QUICK = ("cornell_diffuse", "cornell_caustic", "skylight_room", "cornell_lights")
 

@@ -22,7 +22,7 @@ from pmviewer.render.mirror_rays import take_sample
 from pmviewer.render.pixel import sampled_ray
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, own_radius, radii_of
 from pmviewer.render.reflect import reflected, unfound
-from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
+from pmviewer.render.split import first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import let_through
 from pmviewer.render.virtual_lights.descent import CUT_WORDS
 from pmviewer.render.virtual_lights.lit import asked_for, asked_light, one_light
@@ -214,7 +214,7 @@ def replay_pixel(given, radii, asked, wi, shares, rows, vertices, prims, expecte
                     points += 1
                 si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
                 groups = si.bsdf.groups
-                beta, u = thinned(eye, beta, u), CERTAIN
+                beta = thinned(beta, u)
                 if groups == NOTHING or not largest(beta) > _f4(0.0):
                     break
                 surface += 1
@@ -234,7 +234,7 @@ def replay_pixel(given, radii, asked, wi, shares, rows, vertices, prims, expecte
                     L = unfound(given.caustic_map, eye, r, si)
                     both = _i8(1) if transmits(si.bsdf) else _i8(0)
                     row = _put(rows, row, si, taken, L, r, (_i8(NOT_FOUND), _i8(_CAUSTICS), _i8(depth), both, surface))
-                ray, beta, _, splits, ways = split_camera_path(scene, eye, si, beta, seed, depth, splits, ways)
+                ray, beta, _, u, splits, ways = split_camera_path(scene, eye, si, beta, seed, depth, splits, ways)
                 if not largest(beta) > _f4(0.0):
                     break
             main = False

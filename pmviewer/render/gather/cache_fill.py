@@ -31,11 +31,12 @@ from pmviewer.maps.irradiance_cache import (
     reach_of,
 )
 from pmviewer.render.cast import cast, ray_from
-from pmviewer.render.chain import BLACK, WHITE, arrive, follow_camera_path
+from pmviewer.render.chain import BLACK, CERTAIN, WHITE, arrive, follow_camera_path
 from pmviewer.render.counts import C_DROPPED, C_RAYS
 from pmviewer.render.gather.gather import gather_light
 from pmviewer.render.given import opened
 from pmviewer.render.pixel import pixel_seed, sampled_ray
+from pmviewer.render.split import thinned
 from pmviewer.render.straight import cast_on, way
 
 _f4 = np.float32
@@ -57,7 +58,7 @@ def uncovered_hit(given, pixel, counts):
     """
     scene, eye, cache = given.scene, given.eye, given.cache
     seed, ray = sampled_ray(scene, eye, pixel)
-    beta = WHITE
+    beta, u = WHITE, CERTAIN
     travelled = _f4(0.0)
     for depth in range(eye.max_depth + 1):
         hit = cast(scene, ray)
@@ -66,6 +67,9 @@ def uncovered_hit(given, pixel, counts):
             break
         travelled += hit.t
         si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
+        beta = thinned(beta, u)
+        if not largest(beta) > _f4(0.0):
+            break
         if si.bsdf.groups & STORED != 0 and is_lambertian(si.bsdf):
             n = shading_normal(si.bsdf)
             _, weight, _ = interpolate(cache, si.p, n)
@@ -73,7 +77,7 @@ def uncovered_hit(given, pixel, counts):
                 return True, si.p, si.ng, n, si.gap, cache.pixel_size + travelled * cache.pixel_angle
         if si.bsdf.groups & FOLLOWED == 0 or depth == eye.max_depth:
             break
-        ray, beta, _ = follow_camera_path(given.scene, given.eye, si, beta, seed, depth)
+        ray, beta, _, u = follow_camera_path(given.scene, given.eye, si, beta, seed, depth)
         if not largest(beta) > _f4(0.0):
             break
     return NO_HIT

@@ -15,7 +15,7 @@ from pmviewer.render.gather.guide import AIM_WORDS, aim, gather_direction
 from pmviewer.render.given import GatherRays, opened
 from pmviewer.render.mirror_rays import take_sample
 from pmviewer.render.pixel import sampled_ray
-from pmviewer.render.split import CERTAIN, first_way, next_way, split_camera_path, thinned
+from pmviewer.render.split import first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import cast_straight
 
 _f4 = np.float32
@@ -71,14 +71,14 @@ def gather_points(given, pixel, samples, counts, rows):
                 if hit.prim < 0:
                     break
                 si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
-                beta, u = thinned(eye, beta, u), CERTAIN
+                beta = thinned(beta, u)
                 if not largest(beta) > _f4(0.0):
                     break
                 if si.bsdf.groups & STORED != 0:
                     row = _replay(given, si, beta, samples, seed, rows, row, tally)
                 if si.bsdf.groups & FOLLOWED == 0:
                     break
-                ray, beta, _, splits, ways = split_camera_path(scene, eye, si, beta, seed, depth, splits, ways)
+                ray, beta, _, u, splits, ways = split_camera_path(scene, eye, si, beta, seed, depth, splits, ways)
                 if not largest(beta) > _f4(0.0):
                     break
             if ways.n == 0:
