@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import struct
 
 import numpy as np
@@ -11,7 +12,7 @@ from PIL import Image
 from pmviewer.bench import peer
 from pmviewer.bench.files import bench
 from pmviewer.bench.files.judge import Row
-from pmviewer.bench.files.mitsuba_file import noise, small_size
+from pmviewer.bench.files.mitsuba_file import as_of_3, noise, small_size
 from pmviewer.bench.files.sheet import contact_sheet, write_sheet
 from pmviewer.bench.files.store import Store
 from pmviewer.bench.files.survey import STATES, candidates, survey, surveys
@@ -224,3 +225,13 @@ def test_a_folder_that_is_none_is_refused_in_words(tmp_path):
             bench.run(folder)
     with pytest.raises(SettingError, match="no complete scene file"):
         bench.run(tmp_path)
+
+
+def test_mitsuba_gets_colours_of_old_files_in_linear_numbers():
+    """IEC 61966-2-1: half of white is 0.21404."""
+    text = '<bsdf><srgb name="reflectance" value="0.5 1, 0.04"/><lookAt origin="0 0 1"/></bsdf>'
+    found = as_of_3(text)
+    numbers = [float(word) for word in re.search(r'<rgb name="reflectance" value="([^"]*)"/>', found)[1].split()]
+    assert numbers == pytest.approx([0.2140411, 1.0, 0.04 / 12.92], rel=1e-5)
+    assert '<lookat origin="0 0 1"/>' in found
+    assert as_of_3('<srgb name="radiance" value="#ff8000"/>') == '<srgb name="radiance" value="#ff8000"/>'

@@ -3,7 +3,7 @@
 Runs inside `pmviewer.bench.agree.mitsuba_server`. The file's film gets another size, its integrator is replaced by the
 path tracer, and smooth surfaces of files with blends become a little rough (`ROUGH`). A file that Mitsuba refuses then
 is tried again with properties that nothing reads ignored, with <lookAt>, as it was written before 0.5, and with 0.6's
-texture filters by their nearest equivalents. What was changed beyond that is told.
+<srgb> and texture filters by their nearest equivalents. What was changed beyond that is told.
 """
 
 from __future__ import annotations
@@ -129,10 +129,22 @@ def _scene(mi: Any, request: dict[str, Any], lenient: bool) -> tuple[Any, dict[s
 def _parsed(mi: Any, config: Any, path: Path, lenient: bool) -> Any:
     if not lenient:
         return mi.parser.parse_file(config, str(path))
-    text = path.read_text("utf-8-sig", errors="replace")
-    state = mi.parser.parse_string(config, re.sub(r"<(/?)lookAt\b", r"<\1lookat", text))
+    state = mi.parser.parse_string(config, as_of_3(path.read_text("utf-8-sig", errors="replace")))
     mi.parser.transform_upgrade(config, state)
     return state
+
+
+def as_of_3(text: str) -> str:
+    """A scene file's text with elements of older versions as Mitsuba 3 has them."""
+    text = re.sub(r"<(/?)lookAt\b", r"<\1lookat", text)
+    return re.sub(r'<srgb\b([^>]*?)value="([^"#]*)"', _linear, text)
+
+
+def _linear(found: re.Match[str]) -> str:
+    """<rgb> of three numbers, or one, that an <srgb> has encoded."""
+    encoded = np.array([float(number) for number in found[2].replace(",", " ").split()])
+    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    return f'<rgb{found[1]}value="{" ".join(f"{c:.8g}" for c in linear)}"'
 
 
 def _adapt(mi: Any, state: Any, longest: int, lenient: bool) -> dict[str, Any]:
