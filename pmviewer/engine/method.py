@@ -9,7 +9,7 @@ from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, THIN, in_media
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.maps.variant import Estimator
 from pmviewer.render.camera import are_hidden
-from pmviewer.render.direct.choice import LISTED
+from pmviewer.render.direct.choice import ASKING, LISTED
 from pmviewer.render.direct.samples import samples_at_surface
 from pmviewer.render.filter import BOX, filter_of
 from pmviewer.scene.analysis import SceneTraits
@@ -123,7 +123,7 @@ class Plan:
     @property
     def asks_photons(self) -> bool:
         """Whether photons tell which lights to sample."""
-        return self.choice in ("photons", "Keller-Wald")
+        return self.choice in ASKING
 
     @property
     def judges(self) -> bool:
@@ -332,7 +332,7 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
     if method == "path":
         warnings = (UNFOUND_BY_PATHS,) if traits.has_delta_lights and traits.has_delta else ()
         skipped.append(("light pass", "the path tracer uses no photons"))
-        choice = _light_choice(settings, traits, asks=False)[0]
+        choice = _light_choice(settings, traits, photons=False)[0]
         return Plan(path=True, choice=choice, skipped=tuple(skipped), warnings=warnings)
     thin = thin_rules(settings, traits)
     if thin and "exact" not in thin and REFLECTING not in thin and not traits.follows_beside_thin(glossy):
@@ -476,15 +476,15 @@ def estimator_of(settings: Settings) -> Estimator:
     return "differential" if settings.estimate.differential else "disc"
 
 
-def _light_choice(settings: Settings, traits: SceneTraits, asks: bool = True) -> tuple[str, str]:
-    """How lights are chosen, and why photons don't choose, "" where they do. `asks`: whether there are some to ask."""
+def _light_choice(settings: Settings, traits: SceneTraits, photons: bool = True) -> tuple[str, str]:
+    """How lights are chosen, and why photons don't choose, "" where they do. `photons`: whether there are some."""
     wanted, n = settings.direct.choice, traits.n_lights
     if n <= 1:
         return "power", "there is one light"
     without = "distance" if n <= LISTED else "power"
     if wanted == "auto":
         few = f"only {n} lights (direct.choice = photons asks for it)"
-        return ("photons", "") if asks and n >= MANY_LIGHTS else (without, few)
-    if wanted in ("photons", "Keller-Wald"):
-        return (wanted, "") if asks else (without, "there are none")
+        return ("photons", "") if photons and n >= MANY_LIGHTS else (without, few)
+    if wanted in ASKING:
+        return (wanted, "") if photons else (without, "there are none")
     return ("power" if wanted == "power" else without), f"direct.choice = {wanted}"

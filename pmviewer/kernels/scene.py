@@ -202,8 +202,7 @@ luminance of the power, L_FIRST its row of `projectors`."""
 PROJECTOR_COLUMNS = 3
 PLACE_COLUMNS = 5
 P_RADIUS, P_AREA = _columns[[3, 4]]
-"""Of a light's place: centre and radius of a ball around it, the radius negative where light comes from all around or
-from far away, and the area that rays may meet, 0 where none can, infinite of an environment."""
+"""Of a light's place after the centre, see `pmviewer.scene.arrays.light_places`."""
 
 BITMAP, CHECKERBOARD = 0, 1
 REPEAT, MIRROR, CLAMP = 0, 1, 2

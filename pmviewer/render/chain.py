@@ -25,13 +25,11 @@ from pmviewer.kernels.dimensions import CHAIN
 from pmviewer.kernels.media.medium import has_media, medium_beyond
 from pmviewer.kernels.scene import material_of
 from pmviewer.kernels.surface import face
-from pmviewer.kernels.vector import largest, mul, scale
+from pmviewer.kernels.vector import mul, scale
 from pmviewer.render.cast import leaving
 from pmviewer.render.given import SurfaceInteraction
 
 _f4 = np.float32
-FORKS = 3
-"""Chains that fork go on at least so deep before they are thinned out."""
 CERTAIN = _f4(-1.0)
 """In place of a number for roulette where there is none."""
 BLACK = (_f4(0.0), _f4(0.0), _f4(0.0))
@@ -77,15 +75,8 @@ def follow(scene, si, beta, u_lobe, u, v):
 
 @device
 def follow_camera_path(scene, eye, si, beta, seed, depth):
-    """`follow` at the surface number `depth` of a path from the camera, which is thinned out where it forks often, and
-    the number by which it is beyond the next surface where it forks (`pmviewer.render.split.thinned`), or CERTAIN."""
+    """`follow` at the surface number `depth` of a path from the camera, and the number by which the path is thinned out
+    beyond the next surface where it forks (`pmviewer.render.split.thinned`), CERTAIN where it does not."""
     u_lobe, u, v, u_end = chain_numbers(scene, eye.sequence, seed, eye.index, CHAIN + depth)
     ray, beta, pdf = follow(scene, si, beta, u_lobe, u, v)
-    if si.bsdf.groups & STORED == 0:
-        return ray, beta, pdf, CERTAIN
-    if depth < FORKS:
-        return ray, beta, pdf, u_end
-    survival = min(largest(beta), _f4(1.0))
-    if not u_end < survival:
-        return ray, BLACK, pdf, CERTAIN
-    return ray, scale(beta, _f4(1.0) / survival), pdf, CERTAIN
+    return ray, beta, pdf, u_end if si.bsdf.groups & STORED != 0 else CERTAIN

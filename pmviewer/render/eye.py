@@ -25,7 +25,8 @@ from pmviewer.maps.record import CAUSTIC as CAUSTIC_CLASS
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.counts import C_CUT, C_RAYS
-from pmviewer.render.direct.choice import LIST_WORDS, choose, choose_anywhere, choose_by_power, samples_do
+from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power
+from pmviewer.render.direct.choose import choose, choose_without_photons, samples_suffice
 from pmviewer.render.direct.direct import direct_light, found_light, met_light, radiance_of
 from pmviewer.render.filter_samples import place_of, seen_at, sum_at, value_at
 from pmviewer.render.gather.cached import cached, surface_rays
@@ -175,7 +176,7 @@ def _light_rays(given, si, choice, gather, aimed):
         return _i8(0)
     if gather > 0:
         return max(gather - aimed.rays, _i8(1))
-    if is_lambertian(si.bsdf) and samples_do(given.scene, eye, choice, si.p):
+    if is_lambertian(si.bsdf) and samples_suffice(given.scene, eye, choice, si.p):
         return _i8(0)
     return _i8(1)
 
@@ -229,7 +230,7 @@ def _followed(given, si, beta, pixel, depth, choice, lights):
             count_found(pixel, OF_CAUSTIC, given.caustic_map, eye, r, si, _CAUSTICS)
         deposit(pixel, SPECULAR, mul(beta, L))
     if eye.followed_direct != 0:
-        choice = choose_anywhere(given.scene, eye, si.p, lights)
+        choice = choose_without_photons(given.scene, eye, si.p, lights)
         sampler = Sampler(eye.sequence, pixel.seed, eye.index, CHAIN_LIGHT + depth)
         L = direct_light(given.scene, given.shadows, si, FOLLOWED, choice, _i8(eye.mis), sampler, pixel.counts)
         deposit(pixel, SPECULAR, mul(beta, L))

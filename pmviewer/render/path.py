@@ -20,7 +20,8 @@ from pmviewer.kernels.vector import largest, mul, scale
 from pmviewer.render.cast import cast, leaving
 from pmviewer.render.chain import WHITE, arrive, scatter
 from pmviewer.render.counts import C_CUT, C_RAYS, C_SHADOW_RAYS
-from pmviewer.render.direct.choice import LIST_WORDS, choose_anywhere, choose_by_power, expected_samples
+from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power, expected_samples
+from pmviewer.render.direct.choose import choose_without_photons
 from pmviewer.render.direct.direct import light_samples, met_light, power_heuristic, radiance_of
 from pmviewer.render.given import Sampler
 from pmviewer.render.hidden_lights import hides_lights
@@ -68,11 +69,10 @@ def path_pass(scenes, eyes, film, counts, first, last):
     """Add one path to each of the pixels first … last−1; arguments as in `pmviewer.render.eye.eye_pass`."""
     scene, eye = scenes[0], eyes[0]
     lights, tally = stack_i4(LIST_WORDS), row_of(counts, 0)
-    by_power = choose_by_power(lights, eye.light_samples)
     for number in range(first, last):
         seed, ray = sampled_ray(scene, eye, number)
         pixel = Pixel(number, seed, row_of(film, number), None, tally, None)
-        beta, choice = WHITE, by_power
+        beta, choice = WHITE, choose_by_power(lights, eye.light_samples)
         stored = 0  # how often the path took lobes that photons are stored for
         mirrored = False  # whether it took a followed lobe before the first of these
         by_chain = False  # whether it took one right after the first of these
@@ -105,7 +105,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 u, v, u_lobe, u_end = draw4(eye.sequence, seed, eye.index, PATH_SCATTER + PATH_STRIDE * depth)
                 u_pick, lu, lv, _ = draw4(eye.sequence, seed, eye.index, PATH_LIGHT + PATH_STRIDE * depth)
                 sampler = Sampler(eye.sequence, seed, eye.index, FURTHER_LIGHT)
-                choice = by_power
+                choice = choose_without_photons(scene, eye, arrival.p, lights)
                 after = scatter_in_medium(scene, eye, ray, arrival, choice, sampler, (u_lobe, u, v), (u_pick, lu, lv))
                 tally[C_RAYS] += after.rays
                 tally[C_SHADOW_RAYS] += after.rays
@@ -148,7 +148,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 stored += 1
             if group == STORED or not is_delta(si.bsdf):
                 sampler = Sampler(eye.sequence, seed, eye.index, PATH_LIGHT + PATH_STRIDE * depth)
-                choice = choose_anywhere(scene, eye, si.p, lights)
+                choice = choose_without_photons(scene, eye, si.p, lights)
                 L, rays, _ = light_samples(scene, None, si, group, choice, eye.mis, sampler)
                 tally[C_RAYS] += rays
                 tally[C_SHADOW_RAYS] += rays

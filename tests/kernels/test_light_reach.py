@@ -10,8 +10,11 @@ import pytest
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.lights.light import sample_one_light
-from pmviewer.kernels.lights.reach import may_meet_light, samples_suffice
+from pmviewer.kernels.lights.reach import may_meet_light, samples_by_power_suffice
+from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.scene import light_of
+from pmviewer.render.direct.by_distance import choose_by_distance, samples_by_distance_suffice
+from pmviewer.render.direct.choice import LIST_WORDS, expected_samples
 from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import Camera, Parallelogram, Scene, Shape
 from tests.support.scenes import diffuse, light_scene, panel, rendered, settings_of
@@ -35,13 +38,29 @@ def _densities(scenes, n, points, numbers, shares, suffice, least):
     scene = scenes[0]
     for i in range(len(points)):
         p = (points[i, 0], points[i, 1], points[i, 2])
-        suffice[i] = samples_suffice(scene, n, p)
+        suffice[i] = samples_by_power_suffice(scene, n, p)
         least[i] = np.inf
         for light in range(scene.n_lights):
             for j in range(len(numbers)):
                 _, _, _, pdf, _ = sample_one_light(scene, light, p, numbers[j, 0], numbers[j, 1])
                 if pdf > 0:
                     least[i] = min(least[i], n * shares[light] * pdf)
+
+
+@kernel
+def _densities_by_distance(scenes, n, points, numbers, suffice, least):
+    scene = scenes[0]
+    for i in range(len(points)):
+        p = (points[i, 0], points[i, 1], points[i, 2])
+        choice = choose_by_distance(scene, p, n, stack_i4(LIST_WORDS))
+        suffice[i] = samples_by_distance_suffice(scene, choice, p)
+        least[i] = np.inf
+        for light in range(scene.n_lights):
+            m = expected_samples(scene, choice, light)
+            for j in range(len(numbers)):
+                _, _, _, pdf, _ = sample_one_light(scene, light, p, numbers[j, 0], numbers[j, 1])
+                if pdf > 0:
+                    least[i] = min(least[i], m * pdf)
 
 
 def rays(n, seed=1):
@@ -100,6 +119,26 @@ def test_where_samples_suffice_each_is_ten_times_as_dense_as_a_diffuse_lobe(scen
     _densities(flat.record, n, points, numbers, luminance / luminance.sum(), suffice, least)
     assert 0.05 < suffice.mean() < 0.99
     assert (least[suffice] >= 0.999 * 10 / math.pi).all()
+
+
+@pytest.mark.parametrize("scene", [light_scene("sphere", "mesh"), two_lights()], ids=lambda s: s.name)
+@pytest.mark.parametrize("n", [1, 8])
+def test_where_samples_by_distance_suffice_each_is_ten_times_as_dense(scene, n):
+    flat = flatten(scene)
+    rng = np.random.default_rng(3)
+    points = (rng.normal(size=(2000, 3)) * rng.uniform(0.1, 20, (2000, 1)) ** 2 / 20).astype(np.float32)
+    suffice, least = np.zeros(len(points), bool), np.zeros(len(points))
+    _densities_by_distance(flat.record, n, points, rng.random((64, 2), dtype=np.float32), suffice, least)
+    assert 0.05 < suffice.mean() < 0.99
+    assert (least[suffice] >= 0.999 * 10 / math.pi).all()
+
+
+def test_where_there_is_a_sky_samples_by_distance_never_suffice():
+    flat = flatten(light_scene("disk", "environment"))
+    points = np.random.default_rng(4).normal(size=(200, 3)).astype(np.float32)
+    suffice = np.ones(len(points), bool)
+    _densities_by_distance(flat.record, 8, points, np.zeros((0, 2), np.float32), suffice, np.zeros(len(points)))
+    assert not suffice.any()
 
 
 def floor_below(height, half):

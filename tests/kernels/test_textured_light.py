@@ -12,7 +12,7 @@ from scipy import stats
 from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.dimensions import EMITTER
-from pmviewer.kernels.lights.light import emit_photon, emitted, light_pdf, light_point, sample_light
+from pmviewer.kernels.lights.light import emit_photon, emitted, light_point
 from pmviewer.kernels.lights.textured_light import area_density, radiance_from, spread
 from pmviewer.kernels.random import INDEPENDENT, draw1, draw4
 from pmviewer.kernels.scene import light_of
@@ -21,6 +21,7 @@ from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.arrays.texture_coordinates import rectangle_of, square_uv
 from pmviewer.scene.description import LUMINANCE, Cylinder, Disk, Mesh, Parallelogram, Shape, Sphere
 from pmviewer.scene.texture import Bitmap, evaluate
+from tests.support.light_probe import light_pdf, sample_light
 from tests.support.scenes import diffuse_box
 
 RNG = np.random.default_rng(8)

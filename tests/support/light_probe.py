@@ -8,9 +8,16 @@ import numpy as np
 from scipy import stats
 
 from pmviewer.kernels.accel.raycast import closest_hit
-from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import EMITTER
-from pmviewer.kernels.lights.light import emit_photon, emitted, light_pdf, sample_light
+from pmviewer.kernels.lights.light import (
+    emit_photon,
+    emitted,
+    light_probability,
+    one_light_pdf,
+    pick_light,
+    sample_one_light,
+)
 from pmviewer.kernels.random import INDEPENDENT, SOBOL, draw1, draw4
 from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.surface import surface_at
@@ -50,6 +57,21 @@ MORE = {
     "directional": DirectionalLight("directional", unit(0.4, -1.0, 0.2), (2.0, 1.5, 1.0)),
     "image": ImageEnvironment("image", sky_pixels(), TURN),
 }
+
+
+@device
+def sample_light(scene, x, u_pick, u, v):
+    """A direction from the point x towards a light picked by power: as `sample_one_light`, with the density of the
+    light among all."""
+    light, probability, _ = pick_light(scene, u_pick)
+    wi, end, L, pdf, findable = sample_one_light(scene, light, x, u, v)
+    return wi, end, L, probability * pdf, findable
+
+
+@device
+def light_pdf(scene, light, x, p, ng, wi):
+    """Density per solid angle with which `sample_light` at x would have chosen direction wi to the light's point p."""
+    return light_probability(scene, light) * one_light_pdf(scene, light, x, p, ng, wi)
 
 
 @kernel

@@ -141,7 +141,7 @@ def as_of_3(text: str) -> str:
 
 
 def _linear(found: re.Match[str]) -> str:
-    """<rgb> of three numbers, or one, that an <srgb> has encoded."""
+    """<rgb> of three numbers, or one, that an <srgb> has encoded: not by the reader of files that is compared."""
     encoded = np.array([float(number) for number in found[2].replace(",", " ").split()])
     linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     return f'<rgb{found[1]}value="{" ".join(f"{c:.8g}" for c in linear)}"'

@@ -44,11 +44,11 @@ LEAST_KNOWN = 0.1
 CHOSEN = "; what a trial takes bias relative to, and how far it trusts it, was chosen with cornell_caustic too"
 """The denominator and SPREAD of `pmviewer.engine.auto.widths`, said in the target's own line."""
 CHOSEN_WAYS = (
-    "; what every way of such scenes has, such as caustics of lights alone, and light samples with several lights were "
-    "chosen with these scenes too"
+    "; what every way of such scenes has, such as caustics of lights alone and photons' roulette, light samples with "
+    "several lights and the choice of lights by distance were chosen with these scenes too"
 )
-"""LIGHTS_CAUSTICS, THICKER and WIDE_RECORDS of `pmviewer.engine.auto.candidates`, SEVERAL of
-`pmviewer.render.direct.samples`, likewise."""
+"""CHANNEL_ROULETTE, LIGHTS_CAUSTICS, THICKER and WIDE_RECORDS of `pmviewer.engine.auto.candidates`, SEVERAL of
+`pmviewer.render.direct.samples`, the automatic `direct.choice`, likewise."""
 CHOSEN_BIAS = "; the least and most that the bias may be were chosen with cornell_caustic"
 """TRUE_BIAS of `pmviewer.engine.auto.estimate`, likewise."""
 

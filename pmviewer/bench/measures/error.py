@@ -56,6 +56,9 @@ CHOSEN_WITH = ("ring_caustic", "cornell_caustic")
 """Scenes by which the denominator and SPREAD of `pmviewer.engine.auto.widths`, UNSURE and MISSED of
 `pmviewer.engine.auto.model`, LIGHTS_CAUSTICS of `pmviewer.engine.auto.candidates`, and what
 `pmviewer.engine.auto.choose` prefers were chosen: said in their targets' lines."""
+ROULETTE = "; photons' roulette was chosen with this scene among others"
+ROULETTE_WITH = ("cornell_caustic", "cornell_diffuse", "rooms_10x10")
+"""Scenes by which CHANNEL_ROULETTE of `pmviewer.engine.auto.candidates` was chosen, likewise."""
 AUTOMATIC_BUDGET = 8.0
 """Of the curves by what automatic mode chooses, over their target's seconds."""
 
@@ -203,7 +206,9 @@ def run(quick: bool = False) -> BenchResult:
     for target, scene, error, bound, _ in TARGETS:
         best = min((c for c in curves if c.scene == scene), key=lambda c: c.time_to(error))
         apart = TRIAL_APART if best.method.startswith(AUTOMATIC) else ""
-        apart += CHOSEN if apart and scene in CHOSEN_WITH else ""
+        if apart:
+            apart += CHOSEN if scene in CHOSEN_WITH else ""
+            apart += ROULETTE if scene in ROULETTE_WITH else ""
         note = f"{scene} to relMSE {error:g}, best: {best.method}{apart}"
         targets.append(Target(target, best.time_to(error), bound, "CPU s", False, note))
     if peers:

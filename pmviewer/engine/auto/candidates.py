@@ -32,13 +32,13 @@ class Candidate:
         return replace(self, values={**self.values, **values}, said=(*self.said, *said))
 
 
-BY_CHANNEL = {"photons.roulette": "channel maximum"}
+CHANNEL_ROULETTE = {"photons.roulette": "channel maximum"}
 """Photons keep their largest channel, not their luminance: of those that saturated colours reflect there are more, and
 none outgrows the others. relMSE after 3 CPU s over that by luminance, mean of three seeds: progressive 0.72 in
 cornell_glossy, 0.78 in colonnade, 0.86 in cornell_caustic, 0.87 in cornell_diffuse, 0.91 in museum, 0.99 in
 rooms_10x10; gather with the cache 0.95 to 1.02."""
-PROGRESSIVE = Candidate("progressive", BY_CHANNEL)
-GATHER = Candidate("gather", {"render.method": "gather", **BY_CHANNEL})
+PROGRESSIVE = Candidate("progressive", CHANNEL_ROULETTE)
+GATHER = Candidate("gather", {"render.method": "gather", **CHANNEL_ROULETTE})
 LIGHTS_CAUSTICS = {"photons.indirect_caustics": False}
 """The caustic map holds light straight from lights over mirrors and glass (Jensen's LS⁺D). What diffuse surfaces send
 there is broad and dim: as caustics it has their small radius, and few bright photons. relMSE after 2.5 CPU s over that
@@ -55,7 +55,7 @@ the same time in all bundled scenes tried, from 2 to 64 passes and from 64² to 
 shows."""
 CACHE = Candidate("gather with irradiance cache", {**GATHER.values, "gather.cache": "on", **WIDE_RECORDS})
 PATH = Candidate("path", {"render.method": "path"})
-GUIDED = {"importance.map": "average", "importance.emission": "Christensen keep", **BY_CHANNEL}
+GUIDED = {"importance.map": "average", "importance.emission": "Christensen keep", **CHANNEL_ROULETTE}
 
 
 def assignments(values: Mapping[str, Any]) -> dict[str, Any]:

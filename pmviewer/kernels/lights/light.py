@@ -42,7 +42,10 @@ from pmviewer.kernels.scene import (
     L_RADIANCE,
     L_RADIUS,
     MESH,
+    P_AREA,
+    P_RADIUS,
     PARALLELOGRAM,
+    PLACE_COLUMNS,
     POINT,
     PROJECTOR,
     SPHERE,
@@ -100,6 +103,15 @@ def is_delta_light(scene, light):
 def light_probability(scene, light):
     """That a photon starts at this light: its share of the power."""
     return load_f4(scene.light_cdf, light + 1) - load_f4(scene.light_cdf, light)
+
+
+@device
+def light_place(scene, light):
+    """Centre and radius of a ball around the light, the radius negative where its light comes from all around or from
+    far away, and the area that rays may meet."""
+    place = light * PLACE_COLUMNS
+    center = load3(scene.light_places, place)
+    return center, load_f4(scene.light_places, place + P_RADIUS), load_f4(scene.light_places, place + P_AREA)
 
 
 @device
@@ -168,15 +180,6 @@ def _sphere_cone(scene, light, x):
     if light_number(scene, light, L_FLIP) < _f4(0.0) or sin2 >= _f4(0.9999):
         return _f4(0.0)
     return sin2 / (_f4(1.0) + _f4(math.sqrt(_f4(1.0) - sin2)))
-
-
-@device
-def sample_light(scene, x, u_pick, u, v):
-    """A direction from the point x towards a light picked by power: as `sample_one_light`, with the density of the
-    light among all."""
-    light, probability, _ = pick_light(scene, u_pick)
-    wi, end, L, pdf, findable = sample_one_light(scene, light, x, u, v)
-    return wi, end, L, probability * pdf, findable
 
 
 @specialised
@@ -322,15 +325,10 @@ def environment_radiance(scene, d):
     return image
 
 
-@device
-def light_pdf(scene, light, x, p, ng, wi):
-    """Density per solid angle with which `sample_light` at x would have chosen direction wi to the light's point p."""
-    return light_probability(scene, light) * one_light_pdf(scene, light, x, p, ng, wi)
-
-
 @specialised
 def one_light_pdf(scene, light, x, p, ng, wi):
-    """The same for `sample_one_light`."""
+    """Density per solid angle with which `sample_one_light` at x would have chosen direction wi to the light's point p,
+    whose normal is ng."""
     if not has(scene, "more_lights"):
 
         def plain(scene, light, x, p, ng, wi):

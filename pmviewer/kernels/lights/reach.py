@@ -58,18 +58,12 @@ def _outside(x, low, high):
     return max(max(low - x, x - high), _f4(0.0))
 
 
-@specialised
-def samples_suffice(scene, n, p):
+@device
+def samples_by_power_suffice(scene, n, p):
     """Whether n samples of lights, chosen by power, find direct light at the point p of a Lambertian surface as well
     alone. A sample of a light of area A and probability P has a density of at least n·P·d²/A over directions, d being
-    the distance to the box; `lit_spread` is the largest A/P. In scenes with media, never."""
-    if has_media(scene):
-        return lambda scene, n, p: False
-
-    def by_distance(scene, n, p):
-        x = _outside(p[0], scene.lit_low_x, scene.lit_high_x)
-        y = _outside(p[1], scene.lit_low_y, scene.lit_high_y)
-        z = _outside(p[2], scene.lit_low_z, scene.lit_high_z)
-        return _f4(n) * (x * x + y * y + z * z) >= LEAST_RATIO * scene.lit_spread
-
-    return by_distance
+    the distance to the box; `lit_spread` is the largest A/P."""
+    x = _outside(p[0], scene.lit_low_x, scene.lit_high_x)
+    y = _outside(p[1], scene.lit_low_y, scene.lit_high_y)
+    z = _outside(p[2], scene.lit_low_z, scene.lit_high_z)
+    return _f4(n) * (x * x + y * y + z * z) >= LEAST_RATIO * scene.lit_spread

@@ -21,7 +21,8 @@ from pmviewer.maps.radiance import nearest_radiance_photon, radiance_photon_plac
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.render.cast import Hit, cast
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow
-from pmviewer.render.direct.choice import LIST_WORDS, choose, chosen_light
+from pmviewer.render.direct.choice import LIST_WORDS, chosen_light
+from pmviewer.render.direct.choose import choose
 from pmviewer.render.direct.shadow import UNKNOWN, known_visibility
 from pmviewer.render.hidden_lights import past_lights
 from pmviewer.render.lookup import irradiance, looked_up

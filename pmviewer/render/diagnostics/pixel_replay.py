@@ -16,7 +16,8 @@ from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.maps.virtual_lights import CLAMPED
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import arrive
-from pmviewer.render.direct.choice import LIST_WORDS, choose, expected_samples
+from pmviewer.render.direct.choice import LIST_WORDS, expected_samples
+from pmviewer.render.direct.choose import choose
 from pmviewer.render.given import opened
 from pmviewer.render.mirror_rays import take_sample
 from pmviewer.render.pixel import sampled_ray

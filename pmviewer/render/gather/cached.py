@@ -18,7 +18,7 @@ from pmviewer.kernels.bsdf.plain import INV_PI
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_sample, is_lambertian, shading_normal
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
-from pmviewer.kernels.dimensions import CROWDED
+from pmviewer.kernels.dimensions import OCCLUSION
 from pmviewer.kernels.lights.reach import may_meet_light
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.surface import leave
@@ -33,15 +33,15 @@ from pmviewer.render.gather.gather import gather_rays
 from pmviewer.render.straight import cast_straight
 
 _f4 = np.float32
-CROWDED_WITHIN = np.float32(0.5)
-"""Of the records' mean reach."""
+NEARBY = np.float32(0.5)
+"""How far the short ray goes, over the records' mean reach."""
 
 
 @device
-def is_crowded(given, si, pixel, length):
+def occluded_nearby(given, si, pixel, length):
     """Whether a ray of that length by the cosine meets something."""
     eye = given.eye
-    u, v, _, _ = draw4(eye.sequence, pixel.seed, eye.index, CROWDED)
+    u, v, _, _ = draw4(eye.sequence, pixel.seed, eye.index, OCCLUSION)
     x, y, z = square_to_cosine_hemisphere(u, v)
     wi = from_basis(si.ng, x, y, z)
     pixel.counts[C_RAYS] += 1
@@ -71,7 +71,7 @@ def cached(given, si, pixel, whole):
     def from_records(given, si, pixel, whole):
         if is_lambertian(si.bsdf):
             E, weight, reach = interpolate(given.cache, si.p, shading_normal(si.bsdf))
-            if weight > _f4(0.0) and not is_crowded(given, si, pixel, CROWDED_WITHIN * reach):
+            if weight > _f4(0.0) and not occluded_nearby(given, si, pixel, NEARBY * reach):
                 pixel.counts[C_CACHED] += 1
                 return E, np.int32(0)
         pixel.counts[C_GATHERED] += 1

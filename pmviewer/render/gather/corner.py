@@ -22,7 +22,8 @@ from pmviewer.kernels.vector import add, dot, largest, mul
 from pmviewer.maps.variant import ABSENT
 from pmviewer.render.chain import BLACK
 from pmviewer.render.counts import C_RAYS
-from pmviewer.render.direct.choice import LIST_WORDS, choose
+from pmviewer.render.direct.choice import LIST_WORDS
+from pmviewer.render.direct.choose import choose
 from pmviewer.render.direct.direct import direct_light, found_light
 from pmviewer.render.given import Sampler
 from pmviewer.render.reflect import reflected

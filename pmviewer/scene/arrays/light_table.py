@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pmviewer.errors import SceneError
 from pmviewer.kernels import scene as K
 from pmviewer.scene.arrays.glows import Glow
-from pmviewer.scene.arrays.shape_bounds import shape_bounds
+from pmviewer.scene.arrays.light_places import EVERYWHERE, Place, place_of_light, place_of_shape
 from pmviewer.scene.arrays.sky_table import sky_table
 from pmviewer.scene.description import (
     LUMINANCE,
@@ -37,23 +37,6 @@ from pmviewer.scene.projector import brightest_intensity, projector_arrays
 Float = NDArray[np.float32]
 BRIGHTEST = 1e32
 """Radiance or intensity, a factor of a million from the end of float32: squares of small distances divide it."""
-
-
-EVERYWHERE = (0.0, 0.0, 0.0, -1.0, math.inf)
-"""The place of light from all around."""
-
-
-def _ball_around(shape: Shape) -> tuple[float, float, float, float]:
-    """Centre and radius."""
-    low, high = shape_bounds(shape)
-    return *((low + high) / 2).tolist(), float(np.linalg.norm(high - low)) / 2
-
-
-def _place(light: Light) -> tuple[float, ...]:
-    """Of a light without a surface."""
-    if isinstance(light, PointLight | SpotLight | ProjectorLight):
-        return *light.position, 0.0, 0.0
-    return (0.0, 0.0, 0.0, -1.0, 0.0) if isinstance(light, DirectionalLight) else EVERYWHERE
 
 
 def _shines(shape: Shape) -> bool:
@@ -87,7 +70,7 @@ class LightTable:
         rows: list[list[float]] = []
         powers: list[NDArray[np.float64]] = []
         names: list[str] = []
-        places: list[tuple[float, ...]] = []
+        places: list[Place] = []
         triangles: list[NDArray[np.int64]] = [np.zeros(0, np.int64)]
         cdfs: list[NDArray[np.float64]] = [np.zeros(0)]
         listed = 0
@@ -115,7 +98,7 @@ class LightTable:
             row[K.L_AREA] = area
             self.of_shape[index] = len(rows)
             rows.append(row)
-            places.append((*_ball_around(shape), area))
+            places.append(place_of_shape(shape, area))
             powers.append(math.pi * area * np.array(shape.radiance))
             names.append(shape.name)
         self.sky: ImageEnvironment | None = None
@@ -127,7 +110,7 @@ class LightTable:
             if isinstance(light, ImageEnvironment):
                 self.sky, self._sky_table = light, sky_table(light.pixels)
             self.more = self.more or isinstance(light, SpotLight | ProjectorLight | DirectionalLight | ImageEnvironment)
-            places.append(_place(light))
+            places.append(place_of_light(light))
             powers.append(emitted_power(light, radius))
             rows.append(self._row(light))
             if isinstance(light, ProjectorLight):

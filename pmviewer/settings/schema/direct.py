@@ -59,7 +59,7 @@ class Direct(Group):
         "How light samples are spread over the lights. power: by the lights' power. distance: by power and distance "
         "from the point. photons: mostly by the photons that arrived from each light near the point. Keller-Wald: some "
         "samples for the lights with photons near, some for all others (§3). auto: photons with 8 lights or more, "
-        "distance otherwise and by the path tracer.",
+        "distance with fewer and, up to 64, by the path tracer.",
         section="Many lights",
         stage="image",
         scale="choice",
