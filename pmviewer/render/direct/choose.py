@@ -8,15 +8,15 @@ from pmviewer.kernels.lights.reach import samples_by_power_suffice
 from pmviewer.kernels.media.medium import has_media
 from pmviewer.render.direct.by_distance import choose_by_distance, samples_by_distance_suffice
 from pmviewer.render.direct.by_photons import choose_by_photons
-from pmviewer.render.direct.choice import BY_DISTANCE, BY_POWER, choose_by_power
+from pmviewer.render.direct.choice import BY_DISTANCE, BY_POWER, LISTED, choose_by_power
 
 
 @device
 def choose_without_photons(scene, eye, p, lights):
-    """The choice at p where no photons are asked: by distance where that is the rule, else by power. `lights`:
-    LIST_WORDS words for the list."""
+    """The choice at p where no photons are asked: by distance, or by power where that is the rule or lights are too
+    many. `lights`: LIST_WORDS words for the list."""
     choice = choose_by_power(lights, eye.light_samples)
-    if eye.choice == BY_DISTANCE:
+    if eye.choice != BY_POWER and scene.n_lights <= LISTED:
         choice = choose_by_distance(scene, p, eye.light_samples, lights)
     return choice
 

@@ -10,8 +10,8 @@ most of the error of the first passes; after some ten, photons do, and more samp
 SEVERAL = 4
 """With several lights, or light from all around: a sample knows of one of them alone. relMSE times CPU time after four
 passes over that of two samples, progressive and gather, lights chosen by distance, means of three seeds: cornell_lights
-0.59 and 0.59, colonnade 1.07 and 0.99, office 1.10 and 0.99, glass_egg 1.09 and 1.09, museum 1.17 and 1.08,
-rooms_10x10 (by photons) 1.07 and 1.00, skylight_room (one sky) 1.19 and 1.07. By power it was 0.38 to 0.97 in all but
+0.59 and 0.59, colonnade 1.07 and 0.99, glass_egg 1.09 and 1.09, museum 1.17 and 1.08, office 1.10 and 0.99 and
+rooms_10x10 1.07 and 1.00 (both by photons), skylight_room 1.19 and 1.07 (one sky). By power it was 0.38 to 0.97 in all but
 museum and rooms_10x10: four cost little where two would do."""
 
 
