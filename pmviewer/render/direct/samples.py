@@ -9,10 +9,9 @@ SAMPLES = 2
 most of the error of the first passes; after some ten, photons do, and more samples would only cost."""
 SEVERAL = 4
 """With several lights, or light from all around: a sample knows of one of them alone. relMSE times CPU time after four
-passes over that of two samples, progressive and gather, lights chosen by distance, means of three seeds: cornell_lights
-0.59 and 0.59, colonnade 1.07 and 0.99, glass_egg 1.09 and 1.09, museum 1.17 and 1.08, office 1.10 and 0.99 and
-rooms_10x10 1.07 and 1.00 (both by photons), skylight_room 1.19 and 1.07 (one sky). By power it was 0.38 to 0.97 in all but
-museum and rooms_10x10: four cost little where two would do."""
+passes over that of two samples, progressive and gather, means of three seeds: cornell_lights 0.59 and 0.59, colonnade
+1.07 and 0.99, glass_egg 1.09 and 1.09, museum 1.17 and 1.08, all by distance; office 1.10 and 0.99, rooms_10x10 1.07
+and 1.00, by photons; skylight_room, under one sky, 1.19 and 1.07. Four cost little where two would do."""
 
 
 def samples_at_surface(settings: Direct, path: bool, media: bool, several: bool) -> int:
