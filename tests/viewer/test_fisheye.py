@@ -49,6 +49,8 @@ def test_difference_is_orange_where_reprojection_is_brighter():
     text = described(seen)
     assert "88%" in text
     assert "1.57 W/m²" in text
+    assert "gathers as usual" in text
+    assert "takes 2.50 W/m²" in described(of(gathered, (-1, 0, 1), estimate=np.full(3, 2.5)))
     assert list(pictures(of(gathered, (0, 0, 1)), (0.0, 0.0, 0.0))) == ["gathered"]
 
 

@@ -44,7 +44,9 @@ def fisheye_of(rendered: RenderedPass, pixel: int, origin: Float, gather: Gather
     gathered, _ = seen(np.full(SOURCES, -1, np.int32))
     n, p = (sample[at : at + 3].astype(np.float64) for at in (NORMAL, POINT))
     wo = (origin - p) / max(float(np.linalg.norm(origin - p)), 1e-30)
+    taken = estimates.plane[pixel].astype(np.float64)
+    estimate = taken[:3] if taken[3] > 0 else None
     if known is None:
-        return Fisheye(gathered, n, axes[0], axes[1], wo)
+        return Fisheye(gathered, n, axes[0], axes[1], wo, estimate=estimate)
     reprojected, found = seen(known.sources(np.array([pixel], np.int32), pool)[0])
-    return Fisheye(gathered, n, axes[0], axes[1], wo, reprojected, ~found.reshape(sectors, rings).T)
+    return Fisheye(gathered, n, axes[0], axes[1], wo, reprojected, ~found.reshape(sectors, rings).T, estimate)

@@ -169,7 +169,8 @@ class Fisheye:
     """What a gather at the pixel's first surface sees: radiance `gathered` (rings, sectors, 3) by a ray in each cell of
     the hemisphere (`pmviewer.maps.hemisphere`), around the unit normal n with the tangents s and t, all of them and wo,
     the way to the viewer, (3,). `reprojected` (rings, sectors, 3) is what other gathers of the pass tell instead, and
-    `shot` (rings, sectors) where they tell too little; None without reprojection."""
+    `shot` (rings, sectors) where they tell too little; None without reprojection. `estimate` (3,) W/m² is what
+    the pass takes there, None where the pixel gathers as usual."""
 
     gathered: Float
     n: Float
@@ -178,6 +179,7 @@ class Fisheye:
     wo: Float
     reprojected: Float | None = None
     shot: NDArray[np.bool_] | None = None
+    estimate: Float | None = None
 
     def irradiance(self, radiance: Float) -> Float:
         """(3,) W/m² of one of both: cells have equal projected solid angles."""

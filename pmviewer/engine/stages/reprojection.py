@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from pmviewer.engine.pool import WorkPool
 from pmviewer.render.counts import N_COUNTS
 from pmviewer.render.gather.estimation import ESTIMATE, SAMPLE, TOLD
+from pmviewer.render.gather.pooling import pool_gathers
 from pmviewer.render.gather.reprojection import FULL, NOT_GATHERED, PARTIAL, SOURCES, gather_reprojected, sources_of
 from pmviewer.render.gather.zbuffer import HIT
 from pmviewer.render.given import PassData
@@ -83,6 +84,7 @@ class KnownHits:
         counts = np.zeros(N_COUNTS, np.int64)
         for chosen, sources in self._steps(corners, pool):
             counts += self._gather(given, chosen, sources, estimates, told, pool)
+            self._pool(given, chosen, estimates, told, pool)
         return counts
 
     def sources(self, pixels: NDArray[np.int32], pool: WorkPool) -> NDArray[np.int32]:
@@ -153,6 +155,23 @@ class KnownHits:
         how[pixels[good & full]], how[pixels[good & ~full]] = FULL, PARTIAL
         return np.asarray(sum(counts))
 
+    def _pool(
+        self,
+        given: PassData,
+        pixels: NDArray[np.int32],
+        estimates: NDArray[np.float32],
+        told: NDArray[np.float32],
+        pool: WorkPool,
+    ) -> None:
+        """Full gathers among `pixels` take what others around them have found."""
+        full = pixels[(self.how.reshape(-1)[pixels] == FULL) & ~self.anew[pixels]]
+        others = self.sources(full, pool)
+        near = (others >= 0).any(axis=1)
+        full, sources = full[near], np.column_stack([full, others])[near]
+        known, batch = (self.begin, self.count, self.hits), max(1, BATCH_HITS // self.cells)
+        pooled = partial(pool_gathers, given, full, sources, self.samples, known, self.rule, estimates, told)
+        pool.run([partial(pooled, first, min(first + batch, len(full))) for first in range(0, len(full), batch)])
+
 
 def prepare_reprojection(given: PassData) -> None:
     """Call every kernel of this stage once, on nothing. given: as for the eye pass, with a record of estimates."""
@@ -163,3 +182,4 @@ def prepare_reprojection(given: PassData) -> None:
     rule, counts = rule_of(Gather(), 1.0), np.zeros(N_COUNTS, np.int64)
     made = np.empty(0, np.int32)
     gather_reprojected(given, nobody, sources, samples, no_hits(), rule, plane, told, hits, made, counts, (0, 0))
+    pool_gathers(given, nobody, np.empty((0, SOURCES + 1), np.int32), samples, no_hits(), rule, plane, told, 0, 0)

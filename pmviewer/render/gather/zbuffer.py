@@ -39,6 +39,9 @@ EMPTY = -1
 HIDING = -2
 COARSEST = 4.0
 """A hit that would cover more cells than this hides what is behind it, and tells no radiance."""
+WIDEST = 64.0
+"""A hit hides no more cells than this. Near surfaces whose hits covered less than they do here would have holes,
+through which darkness or light from far behind them comes."""
 
 
 class Hemisphere(NamedTuple):
@@ -97,7 +100,7 @@ def plot(view, hits, row, points, depth, owner):
             who = _i4(HIDING - row)
         cells = hits[row, PATCH] * cos * abs(facing) / (z * z)
         if not cells < _f4(COARSEST):
-            who, cells = _i4(HIDING - row), _f4(COARSEST)
+            who, cells = _i4(HIDING - row), min(cells, _f4(WIDEST))
     rings, sectors = view.rings * view.parts, view.sectors * view.parts
     x, y = dot(d, view.s), dot(d, view.t)
     radius2 = min(x * x + y * y, _f4(1.0))

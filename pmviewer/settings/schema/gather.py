@@ -269,15 +269,15 @@ class Gather(Group):
     reprojection: Literal["off", "on"] = setting(
         "off",
         "Final gather reprojection: gathers of divided tiles take the hit points of full gathers around them as they "
-        "are seen from there, and cast rays only where these tell too little (course guide §6.3.3). Pays with many "
-        "estimation samples.",
+        "are seen from there, and cast rays only where these tell too little (course guide §6.3.3); full gathers take "
+        "what those around them have found besides their own. Pays with many estimation samples.",
         section="Final gather reprojection",
         stage="image",
         scale="choice",
         needs=(ESTIMATION,),
     )
     reprojection_cover: float = setting(
-        0.5,
+        0.25,
         "Share of a direction's cell that known hit points must cover in the first pass, else a ray is cast there. In "
         "later passes it grows towards all of it.",
         stage="image",

@@ -76,13 +76,16 @@ def described(of: Fisheye) -> str:
         f"Radiance of the {of.gathered.shape[0] * of.gathered.shape[1]} directions of a full gather here, latest pass, "
         f"seen along the normal, viewer to the left; white: {BRIGHTEST:g} % are darker. Irradiance {si(E, 'W/m²')}"
     )
+    taken = "; the pass gathers as usual here"
+    if of.estimate is not None:
+        taken = f"; the pass takes {si(float(luminance(of.estimate)), 'W/m²')}"
     if of.reprojected is None or of.shot is None:
-        return text + "."
+        return f"{text}{taken}."
     ours = float(luminance(of.irradiance(of.reprojected)))
     return (
-        f"{text}; reprojected {si(ours, 'W/m²')}. {1 - of.shot.mean():.0%} of the directions are what full gathers "
-        "near it know, the others are gathered here in both. Difference: orange where reprojection is brighter, blue "
-        "where it is darker."
+        f"{text}; reprojected {si(ours, 'W/m²')}{taken}. {1 - of.shot.mean():.0%} of the directions are what full "
+        "gathers near it know, the others are gathered here in both. Difference: orange where reprojection is "
+        "brighter, blue where it is darker."
     )
 
 
