@@ -43,7 +43,7 @@ OFF_PLANE = np.float32(0.1)
 """A point farther than so many ρ off a record's plane is on another surface."""
 NEAREST = np.float32(1e-3)
 """Errors below this weigh the same."""
-FEWEST_OF_PART, MOST_PARTS = 512, 32
+FEWEST_OF_PART, MOST_PARTS = 128, 32
 """Records of a task, and tasks."""
 
 RECORD = np.dtype(

@@ -175,7 +175,7 @@ def test_limits_do_not_depend_on_how_the_work_is_shared(monkeypatch):
     for most in (1, 3, 32):
         monkeypatch.setattr(irradiance_cache, "MOST_PARTS", most)
         cache = build_cache(rows.copy(), recipe())
-        limit_by_neighbours(cache, lambda tasks: [task() for task in reversed(tasks)])
+        limit_by_neighbours(cache, lambda tasks: [task() for task in reversed(tasks)][::-1])
         found.append(cache.rows)
     assert (found[0] < rows[:, : found[0].shape[1]]).any()
     for other in found[1:]:

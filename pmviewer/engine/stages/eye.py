@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,8 @@ from pmviewer.render.path import path_pass
 from pmviewer.render.share import share_samples, weigh_samples
 from pmviewer.settings.access import Settings
 
+SELDOM = 8
+"""Of so many pixels at most one gathers where irradiance is cached."""
 LEAST_TILE = 4
 """Fewest pixels that a task is divided into."""
 SHARED_TILE = 4096
@@ -40,10 +42,9 @@ MOST_POINTS = 1024
 
 def render_into(film: Film, given: PassData, marks: NDArray[np.uint8], plan: Plan, pool: WorkPool) -> NDArray[np.int64]:
     """A pass's samples more, of the path tracer or by maps. Returns the counts of `pmviewer.render.counts`."""
-    spans = film.spans()
-    tile = tile_size(
-        sum(last - first for first, last in spans), given.eye[0], pool.threads, lights_asked(given.virtual)
-    )
+    spans = tuple(film.spans())
+    pixels, lights = sum(last - first for first, last in spans), lights_asked(given.virtual)
+    tile = tile_size(pixels, given.eye[0], pool.threads, lights, plan.cache)
 
     def traced(own: PassData, sums: NDArray[np.float64], counts: NDArray[np.int64], first: int, last: int) -> None:
         if plan.path:
@@ -69,7 +70,7 @@ def render_into(film: Film, given: PassData, marks: NDArray[np.uint8], plan: Pla
 
     if not plan.filtered:
         return sum(pool.run([partial(alone, parts) for parts in _tiled(spans, tile)]), np.zeros(N_COUNTS, np.int64))
-    around = film.spans(around=int(given.eye[0]["filter_reach"]))
+    around = tuple(film.spans(around=int(given.eye[0]["filter_reach"])))
     samples = film.own_samples
     counts = sum(pool.run([partial(sampled, parts) for parts in _tiled(around, tile)]), np.zeros(N_COUNTS, np.int64))
     _share(film, given, marks, spans, pool)
@@ -77,7 +78,7 @@ def render_into(film: Film, given: PassData, marks: NDArray[np.uint8], plan: Pla
 
 
 def _share(
-    film: Film, given: PassData, marks: NDArray[np.uint8], spans: Sequence[tuple[int, int]], pool: WorkPool
+    film: Film, given: PassData, marks: NDArray[np.uint8], spans: tuple[tuple[int, int], ...], pool: WorkPool
 ) -> None:
     """Add what the pixels of the pass have sampled to the film, as its filter shares it."""
     weights = np.empty((2, 2 * int(given.eye[0]["filter_reach"]) + 1), np.float32)
@@ -95,7 +96,8 @@ def _share(
     pool.run([partial(shared, parts) for parts in _tiled(spans, SHARED_TILE)])
 
 
-def _tiled(spans: Sequence[tuple[int, int]], tile: int) -> list[list[tuple[int, int]]]:
+@lru_cache(maxsize=8)
+def _tiled(spans: tuple[tuple[int, int], ...], tile: int) -> list[list[tuple[int, int]]]:
     """Spans of pixels in tasks of some `tile` pixels, short spans together, long ones divided; the last quarter of all
     pixels in tasks of a quarter, so that threads end together."""
     tasks: list[list[tuple[int, int]]] = []
@@ -117,12 +119,13 @@ def _tiled(spans: Sequence[tuple[int, int]], tile: int) -> list[list[tuple[int, 
     return tasks
 
 
-def tile_size(pixels: int, eye: np.void, threads: int, virtual_lights: int = 0) -> int:
+def tile_size(pixels: int, eye: np.void, threads: int, virtual_lights: int = 0, cached: bool = False) -> int:
     """Pixels a task, so that a task takes at most some 15 ms and many threads end together: what a tile costs differs
     by what it shows. The picture does not depend on it."""
     keller_wald = eye["choice"] == CHOICES.index("Keller-Wald")
     light_samples = int(eye["con_samples"] + eye["noncon_samples"] if keller_wald else eye["light_samples"])
-    work = 1 + int(eye["gather_rays"]) + light_samples // 4 + virtual_lights // 2
+    rays = int(eye["gather_rays"])
+    work = 1 + (rays // SELDOM if cached else rays) + light_samples // 4 + virtual_lights // 2
     return max(64 if virtual_lights < 64 else LEAST_TILE, min(4096 // work, -(-pixels // (4 * threads))))
 
 

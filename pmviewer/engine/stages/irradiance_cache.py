@@ -28,7 +28,7 @@ from pmviewer.maps.irradiance_cache import (
     build_cache,
     encode_records,
 )
-from pmviewer.maps.irradiance_limits import limit_by_neighbours
+from pmviewer.maps.irradiance_limits import limit_by_neighbours, prepare_limits
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.counts import N_COUNTS
 from pmviewer.render.gather.cache_fill import fill_records
@@ -93,7 +93,7 @@ def fill_cache(given: PassData, record: NDArray[np.void], pool: WorkPool) -> tup
         total += sum(pool.run(tasks), np.zeros(N_COUNTS, np.int64))
         if made.any():
             cache = _extended(cache, rows[made], pool.run)
-    return cache, total
+    return build_cache(cache.rows, cache.record, pool.run), total
 
 
 def _filled(
@@ -120,6 +120,7 @@ def prepare_cache(given: PassData) -> None:
     """Call every kernel of this stage once, on nothing."""
     none = np.empty((0, ROW), np.float32)
     cache = _extended(build_cache(none, np.zeros(1, RECORD)), none, in_turn)
+    prepare_limits(cache)
     rows, made, counts = np.empty((0, ROW), np.float32), np.empty(0, bool), np.zeros(N_COUNTS, np.int64)
     fill_records(given._replace(cache=cache.record), np.empty(0, np.int32), rows, made, counts, 0, 0)
     cache_cloud(cache)
@@ -128,7 +129,7 @@ def prepare_cache(given: PassData) -> None:
 def _extended(cache: IrradianceCache, rows: NDArray[np.float32], run: Runner) -> IrradianceCache:
     together = build_cache(np.concatenate([cache.rows, rows]), cache.record, run)
     limit_by_neighbours(together, run)
-    return build_cache(together.rows, cache.record, run)
+    return together
 
 
 def cache_cloud(cache: IrradianceCache) -> tuple[NDArray[np.float32], float]:
