@@ -16,6 +16,9 @@ from pmviewer.render.planes import CHANNELS, TERMS_END
 from pmviewer.render.share import OWN_COLUMNS
 from pmviewer.state import State
 
+Spans = tuple[tuple[int, int], ...]
+"""First and last + 1 of runs of pixels, row by row."""
+
 
 @kernel
 def resolve(sums, passes, out, first, last):
@@ -115,15 +118,15 @@ class Film:
         if before is not None:
             self.add(before, first)
 
-    def spans(self, index: int | None = None, around: int = 0) -> list[tuple[int, int]]:
-        """First and last + 1 of the pixels, row by row, that pass `index` renders, the next one without; with those so
-        far around them."""
+    def spans(self, index: int | None = None, around: int = 0) -> Spans:
+        """The pixels that pass `index` renders, the next one without; with those so far
+        around them."""
         if self.region is None or (self.passes if index is None else index) == 0:
-            return [(0, len(self.sums))]
+            return ((0, len(self.sums)),)
         x0, y0, x1, y1 = self.region
         x0, y0 = max(x0 - around, 0), max(y0 - around, 0)
         x1, y1 = min(x1 + around, self.width), min(y1 + around, self.height)
-        return [(y * self.width + x0, y * self.width + x1) for y in range(y0, y1)]
+        return tuple((y * self.width + x0, y * self.width + x1) for y in range(y0, y1))
 
     @property
     def refined(self) -> NDArray[np.bool_] | None:

@@ -32,13 +32,13 @@ def test_inside_all_passes_outside_the_first(filtered):
 
 
 def test_every_pixel_is_in_one_task():
-    spans = [(7, 12), (27, 32), (100, 200), (300, 301)]
+    spans = (7, 12), (27, 32), (100, 200), (300, 301)
     tasks = _tiled(spans, 16)
     parts = [part for task in tasks for part in task]
     assert [i for a, b in parts for i in range(a, b)] == [i for a, b in spans for i in range(a, b)]
     assert max(sum(b - a for a, b in task) for task in tasks) <= 16
     quarters = [[(at, at + 4)] for at in range(48, 64, 4)]
-    assert _tiled([(0, 64)], 16) == [[(0, 16)], [(16, 32)], [(32, 48)], *quarters]
+    assert _tiled(((0, 64),), 16) == [[(0, 16)], [(16, 32)], [(32, 48)], *quarters]
 
 
 def test_a_region_has_a_pixel_at_least_whichever_end_comes_first():

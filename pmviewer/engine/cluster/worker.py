@@ -199,7 +199,7 @@ def _rendered(asked: Asked, pool: WorkPool) -> Rendered:
     spans = renderer.film.spans(asked.index)
     tally, told = renderer.tally.take(asked.index), renderer.told()
     written = None
-    if asked.handle is not None and spans == [(0, len(increment.sums))]:
+    if asked.handle is not None and spans == ((0, len(increment.sums)),):
         written = _bench.writer.write(asked.run, asked.handle, increment)
     return Rendered(written or pack(increment, spans), tally, told, time.perf_counter() - start)
 

@@ -20,7 +20,7 @@ from pmviewer.render.counts import N_COUNTS
 from pmviewer.render.direct.choice import CHOICES
 from pmviewer.render.direct.outline import outline_pixels
 from pmviewer.render.eye import eye_pass
-from pmviewer.render.film import Film
+from pmviewer.render.film import Film, Spans
 from pmviewer.render.filter import BOX, filter_of
 from pmviewer.render.gather.gather_points import POINT_COLUMNS, gather_points
 from pmviewer.render.given import PassData
@@ -42,7 +42,7 @@ MOST_POINTS = 1024
 
 def render_into(film: Film, given: PassData, marks: NDArray[np.uint8], plan: Plan, pool: WorkPool) -> NDArray[np.int64]:
     """A pass's samples more, of the path tracer or by maps. Returns the counts of `pmviewer.render.counts`."""
-    spans = tuple(film.spans())
+    spans = film.spans()
     pixels, lights = sum(last - first for first, last in spans), lights_asked(given.virtual)
     tile = tile_size(pixels, given.eye[0], pool.threads, lights, plan.cache)
 
@@ -70,16 +70,14 @@ def render_into(film: Film, given: PassData, marks: NDArray[np.uint8], plan: Pla
 
     if not plan.filtered:
         return sum(pool.run([partial(alone, parts) for parts in _tiled(spans, tile)]), np.zeros(N_COUNTS, np.int64))
-    around = tuple(film.spans(around=int(given.eye[0]["filter_reach"])))
+    around = film.spans(around=int(given.eye[0]["filter_reach"]))
     samples = film.own_samples
     counts = sum(pool.run([partial(sampled, parts) for parts in _tiled(around, tile)]), np.zeros(N_COUNTS, np.int64))
     _share(film, given, marks, spans, pool)
     return counts
 
 
-def _share(
-    film: Film, given: PassData, marks: NDArray[np.uint8], spans: tuple[tuple[int, int], ...], pool: WorkPool
-) -> None:
+def _share(film: Film, given: PassData, marks: NDArray[np.uint8], spans: Spans, pool: WorkPool) -> None:
     """Add what the pixels of the pass have sampled to the film, as its filter shares it."""
     weights = np.empty((2, 2 * int(given.eye[0]["filter_reach"]) + 1), np.float32)
     weigh_samples(given.eye, weights)
@@ -97,7 +95,7 @@ def _share(
 
 
 @lru_cache(maxsize=8)
-def _tiled(spans: tuple[tuple[int, int], ...], tile: int) -> list[list[tuple[int, int]]]:
+def _tiled(spans: Spans, tile: int) -> Sequence[Sequence[tuple[int, int]]]:
     """Spans of pixels in tasks of some `tile` pixels, short spans together, long ones divided; the last quarter of all
     pixels in tasks of a quarter, so that threads end together."""
     tasks: list[list[tuple[int, int]]] = []

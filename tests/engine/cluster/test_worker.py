@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from pmviewer.engine import memory
 from pmviewer.engine.cluster import worker
+from pmviewer.engine.cluster.packed import PackedIncrement, unpack
+from pmviewer.engine.cluster.shared_memory import Segment, Written
 from pmviewer.engine.cluster.worker import (
     Asked,
     Failed,
@@ -61,6 +67,23 @@ def test_what_goes_wrong_is_told(monkeypatch):
     monkeypatch.undo()
     hold_scene(packed_scene(open_scene("cornell_diffuse")), "scene")
     assert isinstance(render_pass(asked()), Rendered), "and the worker goes on"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no such memory on this system")
+@pytest.mark.parametrize("region", [False, True])
+def test_whole_passes_are_written_to_memory_that_is_lent(region):
+    """And what they add there is what travels otherwise; passes of a region travel."""
+    hold_scene(packed_scene(open_scene("cornell_diffuse")), "scene")
+    values = {"region.on": region, "region.right": 0.5, "region.bottom": 0.5}
+    travels = render_pass(asked(index=1, **values))
+    assert isinstance(travels.increment, PackedIncrement)
+    segment = Segment(1 << 20)
+    there = render_pass(replace(asked(index=1, **values), handle=segment.handle))
+    assert isinstance(there.increment, PackedIncrement if region else Written)
+    if not region:
+        sent = unpack(travels.increment, np.zeros(there.increment.columns)).sums
+        assert np.array_equal(segment.increment(there.increment).sums, sent)
+    segment.close()
 
 
 @pytest.mark.parametrize("values", [{}, {"overlays.global.show": True, "edit.changes": {"light.1.power": 2.0}}])
