@@ -100,7 +100,8 @@ def plot(view, hits, row, points, depth, owner):
             who = _i4(HIDING - row)
         cells = hits[row, PATCH] * cos * abs(facing) / (z * z)
         if not cells < _f4(COARSEST):
-            who, cells = _i4(HIDING - row), min(cells, _f4(WIDEST))
+            who = _i4(HIDING - row)
+            cells = cells if cells < _f4(WIDEST) else _f4(WIDEST)  # also where it is no number
     rings, sectors = view.rings * view.parts, view.sectors * view.parts
     x, y = dot(d, view.s), dot(d, view.t)
     radius2 = min(x * x + y * y, _f4(1.0))
