@@ -67,6 +67,8 @@ COMPARED = (
 """Whose CPU time is compared with whose."""
 FULL, DIFFERENCE = 4.0, 2.0
 """Per cent of the safe pixels that gather in full, and of the difference."""
+LONG = "as long as car_cabin needs, where few photons arrive"
+"""How the time of the curves was chosen."""
 LEAST = 0.01
 """Per cent that two references can tell at best: their noise may well make less of it, or nothing."""
 FULL_REPROJECTED, RAYS_A_PIXEL = 2.0, 19.0
@@ -266,7 +268,7 @@ def run(quick: bool = False) -> BenchResult:
                     rows.append([name, method, p.passes, p.cpu, p.pixels, p.blocks])
                 last = points[-1]
                 if method == "gather estimation":
-                    note = f"{name}: difference by blocks of {BLOCK} × {BLOCK} after {last.cpu:.0f} CPU s"
+                    note = f"{name}: difference by blocks of {BLOCK} × {BLOCK} after {last.cpu:.0f} CPU s, {LONG}"
                     targets.append(Target("R7", last.blocks, DIFFERENCE, "%", False, note))
             targets += times(name, curves)
     finally:
