@@ -30,8 +30,8 @@ from pmviewer.render.path import path_pass
 from pmviewer.render.share import share_samples, weigh_samples
 from pmviewer.settings.access import Settings
 
-SELDOM = 8
-"""Of so many pixels at most one gathers where irradiance is cached."""
+PIXELS_A_GATHER = 8
+"""At least, where irradiance is cached: the others find it there."""
 LEAST_TILE = 4
 """Fewest pixels that a task is divided into."""
 SHARED_TILE = 4096
@@ -123,7 +123,7 @@ def tile_size(pixels: int, eye: np.void, threads: int, virtual_lights: int = 0, 
     keller_wald = eye["choice"] == CHOICES.index("Keller-Wald")
     light_samples = int(eye["con_samples"] + eye["noncon_samples"] if keller_wald else eye["light_samples"])
     rays = int(eye["gather_rays"])
-    work = 1 + (rays // SELDOM if cached else rays) + light_samples // 4 + virtual_lights // 2
+    work = 1 + (rays // PIXELS_A_GATHER if cached else rays) + light_samples // 4 + virtual_lights // 2
     return max(64 if virtual_lights < 64 else LEAST_TILE, min(4096 // work, -(-pixels // (4 * threads))))
 
 

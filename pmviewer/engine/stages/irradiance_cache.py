@@ -93,6 +93,7 @@ def fill_cache(given: PassData, record: NDArray[np.void], pool: WorkPool) -> tup
         total += sum(pool.run(tasks), np.zeros(N_COUNTS, np.int64))
         if made.any():
             cache = _extended(cache, rows[made], pool.run)
+    # Reaches have shrunk since it was indexed: narrower cells for the many look-ups of the eye pass.
     return build_cache(cache.rows, cache.record, pool.run), total
 
 
@@ -127,6 +128,7 @@ def prepare_cache(given: PassData) -> None:
 
 
 def _extended(cache: IrradianceCache, rows: NDArray[np.float32], run: Runner) -> IrradianceCache:
+    """With records more, each limited by its neighbours."""
     together = build_cache(np.concatenate([cache.rows, rows]), cache.record, run)
     limit_by_neighbours(together, run)
     return together

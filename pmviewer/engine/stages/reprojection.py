@@ -3,9 +3,10 @@
 What gathers of the pass have shot is kept until the next one: `KnownHits`. In each round of
 `pmviewer.engine.stages.estimation` the corners that have to gather do so in two steps: those near which too little is
 known gather in full, some of them first, so that the others find them; the rest takes what the full gathers around it
-know. A share of the corners that grows with the pass gathers in full whatever is known, and the cover that hits must
-have of a cell tends to all of it, as fast as radii shrink, so that in the limit nothing is reprojected. Every step
-depends on the steps before alone, and nothing on threads.
+know. Full gathers of a step then take what those around them have found (`pmviewer.render.gather.pooling`). A share of
+the corners that grows with the pass gathers in full whatever is known, and the cover that hits must have of a cell
+tends to all of it, as fast as radii shrink, so that in the limit nothing is reprojected. Every step depends on the
+steps before alone, and nothing on threads.
 """
 
 from __future__ import annotations

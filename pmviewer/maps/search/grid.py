@@ -174,6 +174,15 @@ def grid_ranges(grid, px, py, pz, radius, ranges):
 
 
 @device
+def thinning_step(ranges, runs, most):
+    """Every how many blocks a look-up visits so that it meets some `most` photons of its runs, evenly thinned."""
+    candidates = _i8(0)
+    for k in range(runs):
+        candidates += _i8(stack_get_i4(ranges, 2 * k + 1)) - _i8(stack_get_i4(ranges, 2 * k))
+    return _i8(1) + candidates // _i8(most)
+
+
+@device
 def lanes_between(first, end, block):
     """Mask of those of the eight photons of a block that lie in first … end−1."""
     mask = _i4(0xFF)

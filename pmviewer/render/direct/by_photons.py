@@ -20,7 +20,7 @@ from pmviewer.kernels.memory import (
     stack_put_i4,
 )
 from pmviewer.maps.search.disc import Disc
-from pmviewer.maps.search.grid import counted_in_block, grid_ranges
+from pmviewer.maps.search.grid import counted_in_block, grid_ranges, thinning_step
 from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.render.direct.choice import KELLER_WALD, LISTED, choose_by_power
@@ -63,10 +63,7 @@ def lights_near(grid, n_lights, radius, p, n, lights):
     radius = min(radius, grid.radius)
     disc = Disc(p, n, radius * radius, radius, _i4(ALL_CLASSES))
     runs = grid_ranges(grid, p[0], p[1], p[2], radius, ranges)
-    candidates = _i8(0)
-    for k in range(runs):
-        candidates += _i8(stack_get_i4(ranges, 2 * k + 1)) - _i8(stack_get_i4(ranges, 2 * k))
-    step = _i8(1) + candidates // _i8(MOST_CANDIDATES)
+    step = thinning_step(ranges, runs, MOST_CANDIDATES)
     for k in range(runs):
         first, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
         for block in range(first // WIDTH, (end - 1) // WIDTH + 1, step):

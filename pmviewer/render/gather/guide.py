@@ -37,7 +37,7 @@ from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import basis, dot, luminance, normalize, scale
 from pmviewer.maps.photon_words import decode_direction, decode_powers
 from pmviewer.maps.search.disc import Disc
-from pmviewer.maps.search.grid import PhotonGrid, counted_in_block, grid_ranges
+from pmviewer.maps.search.grid import PhotonGrid, counted_in_block, grid_ranges, thinning_step
 from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH
 from pmviewer.maps.variant import ABSENT, Mark, marked
 from pmviewer.render.direct.direct import power_heuristic
@@ -85,10 +85,7 @@ def photons_near(grid, class_mask, p, n, seed, most, found):
     radius = grid.radius
     disc = Disc(p, n, radius * radius, radius, _i4(class_mask))
     runs = grid_ranges(grid, p[0], p[1], p[2], radius, ranges)
-    candidates = _i8(0)
-    for k in range(runs):
-        candidates += _i8(stack_get_i4(ranges, 2 * k + 1)) - _i8(stack_get_i4(ranges, 2 * k))
-    step = _i8(1) + candidates // _i8(MOST_CANDIDATES)
+    step = thinning_step(ranges, runs, MOST_CANDIDATES)
     seen = _i8(0)
     state = _u4(seed)
     for k in range(runs):
