@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,16 +30,13 @@ from pmviewer.engine.method import Plan, plan_of, radii_of_pixels
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import first_radius
-from pmviewer.engine.stages.estimation import estimate_gathers
 from pmviewer.engine.stages.eye import gather_rays_of, marks_of, render_into
 from pmviewer.engine.stages.importance import ImportanceStage
-from pmviewer.engine.stages.irradiance_cache import fill_cache, recipe
 from pmviewer.engine.stages.light import LightStage
-from pmviewer.engine.stages.pass_data import RenderedPass, pass_data, pass_record
-from pmviewer.engine.stages.pass_maps import Carried, PassMaps
-from pmviewer.engine.stages.shadow_photons import ShadowStage
-from pmviewer.engine.stages.thin_glass import with_thin_glass
-from pmviewer.engine.stages.virtual_lights import VirtualStage, film_of
+from pmviewer.engine.stages.pass_data import RenderedPass
+from pmviewer.engine.stages.pass_maps import Carried
+from pmviewer.engine.stages.pass_stages import MadeAhead, PassStages
+from pmviewer.engine.stages.virtual_lights import film_of
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
 from pmviewer.engine.told import Told, told_of
@@ -107,13 +105,10 @@ class Renderer:
         self.settled_radius = self.first_radius
         """Of the film's first pass; the first radius of a coarse picture is larger."""
         self.tally = Tally()
-        scene = self._lit = with_thin_glass(scene, settings, self.plan)
-        self.light = LightStage(scene, settings, self.plan, pool, store, self.tally)
-        self.importance = ImportanceStage(
+        self._stages = PassStages(
             scene, settings, self.plan, self.render_camera, self.first_radius, pool, store, self.tally
         )
-        self.shadows = ShadowStage(scene, settings, pool, store, self.tally)
-        self.virtual = VirtualStage(scene, settings, pool, store, self.tally)
+        self._next: MadeAhead | None = None
         self.latest: RenderedPass | None = None
         self.coarse_pass: RenderedPass | None = None
         """What made the coarse frame, until the first pass."""
@@ -121,6 +116,16 @@ class Renderer:
         self._told: Told | None = None
         self._marks: NDArray[np.uint8] | None = None
         self._watched = Watched()
+
+    @property
+    def light(self) -> LightStage:
+        """Photons and maps of the latest pass."""
+        return self._stages.light
+
+    @property
+    def importance(self) -> ImportanceStage:
+        """Importance in the latest pass."""
+        return self._stages.importance
 
     @property
     def passes(self) -> int:
@@ -147,10 +152,22 @@ class Renderer:
 
         Raises Cancelled, leaving the film unusable, when the pool is cancelled meanwhile.
         """
-        start = time.perf_counter()
-        self._pass(self.film, self.camera, self.passes, self.settings.photons.N)
+        start, index, N = time.perf_counter(), self.passes, self.settings.photons.N
+        try:
+            made = self._taken(index) or self._maps(self.film, self.camera, index, N)
+            self._make_ahead(made, index + 1, N)
+            self._eye_pass(made, self.film)
+        except BaseException:
+            self.drop()
+            raise
         self._close_pass()
         self.tally.seconds += time.perf_counter() - start
+
+    def drop(self) -> None:
+        """Make nothing ahead of what is asked for: nobody will ask for it."""
+        if self._next is not None:
+            self._next.drop()
+            self._next = None
 
     def increment(self, index: int, lent: bool = False) -> Increment:
         """What pass `index` adds to the film, which stays as it is: `add` takes it, here or elsewhere. `lent` arrays
@@ -227,7 +244,7 @@ class Renderer:
             if index < passes - 1 and radii_of_pixels(self.facts):
                 self.step()  # what pixels found decides about the next pass
             else:
-                self._light(self.film, index, self.settings.photons.N)
+                self._stages.run_light(index, self.settings.photons.N, self._radii_of_pixels(self.film))
         return self.light.photons
 
     def coarse_frame(self, serial: int, wanted: Wanted | None = None) -> Frame:
@@ -297,45 +314,35 @@ class Renderer:
         return Looked(self.scene, self.settings, self.plan, self.camera, film, *stages, self._watched)
 
     def _pass(self, film: Film, camera: CameraPose, index: int, N: int) -> None:
-        made = self._maps(film, camera, index, N)
-        self.tally.timed(self.pool, "camera pass", lambda: self._eye_pass(made, film))
+        self._eye_pass(self._maps(film, camera, index, N), film)
 
     def _maps(self, film: Film, camera: CameraPose, index: int, N: int, again: bool = False) -> RenderedPass:
         """All of pass `index` but its picture; `again` for a pass that is in the film already."""
-        settings, plan, tally, pool = self.settings, self.plan, self.tally, self.pool
-        maps = self._light(film, index, N, again)
-        eye = pass_record(camera, settings, plan, maps, index)
-        shadows = tally.timed(pool, "shadow photons", lambda: self.shadows.run(index)) if plan.shadows else None
-        scene = self._lit.flat.record
-        given = pass_data(scene, eye, settings, plan, maps, shadows.record if shadows is not None else None)
-        cache = virtual = estimates = None
-        if plan.virtual:
-            virtual = tally.timed(pool, "virtual lights", lambda: self.virtual.run(index))
-            given = given._replace(virtual=virtual.record, virtual_map=virtual.photons)
-        if plan.cache:
-            record = recipe(settings.gather, camera, index)
-            cache, counts = tally.timed(pool, "irradiance cache", lambda: fill_cache(given, record, pool))
-            tally.add_cache(cache.n, cache.bytes)
-            tally.add_counts(counts)
-            given = given._replace(cache=cache.record)
-        if plan.estimation:
-            estimates, counts = tally.timed(
-                pool, "gather estimation", lambda: estimate_gathers(given, settings.gather, camera, pool)
-            )
-            tally.add_estimates(estimates.counts)
-            tally.add_counts(counts)
-            given = given._replace(cache=estimates.record)
-        marks = tally.timed(pool, "camera pass", lambda: self._marks_of(film))
-        self.latest, self._told = RenderedPass(given, maps, marks, shadows, cache, virtual, estimates), None
+        marks = self.tally.timed(self.pool, "camera pass", lambda: self._marks_of(film))
+        self.latest = self._stages.run(camera, marks, index, N, self._radii_of_pixels(film, again))
+        self._told = None
         return self.latest
 
-    def _light(self, film: Film, index: int, N: int, again: bool = False) -> PassMaps:
-        self.importance.run(0 if self.settings.photons.renew == "once" else index)
-        widest = self._radii_of_pixels(film, again)
-        if index > 0 and self.light.lacks_first:
-            with self.tally.aside():
-                self.light.run(0, N, self.first_radius, self.importance, widest)
-        return self.light.run(index, N, self.first_radius, self.importance, widest)
+    def _make_ahead(self, made: RenderedPass, index: int, N: int) -> None:
+        """Begin with all of pass `index` but its picture, where it will be asked for and nothing forbids it."""
+        if (
+            index < self.settings.render.passes
+            and not radii_of_pixels(self.facts)
+            and self._stages.can_run_early(index)
+        ):
+            self._next = MadeAhead(self._stages, self.camera, made.marks, index, N)
+
+    def _taken(self, index: int) -> RenderedPass | None:
+        """All of pass `index` but its picture, if that has been made ahead."""
+        ahead, self._next = self._next, None
+        if ahead is None:
+            return None
+        if ahead.index != index:
+            ahead.drop()
+            return None
+        self._stages, self.latest = ahead.take(self._stages)
+        self._told = None
+        return self.latest
 
     def _marks_of(self, film: Film) -> NDArray[np.uint8]:
         if self.plan.path:
@@ -346,7 +353,8 @@ class Renderer:
         return self._marks
 
     def _eye_pass(self, rendered: RenderedPass, film: Film) -> None:
-        self.tally.add_counts(render_into(film, rendered.given, rendered.marks, self.plan, self.pool))
+        render = partial(render_into, film, rendered.given, rendered.marks, self.plan, self.pool)
+        self.tally.add_counts(self.tally.timed(self.pool, "camera pass", render))
 
     def _radii_of_pixels(self, film: Film, again: bool = False) -> dict[str, float]:
         """Gives the pixels the radii of the next pass, unless they have them `again`; returns the largest by map. None

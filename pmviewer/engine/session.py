@@ -424,6 +424,8 @@ class Session:
             else:
                 self._step(self._renderer)
             return
+        if self._renderer is not None:
+            self._renderer.drop()
         with self._changed:
             version, settings, self._restart = self._version, self._settings, False
             self._first_picture, self._attempt = True, version
@@ -472,6 +474,8 @@ class Session:
         if self._ahead is not None:
             self._ahead.shown(renderer.scene, self._settings)
         self._film.after_pass(renderer, self._settings.display.autosave, self._is_finished())
+        if self._is_finished():
+            renderer.drop()
         with self._changed:
             self._settle()
         self._published.notify()

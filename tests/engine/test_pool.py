@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from functools import partial
 from threading import Event, Thread, current_thread
 
@@ -111,3 +112,86 @@ def test_threads_of_a_pool_that_nobody_closes_end_with_it():
     for thread in serving:
         thread.join(10)
         assert not thread.is_alive()
+
+
+def test_what_is_begun_goes_before_the_tasks_of_others():
+    """On the threads that do the others' tasks, from the next one on; each has its own stage and CPU time."""
+    pool, order, asked, begun = WorkPool(2), [], Event(), []
+
+    def late(number: int) -> None:
+        if number == 4:
+            begun.append(pool.begin(early))
+            assert asked.wait(10)
+        order.append(number)
+
+    def early() -> list[str]:
+        pool.stage = "early"
+        asked.set()
+        found: list[str] = pool.run([lambda: order.append("early") or current_thread().name] * 6)
+        return found
+
+    def spend() -> None:
+        start = time.thread_time()
+        while time.thread_time() - start < 0.05:
+            pass
+
+    try:
+        pool.stage = "late"
+        pool.run([partial(late, number) for number in range(1000)])
+        assert pool.stage == "late"
+        names = begun[0].result()
+        assert set(names) <= {"pmviewer_0", "pmviewer_1"}
+        assert max(place for place, who in enumerate(order) if who == "early") < 900
+        before = pool.cpu_seconds
+        more = pool.begin(lambda: pool.run([spend] * 2))
+        more._worker.join(10)
+        assert pool.cpu_seconds == before
+        more.result()
+        assert pool.cpu_seconds - before == pytest.approx(0.1, rel=0.3)
+    finally:
+        pool.close()
+
+
+def test_what_is_begun_and_dropped_begins_no_task():
+    pool, may, done = WorkPool(2), Event(), []
+
+    def make() -> None:
+        assert may.wait(10)
+        pool.run([lambda: done.append(1)] * 8)
+
+    try:
+        dropped = pool.begin(make)
+        dropped.drop()
+        may.set()
+        with pytest.raises(Cancelled):
+            dropped.result()
+        may.clear()
+        thread = (forgotten := pool.begin(make))._worker
+        del forgotten
+        may.set()
+        thread.join(10)
+        assert done == []
+        pool.run([lambda: done.append(1)] * 2)
+        assert done == [1, 1]
+    finally:
+        pool.close()
+
+
+def test_threads_share_begun_and_other_tasks_without_losing_any():
+    """Many short batches of both at the same time, some of which fail."""
+    pool = WorkPool(4)
+
+    def make(round_: int) -> int:
+        total = sum(sum(pool.run([partial(pow, n, 2) for n in range(30)])) for _ in range(10))
+        if round_ % 3 == 0:
+            with pytest.raises(ZeroDivisionError):
+                pool.run([partial(divmod, 1, n) for n in (3, 0, 1, 2)])
+        return total
+
+    try:
+        for round_ in range(60):
+            begun = pool.begin(partial(make, round_))
+            assert pool.run([partial(pow, n, 3) for n in range(200)]) == [n**3 for n in range(200)]
+            assert begun.result() == 10 * sum(n * n for n in range(30))
+    finally:
+        pool.close()

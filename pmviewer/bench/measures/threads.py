@@ -2,8 +2,10 @@
 
 The clock says little on a machine that does other things. The shares come from CPU times: each task's own, and the main
 thread's between them. From these follows how long a pass would take on any number of threads that nothing else uses:
-every call of the pool ends with its last task, and the main thread waits for it. The serial share s is Amdahl's, of
-T(n)/T(1) = s + (1 − s)/n; it holds what only one thread can do as well as the waiting for the last task of a stage.
+every call of the pool ends with its last task, and who called it waits; while a pass's picture is rendered, the stages
+before that of the next one run beside it, and first. The serial share s is Amdahl's, of T(n)/T(1) = s + (1 − s)/n; it
+holds what only one thread can do as well as the waiting for the last task of a stage. That of a single stage is what it
+would be with nothing beside it.
 """
 
 from __future__ import annotations
@@ -31,10 +33,14 @@ CASES: tuple[tuple[str, dict[str, Any]], ...] = (
     ("cornell_diffuse", {"render.method": "gather", "gather.cache": "on"}),
 )
 SIZE = {"camera.width": 512, "camera.height": 512}
-PASSES, QUICK_PASSES, SKIPPED = 12, 6, 4
+PASSES, QUICK_PASSES, SKIPPED = 12, 8, 4
 """Passes, of which the first are not counted: they fill the stage store and the caches."""
+BLOCK = 4
+"""Passes that are clocked together: a part of each is done during the one before."""
 THREADS = (2, 8, 32)
-BETWEEN = "between stages"
+BETWEEN, RENDERED = "between stages", "camera pass"
+Way = list[list[float]]
+"""CPU seconds of tasks that run side by side, and of those that follow when all of these are through, and so on."""
 
 
 @dataclass
@@ -60,9 +66,21 @@ class WatchedPool(WorkPool):
 
     def __init__(self, threads: int = 1) -> None:
         self.stages: dict[str, _Stage] = {}
+        self.passes: list[tuple[Way, Way]] = []
+        """Of each pass: what can be made ahead, and the rest."""
         self._name, self._since = BETWEEN, time.thread_time()
         super().__init__(1)
         self.threads = threads
+
+    @property
+    def overlaps(self) -> bool:
+        """Never: what runs beside something else can't be told from it."""
+        return False
+
+    def begin_pass(self) -> None:
+        """What follows is of one more."""
+        self.note()
+        self.passes.append(([], []))
 
     @property
     def stage(self) -> str:
@@ -78,7 +96,12 @@ class WatchedPool(WorkPool):
         """What the calling thread has done since the last note belongs to the stage."""
         now = time.thread_time()
         self.stages.setdefault(self._name, _Stage()).main += now - self._since
+        self._way([now - self._since])
         self._since = now
+
+    def _way(self, tasks: list[float]) -> None:
+        if self.passes:
+            self.passes[-1][self._name in (BETWEEN, RENDERED)].append(tasks)
 
     def run(self, tasks: Sequence[Task]) -> list[Any]:
         """As the pool's own."""
@@ -94,6 +117,7 @@ class WatchedPool(WorkPool):
         results = super().run([partial(timed, number, task) for number, task in enumerate(tasks)])
         self.note()
         self.stages.setdefault(self._name, _Stage()).calls.append(spent)
+        self._way(spent)
         return results
 
 
@@ -105,28 +129,48 @@ def makespan(tasks: Sequence[float], threads: int) -> float:
     return max(free)
 
 
+def together(first: Way, second: Way, threads: int) -> float:
+    """Seconds until both ways are through, when a thread that is free takes a task of the `first`, if one may begin."""
+    ways = [[sorted(step) for step in way if step] for way in (first, second)]
+    running: list[tuple[float, int]] = []
+    left, now = [0, 0], 0.0
+    while True:
+        for way, steps in enumerate(ways):
+            while steps and not steps[0] and not left[way]:
+                steps.pop(0)
+            while steps and steps[0] and len(running) < threads:
+                left[way] += 1
+                heapq.heappush(running, (now + steps[0].pop(), way))
+        if not running:
+            return now
+        now, way = heapq.heappop(running)
+        left[way] -= 1
+
+
 def serial_share(alone: float, together: float, threads: int) -> float:
     """Amdahl's s of times on one thread and on several."""
     return (threads * together / alone - 1) / (threads - 1) if alone > 0 else 0.0
 
 
 def _clocked(opened: OpenScene, settings: Settings, threads: int, passes: int) -> float:
-    """Seconds of the quickest pass, by the clock."""
+    """Seconds of a pass, by the clock: those of the quickest BLOCK."""
     pool = WorkPool(threads)
     try:
         renderer, best = Renderer(opened, settings, pool, StageStore(0)), float("inf")
-        for index in range(passes):
-            start = time.perf_counter()
+        for _ in range(SKIPPED):
             renderer.step()
-            if index >= SKIPPED:
-                best = min(best, time.perf_counter() - start)
+        for _ in range(0, passes - SKIPPED, BLOCK):
+            start = time.perf_counter()
+            for _ in range(BLOCK):
+                renderer.step()
+            best = min(best, (time.perf_counter() - start) / BLOCK)
     finally:
         pool.close()
     return best
 
 
-def _watched(opened: OpenScene, settings: Settings, threads: int, passes: int) -> tuple[dict[str, _Stage], int]:
-    """What the counted passes cost by stage where so many threads are there, and how many they are."""
+def _watched(opened: OpenScene, settings: Settings, threads: int, passes: int) -> tuple[dict[str, _Stage], float]:
+    """What the counted passes cost by stage where so many threads are there, and the seconds that they take then."""
     pool = WatchedPool(threads)
     try:
         prepare(opened, settings, pool, lambda text, share: None)
@@ -135,11 +179,13 @@ def _watched(opened: OpenScene, settings: Settings, threads: int, passes: int) -
             if index == SKIPPED:
                 pool.note()
                 pool.stages.clear()
+            if index >= SKIPPED:
+                pool.begin_pass()
             renderer.step()
             pool.stage = ""
     finally:
         pool.close()
-    return pool.stages, passes - SKIPPED
+    return pool.stages, sum(together(*ways, threads) for ways in pool.passes)
 
 
 def run(quick: bool = False) -> BenchResult:
@@ -153,7 +199,8 @@ def run(quick: bool = False) -> BenchResult:
         one, two = (_clocked(opened, settings, threads, passes) for threads in (1, 2))
         name = f"{scene}, {settings.render.method}{', cache' if settings.gather.cache == 'on' else ''}"
         alone = {n: sum(stage.alone for stage in stages.values()) for n, (stages, _) in watched.items()}
-        few, counted = watched[THREADS[0]]
+        times = {n: seconds for n, (_, seconds) in watched.items()}
+        few, counted = watched[THREADS[0]][0], passes - SKIPPED
         for title, stage in sorted(few.items(), key=lambda item: -item[1].alone):
             lost = [
                 (n * own.on(n) - own.alone) / (n - 1) / alone[n]
@@ -161,7 +208,6 @@ def run(quick: bool = False) -> BenchResult:
                 for own in [stages.get(title, _Stage())]
             ]
             rows.append([name, title, 1e3 * stage.alone / counted, *(f"{share:.1%}" for share in lost), ""])
-        times = {n: sum(stage.on(n) for stage in stages.values()) for n, (stages, _) in watched.items()}
         shares = {n: serial_share(alone[n], times[n], n) for n in THREADS}
         speed = f"{one / two:.2f}×"
         rows.append([name, "pass", 1e3 * alone[2] / counted, *(f"{shares[n]:.1%}" for n in THREADS), speed])
@@ -171,7 +217,8 @@ def run(quick: bool = False) -> BenchResult:
             targets.append(Target("P19", one / two, 1.9, "×", True, f"{name}: two threads, by the clock"))
     columns = ["case", "stage", "CPU ms a pass", *(f"serial on {n}" for n in THREADS), "clock, 2 threads"]
     notes = [
-        "512×512; a stage's serial share is of the whole pass; clocks need a machine that does nothing else",
+        "512×512; a stage's serial share is of the whole pass, with nothing beside it; in a pass the stages before the "
+        "camera pass run beside that of the pass before; clocks need a machine that does nothing else",
         "serial on n: what a pass on n threads that nothing else uses takes longer than 1/n, by each task's CPU time",
     ]
     return BenchResult("Threads", columns, rows, targets, notes)

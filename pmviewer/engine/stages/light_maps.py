@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -52,7 +52,7 @@ class MapBuilder:
 
     def without_photons(self, index: int, N: int) -> PassMaps:
         """For a method that looks nothing up."""
-        return PassMaps(index, N, *self._empty())
+        return PassMaps(index, N, *self._empty)
 
     def maps(self, light: LightPlan, traced: TracedPass, carried: Carried) -> PassMaps:
         """All maps of the pass. Radii of guides and light choice are kept from pass to pass: they blur nothing."""
@@ -83,7 +83,7 @@ class MapBuilder:
         return PassMaps(
             light.index,
             light.N,
-            *self._empty(),
+            *self._empty,
             photons=photons,
             rules=light.rules,
             notes=traced.notes,
@@ -101,6 +101,7 @@ class MapBuilder:
             volume=volume,
         )
 
+    @cached_property
     def _empty(self) -> tuple[Structure, PhotonGrid]:
         none = np.empty((0, 6), np.float32)
         grid = self.store.get(("empty", "radius"), lambda: build_grid(none, 1.0, 1.0), lambda _: 0)
