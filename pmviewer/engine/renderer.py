@@ -162,6 +162,8 @@ class Renderer:
             raise
         self._close_pass()
         self.tally.seconds += time.perf_counter() - start
+        if self.finished:
+            self.drop()
 
     def drop(self) -> None:
         """Make nothing ahead of what is asked for: nobody will ask for it."""

@@ -88,8 +88,8 @@ class Session:
         self.workers = PassMaker(self._published, cluster, self._pool.threads)
         self._previews = Previews(self._pool, self._published)
         self._renderer: Renderer | None = None
-        notify, threads = self._published.notify, self._pool.threads
-        self._ahead = Ahead(threads, notify, helper, clicks=clicks) if compiles_ahead else None
+        how = self._pool.threads, self._published.notify, helper
+        self._ahead = Ahead(*how, clicks=clicks) if compiles_ahead else None
         self._worker = threading.Thread(target=self._work, name="pmviewer session", daemon=True)
         self._worker.start()
 
@@ -410,22 +410,20 @@ class Session:
         self._film.go_on_with = loaded.film
         if loaded.settings is not None:
             self._settings = loaded.settings
-        self._version += 1
-        self._stopped = False
+        self._version, self._stopped = self._version + 1, False
 
     def _advance(self) -> None:
         """A coarse frame for a new state, one pass for a known one."""
         assert self._opened is not None
-        if not self._is_stale():
-            assert self._renderer is not None
-            wanted = self._unseen()
-            if wanted is not None:
-                self._look(self._renderer, wanted)
+        known = self._renderer
+        if known is not None and not self._is_stale():
+            if (wanted := self._unseen()) is not None:
+                self._look(known, wanted)
             else:
-                self._step(self._renderer)
+                self._step(known)
             return
-        if self._renderer is not None:
-            self._renderer.drop()
+        if known is not None:
+            known.drop()
         with self._changed:
             version, settings, self._restart = self._version, self._settings, False
             self._first_picture, self._attempt = True, version
@@ -474,8 +472,6 @@ class Session:
         if self._ahead is not None:
             self._ahead.shown(renderer.scene, self._settings)
         self._film.after_pass(renderer, self._settings.display.autosave, self._is_finished())
-        if self._is_finished():
-            renderer.drop()
         with self._changed:
             self._settle()
         self._published.notify()

@@ -9,7 +9,7 @@ import pytest
 
 from pmviewer.bench.collected import Kept, load, save
 from pmviewer.bench.measures import everything
-from pmviewer.bench.measures.threads import WatchedPool, makespan, serial_share
+from pmviewer.bench.measures.threads import WatchedPool, makespan, serial_share, together
 from pmviewer.bench.page import write_plot
 from pmviewer.bench.report import BenchResult, Target
 from pmviewer.errors import SceneError
@@ -107,6 +107,15 @@ def test_makespan_and_serial_share_are_those_of_small_examples():
     assert serial_share(10, 5, 2) == pytest.approx(0)
     assert serial_share(10, 10, 2) == pytest.approx(1)
     assert serial_share(10, 1 + 9 / 4, 4) == pytest.approx(0.1)
+
+
+def test_two_ways_share_threads_and_the_first_goes_first():
+    assert together([[1], [1]], [[1, 1]], 1) == 4
+    assert together([[1], [1]], [[1, 1]], 2) == 2, "what the first leaves free the second takes"
+    assert together([[1], [2, 2], [1]], [], 2) == 4
+    assert together([], [[3, 1], [], [1]], 2) == 4, "a step begins when the one before is through"
+    assert together([[2, 2]], [[1, 1]], 2) == 3, "nothing of the second begins while the first has tasks"
+    assert together([], [], 4) == 0
 
 
 def test_a_watched_pool_tells_tasks_from_the_thread_that_waits():
