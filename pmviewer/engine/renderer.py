@@ -97,17 +97,15 @@ class Renderer:
             self.film.moments = Moments(len(self.film.sums), self.film.refined)
         self.error = ErrorEstimate(self.camera.width, self.camera.height, settings, self.plan)
         self.error.bias = scene.biases.get(way_of(settings)) if scene.biases else None
-        self.first_radius = (
+        radius = (
             first_radius(scene.flat, self.render_camera, settings.estimate, self.plan.gather)
             if self.plan.photons
             else 0.0
         )
-        self.settled_radius = self.first_radius
+        self.settled_radius = radius
         """Of the film's first pass; the first radius of a coarse picture is larger."""
         self.tally = Tally()
-        self._stages = PassStages(
-            scene, settings, self.plan, self.render_camera, self.first_radius, pool, store, self.tally
-        )
+        self._stages = PassStages(scene, settings, self.plan, self.render_camera, radius, pool, store, self.tally)
         self._next: MadeAhead | None = None
         self.latest: RenderedPass | None = None
         self.coarse_pass: RenderedPass | None = None
@@ -116,6 +114,11 @@ class Renderer:
         self._told: Told | None = None
         self._marks: NDArray[np.uint8] | None = None
         self._watched = Watched()
+
+    @property
+    def first_radius(self) -> float:
+        """Of look-ups in the first pass, in scene units; 0 without photons."""
+        return self._stages.first_radius
 
     @property
     def light(self) -> LightStage:
@@ -260,7 +263,7 @@ class Renderer:
         N = min(self.settings.photons.N, COARSE_PHOTONS)
         quick = Renderer(self.scene, self.settings, self.pool, self.store, self.version, self.plan)
         quick.settled_radius = self.first_radius
-        quick.first_radius = self.first_radius * min(2.0, (self.settings.photons.N / N) ** 0.25)
+        quick._stages.first_radius = self.first_radius * min(2.0, (self.settings.photons.N / N) ** 0.25)
         quick._pass(film, small, 0, N)
         self.coarse_pass = quick.latest
         film.passes = 1
