@@ -55,6 +55,8 @@ LIGHT_FIELDS: list[tuple[str, str]] = [
     ("sky_texels", "i8"),  # float32 (sky_height, sky_width, 3): radiance of the image environment
     ("sky_rows", "i8"),  # float32 (sky_height − 1,): its distribution, see `pmviewer.kernels.lights.environment`
     ("sky_cells", "i8"),  # float32 (sky_height − 1, sky_width)
+    ("sky_guide", "i8"),  # int32 (sky_height − 1, sky_steps): where in a row of cells to look for a number
+    ("sky_steps", "i8"),
     ("sky_width", "i8"),
     ("sky_height", "i8"),
 ]

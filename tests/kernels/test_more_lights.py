@@ -162,8 +162,9 @@ def test_directions_of_an_image_have_its_luminance_as_density():
         print(f"{what}: chi-square p {p:.3f} over {keep.sum()} cells")
         assert p > 1e-3
     seen, density = sky(flat, wi)
-    np.testing.assert_allclose(radiance, seen, rtol=1e-5, atol=1e-6)
-    np.testing.assert_allclose(pdf, density, rtol=1e-5, atol=1e-7)
+    brightest, thickest = seen.max(), density.max()  # next to which a place's last digits show in what is dark
+    np.testing.assert_allclose(radiance, seen, rtol=1e-5, atol=1e-6 * brightest)
+    np.testing.assert_allclose(pdf, density, rtol=1e-5, atol=1e-6 * thickest)
     by_radiance = radiance @ LUMINANCE / (flat.light_power[0] @ LUMINANCE) * math.pi * flat.radius**2
     np.testing.assert_allclose(pdf, by_radiance, rtol=1e-4)
     np.testing.assert_allclose(beta @ LUMINANCE, 1, rtol=1e-5)

@@ -20,15 +20,17 @@ import numpy as np
 
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.lights.distant import behind_scene, outside
-from pmviewer.kernels.memory import load_f4
+from pmviewer.kernels.memory import load_f4, load_i4
 from pmviewer.kernels.scene import L_A, L_AREA, L_B, L_C, light_number, light_vector, load3
-from pmviewer.kernels.table import find_interval
+from pmviewer.kernels.table import find_between, find_interval
 from pmviewer.kernels.vector import along, dot, luminance, scale
 
 _f4 = np.float32
 _f8 = np.float64
 _i8 = np.int64
 _NEWTON_STEPS = 40
+_SMALL = _f8(0.1)
+"""Radians up to which the series of `_turn` hold to 1e-13."""
 
 
 @device
@@ -75,34 +77,44 @@ def image_pdf(scene, light, L):
 
 
 @device
-def _share(a, slope, angle, step, t):
-    """∫ of (a + slope·t)·sin(angle + step·t) from 0 to t, times step²."""
-    here = angle + step * t
-    return step * (a * math.cos(angle) - (a + slope * t) * math.cos(here)) + slope * (math.sin(here) - math.sin(angle))
+def _turn(angle):
+    """sin and cos − 1 of an angle: by their series where it is small, as in images of 32 rows and more."""
+    if abs(angle) > _SMALL:
+        half = math.sin(_f8(0.5) * angle)
+        return math.sin(angle), _f8(-2.0) * half * half
+    x = angle * angle
+    sine = angle * (_f8(1.0) - x / _f8(6.0) * (_f8(1.0) - x / _f8(20.0) * (_f8(1.0) - x / _f8(42.0))))
+    return sine, x * _f8(-0.5) * (_f8(1.0) - x / _f8(12.0) * (_f8(1.0) - x / _f8(30.0) * (_f8(1.0) - x / _f8(56.0))))
 
 
 @device
-def _height_in_cell(u, a, b, angle, step):
-    """t in [0, 1] with density proportional to (a + t·(b − a))·sin(angle + step·t); safeguarded Newton."""
+def _height_in_cell(u, a, b, sine, cosine, step):
+    """t in [0, 1] with density proportional to (a + t·(b − a))·sin(α + step·t), and sin and cos of that angle, by
+    safeguarded Newton from where the density would be linear; sine, cosine: of α."""
     slope = b - a
-    total = _share(a, slope, angle, step, _f8(1.0))
-    low, high, t = _f8(0.0), _f8(1.0), u
+    over, less = _turn(step)
+    total = step * (a * (sine * over - cosine * less) - slope * (cosine + cosine * less - sine * over))
+    total += slope * (sine * less + cosine * over)
+    low, high = _f8(0.0), _f8(1.0)
+    t = _f8(across_cell(_f4(u), _f4(a * sine), _f4(b * (sine + sine * less + cosine * over))))
     for _ in range(_NEWTON_STEPS):
-        miss = _share(a, slope, angle, step, t) - u * total
+        over, less = _turn(step * t)
+        here, there = sine + sine * less + cosine * over, cosine + cosine * less - sine * over
+        miss = step * (a * (sine * over - cosine * less) - slope * t * there) + slope * (here - sine) - u * total
         if miss > _f8(0.0):
             high = t
         else:
             low = t
-        density = (a + slope * t) * math.sin(angle + step * t) * step * step
+        density = (a + slope * t) * here * step * step
         following = _f8(0.5) * (low + high)
         if density > _f8(0.0):
             newton = t - miss / density
-            if newton > low and newton < high:
+            if newton >= low and newton <= high:
                 following = newton
         if abs(following - t) <= _f8(1e-7):
-            return following
+            break
         t = following
-    return t
+    return t, here, there
 
 
 @device
@@ -116,46 +128,68 @@ def across_cell(u, a, b):
 
 
 @device
-def image_direction(scene, light, u, v):
-    """A unit direction away from the scene with the density of the image's luminance."""
+def _around(turn):
+    """sin and cos of so many turns, to the last digits of float32: by the angle to the nearest quarter."""
+    quarter = math.floor(_f8(4.0) * turn + _f8(0.5))
+    rest = _f4((turn - _f8(0.25) * quarter) * _f8(2.0 * math.pi))
+    sine, cosine = _f4(math.sin(rest)), _f4(math.cos(rest))
+    if _i8(quarter) & 1 != 0:
+        sine, cosine = cosine, -sine
+    if _i8(quarter) & 2 != 0:
+        sine, cosine = -sine, -cosine
+    return sine, cosine
+
+
+@device
+def _cell_of(scene, row, v):
+    """The first of a row of cells whose cumulative share is above v."""
+    steps = scene.sky_steps
+    k = min(_i8(v * _f4(steps)), steps - 1)
+    low, high = _i8(load_i4(scene.sky_guide, row * steps + k)), scene.sky_width - 1
+    if k + 1 < steps:
+        high = min(_i8(load_i4(scene.sky_guide, row * steps + k + 1)) + 1, high)
+    return find_between(scene.sky_cells, low, high, row * scene.sky_width, v)
+
+
+@device
+def _picked(scene, light, u, v):
+    """A unit direction away from the scene with the density of the image's luminance, and the radiance from there."""
     width, rows = scene.sky_width, scene.sky_height - 1
     row = find_interval(scene.sky_rows, rows, _i8(0), u)
     low = _f4(0.0) if row == 0 else load_f4(scene.sky_rows, row - 1)
     u = (u - low) / (load_f4(scene.sky_rows, row) - low)
     first = row * width
-    column = find_interval(scene.sky_cells, width, first, v)
+    column = _cell_of(scene, row, v)
     low = _f4(0.0) if column == 0 else load_f4(scene.sky_cells, first + column - 1)
     v = (v - low) / (load_f4(scene.sky_cells, first + column) - low)
     following = column + 1
     if following == width:
         following = _i8(0)
-    a0, a1 = luminance(_texel(scene, row, column)), luminance(_texel(scene, row, following))
-    b0, b1 = luminance(_texel(scene, row + 1, column)), luminance(_texel(scene, row + 1, following))
+    a0, a1 = _texel(scene, row, column), _texel(scene, row, following)
+    b0, b1 = _texel(scene, row + 1, column), _texel(scene, row + 1, following)
     step = _f8(math.pi) / _f8(rows)
-    t = _height_in_cell(_f8(u), _f8(a0 + a1), _f8(b0 + b1), step * _f8(row), step)
-    f = _f4(t)
-    s = across_cell(v, a0 + f * (b0 - a0), a1 + f * (b1 - a1))
-    theta = step * (_f8(row) + t)
-    phi = _f8(2.0 * math.pi) * (_f8(column) + _f8(0.5) + _f8(s)) / _f8(width)
-    r = math.sin(theta)
-    d = scale(light_vector(scene, light, L_A), _f4(r * math.sin(phi)))
-    d = along(d, light_vector(scene, light, L_B), _f4(math.cos(theta)))
-    return along(d, light_vector(scene, light, L_C), _f4(-r * math.cos(phi)))
+    top = step * _f8(row)
+    upper, lower = _f8(luminance(a0)) + _f8(luminance(a1)), _f8(luminance(b0)) + _f8(luminance(b1))
+    t, r, y = _height_in_cell(_f8(u), upper, lower, math.sin(top), math.cos(top), step)
+    left, right = _between(a0, b0, _f4(t)), _between(a1, b1, _f4(t))
+    s = across_cell(v, luminance(left), luminance(right))
+    sine, cosine = _around((_f8(column) + _f8(0.5) + _f8(s)) / _f8(width))
+    d = scale(light_vector(scene, light, L_A), _f4(r) * sine)
+    d = along(d, light_vector(scene, light, L_B), _f4(y))
+    return along(d, light_vector(scene, light, L_C), _f4(-r) * cosine), _between(left, right, s)
 
 
 @device
 def sample_image(scene, light, x, u, v):
     """As `pmviewer.kernels.lights.light.sample_one_light`."""
-    wi = image_direction(scene, light, u, v)
-    L = image_radiance(scene, light, wi)
+    wi, L = _picked(scene, light, u, v)
     return wi, outside(scene, x, wi), L, image_pdf(scene, light, L), True
 
 
 @device
 def emit_image(scene, light, position, direction):
     """Origin, unit direction and power (luminance 1) of a photon: direction by the image, origin on a disc."""
-    wi = image_direction(scene, light, direction[0], direction[1])
-    L = image_radiance(scene, light, wi)
+    wi, L = _picked(scene, light, direction[0], direction[1])
     d = scale(wi, _f4(-1.0))
     Y = luminance(L)
     inv = _f4(0.0)

@@ -180,6 +180,7 @@ def flatten(
     r["n_lights"], r["environment"] = len(lights.rows), lights.environment
     if lights.sky is not None:
         r["sky_height"], r["sky_width"] = lights.sky.pixels.shape[:2]
+        r["sky_steps"] = arrays["sky_guide"].shape[1]
     r["center_x"], r["center_y"], r["center_z"], r["radius"] = *center, radius
     r["lit_spread"] = lights.spread
     for name, number in zip(LIT_BOX, lit_box(scene, lights, float(np.abs(center).max()) + radius), strict=True):

@@ -176,7 +176,9 @@ class LightTable:
         """The image environment's arrays by the record's field; none without one."""
         if self.sky is None:
             return {}
-        return {"sky_texels": self.sky.pixels, "sky_rows": self._sky_table.rows, "sky_cells": self._sky_table.cells}
+        table = self._sky_table
+        tables = {"sky_rows": table.rows, "sky_cells": table.cells, "sky_guide": table.guide}
+        return {"sky_texels": self.sky.pixels, **tables}
 
     def projector_arrays(self) -> dict[str, NDArray]:
         """The projectors' arrays by the record's field; none without one."""

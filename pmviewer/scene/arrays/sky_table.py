@@ -12,14 +12,18 @@ from pmviewer.scene.description import LUMINANCE
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
+PER_STEP = 8
+"""Cells in a step of a guide, in the mean."""
 
 
 @dataclass(frozen=True)
 class SkyTable:
-    """Cumulative shares of `rows` (h − 1,) and of `cells` (h − 1, w) within each row; `total` is ∫ luminance dω."""
+    """Cumulative shares of `rows` (h − 1,) and of `cells` (h − 1, w) within each row; `guide` (h − 1, steps): where the
+    shares of a row begin that are not below k/steps, or one before; `total` is ∫ luminance dω."""
 
     rows: Float32
     cells: Float32
+    guide: NDArray[np.int32]
     total: float
 
 
@@ -56,5 +60,16 @@ def sky_table(pixels: Float32) -> SkyTable:
     sums = cells[:, -1]
     rows = np.cumsum(sums)
     # A black row is never picked; any table will do.
-    shares = cells / np.where(sums > 0, sums, 1.0)[:, None]
-    return SkyTable((rows / rows[-1]).astype(np.float32), shares.astype(np.float32), float(rows[-1]))
+    shares = (cells / np.where(sums > 0, sums, 1.0)[:, None]).astype(np.float32)
+    return SkyTable((rows / rows[-1]).astype(np.float32), shares, _guide(shares), float(rows[-1]))
+
+
+def _guide(shares: Float32) -> NDArray[np.int32]:
+    """Of `SkyTable`: so many steps that a few shares lie between two of them, and are read from one line of memory
+    where a search through the row would read a line a step."""
+    steps = max(shares.shape[1] // PER_STEP, 1)
+    asked = np.arange(steps) / steps * (1 - 2.0**-20)  # kernels compute k in float32
+    guide = np.empty((len(shares), steps), np.int32)
+    for row, found in zip(shares, guide, strict=True):
+        found[:] = np.searchsorted(row, asked, side="right")
+    return np.minimum(guide, shares.shape[1] - 1)
