@@ -42,6 +42,7 @@ from pmviewer.engine.tally import Tally
 from pmviewer.engine.told import Told, told_of
 from pmviewer.engine.wanted import wanted_of
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
+from pmviewer.progress import Cancelled
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.clip import clipped
 from pmviewer.render.film import Addable, Film, Increment
@@ -345,7 +346,12 @@ class Renderer:
         if ahead.index != index:
             ahead.drop()
             return None
-        self._stages, self.latest = ahead.take(self._stages)
+        try:
+            self._stages, self.latest = ahead.take(self._stages)
+        except Cancelled:
+            if self.pool.cancel.is_set():
+                raise
+            return None  # that was meant for the pass before, which was through by then
         self._told = None
         return self.latest
 

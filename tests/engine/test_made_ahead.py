@@ -156,6 +156,33 @@ def test_a_cancelled_pass_drops_the_next_one(renderer, monkeypatch):
     assert renderer._next is None
 
 
+def test_cancelling_a_pass_that_is_through_loses_nothing(renderer, monkeypatch):
+    """What was being made ahead of the next one is given up, and made anew."""
+    plain = rendered("cornell_caustic", {}, threads=1)[0]
+    may, run, close = threading.Event(), LightStage.run, Renderer._close_pass
+
+    def waiting(self, *arguments):
+        if threading.current_thread().name == "pmviewer begun":
+            assert may.wait(10)
+        return run(self, *arguments)
+
+    def too_late(self):
+        self.pool.cancel.set()
+        may.set()
+        for thread in begun_threads():
+            thread.join(10)
+        self.pool.cancel.clear()
+        close(self)
+
+    monkeypatch.setattr(LightStage, "run", waiting)
+    monkeypatch.setattr(Renderer, "_close_pass", too_late)
+    renderer.step()
+    monkeypatch.undo()
+    while renderer.passes < PASSES:
+        renderer.step()
+    np.testing.assert_array_equal(renderer.film.sums, plain)
+
+
 def test_a_renderer_is_free_once_nobody_knows_it():
     pool = WorkPool(2)
     try:
