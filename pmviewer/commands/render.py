@@ -20,6 +20,7 @@ from pmviewer.commands.options import (
     ThreadsOption,
 )
 from pmviewer.errors import SettingError
+from pmviewer.heap import importing
 
 
 def render(
@@ -63,9 +64,10 @@ def render(
     keep_checkpoint: KeepCheckpointOption = False,
 ) -> None:
     """Render to a file without a window; the result is what the window shows after the same passes."""
-    from pmviewer.commands.checkpointing import Asked
-    from pmviewer.commands.job import Stop, load_job
-    from pmviewer.commands.rendering import render_job
+    with importing():
+        from pmviewer.commands.checkpointing import Asked
+        from pmviewer.commands.job import Stop, load_job
+        from pmviewer.commands.rendering import render_job
 
     if passes is not None and time is not None:
         raise SettingError("--passes and --time exclude each other: give one of them.")

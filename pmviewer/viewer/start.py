@@ -13,7 +13,7 @@ import glfw
 import platformdirs
 
 from pmviewer.errors import WindowError
-from pmviewer.heap import one_heap
+from pmviewer.heap import importing, one_heap
 from pmviewer.settings.access import Settings
 from pmviewer.viewer.background import PATIENCE
 from pmviewer.viewer.session_link import SessionLike, SessionLink
@@ -62,15 +62,16 @@ def _make_session(
     threads: int | None, settings: Settings | None, cluster: str | None, clicks: bool
 ) -> Callable[[], SessionLike]:
     def make() -> SessionLike:
-        from pmviewer.engine.ahead.early import early_helper
-        from pmviewer.kernels.compile import elsewhere
+        with importing(for_long=True):
+            from pmviewer.engine.ahead.early import early_helper
+            from pmviewer.kernels.compile import elsewhere
 
-        helper = early_helper(threads)  # imports while this process does
-        compiler = elsewhere.install()
-        if helper is not None:  # a first start: there will be much to compile
-            compiler.begin()
-        from pmviewer.engine.session import Session
-        from pmviewer.kernels.compile import placed
+            helper = early_helper(threads)  # imports while this process does
+            compiler = elsewhere.install()
+            if helper is not None:  # a first start: there will be much to compile
+                compiler.begin()
+            from pmviewer.engine.session import Session
+            from pmviewer.kernels.compile import placed
 
         placed.install()
         return Session(threads, settings, compiles_ahead=True, clicks=clicks, helper=helper, cluster=cluster)

@@ -29,6 +29,7 @@ def run(quick: bool = False) -> BenchResult:
     warm_window, warm_image = [], []
     with screen() as environment, tempfile.TemporaryDirectory(prefix="pmviewer-bench-") as folder:
         environment["PMVIEWER_CACHE"] = str(Path(folder, "cache"))
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)  # users' second start finds what the first has translated
         to_bytecode(Path(sys.executable), PACKAGE)
         cold = _start(environment)
         rows.append(["cold", *cold])

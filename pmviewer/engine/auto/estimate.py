@@ -15,8 +15,10 @@ have: it is added where a trial has measured it (`pmviewer.engine.auto.trial`).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +46,7 @@ AROUND = (3, 7)
 """Pixels along the sides of the boxes whose means stand for the truth that errors are relative to."""
 BLOCKS = 8
 """Blocks along each side of the picture whose differences tell how well D is known."""
-BAND = 32
+BAND = 16
 """Rows of the picture a task."""
 TRUE_BIAS = 1 / 3, 2.0
 """The least and the most of the squared bias that a trial tells which it may be."""
@@ -84,13 +86,18 @@ class ErrorEstimate:
             return
         w, h = self._size
         x0, y0, x1, y1 = film.region or (0, 0, w, h)
-        total = film.moments.image.reshape(h, w, 3)[y0:y1, x0:x1].copy()
+        image = film.moments.image.reshape(h, w, 3)[y0:y1, x0:x1]
+        total = self._sums[n] = np.empty(image.shape)
+        rows = [slice(begin, begin + BAND) for begin in range(0, len(image), BAND)]
+        tasks: list[Callable[[], Any]] = [partial(np.copyto, total[part], image[part]) for part in rows]
         half = self._sums.pop(n // 2, None) if n % 2 == 0 else None
         if half is not None:
-            level = _level(half, total, n // 2, run)
+            tasks += [partial(_of_band, half, image, n // 2, part.start) for part in rows]
+        made = run(tasks)
+        if half is not None:
+            level = _level(np.concatenate(made[len(rows) :]), n // 2)
             if math.isfinite(level.D) and math.isfinite(level.error):  # a film that is not tells nothing
                 self._levels.append(level)
-        self._sums[n] = total
 
     def state(self) -> State:
         """What the passes have told so far; with the bias, where a trial has measured it."""
@@ -131,26 +138,25 @@ def _is_level(n: int) -> bool:
     return n & (n - 1) == 0 or (n % 3 == 0 and (n // 3) & (n // 3 - 1) == 0)
 
 
-def _level(first: F8, total: F8, m: int, run: Runner) -> _Level:
-    """D of m passes, whose sum is `first`, against the m passes after them; `total` is the sum of both."""
+def _of_band(first: F8, total: F8, m: int, begin: int) -> F8:
+    """Relative squared differences, in BAND rows, of m passes, whose sum is `first`, against the m passes after them;
+    `total` is the sum of both. The mean over channels."""
     from scipy.ndimage import uniform_filter  # late: processes that only compile, or wait for work, start without
 
-    rows = len(total)
+    end, reach = min(begin + BAND, len(total)), max(AROUND) // 2
+    top, bottom = max(begin - reach, 0), min(end + reach, len(total))
+    asked = slice(begin - top, end - top)
+    plane = np.zeros((end - begin, total.shape[1]))
+    for c in range(3):
+        mean = total[top:bottom, :, c] / (2 * m)
+        around = np.minimum(*(uniform_filter(mean, size)[asked] for size in AROUND))
+        square = (2 * first[begin:end, :, c] - total[begin:end, :, c]) ** 2 / (2 * m * m)
+        plane += square / (around**2 + EPSILON) / 3
+    return plane
 
-    def of_band(begin: int) -> F8:
-        """Relative squared differences of BAND rows, the mean over channels."""
-        end, reach = min(begin + BAND, rows), max(AROUND) // 2
-        top, bottom = max(begin - reach, 0), min(end + reach, rows)
-        asked = slice(begin - top, end - top)
-        plane = np.zeros((end - begin, total.shape[1]))
-        for c in range(3):
-            mean = total[top:bottom, :, c] / (2 * m)
-            around = np.minimum(*(uniform_filter(mean, size)[asked] for size in AROUND))
-            square = (2 * first[begin:end, :, c] - total[begin:end, :, c]) ** 2 / (2 * m * m)
-            plane += square / (around**2 + EPSILON) / 3
-        return plane
 
-    plane = np.concatenate(run([partial(of_band, begin) for begin in range(0, rows, BAND)]))
+def _level(plane: F8, m: int) -> _Level:
+    """D of m passes from the relative squared differences of all pixels."""
     blocks = part_means(plane, BLOCKS)
     D = float(plane.mean())
     return _Level(m, D, float(blocks.std()) / math.sqrt(blocks.size) / D if D > 0 else 0.0)
