@@ -41,8 +41,11 @@ CASES = {
 def told(renderer):
     """What there is to say of the film and the latest pass, without times."""
     counts = asdict(renderer.tally)
-    assert counts.pop("seconds") + counts.pop("cpu_seconds") > 0
-    counts["stages"] = sorted(counts.pop("stage_seconds"))
+    assert counts.pop("seconds") > 0
+    stages = counts.pop("stage_seconds")
+    assert sum(stages.values()) == pytest.approx(counts.pop("cpu_seconds"))
+    assert min(stages.values()) > 0
+    counts["stages"] = sorted(stages)
     maps, light = renderer.latest.maps, renderer.light
     counts["maps"] = maps.index, maps.bytes, dict(maps.radii), light.latest is maps
     return counts
