@@ -115,6 +115,7 @@ def test_two_ways_share_threads_and_the_first_goes_first():
     assert together([[1], [2, 2], [1]], [], 2) == 4
     assert together([], [[3, 1], [], [1]], 2) == 4, "a step begins when the one before is through"
     assert together([[2, 2]], [[1, 1]], 2) == 3, "nothing of the second begins while the first has tasks"
+    assert together([], [[1, 1, 1, 3]], 2) == together([[1, 1, 1, 3]], [], 2) == 4, "the long one comes last"
     assert together([], [], 4) == 0
 
 

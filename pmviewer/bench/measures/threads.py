@@ -61,16 +61,15 @@ class _Stage:
 
 
 class WatchedPool(WorkPool):
-    """Remembers by stage what its tasks and the thread that calls it cost. It has one thread, and is taken for one of
-    `threads`, for which work is divided finely enough."""
+    """Remembers by stage what its tasks and the thread that calls it cost, in CPU seconds: it may have more threads
+    than there are processors."""
 
     def __init__(self, threads: int = 1) -> None:
         self.stages: dict[str, _Stage] = {}
         self.passes: list[tuple[Way, Way]] = []
         """Of each pass: what can be made ahead, and the rest."""
         self._name, self._since = BETWEEN, time.thread_time()
-        super().__init__(1)
-        self.threads = threads
+        super().__init__(threads)
 
     @property
     def overlaps(self) -> bool:
@@ -130,8 +129,9 @@ def makespan(tasks: Sequence[float], threads: int) -> float:
 
 
 def together(first: Way, second: Way, threads: int) -> float:
-    """Seconds until both ways are through, when a thread that is free takes a task of the `first`, if one may begin."""
-    ways = [[sorted(step) for step in way if step] for way in (first, second)]
+    """Seconds until both ways are through, when a thread that is free takes the next task of the `first`, if one may
+    begin, and else of the `second`."""
+    ways = [[step[::-1] for step in way if step] for way in (first, second)]
     running: list[tuple[float, int]] = []
     left, now = [0, 0], 0.0
     while True:
