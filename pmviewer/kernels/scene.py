@@ -57,6 +57,7 @@ LIGHT_FIELDS: list[tuple[str, str]] = [
     ("sky_cells", "i8"),  # float32 (sky_height − 1, sky_width)
     ("sky_guide", "i8"),  # int32 (sky_height − 1, sky_steps): where in a row of cells to look for a number
     ("sky_steps", "i8"),
+    ("sky_facings", "i8"),  # float32: how surfaces sample it, see `pmviewer.kernels.lights.sky_facing`; 0 without one
     ("sky_width", "i8"),
     ("sky_height", "i8"),
 ]

@@ -14,10 +14,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, is_lambertian
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, is_lambertian, shading_normal
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import BSDF, CHAIN_LIGHT, LIGHT, OUTLINE
+from pmviewer.kernels.lights.sky_facing import facing_sky
 from pmviewer.kernels.memory import row_of, stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import add, largest, mul, scale
@@ -193,6 +194,7 @@ def _stored(given, si, beta, pixel, scratch, whole):
     choice = choose_by_power(scratch[0], eye.light_samples)
     if eye.direct != 0:
         choice = choose(given.scene, eye, given.choice_map, si.p, si.ng, scratch[0])
+        choice = facing_sky(given.scene, choice, shading_normal(si.bsdf))
     n_bsdf = _light_rays(given, si, choice, gather, aimed)
     if eye.direct != 0:
         sampler = Sampler(eye.sequence, pixel.seed, eye.index, LIGHT)

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, pick_group
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, pick_group, shading_normal
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import FURTHER_LIGHT, PATH_LIGHT, PATH_SCATTER, PATH_STRIDE
-from pmviewer.kernels.lights.light import one_light_pdf
+from pmviewer.kernels.lights.sky_facing import facing_sky, seen_light_pdf
 from pmviewer.kernels.memory import row_of, stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import largest, mul, scale
@@ -125,7 +125,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 if pdf > _f4(0.0):
                     weight = _f4(0.0)
                     if eye.mis != 0:
-                        other = one_light_pdf(scene, light, origin, hit.p, hit.ng, ray.d)
+                        other = seen_light_pdf(scene, light, choice[5], origin, hit, ray.d, L)
                         weight = power_heuristic(_f4(1.0), pdf, expected_samples(scene, choice, light), other)
                 if largest(L) > _f4(0.0) and weight > _f4(0.0):
                     deposit(pixel, term, scale(mul(beta, L), weight))
@@ -149,6 +149,8 @@ def path_pass(scenes, eyes, film, counts, first, last):
             if group == STORED or not is_delta(si.bsdf):
                 sampler = Sampler(eye.sequence, seed, eye.index, PATH_LIGHT + PATH_STRIDE * depth)
                 choice = choose_without_photons(scene, eye, si.p, lights)
+                if group == STORED:
+                    choice = facing_sky(scene, choice, shading_normal(si.bsdf))
                 L, rays, _ = light_samples(scene, None, si, group, choice, eye.mis, sampler)
                 tally[C_RAYS] += rays
                 tally[C_SHADOW_RAYS] += rays

@@ -27,7 +27,7 @@ PARTS = {
     "lights": (
         *("lights", "light_cdf", "light_places", "light_triangles", "light_triangle_cdf", "prim_light", "light_power"),
         *("light_textures", "light_frames", "light_tables", "sky_texels", "sky_rows", "sky_cells"),
-        "sky_guide",
+        *("sky_guide", "sky_facings"),
         *("projectors", "projector_numbers"),
     ),
     "media": (

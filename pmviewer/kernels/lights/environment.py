@@ -45,8 +45,9 @@ def _between(a, b, s):
 
 
 @device
-def image_radiance(scene, light, d):
-    """Radiance that arrives against the unit direction d, which points away from the scene."""
+def _texels_around(scene, light, d):
+    """Row and column of the cell that lies in the unit direction d, away from the scene, and how far down and along it
+    is there."""
     x = dot(light_vector(scene, light, L_A), d)
     y = dot(light_vector(scene, light, L_B), d)
     z = dot(light_vector(scene, light, L_C), d)
@@ -61,9 +62,15 @@ def image_radiance(scene, light, d):
     # atan2 keeps its digits at the poles, where acos loses half of them.
     down = _f8(math.atan2(_f4(math.sqrt(x * x + z * z)), y)) * _f8(1.0 / math.pi) * _f8(height - 1)
     row = min(_i8(down), height - 2)
-    t = _f4(down - _f8(row))
+    return row, column, _f4(down - _f8(row)), s
+
+
+@device
+def image_radiance(scene, light, d):
+    """Radiance that arrives against the unit direction d, which points away from the scene."""
+    row, column, t, s = _texels_around(scene, light, d)
     following = column + 1
-    if following == width:
+    if following == scene.sky_width:
         following = _i8(0)
     upper = _between(_texel(scene, row, column), _texel(scene, row, following), s)
     lower = _between(_texel(scene, row + 1, column), _texel(scene, row + 1, following), s)
@@ -88,19 +95,26 @@ def _turn(angle):
 
 
 @device
+def _below_height(a, b, sine, cosine, step, t):
+    """∫₀ᵗ (a + x·(b − a))·sin(α + step·x) dx · step², and sin and cos of the angle at t; sine, cosine: of α."""
+    over, less = _turn(step * t)
+    here, there = sine + sine * less + cosine * over, cosine + cosine * less - sine * over
+    slope = b - a
+    below = step * (a * (sine * over - cosine * less) - slope * t * there) + slope * (here - sine)
+    return below, here, there
+
+
+@device
 def _height_in_cell(u, a, b, sine, cosine, step):
     """t in [0, 1] with density proportional to (a + t·(b − a))·sin(α + step·t), and sin and cos of that angle, by
     safeguarded Newton from where the density would be linear; sine, cosine: of α."""
     slope = b - a
-    over, less = _turn(step)
-    total = step * (a * (sine * over - cosine * less) - slope * (cosine + cosine * less - sine * over))
-    total += slope * (sine * less + cosine * over)
+    total, there, _ = _below_height(a, b, sine, cosine, step, _f8(1.0))
     low, high = _f8(0.0), _f8(1.0)
-    t = _f8(across_cell(_f4(u), _f4(a * sine), _f4(b * (sine + sine * less + cosine * over))))
+    t = _f8(across_cell(_f4(u), _f4(a * sine), _f4(b * there)))
     for _ in range(_NEWTON_STEPS):
-        over, less = _turn(step * t)
-        here, there = sine + sine * less + cosine * over, cosine + cosine * less - sine * over
-        miss = step * (a * (sine * over - cosine * less) - slope * t * there) + slope * (here - sine) - u * total
+        below, here, there = _below_height(a, b, sine, cosine, step, t)
+        miss = below - u * total
         if miss > _f8(0.0):
             high = t
         else:
@@ -177,6 +191,49 @@ def _picked(scene, light, u, v):
     d = scale(light_vector(scene, light, L_A), _f4(r) * sine)
     d = along(d, light_vector(scene, light, L_B), _f4(y))
     return along(d, light_vector(scene, light, L_C), _f4(-r) * cosine), _between(left, right, s)
+
+
+@device
+def _part_of(low, high, n):
+    """Which of n equal parts of [0, 1) both numbers lie in, −1 if they lie in different ones."""
+    part = min(_i8(low * _f4(n)), n - 1)
+    return part if high * _f4(n) <= _f4(part + 1) else _i8(-1)
+
+
+@device
+def cell_of_square(scene, light, d, n):
+    """Row and column, of n × n cells of the unit square, of the numbers u, v with which `sample_image` picks the unit
+    direction d. Most texels' numbers lie in one cell; the others' are computed."""
+    width, rows = scene.sky_width, scene.sky_height - 1
+    row, column, t, s = _texels_around(scene, light, d)
+    first = row * width
+    u_low = _f4(0.0) if row == 0 else load_f4(scene.sky_rows, row - 1)
+    v_low = _f4(0.0) if column == 0 else load_f4(scene.sky_cells, first + column - 1)
+    u_high, v_high = load_f4(scene.sky_rows, row), load_f4(scene.sky_cells, first + column)
+    i, j = _part_of(u_low, u_high, n), _part_of(v_low, v_high, n)
+    if i >= 0 and j >= 0:
+        return i, j
+    following = column + 1
+    if following == width:
+        following = _i8(0)
+    a0, a1 = _texel(scene, row, column), _texel(scene, row, following)
+    b0, b1 = _texel(scene, row + 1, column), _texel(scene, row + 1, following)
+    if i < 0:
+        step = _f8(math.pi) / _f8(rows)
+        top = step * _f8(row)
+        upper, lower = _f8(luminance(a0)) + _f8(luminance(a1)), _f8(luminance(b0)) + _f8(luminance(b1))
+        sine, cosine = math.sin(top), math.cos(top)
+        below, _, _ = _below_height(upper, lower, sine, cosine, step, _f8(t))
+        whole, _, _ = _below_height(upper, lower, sine, cosine, step, _f8(1.0))
+        u = _f4(below / whole) if whole > _f8(0.0) else t
+        i = min(_i8((u_low + u * (u_high - u_low)) * _f4(n)), n - 1)
+    if j < 0:
+        left, right = luminance(_between(a0, b0, t)), luminance(_between(a1, b1, t))
+        v = s
+        if left + right > _f4(0.0):
+            v = s * (_f4(2.0) * left + s * (right - left)) / (left + right)
+        j = min(_i8((v_low + v * (v_high - v_low)) * _f4(n)), n - 1)
+    return i, j
 
 
 @device

@@ -13,6 +13,7 @@ from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, bsdf_f, same_side
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import LIGHT
 from pmviewer.kernels.lights.light import sample_one_light
+from pmviewer.kernels.lights.sky_facing import facing_sky, place_on_light
 from pmviewer.kernels.memory import bits_of_float, stack_i4
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import dot, largest
@@ -139,6 +140,7 @@ def known_share(scene, eye, choice_map, shadows, si, pixel, lights):
     """Light samples at a surface that count, and how many of them shadow photons decide. `lights`: LIST_WORDS words of
     scratch; the rest as for `shadow_view`."""
     choice = choose(scene, eye, choice_map, si.p, si.ng, lights)
+    choice = facing_sky(scene, choice, shading_normal(si.bsdf))
     samples = choice[4]
     seed = pixel_seed(eye, pixel)
     counted, known = _i8(0), _i8(0)
@@ -146,6 +148,7 @@ def known_share(scene, eye, choice_map, shadows, si, pixel, lights):
     for i in range(rounds * samples):
         u, v, u_pick, _ = draw4(eye.sequence, seed, _u4(i), LIGHT)
         light, m = chosen_light(scene, choice, i % samples, u_pick)
+        u, v, _ = place_on_light(scene, light, choice[5], u, v)
         wi, _, _, pdf, _ = sample_one_light(scene, light, si.p, u, v)
         if not m * pdf > _f4(0.0) or same_side(si.bsdf, STORED, si.ng, si.wo, wi) == 0:
             continue

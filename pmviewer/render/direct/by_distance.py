@@ -53,7 +53,7 @@ def choose_by_distance(scene, p, n, lights):
         share = stack_get_f4(lights, LISTED + light) * inv + DEFENSIVE * light_probability(scene, light)
         stack_put_f4(lights, LISTED + light, _f4(n) * share)
         mass += _f4(n) * share
-    return lights, _i8(scene.n_lights), mass, _f4(0.0), _i8(n)
+    return lights, _i8(scene.n_lights), mass, _f4(0.0), _i8(n), _i8(0)
 
 
 @device

@@ -122,7 +122,7 @@ def choose_by_photons(scene, eye, grid, p, n, lights):
                 m = _f4(1 + spare * upto // total - spare * below // total)
                 below = upto
             stack_put_f4(lights, LISTED + j, m)
-        return lights, known, _f4(con), _f4(rest), con + non
+        return lights, known, _f4(con), _f4(rest), con + non, _i8(0)
     samples = _i8(eye.light_samples)
     if total == 0:
         if eye.biased != 0:
@@ -136,4 +136,4 @@ def choose_by_photons(scene, eye, grid, p, n, lights):
         m *= _f4(samples)
         stack_put_f4(lights, LISTED + j, m)
         mass += m
-    return lights, known, mass, _f4(samples) * delta, samples
+    return lights, known, mass, _f4(samples) * delta, samples, _i8(0)

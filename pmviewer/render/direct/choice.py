@@ -49,14 +49,14 @@ _i8 = np.int64
 @device
 def choose_by_power(lights, n):
     """The rule "power" with n samples. A choice is (list of lights, their number, sum of their m, m/P of any other
-    light, samples)."""
-    return lights, _i8(0), _f4(0.0), _f4(n), _i8(n)
+    light, samples, how the sky is sampled (`pmviewer.kernels.lights.sky_facing`), 0: by luminance)."""
+    return lights, _i8(0), _f4(0.0), _f4(n), _i8(n), _i8(0)
 
 
 @device
 def expected_samples(scene, choice, light):
     """m, the expected number of light samples on `light` under that choice."""
-    lights, known, _, rest, _ = choice
+    lights, known, _, rest, _, _ = choice
     for j in range(known):
         if stack_get_i4(lights, j) == light:
             return stack_get_f4(lights, LISTED + j)
@@ -69,7 +69,7 @@ def chosen_light(scene, choice, s, u):
 
     m is 0 where rounding ended on a light that is not to be sampled.
     """
-    lights, known, mass, rest, samples = choice
+    lights, known, mass, rest, samples, _ = choice
     place = _f4(s) + u
     if place < mass:
         below = _f4(0.0)

@@ -10,7 +10,8 @@ import numpy as np
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, bsdf_f, bsdf_pdf, compressed, same_side, shading_normal
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
-from pmviewer.kernels.lights.light import emitted, environment_radiance, one_light_pdf, sample_one_light
+from pmviewer.kernels.lights.light import emitted, environment_radiance, sample_one_light
+from pmviewer.kernels.lights.sky_facing import place_on_light, seen_light_pdf
 from pmviewer.kernels.media.medium import has_media
 from pmviewer.kernels.random import SOBOL, draw4
 from pmviewer.kernels.scene import light_of
@@ -57,7 +58,7 @@ def left_to_rays(scene, light, group):
 
 @device
 def _drawn_light(scene, choice, s, sampler):
-    """Light of sample s, its m (`chosen_light`), and two numbers for a place on it.
+    """Light of sample s, its m (`chosen_light`), two numbers for a place on it, and their density (`place_on_light`).
 
     Samples of a pass follow one another in the sequence as passes do, so that they complement each other: n samples
     each in the first m passes are its first n·m points. Of these the first two coordinates are spread best, and a
@@ -71,7 +72,8 @@ def _drawn_light(scene, choice, s, sampler):
         s = _i8(place)
         u_pick = place - _f4(s)
     light, m = chosen_light(scene, choice, s, u_pick)
-    return light, m, u, v
+    u, v, density = place_on_light(scene, light, choice[5], u, v)
+    return light, m, u, v, density
 
 
 @device
@@ -85,8 +87,9 @@ def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler):
     total = BLACK
     rays, saved = 0, 0
     for s in range(choice[4]):
-        light, m, u, v = _drawn_light(scene, choice, s, sampler)
+        light, m, u, v, density = _drawn_light(scene, choice, s, sampler)
         wi, end, L, pdf, findable = sample_one_light(scene, light, p, u, v)
+        pdf *= density
         if not m * pdf > _f4(0.0) or same_side(b, group, ng, wo, wi) == 0 or left_to_rays(scene, light, group):
             continue
         f = compressed(b, wo, wi, bsdf_f(b, group, wo, wi))
@@ -134,5 +137,5 @@ def found_light(scene, p, wi, pdf_bsdf, n_bsdf, choice, biased, hit):
     m = expected_samples(scene, choice, light)
     if biased != 0 and not m > _f4(0.0):
         return BLACK
-    pdf = one_light_pdf(scene, light, p, hit.p, hit.ng, wi)
+    pdf = seen_light_pdf(scene, light, choice[5], p, hit, wi, L)
     return scale(L, power_heuristic(_f4(n_bsdf), pdf_bsdf, m, pdf))

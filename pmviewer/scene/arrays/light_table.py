@@ -12,6 +12,7 @@ from pmviewer.errors import SceneError
 from pmviewer.kernels import scene as K
 from pmviewer.scene.arrays.glows import Glow
 from pmviewer.scene.arrays.light_places import EVERYWHERE, Place, place_of_light, place_of_shape
+from pmviewer.scene.arrays.sky_facing import facing_tables
 from pmviewer.scene.arrays.sky_table import sky_table
 from pmviewer.scene.description import (
     LUMINANCE,
@@ -178,6 +179,7 @@ class LightTable:
             return {}
         table = self._sky_table
         tables = {"sky_rows": table.rows, "sky_cells": table.cells, "sky_guide": table.guide}
+        tables["sky_facings"] = facing_tables(table, self.sky.to_world)
         return {"sky_texels": self.sky.pixels, **tables}
 
     def projector_arrays(self) -> dict[str, NDArray]:
