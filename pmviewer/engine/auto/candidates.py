@@ -49,6 +49,11 @@ THICKER = {"estimate.flatness": 0.3}
 """Beside a gather, whose rays average what they meet: photons of the next wall or facet make up for what a disc has
 beyond the edge. relMSE after 12 passes over that of thin discs: 0.53 in cornell_fractal, 0.97 in cornell_diffuse and
 corner_room, 0.99 in museum, 1.00 in eight others. Shown directly, they blur what is finer than the radius."""
+CORNERS = {"gather.secondary": 5.0}
+"""Gather rays that end within five radii gather again, so that no disc is dark beyond an edge or takes light from the
+next wall: relMSE of a model of bricks in the same time 0.5 times that without (its picture 1.5 % too dark instead of
+3 to 5 %), of a coated ball in a mount 0.92, of a wooden staircase 1.05. With the irradiance cache records would cost
+twice as much; what it lacks by comparison is known to the trial as the bias of interpolation."""
 WIDE_RECORDS = {"gather.cache_min": 12.0, "gather.cache_max": 48.0}
 """Records that reach three times as far as those that stay next to the plain gather: fewer of them, and less noise in
 the same time in all bundled scenes tried, from 2 to 64 passes and from 64² to 256² pixels; from four times on, bias
@@ -82,7 +87,7 @@ def candidates(
         return [progressive, *_paths(traits, left_out)], left_out
     gather, cache = (way.having(THICKER) for way in (GATHER, CACHE))
     if not traits.has_media:
-        gather, cache = (way.having(caustics, *why) for way in (gather, cache))
+        gather, cache = gather.having({**caustics, **CORNERS}, *why), cache.having(caustics, *why)
     found = [progressive, gather]
     if traits.has_media:
         left_out.append(("irradiance cache", "it does not know of media"))
