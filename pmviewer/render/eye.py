@@ -194,7 +194,7 @@ def _stored(given, si, beta, pixel, scratch, whole):
     choice = choose_by_power(scratch[0], eye.light_samples)
     if eye.direct != 0:
         choice = choose(given.scene, eye, given.choice_map, si.p, si.ng, scratch[0])
-        choice = facing_sky(given.scene, choice, shading_normal(si.bsdf))
+        choice = facing_sky(given.scene, choice, si.ng, shading_normal(si.bsdf))
     n_bsdf = _light_rays(given, si, choice, gather, aimed)
     if eye.direct != 0:
         sampler = Sampler(eye.sequence, pixel.seed, eye.index, LIGHT)

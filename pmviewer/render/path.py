@@ -150,7 +150,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 sampler = Sampler(eye.sequence, seed, eye.index, PATH_LIGHT + PATH_STRIDE * depth)
                 choice = choose_without_photons(scene, eye, si.p, lights)
                 if group == STORED:
-                    choice = facing_sky(scene, choice, shading_normal(si.bsdf))
+                    choice = facing_sky(scene, choice, si.ng, shading_normal(si.bsdf))
                 L, rays, _ = light_samples(scene, None, si, group, choice, eye.mis, sampler)
                 tally[C_RAYS] += rays
                 tally[C_SHADOW_RAYS] += rays

@@ -67,7 +67,8 @@ def _drawn(scenes, n, wi, f, pdf, seen):
     """Directions for a surface that faces n, the light from there, the density of the draw and of what is seen."""
     scene = scenes[0]
     zero = (np.float32(0.0), np.float32(0.0), np.float32(0.0))
-    choice = facing_sky(scene, choose_by_power(stack_i4(LIST_WORDS), 1), (n[0], n[1], n[2]))
+    n = (n[0], n[1], n[2])
+    choice = facing_sky(scene, choose_by_power(stack_i4(LIST_WORDS), 1), n, n)
     sky = scene.environment
     for i in range(len(wi)):
         u, v, _, _ = draw4(SOBOL, np.uint32(7), np.uint32(i), np.int64(3))
@@ -82,7 +83,8 @@ def _seen(scenes, n, wi, f, pdf):
     """Light from directions and the density with which a surface that faces n would have drawn them."""
     scene = scenes[0]
     zero = (np.float32(0.0), np.float32(0.0), np.float32(0.0))
-    choice = facing_sky(scene, choose_by_power(stack_i4(LIST_WORDS), 1), (n[0], n[1], n[2]))
+    n = (n[0], n[1], n[2])
+    choice = facing_sky(scene, choose_by_power(stack_i4(LIST_WORDS), 1), n, n)
     for i in range(len(wi)):
         d = (wi[i, 0], wi[i, 1], wi[i, 2])
         L = environment_radiance(scene, d)
@@ -154,3 +156,21 @@ def test_tables_are_cumulative_and_leave_nothing_out():
     share = rows[:, :, None] * cells
     assert share.min() > 0.9 * FLOOR / SIDE**2
     np.testing.assert_allclose(share.sum(axis=(1, 2)), 1, rtol=1e-5)
+
+
+@kernel
+def _table(scenes, ng, ns, found):
+    ng, ns = (ng[0], ng[1], ng[2]), (ns[0], ns[1], ns[2])
+    found[0] = facing_sky(scenes[0], choose_by_power(stack_i4(LIST_WORDS), 1), ng, ns)[5]
+
+
+def test_a_shading_normal_behind_the_surface_stands_for_the_side_that_is_seen():
+    """Surfaces that transmit keep theirs when seen from behind."""
+    flat = flat_of(SKIES["clouds"])
+    found = []
+    for ng, ns in (((0, 0, 1), (0.1, 0.2, 0.9)), ((0, 0, 1), (-0.1, -0.2, -0.9)), ((0, 0, -1), (-0.1, -0.2, -0.9))):
+        place = np.zeros(1, np.int64)
+        _table(flat.record, unit(ng), unit(ns), place)
+        found.append(int(place[0]))
+    assert found[0] == found[1]
+    assert found[0] != found[2]

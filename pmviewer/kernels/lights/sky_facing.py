@@ -20,6 +20,7 @@ from pmviewer.kernels.lights.environment import cell_of_square, image_pdf
 from pmviewer.kernels.lights.light import one_light_pdf
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.table import find_interval
+from pmviewer.kernels.vector import dot, scale
 
 SIDE = 16
 FACINGS = 16
@@ -47,16 +48,17 @@ def _facing_cell(n):
 
 
 @specialised
-def facing_sky(scene, choice, n):
-    """The choice of lights (`pmviewer.render.direct.choice`) of a surface whose lobes reflect light from the side that
-    the unit vector n points to: the sky is sampled for that."""
+def facing_sky(scene, choice, ng, ns):
+    """The choice of lights (`pmviewer.render.direct.choice`) of a surface whose lobes reflect light from the side of
+    its geometric normal ng: the sky is sampled for that, by cosines with the shading normal ns or −ns."""
     if not has(scene, "more_lights"):
-        return lambda scene, choice, n: choice
+        return lambda scene, choice, ng, ns: choice
 
-    def facing(scene, choice, n):
+    def facing(scene, choice, ng, ns):
         lights, known, mass, rest, samples, table = choice
         if scene.sky_facings != 0:
-            table = scene.sky_facings + _facing_cell(n) * _i8(4 * TABLE)
+            side = _f4(-1.0) if dot(ng, ns) < _f4(0.0) else _f4(1.0)
+            table = scene.sky_facings + _facing_cell(scale(ns, side)) * _i8(4 * TABLE)
         return lights, known, mass, rest, samples, table
 
     return facing

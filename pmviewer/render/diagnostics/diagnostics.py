@@ -140,7 +140,7 @@ def known_share(scene, eye, choice_map, shadows, si, pixel, lights):
     """Light samples at a surface that count, and how many of them shadow photons decide. `lights`: LIST_WORDS words of
     scratch; the rest as for `shadow_view`."""
     choice = choose(scene, eye, choice_map, si.p, si.ng, lights)
-    choice = facing_sky(scene, choice, shading_normal(si.bsdf))
+    choice = facing_sky(scene, choice, si.ng, shading_normal(si.bsdf))
     samples = choice[4]
     seed = pixel_seed(eye, pixel)
     counted, known = _i8(0), _i8(0)

@@ -62,7 +62,7 @@ def _again(given, si, seed, index, counts, hit):
     scene, eye = given.scene, given.eye
     sampler = Sampler(eye.sequence, hash3(seed, _u4(SECOND_GATHER_SALT), _u4(0)), index, SECOND_LIGHT)
     choice = choose(scene, eye, given.choice_map, si.p, si.ng, stack_i4(LIST_WORDS))
-    choice = facing_sky(scene, choice, shading_normal(si.bsdf))
+    choice = facing_sky(scene, choice, si.ng, shading_normal(si.bsdf))
     L = direct_light(scene, given.shadows, si, STORED, choice, _i8(eye.mis), sampler, counts)
     if eye.caustic_mask != 0:
         L = add(L, reflected(given.caustic_map, eye, eye.caustic_radius, si, eye.caustic_mask))
