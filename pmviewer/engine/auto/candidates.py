@@ -51,8 +51,8 @@ beyond the edge. relMSE after 12 passes over that of thin discs: 0.53 in cornell
 corner_room, 0.99 in museum, 1.00 in eight others. Shown directly, they blur what is finer than the radius."""
 CORNERS = {"gather.secondary": 5.0}
 """Gather rays that end within five radii gather again, so that no disc is dark beyond an edge or takes light from the
-next wall: relMSE of a model of bricks in the same time 0.5 times that without (its picture 1.5 % too dark instead of
-3 to 5 %), of a coated ball in a mount 0.92, of a wooden staircase 1.05. With the irradiance cache records would cost
+next wall: relMSE of a model of bricks in the same time 0.6 times that without (its picture 1.5 % too dark instead of
+3.2 %), of a coated ball in a mount 0.9, of a wooden staircase 1.05. With the irradiance cache records would cost
 twice as much; what it lacks by comparison is known to the trial as the bias of interpolation."""
 WIDE_RECORDS = {"gather.cache_min": 12.0, "gather.cache_max": 48.0}
 """Records that reach three times as far as those that stay next to the plain gather: fewer of them, and less noise in

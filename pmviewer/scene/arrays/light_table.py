@@ -178,9 +178,13 @@ class LightTable:
         if self.sky is None:
             return {}
         table = self._sky_table
-        tables = {"sky_rows": table.rows, "sky_cells": table.cells, "sky_guide": table.guide}
-        tables["sky_facings"] = facing_tables(table, self.sky.to_world)
-        return {"sky_texels": self.sky.pixels, **tables}
+        return {
+            "sky_texels": self.sky.pixels,
+            "sky_rows": table.rows,
+            "sky_cells": table.cells,
+            "sky_guide": table.guide,
+            "sky_facings": facing_tables(table, self.sky.to_world),
+        }
 
     def projector_arrays(self) -> dict[str, NDArray]:
         """The projectors' arrays by the record's field; none without one."""

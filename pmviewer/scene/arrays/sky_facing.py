@@ -67,5 +67,5 @@ def facing_tables(table: SkyTable, to_world: Float64) -> Float32:
     rows = share.sum(axis=2)
     found[:, :SIDE] = np.cumsum(rows, axis=1)
     found[:, SIDE:] = (np.cumsum(share, axis=2) / rows[:, :, None]).reshape(len(share), -1)
-    found[:, SIDE - 1 :: SIDE] = 1.0
+    found[:, SIDE - 1 :: SIDE] = 1.0  # sums end there but for rounding, and searches must end
     return found
