@@ -4,22 +4,35 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import Settings, with_values
 
 
 class Lacking(NamedTuple):
-    """A setting that does nothing in scenes with media: what it is set to instead, and the sentence about it."""
+    """A setting that does nothing in scenes with media: what it is set to instead, and the sentence about it. `lit`:
+    only where they scatter or emit light."""
 
     name: str
     instead: Any
     sentence: str
+    lit: bool = False
 
 
 LACKING = (
     Lacking("importance.emission", "off", "Guided emission does not know of media: photons leave the lights by power."),
-    Lacking("gather.cache", "off", "The irradiance cache does not know of media: every surface point gathers itself."),
+    Lacking(
+        "gather.cache",
+        "off",
+        "The irradiance cache does not know of media that scatter or emit light: every surface point gathers itself.",
+        lit=True,
+    ),
     Lacking("gather.estimation", "off", "Estimated gathers do not know of media: every pixel gathers itself."),
-    Lacking("gather.secondary", 0.0, "Secondary gathering does not know of media: gather rays look the map up."),
+    Lacking(
+        "gather.secondary",
+        0.0,
+        "Secondary gathering does not know of media that scatter or emit light: gather rays look the map up.",
+        lit=True,
+    ),
     Lacking("direct.shadow_photons", False, "Shadow photons do not know of media: all shadow rays are cast."),
 )
 VIRTUAL = (
@@ -36,12 +49,14 @@ BLURRED_FROM = 0.99
 BLURRED = "Photons keep their directions to 0.06°: light that media scatter nearly straight on is blurred by that."
 
 
-def in_media(settings: Settings, emit: bool) -> tuple[Settings, tuple[str, ...]]:
-    """The settings that a scene with media, which `emit` light or don't, goes by, and sentences about those that are
-    others than were asked for."""
+def in_media(settings: Settings, traits: SceneTraits) -> tuple[Settings, tuple[str, ...]]:
+    """The settings that a scene with media goes by, and sentences about those that are others than were asked for."""
+    emit = traits.media_emit
     changes: dict[str, Any] = {}
     said: list[str] = []
     for lacking in (*LACKING, *((LOOKED_FOR,) if emit and settings.render.method != "path" else ())):
+        if lacking.lit and not traits.lit_media:
+            continue
         group, name = lacking.name.split(".")
         if getattr(getattr(settings, group), name) != lacking.instead:
             changes[lacking.name] = lacking.instead
@@ -50,6 +65,6 @@ def in_media(settings: Settings, emit: bool) -> tuple[Settings, tuple[str, ...]]
     if settings.render.method == "virtual lights" and (chosen.estimator in WHOLE or chosen.choice != "even"):
         changes["render.method"] = "progressive"
         said.append(VIRTUAL)
-    if settings.render.method in ("global map", "caustic map"):
+    if settings.render.method in ("global map", "caustic map") and traits.has_scattering:
         said.append(MAP_ALONE)
     return (with_values(settings, changes) if changes else settings), tuple(said)

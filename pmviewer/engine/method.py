@@ -164,7 +164,7 @@ def plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     """The stages that the method needs in this scene."""
     plan = _stages_of(settings, traits)
     several = traits.many_lights or traits.has_environment
-    return replace(plan, light_samples=samples_at_surface(settings.direct, plan.path, plan.media, several))
+    return replace(plan, light_samples=samples_at_surface(settings.direct, plan.path, traits.lit_media, several))
 
 
 def _stages_of(settings: Settings, traits: SceneTraits) -> Plan:
@@ -172,7 +172,7 @@ def _stages_of(settings: Settings, traits: SceneTraits) -> Plan:
     if not traits.has_media:
         return _plan_of(settings, traits)
     asked = settings
-    settings, said = in_media(settings, traits.media_emit)
+    settings, said = in_media(settings, traits)
     plan = _plan_of(settings, traits)
     if any(rule not in ("exact", "by setting") for rule in traits.thin_glass) or (
         "by setting" in traits.thin_glass and asked.render.thin_glass != "exact"

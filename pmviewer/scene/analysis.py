@@ -76,6 +76,11 @@ class SceneTraits:
     """Surfaces that reflect and refract as deltas."""
 
     @property
+    def lit_media(self) -> bool:
+        """Whether media send light along rays: they scatter or emit it. Others only tint what passes."""
+        return self.has_scattering or self.media_emit
+
+    @property
     def many_lights(self) -> bool:
         """Whether direct light has a choice of lights to make."""
         return self.n_lights > 1

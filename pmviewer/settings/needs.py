@@ -57,5 +57,8 @@ LENS = Need(lambda f: f.plan.lens, "Everything is sharp: the camera has no lens 
 IMPORTANCE = Need(lambda f: f.plan.importance, "Only with importance (importance.map).")
 SHADOW_PHOTONS = Need(lambda f: f.plan.shadows, "Only with shadow photons (direct.shadow_photons).")
 CLEAR = Need(lambda f: not f.plan.media, "It does not know of media, and this scene has some.")
+UNLIT_MEDIA = Need(
+    lambda f: not f.traits.lit_media, "It does not know of media that scatter or emit light, and this scene has some."
+)
 MEDIA = Need(lambda f: f.plan.media, "No medium in this scene: no fog, no smoke.")
 VOLUME = Need(lambda f: f.plan.volume, "No photons in media: no medium here scatters light, or not with this method.")

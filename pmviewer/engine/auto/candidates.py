@@ -86,11 +86,11 @@ def candidates(
         left_out.append(("gather", "no surface stores photons"))
         return [progressive, *_paths(traits, left_out)], left_out
     gather, cache = (way.having(THICKER) for way in (GATHER, CACHE))
-    if not traits.has_media:
+    if not traits.lit_media:
         gather, cache = gather.having({**caustics, **CORNERS}, *why), cache.having(caustics, *why)
     found = [progressive, gather]
-    if traits.has_media:
-        left_out.append(("irradiance cache", "it does not know of media"))
+    if traits.lit_media:
+        left_out.append(("irradiance cache", "it does not know of media that scatter or emit light"))
     elif not traits.has_diffuse:
         left_out.append(("irradiance cache", "no diffuse surface"))
     else:

@@ -92,7 +92,7 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
 def _by_traits(opened: OpenScene, base: Settings, found: list[Candidate]) -> Candidate:
     """Without a trial: in scenes without mirrors and glass the irradiance cache, else the default method."""
     traits = opened.traits
-    plain = not traits.follows(base.photons.glossy) and traits.has_diffuse and not traits.has_media
+    plain = not traits.follows(base.photons.glossy) and traits.has_diffuse and not traits.lit_media
     suits = CACHE if plain and not traits.glossy_roughness else PROGRESSIVE
     return next(candidate for candidate in found if candidate.is_like(suits))
 

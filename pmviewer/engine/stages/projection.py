@@ -15,7 +15,9 @@ MOST_LIGHTS = 64
 def projection_for(scene: OpenScene, settings: Settings) -> Projection | None:
     """The maps for these settings; None where photons start everywhere."""
     wanted, plan = settings.photons.projection, plan_of(settings, scene.traits)
-    if wanted == "off" or not plan.photons or plan.emission != "off" or plan.media:  # media scatter to anywhere
+    if wanted == "off" or not plan.photons or plan.emission != "off":
+        return None
+    if scene.traits.lit_media:  # media scatter to anywhere
         return None
     if wanted == "auto" and len(scene.flat.light_names) > MOST_LIGHTS:
         return None

@@ -14,9 +14,9 @@ passes over that of two samples, progressive and gather, means of three seeds: c
 and 1.00, by photons; skylight_room, under one sky, 1.19 and 1.07. Four cost little where two would do."""
 
 
-def samples_at_surface(settings: Direct, path: bool, media: bool, several: bool) -> int:
+def samples_at_surface(settings: Direct, path: bool, lit_media: bool, several: bool) -> int:
     """Light samples per surface and pass. Automatic: `SAMPLES`, `SEVERAL` where lights are `several`; by the path
     tracer, which samples lights at each of its surfaces, and where media are lit along whole rays, 1."""
     if settings.samples == "auto":
-        return 1 if path or media else SEVERAL if several else SAMPLES
+        return 1 if path or lit_media else SEVERAL if several else SAMPLES
     return int(settings.samples)

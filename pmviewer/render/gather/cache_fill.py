@@ -14,7 +14,9 @@ import numpy as np
 from pmviewer.kernels.bsdf.dispersion import new_wave
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian, shading_normal
 from pmviewer.kernels.compile.jit import device, kernel
+from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.dimensions import CACHE_SALT, GATHER_WAVE, HEMISPHERE
+from pmviewer.kernels.media.medium import VACUUM, has_media
 from pmviewer.kernels.memory import row_of
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import dot, largest, luminance, mul
@@ -30,7 +32,7 @@ from pmviewer.maps.irradiance_cache import (
     interpolate,
     reach_of,
 )
-from pmviewer.render.cast import cast, ray_from
+from pmviewer.render.cast import cast, medium_towards, ray_from
 from pmviewer.render.chain import BLACK, CERTAIN, WHITE, arrive, follow_camera_path
 from pmviewer.render.counts import C_DROPPED, C_RAYS
 from pmviewer.render.gather.gather import gather_light
@@ -46,15 +48,22 @@ _INF = _f4(np.inf)
 ENOUGH = _f4(0.25)
 """Sum of weights from which a point needs no record of its own: one of error 0.8, say. Less than that would do for the
 eye pass; the overlap hides the rims."""
-NO_HIT = (False, BLACK, BLACK, BLACK, _f4(0.0), _f4(0.0))
+
+
+@specialised
+def no_medium(scene):
+    """What stands for the medium of a place that there is none of."""
+    if has_media(scene):
+        return lambda scene: VACUUM
+    return lambda scene: None
 
 
 @device
 def uncovered_hit(given, pixel, counts):
     """The first Lambertian surface on the pixel's chain where the cache says too little.
 
-    Returns whether there is one, the point, its geometric and shading normal on the side of the eye, its gap and the
-    size of a pixel there.
+    Returns whether there is one, the point, its geometric and shading normal on the side of the eye, its gap, the
+    medium on that side and the size of a pixel there.
     """
     scene, eye, cache = given.scene, given.eye, given.cache
     seed, ray = sampled_ray(scene, eye, pixel)
@@ -74,22 +83,23 @@ def uncovered_hit(given, pixel, counts):
             n = shading_normal(si.bsdf)
             _, weight, _ = interpolate(cache, si.p, n)
             if weight < ENOUGH:
-                return True, si.p, si.ng, n, si.gap, cache.pixel_size + travelled * cache.pixel_angle
+                footprint = cache.pixel_size + travelled * cache.pixel_angle
+                return True, si.p, si.ng, n, si.gap, medium_towards(si, si.ng), footprint
         if si.bsdf.groups & FOLLOWED == 0 or depth == eye.max_depth:
             break
         ray, beta, _, u = follow_camera_path(given.scene, given.eye, si, beta, seed, depth)
         if not largest(beta) > _f4(0.0):
             break
-    return NO_HIT
+    return False, BLACK, BLACK, BLACK, _f4(0.0), no_medium(scene), _f4(0.0)
 
 
 @device
-def gather_cell(given, p, ng, gap, wi, seed, here, counts):
-    """What the gather ray of cell `here` brings back from direction wi: the Hit, how far it is (inf: none), the tint of
-    its way and the radiance before it."""
+def gather_cell(given, p, ng, gap, medium, wi, seed, here, counts):
+    """What the gather ray of cell `here` brings back from direction wi through the medium at p: the Hit, how far it is
+    (inf: none), the tint of its way and the radiance before it."""
     counts[C_RAYS] += 1
     wave = new_wave(given.scene, given.eye.sequence, seed, _u4(here), GATHER_WAVE)
-    ray = ray_from(p, ng, gap, wi, None, wave)  # never in scenes with media
+    ray = ray_from(p, ng, gap, wi, medium, wave)
     hit, tint = cast_on(given.scene, ray, True)
     if hit.prim < 0:
         return hit, _INF, tint, BLACK
@@ -97,8 +107,8 @@ def gather_cell(given, p, ng, gap, wi, seed, here, counts):
 
 
 @device
-def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
-    """Fill `cells` (see `irradiance_and_gradients`) with what gather rays from p bring back."""
+def gather_hemisphere(given, p, ng, n, gap, medium, seed, cells, counts):
+    """Fill `cells` (see `irradiance_and_gradients`) with what gather rays from p, in that medium, bring back."""
     eye, cache = given.eye, given.cache
     for k in range(cache.sectors):
         for j in range(cache.rings):
@@ -109,7 +119,7 @@ def gather_hemisphere(given, p, ng, n, gap, seed, cells, counts):
             cells[here, 0] = cells[here, 1] = cells[here, 2] = _f4(0.0)
             cells[here, 3], cells[here, 4] = _INF, _f4(1.0) - cos * cos
             if dot(wi, ng) > _f4(0.0):
-                _, cells[here, 3], tint, L = gather_cell(given, p, ng, gap, wi, seed, here, counts)
+                _, cells[here, 3], tint, L = gather_cell(given, p, ng, gap, medium, wi, seed, here, counts)
                 cells[here, 0], cells[here, 1], cells[here, 2] = mul(tint, L)
 
 
@@ -126,12 +136,12 @@ def fill_records(given, pixels, rows, filled, counts, first, last):
     E, rotation, translation = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     for i in range(first, last):
         pixel = pixels[i]
-        found, p, ng, n, gap, footprint = uncovered_hit(given, pixel, tally)
+        found, p, ng, n, gap, medium, footprint = uncovered_hit(given, pixel, tally)
         filled[i] = found
         if not found:
             continue
         seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(CACHE_SALT))
-        gather_hemisphere(given, p, ng, n, gap, seed, cells, tally)
+        gather_hemisphere(given, p, ng, n, gap, medium, seed, cells, tally)
         harmonic = irradiance_and_gradients(cells, cache.rings, cache.sectors, n, E, rotation, translation)
         if not (E[0] + E[1] + E[2] < _f8(np.inf) and harmonic > _f8(0.0)):
             tally[C_DROPPED] += 1

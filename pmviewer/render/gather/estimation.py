@@ -119,7 +119,8 @@ def gather_samples(given, pixels, samples, estimates, told, counts, first, last)
         row = samples[pixel]
         n = _vector(row, NORMAL)
         seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(CACHE_SALT))
-        gather_hemisphere(given, _vector(row, POINT), _vector(row, FACE), n, row[GAP], seed, cells, tally)
+        # None: estimated gathers do not know of media
+        gather_hemisphere(given, _vector(row, POINT), _vector(row, FACE), n, row[GAP], None, seed, cells, tally)
         mean = irradiance_and_gradients(cells, strata.rings, strata.sectors, n, E, rotation, translation)
         if not E[0] + E[1] + E[2] < _f8(np.inf):
             tally[C_DROPPED] += 1

@@ -110,7 +110,7 @@ def _shoot_cells(given, view, gap, seed, known, cells, found, counts):
             cell[3], cell[4] = _INF, _f4(1.0) - cos * cos
             if dot(wi, view.face) <= _f4(0.0):
                 continue
-            hit, far, tint, L = gather_cell(given, view.x, view.face, gap, wi, seed, here, counts)
+            hit, far, tint, L = gather_cell(given, view.x, view.face, gap, None, wi, seed, here, counts)
             L = mul(tint, L)
             cell[0], cell[1], cell[2], cell[3] = L[0], L[1], L[2], far
             row = found[made]

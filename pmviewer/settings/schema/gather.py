@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from pmviewer.settings.needs import CLEAR, Need, Needs
+from pmviewer.settings.needs import CLEAR, UNLIT_MEDIA, Need, Needs
 from pmviewer.settings.schema.base import Auto, Group, setting
 
 GATHER = Need(
@@ -92,7 +92,7 @@ class Gather(Group):
         ge=0.0,
         le=20.0,
         title="secondary below",
-        needs=(CLEAR,),
+        needs=(UNLIT_MEDIA,),
     )
     radiance_photons: Literal["off", "all", "1/4", "1/8"] = setting(
         "off",
@@ -132,7 +132,7 @@ class Gather(Group):
         section="Irradiance cache",
         stage="image",
         scale="choice",
-        needs=(CLEAR,),
+        needs=(UNLIT_MEDIA,),
     )
     cache_error: float = setting(
         0.45,
