@@ -12,6 +12,8 @@ import pytest
 from pmviewer.engine.auto.bias import Bias, Blur, mean_over
 from pmviewer.engine.auto.candidates import (
     CACHE,
+    CACHE_CORNERS,
+    CORNERS,
     GATHER,
     LIGHTS_CAUSTICS,
     PATH,
@@ -21,12 +23,12 @@ from pmviewer.engine.auto.candidates import (
     candidates,
     given,
 )
-from pmviewer.engine.auto.choose import Goal, choose
+from pmviewer.engine.auto.choose import Goal, _by_time, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.auto.measured import Costs, Measured, Numbers, Widths
 from pmviewer.engine.auto.model import error_after, in_time, samples_for, to_error
 from pmviewer.engine.auto.relative import difference, squared, variance
-from pmviewer.engine.auto.trial import RARE, trial
+from pmviewer.engine.auto.trial import RARE, Trial, trial
 from pmviewer.engine.auto.widths import Tried, told_by
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
@@ -48,14 +50,27 @@ PLAIN = SceneTraits(False, True, False, False, 1)
 
 
 def test_what_traits_rule_out_is_not_tried():
-    def names(traits: SceneTraits) -> list[str]:
-        return [c.name for c in candidates(traits, Settings(), 10.0)[0]]
+    def names(traits: SceneTraits, seconds: float = 10.0) -> list[str]:
+        return [c.name for c in candidates(traits, Settings(), seconds)[0]]
 
-    assert names(PLAIN) == [PROGRESSIVE.name, GATHER.name, CACHE.name, PATH.name]
+    assert names(PLAIN) == [PROGRESSIVE.name, GATHER.name, CACHE.name, CACHE_CORNERS.name, PATH.name]
+    assert names(PLAIN, 4.0) == [PROGRESSIVE.name, GATHER.name, CACHE.name, PATH.name]
     assert PATH.name not in names(replace(PLAIN, has_specular=True))
     assert PATH.name not in names(replace(PLAIN, has_findable_lights=False))
-    assert CACHE.name not in names(replace(PLAIN, has_media=True))
+    assert CACHE.name in names(replace(PLAIN, has_media=True))  # these absorb alone
+    for lit in ({"has_scattering": True}, {"media_emit": True}):
+        assert not {CACHE.name, CACHE_CORNERS.name} & set(names(replace(PLAIN, has_media=True, **lit)))
     assert names(replace(PLAIN, has_diffuse=False)) == [PROGRESSIVE.name, PATH.name]
+
+
+@pytest.mark.parametrize(("promised", "expected"), [((1.0, 0.95), GATHER), ((1.0, 0.8), CACHE)])
+def test_of_gathers_that_promise_about_as_much_the_best_known_is_taken(promised, expected):
+    """A tenth more error is nothing beside the bias of records between a trial's few pixels."""
+    gather, cache = (
+        Measured(way.having(more), Costs(0.1, 0.0), error, gathered=1e-9, radius=0.01)
+        for way, more, error in zip((GATHER, CACHE), (CORNERS, {}), promised, strict=True)
+    )
+    assert _by_time(Trial([gather, cache]), 10.0).name == expected.name
 
 
 def test_caustics_are_those_of_lights_unless_that_would_miss_light():
@@ -70,7 +85,8 @@ def test_caustics_are_those_of_lights_unless_that_would_miss_light():
     mirrors = replace(PLAIN, has_specular=True)
     assert caustics(PLAIN) == [{}, {}]
     assert caustics(mirrors) == [LIGHTS_CAUSTICS, LIGHTS_CAUSTICS]
-    assert caustics(replace(mirrors, has_media=True)) == [LIGHTS_CAUSTICS, {}]
+    assert caustics(replace(mirrors, has_media=True)) == [LIGHTS_CAUSTICS, LIGHTS_CAUSTICS]
+    assert caustics(replace(mirrors, has_media=True, has_scattering=True)) == [LIGHTS_CAUSTICS, {}]
     panes = replace(mirrors, thin_glass=("by setting",))
     assert caustics(panes, "tinted and reflecting") == [{}, {}]
     assert caustics(panes, "tinted") == caustics(mirrors)

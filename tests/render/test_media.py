@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pmviewer.engine.method import plan_of
+from pmviewer.scene.analysis import analyse
 from pmviewer.scene.description import (
     Camera,
     ConstantEnvironment,
@@ -20,7 +22,7 @@ from pmviewer.scene.description import (
     Sphere,
 )
 from pmviewer.scene.medium import Phase
-from tests.support.scenes import GLASS, cube_mesh, diffuse, rendered, settings_of
+from tests.support.scenes import GLASS, closed_sphere, cube_mesh, diffuse, rendered, settings_of
 
 pytestmark = pytest.mark.usefixtures("any_light_in_media")
 
@@ -87,6 +89,30 @@ def test_single_scattering_of_a_slab(method, mu0, tau):
     scene, expected = slab(mu0, tau, 0.8)
     image = picture(scene, method, 64, "volume", photons={"N": 500})
     assert image.mean() == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "gather",
+    [{"cache": "on", "secondary": 5.0}, pytest.param({}, marks=pytest.mark.extensive)],
+    ids=["cache and second gathers", "plain"],
+)
+def test_light_in_a_closed_sphere_of_ink(gather):
+    """Le = ρ = ½ and a way of 2cosθ to wherever a wall point looks: L = Le/(1 − ρT) with T = ∫ exp(−2σμ) 2μ dμ, seen
+    from the center through exp(−σ), per channel within 1 %."""
+    sigma = np.array([0.2, 0.8, 2.0])
+    T = 2 * (1 - np.exp(-2 * sigma) * (1 + 2 * sigma)) / (2 * sigma) ** 2
+    sphere = closed_sphere(size=24)
+    filled = replace(
+        sphere,
+        shapes=(replace(sphere.shapes[0], media=(-1, 0)),),
+        camera=replace(sphere.camera, medium=0),
+        media=(Medium("ink", tuple(sigma), BLACK),),
+    )
+    image = picture(filled, "gather", 6, photons={"N": 20_000}, gather=gather)
+    np.testing.assert_allclose(image.mean(axis=(0, 1)), 0.5 / (1 - 0.5 * T) * np.exp(-sigma), rtol=0.01)
+    if gather:
+        values = settings_of(render={"method": "gather"}, gather=gather)
+        assert plan_of(values, analyse(filled)).cache
 
 
 @pytest.mark.extensive

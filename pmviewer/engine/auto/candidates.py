@@ -14,6 +14,9 @@ from pmviewer.settings.presets import RESET
 GUIDED_FROM = 100.0
 """CPU seconds from which guided emission is worth its trial: its first passes are the dearest."""
 
+CORNERS_FROM = 6.0
+"""The same of second gathers beside the irradiance cache: below, the trial's picture would be too small."""
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -26,6 +29,16 @@ class Candidate:
     def is_like(self, other: Candidate) -> bool:
         """Whether it is the same way, by whatever values."""
         return self.name == other.name
+
+    @property
+    def gathers(self) -> bool:
+        """Whether indirect light is gathered."""
+        return self.values.get("render.method") == "gather"
+
+    @property
+    def unseen(self) -> int:
+        """Kinds of bias of its gather rays that a trial may overlook: of records, of look-ups near edges."""
+        return ("gather.cache" in self.values) + ("gather.secondary" not in self.values)
 
     def having(self, values: Mapping[str, Any], *said: str) -> Candidate:
         """The same way with other values, and why."""
@@ -59,6 +72,7 @@ WIDE_RECORDS = {"gather.cache_min": 12.0, "gather.cache_max": 48.0}
 the same time in all bundled scenes tried, from 2 to 64 passes and from 64² to 256² pixels; from four times on, bias
 shows."""
 CACHE = Candidate("gather with irradiance cache", {**GATHER.values, "gather.cache": "on", **WIDE_RECORDS})
+CACHE_CORNERS = Candidate("gather with irradiance cache and second gathers", {**CACHE.values, **CORNERS})
 PATH = Candidate("path", {"render.method": "path"})
 GUIDED = {"importance.map": "average", "importance.emission": "Christensen keep", **CHANNEL_ROULETTE}
 
@@ -86,6 +100,7 @@ def candidates(
         left_out.append(("gather", "no surface stores photons"))
         return [progressive, *_paths(traits, left_out)], left_out
     gather, cache = (way.having(THICKER) for way in (GATHER, CACHE))
+    corners = CACHE_CORNERS.having(caustics, *why)
     if not traits.lit_media:
         gather, cache = gather.having({**caustics, **CORNERS}, *why), cache.having(caustics, *why)
     found = [progressive, gather]
@@ -95,6 +110,10 @@ def candidates(
         left_out.append(("irradiance cache", "no diffuse surface"))
     else:
         found.append(cache)
+        if seconds < CORNERS_FROM:
+            left_out.append((CACHE_CORNERS.name, f"its trial costs too much of less than {CORNERS_FROM:g} CPU s"))
+        else:
+            found.append(corners)
     if traits.n_lights < MANY_LIGHTS:
         left_out.append(("importance", f"fewer than {MANY_LIGHTS} lights: photons reach what the camera sees"))
     elif seconds < GUIDED_FROM or traits.has_media:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pmviewer.engine.auto.bias import Bias
-from pmviewer.engine.auto.candidates import CACHE, GATHER, Candidate, assignments
+from pmviewer.engine.auto.candidates import GATHER, Candidate, assignments
 from pmviewer.engine.auto.measured import BY_PHOTONS, BY_POWER, Costs, Measured, Widths
 from pmviewer.engine.auto.relative import F8, squared, variance
 from pmviewer.engine.auto.widths import NONE, WIDER, Tried, Widened, told_by
@@ -186,7 +186,7 @@ def trial(
     with_caustics = next((tried for tried in every if tried.caustic), None)
     for tried in every:
         interpolated = 0.0
-        if tried.candidate.is_like(CACHE) and gathers is not None:
+        if tried.plan.cache and gathers is not None:
             interpolated = squared(tried.runs[0].images, gathers.runs[0].images, mean, BLOCK)
         source = tried if tried.caustic or not tried.plan.caustic_mask else with_caustics
         caustic = _widened(source, "caustic", mean, trier.scale) if source is not None else NONE
