@@ -29,7 +29,7 @@ from pmviewer.engine.auto.measured import Costs, Measured, Numbers, Widths
 from pmviewer.engine.auto.model import error_after, in_time, samples_for, to_error
 from pmviewer.engine.auto.relative import difference, squared, variance
 from pmviewer.engine.auto.trial import RARE, Trial, trial
-from pmviewer.engine.auto.widths import Tried, told_by
+from pmviewer.engine.auto.widths import HIDDEN, Tried, told_by
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
@@ -196,6 +196,22 @@ def test_radii_are_told_by_passes_with_others(kind, seeds):
     assert found.blur.bias2 == pytest.approx(bias2(1.0), rel=0.2)
     assert found.variance == pytest.approx(0.01**2 / (0.64 + EPSILON), rel=0.15)
     assert found.cost == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(("noise", "expected"), [(0.02, "little"), (20.0, "hidden")])
+def test_a_wide_radius_is_not_free_of_bias_because_noise_hides_it(noise, expected):
+    """Pictures of one brightness, blurred by nothing, whose differences are noise: a trial that sees little says that
+    as much as is usual may be there, one that sees well says how little there is."""
+    rng = np.random.default_rng(7)
+
+    def tried(width: float) -> Tried:
+        return Tried([0.8 + rng.normal(0, noise, (40, 40, 3)) for _ in range(2)], 0.1)
+
+    found = told_by(tried(2.0), tried(1.0), tried(0.5), np.full((40, 40, 3), 0.8), HIDDEN)
+    if expected == "hidden":
+        assert found.blur.wider(2.0).bias2 - found.blur.bias2 > 1.5 * HIDDEN
+    else:
+        assert found.blur.bias2 < 0.1 * HIDDEN
 
 
 @pytest.mark.usefixtures("every_path_may_split")

@@ -21,7 +21,7 @@ from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.candidates import GATHER, Candidate, assignments
 from pmviewer.engine.auto.measured import BY_PHOTONS, BY_POWER, Costs, Measured, Widths
 from pmviewer.engine.auto.relative import F8, squared, variance
-from pmviewer.engine.auto.widths import NONE, WIDER, Tried, Widened, told_by
+from pmviewer.engine.auto.widths import HIDDEN, NONE, WIDER, Tried, Widened, told_by
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
@@ -228,7 +228,7 @@ def _widened(tried: _Tried, name: str, mean: F8, scale: float) -> Widened:
         return NONE
     wide, narrow = (Tried(run.images, run.stages.get("camera pass", 0.0)) for run in runs)
     usual = Tried(tried.runs[0].images, 0.0)
-    found = told_by(wide, usual, narrow, mean)
+    found = told_by(wide, usual, narrow, mean, HIDDEN if name == "shown" else 0.0)
     N = tried.runs[0].N
     return replace(found, variance=found.variance * N, cost=found.cost * scale / N)
 
