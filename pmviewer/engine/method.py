@@ -357,7 +357,8 @@ def _photon_plan(settings: Settings, traits: SceneTraits) -> Plan:
         rough = traits.follows_rough(glossy)
         if not rough:
             skipped.append(("direct light", "all surfaces are smooth mirrors or glass"))
-        return Plan(followed_direct=rough, unfound=unfound, skipped=tuple(skipped))
+        choice = _light_choice(settings, traits, photons=False)[0]
+        return Plan(followed_direct=rough, unfound=unfound, choice=choice, skipped=tuple(skipped))
     choice, why = _light_choice(settings, traits)
     if why:
         skipped.append(("light choice by photons", why))

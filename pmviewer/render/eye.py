@@ -14,11 +14,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, is_lambertian, shading_normal
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, is_lambertian
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import BSDF, CHAIN_LIGHT, LIGHT, OUTLINE
-from pmviewer.kernels.lights.sky_facing import facing_sky
 from pmviewer.kernels.memory import row_of, stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import add, largest, mul, scale
@@ -27,7 +26,7 @@ from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.counts import C_CUT, C_RAYS
 from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power
-from pmviewer.render.direct.choose import choose, choose_without_photons, samples_suffice
+from pmviewer.render.direct.choose import choose, choose_for_group, samples_suffice
 from pmviewer.render.direct.direct import direct_light, found_light, met_light, radiance_of
 from pmviewer.render.filter_samples import place_of, seen_at, sum_at, value_at
 from pmviewer.render.gather.cached import cached, surface_rays
@@ -193,8 +192,7 @@ def _stored(given, si, beta, pixel, scratch, whole):
         aimed = aim(given, si, pixel.seed, scratch[1])
     choice = choose_by_power(scratch[0], eye.light_samples)
     if eye.direct != 0:
-        choice = choose(given.scene, eye, given.choice_map, si.p, si.ng, scratch[0])
-        choice = facing_sky(given.scene, choice, si.ng, shading_normal(si.bsdf))
+        choice = choose(given.scene, eye, given.choice_map, si, scratch[0])
     n_bsdf = _light_rays(given, si, choice, gather, aimed)
     if eye.direct != 0:
         sampler = Sampler(eye.sequence, pixel.seed, eye.index, LIGHT)
@@ -232,7 +230,7 @@ def _followed(given, si, beta, pixel, depth, choice, lights):
             count_found(pixel, OF_CAUSTIC, given.caustic_map, eye, r, si, _CAUSTICS)
         deposit(pixel, SPECULAR, mul(beta, L))
     if eye.followed_direct != 0:
-        choice = choose_without_photons(given.scene, eye, si.p, lights)
+        choice = choose_for_group(given.scene, eye, si, FOLLOWED, lights)
         sampler = Sampler(eye.sequence, pixel.seed, eye.index, CHAIN_LIGHT + depth)
         L = direct_light(given.scene, given.shadows, si, FOLLOWED, choice, _i8(eye.mis), sampler, pixel.counts)
         deposit(pixel, SPECULAR, mul(beta, L))

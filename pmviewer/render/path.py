@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, pick_group, shading_normal
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, NOTHING, STORED, is_delta, pick_group
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import FURTHER_LIGHT, PATH_LIGHT, PATH_SCATTER, PATH_STRIDE
-from pmviewer.kernels.lights.sky_facing import facing_sky, seen_light_pdf
+from pmviewer.kernels.lights.sky_facing import seen_light_pdf
 from pmviewer.kernels.memory import row_of, stack_i4
 from pmviewer.kernels.random import draw4
 from pmviewer.kernels.vector import largest, mul, scale
@@ -21,7 +21,7 @@ from pmviewer.render.cast import cast, leaving
 from pmviewer.render.chain import WHITE, arrive, scatter
 from pmviewer.render.counts import C_CUT, C_RAYS, C_SHADOW_RAYS
 from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power, expected_samples
-from pmviewer.render.direct.choose import choose_without_photons
+from pmviewer.render.direct.choose import choose_for_group, choose_without_photons
 from pmviewer.render.direct.direct import light_samples, met_light, power_heuristic, radiance_of
 from pmviewer.render.given import Sampler
 from pmviewer.render.hidden_lights import hides_lights
@@ -148,9 +148,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 stored += 1
             if group == STORED or not is_delta(si.bsdf):
                 sampler = Sampler(eye.sequence, seed, eye.index, PATH_LIGHT + PATH_STRIDE * depth)
-                choice = choose_without_photons(scene, eye, si.p, lights)
-                if group == STORED:
-                    choice = facing_sky(scene, choice, si.ng, shading_normal(si.bsdf))
+                choice = choose_for_group(scene, eye, si, group, lights)
                 L, rays, _ = light_samples(scene, None, si, group, choice, eye.mis, sampler)
                 tally[C_RAYS] += rays
                 tally[C_SHADOW_RAYS] += rays

@@ -29,7 +29,7 @@ from pmviewer.render.direct.choice import (
     chosen_light,
     expected_samples,
 )
-from pmviewer.render.direct.choose import choose as choose_at
+from pmviewer.render.direct.choose import choose_by_rule
 from pmviewer.render.direct.samples import SAMPLES
 from pmviewer.render.eye import DIRECT
 from pmviewer.render.planes import beauty_of
@@ -181,7 +181,7 @@ def _choose(scenes, eyes, grids, u, m, light, light_m):
     """m: float32 (lights,); light, light_m: (samples, len(u)). Returns known lights and samples."""
     scene, eye = scenes[0], eyes[0]
     zero, one = np.float32(0.0), np.float32(1.0)
-    choice = choose_at(scene, eye, grids[0], (zero, zero, zero), (zero, one, zero), stack_i4(LIST_WORDS))
+    choice = choose_by_rule(scene, eye, grids[0], (zero, zero, zero), (zero, one, zero), stack_i4(LIST_WORDS))
     for i in range(len(m)):
         m[i] = expected_samples(scene, choice, np.int64(i))
     for s in range(choice[4]):

@@ -32,7 +32,7 @@ from pmviewer.engine.stages.projection import projection_for
 from pmviewer.engine.store import StageStore
 from pmviewer.render.camera import resolve_camera
 from pmviewer.render.filter import filter_of, noise_share
-from pmviewer.render.planes import beauty_of
+from pmviewer.render.planes import PLANES, beauty_of
 from pmviewer.settings.access import Settings, with_values
 
 Tell = Callable[[str, float | None], None]
@@ -52,6 +52,8 @@ BLOCK = 4
 with two radii have the same photons and camera rays, and little noise in their difference."""
 SEEDS = ((7_919, 104_729), (1_299_709, 15_485_863), (32_452_843, 49_979_687))
 """Added to the picture's seed; the second pair where a trial that is twice as long still fits, and so on."""
+SAMPLED = ("direct", "specular")
+"""Terms of the picture that light samples are seen in."""
 STORE = 1 << 28
 
 
@@ -69,10 +71,12 @@ class Trial:
 
 @dataclass
 class _Run:
-    """Pictures of the seeds with such settings, and the CPU seconds by stage of the quickest one."""
+    """Pictures of the seeds with such settings, of them what light samples make, directly or over what is followed,
+    and the CPU seconds by stage of the quickest one."""
 
     settings: Settings
     images: list[F8] = field(default_factory=list)
+    sampled: list[F8] = field(default_factory=list)
     stages: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -152,7 +156,9 @@ class _Trier:
         renderer = Renderer(self._opened, chosen, self._pool, self._store)
         renderer.camera = replace(renderer.camera, pixel_side=min(self._side, 1.0))
         renderer.step()
-        run.images.append(beauty_of(renderer.film.planes()).astype(np.float64))
+        planes = renderer.film.planes()
+        run.images.append(beauty_of(planes).astype(np.float64))
+        run.sampled.append(np.sum([planes[..., PLANES[term]] for term in SAMPLED], axis=0, dtype=np.float64))
         for name, seconds in renderer.tally.stage_seconds.items():
             run.stages[name] = min(run.stages.get(name, math.inf), seconds)
 
@@ -250,10 +256,11 @@ def _measured(tried: _Tried, widened: tuple[Widened, Widened], bias: Bias, mean:
 
 
 def _sampled(measured: Measured, source: _Tried, mean: F8, scale: float) -> Measured:
-    """With what light samples do, told by passes with `MORE` times as many and the same photons and camera rays. Their
-    variance is taken to fall as chance's does; it falls faster (`pmviewer.render.direct.samples`)."""
+    """With what light samples do, told by passes with `MORE` times as many and the same photons and camera rays, by the
+    terms that they make: the noise of others would hide it. Their variance is taken to fall as chance's does; it falls
+    faster (`pmviewer.render.direct.samples`)."""
     usual, many = source.runs[-1], source.direct[0]
-    direct = max(variance(usual.images, mean) - variance(many.images, mean), 0.0) / (1 - 1 / MORE)
+    direct = max(variance(usual.sampled, mean) - variance(many.sampled, mean), 0.0) / (1 - 1 / MORE)
     spent = max(many.stages["camera pass"] - usual.stages["camera pass"], 0.0) * scale / (MORE - 1)
     complement = BY_PHOTONS if source.plan.asks_photons else BY_POWER
     costs = replace(measured.costs, sampled=spent)

@@ -13,7 +13,7 @@ from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, bsdf_f, same_side
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.dimensions import LIGHT
 from pmviewer.kernels.lights.light import sample_one_light
-from pmviewer.kernels.lights.sky_facing import facing_sky, place_on_light
+from pmviewer.kernels.lights.sky_facing import place_on_light
 from pmviewer.kernels.memory import bits_of_float, stack_i4
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import dot, largest
@@ -139,8 +139,7 @@ def radiance_view(scenes, eyes, maps, radiance_maps, cell_maps, out, first, last
 def known_share(scene, eye, choice_map, shadows, si, pixel, lights):
     """Light samples at a surface that count, and how many of them shadow photons decide. `lights`: LIST_WORDS words of
     scratch; the rest as for `shadow_view`."""
-    choice = choose(scene, eye, choice_map, si.p, si.ng, lights)
-    choice = facing_sky(scene, choice, si.ng, shading_normal(si.bsdf))
+    choice = choose(scene, eye, choice_map, si, lights)
     samples = choice[4]
     seed = pixel_seed(eye, pixel)
     counted, known = _i8(0), _i8(0)

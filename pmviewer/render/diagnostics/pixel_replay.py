@@ -171,7 +171,7 @@ def _shares(si, group, wi, shares):
 @device
 def _expected(given, si, expected):
     """The light samples that are expected on each light at a surface into expected (n_lights,)."""
-    choice = choose(given.scene, given.eye, given.choice_map, si.p, si.ng, stack_i4(LIST_WORDS))
+    choice = choose(given.scene, given.eye, given.choice_map, si, stack_i4(LIST_WORDS))
     for light in range(len(expected)):
         expected[light] = expected_samples(given.scene, choice, light)
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian, shading_normal
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.lights.reach import samples_by_power_suffice
+from pmviewer.kernels.lights.sky_facing import facing_sky
 from pmviewer.kernels.media.medium import has_media
 from pmviewer.render.direct.by_distance import choose_by_distance, samples_by_distance_suffice
+from pmviewer.render.direct.by_lobes import choose_by_lobes
 from pmviewer.render.direct.by_photons import choose_by_photons
 from pmviewer.render.direct.choice import BY_DISTANCE, BY_POWER, LISTED, choose_by_power
 
@@ -22,11 +25,33 @@ def choose_without_photons(scene, eye, p, lights):
 
 
 @device
-def choose(scene, eye, grid, p, n, lights):
-    """The choice at the point p with normal n. `grid`: of the photons that are asked; `lights` as above."""
+def choose_by_rule(scene, eye, grid, p, n, lights):
+    """The choice at the point p with normal n, whatever reflects there. `grid`: of the photons that are asked; `lights`
+    as above."""
     if eye.choice == BY_POWER or eye.choice == BY_DISTANCE:
         return choose_without_photons(scene, eye, p, lights)
     return choose_by_photons(scene, eye, grid, p, n, lights)
+
+
+@device
+def _for_lobes(scene, si, group, choice):
+    if group == FOLLOWED:
+        return choose_by_lobes(scene, si, FOLLOWED, choice)
+    if not is_lambertian(si.bsdf):
+        choice = choose_by_lobes(scene, si, STORED, choice)
+    return facing_sky(scene, choice, si.ng, shading_normal(si.bsdf))
+
+
+@device
+def choose(scene, eye, grid, si, lights):
+    """The choice for the STORED lobes of a SurfaceInteraction."""
+    return _for_lobes(scene, si, STORED, choose_by_rule(scene, eye, grid, si.p, si.ng, lights))
+
+
+@device
+def choose_for_group(scene, eye, si, group, lights):
+    """The choice for a group of its lobes where no photons are asked."""
+    return _for_lobes(scene, si, group, choose_without_photons(scene, eye, si.p, lights))
 
 
 @specialised

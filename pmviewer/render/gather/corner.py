@@ -13,10 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pmviewer.kernels.bsdf.scattering import STORED, bsdf_sample, shading_normal
+from pmviewer.kernels.bsdf.scattering import STORED, bsdf_sample
 from pmviewer.kernels.compile.specialise import absent, part, specialised
 from pmviewer.kernels.dimensions import SECOND_GATHER_SALT, SECOND_LIGHT, SECOND_RAY
-from pmviewer.kernels.lights.sky_facing import facing_sky
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import draw4, hash3
 from pmviewer.kernels.vector import add, dot, largest, mul
@@ -61,8 +60,7 @@ def gather_again(given, si, seed, index, counts, hit):
 def _again(given, si, seed, index, counts, hit):
     scene, eye = given.scene, given.eye
     sampler = Sampler(eye.sequence, hash3(seed, _u4(SECOND_GATHER_SALT), _u4(0)), index, SECOND_LIGHT)
-    choice = choose(scene, eye, given.choice_map, si.p, si.ng, stack_i4(LIST_WORDS))
-    choice = facing_sky(scene, choice, si.ng, shading_normal(si.bsdf))
+    choice = choose(scene, eye, given.choice_map, si, stack_i4(LIST_WORDS))
     L = direct_light(scene, given.shadows, si, STORED, choice, _i8(eye.mis), sampler, counts)
     if eye.caustic_mask != 0:
         L = add(L, reflected(given.caustic_map, eye, eye.caustic_radius, si, eye.caustic_mask))
