@@ -34,8 +34,12 @@ REFERENCE = 6.0
 """CPU seconds of each of the two references, over those of the comparison."""
 COLUMNS = ("file", "triangles", "chosen", "trial", "relMSE", "expected", "Mitsuba's", "ours / Mitsuba's", "mean ratio",
            "said")  # fmt: skip
-CHOSEN = "; which gather rays gather again was chosen with three files, a coated ball, bricks and a staircase"
-"""CORNERS of `pmviewer.engine.auto.candidates`, said in the targets' own lines."""
+CHOSEN = (
+    "; which gather rays gather again was chosen with three files, a coated ball, bricks and a staircase, second "
+    "gathers with the cache with a living room, lights by what gloss reflects of them with Veach's plates"
+)
+"""CORNERS and CACHE_CORNERS of `pmviewer.engine.auto.candidates` and `pmviewer.render.direct.by_lobes`, said in the
+targets' own lines."""
 
 
 def error_against(image: NDArray[Any], references: NDArray[np.float64]) -> float:
