@@ -73,8 +73,9 @@ the same time in all bundled scenes tried, from 2 to 64 passes and from 64² to 
 shows."""
 CACHE = Candidate("gather with irradiance cache", {**GATHER.values, "gather.cache": "on", **WIDE_RECORDS})
 CACHE_CORNERS = Candidate("gather with irradiance cache and second gathers", {**CACHE.values, **CORNERS})
-"""Without THICKER: no look-up is near an edge. In a living room under a sky the cache alone, with thick discs, was wrong
-by 0.018 (squared, relative; 0.008 with usual ones), with second gathers by 0.0038, and 0.0011 with usual discs."""
+"""Without THICKER: no look-up is near an edge. In a living room under a sky the cache alone, with thick discs, was
+wrong by 0.018 (squared, relative; 0.008 with usual ones), with second gathers by 0.0038, and 0.0011 with usual
+discs."""
 PATH = Candidate("path", {"render.method": "path"})
 GUIDED = {"importance.map": "average", "importance.emission": "Christensen keep", **CHANNEL_ROULETTE}
 
