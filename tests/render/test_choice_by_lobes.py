@@ -3,6 +3,8 @@ plate mirrors beside a strong one overhead."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -60,13 +62,19 @@ def _shares(scenes, eyes, group, before, after):
         after[light] = expected_samples(scene, choice, light)
 
 
-@pytest.mark.parametrize(("alpha", "group"), [(0.05, FOLLOWED), (0.25, STORED)])
-def test_the_lamp_that_is_mirrored_gets_the_samples(alpha, group):
-    flat = flatten(plate(rough(alpha)))
+def shares(scene, group):
+    """m of each lamp, by distance and by lobes, of four samples."""
     eyes = np.zeros(1, EYE_DTYPE)
     eyes["choice"], eyes["light_samples"], eyes["glossy"] = BY_DISTANCE, 4, 0.2
     before, after = np.zeros(3, np.float32), np.zeros(3, np.float32)
+    flat = flatten(scene)
     _shares(flat.record, eyes, group, before, after)
+    return before, after
+
+
+@pytest.mark.parametrize(("alpha", "group"), [(0.05, FOLLOWED), (0.25, STORED)])
+def test_the_lamp_that_is_mirrored_gets_the_samples(alpha, group):
+    before, after = shares(plate(rough(alpha)), group)
     print(f"roughness {alpha}: {before} by distance, {after} by lobes")
     assert after.sum() == pytest.approx(4.0, rel=1e-5)
     assert before[0] < 0.25 * before.sum()
@@ -97,10 +105,18 @@ def test_the_picture_is_that_of_sampling_by_power_with_less_noise(method, alpha)
     assert noise["distance", 4] < 0.5 * noise["power", 4]
 
 
+def test_so_does_the_lamp_behind_rough_glass():
+    """The small lamp straight behind, the strong one beside the ray."""
+    glass = Material("glass", "rough dielectric", (1.0,) * 3, (1.0,) * 3, eta=1.5, alpha=(0.1, 0.1))
+    scene = plate(glass)
+    behind = replace(scene.shapes[1], geometry=Sphere((0.0, -2.5, -1.2), 0.2))
+    shapes = (scene.shapes[0], behind, *scene.shapes[2:])
+    before, after = shares(replace(scene, shapes=shapes), FOLLOWED)
+    print(f"{before} by distance, {after} by lobes")
+    assert before[0] < 0.3 * before.sum()
+    assert after[0] > 0.6 * after.sum()
+
+
 def test_what_scatters_evenly_is_left_as_it_is():
-    flat = flatten(plate(diffuse()))
-    eyes = np.zeros(1, EYE_DTYPE)
-    eyes["choice"], eyes["light_samples"], eyes["glossy"] = BY_DISTANCE, 4, 0.2
-    before, after = np.zeros(3, np.float32), np.zeros(3, np.float32)
-    _shares(flat.record, eyes, STORED, before, after)
+    _, after = shares(plate(diffuse()), STORED)
     assert after.sum() == pytest.approx(4.0, rel=1e-5)

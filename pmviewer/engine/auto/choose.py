@@ -137,15 +137,14 @@ def _to_error(m: Measured, error: float) -> list[Option]:
 
 
 def _picked(found: list[Option], of: Callable[[Option], float]) -> Option:
-    """The one with the least value; among ways to gather that are hardly worse, the one whose bias a trial knows best.
+    """The one with the least value; of ways to gather, each kind of bias that a trial overlooks counts as a tenth more.
     Of its candidate the numbers that `_preference` likes best among those that are hardly worse: those of two trials
     are then the same more often. The default unless another is clearly better."""
     best = min(found, key=of)
-    even = [o for o in found if of(o) <= NEARLY * of(best)]
     if best.measured.candidate.gathers:
-        gathers = [o for o in even if o.measured.candidate.gathers]
-        best = min(gathers, key=lambda o: (o.measured.candidate.unseen, of(o)))
-    near = [o for o in even if o.measured is best.measured]
+        gathers = [o for o in found if o.measured.candidate.gathers]
+        best = min(gathers, key=lambda o: of(o) * NEARLY**o.measured.candidate.unseen)
+    near = [o for o in found if o.measured is best.measured and of(o) <= NEARLY * of(best)]
     best = min(near, key=_preference)
     usual = next((o for o in found if _is_default(o)), None)
     return usual if usual is not None and of(best) > BETTER * of(usual) else best

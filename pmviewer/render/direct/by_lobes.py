@@ -3,7 +3,8 @@
 Gloss shows one lamp of many: a small one that it mirrors counts more than a strong one beside it, of which a choice by
 distance alone makes nearly all samples, and takes the small lamp's rarely and at many times their weight (Veach's
 plates under a lamp overhead). The lobes' f·cos is looked at where the ball around a light comes nearest to the mirror's
-direction. Its mean over the ball is at most one over the ball's solid angle, since no surface reflects more than all.
+direction, and of one behind the surface to where the ray would go straight on. Its mean over the ball is at most one
+over the ball's solid angle, since no surface reflects more than all.
 """
 
 from __future__ import annotations
@@ -59,8 +60,10 @@ def reflected_of(scene, si, group, light):
     if not d2 > radius * radius:
         return _FROM_AFAR
     cos_reach = _f4(math.sqrt(_f4(1.0) - radius * radius / d2))
-    mirrored = reflect(scale(si.wo, _f4(-1.0)), n)
-    wi = _towards(scale(to, _f4(1.0) / _f4(math.sqrt(d2))), mirrored, cos_reach)
+    aimed = scale(si.wo, _f4(-1.0))
+    if dot(to, n) * dot(si.wo, n) > _f4(0.0):
+        aimed = reflect(aimed, n)
+    wi = _towards(scale(to, _f4(1.0) / _f4(math.sqrt(d2))), aimed, cos_reach)
     f = luminance(bsdf_f(si.bsdf, group, si.wo, wi)) * abs(dot(wi, n))
     return min(f, _f4(1.0) / (_f4(2.0 * math.pi) * max(_f4(1.0) - cos_reach, _f4(1e-6))))
 
