@@ -111,13 +111,17 @@ def write_plot(path: Path, kept: list[Kept]) -> bool:
 
     wide = min(len(curves), 2)
     high = -(-len(curves) // wide)
-    figure, axes = pyplot.subplots(high, wide, figsize=(5.5 * wide, 4 * high), squeeze=False, layout="constrained")
+    figure, axes = pyplot.subplots(high, wide, figsize=(5.5 * wide, 4 * high + 1), squeeze=False, layout="constrained")
+    names = list(dict.fromkeys(method for methods in curves.values() for method in methods))
+    colors = dict(zip(names, pyplot.get_cmap("tab20")(range(len(names))), strict=True))
+    drawn = {}
     for axis, (scene, methods) in zip(axes.flat, curves.items(), strict=False):
         for method, points in methods.items():
-            axis.loglog(*zip(*sorted(points), strict=True), marker="o", markersize=3, label=method)
+            x, y = zip(*sorted(points), strict=True)
+            (drawn[method],) = axis.loglog(x, y, marker="o", markersize=3, color=colors[method], label=method)
         axis.set(title=scene, xlabel="CPU seconds", ylabel="relMSE")
         axis.grid(alpha=0.3)
-        axis.legend(fontsize="small")
+    figure.legend(drawn.values(), drawn, loc="outside lower center", ncols=4, fontsize="small")
     path.parent.mkdir(exist_ok=True)
     figure.savefig(path, dpi=90)
     pyplot.close(figure)

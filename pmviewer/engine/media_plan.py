@@ -51,10 +51,10 @@ BLURRED = "Photons keep their directions to 0.06°: light that media scatter nea
 
 def in_media(settings: Settings, traits: SceneTraits) -> tuple[Settings, tuple[str, ...]]:
     """The settings that a scene with media goes by, and sentences about those that are others than were asked for."""
-    emit = traits.media_emit
+    emit = traits.media_emit and settings.render.method != "path"
     changes: dict[str, Any] = {}
     said: list[str] = []
-    for lacking in (*LACKING, *((LOOKED_FOR,) if emit and settings.render.method != "path" else ())):
+    for lacking in (*LACKING, *((LOOKED_FOR,) if emit else ())):
         if lacking.lit and not traits.lit_media:
             continue
         group, name = lacking.name.split(".")

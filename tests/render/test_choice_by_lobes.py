@@ -118,5 +118,6 @@ def test_so_does_the_lamp_behind_rough_glass():
 
 
 def test_what_scatters_evenly_is_left_as_it_is():
-    _, after = shares(plate(diffuse()), STORED)
+    before, after = shares(plate(diffuse()), STORED)
     assert after.sum() == pytest.approx(4.0, rel=1e-5)
+    assert (after == before).all()

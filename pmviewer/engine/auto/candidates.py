@@ -36,7 +36,7 @@ class Candidate:
         return self.values.get("render.method") == "gather"
 
     @property
-    def unseen(self) -> int:
+    def overlooked(self) -> int:
         """Kinds of bias of its gather rays that a trial may overlook: of records, of look-ups near edges."""
         return ("gather.cache" in self.values) + ("gather.secondary" not in self.values)
 
@@ -65,8 +65,9 @@ corner_room, 0.99 in museum, 1.00 in eight others. Shown directly, they blur wha
 CORNERS = {"gather.secondary": 5.0}
 """Gather rays that end within five radii gather again, so that no disc is dark beyond an edge or takes light from the
 next wall: relMSE of a model of bricks in the same time 0.6 times that without (its picture 1.5 % too dark instead of
-3.2 %), of a coated ball in a mount 0.9, of a wooden staircase 1.05. With the irradiance cache records would cost
-twice as much; what it lacks by comparison is known to the trial as the bias of interpolation."""
+3.2 %), of a coated ball in a mount 0.9, of a wooden staircase 1.05. With the irradiance cache records may cost
+twice as much: a way of its own. What either cache lacks by comparison is known to the trial as the bias of
+interpolation."""
 WIDE_RECORDS = {"gather.cache_min": 12.0, "gather.cache_max": 48.0}
 """Records that reach three times as far as those that stay next to the plain gather: fewer of them, and less noise in
 the same time in all bundled scenes tried, from 2 to 64 passes and from 64² to 256² pixels; from four times on, bias
@@ -102,10 +103,10 @@ def candidates(
     if not traits.stores(glossy):
         left_out.append(("gather", "no surface stores photons"))
         return [progressive, *_paths(traits, left_out)], left_out
-    gather, cache = (way.having(THICKER) for way in (GATHER, CACHE))
-    corners = CACHE_CORNERS.having(caustics, *why)
+    gather, cache, corners = GATHER.having(THICKER), CACHE.having(THICKER), CACHE_CORNERS
     if not traits.lit_media:
-        gather, cache = gather.having({**caustics, **CORNERS}, *why), cache.having(caustics, *why)
+        gather = gather.having(CORNERS)
+        gather, cache, corners = (way.having(caustics, *why) for way in (gather, cache, corners))
     found = [progressive, gather]
     if traits.lit_media:
         left_out.append(("irradiance cache", "it does not know of media that scatter or emit light"))

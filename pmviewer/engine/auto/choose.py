@@ -143,7 +143,7 @@ def _picked(found: list[Option], of: Callable[[Option], float]) -> Option:
     best = min(found, key=of)
     if best.measured.candidate.gathers:
         gathers = [o for o in found if o.measured.candidate.gathers]
-        best = min(gathers, key=lambda o: of(o) * NEARLY**o.measured.candidate.unseen)
+        best = min(gathers, key=lambda o: of(o) * NEARLY**o.measured.candidate.overlooked)
     near = [o for o in found if o.measured is best.measured and of(o) <= NEARLY * of(best)]
     best = min(near, key=_preference)
     usual = next((o for o in found if _is_default(o)), None)

@@ -195,10 +195,10 @@ def trial(
         if tried.plan.cache and gathers is not None:
             interpolated = squared(tried.runs[0].images, gathers.runs[0].images, mean, BLOCK)
         source = tried if tried.caustic or not tried.plan.caustic_mask else with_caustics
-        caustic = _widened(source, "caustic", mean, trier.scale) if source is not None else NONE
+        caustic = _widened(source, "caustic", mean, trier.scale, 0.0) if source is not None else NONE
         if source is not None:
             caustic = caustic.wider(tried.radius / source.radius)
-        shown = _widened(tried, "shown", mean, trier.scale)
+        shown = _widened(tried, "shown", mean, trier.scale, HIDDEN)
         bias = Bias(caustic.blur, shown.blur, interpolated)
         measured = _measured(tried, (caustic, shown), bias, mean, trier.scale)
         if tried.plan.direct and with_samples is not None:
@@ -227,14 +227,14 @@ def _either(name: str) -> list[Widths]:
     return [Widths(**{name: WIDER}), Widths(**{name: 1 / WIDER})]
 
 
-def _widened(tried: _Tried, name: str, mean: F8, scale: float) -> Widened:
-    """What passes with other radii of that name tell; nothing without them."""
+def _widened(tried: _Tried, name: str, mean: F8, scale: float, hidden: float) -> Widened:
+    """What passes with other radii of that name tell; nothing without them. hidden: as for `told_by`."""
     runs: list[_Run] = getattr(tried, name)
     if not runs:
         return NONE
     wide, narrow = (Tried(run.images, run.stages.get("camera pass", 0.0)) for run in runs)
     usual = Tried(tried.runs[0].images, 0.0)
-    found = told_by(wide, usual, narrow, mean, HIDDEN if name == "shown" else 0.0)
+    found = told_by(wide, usual, narrow, mean, hidden)
     N = tried.runs[0].N
     return replace(found, variance=found.variance * N, cost=found.cost * scale / N)
 

@@ -1,8 +1,8 @@
 """The choice of few lights by what a surface's lobes reflect of each, on top of the choice by distance.
 
 Gloss shows one lamp of many: a small one that it mirrors counts more than a strong one beside it, of which a choice by
-distance alone makes nearly all samples, and takes the small lamp's rarely and at many times their weight (Veach's
-plates under a lamp overhead). The lobes' f·cos is looked at where the ball around a light comes nearest to the mirror's
+distance alone makes most samples, and takes the small lamp's rarely and at many times their weight (Veach's plates
+under a lamp overhead). The lobes' f·cos is looked at where the ball around a light comes nearest to the mirror's
 direction, and of one behind the surface to where the ray would go straight on. Its mean over the ball is at most one
 over the ball's solid angle, since no surface reflects more than all.
 """
@@ -13,16 +13,17 @@ import math
 
 import numpy as np
 
-from pmviewer.kernels.bsdf.scattering import bsdf_f, shading_normal
+from pmviewer.kernels.bsdf.scattering import bsdf_f, is_plain, shading_normal
 from pmviewer.kernels.bsdf.specular import reflect
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.compile.specialise import part, specialised
 from pmviewer.kernels.lights.light import light_place
 from pmviewer.kernels.memory import stack_get_f4, stack_put_f4
 from pmviewer.kernels.vector import dot, luminance, normalize, scale, sub
 from pmviewer.render.direct.choice import LISTED
 
 MOST = 16
-"""Lights whose lobes are looked at: each costs what a light sample does without its ray."""
+"""Lights that lobes are asked about: each costs what a light sample does without its ray."""
 DEFENSIVE = np.float32(0.2)
 """Share of the samples that go by distance as before: what is in between, and how a lobe varies, nobody knows."""
 SCRATCH = LISTED - MOST
@@ -68,10 +69,16 @@ def reflected_of(scene, si, group, light):
     return min(f, _f4(1.0) / (_f4(2.0 * math.pi) * max(_f4(1.0) - cos_reach, _f4(1e-6))))
 
 
-@device
+@specialised
 def choose_by_lobes(scene, si, group, choice):
     """A choice by distance at a surface with m by what a group of its lobes reflects, too; any other choice as it is,
-    and that of more than MOST lights."""
+    and that of more than MOST lights. Simple scenes have no gloss, and compile none of it."""
+    if is_plain(part(si, "bsdf")):
+        return lambda scene, si, group, choice: choice
+    return _by_lobes
+
+
+def _by_lobes(scene, si, group, choice):
     lights, known, _, rest, n, sky = choice
     if known != scene.n_lights or known < 2 or known > MOST or rest > _f4(0.0):
         return choice

@@ -17,6 +17,9 @@ Keller-Wald   S_con·cₗ/C, or, when there is a sample for  S_non·Pₗ over th
               by cₗ/C in whole numbers
 ============  ==========================================  =====================================
 
+Where lobes are not Lambertian, m of a choice by distance among few lights goes by what they reflect of each, too
+(`pmviewer.render.direct.by_lobes`).
+
 A list holds LISTED lights: all of them, by distance (`pmviewer.render.direct.by_distance`), or those with photons near
 (`pmviewer.render.direct.by_photons`). `pmviewer.render.direct.choose` asks whichever rule the eye record says.
 """

@@ -35,11 +35,12 @@ def choose_by_rule(scene, eye, grid, p, n, lights):
 
 @device
 def _for_lobes(scene, si, group, choice):
-    if group == FOLLOWED:
-        return choose_by_lobes(scene, si, FOLLOWED, choice)
-    if not is_lambertian(si.bsdf):
-        choice = choose_by_lobes(scene, si, STORED, choice)
-    return facing_sky(scene, choice, si.ng, shading_normal(si.bsdf))
+    """The choice that a rule has made, by what the lobes reflect of lights and of the sky."""
+    if group == FOLLOWED or not is_lambertian(si.bsdf):
+        choice = choose_by_lobes(scene, si, group, choice)
+    if group == STORED:
+        choice = facing_sky(scene, choice, si.ng, shading_normal(si.bsdf))
+    return choice
 
 
 @device

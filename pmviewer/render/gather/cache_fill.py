@@ -8,6 +8,7 @@ pure function of pixel, pass and the cache as it was given, so that it does not 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -50,6 +51,17 @@ ENOUGH = _f4(0.25)
 eye pass; the overlap hides the rims."""
 
 
+class Origin(NamedTuple):
+    """Where a hemisphere of gather rays starts: the point, its geometric and shading normal on the side of the eye, how
+    far rays start off it, and the medium on that side, None in scenes without media."""
+
+    p: Any
+    ng: Any
+    n: Any
+    gap: Any
+    medium: Any
+
+
 @specialised
 def no_medium(scene):
     """What stands for the medium of a place that there is none of."""
@@ -62,8 +74,7 @@ def no_medium(scene):
 def uncovered_hit(given, pixel, counts):
     """The first Lambertian surface on the pixel's chain where the cache says too little.
 
-    Returns whether there is one, the point, its geometric and shading normal on the side of the eye, its gap, the
-    medium on that side and the size of a pixel there.
+    Returns whether there is one, the Origin there and the size of a pixel.
     """
     scene, eye, cache = given.scene, given.eye, given.cache
     seed, ray = sampled_ray(scene, eye, pixel)
@@ -84,22 +95,22 @@ def uncovered_hit(given, pixel, counts):
             _, weight, _ = interpolate(cache, si.p, n)
             if weight < ENOUGH:
                 footprint = cache.pixel_size + travelled * cache.pixel_angle
-                return True, si.p, si.ng, n, si.gap, medium_towards(si, si.ng), footprint
+                return True, Origin(si.p, si.ng, n, si.gap, medium_towards(si, si.ng)), footprint
         if si.bsdf.groups & FOLLOWED == 0 or depth == eye.max_depth:
             break
         ray, beta, _, u = follow_camera_path(given.scene, given.eye, si, beta, seed, depth)
         if not largest(beta) > _f4(0.0):
             break
-    return False, BLACK, BLACK, BLACK, _f4(0.0), no_medium(scene), _f4(0.0)
+    return False, Origin(BLACK, BLACK, BLACK, _f4(0.0), no_medium(scene)), _f4(0.0)
 
 
 @device
-def gather_cell(given, p, ng, gap, medium, wi, seed, here, counts):
-    """What the gather ray of cell `here` brings back from direction wi through the medium at p: the Hit, how far it is
-    (inf: none), the tint of its way and the radiance before it."""
+def gather_cell(given, origin, wi, seed, here, counts):
+    """What the gather ray of cell `here` brings back from direction wi: the Hit, how far it is (inf: none), the tint of
+    its way and the radiance before it."""
     counts[C_RAYS] += 1
     wave = new_wave(given.scene, given.eye.sequence, seed, _u4(here), GATHER_WAVE)
-    ray = ray_from(p, ng, gap, wi, medium, wave)
+    ray = ray_from(origin.p, origin.ng, origin.gap, wi, origin.medium, wave)
     hit, tint = cast_on(given.scene, ray, True)
     if hit.prim < 0:
         return hit, _INF, tint, BLACK
@@ -107,9 +118,9 @@ def gather_cell(given, p, ng, gap, medium, wi, seed, here, counts):
 
 
 @device
-def gather_hemisphere(given, p, ng, n, gap, medium, seed, cells, counts):
-    """Fill `cells` (see `irradiance_and_gradients`) with what gather rays from p, in that medium, bring back."""
-    eye, cache = given.eye, given.cache
+def gather_hemisphere(given, origin, seed, cells, counts):
+    """Fill `cells` (see `irradiance_and_gradients`) with what gather rays bring back."""
+    eye, cache, n = given.eye, given.cache, origin.n
     for k in range(cache.sectors):
         for j in range(cache.rings):
             here = j + cache.rings * k
@@ -118,8 +129,8 @@ def gather_hemisphere(given, p, ng, n, gap, medium, seed, cells, counts):
             cos = dot(wi, n)
             cells[here, 0] = cells[here, 1] = cells[here, 2] = _f4(0.0)
             cells[here, 3], cells[here, 4] = _INF, _f4(1.0) - cos * cos
-            if dot(wi, ng) > _f4(0.0):
-                _, cells[here, 3], tint, L = gather_cell(given, p, ng, gap, medium, wi, seed, here, counts)
+            if dot(wi, origin.ng) > _f4(0.0):
+                _, cells[here, 3], tint, L = gather_cell(given, origin, wi, seed, here, counts)
                 cells[here, 0], cells[here, 1], cells[here, 2] = mul(tint, L)
 
 
@@ -136,13 +147,13 @@ def fill_records(given, pixels, rows, filled, counts, first, last):
     E, rotation, translation = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     for i in range(first, last):
         pixel = pixels[i]
-        found, p, ng, n, gap, medium, footprint = uncovered_hit(given, pixel, tally)
+        found, origin, footprint = uncovered_hit(given, pixel, tally)
         filled[i] = found
         if not found:
             continue
         seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(CACHE_SALT))
-        gather_hemisphere(given, p, ng, n, gap, medium, seed, cells, tally)
-        harmonic = irradiance_and_gradients(cells, cache.rings, cache.sectors, n, E, rotation, translation)
+        gather_hemisphere(given, origin, seed, cells, tally)
+        harmonic = irradiance_and_gradients(cells, cache.rings, cache.sectors, origin.n, E, rotation, translation)
         if not (E[0] + E[1] + E[2] < _f8(np.inf) and harmonic > _f8(0.0)):
             tally[C_DROPPED] += 1
             filled[i] = False
@@ -151,7 +162,7 @@ def fill_records(given, pixels, rows, filled, counts, first, last):
         row = rows[i]
         row[:] = _f4(0.0)
         for axis in range(3):
-            row[axis], row[3 + axis] = p[axis], n[axis]
+            row[axis], row[3 + axis] = origin.p[axis], origin.n[axis]
             row[IRRADIANCE + axis] = E[axis]
             for c in range(3):
                 row[ROTATION + 3 * c + axis] = rotation[c, axis]

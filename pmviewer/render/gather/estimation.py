@@ -23,7 +23,7 @@ from pmviewer.maps.hemisphere import irradiance_and_gradients
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, WHITE, arrive
 from pmviewer.render.counts import C_DROPPED, C_RAYS
-from pmviewer.render.gather.cache_fill import gather_hemisphere
+from pmviewer.render.gather.cache_fill import Origin, gather_hemisphere
 from pmviewer.render.given import opened
 from pmviewer.render.pixel import pixel_seed, sampled_ray
 
@@ -119,8 +119,8 @@ def gather_samples(given, pixels, samples, estimates, told, counts, first, last)
         row = samples[pixel]
         n = _vector(row, NORMAL)
         seed = hash3(pixel_seed(eye, pixel), eye.index, _u4(CACHE_SALT))
-        # None: estimated gathers do not know of media
-        gather_hemisphere(given, _vector(row, POINT), _vector(row, FACE), n, row[GAP], None, seed, cells, tally)
+        origin = Origin(_vector(row, POINT), _vector(row, FACE), n, row[GAP], None)  # never in scenes with media
+        gather_hemisphere(given, origin, seed, cells, tally)
         mean = irradiance_and_gradients(cells, strata.rings, strata.sectors, n, E, rotation, translation)
         if not E[0] + E[1] + E[2] < _f8(np.inf):
             tally[C_DROPPED] += 1

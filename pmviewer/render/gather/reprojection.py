@@ -19,7 +19,7 @@ from pmviewer.kernels.vector import basis, dot, mul
 from pmviewer.maps.hemisphere import cell_direction, irradiance_and_gradients
 from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.counts import C_DROPPED
-from pmviewer.render.gather.cache_fill import gather_cell
+from pmviewer.render.gather.cache_fill import Origin, gather_cell
 from pmviewer.render.gather.estimation import FACE, GAP, NORMAL, POINT, standard_error
 from pmviewer.render.gather.zbuffer import FACE as HIT_FACE
 from pmviewer.render.gather.zbuffer import HIT, LIGHT, PATCH, PLACE, USABLE, WAY, Hemisphere, clear, plot, resolve
@@ -96,6 +96,7 @@ def _shoot_cells(given, view, gap, seed, known, cells, found, counts):
     """Gather in the cells that are not known, into `cells`, and into `found`, float32 (≥ cells, HIT), as known hits;
     returns how many these are. The numbers are those of `gather_hemisphere`."""
     eye = given.eye
+    origin = Origin(view.x, view.face, view.n, gap, None)  # never in scenes with media
     made = 0
     for k in range(view.sectors):
         for j in range(view.rings):
@@ -110,7 +111,7 @@ def _shoot_cells(given, view, gap, seed, known, cells, found, counts):
             cell[3], cell[4] = _INF, _f4(1.0) - cos * cos
             if dot(wi, view.face) <= _f4(0.0):
                 continue
-            hit, far, tint, L = gather_cell(given, view.x, view.face, gap, None, wi, seed, here, counts)
+            hit, far, tint, L = gather_cell(given, origin, wi, seed, here, counts)
             L = mul(tint, L)
             cell[0], cell[1], cell[2], cell[3] = L[0], L[1], L[2], far
             row = found[made]

@@ -37,7 +37,7 @@ class Direct(Group):
     samples: int | Auto = setting(
         "auto",
         "Light samples per surface and pass. Automatic: 2, with several lights or light from all around 4; by the path "
-        "tracer and in scenes with media 1.",
+        "tracer and in scenes with media that scatter or emit light 1.",
         stage="image",
         scale="integer",
         unit="samples",
@@ -57,9 +57,9 @@ class Direct(Group):
     choice: Literal["auto", "power", "distance", "photons", "Keller-Wald"] = setting(
         "auto",
         "How light samples are spread over the lights. power: by the lights' power. distance: by power and distance "
-        "from the point. photons: mostly by the photons that arrived from each light near the point. Keller-Wald: some "
-        "samples for the lights with photons near, some for all others (§3). auto: photons with 8 lights or more, "
-        "distance with fewer and, up to 64, by the path tracer.",
+        "from the point, and up to 16 by what gloss reflects of each. photons: mostly by the photons that arrived "
+        "from each light near the point. Keller-Wald: some samples for the lights with photons near, some for all "
+        "others (§3). auto: photons with 8 lights or more, distance with fewer and, up to 64, by the path tracer.",
         section="Many lights",
         stage="image",
         scale="choice",
