@@ -63,6 +63,16 @@ def test_what_traits_rule_out_is_not_tried():
     assert names(replace(PLAIN, has_diffuse=False)) == [PROGRESSIVE.name, PATH.name]
 
 
+def test_large_pictures_are_planned_for_more_than_their_first_passes(cornell, pool):
+    """Of 16 megapixels ten seconds are a few passes; with a time that somebody gives they are what they are."""
+    large = with_values(Settings(), {"camera.width": 4096, "camera.height": 4096})
+    for goal, planned in ((Goal(), math.inf), (Goal(seconds=10.0), 10.0)):
+        choice = choose(cornell, large, goal, pool, lambda text, share: None)
+        usual = min(m.cost(Numbers(SETTINGS["photons.N"].default)) for m in choice.trial.measured)
+        assert 32 * usual > 20.0
+        assert choice.seconds + choice.trial.cpu_seconds == pytest.approx(min(planned, 32 * usual))
+
+
 @pytest.mark.parametrize(("promised", "expected"), [((1.0, 0.95), GATHER), ((1.0, 0.8), CACHE)])
 def test_of_gathers_that_promise_about_as_much_the_best_known_is_taken(promised, expected):
     """A tenth more error is nothing beside the bias of records between a trial's few pixels."""

@@ -20,21 +20,24 @@ from pmviewer.settings.access import SETTINGS, Settings, with_values
 
 SHARE = 0.1
 """Of the time asked for, what a trial may take."""
-USUAL = 10.0
-"""CPU seconds that are planned for where nobody gives any."""
+USUAL, USUAL_PASSES = 10.0, 32
+"""CPU seconds that are planned for where nobody gives any, and passes of the usual numbers: a large picture is looked
+at for longer, and by what is best for its first three passes it would stay bad."""
 NEARLY = 1.1
 """What of the least error counts as the same."""
 PER_PHOTON, PER_PIXEL = 1.5e-6, 6e-6
 """CPU seconds of a trial by trajectory and by pixel and candidate: what its size is planned by, clock or no clock."""
 OF_OTHERS = 10
 """Pictures that are rendered with other radii, and with more light samples."""
+_DEFAULT = Numbers(SETTINGS["photons.N"].default)
 LEAST, LARGEST, FEWEST_PHOTONS = 40, 160, 20_000
 """Sides of the trial's picture in pixels, and N."""
 
 
 @dataclass(frozen=True)
 class Goal:
-    """CPU seconds of rendering, or a relMSE; with neither a picture as good as `USUAL` seconds allow."""
+    """CPU seconds of rendering, or a relMSE; with neither a picture as good as `USUAL` seconds allow, or
+    `USUAL_PASSES`."""
 
     seconds: float = 0.0
     error: float = 0.0
@@ -75,6 +78,8 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
         return Choice(way.name, assignments(way.values), math.nan, 0.0, (f"{way.name}: {why}", *way.said, *said))
     (width, height), N = planned
     tried = trial(opened, with_values(base, {"photons.N": N}), found, pool, (width, height), SHARE * seconds, tell)
+    if not goal.seconds:
+        seconds = max(seconds, USUAL_PASSES * min(m.cost(_DEFAULT) for m in tried.measured))
     picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, seconds - tried.cpu_seconds)
     values, bias = assignments(_values(picked, base, opened)), bias_of(picked.measured, picked.numbers.widths)
     opened.biases[way_of(with_values(base, values))] = bias  # whoever renders so knows it
@@ -159,8 +164,7 @@ def _preference(option: Option) -> float:
 
 
 def _is_default(option: Option) -> bool:
-    usual = Numbers(SETTINGS["photons.N"].default)
-    return option.measured.candidate.is_like(PROGRESSIVE) and option.numbers == usual
+    return option.measured.candidate.is_like(PROGRESSIVE) and option.numbers == _DEFAULT
 
 
 def _values(picked: Option, base: Settings, opened: OpenScene) -> dict[str, Any]:
