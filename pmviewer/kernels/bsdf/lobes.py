@@ -43,7 +43,7 @@ from pmviewer.kernels.bsdf.rough_dielectric import rough_dielectric_f_pdf, sampl
 from pmviewer.kernels.bsdf.schlick import schlick_shadowing
 from pmviewer.kernels.bsdf.smooth import smooth_lobe, smooth_reflectance
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.textures.normal_map import reflecting_normal
+from pmviewer.kernels.textures.normal_map import reflecting_normal, shows_back
 from pmviewer.kernels.vector import add, basis, cross, dot, largest, mul, scale
 from pmviewer.kernels.warp import square_to_cosine_hemisphere
 
@@ -143,11 +143,9 @@ def bsdf_at(scene, material, p, ng, ns, tangent, wo, glossy):
     roughness from which glossy reflection is STORED. The back of a one-sided material and a black one have no groups.
     """
     opaque = not _transparent(p.kind)
+    hidden = opaque and not p.two_sided and shows_back(ng, ns, wo)
     if opaque and dot(ng, wo) < _f4(0.0):
         ng, ns = scale(ng, _f4(-1.0)), scale(ns, _f4(-1.0))
-        hidden = not p.two_sided
-    else:
-        hidden = False
     # A lobe around a normal that looks away, or whose mirror direction is below the surface, would be black.
     # Not so those of maps, which Mitsuba leaves black as well.
     if opaque and p.kind != DIFFUSE and not p.mapped:

@@ -15,7 +15,7 @@ from pmviewer.kernels.bsdf.kinds import CONDUCTOR, DIFFUSE
 from pmviewer.kernels.bsdf.specular import scatter_specular
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.scene import material_kind, material_two_sided, reflectance
-from pmviewer.kernels.textures.normal_map import reflecting_normal
+from pmviewer.kernels.textures.normal_map import reflecting_normal, shows_back
 from pmviewer.kernels.vector import dot, from_basis, scale
 from pmviewer.kernels.warp import square_to_cosine_hemisphere
 
@@ -43,10 +43,10 @@ def plain_bsdf(scene, material, ng, ns, wo):
     kind = material_kind(scene, material)
     if kind != DIFFUSE and kind != CONDUCTOR:
         return PlainBsdf(FOLLOWED, albedo, material, ns, ns)
+    if not material_two_sided(scene, material) and shows_back(ng, ns, wo):
+        return PlainBsdf(NOTHING, albedo, material, ns, ns)
     if dot(ng, wo) < _f4(0.0):
         ng, ns = scale(ng, _f4(-1.0)), scale(ns, _f4(-1.0))
-        if not material_two_sided(scene, material):
-            return PlainBsdf(NOTHING, albedo, material, ns, ns)
     if not albedo[0] + albedo[1] + albedo[2] > _f4(0.0):
         return PlainBsdf(NOTHING, albedo, material, ns, ns)
     if kind == CONDUCTOR:

@@ -114,6 +114,15 @@ def shading_frame(scene, material, prim, b1, b2, p, ng, ns, wo):
 
 
 @device
+def shows_back(ng, ns, wo):
+    """Whether wo sees the back: from below the surface, or where the shading normal looks away, as in Mitsuba.
+
+    A one-sided material is black there. (A two-sided one is shaded about ns on the side of ng that wo is on.)
+    """
+    return dot(ng, wo) < _f4(0.0) or dot(ns, wo) <= _f4(0.0)
+
+
+@device
 def reflecting_normal(ns, ng, wo):
     """ns, bent so that the mirror image of wo leaves on the side of ng that wo is on.
 
