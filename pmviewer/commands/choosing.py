@@ -41,10 +41,11 @@ class Chosen:
     seconds: float = 0.0
 
 
-def with_choice(opened: OpenScene, settings: Settings, pool: WorkPool) -> Chosen:
-    """The settings with what automatic mode chooses for their time or error. The trial's time counts."""
+def with_choice(opened: OpenScene, settings: Settings, pool: WorkPool, apart: bool) -> Chosen:
+    """The settings with what automatic mode chooses for their time or error, by passes that can be rendered `apart`
+    where that is asked. The trial's time counts."""
     render = settings.render
-    goal = Goal(render.time_limit * pool.threads, render.error)
+    goal = Goal(render.time_limit * pool.threads, render.error, apart)
     with progress_bar() as bar:
         choice = choose(opened, settings, goal, pool, bar.update)
     for number, sentence in enumerate(choice.sentences):

@@ -86,7 +86,7 @@ def render_job(
             if keeper is not None and keeper.found is not None:
                 choice = Chosen(keeper.settings(settings))
             elif wants_choice(stop, job.settings):
-                choice = with_choice(opened, settings, pool)
+                choice = with_choice(opened, settings, pool, cluster is not None)
             if keeper is not None:
                 keeper.trial(settings, choice.seconds)
             with borrowed(cluster, threads, opened, choice.settings) as elsewhere:

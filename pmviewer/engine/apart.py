@@ -19,6 +19,11 @@ def bound_passes(facts: Facts) -> str:
             f"importance.emission = {facts.plan.emission}: where photons leave depends on what those of the passes "
             "before met, so that passes can't be rendered apart, as on a cluster; set importance.emission=off."
         )
+    if facts.plan.adaptive:
+        return (
+            "render.adaptive = on: how many samples a pixel has depends on the passes before, so that passes can't be "
+            "rendered apart, as on a cluster; set render.adaptive=off."
+        )
     return ""
 
 

@@ -46,6 +46,7 @@ from pmviewer.render.diagnostics.matter import beam_view, depth_view, slice_view
 from pmviewer.render.film import Film
 from pmviewer.render.filter import filter_of, filtered
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL
+from pmviewer.render.pixel_samples import samples_by_marks
 from pmviewer.render.planes import PLANES, view_of
 from pmviewer.render.virtual_lights.film import WeightedFilm
 from pmviewer.scene.arrays.media import media_bounds
@@ -151,6 +152,8 @@ def diagnostic_planes(wanted: Wanted, looked: Looked, pool: WorkPool) -> dict[st
         return estimates.views() if estimates is not None else {}
     if wanted.family == "noise":
         return noise_plane(looked.film)
+    if wanted.family == "samples":
+        return samples_plane(looked)
     channels = {**FAMILY_CHANNELS, **MATTER_CHANNELS, "importance": IMPORTANCE_CHANNELS, "density": 1, "storing": 1}
     planes = _drawn(looked, channels[wanted.family], lambda out: _kernel(wanted, looked, out), pool)
 
@@ -188,6 +191,17 @@ def noise_plane(film: Film) -> dict[str, NDArray[np.float32]]:
     if film.moments is not None:
         errors = np.nan_to_num(100 * film.moments.relative_errors(), nan=-1.0)
     return {"noise": errors.astype(np.float32).reshape(film.height, film.width, 1)}
+
+
+def samples_plane(looked: Looked) -> dict[str, NDArray[np.float32]]:
+    """Samples of the pixels in the latest pass; −1 of those that it left as they were."""
+    film, rendered = looked.film, looked.rendered
+    samples = np.ones(film.width * film.height, np.float32)
+    if len(rendered.marks):
+        samples[:] = samples_by_marks(rendered.marks, looked.plan.mirror_rays)
+    if film.refined is not None and film.passes > 1:
+        samples[~film.refined] = -1.0
+    return {"samples a pass": samples.reshape(film.height, film.width, 1)}
 
 
 def _denoised(looked: Looked, pool: WorkPool) -> dict[str, NDArray[np.float32]]:

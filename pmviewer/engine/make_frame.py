@@ -14,7 +14,8 @@ from pmviewer.engine.stages.virtual_lights import bias_of, objects_of
 from pmviewer.engine.tally import Tally
 from pmviewer.engine.told import Told
 from pmviewer.maps.irradiance_cache import REACH
-from pmviewer.render.mirror_rays import MIRRORED
+from pmviewer.render.adaptive import DECIDED_AFTER
+from pmviewer.render.pixel_samples import DOUBLINGS, samples_by_marks
 from pmviewer.render.virtual_lights.film import WeightedFilm
 
 
@@ -108,8 +109,12 @@ def _warnings(looked: Looked, tally: Tally, energy: Energy | None, told: Told) -
     """Sentences for the log."""
     plan, film = looked.plan, looked.film
     pixels, marks = len(film.sums), looked.latest.marks if looked.latest is not None else np.empty(0, np.uint8)
-    more = (plan.mirror_rays - 1) * int(np.count_nonzero(marks & MIRRORED))
-    paths = film.passes * (pixels + more)
+    before = min(film.passes, DECIDED_AFTER)
+    usual, latest = (
+        int(samples_by_marks(kept, plan.mirror_rays).sum()) if len(kept) else pixels
+        for kept in (marks & np.uint8((1 << DOUBLINGS) - 1), marks)
+    )
+    paths = before * usual + (film.passes - before) * latest
     cut = caveats(looked.settings, plan, tally, energy, looked.scene.flat.radius, pixels, film.passes, paths)
     biased = bias_of(looked.settings) if plan.virtual else ()
     return (*plan.warnings, *biased, *told.sentences, *cut)

@@ -57,7 +57,8 @@ class Plan:
     splits light into colours; `lens` whether the render camera has one, `filtered` whether the film has another
     reconstruction filter than the plain box, `moments` whether the film keeps what passes tell of its noise, `split`
     whether camera paths go both ways at glass, `mirror_rays` how many samples a pass pixels have that show a mirror or
-    glass, and `one_sample` whether something forbids more than one; `hides` whether the picture shows no lights;
+    glass, `one_sample` whether something forbids more than one, and `adaptive` whether noisy pixels get more
+    (`pmviewer.render.adaptive`); `hides` whether the picture shows no lights;
     `thin_glass` are the rules by which light passes panes of glass, () where all of it is exact; `maps` is how many
     parts of the light pass have photon maps of their own; `warnings` are sentences for the log about what was asked for
     and can't be."""
@@ -89,6 +90,7 @@ class Plan:
     hides: bool = False
     one_sample: bool = False
     mirror_rays: int = 1
+    adaptive: bool = False
     media: bool = False
     volume: bool = False
     phase_rays: bool = False
@@ -206,7 +208,8 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         dispersion=traits.has_dispersion,
         warnings=(*plan.warnings, *_of_thin(settings, traits), *_of_dispersion(plan, traits)),
     )
-    plan = replace(plan, mirror_rays=_mirror_rays(settings, traits, plan))
+    adaptive = settings.render.adaptive == "on" and plan.moments and not plan.one_sample
+    plan = replace(plan, mirror_rays=_mirror_rays(settings, traits, plan), adaptive=adaptive)
     if not plan.photons:
         return plan
     how = settings.importance

@@ -43,13 +43,17 @@ from pmviewer.engine.told import Told, told_of
 from pmviewer.engine.wanted import wanted_of
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.progress import Cancelled
+from pmviewer.render.adaptive import DECIDED_AFTER, cost_of, doublings_of
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.render.clip import clipped
 from pmviewer.render.film import Addable, Film, Increment
+from pmviewer.render.filter import filter_of, reach_of
 from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.gather.gather_points import POINT_COLUMNS
 from pmviewer.render.moments import Moments
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, RADIUS, first_radii, shrink
+from pmviewer.render.pixel_samples import DOUBLINGS, samples_by_marks
+from pmviewer.render.planes import PLANES
 from pmviewer.settings.access import Settings
 from pmviewer.settings.needs import Facts
 from pmviewer.state import State
@@ -211,9 +215,23 @@ class Renderer:
     def _close_pass(self) -> None:
         self.film.passes += 1
         self.coarse_pass = None
+        self._adapt()
         if self.film.moments is not None:
             self.film.moments.close_pass()
         self.error.add(self.film, self.pool.run)
+
+    def _adapt(self) -> None:
+        """Decide which pixels get more samples, when it is time."""
+        film = self.film
+        if not self.plan.adaptive or film.passes != DECIDED_AFTER or film.moments is None:
+            return
+        marks = self._still_marks(film)
+        samples = samples_by_marks(marks if len(marks) else np.zeros(len(film.sums), np.uint8), self.plan.mirror_rays)
+        chosen = filter_of(self.camera.filter, self.settings.render)
+        reach = reach_of(chosen, self.camera.pixel_side) if self.plan.filtered else 0
+        cost = cost_of(samples, film.sums[:, PLANES["normal"]] / film.passes)
+        made = partial(doublings_of, film.moments, (film.height, film.width), cost, reach, film.refined)
+        film.doublings = self.tally.timed(self.pool, "camera pass", lambda: self.pool.run([made])[0])
 
     def state(self) -> State:
         """The film and all that goes on with it: error estimate, counts, exposure, and what a pass takes over from
@@ -324,7 +342,7 @@ class Renderer:
 
     def _maps(self, film: Film, camera: CameraPose, index: int, N: int, again: bool = False) -> RenderedPass:
         """All of pass `index` but its picture; `again` for a pass that is in the film already."""
-        marks = self.tally.timed(self.pool, "camera pass", lambda: self._marks_of(film))
+        marks = self.tally.timed(self.pool, "camera pass", lambda: self._marks_of(film, index))
         self.latest = self._stages.run(camera, marks, index, N, self._radii_of_pixels(film, again))
         self._told = None
         return self.latest
@@ -336,7 +354,7 @@ class Renderer:
             and not radii_of_pixels(self.facts)
             and self._stages.can_run_early(index)
         ):
-            self._next = MadeAhead(self._stages, self.camera, made.marks, index, N)
+            self._next = MadeAhead(self._stages, self.camera, self._still_marks(self.film), index, N)
 
     def _taken(self, index: int) -> RenderedPass | None:
         """All of pass `index` but its picture, if that has been made ahead."""
@@ -352,10 +370,20 @@ class Renderer:
             if self.pool.cancel.is_set():
                 raise
             return None  # that was meant for the pass before, which was through by then
+        self.latest = replace(self.latest, marks=self._marks_of(self.film, index))  # decided on meanwhile
         self._told = None
         return self.latest
 
-    def _marks_of(self, film: Film) -> NDArray[np.uint8]:
+    def _marks_of(self, film: Film, index: int) -> NDArray[np.uint8]:
+        """In pass `index`, of the renderer's film or a smaller one."""
+        marks, doublings = self._still_marks(film), self.film.doublings
+        if doublings is None or index < DECIDED_AFTER:
+            return marks
+        doubled = doublings << np.uint8(DOUBLINGS)
+        return doubled | marks if len(marks) else doubled
+
+    def _still_marks(self, film: Film) -> NDArray[np.uint8]:
+        """Those that are the same in all passes."""
         if self.plan.path:
             return np.zeros(0, np.uint8)
         if self._marks is None:  # the store may keep nothing

@@ -28,6 +28,7 @@ Family = Literal[
     "virtual lights",
     "estimation",
     "noise",
+    "samples",
     "depth in media",
     "beams",
     "slice",
@@ -204,6 +205,14 @@ DIAGNOSTICS: Mapping[str, DiagnosticView] = {
         "%",
         "fewer than two passes",
         log=True,
+    ),
+    "samples a pass": DiagnosticView(
+        "samples",
+        "samples of the pixel in the latest pass: of what shows mirrors or glass, and adapted to the noise",
+        "samples",
+        "not rendered",
+        log=True,
+        fixed=(1.0, 16.0),
     ),
     "optical depth": DiagnosticView(
         "depth in media",

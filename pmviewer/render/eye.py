@@ -34,7 +34,6 @@ from pmviewer.render.gather.guide import AIM_WORDS, aim
 from pmviewer.render.given import Aim, GatherRays, Sampler, opened
 from pmviewer.render.hidden_lights import hides_lights
 from pmviewer.render.media.volume import deposit_media
-from pmviewer.render.mirror_rays import OUTLINED, samples_of, share_of, take_sample
 from pmviewer.render.pixel import (
     CAUSTIC,
     DIRECT,
@@ -49,6 +48,7 @@ from pmviewer.render.pixel import (
     sampled_ray,
 )
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius, radii_of
+from pmviewer.render.pixel_samples import OUTLINED, samples_of, share_of, take_sample
 from pmviewer.render.reflect import reflected, unfound
 from pmviewer.render.share import OWN_COLUMNS
 from pmviewer.render.split import first_way, next_way, split_camera_path, thinned
@@ -250,10 +250,10 @@ def _emission(scene, eye, left, pdf, choice, hit, d):
 def eye_pass(given, marks, radii, film, counts, first, last):
     """Add a pass's samples to each of the pixels first … last−1.
 
-    given: PassData of arrays (1,), whose eye record is the call's own (`pmviewer.render.mirror_rays.own_eye`); marks:
-    uint8 (pixels,), OUTLINED where emission gets camera rays of its own (`pmviewer.render.direct.outline`) and MIRRORED
-    where there are several samples (`pmviewer.render.mirror_rays`), or (0,); radii: float32 (pixels, COLUMNS), look-up
-    radii of the pixels (`pmviewer.render.pixel_radius`), or None; film: float64 (pixels, CHANNELS), see
+    given: PassData of arrays (1,), whose eye record is the call's own (`pmviewer.render.pixel_samples.own_eye`); marks:
+    uint8 (pixels,), OUTLINED where emission gets camera rays of its own (`pmviewer.render.direct.outline`), and what
+    tells how many samples there are (`pmviewer.render.pixel_samples`), or (0,); radii: float32 (pixels, COLUMNS),
+    look-up radii of the pixels (`pmviewer.render.pixel_radius`), or None; film: float64 (pixels, CHANNELS), see
     `pmviewer.render.planes`, or with a filter the samples that pixels share (`pmviewer.render.share`); counts:
     int64 (N_COUNTS,).
     """

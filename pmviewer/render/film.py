@@ -70,6 +70,9 @@ class Film:
         self.radii: NDArray[np.float32] | None = None
         self._samples: NDArray[np.float64] | None = None
         self.moments: Moments | None = None
+        self.doublings: NDArray[np.uint8] | None = None
+        """(pixels,) how often the samples of a pass are doubled (`pmviewer.render.adaptive`); None until that is
+        decided."""
         self.passes = 0
         self.region: tuple[int, int, int, int] | None = None
         """Columns x0 … x1−1 and rows y0 … y1−1 of (x0, y0, x1, y1), which alone are rendered from the second pass on;
@@ -157,6 +160,7 @@ class Film:
         """What has been added so far, moments included."""
         arrays: dict[str, NDArray[Any]] = {"sums": self.sums}
         arrays |= {"radii": self.radii} if self.radii is not None else {}
+        arrays |= {"doublings": self.doublings} if self.doublings is not None else {}
         size = {"width": self.width, "height": self.height, "passes": self.passes}
         moments = self.moments.state() if self.moments is not None else None
         return State.of_parts({**size, "region": self.region}, arrays, moments=moments)
@@ -173,6 +177,7 @@ class Film:
         self.radii = None
         if "radii" in state.arrays:
             self.radii = state.array("radii", (pixels, None), np.float32)
+        self.doublings = state.array("doublings", (pixels,), np.uint8) if "doublings" in state.arrays else None
         if self.moments is not None:
             self.moments.restore(state.part("moments"))
         self.passes = int(state.number("passes"))

@@ -9,7 +9,7 @@ from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.scene import material_of
 from pmviewer.render.camera import CameraPose
-from pmviewer.render.mirror_rays import MIRRORED
+from pmviewer.render.pixel_samples import MIRRORED
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.scene.arrays.material_lobes import always_followed, glossy_roughness, has_diffuse_lobe
 from pmviewer.scene.description import Material

@@ -81,7 +81,8 @@ def relative_halves(image, half, n, out, first, last):
 
 class Moments:
     """Of a film of so many pixels: `image`, the image's sums so far, and `squares` of what passes added, float64
-    (pixels, 3); `efficiency`, the variance of the mean over that of independent passes, 1 until it is known. Where
+    (pixels, 3); `half`, the image's sums after the latest power of two passes; `efficiency`, the variance of the mean
+    over that of independent passes, 1 until it is known. Where
     `refined`, bool (pixels,), is given, the other pixels have a sample of the first pass alone and tell nothing."""
 
     def __init__(self, pixels: int, refined: NDArray[np.bool_] | None = None) -> None:
@@ -89,7 +90,7 @@ class Moments:
         self.image: NDArray[np.float64] = np.zeros((pixels, 3))
         self.squares: NDArray[np.float64] = np.zeros((pixels, 3))
         self.passes = 0
-        self._half = np.zeros((pixels, 3))
+        self.half = np.zeros((pixels, 3))
         self._ratios: list[float] = []
 
     def add(self, sums: NDArray[np.float64], channels: int, first: int, last: int) -> None:
@@ -104,19 +105,19 @@ class Moments:
             return
         if n > FEWEST:
             out, independent = np.empty(len(self.image)), self._told(self.relative_variances()).sum()
-            relative_halves(self.image, self._half, float(n), out, 0, len(out))
+            relative_halves(self.image, self.half, float(n), out, 0, len(out))
             if independent > 0:
                 self._ratios.append(float(self._told(out).sum() / independent))
-        self._half[:] = self.image
+        self.half[:] = self.image
 
     def state(self) -> State:
         """What has been added so far."""
-        arrays = {"image": self.image, "squares": self.squares, "half": self._half}
+        arrays = {"image": self.image, "squares": self.squares, "half": self.half}
         return State({"passes": self.passes, "ratios": list(self._ratios)}, arrays)
 
     def restore(self, state: State) -> None:
         """Go on from there. Raises ValueError where that is of another film."""
-        self.image, self.squares, self._half = (
+        self.image, self.squares, self.half = (
             state.array(name, self.image.shape, np.float64) for name in ("image", "squares", "half")
         )
         self._ratios = [float(ratio) for ratio in state.number("ratios")]

@@ -39,7 +39,7 @@ class Pixel(NamedTuple):
     """A pixel that is sampled: its number and seed, and where its samples go: film, its row of float64
     (pixels, CHANNELS); radii, its row of those of look-ups, or None (`pmviewer.render.pixel_radius`); counts, int64
     (N_COUNTS,), all three by `row_of`; what its sample counts as one of several of the pass, None for 1
-    (`pmviewer.render.mirror_rays`)."""
+    (`pmviewer.render.pixel_samples`)."""
 
     number: Any
     seed: Any

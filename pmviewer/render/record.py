@@ -14,7 +14,7 @@ from pmviewer.render.filter import BOX, filter_of, set_filter
 from pmviewer.render.filter_samples import FILTER_FIELDS
 from pmviewer.render.hidden_lights import HIDDEN_FIELDS
 from pmviewer.render.lens import LENS_FIELDS
-from pmviewer.render.mirror_rays import MIRROR_FIELDS
+from pmviewer.render.pixel_samples import SAMPLE_FIELDS
 from pmviewer.render.split import SPLIT_FIELDS
 from pmviewer.settings.access import Settings
 
@@ -84,16 +84,16 @@ def eye_dtype(
     media: bool = False,
     split: bool = False,
     hides: bool = False,
-    mirrored: bool = False,
+    several: bool = False,
 ) -> np.dtype:
     """The record of a camera with a lens or without, a reconstruction filter other than the plain box or not, of a
-    scene with media or without, of paths that split at glass or choose, that hides lights or not, and has several
-    samples where mirrors and glass are seen or one: kernels are compiled for the record's type, so that what is not
+    scene with media or without, of paths that split at glass or choose, that hides lights or not, and whose pixels
+    may have several samples a pass or one: kernels are compiled for the record's type, so that what is not
     there costs nothing."""
     # In front, since numba warns where one record begins like another.
     extra = [*(LENS_FIELDS if lens else []), *(FILTER_FIELDS if filtered else []), *(MEDIA_FIELDS if media else [])]
     extra += [*(SPLIT_FIELDS if split else []), *(HIDDEN_FIELDS if hides else [])]
-    extra += MIRROR_FIELDS if mirrored else []
+    extra += SAMPLE_FIELDS if several else []
     return np.dtype([*extra, *_FIELDS], align=True)
 
 
@@ -106,8 +106,9 @@ RIMS = ("left out", "half", "whole")
 @dataclass(frozen=True)
 class Evaluation:
     """How a pass evaluates the terms of the picture: what it samples, and what it looks up in which maps. Each field is
-    one of EYE_DTYPE by its name, the last of scenes with media, of paths that split and of mirrors, but for
-    `looked_for`, which sets `mis`; radii and `corner` are in scene units. The defaults sample and look up nothing."""
+    one of EYE_DTYPE by its name, the last of scenes with media, of paths that split and of several samples, but for
+    `looked_for`, which sets `mis`, and `several`, which has the record have the last; radii and `corner` are in scene
+    units. The defaults sample and look up nothing."""
 
     direct: bool = False
     followed_direct: bool = False
@@ -137,6 +138,7 @@ class Evaluation:
     volume_radius: float = 0.0
     free_paths: float = 0.0
     splits: int = 0
+    several: bool = False
     mirror_rays: int = 1
 
 
@@ -151,8 +153,8 @@ def eye_record(
     chosen = filter_of(camera.filter, settings.render)
     in_media = camera.medium is not None
     hides = hidden_from(camera, settings.render)
-    split, mirrored = evaluation.splits > 0, evaluation.mirror_rays > 1
-    record = np.zeros(1, eye_dtype(camera.aperture > 0, chosen != BOX, in_media, split, hides, mirrored))
+    split, several = evaluation.splits > 0, evaluation.several
+    record = np.zeros(1, eye_dtype(camera.aperture > 0, chosen != BOX, in_media, split, hides, several))
     r = record[0]
     if camera.medium is not None:
         r["medium"] = camera.medium

@@ -10,7 +10,7 @@ import numpy as np
 
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.render.filter_samples import places, sum_at, value_at
-from pmviewer.render.mirror_rays import OUTLINED
+from pmviewer.render.pixel_samples import OUTLINED
 from pmviewer.render.planes import CHANNELS, TERMS_END
 
 OWN_COLUMNS = 6

@@ -72,13 +72,14 @@ class AutomaticRun:
         from pmviewer.engine.pool import WorkPool
 
         pool = WorkPool(self._session.threads, behind_window=True)
-        seconds, error = settings.render.time_limit * pool.threads, settings.render.error
+        render, apart = settings.render, self._session.workers.where is not None
 
         def choose_beside() -> str:
             from pmviewer.engine.auto.choose import Goal, choose
             from pmviewer.engine.pool import lower_priority
 
             lower_priority()
+            goal = Goal(render.time_limit * pool.threads, render.error, apart)
             try:
                 if not asked and not _compiled(opened, settings):
                     return "automatic mode has not tried ways of rendering: they are still being compiled (Shift+R)"
@@ -86,7 +87,7 @@ class AutomaticRun:
                 self._arrived = (
                     opened,
                     before,
-                    choose(opened, settings, Goal(seconds, error), pool, lambda text, share: None),
+                    choose(opened, settings, goal, pool, lambda text, share: None),
                 )
             except MemoryError:
                 raise PmviewerError("Not enough memory to try ways of rendering: lower the image size.") from None

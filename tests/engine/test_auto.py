@@ -333,7 +333,10 @@ def test_a_trial_picks_settings_that_alone_give_the_same_picture(cornell):
     small = with_values(Settings(), {"camera.width": 24, "camera.height": 24, "render.seed": 3})
     pool = WorkPool(2)
     try:
-        found = [choose(cornell, small, Goal(seconds=6.0), pool, lambda text, share: None) for _ in range(2)]
+        goals = Goal(seconds=6.0), Goal(seconds=6.0, apart=True)
+        found = [choose(cornell, small, goal, pool, lambda text, share: None) for goal in goals]
+        assert [choice.values["render.adaptive"] for choice in found] == ["on", "off"]
+        assert any("render.adaptive" in sentence for sentence in found[0].sentences)
         chosen = with_values(small, dict(found[0].values))
         pictures = []
         for settings in (chosen, with_values(small, found[0].changed)):

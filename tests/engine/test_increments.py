@@ -80,7 +80,12 @@ def test_what_is_lent_is_the_same():
 
 
 @pytest.mark.parametrize(
-    "values", [{"estimate.radius_rule": "pixel"}, {"importance.map": "screen", "importance.emission": "Peter-Pietrek"}]
+    "values",
+    [
+        {"estimate.radius_rule": "pixel"},
+        {"render.adaptive": "on"},
+        {"importance.map": "screen", "importance.emission": "Peter-Pietrek"},
+    ],
 )
 def test_passes_that_need_those_before_are_refused(values):
     with pytest.raises(SettingError, match=f"{list(values)[-1]} = .* can't be rendered apart"):

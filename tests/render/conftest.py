@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-AS_THEY_ARE = ("test_split.py", "test_mirror_rays.py", "test_same_picture.py")
+AS_THEY_ARE = ("test_split.py", "test_pixel_samples.py", "test_same_picture.py")
 
 
 @pytest.fixture(autouse=True)

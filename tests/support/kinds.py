@@ -47,7 +47,7 @@ def _open_as_if(monkeypatch, where, *features):
 
 def may_always_split(monkeypatch):
     """Kernels follow both ways at glass, and have several samples of pixels that show mirrors, whether there are some
-    or not (`pmviewer.render.split`, `pmviewer.render.mirror_rays`): one variant in place of four, of the same
+    or not (`pmviewer.render.split`, `pmviewer.render.pixel_samples`): one variant in place of four, of the same
     picture."""
     for name in ("_splits", "_mirror_rays"):
         monkeypatch.setattr(method, name, _as_if_mirrors_and_glass(getattr(method, name)))

@@ -101,6 +101,7 @@ def stripped_plan(needs: Needs) -> Plan:
         choice=needs.choice,
         light_samples=needs.samples,
         mirror_rays=MIRROR_RAYS if needs.mirrors else 1,
+        one_sample=not needs.mirrors,
     )
 
 

@@ -92,10 +92,10 @@ def given(settings: Settings) -> list[str]:
 
 
 def candidates(
-    traits: SceneTraits, settings: Settings, seconds: float
+    traits: SceneTraits, settings: Settings, seconds: float, apart: bool = False
 ) -> tuple[list[Candidate], list[tuple[str, str]]]:
     """What is worth a trial in such a scene for so many CPU seconds, the default method first, and what isn't with the
-    reason. `settings` tell what automatic mode does not set."""
+    reason. `settings` tell what automatic mode does not set; `apart`: by passes that can be rendered apart."""
     left_out: list[tuple[str, str]] = []
     glossy = settings.photons.glossy
     caustics, why = _caustics(traits, settings)
@@ -120,6 +120,8 @@ def candidates(
             found.append(corners)
     if traits.n_lights < MANY_LIGHTS:
         left_out.append(("importance", f"fewer than {MANY_LIGHTS} lights: photons reach what the camera sees"))
+    elif apart:
+        left_out.append(("importance", "what it knows comes from the passes before, which may be rendered elsewhere"))
     elif seconds < GUIDED_FROM or traits.has_media:
         left_out.append(("importance", f"its trial costs too much of less than {GUIDED_FROM:g} CPU s"))
     else:

@@ -15,6 +15,7 @@ from pmviewer.engine.auto.trial import Tell, Trial, trial
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
+from pmviewer.render.adaptive import DECIDED_AFTER, WORTH
 from pmviewer.render.camera import resolve_camera
 from pmviewer.settings.access import SETTINGS, Settings, with_values
 
@@ -29,6 +30,8 @@ PER_PHOTON, PER_PIXEL = 1.5e-6, 6e-6
 """CPU seconds of a trial by trajectory and by pixel and candidate: what its size is planned by, clock or no clock."""
 OF_OTHERS = 10
 """Pictures that are rendered with other radii, and with more light samples."""
+ADAPTIVE = {"render.adaptive": "on"}
+ADAPTED = f"from pass {DECIDED_AFTER + 1} on pixels with noise of their own get more samples (render.adaptive)"
 _DEFAULT = Numbers(SETTINGS["photons.N"].default)
 LEAST, LARGEST, FEWEST_PHOTONS = 40, 160, 20_000
 """Sides of the trial's picture in pixels, and N."""
@@ -37,10 +40,11 @@ LEAST, LARGEST, FEWEST_PHOTONS = 40, 160, 20_000
 @dataclass(frozen=True)
 class Goal:
     """CPU seconds of rendering, or a relMSE; with neither a picture as good as `USUAL` seconds allow, or
-    `USUAL_PASSES`."""
+    `USUAL_PASSES`. `apart`: by passes that can be rendered apart, as on a cluster."""
 
     seconds: float = 0.0
     error: float = 0.0
+    apart: bool = False
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     sets itself does not count. Raises Cancelled when the pool is cancelled."""
     base = with_values(settings, assignments({}))
     seconds = goal.seconds or USUAL
-    found, left_out = candidates(opened.traits, base, seconds)
+    found, left_out = candidates(opened.traits, base, seconds, goal.apart)
     said = [f"not tried: {what}, {why}" for what, why in left_out]
     camera = resolve_camera(opened.scene, base.camera)
     planned = _size(SHARE * seconds, len(found), camera.width, camera.height)
@@ -81,14 +85,22 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     if not goal.seconds:
         seconds = max(seconds, USUAL_PASSES * min(m.cost(_DEFAULT) for m in tried.measured))
     picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, seconds - tried.cpu_seconds)
-    values, bias = assignments(_values(picked, base, opened)), bias_of(picked.measured, picked.numbers.widths)
+    found_values = _values(picked, base, opened, goal.apart)
+    values, bias = assignments(found_values), bias_of(picked.measured, picked.numbers.widths)
     opened.biases[way_of(with_values(base, values))] = bias  # whoever renders so knows it
     return Choice(
         picked.name,
         values,
         picked.error,
         picked.seconds,
-        (_sentence(picked, goal), *picked.measured.candidate.said, *_reason(picked), *_table(tried, picked), *said),
+        (
+            _sentence(picked, goal),
+            *picked.measured.candidate.said,
+            *_reason(picked),
+            *(() if "render.adaptive" not in found_values else (ADAPTED,)),
+            *_table(tried, picked),
+            *said,
+        ),
         tried,
         bias,
     )
@@ -167,7 +179,7 @@ def _is_default(option: Option) -> bool:
     return option.measured.candidate.is_like(PROGRESSIVE) and option.numbers == _DEFAULT
 
 
-def _values(picked: Option, base: Settings, opened: OpenScene) -> dict[str, Any]:
+def _values(picked: Option, base: Settings, opened: OpenScene, apart: bool) -> dict[str, Any]:
     """The settings that the option stands for."""
     values, numbers = dict(picked.measured.candidate.values), picked.numbers
     with_photons = with_values(base, assignments(values))
@@ -175,7 +187,12 @@ def _values(picked: Option, base: Settings, opened: OpenScene) -> dict[str, Any]
         values |= {"photons.N": numbers.N, "photons.q": numbers.q}
     if numbers.samples != 1:
         values["direct.samples"] = numbers.samples * plan_of(with_photons, opened.traits).light_samples
-    return values | numbers.widths.values(with_photons, picked.measured.radius)
+    values |= numbers.widths.values(with_photons, picked.measured.radius)
+    if picked.passes >= WORTH and not apart:
+        adapted = with_values(base, assignments(values | ADAPTIVE))
+        if plan_of(adapted, opened.traits).adaptive:
+            values |= ADAPTIVE
+    return values
 
 
 def _sentence(picked: Option, goal: Goal) -> str:

@@ -43,7 +43,7 @@ from pmviewer.render.diagnostics.pixel_replay import (
     empty_rows,
     replay_pixel,
 )
-from pmviewer.render.mirror_rays import own_eye
+from pmviewer.render.pixel_samples import own_eye
 from pmviewer.scene.spectrum import of_bands
 from pmviewer.settings.access import Settings
 

@@ -24,9 +24,9 @@ from pmviewer.render.film import Film, Spans
 from pmviewer.render.filter import BOX, filter_of
 from pmviewer.render.gather.gather_points import POINT_COLUMNS, gather_points
 from pmviewer.render.given import PassData
-from pmviewer.render.mirror_rays import own_eye
 from pmviewer.render.mirrored import mirrored_pixels
 from pmviewer.render.path import path_pass
+from pmviewer.render.pixel_samples import own_eye
 from pmviewer.render.share import share_samples, weigh_samples
 from pmviewer.settings.access import Settings
 
@@ -142,8 +142,8 @@ def outline_of(scene: OpenScene, camera: CameraPose, film: Film, settings: Setti
 def marks_of(
     scene: OpenScene, camera: CameraPose, film: Film, settings: Settings, plan: Plan, store: StageStore
 ) -> NDArray[np.uint8]:
-    """What the eye pass does more in which pixels (`pmviewer.render.mirror_rays`): uint8, empty where nothing. The film
-    may be smaller than the camera's picture."""
+    """What the eye pass does more in which pixels (`pmviewer.render.pixel_samples`): uint8, empty where nothing. The
+    film may be smaller than the camera's picture."""
     outline = outline_of(scene, camera, film, settings, store)
     if plan.mirror_rays < 2:
         return outline

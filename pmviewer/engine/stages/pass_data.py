@@ -26,7 +26,7 @@ from pmviewer.render.direct.shadow import NO_SHADOWS
 from pmviewer.render.given import NO_VOLUME, PassData
 from pmviewer.render.lookup import NO_RADIANCE_PHOTONS
 from pmviewer.render.media.march import march_record
-from pmviewer.render.mirror_rays import MIRRORED
+from pmviewer.render.pixel_samples import samples_by_marks
 from pmviewer.render.record import Evaluation, eye_dtype, eye_record
 from pmviewer.settings.access import Settings
 
@@ -47,8 +47,9 @@ class RenderedPass:
     def samples(self, pixel: int) -> int:
         """Of a pixel in this pass."""
         eye = self.given.eye[0]
-        several = "mirror_rays" in (eye.dtype.names or ()) and len(self.marks) > 0
-        return int(eye["mirror_rays"]) if several and self.marks[pixel] & MIRRORED else 1
+        if "mirror_rays" not in (eye.dtype.names or ()) or len(self.marks) == 0:
+            return 1
+        return int(samples_by_marks(self.marks[pixel : pixel + 1], int(eye["mirror_rays"]))[0])
 
 
 def pass_record(camera: CameraPose, settings: Settings, plan: Plan, maps: PassMaps, index: int) -> NDArray[np.void]:
@@ -85,6 +86,7 @@ def _evaluation(settings: Settings, plan: Plan, maps: PassMaps, index: int) -> E
         phase_rays=plan.phase_rays,
         looked_for=plan.looked_for,
         splits=settings.render.splits if plan.split else 0,
+        several=not plan.one_sample,
         mirror_rays=plan.mirror_rays,
         volume_radius=maps.volume.radius if maps.volume is not None else 0.0,
         free_paths=free_paths(index, settings.estimate),
@@ -151,7 +153,7 @@ def box_of(structure: Structure) -> NDArray[np.float64]:
 def blank_eye(settings: Settings, plan: Plan) -> NDArray[np.void]:
     """An eye record (1,) without contents. The free camera is a pinhole."""
     lens = plan.lens and not settings.free_camera.on
-    return np.zeros(1, eye_dtype(lens, plan.filtered, plan.media, plan.split, plan.hides, plan.mirror_rays > 1))
+    return np.zeros(1, eye_dtype(lens, plan.filtered, plan.media, plan.split, plan.hides, not plan.one_sample))
 
 
 def blank_pass(scene: NDArray[np.void], settings: Settings, plan: Plan) -> PassData:

@@ -19,9 +19,9 @@ from pmviewer.render.chain import arrive
 from pmviewer.render.direct.choice import LIST_WORDS, expected_samples
 from pmviewer.render.direct.choose import choose
 from pmviewer.render.given import opened
-from pmviewer.render.mirror_rays import take_sample
 from pmviewer.render.pixel import sampled_ray
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, own_radius, radii_of
+from pmviewer.render.pixel_samples import take_sample
 from pmviewer.render.reflect import reflected, unfound
 from pmviewer.render.split import first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import let_through

@@ -13,8 +13,8 @@ from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.gather.gather import gather_light, gather_survival
 from pmviewer.render.gather.guide import AIM_WORDS, aim, gather_direction
 from pmviewer.render.given import GatherRays, opened
-from pmviewer.render.mirror_rays import take_sample
 from pmviewer.render.pixel import sampled_ray
+from pmviewer.render.pixel_samples import take_sample
 from pmviewer.render.split import first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import cast_straight
 

@@ -34,6 +34,10 @@ MOMENTS = Need(
     lambda f: f.plan.moments,
     "Not with weighted virtual lights: their pictures divide sums.",
 )
+SEVERAL_SAMPLES = Need(
+    lambda f: f.plan.adaptive or f.plan.mirror_rays > 1,
+    "All pixels have one sample a pass: no mirror or glass, and no adaptive samples (render.adaptive).",
+)
 VIEW_NEEDS: dict[str, Needs] = {
     "denoised": (DENOISER,),
     "look-up radius": (LOOKED_UP,),
@@ -55,6 +59,7 @@ VIEW_NEEDS: dict[str, Needs] = {
     "subdivision level": (ESTIMATION,),
     "reprojected share": (ESTIMATION, REPROJECTION),
     "noise": (MOMENTS,),
+    "samples a pass": (SEVERAL_SAMPLES,),
     "optical depth": (MEDIA,),
     "mean free path": (MEDIA,),
     "volume radius": (MEDIA, VOLUME),
@@ -162,6 +167,7 @@ class Display(Group):
         "subdivision level",
         "reprojected share",
         "noise",
+        "samples a pass",
         "optical depth",
         "mean free path",
         "volume radius",

@@ -13,6 +13,7 @@ TELLS_ERROR = Need(
     lambda f: f.plan.moments and f.settings.photons.renew == "each pass",
     "Passes don't tell their error: they share one photon map, or divide sums.",
 )
+TELLS_NOISE = Need(lambda f: f.plan.moments, "Passes don't tell their noise: they divide sums.")
 TWO_WAYS = Need(
     lambda f: f.settings.render.method in ("progressive", "gather", "virtual lights"),
     "Only with the methods 'progressive', 'gather' and 'virtual lights'.",
@@ -106,7 +107,7 @@ class Render(Group):
     mirror_rays: int | Auto = setting(
         "auto",
         "Samples a pass of pixels that show a mirror or glass, along the whole way through them: what is seen there is "
-        "noisier than all else in the first passes. All other pixels have one. Automatic: 2.",
+        "noisier than all else in the first passes. Automatic: 2.",
         stage="image",
         scale="integer",
         unit="samples",
@@ -117,6 +118,19 @@ class Render(Group):
             FOLLOWED,
             NO_PATHS,
             ONE_SAMPLE,
+        ),
+    )
+    adaptive: Literal["off", "on"] = setting(
+        "off",
+        "From the ninth pass on, pixels with noise of their own (edges, textures, outlines of shadows, what glass "
+        "shows) get 2, 4 or 8 times the samples a pass. The first eight tell which; the mean stays the same.",
+        stage="image",
+        scale="choice",
+        title="adaptive samples",
+        needs=(
+            NO_PATHS,
+            ONE_SAMPLE,
+            TELLS_NOISE,
         ),
     )
     filter: Literal["auto", "box", "tent", "Gaussian", "Mitchell-Netravali", "Catmull-Rom", "Lanczos"] = setting(
