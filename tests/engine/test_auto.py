@@ -23,10 +23,10 @@ from pmviewer.engine.auto.candidates import (
     candidates,
     given,
 )
-from pmviewer.engine.auto.choose import Goal, _by_time, choose
+from pmviewer.engine.auto.choose import Goal, _by_time, _values, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.auto.measured import Costs, Measured, Numbers, Widths
-from pmviewer.engine.auto.model import error_after, in_time, samples_for, to_error
+from pmviewer.engine.auto.model import Option, error_after, in_time, samples_for, to_error
 from pmviewer.engine.auto.relative import difference, squared, variance
 from pmviewer.engine.auto.trial import RARE, Trial, trial
 from pmviewer.engine.auto.widths import HIDDEN, Tried, told_by
@@ -81,6 +81,28 @@ def test_of_gathers_that_promise_about_as_much_the_best_known_is_taken(promised,
         for way, more, error in zip((GATHER, CACHE), (CORNERS, {}), promised, strict=True)
     )
     assert _by_time(Trial([gather, cache]), 10.0).name == expected.name
+
+
+@pytest.mark.parametrize(
+    ("way", "passes", "apart", "adapted"),
+    [
+        (GATHER, 32.0, False, True),
+        (GATHER, 31.0, False, False),
+        (GATHER, 99.0, True, False),
+        (PATH, 99.0, False, False),
+    ],
+)
+def test_samples_are_adapted_where_there_are_passes_enough(cornell, way, passes, apart, adapted):
+    """Those before it is decided are less than a quarter then; on a cluster passes do not know of one another."""
+    option = Option(Measured(way, Costs(0.1, 0.0), 1.0, radius=0.01), Numbers(50_000), passes, 1e-3, 10.0)
+    assert (_values(option, Settings(), cornell, apart).get("render.adaptive") == "on") == adapted
+
+
+def test_ways_that_learn_from_passes_are_not_tried_on_a_cluster():
+    many = replace(PLAIN, n_lights=100)
+    found = [candidates(many, Settings(), 1000.0, apart) for apart in (False, True)]
+    assert [any("guided" in way.name for way in ways) for ways, _ in found] == [True, False]
+    assert "elsewhere" in dict(found[1][1])["importance"]
 
 
 def test_caustics_are_those_of_lights_unless_that_would_miss_light():
@@ -333,10 +355,7 @@ def test_a_trial_picks_settings_that_alone_give_the_same_picture(cornell):
     small = with_values(Settings(), {"camera.width": 24, "camera.height": 24, "render.seed": 3})
     pool = WorkPool(2)
     try:
-        goals = Goal(seconds=6.0), Goal(seconds=6.0, apart=True)
-        found = [choose(cornell, small, goal, pool, lambda text, share: None) for goal in goals]
-        assert [choice.values["render.adaptive"] for choice in found] == ["on", "off"]
-        assert any("render.adaptive" in sentence for sentence in found[0].sentences)
+        found = [choose(cornell, small, Goal(seconds=6.0), pool, lambda text, share: None) for _ in range(2)]
         chosen = with_values(small, dict(found[0].values))
         pictures = []
         for settings in (chosen, with_values(small, found[0].changed)):

@@ -78,7 +78,7 @@ def test_blank_records_have_the_types_of_a_pass(variant, box, pool):
 def test_blank_eyes_have_the_types_of_lens_and_filter(values, box, pool):
     settings = with_values(Settings(), values)
     renderer = Renderer(box, settings, pool, StageStore(0))
-    evaluated = Evaluation(splits=2, mirror_rays=renderer.plan.mirror_rays)
+    evaluated = Evaluation(splits=2, several=True)
     assert blank_eye(settings, renderer.plan).dtype == eye_record(renderer.camera, settings, 0, evaluated).dtype
 
 

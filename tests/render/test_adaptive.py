@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
@@ -179,3 +180,16 @@ def test_records_have_room_for_samples_wherever_several_may_be(pool):
         one = renderer(pool, adaptive, method=method)
         assert one.plan.adaptive == (adaptive == "on" and room)
         assert ("mirror_rays" in blank_eye(one.settings, one.plan).dtype.names) == room
+
+
+def test_a_view_shows_how_many_samples(pool):
+    """Two in mirrors and glass, doubled as often as it was decided."""
+    one = stepped(renderer(pool, "on", region={"on": True, "left": 0.0, "top": 0.0, "right": 1.0, "bottom": 0.5}), 9)
+    (shown,) = one.inspect(Wanted("samples")).planes.values()
+    usual = renderer(pool, "off")
+    usual.step()
+    (before,) = usual.inspect(Wanted("samples")).planes.values()
+    assert set(np.unique(before)) == {1.0, 2.0}
+    top, doublings = SIZE // 2, one.film.doublings.reshape(SIZE, SIZE)
+    assert np.array_equal(shown[:top, :, 0], before[:top, :, 0] * np.exp2(doublings[:top]))
+    assert (shown[top:] == -1.0).all()

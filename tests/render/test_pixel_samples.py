@@ -108,6 +108,9 @@ def test_where_it_does_nothing_it_says_why():
         {"estimate": {"radius_rule": "pixel"}},
     ):
         assert "One sample" in inactive_reason("render.mirror_rays", settings_of(**values), box)
+    view = "display.view=samples a pass"
+    assert "one sample a pass" in inactive_reason(view, settings_of(), plain)
+    assert inactive_reason(view, settings_of(render={"adaptive": "on"}), plain) is None
 
 
 def test_kernels_for_mirrors_and_glass_show_a_room_without_them_as_it_is(monkeypatch):

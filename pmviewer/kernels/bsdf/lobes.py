@@ -143,7 +143,7 @@ def bsdf_at(scene, material, p, ng, ns, tangent, wo, glossy):
     roughness from which glossy reflection is STORED. The back of a one-sided material and a black one have no groups.
     """
     opaque = not _transparent(p.kind)
-    hidden = opaque and not p.two_sided and shows_back(ng, ns, wo)
+    hidden = opaque and not p.two_sided and shows_back(p.kind == DIFFUSE, ng, ns, wo)
     if opaque and dot(ng, wo) < _f4(0.0):
         ng, ns = scale(ng, _f4(-1.0)), scale(ns, _f4(-1.0))
     # A lobe around a normal that looks away, or whose mirror direction is below the surface, would be black.

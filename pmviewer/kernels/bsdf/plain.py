@@ -43,7 +43,7 @@ def plain_bsdf(scene, material, ng, ns, wo):
     kind = material_kind(scene, material)
     if kind != DIFFUSE and kind != CONDUCTOR:
         return PlainBsdf(FOLLOWED, albedo, material, ns, ns)
-    if not material_two_sided(scene, material) and shows_back(ng, ns, wo):
+    if not material_two_sided(scene, material) and shows_back(kind == DIFFUSE, ng, ns, wo):
         return PlainBsdf(NOTHING, albedo, material, ns, ns)
     if dot(ng, wo) < _f4(0.0):
         ng, ns = scale(ng, _f4(-1.0)), scale(ns, _f4(-1.0))

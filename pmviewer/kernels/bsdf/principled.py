@@ -34,7 +34,7 @@ from pmviewer.kernels.bsdf.principled_lobes import (
 from pmviewer.kernels.bsdf.rough_dielectric import rough_dielectric_f_pdf, sample_rough_dielectric
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.scene import GGX
-from pmviewer.kernels.textures.normal_map import reflecting_normal, shows_back
+from pmviewer.kernels.textures.normal_map import reflecting_normal
 from pmviewer.kernels.vector import add, dot, scale
 from pmviewer.kernels.warp import square_to_cosine_hemisphere
 
@@ -76,12 +76,12 @@ def bsdf_at(scene, material, p, metallic, ng, ns, tangent, wo, glossy):
         one = lobes.bsdf_at(scene, material, p, ng, ns, tangent, wo, glossy)
         none = (_ZERO, _ZERO, _ZERO, _ZERO)
         return AnyBsdf(one.groups, one.albedo, one.delta, one.n, one, q, none, (NOTHING, NOTHING))
-    inside = False
-    hidden = not q.transmits and not p.two_sided and shows_back(ng, ns, wo)
+    hidden, inside = False, False
     if dot(ng, wo) < _ZERO:
         inside = q.transmits
         if not inside:
             ng, ns = scale(ng, _f4(-1.0)), scale(ns, _f4(-1.0))
+            hidden = not p.two_sided
     if not q.transmits and not p.mapped:
         ns = reflecting_normal(ns, ng, wo)
     s, t = lobes.frame(ns, tangent)

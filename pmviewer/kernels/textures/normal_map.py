@@ -114,12 +114,10 @@ def shading_frame(scene, material, prim, b1, b2, p, ng, ns, wo):
 
 
 @device
-def shows_back(ng, ns, wo):
-    """Whether wo sees the back: from below the surface, or where the shading normal looks away, as in Mitsuba.
-
-    A one-sided material is black there. (A two-sided one is shaded about ns on the side of ng that wo is on.)
-    """
-    return dot(ng, wo) < _f4(0.0) or dot(ns, wo) <= _f4(0.0)
+def shows_back(diffuse, ng, ns, wo):
+    """Whether wo sees the back of an opaque material, where a one-sided one is black: from below the surface, and of a
+    diffuse one where the shading normal looks away, too, as in Mitsuba. (That of gloss and mirrors is bent instead.)"""
+    return dot(ng, wo) < _f4(0.0) or (diffuse and dot(ns, wo) <= _f4(0.0))
 
 
 @device
