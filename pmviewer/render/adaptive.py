@@ -17,6 +17,8 @@ get more samples, and those passes less weight.)
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,6 +38,8 @@ WORTH = 4 * DECIDED_AFTER
 """Passes from which on automatic mode has samples adapted."""
 MISSED = 0.1
 """What a sample costs that meets nothing."""
+EIGHTHS, LEVELS = 8, 80
+"""Levels an octave, and of ten octaves."""
 NEAR, AROUND = 3, 7
 """Sides of the squares of pixels over which own and shared variances are averaged: of few passes they are noisy."""
 
@@ -66,57 +70,61 @@ def cost_of(samples: NDArray[np.int64], normals: NDArray[np.floating]) -> NDArra
 def _variances(
     moments: Moments, size: tuple[int, int], apart: int, inside: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(pixels,) own and shared variances of a pass. Pixels so far `apart` share no samples; the others than those
-    `inside` tell nothing."""
+    """(pixels,) own and shared variances of a pass, means of the channels. Pixels so far `apart` share no samples; the
+    others than those `inside` tell nothing."""
     from scipy.ndimage import uniform_filter  # takes a moment, and is needed once a picture
 
-    def around(values: NDArray[np.float64], weight: NDArray[np.float64], side: int) -> NDArray[np.float64]:
-        """Means of values that are weighted already."""
-        sides = (side, side, 0)[: values.ndim]
-        return uniform_filter(values, sides) / np.maximum(uniform_filter(weight, sides), 1e-9)
-
     n, told = float(DECIDED_AFTER), inside.reshape(size).astype(float)
-    each = np.repeat(told[..., None], 3, axis=2)
-    image = moments.image.reshape(*size, 3) / n
-    mean = around(each * image, each, NEAR)
-    scale = each / np.sqrt(mean * mean + EPSILON)
-    spread = np.maximum(moments.squares.reshape(*size, 3) - n * image * image, 0.0) / (n - 1.0)
-    variance = around((spread * scale * scale).mean(axis=2), told, NEAR)
-    # (A − B)²/4 is the variance of the mean, the n-th part of a pass's.
-    difference = (moments.half.reshape(*size, 3) / n * 2.0 - image) * scale * np.sqrt(n)
-    products = _products(difference, apart), _products(each, apart)
-    shared = np.clip(around(*products, AROUND), 0.0, variance)
+
+    def around(weighted: NDArray[np.float64], weights: NDArray[np.float64], side: int) -> NDArray[np.float64]:
+        return uniform_filter(weighted, side) / np.maximum(uniform_filter(weights, side), 1e-9)
+
+    variance, products = np.zeros(size), np.zeros(size)
+    for c in range(3):  # one after another, for the memory's sake
+        image = moments.image[:, c].reshape(size) / n
+        scale = told / (around(told * image, told, NEAR) ** 2 + EPSILON) / 3.0
+        squares = moments.squares[:, c].reshape(size)
+        variance += np.maximum(squares - n * image * image, 0.0) / (n - 1.0) * scale
+        # (A − B)²/4 is the variance of the mean, the n-th part of a pass's.
+        half = moments.half[:, c].reshape(size) * (2.0 / n)
+        products += _products((half - image) * np.sqrt(n * scale), apart)
+    variance = around(variance, told, NEAR)
+    shared = np.clip(around(products, _products(told, apart), AROUND), 0.0, variance)
     own = np.maximum(variance - shared, 1e-3 * variance)
     return own.ravel(), shared.ravel()
 
 
 def _products(values: NDArray[np.float64], apart: int) -> NDArray[np.float64]:
-    """(h, w) sums of products of each pixel's values (h, w, 3) with those `apart` from it along rows and columns, mean
-    of the channels."""
-    total = np.zeros(values.shape[:2])
+    """(h, w) sums of products of each pixel's value with those of the pixels `apart` from it along rows and columns."""
+    total = np.zeros(values.shape)
     for axis in (0, 1):
         if values.shape[axis] <= apart:
             continue
         here = tuple(slice(apart, None) if k == axis else slice(None) for k in (0, 1))
         there = tuple(slice(None, -apart) if k == axis else slice(None) for k in (0, 1))
-        product = (values[here] * values[there]).mean(axis=2)
+        product = values[here] * values[there]
         for part in (here, there):
             total[part] += product
     return total
 
 
 def _shared_out(own: NDArray[np.float64], shared: float, cost: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Doublings that make the product of a pass's cost and variance least."""
-    root, beside, rest = np.sqrt(own / cost), BESIDE * cost.sum(), shared * len(own)
-    best, chosen = (beside + cost.sum()) ** FALL * (own.sum() + rest), np.zeros(len(own), np.uint8)
-    if not best > 0.0:
-        return chosen
-    usual = np.sqrt(np.mean(root * root))
-    for unit in usual * np.geomspace(0.1, 10.0, 33):
-        doublings = np.clip(np.rint(np.log2(np.maximum(root / unit, 1.0))), 0, MOST)
+    """Doublings that make the product of a pass's cost and variance least: of pixels whose √(own/cost) is that of an
+    eighth of an octave alike."""
+    beside, rest = BESIDE * cost.sum(), shared * len(own)
+    most = float((own / cost).max(initial=0.0))
+    if not most > 0.0:
+        return np.zeros(len(own), np.uint8)
+    levels = np.arange(-LEVELS, 1)
+    level = np.rint(0.5 * EIGHTHS * np.log2(np.maximum(own / (cost * most), 1e-30)))
+    level = (np.maximum(level, -LEVELS) + LEVELS).astype(np.int64)
+    costs, owns = (np.bincount(level, of, len(levels)) for of in (cost, own))
+    best, chosen = math.inf, np.zeros(len(levels), np.uint8)
+    for unit in range(EIGHTHS, -LEVELS, -1):  # the level that gets no more than usual; none at first
+        doublings = np.clip(np.rint((levels - unit) / EIGHTHS), 0, MOST)
         times = np.exp2(doublings)
-        left = (own * (EARLY + (1.0 - EARLY) / times)).sum() + rest
-        product = (beside + (cost * times).sum()) ** FALL * left
+        left = (owns * (EARLY + (1.0 - EARLY) / times)).sum() + rest
+        product = (beside + (costs * times).sum()) ** FALL * left
         if product < best:
             best, chosen = product, doublings.astype(np.uint8)
-    return chosen
+    return chosen[level]
