@@ -23,7 +23,7 @@ from pmviewer.engine.auto.candidates import (
     candidates,
     given,
 )
-from pmviewer.engine.auto.choose import Goal, _by_time, _values, choose
+from pmviewer.engine.auto.choose import Goal, _adapts, _by_time, _values, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.auto.measured import Costs, Measured, Numbers, Widths
 from pmviewer.engine.auto.model import Option, error_after, in_time, samples_for, to_error
@@ -84,18 +84,22 @@ def test_of_gathers_that_promise_about_as_much_the_best_known_is_taken(promised,
 
 
 @pytest.mark.parametrize(
-    ("way", "passes", "apart", "adapted"),
+    ("way", "passes", "goal", "adapted"),
     [
-        (GATHER, 32.0, False, True),
-        (GATHER, 31.0, False, False),
-        (GATHER, 99.0, True, False),
-        (PATH, 99.0, False, False),
+        (GATHER, 32, Goal(10.0), True),
+        (GATHER, 31, Goal(10.0), False),
+        (GATHER, 31, Goal(), True),
+        (GATHER, 99, Goal(error=1e-3), True),
+        (GATHER, 99, Goal(apart=True), False),
+        (PATH, 99, Goal(), False),
     ],
 )
-def test_samples_are_adapted_where_there_are_passes_enough(cornell, way, passes, apart, adapted):
-    """Those before it is decided are less than a quarter then; on a cluster passes do not know of one another."""
+def test_samples_are_adapted_where_there_are_passes_enough(cornell, way, passes, goal, adapted):
+    """Those before it is decided are less than a quarter then; whoever gives no goal looks on for longer. On a cluster
+    passes do not know of one another."""
     option = Option(Measured(way, Costs(0.1, 0.0), 1.0, radius=0.01), Numbers(50_000), passes, 1e-3, 10.0)
-    assert (_values(option, Settings(), cornell, apart).get("render.adaptive") == "on") == adapted
+    values = _values(option, Settings(), cornell, _adapts(option, goal))
+    assert (values.get("render.adaptive") == "on") == adapted
 
 
 def test_ways_that_learn_from_passes_are_not_tried_on_a_cluster():

@@ -85,7 +85,7 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     if not goal.seconds:
         seconds = max(seconds, USUAL_PASSES * min(m.cost(_DEFAULT) for m in tried.measured))
     picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, seconds - tried.cpu_seconds)
-    found_values = _values(picked, base, opened, goal.apart)
+    found_values = _values(picked, base, opened, _adapts(picked, goal))
     values, bias = assignments(found_values), bias_of(picked.measured, picked.numbers.widths)
     opened.biases[way_of(with_values(base, values))] = bias  # whoever renders so knows it
     return Choice(
@@ -179,8 +179,13 @@ def _is_default(option: Option) -> bool:
     return option.measured.candidate.is_like(PROGRESSIVE) and option.numbers == _DEFAULT
 
 
-def _values(picked: Option, base: Settings, opened: OpenScene, apart: bool) -> dict[str, Any]:
-    """The settings that the option stands for."""
+def _adapts(picked: Option, goal: Goal) -> bool:
+    """Whether there are passes enough for adaptive samples; without a goal somebody watches as long as they like."""
+    return not goal.apart and (picked.passes >= WORTH or not (goal.seconds or goal.error))
+
+
+def _values(picked: Option, base: Settings, opened: OpenScene, adapts: bool) -> dict[str, Any]:
+    """The settings that the option stands for, with adaptive samples where they suit the method."""
     values, numbers = dict(picked.measured.candidate.values), picked.numbers
     with_photons = with_values(base, assignments(values))
     if with_photons.render.method != "path":
@@ -188,7 +193,7 @@ def _values(picked: Option, base: Settings, opened: OpenScene, apart: bool) -> d
     if numbers.samples != 1:
         values["direct.samples"] = numbers.samples * plan_of(with_photons, opened.traits).light_samples
     values |= numbers.widths.values(with_photons, picked.measured.radius)
-    if picked.passes >= WORTH and not apart:
+    if adapts:
         adapted = with_values(base, assignments(values | ADAPTIVE))
         if plan_of(adapted, opened.traits).adaptive:
             values |= ADAPTIVE
