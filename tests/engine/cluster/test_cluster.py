@@ -106,7 +106,7 @@ def test_a_killed_worker_costs_its_pass(borrowed):
     many = rendered(cluster, renderer(), kill)
     np.testing.assert_array_equal(many.film.sums, alone().film.sums)
     # Dask starts another.
-    until(lambda: pid not in [nanny.pid for nanny in local.workers.values()] and len(cluster.members.ready) == 2)
+    until(lambda: not {pid, None} & {nanny.pid for nanny in local.workers.values()} and len(cluster.members.ready) == 2)
 
 
 def test_a_frozen_worker_holds_nobody_up(borrowed):
