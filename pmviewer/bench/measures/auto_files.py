@@ -37,7 +37,7 @@ COLUMNS = ("file", "triangles", "chosen", "trial", "relMSE", "expected", "Mitsub
 CHOSEN = (
     "; which gather rays gather again was chosen with three files, a coated ball, bricks and a staircase, second "
     "gathers with the cache with a living room, lights by what gloss reflects of them with Veach's plates, what bias "
-    "noise may hide with the staircase, what a trial overlooks with the bricks, whom adaptive samples go to with a box, "
+    "noise may hide with the staircase, what a trial overlooks with the bricks, who gets adaptive samples with a box, "
     "the bricks and the staircase"
 )
 """CORNERS, CACHE_CORNERS and `overlooked` of `pmviewer.engine.auto.candidates`, `pmviewer.render.direct.by_lobes`,
