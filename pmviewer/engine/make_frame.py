@@ -15,7 +15,7 @@ from pmviewer.engine.tally import Tally
 from pmviewer.engine.told import Told
 from pmviewer.maps.irradiance_cache import REACH
 from pmviewer.render.adaptive import DECIDED_AFTER
-from pmviewer.render.pixel_samples import DOUBLINGS, samples_by_marks
+from pmviewer.render.pixel_samples import samples_by_marks, without_doublings
 from pmviewer.render.virtual_lights.film import WeightedFilm
 
 
@@ -112,7 +112,7 @@ def _warnings(looked: Looked, tally: Tally, energy: Energy | None, told: Told) -
     before = min(film.passes, DECIDED_AFTER)
     usual, latest = (
         int(samples_by_marks(kept, plan.mirror_rays).sum()) if len(kept) else pixels
-        for kept in (marks & np.uint8((1 << DOUBLINGS) - 1), marks)
+        for kept in (without_doublings(marks), marks)
     )
     paths = before * usual + (film.passes - before) * latest
     cut = caveats(looked.settings, plan, tally, energy, looked.scene.flat.radius, pixels, film.passes, paths)

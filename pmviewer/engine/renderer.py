@@ -52,7 +52,7 @@ from pmviewer.render.free_camera import resolve_view
 from pmviewer.render.gather.gather_points import POINT_COLUMNS
 from pmviewer.render.moments import Moments
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, RADIUS, first_radii, shrink
-from pmviewer.render.pixel_samples import DOUBLINGS, samples_by_marks
+from pmviewer.render.pixel_samples import samples_by_marks, with_doublings
 from pmviewer.render.planes import PLANES
 from pmviewer.settings.access import Settings
 from pmviewer.settings.needs import Facts
@@ -379,8 +379,7 @@ class Renderer:
         marks, doublings = self._still_marks(film), self.film.doublings
         if doublings is None or index < DECIDED_AFTER:
             return marks
-        doubled = doublings << np.uint8(DOUBLINGS)
-        return doubled | marks if len(marks) else doubled
+        return with_doublings(marks, doublings)
 
     def _still_marks(self, film: Film) -> NDArray[np.uint8]:
         """Those that are the same in all passes."""

@@ -37,6 +37,17 @@ def own_eye(given: PassData) -> PassData:
     return given._replace(eye=given.eye.copy())
 
 
+def with_doublings(marks: NDArray[np.uint8], doublings: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Marks (pixels,), or (0,) for none, with how often samples are doubled, (pixels,)."""
+    doubled = doublings << np.uint8(DOUBLINGS)
+    return doubled | marks if len(marks) else doubled
+
+
+def without_doublings(marks: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """As they were before."""
+    return marks & np.uint8((1 << DOUBLINGS) - 1)
+
+
 def samples_by_marks(marks: NDArray[np.uint8], mirror_rays: int) -> NDArray[np.int64]:
     """Samples a pass of pixels with these marks."""
     samples = np.where(marks & MIRRORED, np.int64(mirror_rays), np.int64(1))
