@@ -58,7 +58,7 @@ class Placed(NamedTuple):
 def compare(trees, control, placed, starts, rows, g0, g1, candidates, counts, neighbours):
     """The photons of groups g0 … g1−1 against the tree as it is: counts[i] neighbours that share the power of photon i,
     which is not stored, or UNDECIDED. starts: of `Groups`; rows: address of the stored rows; candidates: that of
-    CANDIDATE_WORDS of scratch."""
+    AMONG_WORDS of scratch."""
     tree, order = trees[0], placed.order
     scratch = SearchScratch(stack_i4(KEYS), stack_i4(WAITING), stack_i4(4), stack_i4(4), stack_i4(8))
     leaves, stack, box = stack_i4(MOST_LEAVES), stack_i4(NODES), stack_i4(BOX)

@@ -52,7 +52,8 @@ from pmviewer.maps.density.growing_tree import (
     reserved,
     search,
 )
-from pmviewer.maps.density.together import CANDIDATE_WORDS
+from pmviewer.maps.density.shares import ROW, add_share
+from pmviewer.maps.density.together import AMONG_WORDS
 from pmviewer.maps.photon_words import decode_direction, decode_powers
 from pmviewer.tasks import Runner
 
@@ -101,8 +102,8 @@ class Arrivals(NamedTuple):
 
 
 class Stored(NamedTuple):
-    """The photons stored, in order: rows (capacity, 6) uint32, needs (capacity,) float32, powers (capacity, 3) float64;
-    size int64 (3,): nodes and leaves of the tree, photons stored."""
+    """The photons stored, in order: rows (capacity, 6) uint32, needs (capacity,) float32, powers (capacity, ROW)
+    float64 of `shares`; size int64 (3,): nodes and leaves of the tree, photons stored."""
 
     rows: Any
     needs: Any
@@ -118,6 +119,7 @@ def _settle(trees, control, arrivals, stored, rows, counts, neighbours, kept):
     Returns how many were rejected.
     """
     tree, words, size, powers = trees[0], arrivals.words, stored.size, stored.powers
+    sums = powers.ctypes.data
     scratch = SearchScratch(stack_i4(KEYS), stack_i4(WAITING), stack_i4(4), stack_i4(4), stack_i4(8))
     leaf_scratch = stack_i4(LEAF_WORDS), stack_i4(CAPACITY)
     rejected = _i8(0)
@@ -144,11 +146,9 @@ def _settle(trees, control, arrivals, stored, rows, counts, neighbours, kept):
         kept[i] = False
         rejected += 1
         share = _f8(1.0) / _f8(count)
+        r, g, b = _f8(red) * share, _f8(green) * share, _f8(blue) * share
         for j in range(count):
-            k = neighbours[i, j]
-            powers[k, 0] += _f8(red) * share
-            powers[k, 1] += _f8(green) * share
-            powers[k, 2] += _f8(blue) * share
+            add_share(sums, _i8(neighbours[i, j]), r, g, b)
     return rejected
 
 
@@ -186,7 +186,7 @@ class DensityControl:
         """Which photons of the latest round are stored."""
         self._rows = np.empty((0, 6), np.uint32)
         self._normals: list[NDArray[np.uint32]] = []
-        self._powers = np.empty((0, 3), np.float64)
+        self._powers = np.empty((0, ROW), np.float64)
         self._needs = np.empty(0, np.float32)
         self._tree: GrowingTree | None = None
 
@@ -243,7 +243,7 @@ class DensityControl:
         placed = Placed(order, groups.photons, groups.normals, arrivals.needs[order], arrivals.first)
 
         def some(g0: int, g1: int) -> None:
-            candidates = aligned_empty((CANDIDATE_WORDS,), np.float32)
+            candidates = aligned_empty((AMONG_WORDS,), np.float32)
             at = candidates.ctypes.data
             compare(tree.record, self.control, placed, groups.starts, rows, g0, g1, at, counts, neighbours)
 
@@ -255,7 +255,7 @@ class DensityControl:
         return Controlled(
             photons=self._rows[:n].view(np.float32),
             normals=np.concatenate([np.empty(0, np.uint32), *self._normals]),
-            powers=self._powers[:n],
+            powers=np.ascontiguousarray(self._powers[:n, :3]),
             required=self._needs[:n],
             redistributed=self.redistributed,
         )
@@ -265,6 +265,7 @@ class DensityControl:
         room = len(self._rows)
         if self._tree is None or photons > room:
             photons = max(photons, room + room // 2)
-            self._tree = reserved(self._tree, photons)
-            self._rows, self._needs, self._powers = (grown(a, photons) for a in (self._rows, self._needs, self._powers))
+            self._tree = reserved(self._tree, self.size, photons)
+            arrays = self._rows, self._needs, self._powers
+            self._rows, self._needs, self._powers = (grown(a, self.stored, photons) for a in arrays)
         return self._tree

@@ -11,28 +11,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.kernels.memory import load_f4, load_i4
+from pmviewer.kernels.memory import load_f4, load_i4, stack_get_i4, stack_i4, stack_put_i4
 from pmviewer.maps.density.growing_tree import AXIS, CHILD, NODE_WORDS, PLANE, GrowingTree
 from pmviewer.tasks import Runner
 
 PIECE = 256
 """Photons of a group at most: comparing their normals takes the square of it."""
 
+ABREAST = 8
+"""Photons that descend the tree side by side."""
+
+_i4 = np.int32
 _i8 = np.int64
 
 
 @kernel
 def leaves_at(trees, photons, leaves, i0, i1):
-    """The numbers of the leaves that photons i0 … i1−1 of (n, 6) lie in, into leaves (n,) int32."""
-    tree = trees[0]
-    for i in range(i0, i1):
-        node = _i8(0)
-        axis = _i8(load_i4(tree.nodes, AXIS))
-        while axis >= 0:
-            side = _i8(photons[i, axis] >= load_f4(tree.nodes, NODE_WORDS * node + PLANE))
-            node = _i8(load_i4(tree.nodes, NODE_WORDS * node + CHILD)) + side
-            axis = _i8(load_i4(tree.nodes, NODE_WORDS * node + AXIS))
-        leaves[i] = load_i4(tree.nodes, NODE_WORDS * node + CHILD)
+    """The numbers of the leaves that photons i0 … i1−1 of (n, 6) lie in, into leaves (n,) int32. Some descend side by
+    side: each step waits for its node, and that of the next photon need not wait for it."""
+    tree, nodes = trees[0], stack_i4(ABREAST)
+    for begin in range(i0, i1, ABREAST):
+        some, descending = min(_i8(ABREAST), _i8(i1) - begin), True
+        for k in range(some):
+            stack_put_i4(nodes, k, _i4(0))
+        while descending:
+            descending = False
+            for k in range(some):
+                at = tree.nodes + 4 * NODE_WORDS * _i8(stack_get_i4(nodes, k))
+                axis = _i8(load_i4(at, AXIS))
+                if axis >= 0:
+                    side = _i4(photons[begin + k, axis] >= load_f4(at, PLANE))
+                    stack_put_i4(nodes, k, load_i4(at, CHILD) + side)
+                    descending = True
+        for k in range(some):
+            leaves[begin + k] = load_i4(tree.nodes, NODE_WORDS * _i8(stack_get_i4(nodes, k)) + CHILD)
 
 
 @kernel

@@ -298,22 +298,22 @@ class GrowingTree:
     record: NDArray[np.void]
 
 
-def reserved(tree: GrowingTree | None, photons: int) -> GrowingTree:
-    """A copy of the tree with room for so many photons, or an empty one."""
+def reserved(tree: GrowingTree | None, size: NDArray[np.int64], photons: int) -> GrowingTree:
+    """A copy of the tree, of size[0] nodes and size[1] leaves, with room for so many photons, or an empty one."""
     n = 2 + photons // (CAPACITY // 2)  # halves of a split leaf are never emptier than this
     nodes, leaves = aligned_empty((2 * n, NODE_WORDS), np.int32), aligned_empty((n, LEAF_WORDS), np.float32)
     if tree is None:
         nodes[0] = (0, LEAF, 0, np.float32(np.inf).view(np.int32))
         leaves[0] = np.inf
     else:
-        nodes[: len(tree.nodes)], leaves[: len(tree.leaves)] = tree.nodes, tree.leaves
+        nodes[: size[0]], leaves[: size[1]] = tree.nodes[: size[0]], tree.leaves[: size[1]]
     record = np.zeros(1, TREE)
     record[0] = (nodes.ctypes.data, leaves.ctypes.data)
     return GrowingTree(nodes, leaves, record)
 
 
-def grown(array: NDArray[Any], n: int) -> NDArray[Any]:
-    """A copy with n rows, zero after the old ones."""
+def grown(array: NDArray[Any], used: int, n: int) -> NDArray[Any]:
+    """A copy with n rows, of which so many are used; the others are zero."""
     larger = np.zeros((n, *array.shape[1:]), array.dtype)
-    larger[: len(array)] = array
+    larger[:used] = array[:used]
     return larger

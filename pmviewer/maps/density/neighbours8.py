@@ -7,7 +7,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from pmviewer.kernels.memory import I8, I32, at_address, with_twin
+from pmviewer.kernels.memory import F32, I8, I32, at_address, with_twin
 from pmviewer.maps.search.simd import (
     FAST,
     ROW_BYTES,
@@ -27,13 +27,37 @@ X, Y, Z, WORD, NEED, MEMBER = range(ROWS)
 density and number. What is not taken is infinitely far."""
 
 
-def _neighbours8(block, p, n, steepness, r2, ceiling, squared):
+def _plainly(block, p, n, steepness, ceiling):
+    """In plain Python: squared distances of eight, and which need no more than `ceiling`."""
     rows = [block + row * ROW_BYTES for row in range(3)]
     d = offsets(*rows, *p)
     height = sum(a * c for a, c in zip(d, n))
     counted = np.maximum(sum(a * a for a in d), steepness * height * height)
+    return counted, at_address(block + NEED * ROW_BYTES, WIDTH, np.float32) <= ceiling
+
+
+def _built(builder, block, p, n, steepness, ceiling):
+    """The same in LLVM's builder."""
+    row = [builder.add(block, ir.Constant(block.type, ROW_BYTES * j)) for j in range(NEED + 1)]
+    normal = [splat(builder, x) for x in cgutils.unpack_tuple(builder, n, 3)]
+    d = [
+        builder.fsub(load_eight(builder, address), splat(builder, coordinate), flags=FAST)
+        for address, coordinate in zip(row, cgutils.unpack_tuple(builder, p, 3))
+    ]
+    height = dot_of(builder, d, normal)
+    above = builder.fmul(builder.fmul(height, height, flags=FAST), splat(builder, steepness), flags=FAST)
+    counted = intrinsic(builder, "maxnum", dot_of(builder, d, d), above)
+    return counted, builder.fcmp_ordered("<=", load_eight(builder, row[NEED]), splat(builder, ceiling))
+
+
+def _bits(builder, mask):
+    return builder.zext(builder.bitcast(mask, I8), I32)
+
+
+def _neighbours8(block, p, n, steepness, r2, ceiling, squared):
+    counted, small = _plainly(block, p, n, steepness, ceiling)
     squared.view(np.float32)[:WIDTH] = counted
-    return bits_of((counted < r2) & (at_address(block + NEED * ROW_BYTES, WIDTH, np.float32) <= ceiling))
+    return bits_of((counted < r2) & small)
 
 
 @with_twin(_neighbours8)
@@ -50,21 +74,48 @@ def neighbours8(typingctx, block, p, n, steepness, r2, ceiling, squared):
 
     def codegen(context, builder, sig, args):
         block, p, n, steepness, r2, ceiling, out = args
-        row = [builder.add(block, ir.Constant(block.type, ROW_BYTES * j)) for j in range(NEED + 1)]
-        normal = [splat(builder, x) for x in cgutils.unpack_tuple(builder, n, 3)]
-        d = [
-            builder.fsub(load_eight(builder, address), splat(builder, coordinate), flags=FAST)
-            for address, coordinate in zip(row, cgutils.unpack_tuple(builder, p, 3))
-        ]
-        height = dot_of(builder, d, normal)
-        above = builder.fmul(builder.fmul(height, height, flags=FAST), splat(builder, steepness), flags=FAST)
-        counted = intrinsic(builder, "maxnum", dot_of(builder, d, d), above)
+        counted, small = _built(builder, block, p, n, steepness, ceiling)
         builder.store(counted, builder.bitcast(out, VECTOR.as_pointer())).align = 4
-        mask = builder.and_(
-            builder.fcmp_ordered("<", counted, splat(builder, r2)),
-            builder.fcmp_ordered("<=", load_eight(builder, row[NEED]), splat(builder, ceiling)),
-        )
-        return builder.zext(builder.bitcast(mask, I8), I32)
+        return _bits(builder, builder.and_(builder.fcmp_ordered("<", counted, splat(builder, r2)), small))
+
+    return signature, codegen
+
+
+def _distances8(block, p, n, steepness, ceiling, into):
+    counted, small = _plainly(block, p, n, steepness, ceiling)
+    at_address(into, WIDTH, np.float32)[:] = np.where(small, counted, np.float32(np.inf))
+
+
+@with_twin(_distances8)
+def distances8(typingctx, block, p, n, steepness, ceiling, into):
+    """The squared distances by which the photons of a block count at a place, as `neighbours8` has them, infinite where
+    they need more than `ceiling`; to the int64 address `into`, as float32."""
+    f, triple = types.float32, types.UniTuple(types.float32, 3)
+    signature = types.void(types.int64, triple, triple, f, f, types.int64)
+
+    def codegen(context, builder, sig, args):
+        block, p, n, steepness, ceiling, into = args
+        counted, small = _built(builder, block, p, n, steepness, ceiling)
+        far = splat(builder, ir.Constant(F32, float("inf")))
+        place = builder.inttoptr(into, VECTOR.as_pointer())
+        builder.store(builder.select(small, counted, far), place).align = 4
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+def _below8(address, limit):
+    return bits_of(at_address(address, WIDTH, np.float32) < limit)
+
+
+@with_twin(_below8)
+def below8(typingctx, address, limit):
+    """Which of the eight float32 at an int64 address are below the limit; int32 with bit j set for the j-th."""
+    signature = types.int32(types.int64, types.float32)
+
+    def codegen(context, builder, sig, args):
+        address, limit = args
+        return _bits(builder, builder.fcmp_ordered("<", load_eight(builder, address), splat(builder, limit)))
 
     return signature, codegen
 
@@ -89,6 +140,6 @@ def inside8(typingctx, block, low, high):
             above = builder.fcmp_ordered(">=", x, splat(builder, a))
             inside = builder.and_(above, builder.fcmp_ordered("<=", x, splat(builder, b)))
             mask = inside if mask is None else builder.and_(mask, inside)
-        return builder.zext(builder.bitcast(mask, I8), I32)
+        return _bits(builder, mask)
 
     return signature, codegen

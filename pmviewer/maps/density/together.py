@@ -18,6 +18,7 @@ from pmviewer.kernels.memory import (
     stack_get_i4,
     stack_put_f4,
     stack_put_i4,
+    stack_put_i8,
     store_f4,
     store_i4,
 )
@@ -30,11 +31,10 @@ from pmviewer.maps.density.growing_tree import (
     NODE_WORDS,
     PLANE,
     M,
-    add_keys,
 )
-from pmviewer.maps.density.neighbours8 import NEED, ROWS, inside8, neighbours8
+from pmviewer.maps.density.neighbours8 import MEMBER, NEED, ROWS, below8, distances8, inside8
 from pmviewer.maps.search.k_nearest import keep_nearest
-from pmviewer.maps.search.simd import BLOCK_BYTES, WIDTH, facing8
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, count_bits, facing8
 from pmviewer.maps.search.stored import ALL_CLASSES
 
 MOST_LEAVES, MOST_CANDIDATES = 128, 1024
@@ -44,6 +44,10 @@ BOX = 6
 NODES = 512
 """int32 elements of scratch for nodes that wait."""
 CANDIDATE_WORDS = ROWS * MOST_CANDIDATES
+AMONG_WORDS = CANDIDATE_WORDS + MOST_CANDIDATES
+"""float32 elements of scratch for candidates, and for them and how far they are."""
+GUESSES = 8
+"""Of a distance within which M are, at most."""
 
 _f4 = np.float32
 _i4 = np.int32
@@ -73,8 +77,8 @@ def widen(box, p, n, r2, limits):
 
 @device
 def leaves_around(tree, box, ceiling, stack, leaves):
-    """Numbers of the leaves that may hold photons in a box, into `leaves`; how many, or −1 where there are too many.
-    ceiling: the most that neighbours need; stack: NODES, leaves: MOST_LEAVES int32 of scratch."""
+    """Numbers of the leaves that lie in a box and have photons that need no more than `ceiling`, into `leaves`; how
+    many, or −1 where there are too many. stack: NODES, leaves: MOST_LEAVES int32 of scratch."""
     count, waiting = _i8(0), _i8(1)
     stack_put_i4(stack, 0, _i4(0))
     while waiting > 0:
@@ -131,15 +135,44 @@ def collected(tree, leaves, leaf_count, box, n, ceiling, limits, candidates):
 @device
 def search_among(candidates, blocks, p, n, need, limits, r2, scratch):
     """What `growing_tree.search` does, among candidates."""
-    ceiling, count = limits.contrast * need, _i8(0)
+    ceiling, distances, within = limits.contrast * need, candidates + _i8(4 * CANDIDATE_WORDS), _i8(0)
     for at in range(blocks):
-        block = candidates + BLOCK_BYTES * at
-        mask = neighbours8(block, p, n, limits.steepness, r2, ceiling, scratch.squared)
-        count = add_keys(block, mask, scratch, count)
+        into = distances + ROW_BYTES * at
+        distances8(candidates + BLOCK_BYTES * at, p, n, limits.steepness, ceiling, into)
+        within += _i8(count_bits(below8(into, r2)))
+    limit, count = _narrowed(distances, blocks, within, r2), _i8(0)
+    for at in range(blocks):
+        block, row = candidates + BLOCK_BYTES * at, distances + ROW_BYTES * at
+        mask = below8(row, limit)
+        while mask != 0:
+            lane = _i8(count_trailing_zeros(mask))
+            mask &= mask - _i4(1)
+            number = _i8(load_i4(block, WIDTH * MEMBER + lane))
+            stack_put_i8(scratch.keys, count, _i8(load_i4(row, lane)) << 32 | number)
+            count += 1
         if count >= 2 * M:
-            r2 = keep_nearest(scratch.keys, count, _i4(M), r2)
+            limit = keep_nearest(scratch.keys, count, _i4(M), limit)
             count = _i8(M)
     if count >= M:
-        r2 = keep_nearest(scratch.keys, count, _i4(M), r2)
+        limit = keep_nearest(scratch.keys, count, _i4(M), limit)
         count = _i8(M)
-    return count, r2
+    return count, limit
+
+
+@device
+def _narrowed(distances, blocks, within, r2):
+    """A squared distance below which there are M photons, or a few more, of `within` that are below r2; r2 where these
+    are no more than M. distances: address of theirs. Photons on a surface are spread evenly over squared distances:
+    where the M-th is can be guessed."""
+    low, before, turn = _f4(0.0), _i8(0), 0
+    while within > M and turn < GUESSES:
+        turn += 1
+        share = (_f4(M - before) + _f4(0.5)) / _f4(within - before + 1)
+        limit, count = low + (r2 - low) * share, _i8(0)
+        for at in range(blocks):
+            count += _i8(count_bits(below8(distances + ROW_BYTES * at, limit)))
+        if count >= M:
+            r2, within = limit, count
+        else:
+            low, before = limit, count
+    return r2

@@ -1,0 +1,40 @@
+"""Powers of photons that share those of others: rows of four float64, red, green, blue and nothing, so that a row is
+added to at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+
+from pmviewer.kernels.memory import at_address, with_twin
+
+ROW = 4
+_ROW_BYTES = 8 * ROW
+_F64 = ir.DoubleType()
+_VECTOR = ir.VectorType(_F64, ROW)
+
+
+def _add_share(address, row, red, green, blue):
+    at_address(address + row * _ROW_BYTES, 3, np.float64)[:] += (red, green, blue)
+
+
+@with_twin(_add_share)
+def add_share(typingctx, address, row, red, green, blue):
+    """Add float64 red, green and blue to a row of powers; address: int64, of the first row."""
+    f = types.float64
+    signature = types.void(types.int64, types.int64, f, f, f)
+
+    def codegen(context, builder, sig, args):
+        address, row, *channels = args
+        at = builder.add(address, builder.mul(row, ir.Constant(row.type, _ROW_BYTES)))
+        place = builder.inttoptr(at, _VECTOR.as_pointer())
+        powers = builder.load(place)
+        powers.align = 8
+        share = ir.Constant(_VECTOR, [0.0] * ROW)
+        for c, channel in enumerate(channels):
+            share = builder.insert_element(share, channel, ir.Constant(ir.IntType(32), c))
+        builder.store(builder.fadd(powers, share), place).align = 8
+        return context.get_dummy_value()
+
+    return signature, codegen
