@@ -47,11 +47,16 @@ def first_radius(scene: FlatScene, camera: CameraPose, estimate: Estimate, gathe
     return 2.0 ** (round(4 * math.log2(wanted)) / 4) * scene.radius
 
 
+def _shrunk(index: int, estimate: Estimate) -> float:
+    """The radius of pass `index` over that of the first."""
+    return progressive_radius(1.0, index + 1, estimate.alpha, delay=estimate.delay)
+
+
 def pass_neighbours(index: int, estimate: Estimate, maps: int = 1) -> tuple[int, float]:
     """Neighbours that a k-nearest look-up of pass `index` searches in each of so many maps, and the share of their
     disc's area that it uses: in all the share r²ᵢ/r²₁ of the area that `estimate.k` fill
     (`pmviewer.maps.estimate.nearest`). Several maps are asked for equally many, for two at least."""
-    s = progressive_radius(1.0, index + 1, estimate.alpha) ** 2
+    s = _shrunk(index, estimate) ** 2
     if maps == 1:
         return shrunk(estimate.k, s)
     k = maps * max(math.ceil(estimate.k / maps), 2)
@@ -62,17 +67,17 @@ def pass_neighbours(index: int, estimate: Estimate, maps: int = 1) -> tuple[int,
 def volume_neighbours(index: int, estimate: Estimate) -> tuple[int, float]:
     """Neighbours in media in pass `index`, and the share of their ball's volume that they count in: the bias goes with
     r², so that their volume shrinks with (r²ᵢ/r²₁)^1.5."""
-    return shrunk(estimate.volume_k, progressive_radius(1.0, index + 1, estimate.alpha) ** 3)
+    return shrunk(estimate.volume_k, _shrunk(index, estimate) ** 3)
 
 
 def pass_radius(first: float, index: int, estimate: Estimate, scene_radius: float) -> float:
     """Radius of pass `index` (E6), never below the floor."""
-    return progressive_radius(first, index + 1, estimate.alpha, estimate.floor * scene_radius)
+    return max(first * _shrunk(index, estimate), estimate.floor * scene_radius)
 
 
 def free_paths(index: int, estimate: Estimate) -> float:
     """Largest radius of look-ups in a medium in pass `index`, in its mean free paths."""
-    return estimate.free_paths * progressive_radius(1.0, index + 1, estimate.alpha)
+    return estimate.free_paths * _shrunk(index, estimate)
 
 
 def volume_radius(radius: float, index: int, estimate: Estimate, media: Sequence[Medium]) -> float:

@@ -67,11 +67,13 @@ def neighbourhood(positions: np.ndarray, neighbours: int = 64) -> float:
     return math.sqrt(max(float(np.quantile(np.partition(squared, rank, axis=1)[:, rank], 0.75)), 0.0))
 
 
-def progressive_radius(r1: float, i: int, alpha: float = 2.0 / 3.0, floor: float = 0.0) -> float:
+def progressive_radius(r1: float, i: int, alpha: float = 2.0 / 3.0, floor: float = 0.0, delay: float = 0.0) -> float:
     """Radius of pass i = 1, 2, …, without those before it (Knaus & Zwicker 2011, eq. 20).
 
-    From r²_{i+1} = r²_i·(i+α)/(i+1) follows r²_i = r1²·Π_{m=1}^{i−1} (m+α)/(m+1) = r1²·Γ(i+α) / (Γ(1+α)·Γ(i+1)).
-    Never less than `floor`.
+    From r²_{i+1} = r²_i·(i+d+α)/(i+d+1) follows r²_i = r1²·Γ(i+d+α)·Γ(d+2) / (Γ(d+1+α)·Γ(i+d+1)). The source has
+    d = 0; with a `delay` d the radius stays about the same for that many passes, and falls as fast in the end. Never
+    less than `floor`.
     """
-    log_ratio = math.lgamma(i + alpha) - math.lgamma(1.0 + alpha) - math.lgamma(i + 1.0)
+    log_ratio = math.lgamma(i + delay + alpha) - math.lgamma(delay + 1.0 + alpha)
+    log_ratio -= math.lgamma(i + delay + 1.0) - math.lgamma(delay + 2.0)
     return max(r1 * math.exp(0.5 * log_ratio), floor)

@@ -22,6 +22,17 @@ def test_progressive_radius_equals_the_recurrence(alpha):
         squared *= (i + alpha) / (i + 1)
 
 
+def test_a_delay_keeps_the_radius_for_as_many_passes_and_lets_it_shrink_as_fast_in_the_end():
+    """By the recurrence as it is from pass 200 on; against none after so many that it makes no difference."""
+    squared = 0.3**2
+    for i in range(1, 2001):
+        assert progressive_radius(0.3, i, 2 / 3, delay=200) == pytest.approx(np.sqrt(squared), rel=1e-9)
+        squared *= (i + 200 + 2 / 3) / (i + 200 + 1)
+    assert progressive_radius(0.3, 50, 2 / 3, delay=200) > 0.96 * 0.3
+    late = [progressive_radius(1.0, 10**i, 2 / 3, delay=200) for i in (7, 10)]
+    assert late[1] / late[0] == pytest.approx(10**-0.5, rel=1e-3)
+
+
 def test_progressive_radius_shrinks_to_its_floor():
     radii = [progressive_radius(2.0, i, 0.5, floor=0.01) for i in (1, 2, 10, 1000, 10**12)]
     assert radii[0] == pytest.approx(2.0)

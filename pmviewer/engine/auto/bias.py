@@ -18,6 +18,11 @@ ORDER = 0.65
 """Power of the radius that the root mean square of bias grows with: ½ where light ends at an outline, as what is wrong
 is a band as wide as the radius, and 2 in the open. Between half and twice the automatic radius it was 0.5 to 1.2 in
 bundled scenes with a reference, mostly 0.6 to 0.7."""
+STEADY = 4
+"""What automatic mode has radii delayed by, in passes that it plans for: they shrink by 4 % meanwhile. Of passes with
+the same noise those of one radius have the least bias, and where light is gathered narrower look-ups bring noise and
+little else. relMSE of files after nine CPU seconds over that without a delay: 0.71 to 0.98, in the mean of eight
+0.85."""
 _SIZE = "camera.width", "camera.height"
 _KNOWN = 4096
 """Passes whose radii are summed up one by one."""
@@ -36,43 +41,58 @@ class Blur:
         """With radii so many times as wide."""
         return replace(self, bias2=self.bias2 * factor ** (2 * self.order))
 
-    def after(self, passes: Any) -> Any:
-        """Squared bias of the mean of so many passes, whose radii shrink; a number or an array."""
-        return self.bias2 * mean_over(passes, self.order) ** 2
+    def after(self, passes: Any, delay: int = 0) -> Any:
+        """Squared bias of the mean of so many passes, whose radii shrink with that delay; a number or an array."""
+        return self.bias2 * mean_over(passes, self.order, delay) ** 2
 
 
 @dataclass(frozen=True)
 class Bias:
-    """By the caustic map, by the global map where it is shown, and by interpolation, which shrinks as radii do."""
+    """By the caustic map, by the global map where it is shown, and by interpolation, which shrinks as radii do without
+    a delay. `delay`: of radii, in passes."""
 
     caustic: Blur = Blur()
     shown: Blur = Blur()
     interpolated: float = 0.0
+    delay: int = 0
 
     def __call__(self, passes: Any) -> Any:
         """Squared relative bias after that many passes, a number or an array: the parts sit in different places."""
         duller = np.asarray(passes, float) ** (-1 / 3)
-        return self.caustic.after(passes) + self.shown.after(passes) + self.interpolated * duller
+        blurred = self.caustic.after(passes, self.delay) + self.shown.after(passes, self.delay)
+        return blurred + self.interpolated * duller
+
+    def steadily(self, passes: Any) -> Any:
+        """The same where radii are delayed by STEADY times as many passes."""
+        n = np.asarray(passes, float)
+        blurred = sum(blur.bias2 * steady_mean(blur.order) ** 2 for blur in (self.caustic, self.shown))
+        return blurred + self.interpolated * n ** (-1 / 3)
 
     @staticmethod
     def restored(told: Mapping[str, Any]) -> Bias:
         """What `dataclasses.asdict` made of one."""
-        return Bias(Blur(**told["caustic"]), Blur(**told["shown"]), told["interpolated"])
+        return Bias(Blur(**told["caustic"]), Blur(**told["shown"]), told["interpolated"], told.get("delay", 0))
 
 
 @cache
-def _sums(power: float) -> F8:
+def _sums(power: float, delay: int) -> F8:
     """Of (rᵢ/r₁)^power over the passes up to each of the first."""
-    ratio = np.array([progressive_radius(1.0, i) for i in range(1, _KNOWN + 1)])
+    ratio = np.array([progressive_radius(1.0, i, delay=delay) for i in range(1, _KNOWN + 1)])
     return np.cumsum(ratio**power)
 
 
-def mean_over(passes: Any, power: float) -> Any:
+def mean_over(passes: Any, power: float, delay: int = 0) -> Any:
     """Mean of (rᵢ/r₁)^power over so many passes, a number or an array, beyond the first ones by the power law that the
-    radius falls with, rᵢ ∝ i^(−1/6)."""
-    sums, n = _sums(power), np.asarray(passes, float)
-    mean = np.interp(n, np.arange(1, _KNOWN + 1), sums) / n
-    return np.where(n <= _KNOWN, mean, sums[-1] / _KNOWN * (n / _KNOWN) ** (-power / 6))
+    radius falls with, rᵢ ∝ (i + delay)^(−1/6)."""
+    sums, n, share = _sums(power, delay), np.asarray(passes, float), 1.0 - power / 6
+    later = (sums[-1] - sums[-2]) * (_KNOWN + delay) / share * (((n + delay) / (_KNOWN + delay)) ** share - 1.0)
+    return np.where(n <= _KNOWN, np.interp(n, np.arange(1, _KNOWN + 1), sums), sums[-1] + later) / n
+
+
+def steady_mean(power: float) -> float:
+    """Mean of (rᵢ/r₁)^power over passes whose radii are delayed by STEADY times as many."""
+    share = -power / 6
+    return STEADY / (1 + share) * ((1 + 1 / STEADY) ** (1 + share) - 1)
 
 
 def way_of(settings: Settings) -> Hashable:

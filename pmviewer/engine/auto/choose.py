@@ -87,6 +87,7 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, seconds - tried.cpu_seconds)
     found_values = _values(picked, base, opened, _adapts(picked, goal))
     values, bias = assignments(found_values), bias_of(picked.measured, picked.numbers.widths)
+    bias = replace(bias, delay=values["estimate.delay"])
     opened.biases[way_of(with_values(base, values))] = bias  # whoever renders so knows it
     return Choice(
         picked.name,
@@ -189,7 +190,7 @@ def _values(picked: Option, base: Settings, opened: OpenScene, adapts: bool) -> 
     values, numbers = dict(picked.measured.candidate.values), picked.numbers
     with_photons = with_values(base, assignments(values))
     if with_photons.render.method != "path":
-        values |= {"photons.N": numbers.N, "photons.q": numbers.q}
+        values |= {"photons.N": numbers.N, "photons.q": numbers.q, "estimate.delay": picked.delay}
     if numbers.samples != 1:
         values["direct.samples"] = numbers.samples * plan_of(with_photons, opened.traits).light_samples
     values |= numbers.widths.values(with_photons, picked.measured.radius)
@@ -227,7 +228,7 @@ def _reason(picked: Option) -> list[str]:
     m, lines = picked.measured, list[str]()
     usual = in_time(m, replace(picked.numbers, widths=Widths()), picked.seconds)
     for what, option in (("the automatic radius", usual), ("this one", picked)):
-        bias2 = float(bias_of(m, option.numbers.widths)(max(option.passes, 1.0)))
+        bias2 = float(bias_of(m, option.numbers.widths).steadily(max(option.passes, 1.0)))
         lines.append(f"{what}: relMSE {option.error:.2g} in that time, {bias2:.2g} of it bias")
     return lines
 

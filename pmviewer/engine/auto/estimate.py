@@ -72,7 +72,8 @@ class ErrorEstimate:
         self._size = width, height
         self.tells = plan.moments and settings.photons.renew == "each pass"
         self.bias: Bias | None = None
-        shrinks = plan.shown_directly | plan.caustic_mask | plan.volume and settings.estimate.alpha < 1.0
+        estimate = settings.estimate
+        shrinks = plan.shown_directly | plan.caustic_mask | plan.volume and estimate.alpha < 1.0 and not estimate.delay
         self._powers = (*POWERS, SHRINKING) if shrinks else POWERS
         self._sums: dict[int, F8] = {}
         """Sums of the image over the first passes, by their number; those that will be compared yet."""

@@ -10,11 +10,10 @@ from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.candidates import Candidate
 from pmviewer.settings.access import Settings
 
-BY_POWER, BY_PHOTONS = 1.4, 1.1
+BY_POWER, BY_PHOTONS = 1.3, 1.1
 """Powers of the number of passes that the variance of direct light falls with, by light samples over all lights and by
-those that photons choose: from the first to the 32nd pass 1.21 to 1.78, in the mean 1.4, where its variance is large
-(colonnade, three_balls, cornell_lights, marble, skylight_room), up to 1.9 where little hangs on it (cornell_diffuse,
-glass_egg, museum); 1.26 in office and 0.92 in rooms_10x10."""
+those that photons choose: from the second to the 32nd pass 1.02 to 1.59 in 17 scenes, in the mean 1.3 (1.02 to 1.37
+where its variance is large: skies, fine geometry); 1.17 in office and 1.10 in rooms_10x10."""
 
 
 @dataclass(frozen=True)

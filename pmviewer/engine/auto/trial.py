@@ -54,6 +54,8 @@ SEEDS = ((7_919, 104_729), (1_299_709, 15_485_863), (32_452_843, 49_979_687))
 """Added to the picture's seed; the second pair where a trial that is twice as long still fits, and so on."""
 SAMPLED = ("direct", "specular")
 """Terms of the picture that light samples are seen in."""
+LOOKED_UP = ("specular", "caustic", "indirect", "volume", "volume indirect")
+"""Terms that photons are seen in. The noise of direct light would hide them."""
 STORE = 1 << 28
 
 
@@ -72,11 +74,12 @@ class Trial:
 @dataclass
 class _Run:
     """Pictures of the seeds with such settings, of them what light samples make, directly or over what is followed,
-    and the CPU seconds by stage of the quickest one."""
+    and what photons do; and the CPU seconds by stage of the quickest one."""
 
     settings: Settings
     images: list[F8] = field(default_factory=list)
     sampled: list[F8] = field(default_factory=list)
+    looked_up: list[F8] = field(default_factory=list)
     stages: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -158,7 +161,9 @@ class _Trier:
         renderer.step()
         planes = renderer.film.planes()
         run.images.append(beauty_of(planes).astype(np.float64))
-        run.sampled.append(np.sum([planes[..., PLANES[term]] for term in SAMPLED], axis=0, dtype=np.float64))
+        for terms, images in ((SAMPLED, run.sampled), (LOOKED_UP, run.looked_up)):
+            there = [planes[..., PLANES[term]] for term in terms if PLANES[term].stop <= planes.shape[-1]]
+            images.append(np.sum(there, axis=0, dtype=np.float64))
         for name, seconds in renderer.tally.stage_seconds.items():
             run.stages[name] = min(run.stages.get(name, math.inf), seconds)
 
@@ -245,7 +250,8 @@ def _measured(tried: _Tried, widened: tuple[Widened, Widened], bias: Bias, mean:
     eye, gathered = variances[0], 0.0
     if len(tried.runs) > 1:
         many, few = tried.runs
-        photons = max(variances[1] - variances[0], 0.0) / (1 / few.N - 1 / many.N)
+        seen = [variance(run.looked_up, mean) for run in tried.runs]
+        photons = max(seen[1] - seen[0], 0.0) / (1 / few.N - 1 / many.N)
         photons = min(max(photons, caustic + shown), variances[0] * many.N)
         eye = variances[0] - photons / many.N
         fitting = min(1.0, photons / (caustic + shown)) if caustic + shown > 0 else 1.0

@@ -47,6 +47,12 @@ SHRINKING_RADIUS = Need(
     lambda f: f.settings.estimate.lookup == "nearest" or f.settings.estimate.alpha != 1.0,
     "The radius does not shrink with alpha = 1.",
 )
+PASS_RADIUS = Need(
+    lambda f: (
+        f.settings.estimate.radius_rule == "pass" or f.settings.estimate.lookup == "nearest" or bool(f.plan.gather)
+    ),
+    "Each pixel's radius shrinks by the photons that it finds (estimate.radius_rule).",
+)
 SEVERAL_MAPS = Need(lambda f: f.plan.maps > 1, "One map is looked up (photons.maps).")
 DISC = Need(
     lambda f: f.settings.estimate.area != "convex hull",
@@ -163,6 +169,17 @@ class Estimate(Group):
         ge=0.0,
         le=1.0,
         needs=(NEW_MAPS,),
+    )
+    delay: int = setting(
+        0,
+        "Passes for which look-ups stay about as wide as in the first one: they shrink as slowly as after so many, "
+        "r²ᵢ₊₁ = r²ᵢ·(i+delay+α)/(i+delay+1), and to nothing in the end. Less noise and more bias after few passes.",
+        stage="maps",
+        scale="linear",
+        unit="passes",
+        ge=0,
+        le=10_000,
+        needs=(SHRINKING, PASS_RADIUS),
     )
     floor: float = setting(
         1e-5,
