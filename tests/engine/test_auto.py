@@ -134,23 +134,27 @@ def test_a_user_s_own_settings_of_the_method_are_told():
     assert given(with_values(Settings(), {"photons.N": 7, "gather.cache": "on"})) == ["photons.N", "gather.cache"]
 
 
-def test_what_the_model_promises_is_what_sums_over_passes_say():
-    """Against sums written out by Knaus and Zwicker's recurrence, as it is from the 80th pass on, four times as many as
-    are planned for."""
+@pytest.mark.parametrize("steady", [False, True])
+def test_what_the_model_promises_is_what_sums_over_passes_say(steady):
+    """Against sums written out by Knaus and Zwicker's recurrence, from its start or from the 80th pass on, four times
+    as many as are planned for."""
     costs, widths = Costs(0.1, 1e-6, shown=2e-6), Widths(caustic=0.5, shown=2.0)
     bias = Bias(Blur(3e-4, 1.0), Blur(1e-4, 1.5))
     m = Measured(PROGRESSIVE, costs, eye=0.02, caustic=50.0, shown=300.0, gathered=7.0, bias=bias)
     area, areas = 1.0, []
     for i in range(1, 21):
         areas.append(area)
-        area *= (i + 80 + 2 / 3) / (i + 80 + 1)
+        late = 80 * steady + i
+        area *= (late + 2 / 3) / (late + 1)
     looked_up = (300.0 / 4 + 50.0 * 4) * sum(1 / a for a in areas) / 20
     noise = 0.02 / 20**1.1 + (looked_up + 7.0) / 50_000 / 20
     blurred = 1e-4 * 2**3 * (sum(a**0.75 for a in areas) / 20) ** 2
     blurred += 3e-4 / 4 * (sum(a**0.5 for a in areas) / 20) ** 2
-    assert error_after(m, Numbers(50_000, widths), 20) == pytest.approx(noise + blurred, rel=2e-3)
+    numbers = Numbers(50_000, widths, steady=steady)
+    assert error_after(m, numbers, 20) == pytest.approx(noise + blurred, rel=2e-3 if steady else 1e-6)
     seconds = 20 * (0.1 + 50_000 * (1e-6 + 4 * 2e-6))
-    assert to_error(m, Numbers(50_000, widths), noise + blurred).seconds == pytest.approx(seconds, rel=5e-3)
+    assert to_error(m, numbers, noise + blurred).seconds == pytest.approx(seconds, rel=5e-3)
+    assert in_time(m, numbers, seconds).delay == 80 * steady
 
 
 def test_light_samples_divide_their_part_of_the_noise_and_cost_what_they_cost():
@@ -173,7 +177,7 @@ def test_light_samples_divide_their_part_of_the_noise_and_cost_what_they_cost():
 
 def test_a_radius_that_may_never_get_there_is_expected_to_take_longer():
     """Of two radii of the same promise, the one whose bias alone comes near the error."""
-    blur = Bias(caustic=Blur(5.6e-3, 0.65))
+    blur = Bias(caustic=Blur(8e-3, 0.65))
     m = Measured(PROGRESSIVE, Costs(0.05, 1e-6), eye=0.01, caustic=300.0, bias=blur)
     every = [to_error(m, Numbers(200_000, Widths(caustic=width)), 5e-3) for width in (0.7, 0.35)]
     assert every[0].seconds < 2 * every[1].seconds

@@ -147,11 +147,11 @@ def _by_error(tried: Trial, error: float) -> Option:
 
 
 def _in_time(m: Measured, seconds: float) -> list[Option]:
-    return [in_time(m, numbers, seconds) for numbers in numbers_for(m, lambda n: in_time(m, n, seconds).error)]
+    return [in_time(m, numbers, seconds) for numbers in numbers_for(m, lambda n: in_time(m, n, seconds).error, True)]
 
 
 def _to_error(m: Measured, error: float) -> list[Option]:
-    return [to_error(m, numbers, error) for numbers in numbers_for(m, lambda n: to_error(m, n, error).expected)]
+    return [to_error(m, numbers, error) for numbers in numbers_for(m, lambda n: to_error(m, n, error).expected, False)]
 
 
 def _picked(found: list[Option], of: Callable[[Option], float]) -> Option:
@@ -177,7 +177,7 @@ def _preference(option: Option) -> float:
 
 
 def _is_default(option: Option) -> bool:
-    return option.measured.candidate.is_like(PROGRESSIVE) and option.numbers == _DEFAULT
+    return option.measured.candidate.is_like(PROGRESSIVE) and replace(option.numbers, steady=False) == _DEFAULT
 
 
 def _adapts(picked: Option, goal: Goal) -> bool:
@@ -228,7 +228,8 @@ def _reason(picked: Option) -> list[str]:
     m, lines = picked.measured, list[str]()
     usual = in_time(m, replace(picked.numbers, widths=Widths()), picked.seconds)
     for what, option in (("the automatic radius", usual), ("this one", picked)):
-        bias2 = float(bias_of(m, option.numbers.widths).steadily(max(option.passes, 1.0)))
+        passes = max(option.passes, 1.0)
+        bias2 = float(replace(bias_of(m, option.numbers.widths), delay=option.delay)(passes))
         lines.append(f"{what}: relMSE {option.error:.2g} in that time, {bias2:.2g} of it bias")
     return lines
 

@@ -3,8 +3,9 @@
 The variance of the mean of n passes is that of the camera rays, whose numbers complement one another from pass to pass,
 eye/n^1.1, or faster where it is light samples' (`Measured.complement`), plus the photons' part, which falls as 1/n.
 The photons' variance in pass i goes with r²₁/r²ᵢ, as for Knaus & Zwicker 2011, and bias with a power of rᵢ/r₁ that the
-trial has measured; radii are delayed (`estimate.delay`) by STEADY times the passes planned for. Of N trajectories q·N
-fill both maps and the others the caustic map alone, in the share of the light that projection maps leave them.
+trial has measured. For a given time radii are delayed (`estimate.delay`) by STEADY times the passes that it has room
+for. Of N trajectories q·N fill both maps and the others the caustic map alone, in the share of the light that
+projection maps leave them.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from pmviewer.engine.auto.bias import STEADY, Bias, steady_mean
+from pmviewer.engine.auto.bias import STEADY, Bias, mean_over, steady_mean
 from pmviewer.engine.auto.measured import Measured, Numbers, Widths
 
 PHOTONS = (12_500, 25_000, 50_000, 100_000, 150_000, 200_000, 300_000, 600_000, 1_200_000, 2_400_000)
@@ -26,7 +27,7 @@ COMPLEMENT = 1.1
 what is followed 0.93 to 1.24, what is gathered 0.74 to 1.23 while radii shrink."""
 CAUSTIC_WIDTHS = (0.25, 8**-0.5, 0.5, 2**-0.5, 1.0, 2**0.5, 2.0)
 SHOWN_WIDTHS = (0.5, 2**-0.5, 1.0, 2**0.5, 2.0)
-"""Radii that are tried, relative to the automatic one."""
+"""Radii that are tried, relative to the automatic one; wider ones only where they shrink from the first pass on."""
 SHARES = (1.0, 0.5, 0.25, 0.125)
 """Values of q that are tried where there are caustics."""
 UNSURE = (2 / 3, 1.0), (1 / 6, 0.5), (1 / 6, 2.0)
@@ -70,16 +71,17 @@ class Option:
     @property
     def delay(self) -> int:
         """Passes that radii are delayed by."""
-        return min(int(float(f"{STEADY * self.passes:.2g}")), MOST_DELAY) if math.isfinite(self.passes) else MOST_DELAY
+        return min(int(float(f"{STEADY * self.passes:.2g}")), MOST_DELAY) if self.numbers.steady else 0
 
 
 def error_after(m: Measured, numbers: Numbers, passes: Any) -> Any:
     """relMSE after that many passes, a number or an array."""
     n, widths = np.asarray(passes, float), numbers.widths
     looked_up = m.caustic / (widths.caustic**2 * numbers.aimed(m.covered)) + m.shown / (widths.shown**2 * numbers.q)
-    photons = looked_up * steady_mean(-2.0) + m.gathered / numbers.q
+    thinner = steady_mean(-2.0) if numbers.steady else mean_over(n, -2.0)
+    photons = (looked_up * thinner if looked_up else 0.0) + m.gathered / numbers.q
     eye = (m.eye - m.direct) / n**COMPLEMENT + m.direct / numbers.samples / n**m.complement
-    return eye + photons / numbers.N / n + bias_of(m, widths).steadily(n)
+    return eye + photons / numbers.N / n + _bias_after(m, numbers, n)
 
 
 def bias_of(m: Measured, widths: Widths) -> Bias:
@@ -88,26 +90,33 @@ def bias_of(m: Measured, widths: Widths) -> Bias:
     return Bias(bias.caustic.wider(widths.caustic), bias.shown.wider(widths.shown), bias.interpolated)
 
 
-def numbers_for(m: Measured, of: Callable[[Numbers], float]) -> list[Numbers]:
+def _bias_after(m: Measured, numbers: Numbers, passes: Any) -> Any:
+    bias = bias_of(m, numbers.widths)
+    return bias.steadily(passes) if numbers.steady else bias(passes)
+
+
+def numbers_for(m: Measured, of: Callable[[Numbers], float], steady: bool) -> list[Numbers]:
     """All that are worth a thought for one candidate, and the defaults. `of` says what is to be least."""
-    samples = samples_for(m, of)
+    samples = samples_for(m, of, steady)
     if m.photons <= 0:
         return [Numbers(PHOTONS[4], samples=samples)]
-    shown = SHOWN_WIDTHS if m.shown > 0 else (1.0,)
+    widest = 1.0 if steady else math.inf
+    shown = [s for s in SHOWN_WIDTHS if s <= widest] if m.shown > 0 else [1.0]
     if m.caustic > 0:
-        widths = [Widths(c, s) for c, s in itertools.product(CAUSTIC_WIDTHS, shown)]
+        widths = [Widths(c, s) for c, s in itertools.product(CAUSTIC_WIDTHS, shown) if c <= widest]
     else:  # without caustics their radius goes with the other
         widths = [Widths(s, s) for s in shown]
-    numbers = [Numbers(N, w, q, samples) for N, w, q in itertools.product(PHOTONS, widths, _shares(m))]
-    return numbers if samples == 1 else [*numbers, *(Numbers(N) for N in PHOTONS)]
+    every = itertools.product(PHOTONS, widths, _shares(m))
+    numbers = [Numbers(N, w, q, samples, steady) for N, w, q in every]
+    return numbers if samples == 1 else [*numbers, *(Numbers(N, steady=steady) for N in PHOTONS)]
 
 
-def samples_for(m: Measured, of: Callable[[Numbers], float]) -> int:
+def samples_for(m: Measured, of: Callable[[Numbers], float], steady: bool = False) -> int:
     """How many times the automatic number of light samples promises the least `of` numbers, with whatever number of
     photons: of what is even the least, and once, unless more are clearly better."""
     if m.direct <= 0:
         return 1
-    least = {samples: min(of(Numbers(N, samples=samples)) for N in PHOTONS) for samples in SAMPLES}
+    least = {samples: min(of(Numbers(N, samples=samples, steady=steady)) for N in PHOTONS) for samples in SAMPLES}
     few = next(samples for samples in SAMPLES if least[samples] <= EVEN * min(least.values()))
     return few if least[few] < BETTER * least[1] else 1
 
@@ -138,7 +147,7 @@ def to_error(m: Measured, numbers: Numbers, error: float) -> Option:
 
 def _seconds_to(m: Measured, numbers: Numbers, error: float) -> list[float]:
     """CPU seconds to that error, for each of the biases that `UNSURE` tells."""
-    bias = bias_of(m, numbers.widths).steadily(_PASSES)
+    bias = _bias_after(m, numbers, _PASSES)
     noise = error_after(m, numbers, _PASSES) - bias
     return [m.cost(numbers) * _passes_to(error, noise + factor * bias) for _, factor in UNSURE]
 
