@@ -45,10 +45,11 @@ CHOSEN = "; what a trial takes bias relative to, and how far it trusts it, was c
 """The denominator and SPREAD of `pmviewer.engine.auto.widths`, said in the target's own line."""
 CHOSEN_WAYS = (
     "; what every way of such scenes has, such as caustics of lights alone and photons' roulette, light samples with "
-    "several lights and the choice of lights by distance were chosen with these scenes too"
+    "several lights, the choice of lights by distance, and how noise is taken to fall were chosen with these scenes too"
 )
 """CHANNEL_ROULETTE, LIGHTS_CAUSTICS, THICKER and WIDE_RECORDS of `pmviewer.engine.auto.candidates`, SEVERAL of
-`pmviewer.render.direct.samples`, the automatic `direct.choice`, likewise."""
+`pmviewer.render.direct.samples`, the automatic `direct.choice`, the powers of `pmviewer.engine.auto.model` and
+`measured`, likewise."""
 CHOSEN_BIAS = "; the least and most that the bias may be were chosen with cornell_caustic"
 """TRUE_BIAS of `pmviewer.engine.auto.estimate`, likewise."""
 
