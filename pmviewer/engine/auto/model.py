@@ -27,7 +27,7 @@ COMPLEMENT = 1.1
 what is followed 0.92 to 1.24, what is gathered 0.74 to 1.28 while radii shrink."""
 CAUSTIC_WIDTHS = (0.25, 8**-0.5, 0.5, 2**-0.5, 1.0, 2**0.5, 2.0)
 SHOWN_WIDTHS = (0.5, 2**-0.5, 1.0, 2**0.5, 2.0)
-"""Radii that are tried, relative to the automatic one; wider ones only where they shrink from the first pass on."""
+"""Radii that are tried, relative to the automatic one."""
 SHARES = (1.0, 0.5, 0.25, 0.125)
 """Values of q that are tried where there are caustics."""
 UNSURE = (2 / 3, 1.0), (1 / 6, 0.5), (1 / 6, 2.0)
@@ -100,10 +100,9 @@ def numbers_for(m: Measured, of: Callable[[Numbers], float], steady: bool) -> li
     samples = samples_for(m, of, steady)
     if m.photons <= 0:
         return [Numbers(PHOTONS[4], samples=samples)]
-    widest = 1.0 if steady else math.inf
-    shown = [s for s in SHOWN_WIDTHS if s <= widest] if m.shown > 0 else [1.0]
+    shown = SHOWN_WIDTHS if m.shown > 0 else (1.0,)
     if m.caustic > 0:
-        widths = [Widths(c, s) for c, s in itertools.product(CAUSTIC_WIDTHS, shown) if c <= widest]
+        widths = [Widths(c, s) for c, s in itertools.product(CAUSTIC_WIDTHS, shown)]
     else:  # without caustics their radius goes with the other
         widths = [Widths(s, s) for s in shown]
     every = itertools.product(PHOTONS, widths, _shares(m))
