@@ -41,15 +41,20 @@ NEAR = 0.3
 MOST_PASSES = 3000
 LEAST_KNOWN = 0.1
 """Of the noise of a reference: errors below that are not told by it."""
-CHOSEN = "; what a trial takes bias relative to, and how far it trusts it, was chosen with cornell_caustic too"
-"""The denominator and SPREAD of `pmviewer.engine.auto.widths`, said in the target's own line."""
+CHOSEN = (
+    "; what a trial takes bias relative to, how far it trusts it, and how noise is taken to fall, was chosen with "
+    "cornell_caustic too"
+)
+"""The denominator and SPREAD of `pmviewer.engine.auto.widths`, the powers of `pmviewer.engine.auto.model` and
+`measured`, said in the target's own line."""
 CHOSEN_WAYS = (
     "; what every way of such scenes has, such as caustics of lights alone and photons' roulette, light samples with "
-    "several lights, the choice of lights by distance, and how noise is taken to fall were chosen with these scenes too"
+    "several lights, the choice of lights by distance, how noise is taken to fall, and how wide radii that wait may be "
+    "were chosen with these scenes too"
 )
 """CHANNEL_ROULETTE, LIGHTS_CAUSTICS, THICKER and WIDE_RECORDS of `pmviewer.engine.auto.candidates`, SEVERAL of
 `pmviewer.render.direct.samples`, the automatic `direct.choice`, the powers of `pmviewer.engine.auto.model` and
-`measured`, likewise."""
+`measured`, and that its radii are as wide for a time as for an error, likewise."""
 CHOSEN_BIAS = "; the least and most that the bias may be were chosen with cornell_caustic"
 """TRUE_BIAS of `pmviewer.engine.auto.estimate`, likewise."""
 

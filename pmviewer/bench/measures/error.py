@@ -59,6 +59,9 @@ CHOSEN_WITH = ("ring_caustic", "cornell_caustic")
 ROULETTE = "; photons' roulette was chosen with this scene among others"
 ROULETTE_WITH = ("cornell_caustic", "cornell_diffuse", "rooms_10x10")
 """Scenes by which CHANNEL_ROULETTE of `pmviewer.engine.auto.candidates` was chosen, likewise."""
+FALL = "; how noise is taken to fall was chosen with this scene among others"
+FALL_WITH = ("cornell_caustic", "rooms_10x10")
+"""Scenes by which the powers of `pmviewer.engine.auto.model` and `measured` were chosen, likewise."""
 AUTOMATIC_BUDGET = 8.0
 """Of the curves by what automatic mode chooses, over their target's seconds."""
 
@@ -209,6 +212,7 @@ def run(quick: bool = False) -> BenchResult:
         if apart:
             apart += CHOSEN if scene in CHOSEN_WITH else ""
             apart += ROULETTE if scene in ROULETTE_WITH else ""
+            apart += FALL if scene in FALL_WITH else ""
         note = f"{scene} to relMSE {error:g}, best: {best.method}{apart}"
         targets.append(Target(target, best.time_to(error), bound, "CPU s", False, note))
     if peers:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -27,6 +27,8 @@ _SIZE = "camera.width", "camera.height"
 _KNOWN = 4096
 """Passes whose radii are summed up one by one."""
 F8 = NDArray[np.float64]
+Mean = Callable[[float], Any]
+"""From a power to the mean of (rᵢ/r₁)^power over passes, a number or an array."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +43,6 @@ class Blur:
         """With radii so many times as wide."""
         return replace(self, bias2=self.bias2 * factor ** (2 * self.order))
 
-    def after(self, passes: Any, delay: int = 0) -> Any:
-        """Squared bias of the mean of so many passes, whose radii shrink with that delay; a number or an array."""
-        return self.bias2 * mean_over(passes, self.order, delay) ** 2
-
 
 @dataclass(frozen=True)
 class Bias:
@@ -58,15 +56,12 @@ class Bias:
 
     def __call__(self, passes: Any) -> Any:
         """Squared relative bias after that many passes, a number or an array: the parts sit in different places."""
-        duller = np.asarray(passes, float) ** (-1 / 3)
-        blurred = self.caustic.after(passes, self.delay) + self.shown.after(passes, self.delay)
-        return blurred + self.interpolated * duller
+        return self.over(passes, lambda power: mean_over(passes, power, self.delay))
 
-    def steadily(self, passes: Any) -> Any:
-        """The same where radii are delayed by STEADY times as many passes."""
-        n = np.asarray(passes, float)
-        blurred = sum(blur.bias2 * steady_mean(blur.order) ** 2 for blur in (self.caustic, self.shown))
-        return blurred + self.interpolated * n ** (-1 / 3)
+    def over(self, passes: Any, mean: Mean) -> Any:
+        """The same with other radii, whose means over the passes are told."""
+        blurred = sum(blur.bias2 * mean(blur.order) ** 2 for blur in (self.caustic, self.shown))
+        return blurred + self.interpolated * np.asarray(passes, float) ** (-1 / 3)
 
     @staticmethod
     def restored(told: Mapping[str, Any]) -> Bias:

@@ -147,11 +147,11 @@ def _by_error(tried: Trial, error: float) -> Option:
 
 
 def _in_time(m: Measured, seconds: float) -> list[Option]:
-    return [in_time(m, numbers, seconds) for numbers in numbers_for(m, lambda n: in_time(m, n, seconds).error, True)]
+    return [in_time(m, numbers, seconds) for numbers in numbers_for(m, lambda n: in_time(m, n, seconds).error)]
 
 
 def _to_error(m: Measured, error: float) -> list[Option]:
-    return [to_error(m, numbers, error) for numbers in numbers_for(m, lambda n: to_error(m, n, error).expected, False)]
+    return [to_error(m, numbers, error) for numbers in numbers_for(m, lambda n: to_error(m, n, error).expected)]
 
 
 def _picked(found: list[Option], of: Callable[[Option], float]) -> Option:
@@ -177,7 +177,7 @@ def _preference(option: Option) -> float:
 
 
 def _is_default(option: Option) -> bool:
-    return option.measured.candidate.is_like(PROGRESSIVE) and replace(option.numbers, steady=False) == _DEFAULT
+    return option.measured.candidate.is_like(PROGRESSIVE) and option.numbers == _DEFAULT
 
 
 def _adapts(picked: Option, goal: Goal) -> bool:

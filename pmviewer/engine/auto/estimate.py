@@ -72,9 +72,8 @@ class ErrorEstimate:
         self._size = width, height
         self.tells = plan.moments and settings.photons.renew == "each pass"
         self.bias: Bias | None = None
-        estimate = settings.estimate
-        shrinks = plan.shown_directly | plan.caustic_mask | plan.volume and estimate.alpha < 1.0 and not estimate.delay
-        self._powers = (*POWERS, SHRINKING) if shrinks else POWERS
+        shrinks = plan.shown_directly | plan.caustic_mask | plan.volume and settings.estimate.alpha < 1.0
+        self._shrinks_after = settings.estimate.delay if shrinks else math.inf
         self._sums: dict[int, F8] = {}
         """Sums of the image over the first passes, by their number; those that will be compared yet."""
         self._levels: list[_Level] = []
@@ -121,8 +120,9 @@ class ErrorEstimate:
             return None
         last = self._levels[-1]
         n, p = self._passes, _power(self._levels)
+        powers = (*POWERS, SHRINKING) if n > self._shrinks_after else POWERS
         one = last.D * (2 * last.passes / n) ** p / (2 * (2**p - 1))
-        several = sum(c * n**-p for p, c in _parts(self._levels, self._powers)) or one
+        several = sum(c * n**-p for p, c in _parts(self._levels, powers)) or one
         value = math.sqrt(one * several)
         spread = math.sqrt(last.error**2 + ROUGHNESS**2 + UNSURE**2 / len(self._levels))
         if not math.isfinite(value) or value <= 0:

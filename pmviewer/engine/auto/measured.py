@@ -45,13 +45,12 @@ AUTOMATIC = Widths()
 @dataclass(frozen=True)
 class Numbers:
     """N trajectories, of which the share q fills the global map, too, the radii, and `samples` times the automatic
-    number of light samples. steady: whether radii are delayed (`pmviewer.engine.auto.bias.STEADY`)."""
+    number of light samples."""
 
     N: int
     widths: Widths = AUTOMATIC
     q: float = 1.0
     samples: int = 1
-    steady: bool = False
 
     def aimed(self, covered: float) -> float:
         """Light's caustics by so many times as many photons as with q = 1, where those for the caustic map alone start

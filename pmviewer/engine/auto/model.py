@@ -14,6 +14,7 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -54,7 +55,7 @@ class Option:
     """A candidate with its numbers, the passes that the time has room for, and the error that they promise.
     `expected`: of one that is to reach an error, the mean over what the bias may be of the seconds to it. Where more
     bias than is likely keeps the picture from it, they count `MISSED` times: wide look-ups promise the least time up to
-    where they never get there."""
+    where they never get there. `delay`: of radii, in passes."""
 
     measured: Measured
     numbers: Numbers
@@ -62,26 +63,22 @@ class Option:
     error: float
     seconds: float
     expected: float = math.nan
+    delay: int = 0
 
     @property
     def name(self) -> str:
         """What it is, in words."""
         return self.measured.candidate.name
 
-    @property
-    def delay(self) -> int:
-        """Passes that radii are delayed by."""
-        return min(int(float(f"{STEADY * self.passes:.2g}")), MOST_DELAY) if self.numbers.steady else 0
 
-
-def error_after(m: Measured, numbers: Numbers, passes: Any) -> Any:
-    """relMSE after that many passes, a number or an array."""
+def error_after(m: Measured, numbers: Numbers, passes: Any, steady: bool = False) -> Any:
+    """relMSE after that many passes, a number or an array; `steady`: with radii delayed by STEADY times as many."""
     n, widths = np.asarray(passes, float), numbers.widths
+    mean = steady_mean if steady else partial(mean_over, n)
     looked_up = m.caustic / (widths.caustic**2 * numbers.aimed(m.covered)) + m.shown / (widths.shown**2 * numbers.q)
-    thinner = steady_mean(-2.0) if numbers.steady else mean_over(n, -2.0)
-    photons = (looked_up * thinner if looked_up else 0.0) + m.gathered / numbers.q
+    photons = (looked_up * mean(-2.0) if looked_up else 0.0) + m.gathered / numbers.q
     eye = (m.eye - m.direct) / n**COMPLEMENT + m.direct / numbers.samples / n**m.complement
-    return eye + photons / numbers.N / n + _bias_after(m, numbers, n)
+    return eye + photons / numbers.N / n + bias_of(m, widths).over(n, mean)
 
 
 def bias_of(m: Measured, widths: Widths) -> Bias:
@@ -90,14 +87,9 @@ def bias_of(m: Measured, widths: Widths) -> Bias:
     return Bias(bias.caustic.wider(widths.caustic), bias.shown.wider(widths.shown), bias.interpolated)
 
 
-def _bias_after(m: Measured, numbers: Numbers, passes: Any) -> Any:
-    bias = bias_of(m, numbers.widths)
-    return bias.steadily(passes) if numbers.steady else bias(passes)
-
-
-def numbers_for(m: Measured, of: Callable[[Numbers], float], steady: bool) -> list[Numbers]:
+def numbers_for(m: Measured, of: Callable[[Numbers], float]) -> list[Numbers]:
     """All that are worth a thought for one candidate, and the defaults. `of` says what is to be least."""
-    samples = samples_for(m, of, steady)
+    samples = samples_for(m, of)
     if m.photons <= 0:
         return [Numbers(PHOTONS[4], samples=samples)]
     shown = SHOWN_WIDTHS if m.shown > 0 else (1.0,)
@@ -105,17 +97,16 @@ def numbers_for(m: Measured, of: Callable[[Numbers], float], steady: bool) -> li
         widths = [Widths(c, s) for c, s in itertools.product(CAUSTIC_WIDTHS, shown)]
     else:  # without caustics their radius goes with the other
         widths = [Widths(s, s) for s in shown]
-    every = itertools.product(PHOTONS, widths, _shares(m))
-    numbers = [Numbers(N, w, q, samples, steady) for N, w, q in every]
-    return numbers if samples == 1 else [*numbers, *(Numbers(N, steady=steady) for N in PHOTONS)]
+    numbers = [Numbers(N, w, q, samples) for N, w, q in itertools.product(PHOTONS, widths, _shares(m))]
+    return numbers if samples == 1 else [*numbers, *(Numbers(N) for N in PHOTONS)]
 
 
-def samples_for(m: Measured, of: Callable[[Numbers], float], steady: bool = False) -> int:
+def samples_for(m: Measured, of: Callable[[Numbers], float]) -> int:
     """How many times the automatic number of light samples promises the least `of` numbers, with whatever number of
     photons: of what is even the least, and once, unless more are clearly better."""
     if m.direct <= 0:
         return 1
-    least = {samples: min(of(Numbers(N, samples=samples, steady=steady)) for N in PHOTONS) for samples in SAMPLES}
+    least = {samples: min(of(Numbers(N, samples=samples)) for N in PHOTONS) for samples in SAMPLES}
     few = next(samples for samples in SAMPLES if least[samples] <= EVEN * min(least.values()))
     return few if least[few] < BETTER * least[1] else 1
 
@@ -130,13 +121,15 @@ def _shares(m: Measured) -> tuple[float, ...]:
 
 
 def in_time(m: Measured, numbers: Numbers, seconds: float) -> Option:
-    """With the error after that many CPU seconds."""
+    """With the error after that many CPU seconds, radii being delayed."""
     passes = min(seconds / max(m.cost(numbers), 1e-6), float(MOST))
-    return Option(m, numbers, passes, float(error_after(m, numbers, max(passes, 1.0))), seconds)
+    error = float(error_after(m, numbers, max(passes, 1.0), steady=True))
+    return Option(m, numbers, passes, error, seconds, delay=min(int(float(f"{STEADY * passes:.2g}")), MOST_DELAY))
 
 
 def to_error(m: Measured, numbers: Numbers, error: float) -> Option:
-    """With the CPU seconds to that error, infinitely many where it is never reached."""
+    """With the CPU seconds to that error, infinitely many where it is never reached. Radii shrink from the first pass
+    on."""
     seconds = _seconds_to(m, numbers, error)
     likely = seconds[0]
     passes = likely / m.cost(numbers) if math.isfinite(likely) else math.inf
@@ -146,7 +139,7 @@ def to_error(m: Measured, numbers: Numbers, error: float) -> Option:
 
 def _seconds_to(m: Measured, numbers: Numbers, error: float) -> list[float]:
     """CPU seconds to that error, for each of the biases that `UNSURE` tells."""
-    bias = _bias_after(m, numbers, _PASSES)
+    bias = bias_of(m, numbers.widths)(_PASSES)
     noise = error_after(m, numbers, _PASSES) - bias
     return [m.cost(numbers) * _passes_to(error, noise + factor * bias) for _, factor in UNSURE]
 

@@ -1,4 +1,4 @@
-"""Which of eight photons of a block are neighbours of a place, at once."""
+"""How far eight photons of a block are from a place, and which of them are its neighbours, at once."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ from numba import types
 from pmviewer.kernels.memory import at_address, with_twin
 
 ROW = 4
+"""float64 elements of a row."""
 _ROW_BYTES = 8 * ROW
 _F64 = ir.DoubleType()
 _VECTOR = ir.VectorType(_F64, ROW)
