@@ -389,6 +389,10 @@ def test_a_trial_picks_settings_that_alone_give_the_same_picture(cornell):
     assert {path for path in SETTINGS if before[path] != after[path]} <= set(assignments({}))
     assert found[0].expected < 0.05
     assert found[0].name in found[0].sentences[0]
+    for choice in found:  # for a time radii wait, where there are any, and the log says so
+        waits = choice.values["render.method"] != "path"
+        assert (choice.values["estimate.delay"] >= 4) == waits
+        assert any("estimate.delay" in sentence for sentence in choice.sentences) == waits
 
 
 def noted(width: int, height: int) -> Film:

@@ -85,9 +85,8 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     if not goal.seconds:
         seconds = max(seconds, USUAL_PASSES * min(m.cost(_DEFAULT) for m in tried.measured))
     picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, seconds - tried.cpu_seconds)
-    found_values = _values(picked, base, opened, _adapts(picked, goal))
-    values, bias = assignments(found_values), bias_of(picked.measured, picked.numbers.widths)
-    bias = replace(bias, delay=values["estimate.delay"])
+    values = assignments(_values(picked, base, opened, _adapts(picked, goal)))
+    bias = replace(bias_of(picked.measured, picked.numbers.widths), delay=values["estimate.delay"])
     opened.biases[way_of(with_values(base, values))] = bias  # whoever renders so knows it
     return Choice(
         picked.name,
@@ -98,7 +97,7 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
             _sentence(picked, goal),
             *picked.measured.candidate.said,
             *_reason(picked),
-            *(() if "render.adaptive" not in found_values else (ADAPTED,)),
+            *_of_passes(values),
             *_table(tried, picked),
             *said,
         ),
@@ -178,6 +177,16 @@ def _preference(option: Option) -> float:
 
 def _is_default(option: Option) -> bool:
     return option.measured.candidate.is_like(PROGRESSIVE) and option.numbers == _DEFAULT
+
+
+def _of_passes(values: Mapping[str, Any]) -> list[str]:
+    """What changes from pass to pass, or waits with it."""
+    lines, delay = list[str](), values["estimate.delay"]
+    if delay:
+        lines.append(f"look-ups stay about as wide as in the first pass for {delay:,} passes (estimate.delay)")
+    if values["render.adaptive"] == "on":
+        lines.append(ADAPTED)
+    return lines
 
 
 def _adapts(picked: Option, goal: Goal) -> bool:
