@@ -25,10 +25,10 @@ from pmviewer.engine.auto.candidates import (
 )
 from pmviewer.engine.auto.choose import Goal, _adapts, _by_time, _values, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
-from pmviewer.engine.auto.measured import Costs, Measured, Numbers, Widths
-from pmviewer.engine.auto.model import Option, error_after, in_time, samples_for, to_error
+from pmviewer.engine.auto.measured import Costs, Measured, Numbers, Trial, Widths
+from pmviewer.engine.auto.model import PHOTONS, Option, error_after, in_time, samples_for, to_error
 from pmviewer.engine.auto.relative import difference, squared, variance
-from pmviewer.engine.auto.trial import RARE, Trial, trial
+from pmviewer.engine.auto.trial import RARE, trial
 from pmviewer.engine.auto.widths import HIDDEN, Tried, told_by
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
@@ -360,6 +360,37 @@ def test_without_time_for_a_trial_traits_choose(cornell):
     assert choice.changed == {**CACHE.values, **THICKER}
     assert math.isnan(choice.expected)
     assert "too few" in choice.sentences[0]
+
+
+def test_a_trial_that_takes_far_too_long_is_given_up(cornell, monkeypatch):
+    """After three pictures, and what they took counts."""
+    monkeypatch.setattr("pmviewer.engine.auto.choose.MOST_SHARE", 1e-5)
+    small, pool = with_values(Settings(), {"camera.width": 16, "camera.height": 16}), WorkPool(1)
+    try:
+        choice = choose(cornell, small, Goal(seconds=4.0), pool, lambda text, share: None)
+        spent = pool.cpu_seconds
+    finally:
+        pool.close()
+    assert choice.changed == {**CACHE.values, **THICKER}
+    assert math.isnan(choice.expected)
+    assert "a trial would take" in choice.sentences[0]
+    assert not choice.trial.measured
+    assert 0 < choice.trial.cpu_seconds <= spent
+
+
+def test_a_trial_that_took_all_the_time_leaves_settings_that_can_be(cornell, monkeypatch):
+    """Negative time would choose the dearest pass, and a delay below 0."""
+    dear = Measured(GATHER, Costs(1.0, 1e-6), 0.04, gathered=100.0)
+    took = Trial([replace(dear, candidate=PROGRESSIVE, costs=Costs(0.7, 6e-7)), dear], 5.0, 5.0, 1936, 2)
+    monkeypatch.setattr("pmviewer.engine.auto.choose.trial", lambda *arguments: took)
+    pool = WorkPool(1)
+    try:
+        choice = choose(cornell, Settings(), Goal(seconds=4.0), pool, lambda text, share: None)
+    finally:
+        pool.close()
+    assert choice.values["estimate.delay"] >= 0
+    assert choice.values["photons.N"] == min(PHOTONS)
+    assert choice.seconds > 0
 
 
 @pytest.mark.usefixtures("every_path_may_split")

@@ -9,9 +9,10 @@ from typing import Any
 
 from pmviewer.engine.auto.bias import Bias, way_of
 from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, Candidate, assignments, candidates
-from pmviewer.engine.auto.measured import Measured, Numbers, Widths
+from pmviewer.engine.auto.measured import Measured, Numbers, Trial, Widths
 from pmviewer.engine.auto.model import BETTER, FEWEST, Option, bias_of, in_time, numbers_for, to_error
-from pmviewer.engine.auto.trial import Tell, Trial, trial
+from pmviewer.engine.auto.runs import TooDearError
+from pmviewer.engine.auto.trial import Tell, trial
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
@@ -19,8 +20,9 @@ from pmviewer.render.adaptive import DECIDED_AFTER, WORTH
 from pmviewer.render.camera import resolve_camera
 from pmviewer.settings.access import SETTINGS, Settings, with_values
 
-SHARE = 0.1
-"""Of the time asked for, what a trial may take."""
+SHARE, MOST_SHARE = 0.1, 0.3
+"""Of the time asked for, what a trial is planned to take, and what it may: where rays go to and fro between mirrors and
+metal a pixel costs a hundred times what is planned for, and traits choose."""
 USUAL, USUAL_PASSES = 10.0, 32
 """CPU seconds that are planned for where nobody gives any, and passes of the usual numbers: a large picture is looked
 at for longer, and by what is best for its first three passes it would stay bad."""
@@ -77,14 +79,19 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     camera = resolve_camera(opened.scene, base.camera)
     planned = _size(SHARE * seconds, len(found), camera.width, camera.height)
     if planned is None or len(found) == 1:
-        way = _by_traits(opened, base, found)
         why = "nothing else suits the scene" if len(found) == 1 else f"{seconds:.3g} CPU s are too few for a trial"
-        return Choice(way.name, assignments(way.values), math.nan, 0.0, (f"{way.name}: {why}", *way.said, *said))
+        return _by_traits(opened, base, found, why, said)
     (width, height), N = planned
-    tried = trial(opened, with_values(base, {"photons.N": N}), found, pool, (width, height), SHARE * seconds, tell)
+    few = with_values(base, {"photons.N": N})
+    try:
+        tried = trial(opened, few, found, pool, (width, height), SHARE * seconds, tell, MOST_SHARE * seconds)
+    except TooDearError as dear:
+        why = f"a trial would take {dear.expected:.2g} CPU s, too much of {seconds:.3g}"
+        return replace(_by_traits(opened, base, found, why, said), trial=dear.begun)
     if not goal.seconds:
         seconds = max(seconds, USUAL_PASSES * min(m.cost(_DEFAULT) for m in tried.measured))
-    picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, seconds - tried.cpu_seconds)
+    left = max(seconds - tried.cpu_seconds, SHARE * seconds)  # a trial may take longer than planned
+    picked = _by_error(tried, goal.error) if goal.error else _by_time(tried, left)
     values = assignments(_values(picked, base, opened, _adapts(picked, goal)))
     bias = replace(bias_of(picked.measured, picked.numbers.widths), delay=values["estimate.delay"])
     opened.biases[way_of(with_values(base, values))] = bias  # whoever renders so knows it
@@ -106,12 +113,13 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     )
 
 
-def _by_traits(opened: OpenScene, base: Settings, found: list[Candidate]) -> Candidate:
-    """Without a trial: in scenes without mirrors and glass the irradiance cache, else the default method."""
+def _by_traits(opened: OpenScene, base: Settings, found: list[Candidate], why: str, said: list[str]) -> Choice:
+    """Without a trial, `why`: in scenes without mirrors and glass the irradiance cache, else the default method."""
     traits = opened.traits
     plain = not traits.follows(base.photons.glossy) and traits.has_diffuse and not traits.lit_media
     suits = CACHE if plain and not traits.glossy_roughness else PROGRESSIVE
-    return next(candidate for candidate in found if candidate.is_like(suits))
+    way = next(candidate for candidate in found if candidate.is_like(suits))
+    return Choice(way.name, assignments(way.values), math.nan, 0.0, (f"{way.name}: {why}", *way.said, *said))
 
 
 def _size(budget: float, count: int, width: int, height: int) -> tuple[tuple[int, int], int] | None:

@@ -112,3 +112,15 @@ class Measured:
     def photons(self) -> float:
         """Variance of one trajectory's."""
         return self.caustic + self.shown + self.gathered
+
+
+@dataclass
+class Trial:
+    """What was measured, by candidate, with so many seeds; `cpu_seconds` and `seconds` that it took, without
+    compiling."""
+
+    measured: list[Measured] = field(default_factory=list)
+    cpu_seconds: float = 0.0
+    seconds: float = 0.0
+    pixels: int = 0
+    seeds: int = 0

@@ -1,0 +1,174 @@
+"""The pictures of a trial: what is rendered of each candidate, and with which settings."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pmviewer.engine.auto.candidates import Candidate, assignments
+from pmviewer.engine.auto.measured import Trial, Widths
+from pmviewer.engine.auto.relative import F8
+from pmviewer.engine.auto.widths import WIDER
+from pmviewer.engine.method import Plan, plan_of
+from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.radius import first_radius
+from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.store import StageStore
+from pmviewer.render.camera import resolve_camera
+from pmviewer.render.filter import filter_of, noise_share
+from pmviewer.render.planes import PLANES, beauty_of
+from pmviewer.settings.access import Settings, with_values
+
+FEWER = 4
+"""Photons of the larger trial pass over those of the smaller one."""
+MORE = 4
+"""Light samples of the passes that tell what these do, over the usual number."""
+SEEDS = ((7_919, 104_729), (1_299_709, 15_485_863), (32_452_843, 49_979_687))
+"""Added to the picture's seed; the second pair where a trial that is twice as long still fits, and so on."""
+SAMPLED = ("direct", "specular")
+"""Terms of the picture that light samples are seen in."""
+LOOKED_UP = ("specular", "caustic", "indirect", "volume", "volume indirect")
+"""Terms that photons are seen in. The noise of direct light would hide them."""
+STORE = 1 << 28
+JUDGED = 3
+"""Pictures after which it is known whether a trial takes too long."""
+
+
+class TooDearError(Exception):
+    """A trial would take `expected` CPU seconds, more than it may; `begun` is what it has taken."""
+
+    def __init__(self, expected: float, begun: Trial) -> None:
+        super().__init__(expected)
+        self.expected, self.begun = expected, begun
+
+
+@dataclass
+class Run:
+    """Pictures of the seeds with such settings, of them what light samples make, directly or over what is followed,
+    and what photons do; and the CPU seconds by stage of the quickest one."""
+
+    settings: Settings
+    images: list[F8] = field(default_factory=list)
+    sampled: list[F8] = field(default_factory=list)
+    looked_up: list[F8] = field(default_factory=list)
+    stages: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def N(self) -> int:
+        """Its trajectories."""
+        return self.settings.photons.N
+
+
+@dataclass
+class Attempt:
+    """A candidate's runs: with all photons and with fewer, with other radii, and with more light samples."""
+
+    candidate: Candidate
+    plan: Plan
+    radius: float
+    runs: list[Run]
+    caustic: list[Run] = field(default_factory=list)
+    shown: list[Run] = field(default_factory=list)
+    direct: list[Run] = field(default_factory=list)
+
+    @property
+    def every(self) -> list[Run]:
+        """All of them."""
+        return [*self.runs, *self.shown, *self.caustic, *self.direct]
+
+
+class Trier:
+    """Renders what is tried, in `most` CPU seconds. Settings have the N of the larger passes."""
+
+    def __init__(
+        self, opened: OpenScene, settings: Settings, pool: WorkPool, size: tuple[int, int], most: float
+    ) -> None:
+        self._opened, self._settings, self._pool = opened, settings, pool
+        self._full = resolve_camera(opened.scene, settings.camera)
+        self._size, self._side = size, size[0] / self._full.width
+        self.kept = noise_share(filter_of(self._full.filter, settings.render))
+        """Share of the variance of a pixel's samples that is left where pixels share them, which those of a trial are
+        too far apart for."""
+        self.scale = self._full.width * self._full.height / (size[0] * size[1])
+        self._store = StageStore(STORE)
+        self._light: dict[int, float] = {}  # what light passes cost whose photons the store has by now
+        self._most, self._pictures, self._done = most, 0, 0
+        self._before, self._started = 0.0, 0.0
+
+    def settings_of(self, candidate: Candidate) -> Settings:
+        """Of the whole picture by that candidate."""
+        return with_values(self._settings, assignments(candidate.values))
+
+    def planned(self, candidate: Candidate) -> Attempt:
+        """All its runs, with no pictures yet."""
+        chosen = self.settings_of(candidate)
+        plan = plan_of(chosen, self._opened.traits)
+        radius = first_radius(self._opened.flat, self._full, chosen.estimate, plan.gather) / self._opened.flat.radius
+        radius = min(max(radius, 1e-7), 10.0)
+        small = with_values(
+            chosen,
+            {
+                "camera.width": self._size[0],
+                "camera.height": self._size[1],
+                "estimate.radius": radius,
+                "gather.cache_min": max(chosen.gather.cache_min * self._side, 0.1),
+                "gather.cache_max": max(chosen.gather.cache_max * self._side, 1.0),
+            },
+        )
+        N = chosen.photons.N
+        counts = (N, N // FEWER) if plan.photons else (N,)
+        found = Attempt(candidate, plan, radius, [Run(with_values(small, {"photons.N": count})) for count in counts])
+        if plan.shown_directly:
+            found.shown = [Run(with_values(small, w.values(chosen, radius))) for w in _either("shown")]
+        if plan.direct and not plan.gather:  # beside a gather they are the same
+            fewest = found.runs[-1].settings
+            found.direct = [Run(with_values(fewest, {"direct.samples": MORE * plan.light_samples}))]
+        if plan.caustic_mask and not plan.gather:  # beside a gather they are the same
+            found.caustic = [Run(with_values(small, w.values(chosen, radius))) for w in _either("caustic")]
+        return found
+
+    def begin(self, every: list[Attempt]) -> None:
+        """Before any is rendered."""
+        self._pictures = len(SEEDS[0]) * sum(len(tried.every) for tried in every)
+        self._before, self._started = self._pool.cpu_seconds, time.perf_counter()
+
+    @property
+    def spent(self) -> Trial:
+        """What it has taken since, with nothing measured."""
+        cpu_seconds = self._pool.cpu_seconds - self._before
+        return Trial(cpu_seconds=cpu_seconds, seconds=time.perf_counter() - self._started)
+
+    def render(self, tried: Attempt, seeds: tuple[int, int]) -> None:
+        """A pass with each seed of each of its runs. Raises TooDearError once that is known."""
+        for run in tried.every:
+            for seed in seeds:
+                self._pass(run, seed)
+                self._done += 1
+                if self._done == JUDGED:
+                    expected = self.spent.cpu_seconds * self._pictures / self._done
+                    if expected > self._most:
+                        raise TooDearError(expected, self.spent)
+            if "light pass" in run.stages and run.settings.importance.emission == "off":
+                light = max(run.stages["light pass"], self._light.get(run.N, 0.0))
+                self._light[run.N] = run.stages["light pass"] = light
+
+    def _pass(self, run: Run, seed: int) -> None:
+        chosen = with_values(run.settings, {"render.seed": (run.settings.render.seed + seed) % 2**31})
+        renderer = Renderer(self._opened, chosen, self._pool, self._store)
+        renderer.camera = replace(renderer.camera, pixel_side=min(self._side, 1.0))
+        renderer.step()
+        planes = renderer.film.planes()
+        run.images.append(beauty_of(planes).astype(np.float64))
+        for terms, images in ((SAMPLED, run.sampled), (LOOKED_UP, run.looked_up)):
+            there = [planes[..., PLANES[term]] for term in terms if PLANES[term].stop <= planes.shape[-1]]
+            images.append(np.sum(there, axis=0, dtype=np.float64))
+        for name, seconds in renderer.tally.stage_seconds.items():
+            run.stages[name] = min(run.stages.get(name, math.inf), seconds)
+
+
+def _either(name: str) -> list[Widths]:
+    return [Widths(**{name: WIDER}), Widths(**{name: 1 / WIDER})]
