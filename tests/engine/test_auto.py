@@ -279,6 +279,34 @@ def test_a_trial_sees_bias_that_is_narrower_than_its_pixels_are_apart(pool):
     assert tried.measured[0].bias.caustic.bias2 == pytest.approx(bias2, rel=0.4)
 
 
+def test_a_trial_tells_what_look_ups_at_the_ends_of_gather_rays_lack(pool):
+    """Near edges, beside the path tracer, as eight passes of one radius do: as much, or with the thick discs and second
+    gathers of automatic mode, which leave little of it, a third to the whole. Second gathers farther out are an option
+    then, with less bias and dearer passes."""
+    scene = open_scene("cornell_diffuse")
+    base = with_values(Settings(), {"camera.width": 64, "camera.height": 64, "photons.N": 50_000})
+
+    def mean_of(passes, **values):
+        renderer = Renderer(scene, with_values(base, values), pool, StageStore(0))
+        for _ in range(passes):
+            renderer.step()
+        return beauty_of(renderer.film.planes()).astype(float)
+
+    gather = GATHER.having(THICKER | CORNERS)
+    for way, least, most in ((GATHER, 0.6, 1.4), (gather, 0.25, 1.4)):
+        tried = trial(scene, base, [way], pool, (64, 64), 0.0, lambda text, share: None)
+        paths = [mean_of(64, **{"render.method": "path", "render.seed": seed}) for seed in (5, 6)]
+        lacking = [mean_of(8, **way.values, **{"estimate.alpha": 1.0, "render.seed": seed}) for seed in (7, 8)]
+        true = squared(lacking, paths, np.mean(paths, axis=0), 4)
+        told = tried.measured[0].bias.gathered.bias2
+        print(f"{way.values}: {told:.3g} told, {true:.3g} true")
+        assert least * true < told < most * true
+    usual, farther = tried.measured
+    assert farther.candidate.values["gather.secondary"] > gather.values["gather.secondary"]
+    assert farther.bias.gathered.bias2 < told
+    assert farther.cost(Numbers(50_000)) > usual.cost(Numbers(50_000))
+
+
 @pytest.mark.usefixtures("every_path_may_split")
 def test_a_trial_of_few_pixels_has_the_records_of_the_whole_picture(pool):
     """Noise of a pass with the irradiance cache, by the trial and by four passes of the picture itself."""

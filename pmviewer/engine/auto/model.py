@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -84,7 +84,7 @@ def error_after(m: Measured, numbers: Numbers, passes: Any, steady: bool = False
 def bias_of(m: Measured, widths: Widths) -> Bias:
     """Of look-ups with such radii."""
     bias = m.bias
-    return Bias(bias.caustic.wider(widths.caustic), bias.shown.wider(widths.shown), bias.interpolated)
+    return replace(bias, caustic=bias.caustic.wider(widths.caustic), shown=bias.shown.wider(widths.shown))
 
 
 def numbers_for(m: Measured, of: Callable[[Numbers], float]) -> list[Numbers]:

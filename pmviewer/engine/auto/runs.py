@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pmviewer.engine.auto.candidates import Candidate, assignments
+from pmviewer.engine.auto.candidates import GATHER, Candidate, assignments
 from pmviewer.engine.auto.measured import Trial, Widths
 from pmviewer.engine.auto.relative import F8
 from pmviewer.engine.auto.widths import WIDER
@@ -65,7 +65,8 @@ class Run:
 
 @dataclass
 class Attempt:
-    """A candidate's runs: with all photons and with fewer, with other radii, and with more light samples."""
+    """A candidate's runs: with all photons and with fewer, with other radii, and with more light samples. `gathered`:
+    with a wider one where gather rays end."""
 
     candidate: Candidate
     plan: Plan
@@ -74,11 +75,12 @@ class Attempt:
     caustic: list[Run] = field(default_factory=list)
     shown: list[Run] = field(default_factory=list)
     direct: list[Run] = field(default_factory=list)
+    gathered: list[Run] = field(default_factory=list)
 
     @property
     def every(self) -> list[Run]:
         """All of them."""
-        return [*self.runs, *self.shown, *self.caustic, *self.direct]
+        return [*self.runs, *self.shown, *self.caustic, *self.direct, *self.gathered]
 
 
 class Trier:
@@ -97,7 +99,7 @@ class Trier:
         self._store = StageStore(STORE)
         self._light: dict[int, float] = {}  # what light passes cost whose photons the store has by now
         self._most, self._pictures, self._done = most, 0, 0
-        self._before, self._started = 0.0, 0.0
+        self._before, self._started, self._in_camera = 0.0, 0.0, 0.0
 
     def settings_of(self, candidate: Candidate) -> Settings:
         """Of the whole picture by that candidate."""
@@ -129,6 +131,8 @@ class Trier:
             found.direct = [Run(with_values(fewest, {"direct.samples": MORE * plan.light_samples}))]
         if plan.caustic_mask and not plan.gather:  # beside a gather they are the same
             found.caustic = [Run(with_values(small, w.values(chosen, radius))) for w in _either("caustic")]
+        if candidate.is_like(GATHER):  # the others have about the same
+            found.gathered = [Run(with_values(small, Widths(shown=WIDER).values(chosen, radius)))]
         return found
 
     def begin(self, every: list[Attempt]) -> None:
@@ -148,8 +152,8 @@ class Trier:
             for seed in seeds:
                 self._pass(run, seed)
                 self._done += 1
-                if self._done == JUDGED:
-                    expected = self.spent.cpu_seconds * self._pictures / self._done
+                if self._done == JUDGED:  # most photons are traced by now, and serve all candidates
+                    expected = self.spent.cpu_seconds + self._in_camera * (self._pictures / self._done - 1)
                     if expected > self._most:
                         raise TooDearError(expected, self.spent)
             if "light pass" in run.stages and run.settings.importance.emission == "off":
@@ -166,6 +170,7 @@ class Trier:
         for terms, images in ((SAMPLED, run.sampled), (LOOKED_UP, run.looked_up)):
             there = [planes[..., PLANES[term]] for term in terms if PLANES[term].stop <= planes.shape[-1]]
             images.append(np.sum(there, axis=0, dtype=np.float64))
+        self._in_camera += renderer.tally.stage_seconds.get("camera pass", 0.0)
         for name, seconds in renderer.tally.stage_seconds.items():
             run.stages[name] = min(run.stages.get(name, math.inf), seconds)
 

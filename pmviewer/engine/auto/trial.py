@@ -16,12 +16,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from pmviewer.engine.auto.bias import Bias
-from pmviewer.engine.auto.candidates import GATHER, Candidate
+from pmviewer.engine.auto.bias import GATHERED_ORDER, Bias, Blur
+from pmviewer.engine.auto.candidates import FARTHER, GATHER, LESS_BIAS, MORE_COST, NEAR_AND_FAR, Candidate
 from pmviewer.engine.auto.measured import BY_PHOTONS, BY_POWER, Costs, Measured, Trial
 from pmviewer.engine.auto.relative import F8, squared, variance
 from pmviewer.engine.auto.runs import MORE, SEEDS, Attempt, Run, Trier
-from pmviewer.engine.auto.widths import HIDDEN, NONE, Tried, Widened, told_by
+from pmviewer.engine.auto.widths import HIDDEN, NONE, WIDER, Tried, Widened, told_by
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
@@ -80,12 +80,15 @@ def trial(
         if source is not None:
             caustic = caustic.wider(tried.radius / source.radius)
         shown = _widened(tried, "shown", mean, trier.scale, HIDDEN)
-        bias = Bias(caustic.blur, shown.blur, interpolated)
+        blur = _of_gather_rays(gathers, mean) if tried.plan.gather and gathers is not None else Blur()
+        bias = Bias(caustic.blur, shown.blur, interpolated, gathered=blur)
         measured = _measured(tried, (caustic, shown), bias, mean, trier.scale)
         if tried.plan.direct and with_samples is not None:
             measured = _sampled(measured, with_samples, mean, trier.scale)
         measured = measured.shared(trier.kept)
         result.measured.append(replace(measured, covered=covered if _aims(tried) else 0.0))
+        if tried is gathers and blur.bias2 > 0 and "gather.secondary" in tried.candidate.values:
+            result.measured.append(_farther(result.measured[-1]))
     return result
 
 
@@ -112,6 +115,24 @@ def _widened(tried: Attempt, name: str, mean: F8, scale: float, hidden: float) -
     found = told_by(wide, usual, narrow, mean, hidden)
     N = tried.runs[0].N
     return replace(found, variance=found.variance * N, cost=found.cost * scale / N)
+
+
+def _of_gather_rays(gathers: Attempt, mean: F8) -> Blur:
+    """What look-ups at the ends of gather rays lack, from passes with a radius WIDER times as wide: as much as that
+    lacks more, with their order. In blocks, as what interpolation does."""
+    more = squared(gathers.gathered[0].images, gathers.runs[0].images, mean, BLOCK)
+    return Blur(more / (WIDER**GATHERED_ORDER - 1) ** 2, GATHERED_ORDER)
+
+
+def _farther(gather: Measured) -> Measured:
+    """What a gather that has been measured would be with second gathers farther out."""
+    costs, blur = gather.costs, gather.bias.gathered
+    return replace(
+        gather,
+        candidate=Candidate(NEAR_AND_FAR, {**gather.candidate.values, **FARTHER}, gather.candidate.said),
+        costs=replace(costs, base=MORE_COST * costs.base),
+        bias=replace(gather.bias, gathered=replace(blur, bias2=LESS_BIAS * blur.bias2)),
+    )
 
 
 def _measured(tried: Attempt, widened: tuple[Widened, Widened], bias: Bias, mean: F8, scale: float) -> Measured:
