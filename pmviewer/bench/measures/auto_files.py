@@ -38,11 +38,13 @@ CHOSEN = (
     "; which gather rays gather again was chosen with three files, a coated ball, bricks and a staircase, second "
     "gathers with the cache with a living room, lights by what gloss reflects of them with Veach's plates, what bias "
     "noise may hide with the staircase, what a trial overlooks with the bricks, who gets adaptive samples with a box, "
-    "the bricks and the staircase, that radii wait with eight files, and how noise is taken to fall with ten"
+    "the bricks and the staircase, what second gathers farther out bring with the bricks, which power of the radius "
+    "the bias of gather rays has with a hall, that radii wait with eight files, and how noise is taken to fall with ten"
 )
-"""CORNERS, CACHE_CORNERS and `overlooked` of `pmviewer.engine.auto.candidates`, `pmviewer.render.direct.by_lobes`,
-HIDDEN of `pmviewer.engine.auto.widths`, `pmviewer.render.adaptive`, STEADY of `pmviewer.engine.auto.bias` and the
-powers of `pmviewer.engine.auto.model` and `measured`, said in the targets' own lines."""
+"""CORNERS, CACHE_CORNERS, LESS_BIAS, MORE_COST and `overlooked` of `pmviewer.engine.auto.candidates`,
+`pmviewer.render.direct.by_lobes`, HIDDEN of `pmviewer.engine.auto.widths`, `pmviewer.render.adaptive`, GATHERED_ORDER
+and STEADY of `pmviewer.engine.auto.bias` and the powers of `pmviewer.engine.auto.model` and `measured`, said in the
+targets' own lines."""
 
 
 def error_against(image: NDArray[Any], references: NDArray[np.float64]) -> float:
