@@ -10,8 +10,9 @@ import pytest
 from scipy import stats
 
 from pmviewer.kernels.compile.jit import kernel
-from pmviewer.kernels.lights.light import environment_radiance, one_light_pdf
+from pmviewer.kernels.lights.light import emit_photon, environment_radiance, one_light_pdf, sample_one_light
 from pmviewer.kernels.random import INDEPENDENT
+from pmviewer.kernels.vector import largest
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.scene.description import ImageEnvironment
 from pmviewer.scene.emission import emitted_power
@@ -174,6 +175,41 @@ def test_directions_of_an_image_have_its_luminance_as_density():
     assert p_uniform(((offset - depth[:, None] * direction) ** 2).sum(1)) > 1e-3
     distance = np.linalg.norm(end - flat.center, axis=1)
     assert distance.min() > flat.radius
+
+
+@kernel
+def _at_corners(scenes, numbers, picks, found):
+    """What lights do with the numbers u, v: found (lights, numbers, 15) of a light sample, then of a photon."""
+    scene = scenes[0]
+    for i in range(len(numbers)):
+        u, v = numbers[i, 0], numbers[i, 1]
+        for light in range(scene.n_lights):
+            row = found[light, i]
+            wi, _, L, pdf, _ = sample_one_light(
+                scene, light, (np.float32(0.0), np.float32(0.01), np.float32(0.0)), u, v
+            )
+            for axis in range(3):
+                row[axis], row[3 + axis] = wi[axis], L[axis]
+            row[6] = pdf
+            p, d, beta, emitted = emit_photon(scene, picks[light], (u, v), (u, v))
+            for axis in range(3):
+                row[7 + axis], row[10 + axis] = p[axis], d[axis]
+            row[13], row[14] = np.float32(emitted), largest(beta)
+
+
+def test_the_first_and_the_last_numbers_that_there_are_give_directions():
+    """A photon in 2²⁴ has the number 0, which was no direction from a sky's pole."""
+    lights = (*MORE.values(), LIGHTS["point"])
+    flat = flat_of(*lights)
+    ends = np.array([0.0, 2.0**-24, 0.5, 1 - 2.0**-24], np.float32)
+    numbers = np.ascontiguousarray(np.stack(np.meshgrid(ends, ends), axis=-1).reshape(-1, 2))
+    cdf = flat.arrays["light_cdf"].astype(np.float64)
+    picks = ((cdf[1:] + cdf[:-1]) / 2).astype(np.float32)
+    found = np.full((len(lights), len(numbers), 15), np.nan, np.float32)
+    _at_corners(flat.record, numbers, picks, found)
+    assert np.isfinite(found).all()
+    np.testing.assert_allclose(np.linalg.norm(found[..., 10:13], axis=-1), 1, rtol=1e-5)
+    np.testing.assert_array_equal(found[..., 13], np.broadcast_to(np.arange(len(lights))[:, None], found.shape[:2]))
 
 
 def test_an_even_image_is_a_constant_sky():

@@ -137,8 +137,10 @@ def across_cell(u, a, b):
     total = a + b
     if not total > _f4(0.0):
         return u
-    root = _f4(math.sqrt(a * a + u * (b * b - a * a)))
-    return min(u * total / (a + root), _f4(1.0))
+    twice = a + _f4(math.sqrt(a * a + u * (b * b - a * a)))
+    if not twice > _f4(0.0):  # the first number where the density begins at 0, as at a pole
+        return _f4(0.0)
+    return min(u * total / twice, _f4(1.0))
 
 
 @device

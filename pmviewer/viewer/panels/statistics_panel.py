@@ -181,9 +181,9 @@ class StatisticsPanel:
         bad = {place: count for place, count in s.dropped.items() if count}
         for place, count in bad.items():
             colour = imgui.ImVec4(*theme.WARNING)
-            imgui.text_colored(colour, f"{grouped(count)} samples dropped in {place}: not finite or negative")
+            imgui.text_colored(colour, f"{grouped(count)} dropped in {place}: not finite or negative")
         if not bad:
-            imgui.text_disabled("No sample was dropped.")
+            imgui.text_disabled("None was dropped.")
 
 
 def _maps(s: Statistics) -> None:

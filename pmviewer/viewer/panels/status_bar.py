@@ -39,7 +39,7 @@ def status_parts(state: ViewerState) -> list[str]:
         parts.append(f"mean ratio {point.metrics.mean_ratio:.3f}")
     dropped = sum(s.dropped.values())
     if dropped:
-        parts.append(f"{grouped(dropped)} samples dropped")
+        parts.append(f"{grouped(dropped)} dropped, not finite")
     return parts
 
 
