@@ -1,4 +1,4 @@
-"""Automatic mode: what it predicts, what it chooses, and what it says of the error that is left."""
+"""Automatic mode: what it predicts, and what it chooses."""
 
 from __future__ import annotations
 
@@ -27,21 +27,12 @@ from pmviewer.engine.auto.choose import Goal, _adapts, _by_time, _values, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.auto.measured import Costs, Measured, Numbers, Trial, Widths
 from pmviewer.engine.auto.model import PHOTONS, Option, error_after, in_time, samples_for, to_error
-from pmviewer.engine.auto.relative import difference, squared, variance
-from pmviewer.engine.auto.trial import RARE, trial
-from pmviewer.engine.auto.widths import HIDDEN, Tried, told_by
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.maps.radius import progressive_radius
-from pmviewer.output.exr import read_exr
-from pmviewer.output.metric import EPSILON
-from pmviewer.render.film import Film
-from pmviewer.render.moments import Moments
-from pmviewer.render.planes import beauty_of
-from pmviewer.resources import data_folder
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import SETTINGS, Settings, flat, with_values
 from pmviewer.state import State
@@ -207,169 +198,6 @@ def test_far_beyond_the_passes_that_are_summed_up_means_follow_their_power_law(d
     assert mean_over(np.array([1.0, 30_000]), -2.0)[0] == 1.0
 
 
-def beyond(x: np.ndarray) -> np.ndarray:
-    """The part of a disc of radius 1 that lies beyond a straight line at x from its middle."""
-    inside = np.clip(x, -1, 1)
-    return (np.arccos(inside) - inside * np.sqrt(1 - inside**2)) / np.pi
-
-
-@pytest.mark.parametrize("seeds", [2, 4])
-@pytest.mark.parametrize("kind", ["outline", "open"])
-def test_radii_are_told_by_passes_with_others(kind, seeds):
-    """Made-up pictures of light that ends at a straight line, blurred by discs, or is wrong by the square of the radius
-    everywhere, and noise of photons that is less in wider ones."""
-    rng = np.random.default_rng(5)
-    across = np.tile(np.arange(-100, 100) + 0.5, (60, 1))[:, :, None].repeat(3, axis=2)
-    truth = 0.6 + 0.4 * (across < 0) if kind == "outline" else np.full(across.shape, 0.8)
-    camera = [rng.normal(0, 0.01, truth.shape) for _ in range(seeds)]
-    photons = [rng.normal(0, 0.01, truth.shape) for _ in range(seeds)]
-
-    def blurred(width: float) -> np.ndarray:
-        if kind == "outline":
-            return 0.6 + 0.4 * beyond(across / (20 * width))
-        return truth + 0.02 * width**2 * np.sin(across / 5)
-
-    def bias2(width: float) -> float:
-        return float(((blurred(width) - truth) ** 2 / (truth**2 + EPSILON)).mean())
-
-    def tried(width: float) -> Tried:
-        images = [blurred(width) + e + p / width for e, p in zip(camera, photons, strict=True)]
-        return Tried(images, 0.1 + 0.01 * width**2)
-
-    mean = np.full(truth.shape, 0.8)
-    found = told_by(tried(2.0), tried(1.0), tried(0.5), mean)
-    assert found.blur.wider(2.0).bias2 - found.blur.bias2 == pytest.approx(bias2(2.0) - bias2(1.0), rel=0.1)
-    assert found.blur.bias2 == pytest.approx(bias2(1.0), rel=0.2)
-    assert found.variance == pytest.approx(0.01**2 / (0.64 + EPSILON), rel=0.15)
-    assert found.cost == pytest.approx(0.01)
-
-
-@pytest.mark.parametrize(("noise", "expected"), [(0.02, "little"), (20.0, "hidden")])
-def test_a_wide_radius_is_not_free_of_bias_because_noise_hides_it(noise, expected):
-    """Pictures of one brightness, blurred by nothing, whose differences are noise: a trial that sees little says that
-    as much as is usual may be there, one that sees well says how little there is."""
-    rng = np.random.default_rng(7)
-
-    def tried(width: float) -> Tried:
-        return Tried([0.8 + rng.normal(0, noise, (40, 40, 3)) for _ in range(2)], 0.1)
-
-    found = told_by(tried(2.0), tried(1.0), tried(0.5), np.full((40, 40, 3), 0.8), HIDDEN)
-    if expected == "hidden":
-        assert found.blur.wider(2.0).bias2 - found.blur.bias2 > 1.5 * HIDDEN
-    else:
-        assert found.blur.bias2 < 0.1 * HIDDEN
-
-
-@pytest.mark.usefixtures("every_path_may_split")
-def test_a_trial_sees_bias_that_is_narrower_than_its_pixels_are_apart(pool):
-    """Caustics of a ring of metal, thinner than the radius: by a trial of few pixels that are as small as the
-    picture's, as it shows in the picture itself against the scene's reference."""
-    scene = open_scene("ring_caustic")
-    camera = {"camera.width": 128, "camera.height": 128}
-    tried = trial(scene, with_values(Settings(), camera), [PROGRESSIVE], pool, (48, 48), 0.0, lambda text, share: None)
-    layers, _ = read_exr(data_folder("scenes") / "ring_caustic" / "reference.exr")
-    reference = layers[""].astype(float).reshape(128, 2, 128, 2, 3).mean(axis=(1, 3))
-    images = []
-    for seed in (11, 12):
-        renderer = Renderer(scene, with_values(Settings(), camera | {"render.seed": seed}), pool, StageStore(0))
-        renderer.step()
-        images.append(beauty_of(renderer.film.planes()).astype(float))
-    bias2 = squared(images, [reference, reference], reference)
-    assert bias2 > 5e-3
-    assert tried.measured[0].bias.caustic.bias2 == pytest.approx(bias2, rel=0.4)
-
-
-def test_a_trial_tells_what_look_ups_at_the_ends_of_gather_rays_lack(pool):
-    """Near edges, beside the path tracer, as eight passes of one radius do: as much, or with the thick discs and second
-    gathers of automatic mode, which leave little of it, a third to the whole. Second gathers farther out are an option
-    then, with less bias and dearer passes."""
-    scene = open_scene("cornell_diffuse")
-    base = with_values(Settings(), {"camera.width": 64, "camera.height": 64, "photons.N": 50_000})
-
-    def mean_of(passes, **values):
-        renderer = Renderer(scene, with_values(base, values), pool, StageStore(0))
-        for _ in range(passes):
-            renderer.step()
-        return beauty_of(renderer.film.planes()).astype(float)
-
-    gather = GATHER.having(THICKER | CORNERS)
-    for way, least, most in ((GATHER, 0.6, 1.4), (gather, 0.25, 1.4)):
-        tried = trial(scene, base, [way], pool, (64, 64), 0.0, lambda text, share: None)
-        paths = [mean_of(64, **{"render.method": "path", "render.seed": seed}) for seed in (5, 6)]
-        lacking = [mean_of(8, **way.values, **{"estimate.alpha": 1.0, "render.seed": seed}) for seed in (7, 8)]
-        true = squared(lacking, paths, np.mean(paths, axis=0), 4)
-        told = tried.measured[0].bias.gathered.bias2
-        print(f"{way.values}: {told:.3g} told, {true:.3g} true")
-        assert least * true < told < most * true
-    usual, farther = tried.measured
-    assert farther.candidate.values["gather.secondary"] > gather.values["gather.secondary"]
-    assert farther.bias.gathered.bias2 < told
-    assert farther.cost(Numbers(50_000)) > usual.cost(Numbers(50_000))
-
-
-@pytest.mark.usefixtures("every_path_may_split")
-def test_a_trial_of_few_pixels_has_the_records_of_the_whole_picture(pool):
-    """Noise of a pass with the irradiance cache, by the trial and by four passes of the picture itself."""
-    scene, N = open_scene("cornell_diffuse"), 20_000
-    settings = with_values(Settings(), {"camera.width": 128, "camera.height": 128, "photons.N": N})
-    tried = trial(scene, settings, [GATHER, CACHE], pool, (32, 32), 0.0, lambda text, share: None)
-    cached = next(m for m in tried.measured if m.candidate is CACHE)
-    images = []
-    for seed in range(4):
-        renderer = Renderer(scene, with_values(settings, {**CACHE.values, "render.seed": seed}), pool, StageStore(0))
-        renderer.step()
-        images.append(beauty_of(renderer.film.planes()).astype(float))
-    noise = (np.var(images, axis=0, ddof=1) / (np.mean(images, axis=0) ** 2 + EPSILON)).mean()
-    assert 0.6 < (cached.eye + cached.gathered / RARE / N) / noise < 1.7
-
-
-def test_a_trial_tells_what_light_samples_do(pool):
-    """Noise of passes with few photons, and what of it is left with four times the light samples: by the trial and by
-    pictures. Four lights in a box, where a third of it goes, and one."""
-    for name, least in (("cornell_lights", 0.3), ("cornell_diffuse", 0.0)):
-        scene = open_scene(name)
-        settings = with_values(Settings(), {"camera.width": 96, "camera.height": 96, "photons.N": 40_000})
-        tried = trial(scene, settings, [PROGRESSIVE], pool, (48, 48), 100.0, lambda text, share: None)
-        usual = plan_of(settings, scene.traits).light_samples
-        noise = []
-        for samples in (usual, 4 * usual):
-            images = []
-            for seed in range(4):
-                values = {"direct.samples": samples, "photons.N": 10_000, "render.seed": seed}
-                renderer = Renderer(scene, with_values(settings, values), pool, StageStore(0))
-                renderer.step()
-                images.append(beauty_of(renderer.film.planes()).astype(float))
-            noise.append(variance(images, np.mean(images, axis=0)))
-        told = 0.75 * tried.measured[0].direct
-        print(f"{name}: noise {noise[0]:.4f}, {noise[1]:.4f} with four times the samples; the trial: {told:.4f} less")
-        assert told == pytest.approx(noise[0] - noise[1], rel=0.35)
-        assert told > least * noise[0]
-        assert tried.measured[0].costs.sampled > 0
-
-
-@pytest.mark.parametrize("seeds", [2, 4, 6])
-def test_a_difference_knows_its_noise(seeds):
-    """Of made-up pictures that differ by a third of their noise: 400 times, with seeds of their own."""
-    rng = np.random.default_rng(seeds)
-    true, found = 0.04, []
-    for _ in range(400):
-        images = list(rng.normal(1 + true, 3 * true, (seeds, 16, 16, 3)))
-        found.append(difference(images, [np.ones((16, 16, 3))] * seeds, np.ones((16, 16, 3))))
-    values, errors = np.array(found).T
-    assert values.mean() == pytest.approx(true**2 / (1 + EPSILON), abs=3 * values.std() / 20)
-    assert 0.9 < math.sqrt((errors**2).mean()) / values.std() < 1.35
-
-
-def test_a_trial_takes_more_seeds_where_time_is_left(pool):
-    scene = open_scene("cornell_diffuse")
-    settings = with_values(Settings(), {"camera.width": 32, "camera.height": 32, "photons.N": 2000})
-    short, long = (
-        trial(scene, settings, [PROGRESSIVE], pool, (16, 16), seconds, lambda text, share: None)
-        for seconds in (0.0, 100.0)
-    )
-    assert (short.seeds, long.seeds) == (2, 6)
-
-
 def test_radii_are_settings():
     """Each width scales its own look-ups alone."""
     settings = Settings()
@@ -452,58 +280,6 @@ def test_a_trial_picks_settings_that_alone_give_the_same_picture(cornell):
         waits = choice.values["render.method"] != "path"
         assert (choice.values["estimate.delay"] >= 4) == waits
         assert any("estimate.delay" in sentence for sentence in choice.sentences) == waits
-
-
-def noted(width: int, height: int) -> Film:
-    film = Film(width, height)
-    film.moments = Moments(width * height)
-    return film
-
-
-def add(film: Film) -> None:
-    """What was added to the sums is a pass."""
-    film.moments.add(film.sums, film.channels, 0, len(film.sums))
-    film.moments.close_pass()
-    film.passes += 1
-
-
-@pytest.mark.parametrize("passes", [2, 8, 24, 100])
-def test_independent_passes_have_the_error_that_they_are_estimated_to_have(cornell, passes):
-    """Against made-up noise of known variance on a known picture."""
-    rng = np.random.default_rng(passes)
-    w = h = 64
-    truth = np.full((h * w, 3), 0.7)
-    film = noted(w, h)
-    error = ErrorEstimate(w, h, Settings(), plan_of(Settings(), cornell.traits))
-    for _ in range(passes):
-        film.sums[:, 0:3] += 0.25 * truth
-        film.sums[:, 12:15] += 0.75 * truth + rng.normal(0, 0.3, truth.shape)
-        add(film)
-        error.add(film)
-    expected = 0.09 / passes / (0.49 + EPSILON)
-    assert error.latest is not None
-    assert error.latest.low < expected < error.latest.high
-    assert error.latest.relmse == pytest.approx(expected, rel=0.45)
-
-
-def test_one_bright_pixel_does_not_hide_in_its_own_brightness(cornell):
-    """A pixel that is a hundred times too bright once is wrong by far more than its own size says."""
-    film = noted(32, 32)
-    error = ErrorEstimate(32, 32, Settings(), plan_of(Settings(), cornell.traits))
-    for i in range(2):
-        film.sums[:, 0:3] += 1.0
-        if i:
-            film.sums[300, 0:3] += 100.0
-        add(film)
-        error.add(film)
-    alone = 50.0**2 / 51.0**2 / 1024
-    assert error.latest is not None
-    assert error.latest.relmse > 10 * alone
-
-
-def test_passes_that_share_one_photon_map_tell_nothing(cornell):
-    once = with_values(Settings(), {"photons.renew": "once"})
-    assert not ErrorEstimate(8, 8, once, plan_of(once, cornell.traits)).tells
 
 
 @pytest.fixture(scope="module")

@@ -68,7 +68,7 @@ next wall: relMSE of a model of bricks in the same time 0.6 times that without (
 3.2 %), of a coated ball in a mount 0.9, of a wooden staircase 1.05. With the irradiance cache records may cost
 twice as much: a way of its own. What either cache lacks by comparison is known to the trial as the bias of
 interpolation."""
-FARTHER = {"gather.secondary": 20.0}
+FARTHER_NAME, FARTHER = "gather with second gathers farther out", {"gather.secondary": 20.0}
 LESS_BIAS, MORE_COST = 0.5, 1.08
 """The same up to twenty radii, and what that leaves of the squared bias of look-ups and costs in that model of bricks
 (4.0e-5 to 2.1e-5; 42 passes to 39 in the same time; relMSE 0.8 times). No trial of its own: worth it where a trial has
@@ -77,7 +77,6 @@ WIDE_RECORDS = {"gather.cache_min": 12.0, "gather.cache_max": 48.0}
 """Records that reach three times as far as those that stay next to the plain gather: fewer of them, and less noise in
 the same time in all bundled scenes tried, from 2 to 64 passes and from 64² to 256² pixels; from four times on, bias
 shows."""
-NEAR_AND_FAR = "gather with second gathers farther out"
 CACHE = Candidate("gather with irradiance cache", {**GATHER.values, "gather.cache": "on", **WIDE_RECORDS})
 CACHE_CORNERS = Candidate("gather with irradiance cache and second gathers", {**CACHE.values, **CORNERS})
 """Without THICKER: no look-up is near an edge. In a living room under a sky the cache alone, with thick discs, was

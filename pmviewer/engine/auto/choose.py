@@ -22,7 +22,7 @@ from pmviewer.settings.access import SETTINGS, Settings, with_values
 
 SHARE, MOST_SHARE = 0.1, 0.3
 """Of the time asked for, what a trial is planned to take, and what it may: where rays go to and fro between mirrors and
-metal a pixel costs a hundred times what is planned for, and traits choose."""
+metal a pixel costs ten to twenty times what is planned for, and traits choose."""
 USUAL, USUAL_PASSES = 10.0, 32
 """CPU seconds that are planned for where nobody gives any, and passes of the usual numbers: a large picture is looked
 at for longer, and by what is best for its first three passes it would stay bad."""
@@ -31,7 +31,8 @@ NEARLY = 1.1
 PER_PHOTON, PER_PIXEL = 1.5e-6, 6e-6
 """CPU seconds of a trial by trajectory and by pixel and candidate: what its size is planned by, clock or no clock."""
 OF_OTHERS = 10
-"""Pictures that are rendered with other radii, and with more light samples."""
+"""Pictures that are rendered with other radii of shown maps, and with more light samples. The two of a gather with a
+wider radius are not counted: with them a trial of four ways would not fit into four seconds (`LEAST`)."""
 ADAPTIVE = {"render.adaptive": "on"}
 ADAPTED = f"from pass {DECIDED_AFTER + 1} on pixels with noise of their own get more samples (render.adaptive)"
 _DEFAULT = Numbers(SETTINGS["photons.N"].default)

@@ -5,7 +5,8 @@ A pass is rendered with two numbers of photons and two seeds, or more as the tim
 the picture, each as large as it will be: larger ones would average the bias of what is narrower than they are away. The
 variance over the seeds is that of a pass. What of it falls with N is the photons' part, what doesn't the camera pass's;
 the times of the stages fall apart in the same way. What either radius does, that of caustics and that of the global map
-where it is shown, is told by passes with twice and half of it (`pmviewer.engine.auto.widths`).
+where it is shown, is told by passes with twice and half of it (`pmviewer.engine.auto.widths`); what look-ups at the
+ends of gather rays lack, by passes with twice of it. `pmviewer.engine.auto.runs` renders the pictures.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from pmviewer.engine.auto.bias import GATHERED_ORDER, Bias, Blur
-from pmviewer.engine.auto.candidates import FARTHER, GATHER, LESS_BIAS, MORE_COST, NEAR_AND_FAR, Candidate
+from pmviewer.engine.auto.candidates import FARTHER, FARTHER_NAME, GATHER, LESS_BIAS, MORE_COST, Candidate
 from pmviewer.engine.auto.measured import BY_PHOTONS, BY_POWER, Costs, Measured, Trial
 from pmviewer.engine.auto.relative import F8, squared, variance
 from pmviewer.engine.auto.runs import MORE, SEEDS, Attempt, Run, Trier
@@ -37,8 +38,9 @@ museum, office). Maps that are shown have none: different radii tell their part 
 MOST_DIRECT = 0.9
 """Most of the camera rays' part that light samples are taken to make: edges and surfaces are some of it."""
 BLOCK = 4
-"""What interpolation does is compared in blocks of so many pixels squared: its bias is smooth, noise is not. Pictures
-with two radii have the same photons and camera rays, and little noise in their difference."""
+"""What interpolation does, or look-ups at the ends of gather rays, is compared in blocks of so many pixels squared: bias
+is smooth there, noise is not. Pictures with two radii of shown maps have the same photons and camera rays, and little
+noise in their difference."""
 
 
 def trial(
@@ -69,6 +71,7 @@ def trial(
     covered = _covered(opened, trier.settings_of(every[0].candidate))
     mean = np.mean([image for tried in every for run in tried.runs for image in run.images], axis=0)
     gathers = next((tried for tried in every if tried.candidate.is_like(GATHER)), None)
+    at_ends = _at_ends(gathers, mean) if gathers is not None else Blur()
     with_samples = next((tried for tried in every if tried.direct), None)
     with_caustics = next((tried for tried in every if tried.caustic), None)
     for tried in every:
@@ -80,14 +83,13 @@ def trial(
         if source is not None:
             caustic = caustic.wider(tried.radius / source.radius)
         shown = _widened(tried, "shown", mean, trier.scale, HIDDEN)
-        blur = _of_gather_rays(gathers, mean) if tried.plan.gather and gathers is not None else Blur()
-        bias = Bias(caustic.blur, shown.blur, interpolated, gathered=blur)
+        bias = Bias(caustic.blur, shown.blur, interpolated, gathered=at_ends if tried.plan.gather else Blur())
         measured = _measured(tried, (caustic, shown), bias, mean, trier.scale)
         if tried.plan.direct and with_samples is not None:
             measured = _sampled(measured, with_samples, mean, trier.scale)
         measured = measured.shared(trier.kept)
         result.measured.append(replace(measured, covered=covered if _aims(tried) else 0.0))
-        if tried is gathers and blur.bias2 > 0 and "gather.secondary" in tried.candidate.values:
+        if tried is gathers and at_ends.bias2 > 0 and "gather.secondary" in tried.candidate.values:
             result.measured.append(_farther(result.measured[-1]))
     return result
 
@@ -117,7 +119,7 @@ def _widened(tried: Attempt, name: str, mean: F8, scale: float, hidden: float) -
     return replace(found, variance=found.variance * N, cost=found.cost * scale / N)
 
 
-def _of_gather_rays(gathers: Attempt, mean: F8) -> Blur:
+def _at_ends(gathers: Attempt, mean: F8) -> Blur:
     """What look-ups at the ends of gather rays lack, from passes with a radius WIDER times as wide: as much as that
     lacks more, with their order. In blocks, as what interpolation does."""
     more = squared(gathers.gathered[0].images, gathers.runs[0].images, mean, BLOCK)
@@ -129,7 +131,7 @@ def _farther(gather: Measured) -> Measured:
     costs, blur = gather.costs, gather.bias.gathered
     return replace(
         gather,
-        candidate=Candidate(NEAR_AND_FAR, {**gather.candidate.values, **FARTHER}, gather.candidate.said),
+        candidate=replace(gather.candidate.having(FARTHER), name=FARTHER_NAME),
         costs=replace(costs, base=MORE_COST * costs.base),
         bias=replace(gather.bias, gathered=replace(blur, bias2=LESS_BIAS * blur.bias2)),
     )
