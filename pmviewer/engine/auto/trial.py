@@ -39,8 +39,8 @@ MOST_DIRECT = 0.9
 """Most of the camera rays' part that light samples are taken to make: edges and surfaces are some of it."""
 BLOCK = 4
 """What interpolation does, or look-ups at the ends of gather rays, is compared in blocks of so many pixels squared:
-bias is smooth there, noise is not. Pictures with two radii of shown maps have the same photons and camera rays, and little
-noise in their difference."""
+bias is smooth there, noise is not. Pictures with two radii of shown maps have the same photons and camera rays, and
+little noise in their difference."""
 
 
 def trial(
