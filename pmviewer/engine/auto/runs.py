@@ -11,6 +11,7 @@ import numpy as np
 from pmviewer.engine.auto.candidates import GATHER, Candidate, assignments
 from pmviewer.engine.auto.measured import Trial, Widths
 from pmviewer.engine.auto.relative import F8
+from pmviewer.engine.auto.sparse import spread, wider_by
 from pmviewer.engine.auto.widths import WIDER
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
@@ -33,6 +34,8 @@ SAMPLED = ("direct", "specular")
 """Terms of the picture that light samples are seen in."""
 LOOKED_UP = ("specular", "caustic", "indirect", "volume", "volume indirect")
 """Terms that photons are seen in. The noise of direct light would hide them."""
+GATHERED = ("indirect",)
+"""The term that gather rays make."""
 STORE = 1 << 28
 JUDGED = 3
 """Pictures after which it is known whether a trial takes too long."""
@@ -49,12 +52,13 @@ class TooDearError(Exception):
 @dataclass
 class Run:
     """Pictures of the seeds with such settings, of them what light samples make, directly or over what is followed,
-    and what photons do; and the CPU seconds by stage of the quickest one."""
+    what photons do, and what gather rays do; and the CPU seconds by stage of the quickest one."""
 
     settings: Settings
     images: list[F8] = field(default_factory=list)
     sampled: list[F8] = field(default_factory=list)
     looked_up: list[F8] = field(default_factory=list)
+    brought: list[F8] = field(default_factory=list)
     stages: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -66,11 +70,12 @@ class Run:
 @dataclass
 class Attempt:
     """A candidate's runs: with all photons and with fewer, with other radii, and with more light samples. `gathered`:
-    with a wider one where gather rays end."""
+    with a wider one where gather rays end. `radius` and `caustic_radius`: of the first pass, relative to the scene."""
 
     candidate: Candidate
     plan: Plan
     radius: float
+    caustic_radius: float
     runs: list[Run]
     caustic: list[Run] = field(default_factory=list)
     shown: list[Run] = field(default_factory=list)
@@ -102,8 +107,27 @@ class Trier:
         self._before, self._started, self._in_camera = 0.0, 0.0, 0.0
 
     def settings_of(self, candidate: Candidate) -> Settings:
-        """Of the whole picture by that candidate."""
-        return with_values(self._settings, assignments(candidate.values))
+        """Of the whole picture by that candidate, with the N of the larger passes."""
+        return with_values(self._settings, assignments(candidate.values) | {"photons.N": self._settings.photons.N})
+
+    def spread(self, candidates: list[Candidate]) -> list[Candidate]:
+        """The candidates, with wider look-ups where gather rays end if photons lie far apart
+        (`pmviewer.engine.auto.sparse`). The photons are those of the first pictures."""
+        first = next((c for c in candidates if c.gathers), None)
+        if first is None:
+            return candidates
+        chosen = self.settings_of(first)
+        pixel = {"camera.width": 1, "camera.height": 1, "render.seed": _seed(chosen, SEEDS[0][0])}
+        renderer = Renderer(self._opened, with_values(chosen, pixel), self._pool, self._store)
+        renderer.step()
+        self._light[chosen.photons.N] = renderer.tally.stage_seconds.get("light pass", 0.0)
+        photons = renderer.latest.maps.photons if renderer.latest is not None else None
+        usual = first_radius(self._opened.flat, self._full, chosen.estimate, True)
+        wider = wider_by(photons.global_[:, :3], chosen.photons.N, usual) if photons is not None else 1.0
+        if wider == 1.0:
+            return candidates
+        radius = usual / self._opened.flat.radius
+        return [spread(c, self.settings_of(c), radius, wider) if c.gathers else c for c in candidates]
 
     def planned(self, candidate: Candidate) -> Attempt:
         """All its runs, with no pictures yet."""
@@ -123,7 +147,8 @@ class Trier:
         )
         N = chosen.photons.N
         counts = (N, N // FEWER) if plan.photons else (N,)
-        found = Attempt(candidate, plan, radius, [Run(with_values(small, {"photons.N": count})) for count in counts])
+        runs = [Run(with_values(small, {"photons.N": count})) for count in counts]
+        found = Attempt(candidate, plan, radius, radius * chosen.estimate.caustic_radius, runs)
         if plan.shown_directly:
             found.shown = [Run(with_values(small, w.values(chosen, radius))) for w in _either("shown")]
         if plan.direct and not plan.gather:  # beside a gather they are the same
@@ -135,10 +160,13 @@ class Trier:
             found.gathered = [Run(with_values(small, Widths(shown=WIDER).values(chosen, radius)))]
         return found
 
-    def begin(self, every: list[Attempt]) -> None:
-        """Before any is rendered."""
-        self._pictures = len(SEEDS[0]) * sum(len(tried.every) for tried in every)
+    def begin(self) -> None:
+        """Before anything is rendered."""
         self._before, self._started = self._pool.cpu_seconds, time.perf_counter()
+
+    def expect(self, every: list[Attempt]) -> None:
+        """What is to be rendered."""
+        self._pictures = len(SEEDS[0]) * sum(len(tried.every) for tried in every)
 
     @property
     def spent(self) -> Trial:
@@ -161,18 +189,22 @@ class Trier:
                 self._light[run.N] = run.stages["light pass"] = light
 
     def _pass(self, run: Run, seed: int) -> None:
-        chosen = with_values(run.settings, {"render.seed": (run.settings.render.seed + seed) % 2**31})
+        chosen = with_values(run.settings, {"render.seed": _seed(run.settings, seed)})
         renderer = Renderer(self._opened, chosen, self._pool, self._store)
         renderer.camera = replace(renderer.camera, pixel_side=min(self._side, 1.0))
         renderer.step()
         planes = renderer.film.planes()
         run.images.append(beauty_of(planes).astype(np.float64))
-        for terms, images in ((SAMPLED, run.sampled), (LOOKED_UP, run.looked_up)):
+        for terms, images in ((SAMPLED, run.sampled), (LOOKED_UP, run.looked_up), (GATHERED, run.brought)):
             there = [planes[..., PLANES[term]] for term in terms if PLANES[term].stop <= planes.shape[-1]]
             images.append(np.sum(there, axis=0, dtype=np.float64))
         self._in_camera += renderer.tally.stage_seconds.get("camera pass", 0.0)
         for name, seconds in renderer.tally.stage_seconds.items():
             run.stages[name] = min(run.stages.get(name, math.inf), seconds)
+
+
+def _seed(settings: Settings, added: int) -> int:
+    return (settings.render.seed + added) % 2**31
 
 
 def _either(name: str) -> list[Widths]:

@@ -59,8 +59,9 @@ def trial(
     trier = Trier(opened, settings, pool, size, most)
     for candidate in candidates:
         prepare(opened, trier.settings_of(candidate), pool, tell)
-    every = [trier.planned(candidate) for candidate in candidates]
-    trier.begin(every)
+    trier.begin()
+    every = [trier.planned(candidate) for candidate in trier.spread(candidates)]
+    trier.expect(every)
     for done, seeds in enumerate(SEEDS):
         if done and trier.spent.cpu_seconds * (done + 1) / done > seconds:
             break
@@ -81,7 +82,7 @@ def trial(
         source = tried if tried.caustic or not tried.plan.caustic_mask else with_caustics
         caustic = _widened(source, "caustic", mean, trier.scale, 0.0) if source is not None else NONE
         if source is not None:
-            caustic = caustic.wider(tried.radius / source.radius)
+            caustic = caustic.wider(tried.caustic_radius / source.caustic_radius)
         shown = _widened(tried, "shown", mean, trier.scale, HIDDEN)
         bias = Bias(caustic.blur, shown.blur, interpolated, gathered=at_ends if tried.plan.gather else Blur())
         measured = _measured(tried, (caustic, shown), bias, mean, trier.scale)
@@ -91,6 +92,9 @@ def trial(
         result.measured.append(replace(measured, covered=covered if _aims(tried) else 0.0))
         if tried is gathers and at_ends.bias2 > 0 and "gather.secondary" in tried.candidate.values:
             result.measured.append(_farther(result.measured[-1]))
+    # A few rays of a pixel are no less noisy than records: what is less was taken for photons.
+    least = min((m.eye for m in result.measured if m.candidate.values.get("gather.cache") == "on"), default=0.0)
+    result.measured = [replace(m, eye=max(m.eye, least)) if m.candidate.gathers else m for m in result.measured]
     return result
 
 
@@ -126,6 +130,13 @@ def _at_ends(gathers: Attempt, mean: F8) -> Blur:
     return Blur(more / (WIDER**GATHERED_ORDER - 1) ** 2, GATHERED_ORDER)
 
 
+def _brought(tried: Attempt, mean: F8) -> float:
+    """Variance that the photons of one trajectory make in the light of gather rays alone: with rare caustics, other
+    radii say more of theirs than fewer photons do, and would leave nothing for these."""
+    many, few = tried.runs
+    return max(variance(few.brought, mean) - variance(many.brought, mean), 0.0) / (1 / few.N - 1 / many.N)
+
+
 def _farther(gather: Measured) -> Measured:
     """What a gather that has been measured would be with second gathers farther out."""
     costs, blur = gather.costs, gather.bias.gathered
@@ -145,9 +156,10 @@ def _measured(tried: Attempt, widened: tuple[Widened, Widened], bias: Bias, mean
         many, few = tried.runs
         seen = [variance(run.looked_up, mean) for run in tried.runs]
         photons = max(seen[1] - seen[0], 0.0) / (1 / few.N - 1 / many.N)
-        photons = min(max(photons, caustic + shown), variances[0] * many.N)
+        told = caustic + shown + (_brought(tried, mean) if tried.plan.gather else 0.0)
+        photons = min(max(photons, told), variances[0] * many.N)
         eye = variances[0] - photons / many.N
-        fitting = min(1.0, photons / (caustic + shown)) if caustic + shown > 0 else 1.0
+        fitting = min(1.0, photons / told) if told > 0 else 1.0
         caustic, shown = caustic * fitting, shown * fitting
         gathered = max(photons - caustic - shown, 0.0)
     costs = _costs(tried.runs, (widened[0].cost, widened[1].cost), scale)
