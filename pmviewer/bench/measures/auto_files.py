@@ -39,12 +39,14 @@ CHOSEN = (
     "gathers with the cache with a living room, lights by what gloss reflects of them with Veach's plates, what bias "
     "noise may hide with the staircase, what a trial overlooks with the bricks, who gets adaptive samples with a box, "
     "the bricks and the staircase, what second gathers farther out bring with the bricks, which power of the radius "
-    "the bias of gather rays has with a hall, that radii wait with eight files, and how noise is taken to fall with ten"
+    "the bias of gather rays has with a hall, that radii wait with eight files, how noise is taken to fall with ten, "
+    "and how wide look-ups are where photons lie far apart with a coated ball, five lamps, a hall, a living room and a "
+    "staircase"
 )
 """CORNERS, CACHE_CORNERS, LESS_BIAS, MORE_COST and `overlooked` of `pmviewer.engine.auto.candidates`,
 `pmviewer.render.direct.by_lobes`, HIDDEN of `pmviewer.engine.auto.widths`, `pmviewer.render.adaptive`, GATHERED_ORDER
-and STEADY of `pmviewer.engine.auto.bias` and the powers of `pmviewer.engine.auto.model` and `measured`, said in the
-targets' own lines."""
+and STEADY of `pmviewer.engine.auto.bias`, the powers of `pmviewer.engine.auto.model` and `measured`, and HELD and MOST
+of `pmviewer.engine.auto.sparse`, said in the targets' own lines."""
 
 
 def error_against(image: NDArray[Any], references: NDArray[np.float64]) -> float:
