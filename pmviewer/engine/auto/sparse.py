@@ -4,10 +4,10 @@ The automatic radius goes with the pixels, whatever number of photons it holds: 
 but in a large scene, or under a sky whose photons come down all over it, it may be less than one. What few photons
 bring is noise then that all rays of a region share, and no number of rays takes away. Bias grows with the radius, too,
 so that it is at most doubled. relMSE after 5 CPU seconds with twice the radius over that with the usual one, gather
-with the cache, where that holds 0.2 to 2.4 photons in the mean: office 0.40 of what is no reference's noise, rooms_10x10
-0.68, skylight_room 0.8, a coated ball under a sky (file) 0.82, colonnade 0.87, five lamps over plates (file) 0.99; with
-four times 0.27, 0.81, 0.87, 0.65, 0.92 and 1.04. Of scenes where it holds 4 to 11, a hall had 0.93, a living room 0.99
-and a staircase 1.13 with twice the radius (files, 8 CPU seconds).
+with the cache, where that holds 0.2 to 2.4 photons in the mean: office 0.40 of what is no reference's noise,
+rooms_10x10 0.68, skylight_room 0.8, a coated ball under a sky (file) 0.82, colonnade 0.87, five lamps over plates
+(file) 0.99; with four times 0.27, 0.81, 0.87, 0.65, 0.92 and 1.04. Of scenes where it holds 4 to 11, a hall had 0.93, a
+living room 0.99 and a staircase 1.13 with twice the radius (files, 8 CPU seconds).
 """
 
 from __future__ import annotations
