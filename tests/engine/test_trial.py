@@ -17,6 +17,7 @@ from pmviewer.engine.auto.candidates import (
 from pmviewer.engine.auto.measured import Numbers
 from pmviewer.engine.auto.relative import difference, squared, variance
 from pmviewer.engine.auto.runs import Trier
+from pmviewer.engine.auto.sparse import wider_by
 from pmviewer.engine.auto.trial import RARE, trial
 from pmviewer.engine.auto.widths import HIDDEN, Tried, told_by
 from pmviewer.engine.method import plan_of
@@ -29,7 +30,7 @@ from pmviewer.output.metric import EPSILON
 from pmviewer.render.camera import resolve_camera
 from pmviewer.render.planes import beauty_of
 from pmviewer.resources import data_folder
-from pmviewer.settings.access import Settings, with_values
+from pmviewer.settings.access import SETTINGS, Settings, with_values
 
 
 def beyond(x: np.ndarray) -> np.ndarray:
@@ -238,3 +239,16 @@ def test_a_trial_has_the_number_of_photons_that_it_is_planned_with(pool):
     trier = Trier(open_scene("cornell_diffuse"), base, pool, (40, 40), math.inf)
     for candidate in (PROGRESSIVE, CACHE):
         assert [run.N for run in trier.planned(candidate).runs] == [20_000, 5_000]
+
+
+def test_wider_look_ups_are_for_little_time():
+    """Places on a grid of a unit square, a hundredth apart: the fourth neighbour is that far off, and the fourth root
+    of a time makes it less."""
+    x, y = np.meshgrid(np.arange(100) / 100, np.arange(100) / 100)
+    places = np.stack([x.ravel(), y.ravel(), np.zeros(10_000)], axis=1).astype(np.float32)
+    N = SETTINGS["photons.N"].default
+    for seconds, expected in ((4.0, 1.6), (10.0, 1.6), (40.0, 1.6 / 4**0.25), (1e4, 1.0)):
+        assert wider_by(places, N, 0.01 / 1.6, seconds) == pytest.approx(expected, rel=1e-4)
+    assert wider_by(places, N // 4, 0.01 / 1.6) == 1.0
+    assert wider_by(places, N, 0.001) == 2.0
+    assert wider_by(places[:3], N, 0.001) == 1.0

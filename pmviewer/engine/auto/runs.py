@@ -110,9 +110,9 @@ class Trier:
         """Of the whole picture by that candidate, with the N of the larger passes."""
         return with_values(self._settings, assignments(candidate.values) | {"photons.N": self._settings.photons.N})
 
-    def spread(self, candidates: list[Candidate]) -> list[Candidate]:
-        """The candidates, with wider look-ups where gather rays end if photons lie far apart
-        (`pmviewer.engine.auto.sparse`). The photons are those of the first pictures."""
+    def spread(self, candidates: list[Candidate], seconds: float = 0.0) -> list[Candidate]:
+        """The candidates, with wider look-ups where gather rays end if photons lie far apart for a picture of so many
+        CPU seconds (`pmviewer.engine.auto.sparse`). The photons are those of the first pictures."""
         first = next((c for c in candidates if c.gathers), None)
         if first is None:
             return candidates
@@ -123,7 +123,8 @@ class Trier:
         self._light[chosen.photons.N] = renderer.tally.stage_seconds.get("light pass", 0.0)
         photons = renderer.latest.maps.photons if renderer.latest is not None else None
         usual = first_radius(self._opened.flat, self._full, chosen.estimate, True)
-        wider = wider_by(photons.global_[:, :3], chosen.photons.N, usual) if photons is not None else 1.0
+        places = photons.global_[:, :3] if photons is not None else np.empty((0, 3), np.float32)
+        wider = wider_by(places, chosen.photons.N, usual, seconds)
         if wider == 1.0:
             return candidates
         radius = usual / self._opened.flat.radius

@@ -25,13 +25,15 @@ HELD = 4
 wider."""
 LEAST, MOST = 1.1, 2.0
 """How much wider is worth a word, and how much it may be."""
+SECONDS = 10.0
+"""For longer, less wide: of n passes noise falls with n and squared bias goes with r², so that r⁴ ∝ 1/n is best."""
 PROBES = 512
 """Photons that are looked around."""
 
 
-def wider_by(positions: NDArray[np.float32], N: int, usual: float) -> float:
-    """How many times as wide as that radius, in scene units, look-ups are to be, from photons of N trajectories at
-    positions (n, 3); 1 where it does, or where there are no photons."""
+def wider_by(positions: NDArray[np.float32], N: int, usual: float, seconds: float = 0.0) -> float:
+    """How many times as wide as that radius, in scene units, look-ups are to be for so many CPU seconds, from photons
+    of N trajectories at positions (n, 3); 1 where it does, or where there are no photons."""
     if len(positions) <= HELD:
         return 1.0
     from scipy.spatial import cKDTree  # takes a moment, and is needed once a trial
@@ -39,7 +41,7 @@ def wider_by(positions: NDArray[np.float32], N: int, usual: float) -> float:
     probes = positions[:: -(-len(positions) // PROBES)]
     found, _ = cKDTree(positions).query(probes, k=[HELD + 1])  # the nearest is the photon itself
     apart = float(np.quantile(found, 0.75)) * math.sqrt(N / SETTINGS["photons.N"].default)
-    wider = min(apart / usual, MOST)
+    wider = min(apart / usual, MOST) * (SECONDS / max(seconds, SECONDS)) ** 0.25
     return wider if wider >= LEAST else 1.0
 
 

@@ -52,15 +52,16 @@ def trial(
     seconds: float,
     tell: Tell,
     most: float = math.inf,
+    whole: float = 0.0,
 ) -> Trial:
     """Measure the candidates on that many columns and rows of pixels, with as many pairs of seeds as fit into those CPU
-    seconds, one at least. Raises Cancelled when the pool is cancelled, and TooDearError where one would take more than
-    `most`."""
+    seconds, one at least; the picture is to take `whole`. Raises Cancelled when the pool is cancelled, and TooDearError
+    where one would take more than `most`."""
     trier = Trier(opened, settings, pool, size, most)
     for candidate in candidates:
         prepare(opened, trier.settings_of(candidate), pool, tell)
     trier.begin()
-    every = [trier.planned(candidate) for candidate in trier.spread(candidates)]
+    every = [trier.planned(candidate) for candidate in trier.spread(candidates, whole)]
     trier.expect(every)
     for done, seeds in enumerate(SEEDS):
         if done and trier.spent.cpu_seconds * (done + 1) / done > seconds:
