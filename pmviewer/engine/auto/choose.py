@@ -85,8 +85,8 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     (width, height), N = planned
     few = with_values(base, {"photons.N": N})
     try:
-        shares = SHARE * seconds, MOST_SHARE * seconds
-        tried = trial(opened, few, found, pool, (width, height), shares[0], tell, shares[1], seconds)
+        size, most = (width, height), MOST_SHARE * seconds
+        tried = trial(opened, few, found, pool, size, SHARE * seconds, tell, most, seconds)
     except TooDearError as dear:
         why = f"a trial would take {dear.expected:.2g} CPU s, too much of {seconds:.3g}"
         return replace(_by_traits(opened, base, found, why, said), trial=dear.begun)

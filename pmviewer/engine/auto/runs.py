@@ -11,7 +11,7 @@ import numpy as np
 from pmviewer.engine.auto.candidates import GATHER, Candidate, assignments
 from pmviewer.engine.auto.measured import Trial, Widths
 from pmviewer.engine.auto.relative import F8
-from pmviewer.engine.auto.sparse import spread, wider_by
+from pmviewer.engine.auto.sparse import wider_by, with_wider
 from pmviewer.engine.auto.widths import WIDER
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
@@ -128,7 +128,7 @@ class Trier:
         if wider == 1.0:
             return candidates
         radius = usual / self._opened.flat.radius
-        return [spread(c, self.settings_of(c), radius, wider) if c.gathers else c for c in candidates]
+        return [with_wider(c, self.settings_of(c), radius, wider) if c.gathers else c for c in candidates]
 
     def planned(self, candidate: Candidate) -> Attempt:
         """All its runs, with no pictures yet."""

@@ -45,7 +45,7 @@ def wider_by(positions: NDArray[np.float32], N: int, usual: float, seconds: floa
     return wider if wider >= LEAST else 1.0
 
 
-def spread(candidate: Candidate, settings: Settings, radius: float, wider: float) -> Candidate:
+def with_wider(candidate: Candidate, settings: Settings, radius: float, wider: float) -> Candidate:
     """The way to gather with look-ups so many times as wide as the automatic `radius`, relative to the scene. Those of
     caustics stay. settings: the candidate's."""
     values = {

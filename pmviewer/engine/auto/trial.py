@@ -131,11 +131,11 @@ def _at_ends(gathers: Attempt, mean: F8) -> Blur:
     return Blur(more / (WIDER**GATHERED_ORDER - 1) ** 2, GATHERED_ORDER)
 
 
-def _brought(tried: Attempt, mean: F8) -> float:
-    """Variance that the photons of one trajectory make in the light of gather rays alone: with rare caustics, other
-    radii say more of theirs than fewer photons do, and would leave nothing for these."""
+def _of_photons(tried: Attempt, pictures: Callable[[Run], list[F8]], mean: F8) -> float:
+    """Variance that the photons of one trajectory make in such pictures, from passes with fewer of them."""
     many, few = tried.runs
-    return max(variance(few.brought, mean) - variance(many.brought, mean), 0.0) / (1 / few.N - 1 / many.N)
+    more = variance(pictures(few), mean) - variance(pictures(many), mean)
+    return max(more, 0.0) / (1 / few.N - 1 / many.N)
 
 
 def _farther(gather: Measured) -> Measured:
@@ -154,10 +154,11 @@ def _measured(tried: Attempt, widened: tuple[Widened, Widened], bias: Bias, mean
     caustic, shown = (part.variance for part in widened)
     eye, gathered = variances[0], 0.0
     if len(tried.runs) > 1:
-        many, few = tried.runs
-        seen = [variance(run.looked_up, mean) for run in tried.runs]
-        photons = max(seen[1] - seen[0], 0.0) / (1 / few.N - 1 / many.N)
-        told = caustic + shown + (_brought(tried, mean) if tried.plan.gather else 0.0)
+        many = tried.runs[0]
+        told = caustic + shown
+        if tried.plan.gather:  # rare caustics' radii say more of them than fewer photons do, and would leave nothing
+            told += _of_photons(tried, lambda run: run.brought, mean)
+        photons = _of_photons(tried, lambda run: run.looked_up, mean)
         photons = min(max(photons, told), variances[0] * many.N)
         eye = variances[0] - photons / many.N
         fitting = min(1.0, photons / told) if told > 0 else 1.0
