@@ -83,6 +83,11 @@ class Attempt:
     gathered: list[Run] = field(default_factory=list)
 
     @property
+    def spread(self) -> bool:
+        """Whether gather rays look up wider than usual, as photons lie far apart."""
+        return self.plan.gather and "estimate.radius" in self.candidate.values
+
+    @property
     def every(self) -> list[Run]:
         """All of them."""
         return [*self.runs, *self.shown, *self.caustic, *self.direct, *self.gathered]

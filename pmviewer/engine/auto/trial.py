@@ -156,7 +156,7 @@ def _measured(tried: Attempt, widened: tuple[Widened, Widened], bias: Bias, mean
     if len(tried.runs) > 1:
         many = tried.runs[0]
         told = caustic + shown
-        if tried.plan.gather:  # rare caustics' radii say more of them than fewer photons do, and would leave nothing
+        if tried.spread:  # rare caustics' radii say more of them than fewer photons do, and would leave nothing
             told += _of_photons(tried, lambda run: run.brought, mean)
         photons = _of_photons(tried, lambda run: run.looked_up, mean)
         photons = min(max(photons, told), variances[0] * many.N)
