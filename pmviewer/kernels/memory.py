@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import config, types
-from numba.core import errors
+from numba.core import cgutils, errors
 from numba.extending import intrinsic
 
 I8, I32, I64, F32, F64 = ir.IntType(8), ir.IntType(32), ir.IntType(64), ir.FloatType(), ir.DoubleType()
@@ -101,6 +101,23 @@ load_i4 = _loader(types.int32, I32, np.int32)
 load_u4 = _loader(types.uint32, I32, np.uint32)
 load_i8 = _loader(types.int64, I64, np.int64)
 load_f8 = _loader(types.float64, F64, np.float64)
+
+
+@with_twin(lambda address, index: None)
+def prefetch(typingctx, address, index):
+    """Have the processor fetch element `index` of an array of 4-byte elements into its caches, and go on meanwhile.
+    Whether there is such an element doesn't matter."""
+    signature = types.void(types.int64, types.int64)
+
+    def codegen(context, builder, sig, args):
+        place = builder.gep(builder.inttoptr(args[0], I32.as_pointer()), [args[1]])
+        kind = ir.FunctionType(ir.VoidType(), [I8.as_pointer(), I32, I32, I32])
+        function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
+        to_read, to_all_caches, data = ir.Constant(I32, 0), ir.Constant(I32, 3), ir.Constant(I32, 1)
+        builder.call(function, [builder.bitcast(place, I8.as_pointer()), to_read, to_all_caches, data])
+        return context.get_dummy_value()
+
+    return signature, codegen
 
 
 def _storer(numba_type, llvm_type, dtype):

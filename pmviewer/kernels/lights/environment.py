@@ -20,9 +20,9 @@ import numpy as np
 
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.lights.distant import behind_scene, outside
-from pmviewer.kernels.memory import load_f4, load_i4
+from pmviewer.kernels.lights.sky_cells import cell_between, cells_between, row_of_cells
+from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.scene import L_A, L_AREA, L_B, L_C, light_number, light_vector, load3
-from pmviewer.kernels.table import find_between, find_interval
 from pmviewer.kernels.vector import along, dot, luminance, scale
 
 _f4 = np.float32
@@ -157,27 +157,18 @@ def _around(turn):
 
 
 @device
-def _cell_of(scene, row, v):
-    """The first of a row of cells whose cumulative share is above v."""
-    steps = scene.sky_steps
-    k = min(_i8(v * _f4(steps)), steps - 1)
-    low, high = _i8(load_i4(scene.sky_guide, row * steps + k)), scene.sky_width - 1
-    if k + 1 < steps:
-        high = min(_i8(load_i4(scene.sky_guide, row * steps + k + 1)) + 1, high)
-    return find_between(scene.sky_cells, low, high, row * scene.sky_width, v)
+def _picked(scene, light, u, v):
+    """A unit direction away from the scene with the density of the image's luminance, and the radiance from there."""
+    row, u = row_of_cells(scene, u)
+    low, high = cells_between(scene, row, v)
+    column, v = cell_between(scene, row, low, high, v)
+    return _in_cell(scene, light, row, column, u, v)
 
 
 @device
-def _picked(scene, light, u, v):
-    """A unit direction away from the scene with the density of the image's luminance, and the radiance from there."""
+def _in_cell(scene, light, row, column, u, v):
+    """The same of a cell, by two numbers of [0, 1) within it."""
     width, rows = scene.sky_width, scene.sky_height - 1
-    row = find_interval(scene.sky_rows, rows, _i8(0), u)
-    low = _f4(0.0) if row == 0 else load_f4(scene.sky_rows, row - 1)
-    u = (u - low) / (load_f4(scene.sky_rows, row) - low)
-    first = row * width
-    column = _cell_of(scene, row, v)
-    low = _f4(0.0) if column == 0 else load_f4(scene.sky_cells, first + column - 1)
-    v = (v - low) / (load_f4(scene.sky_cells, first + column) - low)
     following = column + 1
     if following == width:
         following = _i8(0)
@@ -242,6 +233,14 @@ def cell_of_square(scene, light, d, n):
 def sample_image(scene, light, x, u, v):
     """As `pmviewer.kernels.lights.light.sample_one_light`."""
     wi, L = _picked(scene, light, u, v)
+    return wi, outside(scene, x, wi), L, image_pdf(scene, light, L), True
+
+
+@device
+def sample_cell(scene, light, x, row, column, u, v):
+    """What `sample_image` returns, from the cell that its numbers fall to and what these are within it
+    (`pmviewer.kernels.lights.sky_cells`)."""
+    wi, L = _in_cell(scene, light, row, column, u, v)
     return wi, outside(scene, x, wi), L, image_pdf(scene, light, L), True
 
 

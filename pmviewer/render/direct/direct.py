@@ -10,21 +10,21 @@ import numpy as np
 from pmviewer.kernels.bsdf.scattering import FOLLOWED, bsdf_f, bsdf_pdf, compressed, same_side, shading_normal
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
-from pmviewer.kernels.lights.light import emitted, environment_radiance, sample_one_light
-from pmviewer.kernels.lights.sky_facing import place_on_light, seen_light_pdf
+from pmviewer.kernels.lights.light import emitted, environment_radiance
+from pmviewer.kernels.lights.sky_facing import seen_light_pdf
 from pmviewer.kernels.media.medium import has_media
-from pmviewer.kernels.random import SOBOL, draw4
+from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.scene import light_of
 from pmviewer.kernels.vector import add, dot, largest, mul, scale
 from pmviewer.render.chain import BLACK, WHITE
 from pmviewer.render.counts import C_RAYS, C_SAVED, C_SHADOW_RAYS
-from pmviewer.render.direct.choice import chosen_light, expected_samples
+from pmviewer.render.direct.choice import expected_samples
+from pmviewer.render.direct.places import ABREAST, DRAWN_WORDS, draw_places, drawn_place
 from pmviewer.render.direct.shadow import LIT, UNKNOWN, known_visibility
 from pmviewer.render.media.through import ANYWHERE, place_of
 from pmviewer.render.straight import transmission
 
 _f4 = np.float32
-_u4 = np.uint32
 _i8 = np.int64
 
 
@@ -57,58 +57,47 @@ def left_to_rays(scene, light, group):
 
 
 @device
-def _drawn_light(scene, choice, s, sampler):
-    """Light of sample s, its m (`chosen_light`), two numbers for a place on it, and their density (`place_on_light`).
-
-    Samples of a pass follow one another in the sequence as passes do, so that they complement each other: n samples
-    each in the first m passes are its first n·m points. Of these the first two coordinates are spread best, and a
-    block of 2ⁱ falls into as many parts of the third.
-    """
-    n = choice[4]
-    index = _u4(_u4(sampler.index) * _u4(n) + _u4(s))
-    u, v, u_pick, _ = draw4(sampler.sequence, sampler.seed, index, sampler.dimension)
-    if sampler.sequence == SOBOL and n & (n - 1) == 0:
-        place = _f4(n) * u_pick
-        s = _i8(place)
-        u_pick = place - _f4(s)
-    light, m = chosen_light(scene, choice, s, u_pick)
-    u, v, density = place_on_light(scene, light, choice[5], u, v)
-    return light, m, u, v, density
-
-
-@device
 def light_samples(scene, shadows, si, group, choice, n_bsdf, sampler):
     """Radiance towards wo from the light samples of the choice, reflected by a group of the BSDF's lobes.
 
     Each is weighted against n_bsdf BSDF samples of the group (0: no MIS). `shadows` is for `known_visibility`. Returns
     L, the shadow rays cast and those that shadow photons saved.
     """
-    p, ng, b, wo = si.p, si.ng, si.bsdf, si.wo
-    total = BLACK
-    rays, saved = 0, 0
-    for s in range(choice[4]):
-        light, m, u, v, density = _drawn_light(scene, choice, s, sampler)
-        wi, end, L, pdf, findable = sample_one_light(scene, light, p, u, v)
-        pdf *= density
-        if not m * pdf > _f4(0.0) or same_side(b, group, ng, wo, wi) == 0 or left_to_rays(scene, light, group):
-            continue
-        f = compressed(b, wo, wi, bsdf_f(b, group, wo, wi))
-        cos = abs(dot(wi, shading_normal(b)))
-        if f[0] + f[1] + f[2] > _f4(0.0) and cos > _f4(0.0):
-            known = known_visibility(shadows, p, ng, light)
-            if known == UNKNOWN:
-                rays += 1
-            else:
-                saved += 1
-            tint = WHITE if known == LIT else BLACK
-            if known == UNKNOWN:
-                tint = transmission(scene, si, light, wi, end, group != FOLLOWED or not findable)
-            if largest(tint) > _f4(0.0):
-                weight = cos / (m * pdf)
-                if findable and n_bsdf > 0:
-                    weight *= power_heuristic(m, pdf, _f4(n_bsdf), bsdf_pdf(b, group, wo, wi))
-                total = add(total, scale(mul(mul(f, L), tint), weight))
+    total, rays, saved, drawn = BLACK, 0, 0, stack_i4(DRAWN_WORDS)
+    for begin in range(0, choice[4], ABREAST):
+        count = min(_i8(ABREAST), choice[4] - begin)
+        draw_places(scene, choice, sampler, begin, count, drawn)
+        for k in range(count):
+            light, m, place = drawn_place(scene, drawn, k, si.p)
+            L, cast, spared = _light_sample(scene, shadows, si, group, n_bsdf, light, m, place)
+            total = add(total, L)
+            rays += cast
+            saved += spared
     return total, rays, saved
+
+
+@device
+def _light_sample(scene, shadows, si, group, n_bsdf, light, m, place):
+    """The same of one sample, at a place on the light (`drawn_place`)."""
+    p, ng, b, wo = si.p, si.ng, si.bsdf, si.wo
+    wi, end, L, pdf, findable = place
+    if not m * pdf > _f4(0.0) or same_side(b, group, ng, wo, wi) == 0 or left_to_rays(scene, light, group):
+        return BLACK, 0, 0
+    f = compressed(b, wo, wi, bsdf_f(b, group, wo, wi))
+    cos = abs(dot(wi, shading_normal(b)))
+    if not (f[0] + f[1] + f[2] > _f4(0.0) and cos > _f4(0.0)):
+        return BLACK, 0, 0
+    known = known_visibility(shadows, p, ng, light)
+    tint = WHITE if known == LIT else BLACK
+    if known == UNKNOWN:
+        tint = transmission(scene, si, light, wi, end, group != FOLLOWED or not findable)
+    reflected = BLACK
+    if largest(tint) > _f4(0.0):
+        weight = cos / (m * pdf)
+        if findable and n_bsdf > 0:
+            weight *= power_heuristic(m, pdf, _f4(n_bsdf), bsdf_pdf(b, group, wo, wi))
+        reflected = scale(mul(mul(f, L), tint), weight)
+    return (reflected, 1, 0) if known == UNKNOWN else (reflected, 0, 1)
 
 
 @device
