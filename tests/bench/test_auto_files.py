@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pmviewer.bench import peer
-from pmviewer.bench.measures.auto_files import error_against, on_files
+from pmviewer.bench.measures import auto
+from pmviewer.bench.measures.auto_files import COLUMNS, error_against, on_files
+from pmviewer.bench.report import BenchResult
 from pmviewer.errors import PmviewerError, SettingError
 from pmviewer.output.metric import EPSILON
 
@@ -65,3 +70,21 @@ def test_files_that_do_not_open_are_named(tmp_path, monkeypatch):
     assert not result.rows
     assert any("sphere.xml: Mitsuba 3 (made up) could not render it." in note for note in result.notes)
     assert not any(target.ok for target in result.targets)
+
+
+def test_ten_files_count_together_with_the_bundled_scenes(tmp_path, monkeypatch):
+    """P17 is one mean over both. Ten files at 0.4 of Mitsuba's error, seven scenes at 0.1, and seven that it can't
+    render."""
+    row = ["file.xml", 1, "gather", 0.1, 1.0, 1.0, 1.0, 0.4, "1", ""]
+    files = BenchResult("files", COLUMNS, [row] * auto.REAL, [])
+    monkeypatch.setattr(auto, "on_files", lambda folder, seconds, count, seed: replace(files, rows=files.rows[:count]))
+    monkeypatch.setattr(auto, "_with_choice", lambda scene, seconds, pool: (None, None, None))
+    monkeypatch.setattr(auto, "_error", lambda renderer, scene: 1e-3)
+    monkeypatch.setattr(auto, "_over_peer", lambda scene, error, s: 0.1 if scene in auto.QUICK else math.nan)
+    monkeypatch.setattr(peer, "variant", lambda: "made up")
+    mean, worst = auto.run(folder=tmp_path).targets
+    assert mean.value == pytest.approx((0.4**10 * 0.1**7) ** (1 / 17))
+    assert worst.value == 0.4
+    assert "7 bundled scenes" in mean.note
+    assert not auto.run(folder=tmp_path, scenes=9).targets, "too few"
+    assert not auto.run(folder=tmp_path, quick=True).targets

@@ -6,17 +6,20 @@ from __future__ import annotations
 import contextlib
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.bench import peer
+from pmviewer.bench.measures.auto_files import CHOSEN as CHOSEN_FILES
+from pmviewer.bench.measures.auto_files import RATIO as FILE_RATIO
 from pmviewer.bench.measures.auto_files import on_files
 from pmviewer.bench.measures.error import PEER, measure_peer, reference, reference_noise
 from pmviewer.bench.measures.timed import error_at, geometric_mean, name_of, picture, rendered, silent
 from pmviewer.bench.report import BenchResult, Target
-from pmviewer.engine.auto.choose import Goal, choose
+from pmviewer.engine.auto.choose import Choice, Goal, choose
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
@@ -30,6 +33,8 @@ QUICK = ("cornell_caustic", "cornell_diffuse", "cornell_glossy", "rooms_10x10", 
 REST = ("cornell_lights", "colonnade", "corner_room", "glossy_room", "glass_egg", "skylight_room", "three_glasses")
 SECONDS, QUICK_SECONDS = 10.0, 4.0
 """CPU seconds, the trial's among them."""
+REAL = 10
+"""Files of other people's, at least, that P17 counts together with the bundled scenes."""
 RUN_SCENES = ("cornell_diffuse", "cornell_caustic", "cornell_glossy", "colonnade")
 RUNS, QUICK_RUNS = 25, 6
 """With different seeds on each of these scenes."""
@@ -66,28 +71,38 @@ def without_noise(error: float, noise: float) -> float:
     return max(error - noise, LEAST_KNOWN * noise)
 
 
-def _against(scene: str, seconds: float, pool: WorkPool) -> tuple[list[str | float | int], float]:
-    """A row of the table, and the error over Mitsuba's, NaN without it, both without the reference's noise."""
+def _error(renderer: Renderer, scene: str) -> float:
+    return without_noise(relmse(picture(renderer), reference(scene)), reference_noise(scene))
+
+
+def _over_peer(scene: str, error: float, seconds: float) -> float:
+    """That error over Mitsuba's, without the reference's noise; NaN without Mitsuba, or where it lacks a material."""
+    if peer.installed():
+        with contextlib.suppress(PmviewerError):
+            curve = measure_peer(scene, seconds)
+            theirs = [without_noise(one, reference_noise(scene)) for one in curve.error]
+            return error / error_at(curve.cpu, theirs, seconds)
+    return math.nan
+
+
+def _with_choice(scene: str, seconds: float, pool: WorkPool) -> tuple[OpenScene, Choice, Renderer]:
+    """The scene, what automatic mode chose for that time, and what it rendered in the rest of it."""
     opened, base = open_scene(scene), Settings()
     choice = choose(opened, base, Goal(seconds=seconds), pool, silent)
     chosen = with_values(base, dict(choice.values))
-    renderer = rendered(opened, chosen, seconds - choice.trial.cpu_seconds, pool)
-    noise = reference_noise(scene)
-    error, default = (
-        without_noise(relmse(picture(each), reference(scene)), noise)
-        for each in (renderer, rendered(opened, base, seconds, pool))
-    )
-    ratio = math.nan
-    if peer.installed():
-        with contextlib.suppress(PmviewerError):  # materials that Mitsuba does not have
-            curve = measure_peer(scene, seconds)
-            theirs = [without_noise(one, noise) for one in curve.error]
-            ratio = error / error_at(curve.cpu, theirs, seconds)
+    return opened, choice, rendered(opened, chosen, seconds - choice.trial.cpu_seconds, pool)
+
+
+def _against(scene: str, seconds: float, pool: WorkPool) -> tuple[list[str | float | int], float]:
+    """A row of the table, and the error over Mitsuba's, NaN without it, both without the reference's noise."""
+    opened, choice, renderer = _with_choice(scene, seconds, pool)
+    error, default = _error(renderer, scene), _error(rendered(opened, Settings(), seconds, pool), scene)
+    ratio = _over_peer(scene, error, seconds)
     share = choice.trial.cpu_seconds / seconds
     said = renderer.error.latest
     found = said.relmse if said is not None else math.nan
     row: list[str | float | int] = [scene, name_of(choice), share, error, choice.expected, found, default]
-    return [*row, error / default, ratio, noise], ratio
+    return [*row, error / default, ratio, reference_noise(scene)], ratio
 
 
 def _runs(scene: str, runs: int, pool: WorkPool) -> tuple[list[str | float | int], list[float], list[bool]]:
@@ -127,12 +142,38 @@ def _truth(opened: OpenScene, small: Settings, pool: WorkPool) -> NDArray[np.flo
     return picture(renderer)
 
 
+def _with_bundled(files: BenchResult, seconds: float) -> BenchResult:
+    """What P17 says of files and bundled scenes together, put before what it says of files alone."""
+    known: dict[str, float] = {}
+    pool = WorkPool()
+    try:
+        for name in (*QUICK, *REST):
+            ratio = _over_peer(name, _error(_with_choice(name, seconds, pool)[2], name), seconds)
+            print(name, ratio, file=sys.stderr, flush=True)
+            if math.isfinite(ratio):
+                known[name] = ratio
+    finally:
+        pool.close()
+    ratios = [*known.values(), *(float(row[FILE_RATIO]) for row in files.rows)]
+    what = f"{len(known)} bundled scenes, less the references' noise, and {len(files.rows)} files"
+    note = f"relMSE over {PEER}, {peer.variant()}, at {seconds:g} CPU s, with the trial"
+    chosen = f"{CHOSEN_WAYS}{CHOSEN_FILES}"
+    targets = [
+        Target("P17", geometric_mean(ratios), 0.08, "", False, f"{note}, geometric mean of {what}{chosen}"),
+        Target("P17", max(ratios), 0.3, "", False, f"{note}, worst of {what}{chosen}"),
+    ]
+    said = ", ".join(f"{name} {ratio:.3g}" for name, ratio in known.items())
+    return replace(files, targets=[*targets, *files.targets], notes=[*files.notes, f"bundled scenes: {said}"])
+
+
 def run(quick: bool = False, scenes: int | None = None, folder: Path | None = None, seed: int = 1) -> BenchResult:
     """Both tables in one: scenes at equal time, then runs that were asked for an error. With a `folder` the Mitsuba
-    files below it instead, or so many `scenes` of them, drawn by `seed`, at equal time."""
+    files below it instead, or so many `scenes` of them, drawn by `seed`, at equal time; if not quick and there are
+    `REAL` of them, together with the bundled scenes, as P17 counts."""
     seconds = QUICK_SECONDS if quick else SECONDS
     if folder is not None:
-        return on_files(folder, seconds, scenes, seed)
+        files = on_files(folder, seconds, scenes, seed)
+        return files if quick or len(files.rows) < REAL else _with_bundled(files, seconds)
     names = (QUICK if quick else (*QUICK, *REST))[:scenes]
     pool = WorkPool()
     rows: list[list[str | float | int]] = []

@@ -34,6 +34,7 @@ REFERENCE = 6.0
 """CPU seconds of each of the two references, over those of the comparison."""
 COLUMNS = ("file", "triangles", "chosen", "trial", "relMSE", "expected", "Mitsuba's", "ours / Mitsuba's", "mean ratio",
            "said")  # fmt: skip
+RATIO = COLUMNS.index("ours / Mitsuba's")
 CHOSEN = (
     "; which gather rays gather again was chosen with three files, a coated ball, bricks and a staircase, second "
     "gathers with the cache with a living room, lights by what gloss reflects of them with Veach's plates, what bias "
