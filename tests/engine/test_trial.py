@@ -199,3 +199,16 @@ def test_a_trial_has_the_number_of_photons_that_it_is_planned_with(pool):
     trier = Trier(open_scene("cornell_diffuse"), base, pool, (40, 40), math.inf)
     for candidate in (PROGRESSIVE, CACHE):
         assert [run.N for run in trier.planned(candidate).runs] == [20_000, 5_000]
+
+
+@pytest.mark.parametrize(("seconds", "pixels", "N"), [(1e-6, 40 * 40, 20_000), (1e6, 80 * 80, 100_000)])
+def test_a_trial_is_made_smaller_where_pixels_and_photons_cost_more_than_it_may_take(seconds, pixels, N, pool):
+    """Down to what still tells something; what costs little enough stays."""
+    base = with_values(Settings(), {"camera.width": 128, "camera.height": 128, "photons.N": 100_000})
+    trier = Trier(open_scene("cornell_diffuse"), base, pool, (80, 80), math.inf)
+    trier.begin()
+    trier.fit([PROGRESSIVE, CACHE], seconds)
+    assert (trier.pixels, trier.scale) == (pixels, 128 * 128 / pixels)
+    for candidate in (PROGRESSIVE, CACHE):
+        chosen = trier.planned(candidate).runs[0].settings
+        assert (chosen.camera.width * chosen.camera.height, chosen.photons.N) == (pixels, N)

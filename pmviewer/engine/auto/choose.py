@@ -11,7 +11,7 @@ from pmviewer.engine.auto.bias import Bias, way_of
 from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, Candidate, assignments, candidates
 from pmviewer.engine.auto.measured import Measured, Numbers, Trial, Widths
 from pmviewer.engine.auto.model import BETTER, FEWEST, Option, bias_of, in_time, numbers_for, to_error
-from pmviewer.engine.auto.runs import TooDearError
+from pmviewer.engine.auto.runs import LEAST, TooDearError
 from pmviewer.engine.auto.trial import Tell, trial
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
@@ -36,8 +36,8 @@ wider radius are not counted: with them a trial of four ways would not fit into 
 ADAPTIVE = {"render.adaptive": "on"}
 ADAPTED = f"from pass {DECIDED_AFTER + 1} on pixels with noise of their own get more samples (render.adaptive)"
 _DEFAULT = Numbers(SETTINGS["photons.N"].default)
-LEAST, LARGEST, FEWEST_PHOTONS = 40, 160, 20_000
-"""Sides of the trial's picture in pixels, and N."""
+LARGEST, FEWEST_PHOTONS = 160, 20_000
+"""Side of the trial's picture in pixels, at most, and N, at least."""
 
 
 @dataclass(frozen=True)

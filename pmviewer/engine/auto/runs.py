@@ -28,6 +28,13 @@ FEWER = 4
 """Photons of the larger trial pass over those of the smaller one."""
 MORE = 4
 """Light samples of the passes that tell what these do, over the usual number."""
+PROBED, PROBED_PHOTONS = 1024, 20_000
+"""Pixels and photons of the picture that tells what a trial costs."""
+OF_DEAREST = 0.8
+"""What a pixel of a trial's pictures costs in the mean, over one of a way that gathers (0.74 to 1.0 in nine scenes; 1.4
+and 1.9 in two where it costs so little that no trial is made smaller)."""
+LEAST = 40
+"""Side of a trial's picture in pixels, at least."""
 SEEDS = ((7_919, 104_729), (1_299_709, 15_485_863), (32_452_843, 49_979_687))
 """Added to the picture's seed; the second pair where a trial that is twice as long still fits, and so on."""
 SAMPLED = ("direct", "specular")
@@ -101,15 +108,54 @@ class Trier:
     ) -> None:
         self._opened, self._settings, self._pool = opened, settings, pool
         self._full = resolve_camera(opened.scene, settings.camera)
-        self._size, self._side = size, size[0] / self._full.width
+        self._size = size
         self.kept = noise_share(filter_of(self._full.filter, settings.render))
         """Share of the variance of a pixel's samples that is left where pixels share them, which those of a trial are
         too far apart for."""
-        self.scale = self._full.width * self._full.height / (size[0] * size[1])
         self._store = StageStore(STORE)
         self._light: dict[int, float] = {}  # what light passes cost whose photons the store has by now
         self._most, self._pictures, self._done = most, 0, 0
         self._before, self._started, self._in_camera = 0.0, 0.0, 0.0
+
+    @property
+    def pixels(self) -> int:
+        """Of each picture."""
+        return self._size[0] * self._size[1]
+
+    @property
+    def scale(self) -> float:
+        """Pixels of the whole picture over these."""
+        return self._full.width * self._full.height / self.pixels
+
+    @property
+    def _side(self) -> float:
+        return self._size[0] / self._full.width
+
+    def fit(self, candidates: list[Candidate], seconds: float) -> None:
+        """Fewer pixels and photons, if either would cost more than so many CPU seconds: in a hall full of gloss and
+        textures a pixel costs three times what trials are planned by. A small picture tells, of a way that gathers."""
+        candidate = next((c for c in candidates if c.gathers), candidates[0])
+        pixels, N = min(PROBED, self.pixels), min(PROBED_PHOTONS, self._settings.photons.N)
+        found = self._probed(self.planned(candidate).runs[0].settings, math.sqrt(pixels / self.pixels), N)
+        pictures = len(SEEDS[0]) * sum(len(self.planned(c).every) for c in candidates)
+        pixel = OF_DEAREST * found.get("camera pass", 0.0) / pixels * pictures
+        trajectory = found.get("light pass", 0.0) / N * len(SEEDS[0]) * (1 + 1 / FEWER)
+        self._shrink(math.sqrt(max(min(seconds / (pixel * self.pixels), 1.0), LEAST**2 / self.pixels)) if pixel else 1)
+        if trajectory > 0:
+            N = max(min(self._settings.photons.N, int(seconds / trajectory)), N)
+            self._settings = with_values(self._settings, {"photons.N": N})
+
+    def _shrink(self, by: float) -> None:
+        self._size = _times(self._size, min(by, 1.0))
+
+    def _probed(self, settings: Settings, by: float, N: int) -> dict[str, float]:
+        """CPU seconds by stage of a picture that is smaller by that, with N photons."""
+        width, height = _times(self._size, by)
+        values = {"camera.width": width, "camera.height": height, "photons.N": N}
+        renderer = Renderer(self._opened, with_values(settings, values), self._pool, self._store)
+        renderer.camera = replace(renderer.camera, pixel_side=min(width / self._full.width, 1.0))
+        renderer.step()
+        return renderer.tally.stage_seconds
 
     def settings_of(self, candidate: Candidate) -> Settings:
         """Of the whole picture by that candidate, with the N of the larger passes."""
@@ -211,6 +257,10 @@ class Trier:
 
 def _seed(settings: Settings, added: int) -> int:
     return (settings.render.seed + added) % 2**31
+
+
+def _times(size: tuple[int, int], by: float) -> tuple[int, int]:
+    return max(round(size[0] * by), 1), max(round(size[1] * by), 1)
 
 
 def _either(name: str) -> list[Widths]:

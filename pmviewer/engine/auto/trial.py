@@ -54,13 +54,15 @@ def trial(
     most: float = math.inf,
     whole: float = 0.0,
 ) -> Trial:
-    """Measure the candidates on that many columns and rows of pixels, with as many pairs of seeds as fit into those CPU
-    seconds, one at least; the picture is to take `whole`. Raises Cancelled when the pool is cancelled, and TooDearError
-    where one would take more than `most`."""
+    """Measure the candidates on that many columns and rows of pixels, or fewer, with as many pairs of seeds as fit into
+    those CPU seconds, one at least (0: one, on all of these pixels); the picture is to take `whole`. Raises Cancelled
+    when the pool is cancelled, and TooDearError where one would take more than `most`."""
     trier = Trier(opened, settings, pool, size, most)
     for candidate in candidates:
         prepare(opened, trier.settings_of(candidate), pool, tell)
     trier.begin()
+    if seconds:
+        trier.fit(candidates, seconds)
     every = [trier.planned(candidate) for candidate in trier.spread(candidates, whole)]
     trier.expect(every)
     for done, seeds in enumerate(SEEDS):
@@ -69,7 +71,7 @@ def trial(
         for number, tried in enumerate(every):
             tell(f"trying {tried.candidate.name}", number / len(every))
             trier.render(tried, seeds)
-    result = replace(trier.spent, pixels=size[0] * size[1], seeds=len(every[0].runs[0].images))
+    result = replace(trier.spent, pixels=trier.pixels, seeds=len(every[0].runs[0].images))
     covered = _covered(opened, trier.settings_of(every[0].candidate))
     mean = np.mean([image for tried in every for run in tried.runs for image in run.images], axis=0)
     gathers = next((tried for tried in every if tried.candidate.is_like(GATHER)), None)
