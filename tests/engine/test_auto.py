@@ -23,7 +23,7 @@ from pmviewer.engine.auto.candidates import (
     candidates,
     given,
 )
-from pmviewer.engine.auto.choose import Goal, _adapts, _by_time, _values, choose
+from pmviewer.engine.auto.choose import Goal, _adapts, _by_time, _picked, _values, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
 from pmviewer.engine.auto.measured import Costs, Measured, Numbers, Trial, Widths
 from pmviewer.engine.auto.model import PHOTONS, Option, error_after, in_time, samples_for, to_error
@@ -52,6 +52,20 @@ def test_what_traits_rule_out_is_not_tried():
     for lit in ({"has_scattering": True}, {"media_emit": True}):
         assert not {CACHE.name, CACHE_CORNERS.name} & set(names(replace(PLAIN, has_media=True, **lit)))
     assert names(replace(PLAIN, has_diffuse=False)) == [PROGRESSIVE.name, PATH.name]
+
+
+@pytest.mark.parametrize(("less", "chosen"), [(0.8, 150_000), (0.75, 50_000)])
+def test_fewer_photons_than_usual_are_chosen_where_they_promise_a_fifth_less(less, chosen):
+    """A trial meets few bright ones: what it says of fewer photons is too good rather than too bad. Of more of them it
+    believes a tenth."""
+    measured = Measured(CACHE, Costs(0.1, 0.0), 1.0, radius=0.01)
+
+    def option(N: int, error: float) -> Option:
+        return Option(measured, Numbers(N), 20.0, error, 10.0)
+
+    usual = option(150_000, 1e-3)
+    assert _picked([usual, option(50_000, less * 1e-3)], lambda o: o.error).numbers.N == chosen
+    assert _picked([usual, option(300_000, 0.9e-3)], lambda o: o.error).numbers.N == 300_000
 
 
 def test_large_pictures_are_planned_for_more_than_their_first_passes(cornell, pool):

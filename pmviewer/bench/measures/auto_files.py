@@ -41,13 +41,13 @@ CHOSEN = (
     "noise may hide with the staircase, what a trial overlooks with the bricks, who gets adaptive samples with a box, "
     "the bricks and the staircase, what second gathers farther out bring with the bricks, which power of the radius "
     "the bias of gather rays has with a hall, that radii wait with eight files, how noise is taken to fall with ten, "
-    "and how wide look-ups are where photons lie far apart with a coated ball, five lamps, a hall, a living room and a "
-    "staircase"
+    "how wide look-ups are where photons lie far apart with a coated ball, five lamps, a hall, a living room and a "
+    "staircase, and what fewer photons have to promise with the living room, the staircase, Veach's room and three boxes"
 )
 """CORNERS, CACHE_CORNERS, LESS_BIAS, MORE_COST and `overlooked` of `pmviewer.engine.auto.candidates`,
 `pmviewer.render.direct.by_lobes`, HIDDEN of `pmviewer.engine.auto.widths`, `pmviewer.render.adaptive`, GATHERED_ORDER
-and STEADY of `pmviewer.engine.auto.bias`, the powers of `pmviewer.engine.auto.model` and `measured`, and HELD and MOST
-of `pmviewer.engine.auto.sparse`, said in the targets' own lines."""
+and STEADY of `pmviewer.engine.auto.bias`, the powers of `pmviewer.engine.auto.model` and `measured`, HELD and MOST of
+`pmviewer.engine.auto.sparse`, and FEWER_PHOTONS of `pmviewer.engine.auto.choose`, said in the targets' own lines."""
 
 
 def error_against(image: NDArray[Any], references: NDArray[np.float64]) -> float:
