@@ -174,7 +174,7 @@ def _picked(found: list[Option], promised: Callable[[Option], float]) -> Option:
     default unless another is clearly better."""
 
     def of(option: Option) -> float:
-        few = option.numbers.N < float(SETTINGS["photons.N"].default)
+        few = option.numbers.N < _DEFAULT.N
         return promised(option) * (FEWER_PHOTONS if few else 1.0)
 
     best = min(found, key=of)
