@@ -169,7 +169,7 @@ def _to_error(m: Measured, error: float) -> list[Option]:
 
 def _picked(found: list[Option], promised: Callable[[Option], float]) -> Option:
     """The one that promises least, fewer photons than usual being counted for more (`FEWER_PHOTONS`); of ways to
-    gather, each kind of bias that a trial overlooks counts as a tenth more. Of its candidate the numbers that
+    gather, so is bias that a trial overlooks (`Candidate.overlooked`). Of its candidate the numbers that
     `_preference` likes best among those that are hardly worse: those of two trials are then the same more often. The
     default unless another is clearly better."""
 
@@ -180,7 +180,7 @@ def _picked(found: list[Option], promised: Callable[[Option], float]) -> Option:
     best = min(found, key=of)
     if best.measured.candidate.gathers:
         gathers = [o for o in found if o.measured.candidate.gathers]
-        best = min(gathers, key=lambda o: of(o) * NEARLY**o.measured.candidate.overlooked)
+        best = min(gathers, key=lambda o: of(o) * o.measured.candidate.overlooked)
     near = [o for o in found if o.measured is best.measured and of(o) <= NEARLY * of(best)]
     best = min(near, key=_preference)
     usual = next((o for o in found if _is_default(o)), None)
