@@ -95,7 +95,8 @@ def test_large_pictures_are_planned_for_more_than_their_first_passes(cornell, po
 
 @pytest.mark.parametrize(("promised", "expected"), [((1.0, 0.8), GATHER), ((1.0, 0.7), CACHE)])
 def test_of_gathers_that_promise_about_as_much_the_best_known_is_taken(promised, expected):
-    """A quarter more error is nothing beside the bias of records between a trial's few pixels, and of look-ups near edges."""
+    """A quarter more error is nothing beside the bias of records between a trial's few pixels, and of look-ups near
+    edges."""
     gather, cache = (
         Measured(way.having(more), Costs(0.1, 0.0), error, gathered=1e-9, radius=0.01)
         for way, more, error in zip((GATHER, CACHE), (CORNERS, {}), promised, strict=True)
