@@ -80,7 +80,7 @@ def test_ten_files_count_together_with_the_bundled_scenes(tmp_path, monkeypatch)
     monkeypatch.setattr(auto, "on_files", lambda folder, seconds, count, seed: replace(files, rows=files.rows[:count]))
     monkeypatch.setattr(auto, "_with_choice", lambda scene, seconds, pool: (None, None, None))
     monkeypatch.setattr(auto, "_error", lambda renderer, scene: 1e-3)
-    monkeypatch.setattr(auto, "_over_peer", lambda scene, error, s: 0.1 if scene in auto.QUICK else math.nan)
+    monkeypatch.setattr(auto, "_ratio", lambda scene, error, s: 0.1 if scene in auto.QUICK else math.nan)
     monkeypatch.setattr(peer, "variant", lambda: "made up")
     mean, worst = auto.run(folder=tmp_path).targets
     assert mean.value == pytest.approx((0.4**10 * 0.1**7) ** (1 / 17))

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from pmviewer.bench import peer
 from pmviewer.bench.measures.auto_files import CHOSEN as CHOSEN_FILES
 from pmviewer.bench.measures.auto_files import RATIO as FILE_RATIO
-from pmviewer.bench.measures.auto_files import on_files
-from pmviewer.bench.measures.error import PEER, measure_peer, reference, reference_noise
+from pmviewer.bench.measures.auto_files import on_files, over_peer
+from pmviewer.bench.measures.error import measure_peer, reference, reference_noise
 from pmviewer.bench.measures.timed import error_at, geometric_mean, name_of, picture, rendered, silent
 from pmviewer.bench.report import BenchResult, Target
 from pmviewer.engine.auto.choose import Choice, Goal, choose
@@ -75,7 +75,7 @@ def _error(renderer: Renderer, scene: str) -> float:
     return without_noise(relmse(picture(renderer), reference(scene)), reference_noise(scene))
 
 
-def _over_peer(scene: str, error: float, seconds: float) -> float:
+def _ratio(scene: str, error: float, seconds: float) -> float:
     """That error over Mitsuba's, without the reference's noise; NaN without Mitsuba, or where it lacks a material."""
     if peer.installed():
         with contextlib.suppress(PmviewerError):
@@ -97,7 +97,7 @@ def _against(scene: str, seconds: float, pool: WorkPool) -> tuple[list[str | flo
     """A row of the table, and the error over Mitsuba's, NaN without it, both without the reference's noise."""
     opened, choice, renderer = _with_choice(scene, seconds, pool)
     error, default = _error(renderer, scene), _error(rendered(opened, Settings(), seconds, pool), scene)
-    ratio = _over_peer(scene, error, seconds)
+    ratio = _ratio(scene, error, seconds)
     share = choice.trial.cpu_seconds / seconds
     said = renderer.error.latest
     found = said.relmse if said is not None else math.nan
@@ -148,7 +148,8 @@ def _with_bundled(files: BenchResult, seconds: float) -> BenchResult:
     pool = WorkPool()
     try:
         for name in (*QUICK, *REST):
-            ratio = _over_peer(name, _error(_with_choice(name, seconds, pool)[2], name), seconds)
+            _, _, renderer = _with_choice(name, seconds, pool)
+            ratio = _ratio(name, _error(renderer, name), seconds)
             print(name, ratio, file=sys.stderr, flush=True)
             if math.isfinite(ratio):
                 known[name] = ratio
@@ -156,12 +157,7 @@ def _with_bundled(files: BenchResult, seconds: float) -> BenchResult:
         pool.close()
     ratios = [*known.values(), *(float(row[FILE_RATIO]) for row in files.rows)]
     what = f"{len(known)} bundled scenes, less the references' noise, and {len(files.rows)} files"
-    note = f"relMSE over {PEER}, {peer.variant()}, at {seconds:g} CPU s, with the trial"
-    chosen = f"{CHOSEN_WAYS}{CHOSEN_FILES}"
-    targets = [
-        Target("P17", geometric_mean(ratios), 0.08, "", False, f"{note}, geometric mean of {what}{chosen}"),
-        Target("P17", max(ratios), 0.3, "", False, f"{note}, worst of {what}{chosen}"),
-    ]
+    targets = over_peer(ratios, seconds, what, CHOSEN_WAYS + CHOSEN_FILES)
     said = ", ".join(f"{name} {ratio:.3g}" for name, ratio in known.items())
     return replace(files, targets=[*targets, *files.targets], notes=[*files.notes, f"bundled scenes: {said}"])
 
@@ -211,17 +207,12 @@ def run(quick: bool = False, scenes: int | None = None, folder: Path | None = No
             f"{len(covered)} intervals that cover the truth{CHOSEN_BIAS}",
         ),
     ]
-    if any(map(math.isfinite, ratios)):
-        known = sum(map(math.isfinite, ratios))
-        note = f"relMSE over {PEER}, {peer.variant()}, at {seconds:g} CPU s, with the trial, less the reference's noise"
-        mean = f"{note}, geometric mean of {known}{CHOSEN_WAYS}"
-        targets.insert(0, Target("P17", geometric_mean(ratios), 0.08, "", False, mean))
-        targets.insert(
-            1,
-            Target(
-                "P17", max(r for r in ratios if math.isfinite(r)), 0.3, "", False, f"{note}, worst scene{CHOSEN_WAYS}"
-            ),
-        )
+    known = [ratio for ratio in ratios if math.isfinite(ratio)]
+    if known:
+        targets = [
+            *over_peer(known, seconds, f"{len(known)} scenes, less the references' noise", CHOSEN_WAYS),
+            *targets,
+        ]
     columns = ["scene", "chosen", "trial / near", "relMSE / 5 %", "expected / median", "estimated / 95 %"]
     columns += ["default / passes", "over default / covered", "over Mitsuba", "reference's noise"]
     notes = [

@@ -45,7 +45,7 @@ CHOSEN = (
     "staircase, what fewer photons have to promise with a living room, a staircase, Veach's room and three boxes, and "
     "how far look-ups near edges are trusted with the living room"
 )
-"""CORNERS, CACHE_CORNERS, LESS_BIAS, MORE_COST and `overlooked` of `pmviewer.engine.auto.candidates`,
+"""CORNERS, CACHE_CORNERS, LESS_BIAS, MORE_COST, RECORDS and EDGES of `pmviewer.engine.auto.candidates`,
 `pmviewer.render.direct.by_lobes`, HIDDEN of `pmviewer.engine.auto.widths`, `pmviewer.render.adaptive`, GATHERED_ORDER
 and STEADY of `pmviewer.engine.auto.bias`, the powers of `pmviewer.engine.auto.model` and `measured`, HELD and MOST of
 `pmviewer.engine.auto.sparse`, and FEWER_PHOTONS of `pmviewer.engine.auto.choose`, said in the targets' own lines."""
@@ -55,6 +55,15 @@ def error_against(image: NDArray[Any], references: NDArray[np.float64]) -> float
     """relMSE of an image (h, w, 3) against two references (2, h, w, 3), whose noise is no part of it."""
     a, b = references
     return float(((image - a) * (image - b) / (references.mean(axis=0) ** 2 + EPSILON)).mean())
+
+
+def over_peer(ratios: list[float], seconds: float, of: str, chosen: str) -> list[Target]:
+    """P17 of errors over Mitsuba's, of what they are, and what was chosen with them."""
+    note = f"relMSE over {PEER}, {peer.variant()}, at {seconds:g} CPU s, the trial counted{chosen}"
+    return [
+        Target("P17", geometric_mean(ratios), 0.08, "", False, f"{note}, geometric mean of {of}"),
+        Target("P17", max(ratios, default=float("nan")), 0.3, "", False, f"{note}, worst of {of}"),
+    ]
 
 
 def _on_file(path: Path, name: str, seconds: float, pool: WorkPool) -> tuple[list[str | float | int], float]:
@@ -105,9 +114,5 @@ def on_files(folder: Path, seconds: float, count: int | None, seed: int) -> Benc
             ratios.append(ratio)
     finally:
         pool.close()
-    note = f"relMSE over {PEER}, {variant}, at {seconds:g} CPU s, the trial counted{CHOSEN}"
-    targets = [
-        Target("P17", geometric_mean(ratios), 0.08, "", False, f"{note}, geometric mean of {len(ratios)} files"),
-        Target("P17", max(ratios, default=float("nan")), 0.3, "", False, f"{note}, worst file"),
-    ]
+    targets = over_peer(ratios, seconds, f"{len(ratios)} files", CHOSEN)
     return BenchResult(f"Automatic mode on {len(rows)} files", COLUMNS, rows, targets, notes)

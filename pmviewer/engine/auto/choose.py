@@ -11,7 +11,8 @@ from pmviewer.engine.auto.bias import Bias, way_of
 from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, Candidate, assignments, candidates
 from pmviewer.engine.auto.measured import Measured, Numbers, Trial, Widths
 from pmviewer.engine.auto.model import BETTER, FEWEST, Option, bias_of, in_time, numbers_for, to_error
-from pmviewer.engine.auto.runs import LEAST, TooDearError
+from pmviewer.engine.auto.runs import TooDearError
+from pmviewer.engine.auto.size import planned
 from pmviewer.engine.auto.trial import Tell, trial
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
@@ -31,17 +32,10 @@ NEARLY = 1.1
 FEWER_PHOTONS = 1.15
 """What an error promised by fewer photons than the default number counts as: a trial does not meet the bright ones that
 few pixels meet. With `NEARLY` they have to promise a fifth less. (A living room with N = 50,000: 1.8 times the error of
-150,000, seven seeds, where trials promised less.)"""
-PER_PHOTON, PER_PIXEL = 1.5e-6, 6e-6
-"""CPU seconds of a trial by trajectory and by pixel and candidate: what its size is planned by, clock or no clock."""
-OF_OTHERS = 10
-"""Pictures that are rendered with other radii of shown maps, and with more light samples. The two of a gather with a
-wider radius are not counted: with them a trial of four ways would not fit into four seconds (`LEAST`)."""
+150,000, four seeds, where trials promised less.)"""
 ADAPTIVE = {"render.adaptive": "on"}
 ADAPTED = f"from pass {DECIDED_AFTER + 1} on pixels with noise of their own get more samples (render.adaptive)"
 _DEFAULT = Numbers(SETTINGS["photons.N"].default)
-LARGEST, FEWEST_PHOTONS = 160, 20_000
-"""Side of the trial's picture in pixels, at most, and N, at least."""
 
 
 @dataclass(frozen=True)
@@ -82,15 +76,13 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     found, left_out = candidates(opened.traits, base, seconds, goal.apart)
     said = [f"not tried: {what}, {why}" for what, why in left_out]
     camera = resolve_camera(opened.scene, base.camera)
-    planned = _size(SHARE * seconds, len(found), camera.width, camera.height)
-    if planned is None or len(found) == 1:
+    size = planned(SHARE * seconds, len(found), camera.width, camera.height)
+    if size is None or len(found) == 1:
         why = "nothing else suits the scene" if len(found) == 1 else f"{seconds:.3g} CPU s are too few for a trial"
         return _by_traits(opened, base, found, why, said)
-    (width, height), N = planned
-    few = with_values(base, {"photons.N": N})
+    few, most = with_values(base, {"photons.N": size.N}), MOST_SHARE * seconds
     try:
-        size, most = (width, height), MOST_SHARE * seconds
-        tried = trial(opened, few, found, pool, size, SHARE * seconds, tell, most, seconds)
+        tried = trial(opened, few, found, pool, size[:2], SHARE * seconds, tell, most, seconds)
     except TooDearError as dear:
         why = f"a trial would take {dear.expected:.2g} CPU s, too much of {seconds:.3g}"
         return replace(_by_traits(opened, base, found, why, said), trial=dear.begun)
@@ -126,21 +118,6 @@ def _by_traits(opened: OpenScene, base: Settings, found: list[Candidate], why: s
     suits = CACHE if plain and not traits.glossy_roughness else PROGRESSIVE
     way = next(candidate for candidate in found if candidate.is_like(suits))
     return Choice(way.name, assignments(way.values), math.nan, 0.0, (f"{way.name}: {why}", *way.said, *said))
-
-
-def _size(budget: float, count: int, width: int, height: int) -> tuple[tuple[int, int], int] | None:
-    """Size of the trial's picture, and N, for that many CPU seconds and candidates; None where they are too few."""
-    default = int(SETTINGS["photons.N"].default)
-    N = min(default, int(0.35 * budget / PER_PHOTON / 2))
-    if N < FEWEST_PHOTONS:
-        return None
-    pixels = 0.65 * budget / (PER_PIXEL * (count * 4 + OF_OTHERS))
-    if pixels < LEAST**2:
-        return None
-    shrink = math.sqrt(min(pixels, LARGEST**2) / (width * height))
-    if shrink >= 1:
-        return (width, height), N
-    return (max(round(width * shrink), 1), max(round(height * shrink), 1)), N
 
 
 def _by_time(tried: Trial, seconds: float) -> Option:

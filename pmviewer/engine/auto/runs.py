@@ -11,6 +11,7 @@ import numpy as np
 from pmviewer.engine.auto.candidates import GATHER, Candidate, assignments
 from pmviewer.engine.auto.measured import Trial, Widths
 from pmviewer.engine.auto.relative import F8
+from pmviewer.engine.auto.size import FEWEST_PHOTONS, OF_DEAREST, PROBED, Size, fitted
 from pmviewer.engine.auto.sparse import wider_by, with_wider
 from pmviewer.engine.auto.widths import WIDER
 from pmviewer.engine.method import Plan, plan_of
@@ -28,13 +29,6 @@ FEWER = 4
 """Photons of the larger trial pass over those of the smaller one."""
 MORE = 4
 """Light samples of the passes that tell what these do, over the usual number."""
-PROBED, PROBED_PHOTONS = 1024, 20_000
-"""Pixels and photons of the picture that tells what a trial costs."""
-OF_DEAREST = 0.8
-"""What a pixel of a trial's pictures costs in the mean, over one of a way that gathers (0.74 to 1.0 in nine scenes; 1.4
-and 1.9 in two where it costs so little that no trial is made smaller)."""
-LEAST = 40
-"""Side of a trial's picture in pixels, at least."""
 SEEDS = ((7_919, 104_729), (1_299_709, 15_485_863), (32_452_843, 49_979_687))
 """Added to the picture's seed; the second pair where a trial that is twice as long still fits, and so on."""
 SAMPLED = ("direct", "specular")
@@ -108,7 +102,7 @@ class Trier:
     ) -> None:
         self._opened, self._settings, self._pool = opened, settings, pool
         self._full = resolve_camera(opened.scene, settings.camera)
-        self._size = size
+        self._size = Size(*size, settings.photons.N)
         self.kept = noise_share(filter_of(self._full.filter, settings.render))
         """Share of the variance of a pixel's samples that is left where pixels share them, which those of a trial are
         too far apart for."""
@@ -120,7 +114,7 @@ class Trier:
     @property
     def pixels(self) -> int:
         """Of each picture."""
-        return self._size[0] * self._size[1]
+        return self._size.pixels
 
     @property
     def scale(self) -> float:
@@ -129,37 +123,28 @@ class Trier:
 
     @property
     def _side(self) -> float:
-        return self._size[0] / self._full.width
+        return self._size.width / self._full.width
 
     def fit(self, candidates: list[Candidate], seconds: float) -> None:
-        """Fewer pixels and photons, if either would cost more than so many CPU seconds: in a hall full of gloss and
-        textures a pixel costs three times what trials are planned by. A small picture tells, of a way that gathers."""
+        """Fewer pixels and photons, if either would cost more than so many CPU seconds. A small picture tells, by a way
+        that gathers, whose pixels cost most."""
         candidate = next((c for c in candidates if c.gathers), candidates[0])
-        pixels, N = min(PROBED, self.pixels), min(PROBED_PHOTONS, self._settings.photons.N)
-        found = self._probed(self.planned(candidate).runs[0].settings, math.sqrt(pixels / self.pixels), N)
-        pictures = len(SEEDS[0]) * sum(len(self.planned(c).every) for c in candidates)
-        pixel = OF_DEAREST * found.get("camera pass", 0.0) / pixels * pictures
-        trajectory = found.get("light pass", 0.0) / N * len(SEEDS[0]) * (1 + 1 / FEWER)
-        self._shrink(math.sqrt(max(min(seconds / (pixel * self.pixels), 1.0), LEAST**2 / self.pixels)) if pixel else 1)
-        if trajectory > 0:
-            N = max(min(self._settings.photons.N, int(seconds / trajectory)), N)
-            self._settings = with_values(self._settings, {"photons.N": N})
-
-    def _shrink(self, by: float) -> None:
-        self._size = _times(self._size, min(by, 1.0))
-
-    def _probed(self, settings: Settings, by: float, N: int) -> dict[str, float]:
-        """CPU seconds by stage of a picture that is smaller by that, with N photons."""
-        width, height = _times(self._size, by)
-        values = {"camera.width": width, "camera.height": height, "photons.N": N}
-        renderer = Renderer(self._opened, with_values(settings, values), self._pool, self._store)
-        renderer.camera = replace(renderer.camera, pixel_side=min(width / self._full.width, 1.0))
+        probe = self._size.smaller(PROBED, FEWEST_PHOTONS)
+        values = {"camera.width": probe.width, "camera.height": probe.height, "photons.N": probe.N}
+        renderer = Renderer(
+            self._opened, with_values(self.planned(candidate).runs[0].settings, values), self._pool, self._store
+        )
+        renderer.camera = replace(renderer.camera, pixel_side=min(probe.width / self._full.width, 1.0))
         renderer.step()
-        return renderer.tally.stage_seconds
+        stages, seeds = renderer.tally.stage_seconds, len(SEEDS[0])
+        pictures = seeds * sum(len(self.planned(c).every) for c in candidates)
+        per_pixel = OF_DEAREST * stages.get("camera pass", 0.0) / probe.pixels * pictures
+        per_trajectory = stages.get("light pass", 0.0) / probe.N * seeds * (1 + 1 / FEWER)
+        self._size = fitted(self._size, per_pixel, per_trajectory, seconds)
 
     def settings_of(self, candidate: Candidate) -> Settings:
         """Of the whole picture by that candidate, with the N of the larger passes."""
-        return with_values(self._settings, assignments(candidate.values) | {"photons.N": self._settings.photons.N})
+        return with_values(self._settings, assignments(candidate.values) | {"photons.N": self._size.N})
 
     def spread(self, candidates: list[Candidate], seconds: float = 0.0) -> list[Candidate]:
         """The candidates, with wider look-ups where gather rays end if photons lie far apart for a picture of so many
@@ -190,8 +175,8 @@ class Trier:
         small = with_values(
             chosen,
             {
-                "camera.width": self._size[0],
-                "camera.height": self._size[1],
+                "camera.width": self._size.width,
+                "camera.height": self._size.height,
                 "estimate.radius": radius,
                 "gather.cache_min": max(chosen.gather.cache_min * self._side, 0.1),
                 "gather.cache_max": max(chosen.gather.cache_max * self._side, 1.0),
@@ -257,10 +242,6 @@ class Trier:
 
 def _seed(settings: Settings, added: int) -> int:
     return (settings.render.seed + added) % 2**31
-
-
-def _times(size: tuple[int, int], by: float) -> tuple[int, int]:
-    return max(round(size[0] * by), 1), max(round(size[1] * by), 1)
 
 
 def _either(name: str) -> list[Widths]:

@@ -20,7 +20,7 @@ import numpy as np
 
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.lights.distant import behind_scene, outside
-from pmviewer.kernels.lights.sky_cells import cell_between, cells_between, row_of_cells
+from pmviewer.kernels.lights.sky_cells import cell_of
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.scene import L_A, L_AREA, L_B, L_C, light_number, light_vector, load3
 from pmviewer.kernels.vector import along, dot, luminance, scale
@@ -157,17 +157,9 @@ def _around(turn):
 
 
 @device
-def _picked(scene, light, u, v):
-    """A unit direction away from the scene with the density of the image's luminance, and the radiance from there."""
-    row, u = row_of_cells(scene, u)
-    low, high = cells_between(scene, row, v)
-    column, v = cell_between(scene, row, low, high, v)
-    return _in_cell(scene, light, row, column, u, v)
-
-
-@device
 def _in_cell(scene, light, row, column, u, v):
-    """The same of a cell, by two numbers of [0, 1) within it."""
+    """A unit direction away from the scene, by two numbers of [0, 1) within a cell, with the density of the image's
+    luminance there, and the radiance from there."""
     width, rows = scene.sky_width, scene.sky_height - 1
     following = column + 1
     if following == width:
@@ -232,8 +224,8 @@ def cell_of_square(scene, light, d, n):
 @device
 def sample_image(scene, light, x, u, v):
     """As `pmviewer.kernels.lights.light.sample_one_light`."""
-    wi, L = _picked(scene, light, u, v)
-    return wi, outside(scene, x, wi), L, image_pdf(scene, light, L), True
+    row, column, u, v = cell_of(scene, u, v)
+    return sample_cell(scene, light, x, row, column, u, v)
 
 
 @device
@@ -247,7 +239,8 @@ def sample_cell(scene, light, x, row, column, u, v):
 @device
 def emit_image(scene, light, position, direction):
     """Origin, unit direction and power (luminance 1) of a photon: direction by the image, origin on a disc."""
-    wi, L = _picked(scene, light, direction[0], direction[1])
+    row, column, u, v = cell_of(scene, direction[0], direction[1])
+    wi, L = _in_cell(scene, light, row, column, u, v)
     d = scale(wi, _f4(-1.0))
     Y = luminance(L)
     inv = _f4(0.0)

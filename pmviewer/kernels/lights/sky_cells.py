@@ -57,3 +57,12 @@ def cell_between(scene, row, low, high, v):
     prefetch(scene.sky_texels, (first + scene.sky_width + column) * _i8(3))
     below = _f4(0.0) if column == 0 else load_f4(scene.sky_cells, first + column - 1)
     return column, (v - below) / (load_f4(scene.sky_cells, first + column) - below)
+
+
+@device
+def cell_of(scene, u, v):
+    """Row and column of the cell that u and v fall to, and both stretched to [0, 1) within it: all steps of one."""
+    row, u = row_of_cells(scene, u)
+    low, high = cells_between(scene, row, v)
+    column, v = cell_between(scene, row, low, high, v)
+    return row, column, u, v
