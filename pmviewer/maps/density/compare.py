@@ -35,8 +35,6 @@ FEWEST = 3
 """Photons that look for neighbours together at least."""
 ALIKE = np.float32(8.0)
 """Their searches differ in area by no more than this."""
-UNDECIDED = np.int32(-1)
-"""In place of the number of those who share a photon's power."""
 
 _f4 = np.float32
 _i4 = np.int32
@@ -56,9 +54,9 @@ class Placed(NamedTuple):
 
 @kernel
 def compare(trees, control, placed, starts, rows, g0, g1, candidates, counts, neighbours):
-    """The photons of groups g0 … g1−1 against the tree as it is: counts[i] neighbours that share the power of photon i,
-    which is not stored, or UNDECIDED. starts: of `Groups`; rows: address of the stored rows; candidates: that of
-    AMONG_WORDS of scratch."""
+    """The photons of groups g0 … g1−1 against the tree as it is: counts[j] of neighbours[j] share the power of photon j
+    of `placed`, which is not stored; none where this is still open. starts: of `Groups`; rows: address of the stored
+    rows; candidates: that of AMONG_WORDS of scratch."""
     tree, order = trees[0], placed.order
     scratch = SearchScratch(stack_i4(KEYS), stack_i4(WAITING), stack_i4(4), stack_i4(4), stack_i4(8))
     leaves, stack, box = stack_i4(MOST_LEAVES), stack_i4(NODES), stack_i4(BOX)
@@ -78,16 +76,16 @@ def compare(trees, control, placed, starts, rows, g0, g1, candidates, counts, ne
                     blocks = collected(tree, leaves, count, box, n, ceiling, control.limits, candidates)
             for at in range(rest, left):
                 j = first + _i8(stack_get_i4(some, at))
-                p, need, i = place(placed, j), placed.needs[j], _i8(order[j])
+                p, need, index = place(placed, j), placed.needs[j], _i8(placed.first) + _i8(order[j])
                 r2 = stack_get_f4(far, j - first)
                 if blocks >= 0:
                     count, r2 = search_among(candidates, blocks, p, n, need, control.limits, r2, scratch)
                 else:
                     count, r2 = search(tree, p, n, need, control.limits, r2, scratch)
-                count = sharing(control, n, need, _i8(placed.first) + i, rows, count, r2, scratch)
-                counts[i] = _i4(count) if count > 0 else UNDECIDED
+                count = sharing(control, n, need, index, rows, count, r2, scratch)
+                counts[j] = _i4(count)
                 for k in range(count):
-                    neighbours[i, k] = _i4(stack_get_i8(scratch.keys, k) & _i8(0xFFFFFFFF))
+                    neighbours[j, k] = _i4(stack_get_i8(scratch.keys, k) & _i8(0xFFFFFFFF))
             left = rest
 
 

@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.memory import aligned_empty, stack_get_i8, stack_i4
 from pmviewer.kernels.vector import normalize
-from pmviewer.maps.density.compare import UNDECIDED, Placed, compare, place
+from pmviewer.maps.density.compare import Placed, compare, place
 from pmviewer.maps.density.decide import Control, farthest, sharing
 from pmviewer.maps.density.groups import Groups, groups_of
 from pmviewer.maps.density.growing_tree import (
@@ -52,7 +52,7 @@ from pmviewer.maps.density.growing_tree import (
     reserved,
     search,
 )
-from pmviewer.maps.density.shares import ROW, add_share
+from pmviewer.maps.density.shares import ROW, add_share, hand_out
 from pmviewer.maps.density.together import AMONG_WORDS
 from pmviewer.maps.photon_words import decode_direction, decode_powers
 from pmviewer.tasks import Runner
@@ -112,44 +112,38 @@ class Stored(NamedTuple):
 
 
 @kernel
-def _settle(trees, control, arrivals, stored, rows, counts, neighbours, kept):
-    """Decide the photons that `compare` left open, in order, and hand out the power of the others.
+def _settle(trees, control, arrivals, stored, rows, undecided, kept):
+    """Decide the photons that `compare` left open, in order, and hand out the power of those that are not stored.
 
-    stored: a `Stored`, filled, whose rows are at the address `rows`; kept: bool, receives which of these are stored.
-    Returns how many were rejected.
+    stored: a `Stored`, filled, whose rows are at the address `rows`; undecided, kept: (n,) bool, the latter receives
+    which of these are stored.
     """
     tree, words, size, powers = trees[0], arrivals.words, stored.size, stored.powers
     sums = powers.ctypes.data
     scratch = SearchScratch(stack_i4(KEYS), stack_i4(WAITING), stack_i4(4), stack_i4(4), stack_i4(8))
     leaf_scratch = stack_i4(LEAF_WORDS), stack_i4(CAPACITY)
-    rejected = _i8(0)
     for i in range(len(words)):
+        if not undecided[i]:
+            continue
+        p, need, index = place(arrivals, i), arrivals.needs[i], _i8(arrivals.first) + i
+        n, r2 = normalize(decode_direction(arrivals.normals[i])), farthest(control, need, index)
+        count, r2 = search(tree, p, n, need, control.limits, r2, scratch)
+        count = sharing(control, n, need, index, rows, count, r2, scratch)
         red, green, blue = decode_powers(words[i, 4], words[i, 5])
-        count = _i8(counts[i])
-        if count == UNDECIDED:
-            p, need, index = place(arrivals, i), arrivals.needs[i], _i8(arrivals.first) + i
-            n, r2 = normalize(decode_direction(arrivals.normals[i])), farthest(control, need, index)
-            count, r2 = search(tree, p, n, need, control.limits, r2, scratch)
-            count = sharing(control, n, need, index, rows, count, r2, scratch)
-            if count == 0:
-                new = size[2]
-                for w in range(6):
-                    stored.rows[new, w] = words[i, w]
-                stored.needs[new] = need
-                powers[new, 0], powers[new, 1], powers[new, 2] = _f8(red), _f8(green), _f8(blue)
-                insert(tree, size, p, need, words[i, 3], _i4(new), leaf_scratch)
-                size[2] += 1
-                kept[i] = True
-                continue
-            for j in range(count):
-                neighbours[i, j] = _i4(stack_get_i8(scratch.keys, j) & _i8(0xFFFFFFFF))
-        kept[i] = False
-        rejected += 1
+        if count == 0:
+            new = size[2]
+            for w in range(6):
+                stored.rows[new, w] = words[i, w]
+            stored.needs[new] = need
+            powers[new, 0], powers[new, 1], powers[new, 2] = _f8(red), _f8(green), _f8(blue)
+            insert(tree, size, p, need, words[i, 3], _i4(new), leaf_scratch)
+            size[2] += 1
+            kept[i] = True
+            continue
         share = _f8(1.0) / _f8(count)
         r, g, b = _f8(red) * share, _f8(green) * share, _f8(blue) * share
         for j in range(count):
-            add_share(sums, _i8(neighbours[i, j]), r, g, b)
-    return rejected
+            add_share(sums, stack_get_i8(scratch.keys, j) & _i8(0xFFFFFFFF), r, g, b)
 
 
 def needs_of(required: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -217,30 +211,23 @@ class DensityControl:
         arrivals = Arrivals(photons, photons.view(np.uint32), normals, needs_of(required), np.int64(self.arrived))
         tree = self._reserve(self.stored + n)
         rows = self._rows.ctypes.data
-        counts, neighbours = np.full(n, UNDECIDED, np.int32), np.empty((n, M), np.int32)
-
+        undecided = np.ones(n, bool)
         if self.stored:
-            groups = groups or self.groups(photons, normals, run)
-            self._compared(tree, arrivals, groups, counts, neighbours, run)
+            self._compare(arrivals, groups or self.groups(photons, normals, run), undecided, run)
         before, stored = self.stored, Stored(self._rows, self._needs, self._powers, self.size)
-        rejected = run([lambda: _settle(tree.record, self.control, arrivals, stored, rows, counts, neighbours, kept)])
-        self.redistributed += rejected[0]
+        run([lambda: _settle(tree.record, self.control, arrivals, stored, rows, undecided, kept)])
         self.arrived += n
         self._normals.append(normals[kept])
-        assert self.stored - before == int(kept.sum())
+        assert self.stored - before == np.count_nonzero(kept)
+        self.redistributed += n - (self.stored - before)
 
-    def _compared(
-        self,
-        tree: GrowingTree,
-        arrivals: Arrivals,
-        groups: Groups,
-        counts: NDArray[np.int32],
-        neighbours: NDArray[np.int32],
-        run: Runner,
-    ) -> None:
-        """Compare a round's photons with what was stored before it."""
-        rows, order = self._rows.ctypes.data, groups.order
+    def _compare(self, arrivals: Arrivals, groups: Groups, undecided: NDArray[np.bool_], run: Runner) -> None:
+        """Compare a round's photons with what was stored before it; false in `undecided` (n,) for those that are not
+        stored, whose power their neighbours get: of near photons these are the same."""
+        tree, order = self._reserve(self.stored), groups.order
+        rows, n = self._rows.ctypes.data, len(order)
         placed = Placed(order, groups.photons, groups.normals, arrivals.needs[order], arrivals.first)
+        counts, neighbours = np.empty(n, np.int32), np.empty((n, M), np.int32)
 
         def some(g0: int, g1: int) -> None:
             candidates = aligned_empty((AMONG_WORDS,), np.float32)
@@ -248,6 +235,8 @@ class DensityControl:
             compare(tree.record, self.control, placed, groups.starts, rows, g0, g1, at, counts, neighbours)
 
         run([partial(some, *part) for part in groups.parts(CHUNK)])
+        run([lambda: hand_out(groups.photons.view(np.uint32), counts, neighbours, self._powers)])
+        undecided[order] = counts == 0
 
     def result(self) -> Controlled:
         """The map as it stands; the arrays are this object's own."""

@@ -7,11 +7,15 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 
+from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.memory import at_address, with_twin
+from pmviewer.maps.photon_words import decode_powers
 
 ROW = 4
 """float64 elements of a row."""
 _ROW_BYTES = 8 * ROW
+_f8 = np.float64
+_i8 = np.int64
 _F64 = ir.DoubleType()
 _VECTOR = ir.VectorType(_F64, ROW)
 
@@ -39,3 +43,17 @@ def add_share(typingctx, address, row, red, green, blue):
         return context.get_dummy_value()
 
     return signature, codegen
+
+
+@kernel
+def hand_out(words, counts, neighbours, powers):
+    """The powers of photons (n, 6) uint32 `words` to equal parts to the first counts[j] of neighbours[j], (n, k) int32
+    numbers of rows of powers (m, ROW) float64; photons without any keep theirs."""
+    sums = powers.ctypes.data
+    for j in range(len(counts)):
+        if counts[j] > 0:
+            red, green, blue = decode_powers(words[j, 4], words[j, 5])
+            share = _f8(1.0) / _f8(counts[j])
+            r, g, b = _f8(red) * share, _f8(green) * share, _f8(blue) * share
+            for k in range(counts[j]):
+                add_share(sums, _i8(neighbours[j, k]), r, g, b)

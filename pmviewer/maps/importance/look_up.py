@@ -9,7 +9,7 @@ import numpy as np
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.compile.specialise import absent, specialised
 from pmviewer.kernels.memory import load_f4, stack_get_i8, stack_i4
-from pmviewer.maps.importance.nearest_one import nearest_one
+from pmviewer.maps.importance.nearest_one import ROOT, nearest_one
 from pmviewer.maps.search.disc import Facing
 from pmviewer.maps.search.k_nearest import KEYS, nearest
 from pmviewer.maps.search.stored import ALL_CLASSES
@@ -39,7 +39,7 @@ def importance_at(importance, p, n):
         r, inf = importance.farthest, _f4(np.inf)
         if importance.n == 0 or not abs(p[0]) + abs(p[1]) + abs(p[2]) < inf:
             return _f4(0.0)
-        i, d2, _ = nearest_one(importance, p, n, STEEPNESS, _i8(-1), r * r, inf)
+        i, d2, _, _ = nearest_one(importance, p, n, STEEPNESS, ROOT, _i8(-1), r * r, inf)
         if i < 0:
             return _f4(0.0)
         reach = load_f4(importance.reach, i)
