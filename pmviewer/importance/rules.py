@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.maps.density.growing_tree import M
-from pmviewer.maps.importance.facets import Facets, facets_of, importances_on, sums_on
+from pmviewer.maps.importance.facets import Facets, facets_of, sums_on
 from pmviewer.maps.importance.importance_map import ImportanceMap, required_density
 from pmviewer.maps.importance.look_up import importance_sums
 from pmviewer.maps.importance.nearest_of_all import nearest_importances, node_boxes
+from pmviewer.maps.importance.together import importances_on
 from pmviewer.maps.record import decode_directions
 
 Float = NDArray[np.float32]

@@ -5,10 +5,11 @@ import pytest
 
 from pmviewer.importance.rules import important_weight, probability_of
 from pmviewer.maps.importance.build import build_importance
-from pmviewer.maps.importance.facets import MOST, facets_of, importances_on
+from pmviewer.maps.importance.facets import MOST, facets_of
 from pmviewer.maps.importance.importance_map import Importons
 from pmviewer.maps.importance.look_up import FLATNESS
 from pmviewer.maps.importance.nearest_of_all import nearest_importances, node_boxes
+from pmviewer.maps.importance.together import importances_on
 from pmviewer.maps.record import decode_directions
 from tests.maps.test_importance import EAST, UP, _codes, importons
 

@@ -26,8 +26,25 @@ _i8 = np.int64
 
 
 @kernel
-def leaves_at(trees, photons, leaves, i0, i1):
-    """The numbers of the leaves that photons i0 … i1−1 of (n, 6) lie in, into leaves (n,) int32. Some descend side by
+def leaf_ranks(trees, ranks):
+    """Where each leaf comes, by number, if near ones follow one another: from left to right below each node."""
+    tree, stack = trees[0], np.empty(len(ranks) + 1, np.int32)
+    stack[0], waiting, rank = 0, _i8(1), _i4(0)
+    while waiting > 0:
+        waiting -= 1
+        at = tree.nodes + 4 * NODE_WORDS * _i8(stack[waiting])
+        child = load_i4(at, CHILD)
+        if load_i4(at, AXIS) >= 0:
+            stack[waiting], stack[waiting + 1] = child + _i4(1), child
+            waiting += 2
+        else:
+            ranks[child] = rank
+            rank += 1
+
+
+@kernel
+def leaves_at(trees, ranks, photons, leaves, i0, i1):
+    """The ranks of the leaves that photons i0 … i1−1 of (n, 6) lie in, into leaves (n,) int32. Some descend side by
     side: each step waits for its node, and that of the next photon need not wait for it."""
     tree, nodes = trees[0], stack_i4(ABREAST)
     for begin in range(i0, i1, ABREAST):
@@ -44,12 +61,12 @@ def leaves_at(trees, photons, leaves, i0, i1):
                     stack_put_i4(nodes, k, load_i4(at, CHILD) + side)
                     descending = True
         for k in range(some):
-            leaves[begin + k] = load_i4(tree.nodes, NODE_WORDS * _i8(stack_get_i4(nodes, k)) + CHILD)
+            leaves[begin + k] = ranks[load_i4(tree.nodes, NODE_WORDS * _i8(stack_get_i4(nodes, k)) + CHILD)]
 
 
 @kernel
 def sort_by_leaf(leaves, begins, order):
-    """Numbers of photons by their leaves (n,), in order, into order (n,) int32; those of leaf l are begins[l] …
+    """Numbers of photons by the ranks of their leaves (n,), in order, into order (n,) int32; those of rank l are begins[l] …
     begins[l + 1] − 1. begins: int64, zero, for all leaves and two more."""
     for i in range(len(leaves)):
         begins[_i8(leaves[i]) + 2] += 1
@@ -106,7 +123,9 @@ def groups_of(
     """Of photons (n, 6) with normal codes (n,) in a tree of so many leaves, found in tasks of `size`."""
     n = len(photons)
     of_leaf, begins, order = np.empty(n, np.int32), np.zeros(leaves + 2, np.int64), np.empty(n, np.int32)
-    run([partial(leaves_at, tree.record, photons, of_leaf, i0, min(i0 + size, n)) for i0 in range(0, n, size)])
+    ranks = np.empty(leaves, np.int32)
+    leaf_ranks(tree.record, ranks)
+    run([partial(leaves_at, tree.record, ranks, photons, of_leaf, i0, min(i0 + size, n)) for i0 in range(0, n, size)])
     sort_by_leaf(of_leaf, begins, order)
     starts = np.empty(n + 1, np.int64)
     groups = sort_by_normal(begins, normals, order, starts)

@@ -18,19 +18,12 @@ from numpy.typing import NDArray
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import (
     load_f4,
-    stack_get_f4,
-    stack_get_i4,
     stack_get_i8,
     stack_i4,
-    stack_put_f4,
-    stack_put_i4,
 )
-from pmviewer.kernels.vector import normalize
 from pmviewer.maps.importance.importance_map import IMPORTON_DTYPE, ImportanceMap
 from pmviewer.maps.importance.look_up import STEEPNESS
-from pmviewer.maps.importance.nearest_one import ROOT, nearest_one, squared_distance
 from pmviewer.maps.importance.reached import BOXES, ReachedBoxes, reached_boxes
-from pmviewer.maps.photon_words import decode_direction
 from pmviewer.maps.search.disc import Facing
 from pmviewer.maps.search.k_nearest import KEYS, nearest
 from pmviewer.maps.search.kdtree import RECORD, PhotonKdTree, build_kdtree
@@ -50,7 +43,6 @@ SIMILAR = np.pi / 3
 ROUNDING = 0.01
 """Radians by which codes of directions, and rounding, may turn a normal."""
 AXIS, COSINE, MIDDLE, HALF, LOW, EDGE = 0, 3, 4, 7, 10, 13
-WIDE = np.float32(10)
 SHAPE_WORDS = 14
 """A facet's shape, float64: middle of its cone of normals, cosine to it below which it does not count; middle and half
 of the edges of its box; where its reached boxes begin, and the inverse of their edge."""
@@ -136,14 +128,14 @@ def _shape(positions: Float, normals: Float, boxes: ReachedBoxes) -> NDArray[np.
 
 
 @device
-def _faces(shapes, g, n):
+def faces(shapes, g, n):
     """Whether importons of facet g may count at places with unit normal n."""
     cosine = shapes[g, AXIS] * _f8(n[0]) + shapes[g, AXIS + 1] * _f8(n[1]) + shapes[g, AXIS + 2] * _f8(n[2])
     return cosine >= shapes[g, COSINE]
 
 
 @device
-def _farness(shapes, g, p, n):
+def farness(shapes, g, p, n):
     """No importon of facet g counts at p, with unit normal n, as nearer than the square root of this."""
     d2, h, thickness = _f8(0.0), _f8(0.0), _f8(0.0)
     for a in range(3):
@@ -157,7 +149,7 @@ def _farness(shapes, g, p, n):
 
 
 @device
-def _reached(shapes, boxes, reached, g, p):
+def reached_at(shapes, boxes, reached, g, p):
     """How far the importons of facet g reach that touch p's box, 0 where none does."""
     at = _i8(0)
     for a in range(3):
@@ -166,85 +158,6 @@ def _reached(shapes, boxes, reached, g, p):
             return _f4(0.0)
         at = at * boxes[g, a] + _i8(x)
     return reached[boxes[g, 3] + at]
-
-
-@device
-def _way2(p, q, n):
-    """Squared distance between two places as that of an importon counts at either, n being the unit normal there."""
-    dx, dy, dz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
-    h = n[0] * dx + n[1] * dy + n[2] * dz
-    return max(dx * dx + dy * dy + dz * dz, STEEPNESS * h * h)
-
-
-@kernel
-def importances_on(maps, shapes, boxes, reached, points, codes, out, i0, i1):
-    """Γ at points[i0:i1] (m, 3) float32 with normal codes (m,) uint32, into out (m,) float32, as `importance_at` has
-    it. Places that are near the one before and have its normal cost least: the same importons are near.
-
-    The facets that face a place are weighed at some places only, the `hubs`. Distances obey the triangle inequality:
-    with the importon that was found there r away, the one of a place within ρ of it lies on a facet that is no farther
-    from the hub than r + 2ρ.
-    """
-    facing, farness, latest, zero = stack_i4(MOST), stack_i4(MOST), stack_i4(MOST), _f4(0.0)
-    around, leaf = stack_i4(MOST), stack_i4(MOST)
-    for facet in range(len(maps)):
-        stack_put_i4(latest, facet, _i4(0))
-        stack_put_i4(leaf, facet, _i4(ROOT))
-    count, near, n, hub, within2 = _i8(0), _i8(0), (zero, zero, zero), (zero, zero, zero), _f4(-1.0)
-    for i in range(i0, i1):
-        p = (points[i, 0], points[i, 1], points[i, 2])
-        if i == i0 or codes[i] != codes[i - 1]:
-            count, n, within2 = _i8(0), normalize(decode_direction(codes[i])), _f4(-1.0)
-            for facet in range(len(maps)):
-                stack_put_i4(facing, count, _i4(facet))
-                count += _i8(_faces(shapes, facet, n))
-        known = _way2(p, hub, n) <= within2
-        if not known:
-            near, least = _i8(0), _f4(np.inf)
-            for place in range(count):
-                g = _i8(stack_get_i4(facing, _i8(place)))
-                far = _farness(shapes, g, p, n)
-                stack_put_f4(farness, g, far)
-                stack_put_i4(around, near, _i4(g))
-                near += 1
-                if far < least:  # the one that p lies on comes first
-                    least = far
-                    stack_put_i4(around, near - 1, stack_get_i4(around, _i8(0)))
-                    stack_put_i4(around, _i8(0), _i4(g))
-        r2, e2, gamma, reach, found = zero, _f4(np.inf), zero, zero, False
-        for place in range(near):
-            within = _reached(shapes, boxes, reached, _i8(stack_get_i4(around, _i8(place))), p)
-            r2 = max(r2, within * within)
-        for place in range(near if r2 > zero else 0):
-            g, j = _i8(stack_get_i4(around, _i8(place))), _i8(-1)
-            if place > 0 and not (_farness(shapes, g, p, n) if known else stack_get_f4(farness, g)) < r2:
-                continue
-            before = _i8(stack_get_i4(latest, g))
-            d2, e = squared_distance(maps[g], before, p, n, STEEPNESS)
-            if d2 < r2 or (d2 == r2 and e < e2):
-                r2, e2, j = d2, e, before
-            start = _i8(stack_get_i4(leaf, g)) if j >= 0 else ROOT
-            j, r2, e2, of = nearest_one(maps[g], p, n, STEEPNESS, start, j, r2, e2)
-            if j >= 0:
-                found = True
-                gamma, reach = load_f4(maps[g].payload, 3 * j + 1), load_f4(maps[g].reach, j)
-                stack_put_i4(latest, g, _i4(j))
-                stack_put_i4(leaf, g, _i4(of))
-        out[i] = gamma if r2 <= reach * reach else zero
-        if not known:
-            within2 = _f4(-1.0)
-            if found:
-                hub, r, second = p, _f4(np.sqrt(r2)), _f4(np.inf)
-                for place in range(1, near):
-                    second = min(second, stack_get_f4(farness, _i8(stack_get_i4(around, _i8(place)))))
-                rho = max(WIDE * r, _f4(0.499) * (_f4(np.sqrt(second)) - r))
-                within2, most, kept = rho * rho, _f4(1.001) * (r + _f4(2.0) * rho), _i8(0)
-                for place in range(near):
-                    g = stack_get_i4(around, _i8(place))
-                    if stack_get_f4(farness, _i8(g)) < most * most:
-                        stack_put_i4(around, kept, g)
-                        kept += 1
-                near = kept
 
 
 @kernel
@@ -257,7 +170,7 @@ def sums_on(maps, shapes, points, normals, k, out, i0, i1):
         missing, total = _i8(k), _f8(0.0)
         for g in range(len(maps)):
             r2 = maps[g].sum_radius * maps[g].sum_radius
-            if missing > 0 and _faces(shapes, g, n) and _farness(shapes, g, p, n) < r2:
+            if missing > 0 and faces(shapes, g, n) and farness(shapes, g, p, n) < r2:
                 count, _ = nearest(maps[g], p, _i4(missing), r2, keys, Facing(n, STEEPNESS, _i4(ALL_CLASSES)))
                 for j in range(count):
                     total += _f8(load_f4(maps[g].weight, stack_get_i8(keys, j) & _i8(0xFFFFFFFF)))

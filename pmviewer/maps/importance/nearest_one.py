@@ -66,7 +66,7 @@ def nearest_one(tree, p, n, steepness, start, best, r2, e2):
             node = near
         j, end = (tree.n * (node - leaves)) >> tree.depth, (tree.n * (node - leaves + 1)) >> tree.depth
         while j < end:
-            mask = nearer8(tree.x + 4 * j, tree.y + 4 * j, tree.z + 4 * j, p, n, steepness, r2, squared)
+            mask = nearer8(tree.x + 4 * j, tree.y + 4 * j, tree.z + 4 * j, p, n, steepness, r2, e2, squared)
             if end - j < WIDTH:
                 mask &= _i4((1 << (end - j)) - 1)
             while mask != 0:

@@ -106,38 +106,38 @@ def within8(typingctx, x_address, y_address, z_address, x, y, z, r2, squared):
     return signature, codegen
 
 
-def _nearer8(x_address, y_address, z_address, p, n, steepness, r2, squared):
+def _nearer8(x_address, y_address, z_address, p, n, steepness, r2, e2, squared):
     d = offsets(x_address, y_address, z_address, *p)
     total, height = sum(a * a for a in d), sum(a * c for a, c in zip(d, n))
     counted = np.maximum(total, steepness * height * height)
     both = squared.view(np.float32)
     both[:WIDTH], both[WIDTH : 2 * WIDTH] = counted, total
-    return bits_of(counted <= r2)
+    return bits_of((counted < r2) | ((counted == r2) & (total < e2)))
 
 
 @with_twin(_nearer8)
-def nearer8(typingctx, x_address, y_address, z_address, p, n, steepness, r2, squared):
-    """Which of eight photons count as no farther than sqrt(r2) from a place with a normal, their heights over its plane
-    counting more than what is along it.
+def nearer8(typingctx, x_address, y_address, z_address, p, n, steepness, r2, e2, squared):
+    """Which of eight photons count as nearer than sqrt(r2) to a place with a normal, their heights over its plane
+    counting more than what is along it; or as that far, but nearer in space than sqrt(e2).
 
     Parameters
     ----------
     x_address, y_address, z_address: int64 addresses of the float32 coordinates.
     p, n: float32 triples, the place and the unit normal there.
     steepness: float32 weight of the squared height.
-    r2: float32.
+    r2, e2: float32.
     squared: pointer to 16 float32 of scratch that receive the squared distances by which they count, and those in
         space.
 
     Returns
     -------
-    int32 with bit j set when photon j is inside.
+    int32 with bit j set when photon j is nearer.
     """
     f, i8, triple = types.float32, types.int64, types.UniTuple(types.float32, 3)
-    signature = types.int32(i8, i8, i8, triple, triple, f, f, types.CPointer(types.int32))
+    signature = types.int32(i8, i8, i8, triple, triple, f, f, f, types.CPointer(types.int32))
 
     def codegen(context, builder, sig, args):
-        *addresses, p, n, steepness, limit, out = args
+        *addresses, p, n, steepness, limit, tie, out = args
         normal = [splat(builder, x) for x in cgutils.unpack_tuple(builder, n, 3)]
         d = [
             builder.fsub(load_eight(builder, address), splat(builder, coordinate), flags=FAST)
@@ -149,7 +149,10 @@ def nearer8(typingctx, x_address, y_address, z_address, p, n, steepness, r2, squ
         place = builder.bitcast(out, VECTOR.as_pointer())
         builder.store(counted, place).align = 4
         builder.store(total, builder.gep(place, [ir.Constant(I32, 1)])).align = 4
-        mask = builder.fcmp_ordered("<=", counted, splat(builder, limit))
+        limits = splat(builder, limit)
+        equal = builder.fcmp_ordered("==", counted, limits)
+        equal = builder.and_(equal, builder.fcmp_ordered("<", total, splat(builder, tie)))
+        mask = builder.or_(builder.fcmp_ordered("<", counted, limits), equal)
         return builder.zext(builder.bitcast(mask, I8), I32)
 
     return signature, codegen
