@@ -66,8 +66,8 @@ def leaves_at(trees, ranks, photons, leaves, i0, i1):
 
 @kernel
 def sort_by_leaf(leaves, begins, order):
-    """Numbers of photons by the ranks of their leaves (n,), in order, into order (n,) int32; those of rank l are begins[l] …
-    begins[l + 1] − 1. begins: int64, zero, for all leaves and two more."""
+    """Numbers of photons by the ranks of their leaves (n,), in order, into order (n,) int32; those of rank l are
+    begins[l] … begins[l + 1] − 1. begins: int64, zero, for all leaves and two more."""
     for i in range(len(leaves)):
         begins[_i8(leaves[i]) + 2] += 1
     for leaf in range(2, len(begins)):
